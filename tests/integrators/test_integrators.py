@@ -254,3 +254,70 @@ def test_bad_input(method, words):
 def test_methods_that_ignore_the_velocity_are_refused():
     with pytest.raises(ts.InvalidArgument, match="ignores the velocity"):
         ts.NystromTableau(a=((), (0,)), abar=((), (1 / 8,)), b=(0, 1), bbar=(0, 1 / 2), c=(0, 1 / 2), order=2)
+
+
+# orders that show late
+
+
+def explicit(a, b, c, order, **given):
+    """A class with a tableau; the last of the order is what it declares."""
+    tableau = ts.RungeKuttaTableau(a=a, b=b, c=c, order=order, **given)
+    return type("Method", (ts.ExplicitRungeKutta,), {"order": order, "tableau": tableau})
+
+
+TEXTBOOK = {
+    "Euler": (((),), (1.0,), (0.0,), 1),
+    "Heun": (((), (1.0,)), (0.5, 0.5), (0.0, 1.0), 2),
+    "midpoint": (((), (0.5,)), (0.0, 1.0), (0.0, 0.5), 2),
+    "Ralston": (((), (2 / 3,)), (0.25, 0.75), (0.0, 2 / 3), 2),
+    "Kutta": (((), (0.5,), (-1.0, 2.0)), (1 / 6, 2 / 3, 1 / 6), (0.0, 0.5, 1.0), 3),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TEXTBOOK)
+def test_textbook_methods_pass(name):
+    """Heun's order shows from 10,000 steps on, Euler's from 8,000 in an eighth of the span."""
+    findings = ts.testing.check_integrator(explicit(*TEXTBOOK[name]))
+    assert len(findings) == 6
+    assert all(abs(finding.order - TEXTBOOK[name][3]) < 0.7 for finding in findings)
+
+
+@pytest.mark.slow
+def test_an_adaptive_pair_of_low_order_passes():
+    pair = explicit(*TEXTBOOK["Heun"], error=(-0.5, 0.5, 0.0), embedded_order=1)
+    assert all(len(finding.errors) == 3 for finding in ts.testing.check_integrator(pair))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "b"),
+    [("Heun", (0.48, 0.52)), ("midpoint", (0.01, 0.99)), ("Ralston", (0.26, 0.74)), ("Kutta", (0.16, 0.68, 0.16))],
+)
+def test_wrong_weights_of_low_order_are_refused(name, b):
+    """They make a method of order one or two, which the tableau says and the class does not."""
+    a, _, c, order = TEXTBOOK[name]
+    wrong = explicit(a, b, c, 1 if order == 2 else 2)
+    wrong.order = order
+    fails(wrong, rf"observed order is \d\.\d\d, {order} is declared")
+
+
+@pytest.mark.parametrize(
+    ("check", "kind", "words"),
+    [
+        (
+            "check_primitive",
+            ts.forces.Spring,
+            r"Spring is a subclass of ts.Force: use ts.testing.check_force\(Spring\)",
+        ),
+        ("check_primitive", I.RK45, "check_integrator"),
+        ("check_primitive", lambda a, b: ts.forces.Spring(a, b, stiffness=1.0), "check_force"),
+        ("check_primitive", lambda a, b: 3, "makes a Primitive"),
+        ("check_force", ts.constraints.Distance, "check_primitive"),
+        ("check_force", ts.constraints.Revolute, "check_primitive"),
+        ("check_integrator", ts.forces.Spring, "check_force"),
+    ],
+)
+def test_what_another_check_is_for(check, kind, words):
+    with pytest.raises(ts.InvalidArgument, match=words):
+        getattr(ts.testing, check)(kind)

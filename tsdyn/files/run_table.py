@@ -59,8 +59,9 @@ def output_times(start, end, every):
     """Output times at an interval, with both ends; raises InvalidArgument."""
     if not every > 0.0 or (end - start) / every > MOST:
         raise InvalidArgument(f"every must be an interval in s, with at most {MOST} outputs in a run, got {every:g}.")
+    near = max(1e-9 * every, 4.0 * np.finfo(float).eps * max(abs(start), abs(end)))  # s: rounding of the times
     times = start + every * np.arange(math.floor((end - start) / every * (1.0 + 1e-12)) + 1)
-    return np.append(times[times < end - 1e-9 * every], end)
+    return np.append(times[times < end - near], end)
 
 
 def _method(value, path, mistakes, names):

@@ -1,12 +1,12 @@
 """Kinematic analysis: a configuration without freedom, followed from time to time."""
 
-import time
 from typing import NamedTuple
 
 import numpy as np
 
 from ..configuration.kinetic_metric import Metric
 from ..errors import InvalidArgument, Status
+from ..jit.compiled import clock
 from ..jit.kernels import resident
 from ..model import joint_motion
 from ..model.handles import handles_of
@@ -15,7 +15,7 @@ from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of
 from ..statics.moves import update_memory
 from .branch_steps import branch_of, follow
-from .tolerances import LEAST_STEPS, SHORTEST, SLICE
+from .tolerances import LEAST_STEPS, SEEN, SHORTEST, SLICE
 
 
 class Followed(NamedTuple):
@@ -52,10 +52,10 @@ def analyse(packed, t0, q, remembered, times, stops):
     way.t, way.size = t0, Metric(packed, None, t0).reach(q)
     span = float(np.ptp(np.append(times, t0)))
     way.longest = way.h = max(span / LEAST_STEPS, np.finfo(float).tiny)
-    way.least = SHORTEST * max(span, np.abs(times).max())
+    way.least = max(SHORTEST * span, SEEN * max(abs(t0), np.abs(times).max()))
     every, asked = _with_stops(t0, times, stops)
     out = np.zeros((every.size, 1 + 3 * q.size + remembered.size))
-    started, done, status = time.perf_counter(), 0, Status.SLICE_DONE
+    started, done, status = clock(), 0, Status.SLICE_DONE
     try:
         while status is Status.SLICE_DONE:
             done = follow(address, every, out.reshape(-1), done, _slice(q.size))
@@ -65,7 +65,7 @@ def analyse(packed, t0, q, remembered, times, stops):
     counters = branch.work.counters
     return Followed(
         status, out[:done][asked[:done]], way.t, branch.now.copy(), branch.remembered.copy(), way.steps, way.rejected,
-        counters.newton, counters.factorizations, time.perf_counter() - started,
+        counters.newton, counters.factorizations, clock() - started,
     )  # fmt: skip
 
 

@@ -11,8 +11,8 @@ NO_CHANGE = 1e-3
 SMALL, GROWTH = 0.2, 2.0
 # Steps over the times asked for, at least: a motion that comes back to rest in between is seen.
 LEAST_STEPS = 50
-# Share of the times asked for below which a step is none.
-SHORTEST = 1e-11
+# Share of the span below which a step is none; and share of the time: rounding of a shorter one is a thousandth of it.
+SHORTEST, SEEN = 1e-11, 2e-13
 # Shares of a time, or step, that are rounding.
 TIME_ROUNDING = 1e-10
 # |Phi| that rounding leaves, over the largest coordinate: sums of a few products.

@@ -33,7 +33,7 @@ from .. import regular_files
 from ..errors import StorageError
 from .code_hash import deep_hash, is_ours, platform_hash
 
-statistics = Counter()  # "hits", "misses", "damaged", "seconds" of this process
+statistics = Counter()  # "hits", "misses", "damaged", "seconds" of reading, "waited" (s) for kernels, of this process
 _DAY = 86400.0
 _KEEP = 30 * _DAY  # files that nothing has read for so long are deleted
 _told = []

@@ -4,24 +4,45 @@ Both are cached on disk, and compiled or loaded when they are first needed. With
 first call they can be compiled ahead of it, by worker processes (`tsdyn.ahead`).
 """
 
+import contextlib
 import os
 import threading
+import time
 
 import numba
 from numba.core.ccallback import CFunc
 from numba.core.registry import cpu_target
 from numba.core.typing import signature as numba_signature
 
-from .cache import KernelCache
+from .cache import KernelCache, statistics
 from .compiler import OPTIONS, Compiler
 from .interrupts import prompt_interrupts
 
 DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
-_lock = threading.RLock()
+_lock, _within = threading.RLock(), threading.local()
 table = [None]  # debug mode: what an address stands for; zero is no address
 letters = {"i": numba.types.int64, "d": numba.types.float64, "p": numba.types.int64}
 _letters = {**letters, "v": numba.types.float64[::1], "w": numba.types.int64[::1]}
 _entries = {}  # of functions: what their signatures are made of
+
+
+def clock():
+    """The time in s, of a clock that stands still while kernels are compiled or loaded."""
+    return time.perf_counter() - statistics["waited"]
+
+
+@contextlib.contextmanager
+def _compiling():
+    """A block that compiles a kernel or loads it."""
+    began, outermost = time.perf_counter(), not getattr(_within, "block", False)
+    _within.block = True
+    try:
+        with prompt_interrupts():
+            yield
+    finally:
+        if outermost:
+            _within.block = False
+            statistics["waited"] += time.perf_counter() - began
 
 
 def entry(*arguments):
@@ -46,7 +67,7 @@ def _entry(function):
         return function
     dispatcher = numba.njit(nogil=True, pipeline_class=Compiler, **OPTIONS)(function)
     dispatcher._cache = KernelCache(function)
-    dispatcher.compile = prompt_interrupts()(dispatcher.compile)
+    dispatcher.compile = _compiling()(dispatcher.compile)
     return dispatcher
 
 
@@ -84,7 +105,7 @@ class Callback:
         cfunc = CFunc(self.py_func, self.types(), locals={}, options=self.options, pipeline_class=Compiler)
         cfunc._cache = cache = KernelCache(self.py_func)
         try:
-            with prompt_interrupts():
+            with _compiling():
                 cfunc.compile()
         finally:
             cache.release()

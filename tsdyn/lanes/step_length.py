@@ -13,7 +13,7 @@ from ..jit.simd import four, get, larger, let, splat
 from ..taylor.step_length import largest_of_three, size_of_order
 from ..taylor.tolerances import STEP_COST, STIFF_RATES
 from .context import FLOOR, NEXT, SIZE, STEPS, TOP, H
-from .tolerances import LEAST_SIZE, NO_STEP
+from .tolerances import FAINT, LEAST_SIZE, NO_STEP
 
 
 @kernel
@@ -33,7 +33,10 @@ def weights(c):
 
 @kernel
 def _radii(c, least, most, far, fast):
-    """log2 of the radius of convergence as the coefficients up to top + 1 have it, and up to top - 1."""
+    """log2 of the radius of convergence as the coefficients up to top + 1 have it, and up to top - 1.
+
+    -inf where they are not finite, or vanish in a motion as slow as that: `order_in_range` is for a case alone.
+    """
     x, nb, top = c.expansion, c.graph.bodies.shape[0], get(c.state, TOP)
     rho, lower, finite = 0.0 * top + math.inf, 0.0 * top + math.inf, 0.0 * top + 1.0
     for k in range(most + 1, max(least - 4, 2) - 1, -1):
@@ -44,6 +47,12 @@ def _radii(c, least, most, far, fast):
         rho = choose(both(own, below(top - 2.5, k)), min(rho, here), rho)
         above = both(below(k - 0.5, top - 1.0), below(top - 4.5, k))
         lower = choose(above, min(lower, here), lower)
+    likely = 0.0 * top - math.inf  # log2 of coefficient top + 1, from those of orders 4 and 5
+    for k in range(4, 6):
+        size = size_of_order(x.bodies, nb, x.order.room, k, far, fast)
+        here = choose(below(0.0, size), binary_log(max(size, LEAST_SIZE)) * ((top + 1.0) / k), -math.inf)
+        likely = max(likely, here)
+    finite = choose(both(below(-math.inf, likely), below(likely, FAINT)), 0.0, finite)
     return choose(below(0.5, finite), rho, -math.inf), lower
 
 

@@ -5,6 +5,7 @@ extrema near zero are sampled too, so that pairs of close zeros are found; other
 that stays unresolved on ever shorter intervals has a kink or a jump, judged by the signs of the samples.
 """
 
+import math
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,13 +18,17 @@ from .tolerances import (
     DEEPEST,
     EPS,
     EXTREME,
+    FAINT,
     HOPELESS,
+    MOST_SCALED,
     NEAR,
     NO_NOISE,
     NOISE_RATIO,
+    SAFE,
     SHORTEST,
     TIGHT,
     TINY,
+    VAST,
     WIDEST_NOISE,
 )
 
@@ -77,27 +82,39 @@ class Search:
 
     def __init__(self, sample, shaken, noise=0.0):
         self.sample, self.shaken, self.noise = sample, shaken, noise
-        self.points, self.spent, self._shortest = [], 0, 0.0
+        self.points, self.spent, self._shortest, self._unit = [], 0, 0.0, 1.0
 
     def run(self, a, value, b, degree):
         """Search [a, b], the value at a being known, with interpolants of this degree at first.
 
         Return the degree needed and the value at b. Raises TooFast.
         """
-        self.points.append((a, value))
         self._shortest = max(DEEPEST * (b - a), SHORTEST * max(abs(a), abs(b)))
-        whole = self._fit(a, b, value, None, degree)
+        self._measure_by(SAFE)
+        whole = self._fit(a, b, SAFE * value, None, degree)
+        if whole.scale < FAINT or whole.scale > VAST:
+            exponent = -math.frexp(whole.scale)[1] if whole.scale else MOST_SCALED  # denormal numbers times SAFE are 0
+            self._measure_by(math.ldexp(SAFE, min(exponent, MOST_SCALED)))
+            whole = self._fit(a, b, self._unit * value, None, degree)
+        self.points.append((a, self._unit * value))
         if not (whole.resolved or whole.off != whole.off):
-            self.noise = max(self._rounding(whole), self.shaken(0.5 * (a + b)))
+            self.noise = max(self._rounding(whole), self._unit * self.shaken(0.5 * (a + b)))
             whole = whole._replace(resolved=whole.off <= self.noise)
         self._follow(whole, 0)
-        return whole.degree, self.points[-1][1] if self.points[-1][0] == b else float(whole.samples[-1])
+        last = self.points[-1][1] if self.points[-1][0] == b else float(whole.samples[-1])
+        last, self.points = last / self._unit, [(t, value / self._unit) for t, value in self.points]
+        self._measure_by(1.0)
+        return whole.degree, last
+
+    def _measure_by(self, unit):
+        """Take values times a power of two from now on: no sum of them leaves the range of numbers."""
+        self.noise, self._unit = self.noise * unit / self._unit, unit
 
     def _values(self, times):
         self.spent += times.size
         if self.spent > MOST:
             raise TooFast
-        return self.sample(times)
+        return self._unit * self.sample(times)
 
     def _fit(self, a, b, first, last, degree):
         """Return the `Fit` of the degree that resolves the function on [a, b], or of the highest worth trying."""

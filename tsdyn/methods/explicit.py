@@ -27,6 +27,7 @@ def error_kernel(function):
     """Decorate the kernel of an error estimate: f(h, nx, ny, y, yd, tableau, memory, ex, ey).
 
     It writes the errors ex, ey of the step that `memory` holds, y and yd being x' and y' at its end, and returns 0.
+    Arrays come as addresses: `vector(ex, nx)` is the array.
     """
     return callback(ERROR)(function)
 

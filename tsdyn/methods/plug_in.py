@@ -16,7 +16,8 @@ def step_kernel(function):
     """Decorate a step kernel: f(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy).
 
     It writes the increments dx, dy and returns 0, or the status that `call_place` or `call_accelerate` gave. Arrays
-    come as addresses: `vector(x, nx)` is the array.
+    come as addresses, integers: `vector(x, nx)` is the array of nx floats there, without a copy. x, xd and dx have nx
+    floats, y, yd and dy have ny; lengths are not checked.
     """
     return callback(PLUG_IN_STEP)(function)
 

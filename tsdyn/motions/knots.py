@@ -59,12 +59,12 @@ def stops_of(parameters, instants, t0, t1):
     times = np.concatenate([instants, *found])
     order = np.argsort(times, kind="stable")
     times, asked = times[order], np.where(order < instants.size, 1.0, 0.0)
-    near = TOGETHER * max(abs(t0), abs(t1), LEAST_SPAN * (t1 - t0))
+    near = TOGETHER * np.maximum(np.abs(times), LEAST_SPAN * (t1 - t0))
     late = t1 - times <= near
     times, asked = np.where(late, t1, times), np.where(late, 0.0, asked)
     kept = times - t0 > near
-    times, asked = times[kept], asked[kept]
+    times, asked, near = times[kept], asked[kept], near[kept]
     if not times.size:
         return NO_STOPS
-    ends = np.flatnonzero(np.append(np.diff(times) > near, True))  # of each group
+    ends = np.flatnonzero(np.append(np.diff(times) > near[1:], True))  # of each group
     return np.column_stack((times[ends], np.maximum.reduceat(asked, np.append(0, ends[:-1] + 1))))

@@ -1,7 +1,7 @@
 """Limits of prescribed motions and data, as shares of what is named."""
 
-# Of the time: knots that are nearer to each other are one (some 50 roundings); of the run's length, the time that this
-# is at least a share of.
+# Of the time: knots, stops and instants that are nearer to each other are one (some 50 roundings); of the run's length,
+# the time that this is at least a share of.
 TOGETHER, LEAST_SPAN = 1e-14, 1e-3
 # Of the largest value or rate at a knot: smaller differences between its sides are rounding of data.
 JUMP = 1e-9

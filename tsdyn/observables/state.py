@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import InvalidArgument
+from .exerted import Exerting
 from .kinematics import Kinematics
 
 if TYPE_CHECKING:
-    from ..hints import Floats, Handles
+    from ..hints import Floats
 
 NOTHING = np.empty(0)
 
@@ -23,7 +24,7 @@ class _Arrays(NamedTuple):
     multipliers: Floats
 
 
-class State(Kinematics["float | Any"], _Arrays):
+class State(Exerting, Kinematics["float | Any"], _Arrays):
     """Time, positions, velocities, accelerations and multipliers at one instant.
 
     Parameters
@@ -35,7 +36,7 @@ class State(Kinematics["float | Any"], _Arrays):
     Notes
     -----
     A state made by a run (`solution.state`, `solution.at(t)`, the argument of an event) knows its scene and gives the
-    motion of bodies and joints, too.
+    motion of bodies and joints, and `reaction(joint)`, too.
 
     Examples
     --------
@@ -55,8 +56,8 @@ class State(Kinematics["float | Any"], _Arrays):
     __slots__ = ()
 
     @property
-    def handles(self) -> Handles:
-        """The bodies and joints of its scene."""
+    def packed(self) -> Any:
+        """Its scene, packed."""
         raise InvalidArgument(
             "this state is arrays alone and knows no bodies and joints: ask solution.state, solution.at(t), or the "
             "state that an event receives."
@@ -64,30 +65,30 @@ class State(Kinematics["float | Any"], _Arrays):
 
 
 class RememberingState(State):
-    """A State with the bodies and joints of its scene and the memory of forces, from which a run continues.
+    """A State that knows its scene and the memory of forces, from which a run continues.
 
     Attributes
     ----------
+    packed : Packed
     memory : ndarray (slots,) or (k, slots)
         Memory of forces.
-    handles : Handles
     anchor : Anchor
         Reference of turn counts.
     """
 
-    handles: Any = None
+    packed: Any = None
     memory: Any = None
     anchor: Any = None
 
     @classmethod
-    def of(cls, handles, memory, anchor, *parts):
+    def of(cls, packed, memory, anchor, *parts):
         """Make a state, or k states."""
         state = cls(*parts)
-        state.handles, state.memory, state.anchor = handles, memory, anchor
+        state.packed, state.memory, state.anchor = packed, memory, anchor
         return state
 
     def _replace(self, **changes: Any) -> RememberingState:
-        return self.of(self.handles, self.memory, self.anchor, *super()._replace(**changes))
+        return self.of(self.packed, self.memory, self.anchor, *super()._replace(**changes))
 
 
 def remembered(state, prepared, t, q):

@@ -9,6 +9,7 @@ import math
 
 from ..jit.kernels import kernel
 from ..model.equations import hold_pieces
+from ..motions.tolerances import TOGETHER
 from .outputs import record
 from .tolerances import SLIVER
 
@@ -27,14 +28,15 @@ def next_stop(r, log):
 def fixed_end(r, stop):
     """The end of the next step of fixed length, whether it is the run's last, and whether a stop cuts it.
 
-    t_k = t_origin + k h, but for steps that end at stops; a stop within SLIVER h of t_k stands for it.
+    t_k = t_origin + k h, but for steps that end at stops; a stop within SLIVER h, or rounding, of t_k stands for it.
     """
     done, h = r.numbers.steps + 1 - r.numbers.cuts, r.clock.h
     last = done == r.numbers.steps_wanted
     t1 = r.clock.t_end if last else r.clock.t_origin + done * h
-    if stop < t1 - SLIVER * h or (last and stop < t1):
+    near = max(SLIVER * h, TOGETHER * abs(t1))
+    if stop < t1 - near or (last and stop < t1):
         return stop, False, True
-    return stop if stop < t1 + SLIVER * h and not last else t1, last, False
+    return stop if stop < t1 + near and not last else t1, last, False
 
 
 @kernel

@@ -18,7 +18,7 @@ from ..workspaces.run_state import B_END, STORED
 from .event_states import Inside
 from .events import Failed, Instant
 from .snapshot import demand, demand_counts
-from .tolerances import FAST_TURN, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
+from .tolerances import EPS, FAST_TURN, LEAST_TIME, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
 
 
 class Occurrence(NamedTuple):
@@ -267,7 +267,7 @@ class Watch:
     def _left(self, i, step, t, last):
         """The `Occurrence` where event i leaves a zero: that at t, or one that is so within rounding."""
         value = self._at(i, step, t)
-        if value * last[1] < 0.0:
+        if value != 0.0 and (value < 0.0) != (last[1] < 0.0):
             t = self._between(i, step, (t, value), last)
             return Occurrence(t, i, step.at(t))
         return self._zero(i, step, t, last[0])
@@ -276,26 +276,33 @@ class Watch:
         """The change of sign up to t1, where event i has the value b; none if it is that of the run's start."""
         track = self.tracks[i]
         t0, a = max(track.significant, (step.t0, track.value))
-        if a * b >= 0.0:
+        if a == 0.0 or (a < 0.0) == (b < 0.0):
             return [Occurrence(t0, i, step.at(t0))]
         root = self._between(i, step, (t0, a), (t1, b))
-        if root - self.start <= START_ZERO * max(1.0, abs(self.start)):
-            return []
-        return [Occurrence(root, i, step.at(root))]
+        return [] if self._is_start(i, step, root) else [Occurrence(root, i, step.at(root))]
+
+    def _is_start(self, i, step, t):
+        """Whether a zero at t is that of the run's start: by rounding of the time, or of the value there."""
+        if t - self.start <= START_ZERO * max(abs(self.start), step.t1 - step.t0):
+            return True
+        return step.t0 == self.start and abs(self.tracks[i].value) <= self._shaken(i, step, step.t0)
 
     def _between(self, i, step, first, last):
         """Where event i changes its sign between two times with values."""
         from scipy.optimize import brentq  # takes a while to import
 
-        known, (t1, b) = dict((first, last)), last
+        known, (t0, a), (t1, b) = dict((first, last)), first, last
+        exponent = math.frexp(max(abs(a), abs(b)))[1]
 
-        def value(t):
-            return known[t] if t in known else self._at(i, step, t)
+        def value(t):  # of size one: Brent's method multiplies three of them
+            return math.ldexp(known[t] if t in known else self._at(i, step, t), -exponent)
 
-        root = brentq(value, first[0], t1, xtol=ROOT, rtol=ROOT, maxiter=1000)
-        shift = ROOT * max(abs(root), 1.0)
+        least = max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
+        root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
+        shift = least + ROOT * abs(root)
         # a run that goes on from a terminal event had better find it behind itself
-        while self.events[i].limit < math.inf and root + shift < t1 and value(root) * b <= 0.0:
+        ends, side = self.events[i].limit < math.inf, math.copysign(1.0, b)
+        while ends and root + shift < t1 and side * value(root) <= 0.0:
             root, shift = root + shift, 2.0 * shift
         return root
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidArgument
-from ..model.handles import handles_of
 from ..observables import reactions
+from ..observables.exerted import Exerting
 from ..observables.kinematics import Anchor, Kinematics
 from ..validation import number
 
@@ -65,7 +65,7 @@ def prepare(events):
     return found
 
 
-class Instant(Kinematics):
+class Instant(Exerting, Kinematics):
     """What an event function is given: a `State`, with multipliers made when asked for.
 
     Parameters
@@ -79,16 +79,11 @@ class Instant(Kinematics):
     state : ndarray (3, n)
     """
 
-    __slots__ = ("_beside", "_packed", "memory", "q", "qd", "qdd", "t")
+    __slots__ = ("_beside", "memory", "packed", "q", "qd", "qdd", "t")
 
     def __init__(self, packed, memory, beside, t, state):
-        self._packed, self.memory, self._beside, self.t = packed, memory, beside, t
+        self.packed, self.memory, self._beside, self.t = packed, memory, beside, t
         self.q, self.qd, self.qdd = state.copy()  # the function may keep or change it
-
-    @property
-    def handles(self):
-        """The scene's `Handles`."""
-        return handles_of(self._packed)
 
     @property
     def anchor(self):
@@ -100,7 +95,7 @@ class Instant(Kinematics):
     def multipliers(self):
         """Multipliers (m,)."""
         parts = (part[None] for part in (self.q, self.qd, self.qdd))
-        return reactions.multipliers(self._packed, np.array([self.t]), *parts, self.memory[None])[0]
+        return reactions.multipliers(self.packed, np.array([self.t]), *parts, self.memory[None])[0]
 
     def __iter__(self):
         return iter((self.t, self.q, self.qd, self.qdd, self.multipliers))

@@ -14,9 +14,8 @@ the ends of steps; serves any number of runs (`Prepared.engine`), and has
     skipped         bodies without gyroscopic torque, bodies that never turn, constant columns of series
 """
 
-import time
-
 from ..errors import Status
+from ..jit.compiled import clock
 from ..jit.interrupts import CollectionsDeferred
 from .brief import Brief, begin, has_ended_well, limit_of, readings_of
 from .counts import Counts
@@ -48,7 +47,7 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False, unfini
             memory = engine.memory(prepared)
     memory.enter(engine, task, relay is not None and relay.passes)
     if briefly:
-        began = time.perf_counter()
+        began = clock()
         begun = begin(memory, task.times, task.stops, limit_of(memory.run, task.stops, task.max_steps))
         return _end(task, memory, begun, began, relay)
     readings = readings_of(memory, task)
@@ -59,7 +58,7 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False, unfini
         relay.enter(memory)
     if task.events is not None:
         watch = (relay or Relay()).watching(task, readings[0])
-    began = time.perf_counter()
+    began = clock()
     advanced = memory if task.sampling is None else Sampled(memory, task.sampling)
     driven = drive(advanced if past is None else past(advanced), task, watch)
     if relay is not None and driven[0] in (PASSAGE, STIFF):

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InvalidArgument, InvalidForce, Status
 from ..model import joint_motion
+from ..motions.tolerances import TOGETHER
 from ..validation import number
 from .tolerances import MOST_INSTANTS, SAME_INSTANT
 
@@ -114,7 +115,7 @@ def sampled(packed):
 
 def is_due(t, period):
     """Return True if t is an instant of a period."""
-    return abs(t - round(t / period) * period) <= SAME_INSTANT * period
+    return abs(t - round(t / period) * period) <= max(SAME_INSTANT * period, TOGETHER * abs(t))
 
 
 def instants_of(packed, t0, t1):

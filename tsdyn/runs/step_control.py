@@ -64,7 +64,7 @@ def first_step(context, w, r):
     d0 = math.sqrt(d0 / (2 * n))
     d1 = call_norm(r.kernels.error_norm, context, first, r.yd, r.now, rtol, atol)
     span = r.clock.t_end - r.clock.t
-    h = min(FIRST_ERROR * d0 / d1 if d1 > TOO_SMALL and d0 > TOO_SMALL else TRIAL, FIRST_PART * span)
+    h = min(FIRST_ERROR * d0 / d1 if d1 * span > TOO_SMALL and d0 > TOO_SMALL else TRIAL * span, FIRST_PART * span)
     # d2 = |(x'', y'')|, by an Euler step of h
     for i in range(r.x.size):
         r.xs[i] = r.x[i] + h * first[i]
@@ -80,7 +80,7 @@ def first_step(context, w, r):
     d2 = call_norm(r.kernels.error_norm, context, r.dx, r.dy, r.now, rtol, atol) / h
     # h^(order + 1) max(d1, d2) = FIRST_ERROR
     size, most = max(d1, d2), FIRST_GROWTH * h
-    return min(most, (FIRST_ERROR / size) ** r.clock.exponent if size > NO_SLOPE else most, span)
+    return min(most, (FIRST_ERROR / size) ** r.clock.exponent if size * span > NO_SLOPE else most, span)
 
 
 @kernel

@@ -70,5 +70,5 @@ class Outcome(NamedTuple):
     counts: Mapping  # of `Solution.stats`
     trajectory: object  # a `trajectory.Trajectory`, or None
     events: tuple  # times, positions, velocities of each event; or None
-    began: float  # time.perf_counter() when the driver began, prepared
+    began: float  # by `jit.compiled.clock` when the driver began, prepared
     method: str = ""  # the methods of a run that has turned from one to another

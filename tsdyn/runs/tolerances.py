@@ -42,9 +42,9 @@ LEAST_ERROR, LEAST_BEFORE = 1e-10, 1e-4
 # Weight of the second estimate in Hairer's combination of two orders (DOP853: Solving ODEs I, II.10).
 SECOND_ESTIMATE = 0.1
 
-# First step (Solving ODEs I, II.4): norms below TOO_SMALL don't tell it, and it is TRIAL s; its error is to be
-# FIRST_ERROR; x' and x'' below NO_SLOPE count as zero; it is FIRST_GROWTH times the trial at most, and the trial
-# FIRST_PART of the run.
+# First step (Solving ODEs I, II.4): norms below TOO_SMALL don't tell it, and it is the part TRIAL of the run; its error
+# is to be FIRST_ERROR; x' and x'' below NO_SLOPE count as zero, times the run's length; it is FIRST_GROWTH times the
+# trial at most, and the trial FIRST_PART of the run.
 TOO_SMALL, TRIAL, FIRST_ERROR, NO_SLOPE, FIRST_GROWTH, FIRST_PART = 1e-5, 1e-6, 0.01, 1e-15, 100.0, 0.1
 
 # Factors of the step after a stage that was not solved, and after a step that left a chart at once.
@@ -82,8 +82,8 @@ START_ZERO = 64.0 * EPS
 # largest change it is taken for: three changes of random signs are tried.
 SHAKEN, NOISE = 4.0 * EPS, 4.0
 
-# s, and relative: how near to a zero Brent's method comes.
-ROOT = 4.0 * EPS
+# Of the time: how near to a zero Brent's method comes, as near as it can. s: the least distance there, a normal number.
+ROOT, LEAST_TIME = 4.0 * EPS, 2.0**-1022
 
 # --- slices ----------------------------------------------------------------------------------------------------------
 # s between returns to Python: progress bars and Ctrl-C answer at once, at a cost of 0.1 ms a slice.
@@ -102,7 +102,7 @@ PACED, HOPELESS = 1000, 1e10
 # A run whose pace, in s a step, has more than doubled since it was taken last gets on.
 GETTING_ON = 2.0
 
-# Relative rounding error of (t1 - t0) / step that counts no step more.
+# Relative rounding error of (t1 - t0) / step that counts no step more, beside that of t0 and t1.
 SAME_COUNT = 1e-12
 
 # Tries of a Taylor step, at most, that are kept in the history of a slice beyond one for each of its steps.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ..calls import fitting_methods
 from ..errors import InvalidArgument
 from ..observables import diagnostics, power, reactions
+from ..observables.exerted import member
 from .mechanical_work import work as integrate_work
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ class Balances:
         """The `Load` of a force, or the `Member` of a constraint."""
         item = self.handles.item(item)
         load = reactions.loads_of(self.packed).get(id(item))
-        return self._member(item) if load is None else load
+        return member(self.packed, item) if load is None else load
 
     def _integrated(self, part):
         if self._trajectory is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from ..calls import fitting
 from ..errors import InvalidArgument, Status
+from ..jit.compiled import clock
 from ..validation import finite_times, floats
 from .given_motion import GivenMotion, follow
 from .inverse_result import InverseDynamics
@@ -82,7 +82,7 @@ def inverse_dynamics(
     from ..inverse.actuators import actuators_of  # imported here: a run needs none of it
     from ..statics.smoothness import demand_continuous
 
-    started = time.perf_counter()
+    started = clock()
     given = motion if hasattr(motion, "qdd") else None
     message = ""
     if given is not None:
@@ -97,7 +97,7 @@ def inverse_dynamics(
     every = actuators_of(scene, kept.handles, actuators, rows[:, 1 : 1 + n].copy())
     demand_continuous(kept.packed, [one.item for one in every])
     wanted = np.size(given.t) if t is None else np.size(t)
-    followed = followed._replace(seconds=time.perf_counter() - started)
+    followed = followed._replace(seconds=clock() - started)
     return InverseDynamics(scene, wanted, kept, followed, every, message)
 
 

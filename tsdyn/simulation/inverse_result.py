@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -11,7 +10,9 @@ import numpy as np
 from ..calls import fitting_methods
 from ..drawing import Drawn, new_figure
 from ..elements.force import Force
+from ..jit.compiled import clock
 from ..observables import power, reactions
+from ..observables.exerted import acted
 from ..validation import unknown_name
 from .given_motion import GivenMotion
 
@@ -41,13 +42,13 @@ class InverseDynamics(Drawn, GivenMotion):
         from ..inverse.loads import demand_produced, find_loads  # imported here: a run needs none of it
 
         super().__init__(scene, wanted, kept, followed, message)
-        started = time.perf_counter()
+        started = clock()
         found = find_loads(self.packed, self.t, self.q, self.qd, self.qdd, self._remembers, every)
         self.residual: Floats = demand_produced(self, every, found)
         self.actuators: tuple[str, ...] = tuple(one.name for one in every)
         self.units: dict[str, str] = {one.name: one.unit for one in every}
         self.loads: dict[str, Floats] = {one.name: u for one, u in zip(every, found.u.T, strict=True)}
-        self._seconds = {"prepare": 0.0, "run": followed.seconds + time.perf_counter() - started}
+        self._seconds = {"prepare": 0.0, "run": followed.seconds + clock() - started}
         self._every, self.multipliers, self._normals = every, found.multipliers, found.normals
 
     def __getitem__(self, part: slice) -> Self:
@@ -81,7 +82,7 @@ class InverseDynamics(Drawn, GivenMotion):
         load, found = reactions.loads_of(self.packed).get(id(item)), [one for one in self._every if one.item is item]
         if load is None or not found:
             return super().reaction(item, on)
-        body = self._acted(item, on)
+        body = acted(self.packed, item, on)
         at, dimension = self.handles.where(body)
         whole = np.zeros_like(self.q)
         for one in found:

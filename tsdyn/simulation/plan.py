@@ -8,6 +8,7 @@ import time
 from typing import NamedTuple
 
 from ..configuration.holonomic import demand_holonomic
+from ..jit.compiled import clock
 from ..jit.interrupts import CollectionsDeferred
 from ..motions.knots import NO_STOPS
 from ..observables.state import remembered
@@ -36,7 +37,7 @@ class Unfinished(NamedTuple):
     start: Start
     memory: object
     begun: Begun
-    called: float  # time.perf_counter()
+    called: float  # clock()
     began: float
 
 
@@ -74,7 +75,7 @@ class Plan:
 
     def run(self, scene, t_span, t_eval, state):
         """Run it: a `Solution` or the `Unfinished` run; None if the call is to go the ordinary way."""
-        called, kept, stretch = time.perf_counter(), self.kept, self._stretch
+        called, kept, stretch = clock(), self.kept, self._stretch
         if stretch is None or t_span is not stretch.t_span or t_eval is not stretch.t_eval:
             stretch = Stretch.of(stretch, t_span, t_eval, kept, self.task.method)
             self._stretch = stretch if stretch.times.size <= FEW_TIMES else None
@@ -84,7 +85,7 @@ class Plan:
         if memory is None:
             return None
         memory.enter_again(self, engine, stretch, start)
-        began = time.perf_counter()
+        began = clock()
         begun = begin(memory, stretch.times, stretch.stops, limit_of(memory.run, stretch.stops, self.task.max_steps))
         if not has_ended_well(memory, begun):
             return Unfinished(self, stretch, start, memory, begun, called, began)
@@ -97,7 +98,7 @@ class Plan:
         vars(solution).update(
             self._told, span=stretch.span, _rows=(rows, kept.n), _remains=remains, _trajectory=trajectory,
             _made=time.time(),
-            _seconds={"prepare": began - called, "run": time.perf_counter() - began},
+            _seconds={"prepare": began - called, "run": clock() - began},
         )  # fmt: skip
         return solution
 

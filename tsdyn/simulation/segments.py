@@ -5,13 +5,13 @@ Status.PASSAGE where series go on past a singular configuration, or have done so
 runs have one segment.
 """
 
-import time
 from itertools import pairwise
 
 import numpy as np
 
 from ..configuration.holonomic import demand_holonomic
 from ..errors import Status, TsdynError
+from ..jit.compiled import clock
 from ..runs import counts
 from ..runs.history import ChartLog, StepLog
 from ..runs.run import run
@@ -87,7 +87,7 @@ def _recalled(known, task):
     demand_counts(known["counts"], counts.NAMES)
     return Outcome(
         Status(known["status"]), "", range(known["rows"]), None, None, float(known["reached"]), last, remembered,
-        known["counts"], None, None, time.perf_counter(),
+        known["counts"], None, None, clock(),
     )  # fmt: skip
 
 

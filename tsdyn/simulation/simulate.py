@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ from ..calls import fitting
 from ..configuration.holonomic import demand_holonomic
 from ..elements.membership import warn_of_waiting
 from ..errors import InvalidArgument
+from ..jit.compiled import clock
 from ..methods.integrator import frozen
 from ..observables.state import remembered
 from ..runs.arguments import demand_steps_seen, state_arrays
@@ -186,7 +186,7 @@ def run_from(given, numbers=None, arrays=None, archive=None, plans=False):
         method = frozen(method.bounded(settings.max_step))
     demand_steps_seen(method, *options.span)
 
-    started = time.perf_counter()
+    started = clock()
     choose = method_choice.turns_of(scene, kept, method, options) if given["integrator"] is None else None
     task = _request(scene, kept, method, options, given["state"], choose)
     if given["store"] is not None:
@@ -200,7 +200,7 @@ def run_from(given, numbers=None, arrays=None, archive=None, plans=False):
 
 def _solution(given, task, outcome, started):
     """The `Solution` of a run, or of one by another method if it has failed."""
-    ended = time.perf_counter()
+    ended = clock()
     other = method_choice.instead(task, outcome.status)
     if other is not None:
         return run_from(_again(given, other))
@@ -217,7 +217,7 @@ def _run_stored(task, given, options, found, archive):
     """Run a task whose outputs go to a store, from its start or from what was found in a checkpoint."""
     scene, (numbers, arrays), kept = given["scene"], found, task.prepared
     archive = archive or stored_runs.archive_of(given, kept, options.history, numbers, arrays)
-    started = time.perf_counter()
+    started = clock()
     if numbers is not None and numbers.get("ended"):
         with restoring():
             slots = kept.handles.count + kept.packed.system.memory.size
@@ -225,7 +225,7 @@ def _run_stored(task, given, options, found, archive):
         return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
     try:
         outcome = run_task(task._replace(archive=archive), scene, options.settings.initial_tol)
-        seconds = time.perf_counter() - started
+        seconds = clock() - started
         other = method_choice.instead(task, outcome.status)
         if other is not None:
             given = _again(given, other)

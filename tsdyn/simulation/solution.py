@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from ..calls import fitting_methods
-from ..errors import InvalidArgument, InvalidBody, InvalidConstraint, Status, StepFailure
+from ..errors import InvalidArgument, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
-from ..model.packed import member_of
 from ..observables import diagnostics, reactions, uniqueness
+from ..observables.exerted import acted, exerted, member
 from ..observables.friction_reactions import with_normal_loads
 from ..observables.kinematics import Anchor, Kinematics
 from ..observables.state import RememberingState
@@ -168,7 +168,7 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         q, qd, qdd = (a.copy() for a in self._last)
         t, memory = np.array([self._reached]), self._remembered[None]
         lam = reactions.multipliers(self.packed, t, q[None], qd[None], qdd[None], memory)[0]
-        remembered = self.handles, self._remembered.copy(), Anchor(self._angles)
+        remembered = self.packed, self._remembered.copy(), Anchor(self._angles)
         return RememberingState.of(*remembered, self._reached, q, qd, qdd, lam)
 
     def at(self, t: ArrayLike) -> RememberingState:
@@ -216,10 +216,10 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         parts = q, qd, qdd, reactions.multipliers(self.packed, every, q, qd, qdd, memory)
         anchor = self._anchor_of(every)
         if times.ndim:
-            return RememberingState.of(self.handles, memory, anchor, every, *parts)
+            return RememberingState.of(self.packed, memory, anchor, every, *parts)
         angles, h, levels = anchor
         anchor = Anchor(angles[0], h[0], tuple(level[0] for level in levels))
-        return RememberingState.of(self.handles, memory[0], anchor, float(times), *(part[0] for part in parts))
+        return RememberingState.of(self.packed, memory[0], anchor, float(times), *(part[0] for part in parts))
 
     def _anchor_of(self, t):
         """Return the turn counts at times t (k,): those at the starts of their steps."""
@@ -286,12 +286,7 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> print(force[-1].round(6) + 0.0, torque[-1].round(6) + 0.0)
         [ 0.  0. 20.] [  0. -20.   0.]
         """
-        item = self.handles.item(item)
-        load = reactions.loads_of(self.packed).get(id(item))
-        if load is not None:
-            return reactions.force_reaction(self, load, self._acted(item, on))
-        member = self._member(item)
-        return reactions.reaction(self, member, self._acted(item, on))
+        return exerted(self, item, on)
 
     def reaction_unique(self, item: ItemLike, on: BodyLike | None = None) -> Bools:
         """Return True where `reaction` is unique, at each output: bool (k,).
@@ -300,33 +295,14 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         solution whose multipliers of redundant rows (NaN in `multipliers`) are zero.
         """
         item = self.handles.item(item)
-        body = self._acted(item, on)
+        body = acted(self.packed, item, on)
         if id(item) in reactions.loads_of(self.packed):
             return np.ones(self.t.size, bool)
-        return uniqueness.unique(self, self._member(item).rows, body)
+        return uniqueness.unique(self, member(self.packed, item).rows, body)
 
     def rows(self, constraint: ItemLike) -> slice:
         """Return the columns of `multipliers` of a constraint, as a slice."""
-        return self._member(self.handles.item(constraint)).rows
-
-    def _member(self, constraint):
-        member = member_of(self.packed, constraint)
-        if member is None:
-            raise InvalidConstraint(f"{constraint!r} is not a constraint or force of this solution's scene.")
-        return member
-
-    def _acted(self, item, on):
-        """Return the body on which a reaction is requested."""
-        if on is None:
-            return item.on
-        on = self.handles.body(on) if isinstance(on, str) else self.handles.own(on)
-        if on is item.a or on is item.b:
-            if on.dimension:
-                return on
-            raise InvalidBody(f"{item.name}: the load on the ground is the opposite of the load on {item.on.name!r}.")
-        if getattr(on, "dimension", 0):
-            on = self.handles.body(on)  # refuses one of another scene
-        raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
+        return member(self.packed, self.handles.item(constraint)).rows
 
     def _facts(self):
         s = self.stats

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..calls import fitting_methods
-from ..errors import InvalidBody, InvalidConstraint, NoEquilibrium
+from ..errors import NoEquilibrium
 from ..jit.interrupts import interruptible
-from ..model.packed import member_of
 from ..observables import reactions
 from ..observables.kinematics import Anchor
 from ..observables.state import RememberingState
@@ -55,13 +54,11 @@ class Equilibrium:
 
     def __init__(self, descent: Any, q0: Any, findings: Any, spin: Any = None) -> None:
         motion, packed = descent.motion, descent.packed
-        self.packed, self.system, self._memory = packed, packed.system, descent.memory[None]
-        self.t, self.q, self.qd = np.array([descent.t]), motion.q[None], motion.qd[None]
-        qdd = motion.accelerations
-        self.multipliers: Floats = reactions.multipliers(packed, self.t, self.q, self.qd, qdd[None], self._memory)
-        arrays = descent.t, motion.q.copy(), motion.qd.copy(), qdd.copy(), self.multipliers[0]
+        t, levels = np.array([descent.t]), (motion.q[None], motion.qd[None], motion.accelerations[None])
+        self.multipliers: Floats = reactions.multipliers(packed, t, *levels, descent.memory[None])
+        arrays = descent.t, motion.q.copy(), motion.qd.copy(), levels[2][0].copy(), self.multipliers[0]
         self.state: RememberingState = RememberingState.of(
-            descent.handles, descent.memory.copy(), Anchor(descent.angles.copy()), *arrays
+            packed, descent.memory.copy(), Anchor(descent.angles.copy()), *arrays
         )
         self.rotation_rate: Floats = np.zeros(3) if spin is None else spin
         self.stable, self.smallest_stiffness, self.neutral = findings
@@ -69,16 +66,7 @@ class Equilibrium:
 
     def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
         """Force (3,), N, and torque (3,), N m, of a constraint, joint or force, as `Solution.reaction` defines them."""
-        handles = self.state.handles
-        item = handles.item(item)
-        load, member = reactions.loads_of(self.packed).get(id(item)), member_of(self.packed, item)
-        if load is None and member is None:
-            raise InvalidConstraint(f"{item!r} is not a constraint or force of this scene.")
-        body = item.on if on is None else handles.body(on)
-        if body not in (item.a, item.b):
-            raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
-        found = reactions.reaction(self, member, body) if load is None else reactions.force_reaction(self, load, body)
-        return found[0][0], found[1][0]
+        return self.state.reaction(item, on)
 
     def __repr__(self) -> str:
         kind = "stable" if self.stable else "unstable"

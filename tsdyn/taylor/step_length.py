@@ -7,7 +7,7 @@ from ..formulations.chart_validity import ROUNDING
 from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import first, four, larger, second, splat, third
 from ..rows.interface import is_near_singular
-from .tolerances import FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST, STIFF_RATES
+from .tolerances import FAINT, FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST, STIFF_RATES, VAST
 
 
 @kernel
@@ -46,6 +46,31 @@ def radius(bodies, nb, orders, top, far, fast):
 
 
 @long_kernel
+def order_in_range(bodies, nb, orders, top, far, fast):
+    """The highest order up to top whose coefficients neither overflow nor vanish.
+
+    They are in proportion to rate^k: 1e450 at order 30 where rates are 1e15 / s, and 1e-450 where they are 1e-15 / s.
+    """
+    k = top + 1
+    size = size_of_order(bodies, nb, orders, k, far, fast)
+    if FAINT < size < VAST:
+        return top
+    while k > LEAST_ORDER and not size < VAST:
+        k -= 1
+        size = size_of_order(bodies, nb, orders, k, far, fast)
+    held = k - 1
+    while k > 2 and size == 0.0:
+        k -= 1
+        size = size_of_order(bodies, nb, orders, k, far, fast)
+    if size == 0.0 or size > FAINT:  # the zeros are exact
+        return held
+    while k > LEAST_ORDER and not size > FAINT:
+        k -= 1
+        size = size_of_order(bodies, nb, orders, k, far, fast)
+    return k - 1
+
+
+@long_kernel
 def weights(c, r):
     """Set the floor of Phi. Weights of the coefficients of r and of omega' beside those of A; 1 + the largest rate."""
     x, orders = c.expansion, c.expansion.order.room
@@ -74,10 +99,10 @@ def _held(h, rate, k):
 @kernel
 def step_length(c, r):
     """h = rho tol^(1 / (top + 2)), at most; and the order of the next step, that with the longer step for the work."""
-    x, nb = c.expansion, c.graph.bodies.shape[0]
-    top, orders = x.order.top, x.order.room
+    x, nb, orders = c.expansion, c.graph.bodies.shape[0], c.expansion.order.room
     tol = r.clock.atol + r.clock.rtol
     far, fast, rate = weights(c, r)
+    x.order.top = top = order_in_range(x.bodies, nb, orders, x.order.top, far, fast)
     h = _held(radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2)), rate, top + 2)
     if x.order.highest > x.order.lowest:
         lower = _held(radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top), rate, top)

@@ -71,9 +71,8 @@ def _fastest(c):
 def _propose(c, r, tol):
     """The first step to try."""
     s, order = c.trial, c.expansion.order
-    s.failed = 0
+    s.failed, s.h = 0, step_length(c, r)
     s.shorter, s.share, s.serves, s.looser, s.tol, s.highest = 0, math.inf, 0, r.numbers.adaptive, tol, order.top
-    s.h = step_length(c, r)
     if r.numbers.adaptive == 0:
         s.h = r.clock.h
         return

@@ -7,6 +7,9 @@ Shares are values of the singularity indicator (rows/singularity.py), which fall
 # Cost of a step's end (projection, factors of S, poses), in orders of its series: benchmarks/measure.py, chain of 16.
 STEP_COST = 3
 
+# Sizes of the coefficients of a step's last order: beyond them products of others lose digits, or are infinite.
+FAINT, VAST = 1e-280, 1e280
+
 # Landing, over tolerance and rounding of Phi, beyond which the projection corrects no truncation error: the radius of
 # convergence was wrong.
 MISSED = 100.0

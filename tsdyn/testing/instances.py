@@ -2,14 +2,30 @@
 
 import numpy as np
 
+from ..elements.force import Force
+from ..elements.joint import Joint
+from ..elements.primitive import Primitive
 from ..errors import InvalidArgument
+from ..methods.integrator import Integrator
 from ..simulation.scene import Scene
 
 ARRANGEMENTS = ("body to body", "body to ground", "ground to body")
+CHECKS = {Primitive: "check_primitive", Joint: "check_primitive", Force: "check_force", Integrator: "check_integrator"}
+
+
+def demand_kind(item, bases):
+    """Refuse a class or an instance that another check is for."""
+    kind = item if isinstance(item, type) else type(item)
+    for base, check in CHECKS.items():
+        if issubclass(kind, base) and not issubclass(kind, bases):
+            raise InvalidArgument(
+                f"{kind.__name__} is a subclass of ts.{base.__name__}: use ts.testing.{check}({kind.__name__})."
+            )
 
 
 def maker(kind, bases, error, example):
     """Make the `make` of `instances`: of a class by example(a, b), or a callable (a, b)."""
+    demand_kind(kind, bases)
 
     def make(a, b, alone):
         if isinstance(kind, type) and issubclass(kind, bases):
@@ -25,6 +41,9 @@ def maker(kind, bases, error, example):
             if alone:
                 return None
             raise
+        demand_kind(made, bases)
+        if not isinstance(made, bases):
+            raise InvalidArgument(f"a check needs what makes a {bases[0].__name__}; {kind!r} made {made!r}.")
         return None if alone and made.b is None else made
 
     return make

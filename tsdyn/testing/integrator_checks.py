@@ -88,13 +88,13 @@ def check_integrator(
     if not order > 0:
         raise InvalidArgument(f"{type(kind).__name__}: order must say the method's order, got {order!r}.")
     findings = []
-    for case in cases(type(kind)):
+    for case in cases(type(kind), order):
         for form in FORMS:
             if not serves(case, kind, form):
                 continue
             where = f"{type(kind).__name__}, {case.name}, formulation {form!r}"
             interpolant = kind.interpolant(FORMULATIONS[form].first_order)
-            steps, off, between = fixed_steps(method, case, form, where)
+            steps, off, between = fixed_steps(method, case, form, order, where)
             demand_repeatable(lambda: make_method(method, step=case.end / 500.0), case, form, where)  # noqa: B023
             found = observed_order(steps, off, order, where, case.trusted)
             wanted = min(order, interpolant.order) if dense_order is None else dense_order

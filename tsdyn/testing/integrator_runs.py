@@ -7,6 +7,7 @@ from ..formulations.registry import FORMULATIONS
 from ..methods.integrator import Integrator
 from ..observables.diagnostics import ConstraintError, constraint_error
 from ..simulation.simulate import simulate
+from .instances import demand_kind
 from .tolerances import (
     EPS,
     LEVELS,
@@ -15,6 +16,7 @@ from .tolerances import (
 
 def make_method(method, **settings):
     """An instance with these settings."""
+    demand_kind(method, Integrator)
     if not callable(method):
         raise InvalidArgument(
             f"check_integrator needs an Integrator class or a callable that makes one, got {method!r}."

@@ -9,7 +9,7 @@ from ..constraints import Distance, PlaneContact, Spherical
 from ..integrators import DOP853, RK45
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
-from .tolerances import TIGHT
+from .tolerances import BRIEF, TIGHT
 
 GRID = 16  # equal parts of the span, at whose ends fixed steps are compared
 INNER = np.sort(np.random.default_rng(1).uniform(0.01, 0.99, 40))  # fractions of the span, within the steps
@@ -71,10 +71,11 @@ SCENES: dict[str, tuple[Callable[[], Scene], float]] = {
 }
 
 
-def cases(kind):
-    """Yield a `Case` for each scene; the reference is not by the method `kind` that is to be judged by it."""
+def cases(kind, order=2):
+    """Yield a `Case` for each scene, for methods of an order; the reference is not by the method `kind`, the judged."""
     first, second = (RK45, DOP853) if isinstance(kind, type) and issubclass(kind, DOP853) else (DOP853, RK45)
     for name, (build, end) in SCENES.items():
+        end *= BRIEF if order == 1 else 1.0
         scene, grid, inner = build(), np.linspace(0.0, end, GRID + 1), end * INNER
         times = np.union1d(grid, inner)
         best, other = (

@@ -9,6 +9,7 @@ from .tolerances import (
     COARSEST,
     DENSE_TOLERANCE,
     FEWEST,
+    FINEST,
     HIGH_ORDER,
     HIGH_TOLERANCE,
     MOST,
@@ -16,14 +17,19 @@ from .tolerances import (
     POINTS,
     RATIO,
     ROUNDING,
+    SETTLED,
 )
 
 
-def fixed_steps(method, case, form, where):
-    """Runs of more and more steps: their numbers, and errors at the ends of steps and between."""
+def fixed_steps(method, case, form, order, where):
+    """Runs of more and more steps: their numbers, and errors at the ends of steps and between.
+
+    There are more than MOST steps only where the order observed falls short of `order` and still changes.
+    """
     steps, off, between, count = [], [], [], FEWEST
-    while GRID * round(count) <= MOST:
-        number = GRID * round(count)
+    while (number := GRID * round(count)) <= FINEST:
+        if number > MOST and not (steps and _falls_short(steps, off, order, case.trusted)):
+            break
         count *= RATIO
         if steps and number == steps[-1]:
             continue
@@ -56,16 +62,28 @@ def _error(q, qd, q_expected, qd_expected):
     return np.hypot(mean_distance(q, q_expected), mean_distance(qd, qd_expected))
 
 
-def _slopes(steps, off, trusted, where):
-    """Orders fitted to the errors of the finest steps above rounding."""
+def _fits(steps, off, trusted):
+    """Orders fitted to the errors of the finest steps above rounding; none for less than three."""
+    steps, off = np.array(steps), np.array(off)
     good = (off > _floor(trusted)) & (off < COARSEST)
-    if good.sum() < 3:
-        raise CheckFailed(
-            f"{where}: the errors of {steps[0]} to {steps[-1]} steps go from {off[0]:.1e} to {off[-1]:.1e}: they do "
-            "not converge to the solution, or too fast for an order to be seen."
-        )
     steps, off = np.log(steps[good]), np.log(off[good])
-    return [-np.polyfit(steps[-n:], off[-n:], 1)[0] for n in POINTS]
+    return [-np.polyfit(steps[-n:], off[-n:], 1)[0] for n in POINTS] if good.sum() > 2 else []
+
+
+def _falls_short(steps, off, order, trusted):
+    """Whether the order observed is too low, and changes with the number of steps."""
+    slopes = _fits(steps, off, trusted)
+    return not slopes or (max(slopes) < order - slack(order) and np.ptp(slopes) > SETTLED)
+
+
+def _slopes(steps, off, trusted, where):
+    """The fitted orders; refuse errors that show none."""
+    if slopes := _fits(steps, off, trusted):
+        return slopes
+    raise CheckFailed(
+        f"{where}: the errors of {steps[0]} to {steps[-1]} steps go from {off[0]:.1e} to {off[-1]:.1e}: they do not "
+        "converge to the solution, or too fast for an order to be seen."
+    )
 
 
 def slack(order):

@@ -21,8 +21,12 @@ DRAWN = 8
 LEVELS = (50.0, 500.0, 5000.0)
 # What the observed order may fall short: of steps, of dense output; from the third on, the fourth.
 ORDER_TOLERANCE, DENSE_TOLERANCE, HIGH_ORDER, HIGH_TOLERANCE = 0.2, 0.5, 6, 0.75
-# Steps: in each part of the grid at least, in a run at most, and their ratio from run to run.
-FEWEST, MOST, RATIO = 2, 6000, 2.0 ** (1.0 / 3.0)
+# Steps: in each part of the grid at least, in a run at most, and their ratio from run to run. Where the order falls
+# short there are more, up to FINEST, until fits to more and to fewer runs agree to SETTLED: leading terms of the errors
+# of low orders show late.
+FEWEST, MOST, RATIO, FINEST, SETTLED = 2, 6000, 2.0 ** (1.0 / 3.0), 100_000, 0.03
+# Part of the span of a scene for methods of order one: a whole one takes them a million steps.
+BRIEF = 0.125
 # Sizes of step that an order is fitted to, at least and at most; errors that count: above rounding, below the coarsest.
 POINTS, COARSEST, ROUNDING = (4, 7), 0.05, 2e-11
 # Tolerances that are tried, from order four on and below; the error may be so many times as large.

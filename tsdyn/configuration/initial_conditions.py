@@ -9,6 +9,7 @@ from ..observables.evaluate import constraint_arrays
 from ..rows.interface import redundant_of, set_selection
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of, set_redundant
+from ..sparse.length_metric import coordinate_scales
 from ..sparse.massless_axes import axis_of
 from .rank import check_rank
 from .start_kernels import (
@@ -16,13 +17,13 @@ from .start_kernels import (
     HOLDS,
     NONE,
     evaluate_start,
-    free_axis,
+    failing_row,
     go_near_by,
     land_start,
     select_redundant,
     take_start,
 )
-from .start_violations import demand_finite, demand_small, refuse_vanished
+from .start_violations import demand_finite, demand_small, refuse_masses, refuse_vanished
 from .start_workspace import give, taken
 from .tolerances import (
     DENSE_ENTRIES,
@@ -83,6 +84,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         start = start.again()
     elif still(packed).bodies.size:
         start.check()  # for H where it starts
+    start.demand_inertia()
     settle(packed, start.graph, start.tangent.rows.H)
     return start.landed()
 
@@ -171,13 +173,22 @@ class _Start:
         tol = self.tol * (1.0 + np.abs(self.qd).max())
         demand_small(self.scene, self.velocity, tol, "velocity", "Phi_q qd + Phi_t")
 
+    def failing_row(self):
+        """Return the row at which the dynamics of the kept rows are singular, or -1: by masses, rows aside."""
+        looked_at = len(self.graph.axes.rows) or self.workspace.unequal
+        return failing_row(self.context, self.q, self.t) if looked_at else -1
+
     def loose_axis(self):
         """Return the row of a massless axis about which the kept rows leave rotation free, or -1."""
-        return free_axis(self.context, self.q, self.t) if len(self.graph.axes.rows) else -1
+        row = self.failing_row()
+        return row if row in self.graph.axes.rows["row"] else -1
 
     def demand_inertia(self):
-        """Refuse a massless axis about which rotation is free."""
-        self.refuse_axis(self.loose_axis())
+        """Refuse a massless axis about which rotation is free, and masses so unequal that S is singular."""
+        row = self.failing_row()
+        if row >= 0 and row not in self.graph.axes.rows["row"]:
+            refuse_masses(self.scene, self.graph, row)
+        self.refuse_axis(row)
 
     def refuse_axis(self, row):
         """Refuse the axis of a row, by its body; -1 is none."""
@@ -223,7 +234,7 @@ class _Start:
     def is_regular(self):
         """Whether rows are independent and hold to rounding, as `check` finds it, with inertia about every axis."""
         self.found = self.evaluate()
-        return self.found == HOLDS and self.loose_axis() < 0
+        return self.found == HOLDS and self.failing_row() < 0
 
     def redundant_rows(self):
         """Return the rows that are redundant here and nearby; refuse a singular configuration."""
@@ -270,7 +281,7 @@ class _Start:
         A = constraint_arrays(self.scene.system, q, self.qd, self.t)[1][graph.row[joints]]
         for at in self.at:  # without the component along p, which the normalisations hold
             A[:, at] -= np.outer(A[:, at] @ q[at], q[at])
-        return joints[np.sort(dependent(A))]
+        return joints[np.sort(dependent(A * coordinate_scales(self.packed)))]
 
     def serve(self, rows):
         """Take these rows for redundant; return True if S of the others is nonsingular."""

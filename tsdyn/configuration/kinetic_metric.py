@@ -6,6 +6,8 @@
 Euler parameters stay normalised, so A has no normalisation rows.
 """
 
+from functools import cached_property
+
 import numpy as np
 
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
@@ -13,6 +15,7 @@ from ..maths.row_rank import row_lengths
 from ..maths.sparse_lu import sparse_lu
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
+from ..sparse.length_metric import arms
 from .tolerances import DENSE, IMMOBILE, LEAST_DIVISOR, PLAIN, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
 
 _G = transform_g(np.eye(4)).reshape(4, 12)  # G is linear in p
@@ -21,10 +24,11 @@ _G = transform_g(np.eye(4)).reshape(4, 12)  # G is linear in p
 class Metric:
     """Constraints of a packed scene at time t as rows (m', x), dense or, of more than DENSE coordinates, sparse.
 
-    held (n,) marks coordinates that are fixed.
+    held (n,) marks coordinates that are fixed. With `lengths`, the metric is that of sparse/length_metric.py: rank is
+    geometry.
     """
 
-    def __init__(self, packed, held=None, t=0.0):
+    def __init__(self, packed, held=None, t=0.0, lengths=False):
         system = packed.system
         rigid = system.bodies[:, 1] == 7
         self.packed, self.t, self.n = packed, t, int(system.bodies[:, 1].sum())
@@ -35,12 +39,15 @@ class Metric:
         self.rigid, self.at = rigid, system.bodies[:, 0]
         self.r, self.move = self.at[:, None] + np.arange(3), starts[:-1, None] + np.arange(3)
         self.p, self.turn = self.at[rigid, None] + np.arange(3, 7), starts[:-1][rigid, None] + np.arange(3, 6)
-        self.root = np.sqrt(system.mass)[:, None]
-        J = system.inertia[rigid].reshape(-1, 3, 3)
+        masses, J = system.mass, system.inertia[rigid].reshape(-1, 3, 3)
+        if lengths:
+            masses, J = np.ones(len(masses)), (arms(packed)[rigid] ** 2)[:, None, None] * np.eye(3)
+        self.root = np.sqrt(masses)[:, None]
         mean = np.trace(J, axis1=1, axis2=2) / 3.0
         thin = np.linalg.eigvalsh(J)[:, 0] < THIN * mean
         self.fall = np.linalg.cholesky(J + (THIN * mean * thin)[:, None, None] * np.eye(3)).swapaxes(1, 2)  # L^T
         self.rise = np.linalg.inv(self.fall)
+        self.J, self.thin = J, thin
         own = [not part.normalises for part in packed.constraints for _ in range(part.rows)]
         self.own = np.flatnonzero(np.array(own, bool))
         free = np.ones(self.size, bool)
@@ -49,6 +56,14 @@ class Metric:
             free[self.turn[held[self.p[:, 0]]]] = False
         self.columns = np.flatnonzero(free)
         self._last = None, None, None  # q and rows of the last `linear`, and what it returned
+
+    @cached_property
+    def inertia_roots(self):
+        """Q (b, 3, 3), Q^T Q = J' as it is: zero for axes without inertia, which have some in the metric."""
+        roots = self.fall.copy()
+        size, axes = np.linalg.eigh(self.J[self.thin])
+        roots[self.thin] = np.sqrt(np.maximum(size, 0.0))[:, :, None] * axes.swapaxes(1, 2)
+        return roots
 
     def arrays(self, q):
         """Phi (m,), Phi_q (m, n), Phi_t (m,), all rows."""

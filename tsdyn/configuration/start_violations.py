@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..errors import InconsistentState, SingularConfiguration
+from .tolerances import LEAST_DIVISOR
 
 
 def demand_finite(scene, *arrays):
@@ -40,3 +41,25 @@ def refuse_vanished(row):
         f"the row of {row} in Phi_q is zero in this configuration: the constraint is singular here. Start from another "
         "configuration, or use a constraint that is regular here."
     )
+
+
+def refuse_masses(scene, graph, row):
+    """Refuse masses so unequal that S is singular to rounding at a row of the graph."""
+    system = scene.packed.system
+    found = scene.bodies, system.mass, "kg"
+    rigid = system.bodies[:, 1] == 7
+    spread = _ratio(system.mass)
+    if rigid.any() and _ratio(moments := np.abs(system.inertia[rigid]).max(axis=1)) > spread:
+        found = [body for body, turns in zip(scene.bodies, rigid, strict=True) if turns], moments, "kg m^2"
+    (bodies, sizes, unit), names = found, scene.row_names()
+    light, heavy = int(sizes.argmin()), int(sizes.argmax())
+    where = names[graph.row[row]] if graph.row[row] >= 0 else "a body with many joints"
+    raise SingularConfiguration(
+        f"the mass ratio of these bodies is too large for accelerations in double precision: {bodies[light].name} "
+        f"({sizes[light]:.3g} {unit}) beside {bodies[heavy].name} ({sizes[heavy]:.3g} {unit}), found at {where}. Give "
+        "light bodies that carry heavy ones more mass, or make them one body with what they carry."
+    )
+
+
+def _ratio(sizes):
+    return sizes.max() / max(sizes.min(), LEAST_DIVISOR)

@@ -3,15 +3,14 @@
 import numpy as np
 
 from ..sparse.massless_axes import lean_bodies, levers
-from ..sparse.tolerances import THIN
-from ..taylor.tolerances import LIGHT
+from ..sparse.tolerances import THIN, UNEQUAL
 
 
 class Weights:
     """Whether masses and inertias of the cases ask for no other equations than those of the arena.
 
     They do where a body has next to no inertia about an axis (`massless_axes.lean_bodies`), or where masses become
-    unequal (`taylor.run_memory.are_unequal`).
+    unequal (`length_metric.are_unequal`).
     """
 
     def __init__(self, base, is_unequal):
@@ -37,7 +36,7 @@ class Weights:
         return fits & (self._are_unequal(count) == self._is_unequal)
 
     def _are_unequal(self, count):
-        """As `taylor.run_memory.are_unequal`, of each case."""
+        """As `length_metric.are_unequal`, of each case."""
         system, found = self._base.system, np.zeros(count, bool)
         for own, varied in ((system.mass, self.masses), (np.abs(system.inertia).max(axis=1), self.inertias)):
             others = own > 0.0  # zero for the inertia of a point mass
@@ -45,5 +44,5 @@ class Weights:
             every = [own[others][None], *(column[:, None] for column in varied.values())]
             every = np.hstack([np.broadcast_to(columns, (count, columns.shape[1])) for columns in every])
             if every.size:
-                found |= every.max(axis=1) > LIGHT * every.min(axis=1)
+                found |= every.max(axis=1) > UNEQUAL * every.min(axis=1)
         return found

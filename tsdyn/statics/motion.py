@@ -20,6 +20,7 @@ from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sp
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import graph_of, redundant_rows
+from ..sparse.length_metric import coordinate_scales
 from .pairwise import derivatives
 from .tolerances import DENSE, LEAST_DIVISOR, REDUNDANT_SHARE, ROUNDED, SINGULAR
 
@@ -87,7 +88,7 @@ class Motion:
         if not known.size:
             return known
         if self.q.size <= DENSE:
-            found = dependent(self.Phi_q.toarray())
+            found = dependent(self.Phi_q.toarray() * coordinate_scales(self.packed))
         else:
             found = dependent_rows(self.packed, self.q, self.t, REDUNDANT_SHARE)
         if found is not None and found.size > known.size and self.q.size <= DENSE:

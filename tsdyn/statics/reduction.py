@@ -95,7 +95,7 @@ class Reduced:
         rows = np.zeros((metric.size, k))
         rows[metric.move] = metric.root[:, :, None] * T[metric.r]
         rotations = 2.0 * transform_g(motion.q[metric.p]) @ T[metric.p]
-        rows[metric.turn] = metric.fall @ rotations
+        rows[metric.turn] = metric.inertia_roots @ rotations
         R = interruptible(lambda: np.linalg.qr(rows, mode="r")) if k else np.zeros((0, 0))
         if k and np.abs(np.diagonal(R)).min() == 0.0:
             raise SingularConfiguration("linearise: a coordinate carries no inertia.")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..errors import RedundantConstraints, SingularConfiguration, Status
+from ..errors import InvalidArgument, RedundantConstraints, SingularConfiguration, Status
 from ..formulations.locked_orientations import keep_turning, settle, still
 from ..maths.row_rank import dependent
 from ..observables.evaluate import constraint_arrays
@@ -11,6 +11,8 @@ from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of, set_redundant
 from ..sparse.length_metric import coordinate_scales
 from ..sparse.massless_axes import axis_of
+from ..validation import counted
+from .mobility import mobility_at
 from .rank import check_rank
 from .start_kernels import (
     DOUBTFUL,
@@ -42,6 +44,7 @@ NO_CHOICE = (
     "Phi_q has dependent rows, and no independent selection of its rows was found: a row may be zero here. Start from "
     "another configuration."
 )
+STRAIGHT = " Long straight chains look so, too: their rows depend on each other to rounding. Bend them."
 DEPENDENT = (
     "Phi_q has dependent rows.\nRemove the redundant rows, or use a joint with fewer rows. If the rows are independent "
     "elsewhere, this is a singular configuration: start from another one."
@@ -260,16 +263,28 @@ class _Start:
         chosen = self.chosen_of_all()
         if chosen.size and self.serve(chosen) and self.hold_near_by(way.ravel()):
             return chosen
-        which = ", ".join(names[i] for i in sorted(row[rows])[:8])
-        count = int((row >= 0).sum())
-        free = int(np.where(self.graph.bodies[:, 1] == 7, 6, 3).sum()) - count + rows.size
-        straight = " Long straight chains look so, too: their rows depend on each other to rounding. Bend them."
-        raise SingularConfiguration(
-            f"Phi_q has lost rank in this configuration, and has full rank nearby: of {count} rows of the joints "
-            f"{count - rows.size} are independent here ({which} depend{'s' if rows.size == 1 else ''} on the "
-            f"others), so {free} directions are free at this point and fewer next to it. Branches of the motion meet "
-            "here, and its branch is not determined: start from another configuration, on the intended branch."
-            + (straight if count > MANY_ROWS else "")
+        which = [names[i] for i in sorted(row[rows])]
+        raise SingularConfiguration(self._singular(which) + STRAIGHT * (int((row >= 0).sum()) > MANY_ROWS))
+
+    def _singular(self, which):
+        """What to say of a configuration in which rows, by name, are dependent that don't hold nearby."""
+        try:
+            found = mobility_at(self.scene, self.q, self.t)
+        except InvalidArgument:  # too large
+            found = None
+        counts = ""
+        if found is not None and found.singular:
+            real, free = int((self.graph.row >= 0).sum()), found.degrees_of_freedom
+            counts = (
+                f": of {real} rows of the joints {real - found.rows + found.rank} are independent here, so "
+                f"{counted(free, 'direction')} {'is' if free == 1 else 'are'} free at this point and "
+                f"{found.generic_degrees_of_freedom or 'none'} next to it"
+            )
+            which = [each.name for each in found.dependent_here]
+        return (
+            f"Phi_q has a lower rank in this configuration than nearby{counts}. {', '.join(which[:8])} "
+            f"depend{'s' if len(which) == 1 else ''} on other rows just here. Branches of the motion meet, and its "
+            "branch is not determined: start from another configuration, on the intended branch."
         )
 
     def chosen_of_all(self):

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
 from ..maths.row_rank import row_lengths
-from ..maths.tolerances import RANK_TOL
 from ..maths.sparse_lu import sparse_lu
+from ..maths.tolerances import RANK_TOL
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
 from ..sparse.length_metric import arms

@@ -1,6 +1,8 @@
 """The metric of lengths, in which the rank of constraint rows is judged: geometry alone, whatever the masses.
 
-    |x|^2 = sum |dr|^2 + L^2 |w'|^2,        L: the longest arm of a body's joints, m
+    |x|^2 = sum |dr|^2 + L^2 |w'|^2
+
+L is the longest arm of a body's joints, m.
 """
 
 import numpy as np

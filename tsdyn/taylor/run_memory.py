@@ -1,7 +1,5 @@
 """Run workspace of the Taylor driver, and what all Taylor runs of a scene share."""
 
-import numpy as np
-
 from ..errors import InvalidArgument, Status
 from ..formulations.locked_orientations import moving_parts
 from ..model.packed import System

@@ -9,8 +9,8 @@ from ..sparse.tolerances import FAINT, THIN, UNEQUAL
 class Weights:
     """Whether masses and inertias of the cases ask for no other equations than those of the arena.
 
-    They do where a body has next to no inertia about an axis, also beside others (`massless_axes.lean_bodies`), or where masses become
-    unequal (`length_metric.are_unequal`).
+    They do where a body has next to no inertia about an axis, also beside others (`massless_axes.lean_bodies`), or
+    where masses become unequal (`length_metric.are_unequal`).
     """
 
     def __init__(self, base, is_unequal):

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..elements.markers import POINT
 from ..jit.kernels import Record, records
-from .tolerances import FAINT, GIVEN, NONE, THIN
+from .tolerances import FAINT, GIVEN, NONE, RAISED, THIN
 
 
 class Axis(Record):
@@ -68,7 +68,7 @@ def lean_bodies(packed):
     most, found = whole.max(initial=0.0), {}
     light = np.where(size[:, 0] < THIN * whole, GIVEN * whole, size[:, 0]) < FAINT * most
     carries = np.isin(rigid, _carriers(packed, set(rigid[light].tolist()))) if light.any() else light
-    least = np.where(carries, FAINT * most, THIN * whole)
+    least = np.where(carries, RAISED * most, THIN * whole)
     given = np.where(carries, np.sqrt(whole * most), GIVEN * whole)
     for i in np.flatnonzero(size[:, 0] < least):
         few = size[i] < least[i]

@@ -26,8 +26,8 @@ UNEQUAL = 1e4
 # Moment of inertia over the largest of the body, about its centroid or by its lever arms: less takes an axis row. The
 # condition of S is about its inverse, so six digits of the multipliers are at stake.
 THIN = 1e-6
-# The same over the largest of the scene, of a body that carries heavier ones: pivots of S are smaller than the root of
-# rounding from here on.
-FAINT = 1e-8
+# The same over the largest of the scene, of a body that carries heavier ones: below the first, pivots of S come close
+# to rounding, and all moments below the second, its root, are raised. Radau takes shorter steps then.
+FAINT, RAISED = 1e-12, 1e-8
 GIVEN = 0.1  # the raised moment of inertia J over the same: a condition of ten
 NONE = 1e-14  # moment of inertia over the largest about the centroid: less is rounding of the eigenvalues, and zero

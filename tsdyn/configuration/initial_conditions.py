@@ -82,12 +82,12 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         set_redundant(packed, np.zeros(0, np.int64))
         start = start.again()
     rows = start.redundant_rows()
+    start.demand_inertia()
     if known is None or len(known) != len(rows):
         set_redundant(packed, rows if len(rows) else None)
         start = start.again()
     elif still(packed).bodies.size:
         start.check()  # for H where it starts
-    start.demand_inertia()
     settle(packed, start.graph, start.tangent.rows.H)
     return start.landed()
 
@@ -148,6 +148,7 @@ class RedundantStarts:
         again.check()
         if not np.array_equal(again.redundant_rows(), last.packed.derived.redundant):
             return None
+        again.demand_inertia()
         last.check()
         settle(last.packed, last.graph, last.tangent.rows.H)
         return last.landed()

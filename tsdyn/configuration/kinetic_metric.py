@@ -54,7 +54,7 @@ class Metric:
         masses, J, L = system.mass, system.inertia[rigid].reshape(-1, 3, 3), arms(packed)[rigid]
         if lengths:
             masses, J = np.ones(len(masses)), (L**2)[:, None, None] * np.eye(3)
-        least = LIGHTEST * masses.max()
+        least = LIGHTEST * masses.max(initial=0.0)
         size = np.maximum(np.trace(J, axis1=1, axis2=2) / 3.0, masses[rigid] * L**2)
         more = np.maximum(THIN * size, LIGHTEST * size.max(initial=0.0))
         thin = np.linalg.eigvalsh(J)[:, 0] < more

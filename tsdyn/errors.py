@@ -122,7 +122,7 @@ class RedundantConstraints(TsdynError, ValueError):
 
 
 class SingularConfiguration(TsdynError, ArithmeticError):
-    """The equations of motion have no unique solution: Phi_q loses rank, or D^T M D is singular.
+    """The equations of motion have no unique solution: Phi_q loses rank, or D^T M D is singular, also to rounding.
 
     Examples
     --------

@@ -292,3 +292,40 @@ def test_joint_that_constraints_hold_is_no_coordinate():
     scene.add(ts.constraints.Fixed.at(one, two, point=(1, 0, 0)))
     scene.add(ts.constraints.Revolute.at(one, two, point=(1, 0, 0), axis=(0, 1, 0), name="hinge"))
     assert not any("hinge" in name for name in scene.linearise().coordinates)
+
+
+def wire(j):
+    """A slender body with inertia j about its axis, hinged about this with a torsional spring of 1e-6 N m."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    body = scene.add_body(1.0, (1e-2, 1e-2, j), position=(0, 0, -0.5), name="wire")
+    scene.add(ts.constraints.Spherical.at(scene.ground, body, point=(0, 0, 0), name="end"))
+    directions = {"axis_a": (0, 0, 1), "reference_a": (1, 0, 0), "reference_b": (1, 0, 0)}
+    scene.add(ts.forces.TorsionalSpring(scene.ground, body, **directions, stiffness=1e-6, name="torsion"))
+    return scene
+
+
+@pytest.mark.parametrize("j", [1e-5, 1e-8, 1e-10, 1e-12])
+def test_torsion_of_a_slender_body(j):
+    found, expected = wire(j).linearise(), np.sqrt(1e-6 / j)
+    A = found.state_space().A
+    np.testing.assert_allclose(np.abs(found.eigenvalues()).max(), expected, rtol=HELD)
+    np.testing.assert_allclose(2 * np.pi * found.modes().frequency.max(), expected, rtol=HELD)
+    np.testing.assert_allclose(np.abs(np.linalg.eigvals(A)).max(), expected, rtol=HELD)
+    shape = found.modes().shapes[-1].real
+    assert shape @ found.M @ shape == pytest.approx(1.0, rel=HELD)
+    assert wire(j).equilibrium().smallest_stiffness == pytest.approx(1e-6 / j, rel=HELD)
+
+
+def test_damping_ratio_of_a_slender_body():
+    scene = wire(1e-10)
+    directions = {"axis_a": (0, 0, 1), "reference_a": (1, 0, 0), "reference_b": (1, 0, 0)}
+    scene.add(ts.forces.TorsionalSpring(scene.ground, scene["wire"], **directions, stiffness=0.0, damping=2e-9))
+    assert scene.linearise().modes().damping_ratio[-1] == pytest.approx(0.1, rel=HELD)
+
+
+def test_a_rod_is_as_slender_as_it_is():
+    scene = ts.Scene()
+    rod = scene.add_body(**ts.shapes.rod(1.0, axis="z", mass=1.0), position=(0, 0, -0.5), name="rod")
+    scene.add(ts.constraints.Revolute.at(scene.ground, rod, point=(0, 0, 0), axis=(0, 1, 0)))
+    assert scene.equilibrium().smallest_stiffness == pytest.approx(1.5 * 9.81, rel=HELD)
+    np.testing.assert_allclose(np.abs(scene.linearise().eigenvalues()), np.sqrt(1.5 * 9.81), rtol=HELD)

@@ -15,7 +15,7 @@ from ..maths.row_rank import row_lengths
 from ..validation import number, one_of, positive, sequence
 from .continuation import Found, Kept, close, nearest, relax, settle, stuck
 from .infeasible_subset import refuse
-from .kinetic_metric import Metric, least_step, rotation_vectors
+from .kinetic_metric import Metric, least_energy, least_step, rotation_vectors
 from .loop_folds import Folds
 from .mirrored_branches import demand_aligned
 from .start_violations import demand_finite, refuse_vanished
@@ -98,8 +98,9 @@ def assemble(
     Notes
     -----
     Springs hold the bodies at their poses in the sketch, in the metric of kinetic energy; the constraints are springs
-    whose stiffness increases until they hold. Gauss-Newton steps follow. Redundant rows are allowed. The velocity
-    correction has the least kinetic energy.
+    whose stiffness increases until they hold. Gauss-Newton steps follow. Redundant rows are allowed. For the positions
+    a mass counts as 1e-8 of the largest at least, a moment of inertia also as 1e-6 of the body's mean. The velocity
+    correction has the least kinetic energy, with masses as they are; above 200 coordinates with those of the positions.
 
     Examples
     --------
@@ -134,7 +135,7 @@ def assemble(
     A = whole.reduced(q, Phi_q[whole.own])
     _demand_regular(scene, whole, A)
     demand_aligned(packed, q, float(t))
-    given, qd = _velocities(whole, q, (sketch, qd), A, Phi_t[whole.own])
+    given, qd = _velocities(whole, q, (sketch, qd), A, Phi_q, Phi_t[whole.own])
     residual = Phi_q @ qd + Phi_t
     _demand_compatible(scene, residual, max(tol, LEAST_VELOCITY_TOL) * (1.0 + np.abs(qd).max()))
     over = () if links is None else links.turned(metric, q, links.shown(metric, sketch))
@@ -222,18 +223,22 @@ def _unfolded(metric, sketch, found, links, tol):
     )
 
 
-def _velocities(metric, q, sketch, A, Phi_t):
+def _velocities(metric, q, sketch, A, Phi_q, Phi_t):
     """Return qd of the sketch (q, qd), its angular velocities at the orientations q, and the nearest consistent qd."""
     qd = sketch[1]
     x = metric.speeds(qd[metric.r], metric.spins(*sketch))
     given = qd.copy()
     given[metric.p] = metric.rates(q, x)[metric.p]
+    exact = metric.is_bounded and not metric.sparse
+    if exact:
+        metric = Metric(metric.packed, None, metric.t, lengths=True)
+        A, x = metric.reduced(q, Phi_q[metric.own]), metric.speeds(qd[metric.r], metric.spins(*sketch))
     fitted = given
     for _ in range(3):
         residual = A @ x + Phi_t
         if np.abs(residual).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(fitted).max()):
             break
-        x = x + least_step(A, residual)
+        x = least_energy(metric, q, A, x, Phi_t) if exact else x + least_step(A, residual)
         fitted = metric.rates(q, x)
     return given, fitted
 

@@ -2,27 +2,30 @@
 
 import numpy as np
 
-from ..errors import RedundantConstraints, SingularConfiguration, Status
+from ..errors import InvalidArgument, RedundantConstraints, SingularConfiguration, Status
 from ..formulations.locked_orientations import keep_turning, settle, still
 from ..maths.row_rank import dependent
 from ..observables.evaluate import constraint_arrays
 from ..rows.interface import redundant_of, set_selection
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of, set_redundant
+from ..sparse.length_metric import coordinate_scales
 from ..sparse.massless_axes import axis_of
+from ..validation import counted
+from .mobility import mobility_at
 from .rank import check_rank
 from .start_kernels import (
     DOUBTFUL,
     HOLDS,
     NONE,
     evaluate_start,
-    free_axis,
+    failing_row,
     go_near_by,
     land_start,
     select_redundant,
     take_start,
 )
-from .start_violations import demand_finite, demand_small, refuse_vanished
+from .start_violations import demand_finite, demand_small, refuse_masses, refuse_vanished
 from .start_workspace import give, taken
 from .tolerances import (
     DENSE_ENTRIES,
@@ -41,6 +44,7 @@ NO_CHOICE = (
     "Phi_q has dependent rows, and no independent selection of its rows was found: a row may be zero here. Start from "
     "another configuration."
 )
+STRAIGHT = " Long straight chains look so, too: their rows depend on each other to rounding. Bend them."
 DEPENDENT = (
     "Phi_q has dependent rows.\nRemove the redundant rows, or use a joint with fewer rows. If the rows are independent "
     "elsewhere, this is a singular configuration: start from another one."
@@ -78,6 +82,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         set_redundant(packed, np.zeros(0, np.int64))
         start = start.again()
     rows = start.redundant_rows()
+    start.demand_inertia()
     if known is None or len(known) != len(rows):
         set_redundant(packed, rows if len(rows) else None)
         start = start.again()
@@ -143,6 +148,7 @@ class RedundantStarts:
         again.check()
         if not np.array_equal(again.redundant_rows(), last.packed.derived.redundant):
             return None
+        again.demand_inertia()
         last.check()
         settle(last.packed, last.graph, last.tangent.rows.H)
         return last.landed()
@@ -171,13 +177,22 @@ class _Start:
         tol = self.tol * (1.0 + np.abs(self.qd).max())
         demand_small(self.scene, self.velocity, tol, "velocity", "Phi_q qd + Phi_t")
 
+    def failing_row(self):
+        """Return the row at which the dynamics of the kept rows are singular, or -1: by masses, rows aside."""
+        looked_at = len(self.graph.axes.rows) or self.workspace.unequal
+        return failing_row(self.context, self.q, self.t) if looked_at else -1
+
     def loose_axis(self):
         """Return the row of a massless axis about which the kept rows leave rotation free, or -1."""
-        return free_axis(self.context, self.q, self.t) if len(self.graph.axes.rows) else -1
+        row = self.failing_row()
+        return row if row in self.graph.axes.rows["row"] else -1
 
     def demand_inertia(self):
-        """Refuse a massless axis about which rotation is free."""
-        self.refuse_axis(self.loose_axis())
+        """Refuse a massless axis about which rotation is free, and masses so unequal that S is singular."""
+        row = self.failing_row()
+        if row >= 0 and row not in self.graph.axes.rows["row"]:
+            refuse_masses(self.scene, self.graph, row)
+        self.refuse_axis(row)
 
     def refuse_axis(self, row):
         """Refuse the axis of a row, by its body; -1 is none."""
@@ -223,7 +238,7 @@ class _Start:
     def is_regular(self):
         """Whether rows are independent and hold to rounding, as `check` finds it, with inertia about every axis."""
         self.found = self.evaluate()
-        return self.found == HOLDS and self.loose_axis() < 0
+        return self.found == HOLDS and self.failing_row() < 0
 
     def redundant_rows(self):
         """Return the rows that are redundant here and nearby; refuse a singular configuration."""
@@ -249,16 +264,28 @@ class _Start:
         chosen = self.chosen_of_all()
         if chosen.size and self.serve(chosen) and self.hold_near_by(way.ravel()):
             return chosen
-        which = ", ".join(names[i] for i in sorted(row[rows])[:8])
-        count = int((row >= 0).sum())
-        free = int(np.where(self.graph.bodies[:, 1] == 7, 6, 3).sum()) - count + rows.size
-        straight = " Long straight chains look so, too: their rows depend on each other to rounding. Bend them."
-        raise SingularConfiguration(
-            f"Phi_q has lost rank in this configuration, and has full rank nearby: of {count} rows of the joints "
-            f"{count - rows.size} are independent here ({which} depend{'s' if rows.size == 1 else ''} on the "
-            f"others), so {free} directions are free at this point and fewer next to it. Branches of the motion meet "
-            "here, and its branch is not determined: start from another configuration, on the intended branch."
-            + (straight if count > MANY_ROWS else "")
+        which = [names[i] for i in sorted(row[rows])]
+        raise SingularConfiguration(self._singular(which) + STRAIGHT * (int((row >= 0).sum()) > MANY_ROWS))
+
+    def _singular(self, which):
+        """What to say of a configuration in which rows, by name, are dependent that don't hold nearby."""
+        try:
+            found = mobility_at(self.scene, self.q, self.t)
+        except InvalidArgument:  # too large
+            found = None
+        counts = ""
+        if found is not None and found.singular:
+            real, free = int((self.graph.row >= 0).sum()), found.degrees_of_freedom
+            counts = (
+                f": of {real} rows of the joints {real - found.rows + found.rank} are independent here, so "
+                f"{counted(free, 'direction')} {'is' if free == 1 else 'are'} free at this point and "
+                f"{found.generic_degrees_of_freedom or 'none'} next to it"
+            )
+            which = [each.name for each in found.dependent_here]
+        return (
+            f"Phi_q has a lower rank in this configuration than nearby{counts}. {', '.join(which[:8])} "
+            f"depend{'s' if len(which) == 1 else ''} on other rows just here. Branches of the motion meet, and its "
+            "branch is not determined: start from another configuration, on the intended branch."
         )
 
     def chosen_of_all(self):
@@ -270,7 +297,7 @@ class _Start:
         A = constraint_arrays(self.scene.system, q, self.qd, self.t)[1][graph.row[joints]]
         for at in self.at:  # without the component along p, which the normalisations hold
             A[:, at] -= np.outer(A[:, at] @ q[at], q[at])
-        return joints[np.sort(dependent(A))]
+        return joints[np.sort(dependent(A * coordinate_scales(self.packed)))]
 
     def serve(self, rows):
         """Take these rows for redundant; return True if S of the others is nonsingular."""

@@ -11,9 +11,23 @@ import numpy as np
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
 from ..maths.row_rank import row_lengths
 from ..maths.sparse_lu import sparse_lu
+from ..maths.tolerances import RANK_TOL
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
-from .tolerances import DENSE, IMMOBILE, LEAST_DIVISOR, PLAIN, SMALL_ANGLE, SOFT, SOLVED, TANGENT, THIN
+from ..sparse.length_metric import arms
+from .tolerances import (
+    DENSE,
+    IMMOBILE,
+    LEAST_DIVISOR,
+    LIGHTEST,
+    NO_INERTIA,
+    PLAIN,
+    SMALL_ANGLE,
+    SOFT,
+    SOLVED,
+    TANGENT,
+    THIN,
+)
 
 _G = transform_g(np.eye(4)).reshape(4, 12)  # G is linear in p
 
@@ -21,10 +35,12 @@ _G = transform_g(np.eye(4)).reshape(4, 12)  # G is linear in p
 class Metric:
     """Constraints of a packed scene at time t as rows (m', x), dense or, of more than DENSE coordinates, sparse.
 
-    held (n,) marks coordinates that are fixed.
+    held (n,) marks coordinates that are fixed. With `lengths`, the metric is that of sparse/length_metric.py: rank is
+    geometry. The kinetic one `is_bounded` where masses or moments of inertia are raised, so that it stays a metric: it
+    says which of many configurations is near, and no physical number. Those come of `kinetic_rows`.
     """
 
-    def __init__(self, packed, held=None, t=0.0):
+    def __init__(self, packed, held=None, t=0.0, lengths=False):
         system = packed.system
         rigid = system.bodies[:, 1] == 7
         self.packed, self.t, self.n = packed, t, int(system.bodies[:, 1].sum())
@@ -35,11 +51,16 @@ class Metric:
         self.rigid, self.at = rigid, system.bodies[:, 0]
         self.r, self.move = self.at[:, None] + np.arange(3), starts[:-1, None] + np.arange(3)
         self.p, self.turn = self.at[rigid, None] + np.arange(3, 7), starts[:-1][rigid, None] + np.arange(3, 6)
-        self.root = np.sqrt(system.mass)[:, None]
-        J = system.inertia[rigid].reshape(-1, 3, 3)
-        mean = np.trace(J, axis1=1, axis2=2) / 3.0
-        thin = np.linalg.eigvalsh(J)[:, 0] < THIN * mean
-        self.fall = np.linalg.cholesky(J + (THIN * mean * thin)[:, None, None] * np.eye(3)).swapaxes(1, 2)  # L^T
+        masses, J, L = system.mass, system.inertia[rigid].reshape(-1, 3, 3), arms(packed)[rigid]
+        if lengths:
+            masses, J = np.ones(len(masses)), (L**2)[:, None, None] * np.eye(3)
+        least = LIGHTEST * masses.max(initial=0.0)
+        size = np.maximum(np.trace(J, axis1=1, axis2=2) / 3.0, masses[rigid] * L**2)
+        more = np.maximum(THIN * size, LIGHTEST * size.max(initial=0.0))
+        thin = np.linalg.eigvalsh(J)[:, 0] < more
+        self.is_bounded = bool(thin.any() or (masses < least).any())
+        self.root = np.sqrt(np.maximum(masses, least))[:, None]
+        self.fall = np.linalg.cholesky(J + (more * thin)[:, None, None] * np.eye(3)).swapaxes(1, 2)  # L^T
         self.rise = np.linalg.inv(self.fall)
         own = [not part.normalises for part in packed.constraints for _ in range(part.rows)]
         self.own = np.flatnonzero(np.array(own, bool))
@@ -227,6 +248,40 @@ def _of_independent(unit, target):
     except np.linalg.LinAlgError:
         return None
     return unit.T @ np.linalg.solve(K, target) if far > PLAIN else None
+
+
+def kinetic_rows(system, q, rates):
+    """Rows F (6 b + 3 points, k) of rates qd (n, k): |F x|^2 = 2 T of qd = rates x, with masses as they are."""
+    bodies = system.bodies
+    rigid = bodies[:, 1] == 7
+    p = bodies[rigid, :1] + np.arange(3, 7)
+    size, axes = np.linalg.eigh(system.inertia[rigid].reshape(-1, 3, 3))
+    roots = np.sqrt(np.maximum(size, 0.0))[:, :, None] * axes.swapaxes(1, 2)
+    shifts = np.sqrt(system.mass)[:, None, None] * rates[bodies[:, :1] + np.arange(3)]
+    turns = 2.0 * (roots @ _transforms(q[p])) @ rates[p]
+    return np.concatenate((shifts.reshape(-1, rates.shape[1]), turns.reshape(-1, rates.shape[1])))
+
+
+def least_energy(metric, q, A, x, drift):
+    """Return the x' with A x' + drift = 0 for which x' - x has the least kinetic energy; a metric of lengths, dense.
+
+    x' = x + d + Z y,    A Z = 0,    |F (d + Z y)| -> min
+
+    Masses enter F alone, its rows in order of size: QR with pivoting then keeps the digits of light bodies.
+    """
+    from scipy.linalg import lstsq  # imported here: it would double the time of `import tsdyn`
+
+    lengths = row_lengths(A)
+    some = lengths > 0.0
+    U, s, V = np.linalg.svd(A[some] / lengths[some, None])
+    rank = int((s > RANK_TOL * s.max(initial=0.0)).sum())
+    residual = (A @ x + drift)[some] / lengths[some]
+    d = -V[:rank].T @ ((U[:, :rank].T @ residual) / s[:rank])
+    rates = np.stack([metric.rates(q, each) for each in (d, *V[rank:])], axis=1)
+    F = kinetic_rows(metric.system, q, rates)
+    F = F[np.argsort(-np.linalg.norm(F, axis=1))]
+    y = lstsq(F[:, 1:], -F[:, 0], cond=NO_INERTIA, lapack_driver="gelsy")[0] if rank < len(V) else np.zeros(0)
+    return x + d + V[rank:].T @ y
 
 
 def unit_tangent(metric, q, rng):

@@ -140,10 +140,11 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
 
     Notes
     -----
-    The rank is that of Phi_q with rows of unit length in the metric of kinetic energy: singular values above 1e-7 of
-    the largest. A row is called redundant if it depends on those of its joint and of joints added before it, so they
-    gather in few joints. Whether a configuration is singular is told by consistent ones beside it. Above 1000
-    coordinates, what hangs in open chains is put aside first and costs O(N); closed loops cost the cube of their rows.
+    The rank is that of Phi_q with rows of unit length, rotations times the longest arm of the body's joints: singular
+    values above 1e-7 of the largest. Masses don't matter. A row is called redundant if it depends on those of its
+    joint and of joints added before it, so they gather in few joints. Whether a configuration is singular is told by
+    consistent ones beside it. Above 1000 coordinates, what hangs in open chains is put aside first and costs O(N);
+    closed loops cost the cube of their rows.
 
     Examples
     --------
@@ -160,11 +161,17 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
     >>> report.degrees_of_freedom, len(report.redundant)
     (1, 5)
     """
-    packed, start = scene.packed, scene.start[0]
+    start = scene.start[0]
     q = finite_vector(start if q is None else q, start.size, "q").copy()
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
-    metric = Metric(packed, None, float(t))
+    return mobility_at(scene, q, float(t))
+
+
+def mobility_at(scene, q, t):
+    """As `mobility`, of arguments that are checked."""
+    packed = scene.packed
+    metric = Metric(packed, None, t, lengths=True)
     Phi, Phi_q, Phi_t = metric.arrays(q)
     demand_finite(scene, Phi, Phi_q, Phi_t)
     demand_small(scene, Phi, CONSISTENT * (1.0 + np.abs(q).max()), "position", "Phi")

@@ -5,12 +5,14 @@ import numpy as np
 from ..constraints.euler_normalization import EulerNormalization
 from ..errors import RedundantConstraints
 from ..maths.row_rank import farthest_first, rank_of, singular_values, unit_rows
+from ..sparse.length_metric import coordinate_scales
 from .row_dependence import partners
 from .start_violations import refuse_vanished
 
 
 def check_rank(scene, Phi_q):
     """Refuse dependent rows of Phi_q, by name."""
+    Phi_q = Phi_q * coordinate_scales(scene.packed)
     m = Phi_q.shape[0]
     if m == 0:
         return
@@ -41,7 +43,7 @@ def weakest_row(scene, Phi_q, redundant=0):
     """
     if not (Phi_q.size and np.isfinite(Phi_q).all()):
         return "", 1.0
-    scaled = unit_rows(Phi_q)
+    scaled = unit_rows(Phi_q * coordinate_scales(scene.packed))
     size = singular_values(scaled)
     last = len(scaled) - 1 - redundant  # there are fewer values where rows are more than coordinates
     return scene.row_names()[_pivots(scene, scaled)[last]], size[last] / size[0]

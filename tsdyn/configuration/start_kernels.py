@@ -1,10 +1,16 @@
-"""Kernels of initial conditions: residuals, projection, selection of independent rows, motion to a place near by."""
+"""Kernels of initial conditions: residuals, projection, selection of independent rows, motion to a place near by.
+
+Rows are compared in the metric of lengths, and projected in that of kinetic energy.
+"""
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from ..elements.loops.body_poses import move_bodies, place_bodies, write_positions, write_velocities
 from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
-from ..jit.kernels import callback, entry, integers, kernel, vector
+from ..jit.kernels import callback, entry, integers, kernel, loader, vector
 from ..maths.dense_linalg import copy, is_finite, largest
 from ..model.equations import set_time
 from ..model.lengths import SMALL
@@ -13,7 +19,6 @@ from ..rows.interface import (
     METRIC,
     evaluate_rows,
     factorise_selected_rows,
-    is_axis,
     keep_every_row,
     multiply_rows,
     project,
@@ -21,13 +26,24 @@ from ..rows.interface import (
     select_rows,
     singularity_indicator,
 )
-from ..workspaces.workspace import load_parts
+from ..workspaces.workspace import Parts, no_parts
 from .tolerances import DOUBTFUL_SHARE, IMMOBILE, LEAST_SIZE, ROUNDING
 
 # In place of a row that depends on others: there is none; rounding may hide one.
 NONE, DOUBTFUL = -1, -2
 HOLDS = -3  # there is none, and all rows hold
 PLAIN, LANDED = 1, 2  # what `take_start` has done
+
+
+class StartParts(NamedTuple):
+    """What the kernels of a start find by one address: the same parts twice, but for the metric of their graphs."""
+
+    own: Parts
+    lengths: Parts  # length_metric.by_lengths
+    unequal: np.ndarray  # int64 (1,): length_metric.are_unequal
+
+
+load_start = loader(StartParts(no_parts(), no_parts(), np.zeros(1, np.int64)))
 
 
 @entry("pvvdviwd")
@@ -39,7 +55,7 @@ def evaluate_start(context, q, qd, t, velocity, every, at, tol):
     NONE if Phi and its rate hold to tol (1 + max |q|) and tol (1 + max |qd|), and H is finite; at: where the Euler
     parameters of the rigid bodies begin.
     """
-    c = load_parts(context)
+    c = load_start(context).lengths
     found = _evaluate(c, q, qd, t, velocity, every)
     if found == NONE and _hold(c.tangent.b, velocity, c.tangent.rows.H, q, qd, at, tol) == 1:
         return HOLDS
@@ -92,7 +108,7 @@ def _hold(b, velocity, H, q, qd, at, tol):
 @entry("pd")
 def land_start(context, t):
     """Project w.q and w.qd onto the constraint manifold. Status."""
-    return _land(load_parts(context), t)
+    return _land(load_start(context).own, t)
 
 
 @kernel
@@ -114,26 +130,28 @@ def _land(c, t):
 @entry("pdd")
 def select_redundant(context, t, share):
     """Select redundant rows at the poses, those with pivots below a share; return their number, or -1."""
-    c = load_parts(context)
+    c = load_start(context).lengths
     graph, f = c.graph, c.tangent
     count = select_rows(graph, c.system, f, t, share)
     return count if factorise_selected_rows(graph, f, f.rows, METRIC) < 0 else -1
 
 
 @entry("pvd")
-def free_axis(context, q, t):
-    """Return the row of a massless axis about which the kept rows leave rotation free at q, or -1."""
-    return _free_axis(load_parts(context), q, t)
+def failing_row(context, q, t):
+    """Return the row at which S = H W H^T of the kept rows turns out singular at q, or -1.
+
+    That of a massless axis: rotation about it is free. Any other, if rows are independent: masses are too unequal.
+    """
+    return _failing_row(load_start(context).own, q, t)
 
 
 @kernel
-def _free_axis(c, q, t):
+def _failing_row(c, q, t):
     graph, f = c.graph, c.tangent
     set_time(c.system, t)
     place_bodies(graph.bodies, q, f.poses)
     evaluate_rows(graph, c.system, f, f.rows, t)
-    failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
-    return failed if is_axis(graph, f.rows, failed) else -1
+    return factorise_selected_rows(graph, f, f.rows, DYNAMICS)
 
 
 @callback("pppppidd")
@@ -143,14 +161,15 @@ def take_start(context, q, qd, velocity, at, count, t, tol):  # eight: addresses
     The workspace is as `StartWorkspace.enter` leaves it. Return PLAIN if q and qd were at rounding, LANDED if they have
     been projected, and 0 if there is more to be looked at.
     """
-    c = load_parts(context)
+    parts = load_start(context)
+    c = parts.own
     w, f, n = c.work, c.tangent, c.work.q.size
     x, xd, at = vector(q, n), vector(qd, n), integers(at, count)
     rates = vector(velocity, c.graph.row.shape[0])
     _set_floor(w.control, x, at)
-    if _evaluate(c, x, xd, t, rates, 1) != NONE:
+    if _evaluate(parts.lengths, x, xd, t, rates, 1) != NONE:
         return 0
-    if c.graph.axes.rows.shape[0] > 0 and _free_axis(c, x, t) >= 0:
+    if (c.graph.axes.rows.shape[0] > 0 or parts.unequal[0] != 0) and _failing_row(c, x, t) >= 0:
         return 0
     if _hold(f.b, rates, f.rows.H, x, xd, at, min(ROUNDING, tol)) == 1:
         return PLAIN
@@ -212,7 +231,7 @@ def go_near_by(context, t, way, far):
 
     way (bodies, 8) is any direction; its tangent part is taken.
     """
-    c = load_parts(context)
+    c = load_start(context).lengths
     graph, f = c.graph, c.tangent
     status = factorise(graph, c.system, c.work, f, t)
     if status != 0:

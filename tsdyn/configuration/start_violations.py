@@ -40,3 +40,20 @@ def refuse_vanished(row):
         f"the row of {row} in Phi_q is zero in this configuration: the constraint is singular here. Start from another "
         "configuration, or use a constraint that is regular here."
     )
+
+
+def refuse_masses(scene, graph, row):
+    """Refuse masses so unequal that S is singular to rounding at a row of the graph."""
+    system = scene.packed.system
+    rigid = np.flatnonzero(system.bodies[:, 1] == 7)
+    found = [(np.arange(len(system.mass)), system.mass, "kg")]
+    found += [(rigid, np.abs(system.inertia[rigid]).max(axis=1), "kg m^2")] * bool(rigid.size)
+    which, sizes, unit = min(found, key=lambda each: each[1].min() / each[1].max())
+    light, heavy = int(sizes.argmin()), int(sizes.argmax())
+    bodies, names = [scene.bodies[i] for i in which], scene.row_names()
+    where = names[graph.row[row]] if graph.row[row] >= 0 else "a body with many joints"
+    raise SingularConfiguration(
+        f"the mass ratio of these bodies is too large for accelerations in double precision: {bodies[light].name} "
+        f"({sizes[light]:.3g} {unit}) beside {bodies[heavy].name} ({sizes[heavy]:.3g} {unit}), found at {where}. Give "
+        "light bodies that carry heavy ones more mass, or make them one body with what they carry."
+    )

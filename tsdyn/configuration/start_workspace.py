@@ -5,8 +5,10 @@ import numpy as np
 from ..jit.kernels import resident
 from ..model.lengths import is_small
 from ..rows.interface import allocate_tangent, reset_selection, selection_parts
+from ..sparse.length_metric import are_unequal, by_lengths
 from ..workspaces.carving import words
 from ..workspaces.workspace import parts
+from .start_kernels import StartParts
 from .tolerances import KEPT_FLOATS, ROUNDING
 
 
@@ -28,7 +30,9 @@ class StartWorkspace:
         if packed.derived.redundant is not None:
             whole = whole._replace(tangent=allocate_tangent(graph, n, redundant=True))
         self.reals, self.tangent, self.work, self.rates = own.reals, whole.tangent, whole.work, np.zeros(len(graph.row))
-        self.address, *self._keep = resident(whole)
+        measured = whole._replace(graph=by_lengths(packed, graph))
+        self.unequal = are_unequal(packed.system)
+        self.address, *self._keep = resident(StartParts(whole, measured, np.array([self.unequal], np.int64)))
         rigid = graph.bodies[graph.bodies[:, 1] == 7, 0]
         self.at, self.first_parameters = rigid[:, None] + np.arange(3, 7), rigid + 3  # Euler parameters
 

@@ -51,8 +51,12 @@ STEEP, SOLVED, TANGENT = 1e-6, 1e-10, 1e-7
 PLAIN = 1e-2
 # Softness of rows in sparse least squares, which no rank is known of: above the rounding of their squares.
 SOFT = 1e-13
-# Inertia of an axis that has none, as a share of the body's mean moment: the metric of kinetic energy stays a metric.
-THIN = 1e-6
+# Inertia of an axis that has none, as a share of the body's mean moment, or of its mass at the arm of its joints; and
+# mass and inertia of light bodies, as a share of the largest: the metric of kinetic energy stays a metric, of numbers
+# whose roots are four digits apart at most.
+THIN, LIGHTEST = 1e-6, 1e-8
+# Share of the largest root of an inertia below which that of a motion is none: rounding of a direction without mass.
+NO_INERTIA = 1e-14
 
 # --- the way from a sketch ---
 # Coordinates up to which matrices are dense: with 30 bodies both ways take the same time, and dense ones know the rank.

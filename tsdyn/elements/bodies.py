@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from ..errors import InvalidBody
 from ..validation import demand_known, floats, positive, shown, vector3
 from .names import new_name
-from .tolerances import INERTIA_ROUNDING, LEAST_MASS, TRIANGLE, UNIT_LENGTH
+from .tolerances import INERTIA_ROUNDING, LEAST_MASS, MOST_MASS, TRIANGLE, UNIT_LENGTH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -72,11 +72,16 @@ class Attribute(Generic[Given, Kept]):
 
 def _mass(value, body):
     mass = np.float64(positive(value, f"{body.name}: mass (kg)", InvalidBody))
-    if mass < LEAST_MASS:
-        raise InvalidBody(
-            f"{body.name}: mass (kg) must be at least {LEAST_MASS:g}, got {shown(value)}: 1 / mass overflows."
-        )
+    _demand_within(mass, value, "mass (kg)", body)
     return mass
+
+
+def _demand_within(size, value, what, body):
+    if not LEAST_MASS <= size <= MOST_MASS:
+        raise InvalidBody(
+            f"{body.name}: the {what} must be from {LEAST_MASS:g} to {MOST_MASS:g}, got {shown(value)}: its reciprocal "
+            "and its products must be finite numbers."
+        )
 
 
 def _inertia(value, body):
@@ -89,13 +94,14 @@ def _inertia(value, body):
             f"got {shown(value)}."
         )
     scale = np.abs(given).max()
+    if scale > 0.0:
+        _demand_within(scale, value, "largest moment of inertia (kg m^2)", body)
     unit = given / (scale or 1.0)  # no square or sum of its entries overflows
     skew = np.abs(unit - unit.T).max()
     if skew > INERTIA_ROUNDING:
         raise InvalidBody(f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {skew * scale:.3g}.")
     principal = np.linalg.eigvalsh(unit / 2.0 + unit.T / 2.0)
-    with np.errstate(over="ignore"):
-        moments = principal * scale
+    moments = principal * scale
     if principal[0] < -INERTIA_ROUNDING or scale == 0.0:
         raise InvalidBody(
             f"{body.name}: the principal moments of inertia {moments} kg m^2 must not be negative, nor all "

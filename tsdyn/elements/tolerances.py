@@ -3,8 +3,8 @@
 # m: squares of a point's coordinates must be numbers.
 FARTHEST = 1e150
 
-# kg: the reciprocal of a mass must be a number.
-LEAST_MASS = 1e-300
+# kg, and kg m^2 of the largest moment of inertia: reciprocals must be numbers, and so must products of two of them.
+LEAST_MASS, MOST_MASS = 1e-300, 1e150
 
 # Inertia, relative to its largest entry. A tensor turned to other axes is symmetric, and its principal moments are
 # right, to some 10 roundings; sums of hundreds of parts to 1000. The triangle inequality is a limit that a flat body

@@ -19,8 +19,8 @@ from ..runs.task import Task
 from ..simulation import method_choice
 from ..simulation.simulate import run_task
 from ..sparse.graph_builder import weights
+from ..sparse.length_metric import are_unequal
 from ..sparse.massless_axes import lean_bodies
-from ..taylor.run_memory import are_unequal
 from .batch import Batch
 from .first_slice import Finished, FirstSlice
 from .pen import pen_of

@@ -3,12 +3,10 @@
 Each function returns what is kept of the values, and which of them are admissible; what is kept of others is undefined.
 """
 
-import math
-
 import numpy as np
 
 from ..elements.bodies import transform_g
-from ..elements.tolerances import INERTIA_ROUNDING, LEAST_MASS, TRIANGLE, UNIT_LENGTH
+from ..elements.tolerances import INERTIA_ROUNDING, LEAST_MASS, MOST_MASS, TRIANGLE, UNIT_LENGTH
 
 
 def vectors(values):
@@ -22,7 +20,7 @@ def masses(values):
     """Masses (k,)."""
     if values.ndim != 1:
         return np.ones(len(values)), np.zeros(len(values), bool)
-    return values, (values >= LEAST_MASS) & (values < math.inf)
+    return values, (values >= LEAST_MASS) & (values <= MOST_MASS)
 
 
 def inertias(values):
@@ -35,6 +33,7 @@ def inertias(values):
     fits = np.isfinite(values).all(axis=(1, 2)) & values.any(axis=(1, 2))
     values = np.where(fits[:, None, None], values, np.eye(3))
     scale = np.abs(values).max(axis=(1, 2))
+    fits &= (scale >= LEAST_MASS) & (scale <= MOST_MASS)
     unit = values / scale[:, None, None]
     fits &= np.abs(unit - unit.swapaxes(1, 2)).max(axis=(1, 2)) <= INERTIA_ROUNDING
     principal = np.linalg.eigvalsh(unit / 2.0 + unit.swapaxes(1, 2) / 2.0)

@@ -3,15 +3,14 @@
 import numpy as np
 
 from ..sparse.massless_axes import lean_bodies, levers
-from ..sparse.tolerances import THIN
-from ..taylor.tolerances import LIGHT
+from ..sparse.tolerances import FAINT, THIN, UNEQUAL
 
 
 class Weights:
     """Whether masses and inertias of the cases ask for no other equations than those of the arena.
 
-    They do where a body has next to no inertia about an axis (`massless_axes.lean_bodies`), or where masses become
-    unequal (`taylor.run_memory.are_unequal`).
+    They do where a body has next to no inertia about an axis, also beside others (`massless_axes.lean_bodies`), or
+    where masses become unequal (`length_metric.are_unequal`).
     """
 
     def __init__(self, base, is_unequal):
@@ -34,10 +33,20 @@ class Weights:
         for i, far in self.far.items():
             m, moments = self.masses.get(i, self._base.system.mass[i]), self.moments.get(i, self._moments[i : i + 1])
             fits &= ~(moments[:, 0] < THIN * np.maximum(moments[:, 2], m * far))
-        return fits & (self._are_unequal(count) == self._is_unequal)
+        return fits & ~self._are_light(count) & (self._are_unequal(count) == self._is_unequal)
+
+    def _are_light(self, count):
+        """Which cases may have light bodies that carry others."""
+        moments, rigid = self._moments, self._base.system.bodies[:, 1] == 7
+        least, most = np.full(count, np.inf), np.zeros(count)
+        for i in np.flatnonzero(rigid):
+            own = self.moments.get(i, moments[i : i + 1])
+            far = self.masses.get(i, self._base.system.mass[i]) * self._levers[i] ** 2
+            least, most = np.minimum(least, own[:, 0]), np.maximum(most, np.maximum(own[:, 2], far))
+        return least < FAINT * most
 
     def _are_unequal(self, count):
-        """As `taylor.run_memory.are_unequal`, of each case."""
+        """As `length_metric.are_unequal`, of each case."""
         system, found = self._base.system, np.zeros(count, bool)
         for own, varied in ((system.mass, self.masses), (np.abs(system.inertia).max(axis=1), self.inertias)):
             others = own > 0.0  # zero for the inertia of a point mass
@@ -45,5 +54,5 @@ class Weights:
             every = [own[others][None], *(column[:, None] for column in varied.values())]
             every = np.hstack([np.broadcast_to(columns, (count, columns.shape[1])) for columns in every])
             if every.size:
-                found |= every.max(axis=1) > LIGHT * every.min(axis=1)
+                found |= every.max(axis=1) > UNEQUAL * every.min(axis=1)
         return found

@@ -9,6 +9,7 @@ from ..model.equations import set_time
 from ..rows.interface import allocate_tangent, redundant_of, select_rows
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import graph_of
+from ..sparse.length_metric import by_lengths
 from ..workspaces.workspace import load_parts, parts
 
 
@@ -33,7 +34,7 @@ def dependent_rows(packed, q, t, share):
         if known.examined is None:
             known.examined = packed._replace(derived=Derived(redundant=np.zeros(0, np.int64)))
         own = known.examined
-    graph = graph_of(own, REDUCED)
+    graph = by_lengths(packed, graph_of(own, REDUCED))
     whole = parts(packed.system._replace(reals=packed.system.reals.copy()), graph, q.size)
     tangent = allocate_tangent(graph, q.size, redundant=True)
     context, *_keep = resident(whole._replace(tangent=tangent))

@@ -30,6 +30,7 @@ from ..rows.interface import (
     multiply_rates,
     multiply_rows,
     redundant_rows_hold,
+    refinements,
     solve_product,
     solve_rows,
 )
@@ -220,6 +221,8 @@ def accelerate(context, t, y, yd, unused):
             return status
     else:
         solve_accelerations(graph, system, w, f, t)
+        if refinements(f.indicator.start) > 1:
+            refine_accelerations(graph, f)
     write_back(graph, l, f.poses, f.Z, yd)
     w.counters.evaluations += 1
     return OK if is_finite(yd) else NOT_FINITE

@@ -33,9 +33,9 @@ def demand_driven(packed, memory, t, q, who, remedy):
 
 
 def driven_rates(scene, t, q, who):
-    """The smallest velocities qd (n,), in the metric of kinetic energy, with Phi_q qd + Phi_t = 0."""
+    """The smallest velocities qd (n,), in the metric of lengths, with Phi_q qd + Phi_t = 0."""
     packed = scene.packed
-    metric = Metric(packed, None, t)
+    metric = Metric(packed, None, t, lengths=True)
     _, Phi_q, Phi_t = metric.arrays(q)
     A, drift = metric.reduced(q, Phi_q[metric.own]), Phi_t[metric.own]
     x = least_step(A, drift)

@@ -16,6 +16,7 @@ from ..maths.sparse_lu import sparse_lu
 from ..maths.tolerances import RANK_TOL
 from ..model.equations import evaluate_constraints
 from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
+from ..sparse.length_metric import coordinate_scales
 from ..validation import finite_vector, number
 from .generalised_forces import applied_loads, velocity_forces
 from .tolerances import INDEPENDENT, LARGE, LEAST_DIVISOR, LOST, LOST_DENSE, REDUNDANT_SHARES
@@ -115,7 +116,7 @@ def _evaluate_dense(packed, q, qd, t):
         try:
             return equilibrated_solve(kkt, np.concatenate((Q_A + Q_v + friction, -gamma)))
         except np.linalg.LinAlgError:
-            return _of_independent_rows(M, Phi_q, Q_A + Q_v + friction, gamma)
+            return _of_independent_rows(packed, M, Phi_q, Q_A + Q_v + friction, gamma)
 
     friction, solution = _with_friction(packed, t, q, qd, Phi_q, solve)
     return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, Q_v, solution[n:], solution[:n])
@@ -130,9 +131,9 @@ def _with_friction(packed, t, q, qd, Phi_q, solve):
     return balance(packed, float(t), q, qd, Phi_q, solve)
 
 
-def _of_independent_rows(M, Phi_q, load, gamma):
+def _of_independent_rows(packed, M, Phi_q, load, gamma):
     """Return (qdd, lam) with NaN for redundant rows, which hold all the same."""
-    redundant = dependent(Phi_q)
+    redundant = dependent(Phi_q * coordinate_scales(packed))
     if not redundant.size:
         raise SingularConfiguration(NOT_UNIQUE)
     kept = np.setdiff1d(np.arange(len(Phi_q)), redundant)

@@ -6,7 +6,7 @@ in the run.
 
 from ..jit.kernels import kernel
 from .independent_rows import weakest
-from .tolerances import ILL_CONDITIONED, NEAR, NEXT_TO, WITHIN_A_STEP, WORST_CONDITIONED
+from .tolerances import HARDLY_CONDITIONED, ILL_CONDITIONED, NEAR, NEXT_TO, WITHIN_A_STEP, WORST_CONDITIONED
 
 
 @kernel
@@ -32,7 +32,9 @@ def is_near_singular(f, share):
 @kernel
 def refinements(indicator):
     """How often multipliers are refined for the condition of S."""
-    return 0 if indicator > ILL_CONDITIONED else 1 if indicator > WORST_CONDITIONED else 2
+    if indicator > WORST_CONDITIONED:
+        return 0 if indicator > ILL_CONDITIONED else 1
+    return 2 if indicator > HARDLY_CONDITIONED else 4
 
 
 @kernel

@@ -41,8 +41,8 @@ NEXT_TO = 1e-3  # below, at 0.03: a step method hands over to series
 WITHIN_A_STEP = 0.2  # below, at 0.45: so does a fixed step that fails
 
 # The indicator itself: below these S loses so many digits, to unequal masses or to rows that nearly depend on others,
-# that multipliers are refined once, and twice. It is 1e-3 in a chain of a thousand links.
-ILL_CONDITIONED, WORST_CONDITIONED = 5e-4, 1e-8
+# that multipliers are refined once, twice, and four times. It is 1e-3 in a chain of a thousand links.
+ILL_CONDITIONED, WORST_CONDITIONED, HARDLY_CONDITIONED = 5e-4, 1e-8, 1e-11
 
 # The pivots of a primitive with several rows may change in opposite directions: their product then changes by half as
 # much as the pivot that changes most, in chains of balls.

@@ -9,6 +9,9 @@ The motion is that of J' for any J. The second equation is an axis row of S: pro
 body, and -j / J on the diagonal. It is eliminated after those rows. Its pivot is minus the part of J that these rows
 and j account for, so S needs no pivoting wherever the constraints hold the axis, and is as well conditioned as with
 inertia J. A body that is small compared with its lever arms has three such axes.
+
+So has a light body that carries heavy ones: the pivots of S at the joints of these are as small as the ratio of
+inertias, and J is the mean of the two by logarithms. About an axis that nothing holds as many digits are at stake.
 """
 
 from typing import NamedTuple
@@ -17,7 +20,7 @@ import numpy as np
 
 from ..elements.markers import POINT
 from ..jit.kernels import Record, records
-from .tolerances import GIVEN, NONE, THIN
+from .tolerances import FAINT, GIVEN, NONE, RAISED, THIN
 
 
 class Axis(Record):
@@ -62,11 +65,34 @@ def lean_bodies(packed):
     rigid = np.flatnonzero(system.bodies[:, 1] == 7)
     size, axes = np.linalg.eigh(system.inertia[rigid].reshape(-1, 3, 3))
     whole = np.maximum(size[:, 2], system.mass[rigid] * levers(packed)[rigid] ** 2)
-    found = {}
-    for i in np.flatnonzero(size[:, 0] < THIN * whole):
-        few = size[i] < THIN * whole[i]
+    most, found = whole.max(initial=0.0), {}
+    light = np.where(size[:, 0] < THIN * whole, GIVEN * whole, size[:, 0]) < FAINT * most
+    carries = np.isin(rigid, _carriers(packed, set(rigid[light].tolist()))) if light.any() else light
+    least = np.where(carries, RAISED * most, THIN * whole)
+    given = np.where(carries, np.sqrt(whole * most), GIVEN * whole)
+    for i in np.flatnonzero(size[:, 0] < least):
+        few = size[i] < least[i]
         true = np.where(size[i, few] > NONE * size[i, 2], size[i, few], 0.0)
-        found[int(rigid[i])] = Lean(axes[i].T[few], true, GIVEN * whole[i])
+        found[int(rigid[i])] = Lean(axes[i].T[few], true, given[i])
+    return found
+
+
+def _carriers(packed, light):
+    """Which of some light bodies join others to each other or to the ground, by themselves or together."""
+    number, near, found = {id(body): i for i, body in enumerate(packed.bodies)}, {i: set() for i in light}, []
+    for constraint in packed.constraints:
+        ends = {number.get(id(constraint.body_of(marker)), -1) for marker in constraint.markers}
+        for i in ends & light:
+            near[i] |= ends - {i}
+    left = set(light)
+    while left:
+        together, queue = set(), [left.pop()]
+        while queue:
+            together.add(i := queue.pop())
+            queue += near[i] & left
+            left -= near[i]
+        if len(set().union(*(near[i] for i in together)) - together) > 1:
+            found += together
     return found
 
 

@@ -60,10 +60,10 @@ class Increments:
 
     def inertia(self):
         """M of each body, (b, 6, 6), kg m^2."""
-        metric = self.metric
-        M = np.zeros((len(metric.at), 6, 6))
-        M[:, :3, :3] = (self.reach * metric.root[:, :, None]) ** 2 * np.eye(3)
-        M[metric.rigid, 3:, 3:] = metric.fall.swapaxes(1, 2) @ metric.fall
+        system, rigid = self.metric.system, self.metric.rigid
+        M = np.zeros((len(rigid), 6, 6))
+        M[:, :3, :3] = self.reach**2 * system.mass[:, None, None] * np.eye(3)
+        M[rigid, 3:, 3:] = system.inertia[rigid].reshape(-1, 3, 3)
         return M
 
     def kinetic(self, u):
@@ -85,9 +85,9 @@ class Increments:
 
         Bodies turn about any axis alike, so axes without inertia count as others do.
         """
-        metric = self.metric
-        mean = (metric.fall * metric.fall).sum(axis=(1, 2))[:, None] / 3.0
-        return load[metric.move] / metric.root**2 / self.reach, load[metric.turn] / mean
+        metric, system = self.metric, self.metric.system
+        mean = np.trace(system.inertia[metric.rigid].reshape(-1, 3, 3), axis1=1, axis2=2)[:, None] / 3.0
+        return load[metric.move] / system.mass[:, None] / self.reach, load[metric.turn] / mean
 
     def of(self, q, dq):
         """The increment that displaces q by dq (n,)."""

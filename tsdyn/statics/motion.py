@@ -20,8 +20,9 @@ from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sp
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..sparse.constraint_graph import REDUCED
 from ..sparse.constraint_graphs import graph_of, redundant_rows
+from ..sparse.length_metric import are_unequal, coordinate_scales
 from .pairwise import derivatives
-from .tolerances import DENSE, LEAST_DIVISOR, REDUNDANT_SHARE, ROUNDED, SINGULAR
+from .tolerances import DENSE, LEAST_DIVISOR, REDUNDANT_SHARE, ROUNDED, SINGULAR, UNEQUAL_SWEEPS
 
 
 class Motion:
@@ -87,7 +88,7 @@ class Motion:
         if not known.size:
             return known
         if self.q.size <= DENSE:
-            found = dependent(self.Phi_q.toarray())
+            found = dependent(self.Phi_q.toarray() * coordinate_scales(self.packed))
         else:
             found = dependent_rows(self.packed, self.q, self.t, REDUNDANT_SHARE)
         if found is not None and found.size > known.size and self.q.size <= DENSE:
@@ -116,9 +117,13 @@ class Motion:
 
     def solve(self, load, bias):
         """Return (x, lam) with M x + H^T lam = load, H x = bias; vectors, or matrices of as many columns."""
-        weights = self._weights if load.ndim == 1 else self._weights[:, None]
+        weights, n = self._weights if load.ndim == 1 else self._weights[:, None], self.q.size
         found = weights * self._factors.solve(weights * np.concatenate((load, bias)))
-        return found[: self.q.size], found[self.q.size :]
+        for _ in range(UNEQUAL_SWEEPS if are_unequal(self.system) else 0):
+            x, lam = found[:n], found[n:]
+            left = np.concatenate((load - self.M @ x - self.H.T @ lam, bias - self.H @ x))
+            found = found + weights * self._factors.solve(weights * left)
+        return found[:n], found[n:]
 
     def holding(self, Z):
         """Return free(load) = x with M x + H^T lam + Z^T held = load, H x = 0, Z x = 0; loads (n, c) are columns."""

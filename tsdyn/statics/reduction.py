@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..configuration.kinetic_metric import Metric
+from ..configuration.kinetic_metric import kinetic_rows
 from ..elements.bodies import transform_g
 from ..errors import SingularConfiguration
 from ..jit.interrupts import interruptible
@@ -90,12 +90,8 @@ class Reduced:
     @cached_property
     def R(self):
         """R (k, k), an upper triangle, M = R^T R, by orthogonal factorisation: less is lost than by Cholesky's of M."""
-        motion, T = self._motion, self.T
-        metric, k = Metric(motion.packed), T.shape[1]
-        rows = np.zeros((metric.size, k))
-        rows[metric.move] = metric.root[:, :, None] * T[metric.r]
-        rotations = 2.0 * transform_g(motion.q[metric.p]) @ T[metric.p]
-        rows[metric.turn] = metric.fall @ rotations
+        k = self.T.shape[1]
+        rows = kinetic_rows(self._motion.system, self._motion.q, self.T)
         R = interruptible(lambda: np.linalg.qr(rows, mode="r")) if k else np.zeros((0, 0))
         if k and np.abs(np.diagonal(R)).min() == 0.0:
             raise SingularConfiguration("linearise: a coordinate carries no inertia.")

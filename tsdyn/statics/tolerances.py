@@ -4,6 +4,8 @@
 LEAST_DIVISOR = 1e-300
 # Share of the largest pivot of the saddle-point matrix with unit masses and unit rows: a share of rounding.
 SINGULAR = 1e-15
+# Refinements of accelerations and multipliers where masses are unequal: the factors lose their ratio, each regains it.
+UNEQUAL_SWEEPS = 3
 
 # Share of the loads' own accelerations below which those that are left are rounding.
 ROUNDED = 1e-13

@@ -94,7 +94,23 @@ def output_times(case, solution, run):
     ]
 
 
-ALL = (another_method, implicit_methods, another_form, once_more, stopped, output_times)
+def other_masses(case, solution, run):
+    """Masses, whatever their ratio, change neither the degrees of freedom nor which rows are redundant."""
+    scene = case.scene
+    if len(scene.bodies) > FEW:
+        return []
+    factors = 10.0 ** np.random.default_rng(len(scene.bodies)).uniform(-12.0, 12.0, len(scene.bodies))
+    values = {f"{body.name}.mass": f * body.mass for body, f in zip(scene.bodies, factors, strict=True)}
+    found = [_mobility(each) for each in (scene, scene.with_parameters(values))]
+    return [Finding("mobility with other masses", float(found[0] != found[1]), 0.0)]
+
+
+def _mobility(scene):
+    found = scene.mobility()
+    return found.degrees_of_freedom, found.rank, [row.name for row in found.redundant]
+
+
+ALL = (other_masses, another_method, implicit_methods, another_form, once_more, stopped, output_times)
 
 
 def _tolerance(case):

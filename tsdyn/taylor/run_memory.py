@@ -1,7 +1,5 @@
 """Run workspace of the Taylor driver, and what all Taylor runs of a scene share."""
 
-import numpy as np
-
 from ..errors import InvalidArgument, Status
 from ..formulations.locked_orientations import moving_parts
 from ..model.packed import System
@@ -9,13 +7,14 @@ from ..rows.interface import allocate_tangent
 from ..runs.run_memory import Memory
 from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import with_loops
+from ..sparse.length_metric import are_unequal
 from ..workspaces.carving import words
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import plain_work
 from .layout import allocate_expansion, masks
 from .step_parts import check_laws, pass_singular
 from .stepper import advance_series
-from .tolerances import LIGHT, MANY
+from .tolerances import MANY
 from .workspace import SeriesContext, Trial
 
 PASSAGE = Status.PASSAGE
@@ -43,12 +42,6 @@ class Series:
         self.constant_columns = _masks_once(graph, packed)
         self.graph = with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
         self.refined = int(len(graph.bodies) > MANY or are_unequal(packed.system))
-
-
-def are_unequal(system):
-    """Whether heavy bodies may load light ones: a last place of lam accelerates these by many of their own."""
-    largest = np.abs(system.inertia).max(axis=1)  # zero for a point mass
-    return any(x.max() > LIGHT * x.min() for x in (system.mass, largest[largest > 0.0]) if x.size)
 
 
 def _masks_once(graph, packed):

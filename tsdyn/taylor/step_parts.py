@@ -70,8 +70,8 @@ def begin_orders(c, start):
         keep_start(c.graph, f.poses, x.start)
         begin(c.graph, c.system, f.poses, orders, x.bodies, f.Z)
     near = is_near_singular(f, f.indicator.start)  # there rounding of lam grows from order to order
-    refine, x.order.sweeps = orders if near else x.order.refined, 1
     sweeps = refinements(f.indicator.start)
+    refine, x.order.sweeps = orders if near or sweeps > 1 else x.order.refined, 1
     if sweeps > 0 and not near:
         refine, x.order.sweeps = max(refine, ILL_ORDERS), sweeps
     return refine

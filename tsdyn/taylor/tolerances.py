@@ -80,11 +80,7 @@ WARY, SPARE = 0.06, 0.1
 # Bodies from which lam is refined once in every run: errors of a solution by elimination grow with their number.
 MANY = 100
 
-# Ratio of masses, or of the largest inertias of bodies, above which lam is refined once too: accelerations lose as many
-# digits.
-LIGHT = 1e4
-
-# Orders of lam, from zero on, that are refined where S is ill-conditioned.
+# Orders of lam, from zero on, that are refined where S is ill-conditioned; all are where it takes two refinements.
 ILL_ORDERS = 3
 
 # Orders of all bodies, about a hundred bytes each, from which series exceed the near caches (3 MB).

@@ -225,4 +225,9 @@ def parts(system, graph, n):
     return Parts(system, plain_work(n), graph, allocate_tangent(graph, n))
 
 
-load_parts = loader(parts(plain_context().system, no_graph(), 0))
+def no_parts():
+    """Those of nothing, for their type."""
+    return parts(plain_context().system, no_graph(), 0)
+
+
+load_parts = loader(no_parts())

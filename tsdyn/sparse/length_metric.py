@@ -1,0 +1,44 @@
+"""The metric of lengths, in which the rank of constraint rows is judged: geometry alone, whatever the masses.
+
+    |x|^2 = sum |dr|^2 + L^2 |w'|^2
+
+L is the longest arm of a body's joints, m.
+"""
+
+import numpy as np
+
+from .constraint_graph import W_MASS, W_ROTATION, WEIGHTS
+from .massless_axes import AXIS_OWN, levers
+from .tolerances import LEAST_ARM, UNEQUAL
+
+
+def arms(packed):
+    """L of each body, (bodies,), m: no less than a share of the longest; one in a scene without arms."""
+    found = levers(packed)
+    longest = found.max(initial=0.0)
+    return np.maximum(found, LEAST_ARM * longest) if longest > 0.0 else np.ones(found.size)
+
+
+def coordinate_scales(packed):
+    """What columns of Phi_q are multiplied by, (n,): dr, and 2 L dp, of which the length is that of L w'."""
+    bodies, L = packed.system.bodies, arms(packed)
+    scales = np.ones(int(bodies[:, 1].sum()))
+    rigid = bodies[:, 1] == 7
+    scales[bodies[rigid, :1] + np.arange(3, 7)] = 0.5 / L[rigid, None]
+    return scales
+
+
+def by_lengths(packed, graph):
+    """The constraint graph with the inverse of this metric for W, and without axis rows but in name."""
+    inverse, values = np.zeros((len(graph.bodies) + 1, WEIGHTS)), np.zeros_like(graph.axes.values)
+    inverse[:-1, W_MASS] = 1.0
+    rigid = np.flatnonzero(graph.bodies[:, 1] == 7)
+    inverse[rigid[:, None], W_ROTATION + np.array([0, 5, 10])] = arms(packed)[rigid, None] ** -2.0
+    values[:, AXIS_OWN] = -1.0
+    return graph._replace(inverse=inverse.ravel(), axes=graph.axes._replace(values=values))
+
+
+def are_unequal(system):
+    """Whether heavy bodies may load light ones: the factors of S, and accelerations, lose digits to their ratio."""
+    largest = np.abs(system.inertia).max(axis=1)  # zero for a point mass
+    return any(x.max() > UNEQUAL * x.min() for x in (system.mass, largest[largest > 0.0]) if x.size)

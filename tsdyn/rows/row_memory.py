@@ -69,10 +69,8 @@ def reset_selection(graph, tangent):
 def selection_parts(tangent):
     """The arrays and the records that `reset_selection` sets."""
     friction = tangent.friction
-    return [friction.lam, friction.load, tangent.dropped, tangent.best, *tangent.left], [
-        tangent.selection,
-        tangent.indicator,
-    ]
+    arrays = [friction.lam, friction.load, tangent.dropped, tangent.best, *tangent.left]
+    return arrays, [tangent.selection, tangent.indicator]
 
 
 def set_selection(tangent, redundant):

@@ -27,6 +27,7 @@ from ..methods.explicit import NORM
 from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
     apply_multipliers,
+    clear_redundant,
     evaluate_bias,
     evaluate_drift,
     evaluate_rows,
@@ -66,6 +67,7 @@ def residual(context, t, g, x, y, k):
     if not set_time(system, t):
         return NOT_FINITE
     _begin(numbers, s, w.counters.charts, t)
+    clear_redundant(f, s.multipliers)  # which no iteration corrects: extrapolation would amplify those of dropped rows
     copy(vector(x, n), l.x)
     copy(vector(y, n), l.y)
     apply_multipliers(graph, l.rows0, w.u, l.x)

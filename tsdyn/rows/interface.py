@@ -56,7 +56,7 @@ from .redundant_rows import (
     save_selection,
     take_noted_selection,
 )
-from .reselection import factorise_rows, select_rows, selection_serves
+from .reselection import doubt_selection, factorise_rows, select_rows, selection_serves
 from .row_memory import (
     allocate_rows,
     allocate_tangent,
@@ -127,6 +127,7 @@ __all__ = [
     "constrain",
     "constrain_accelerations",
     "count_self_stresses",
+    "doubt_selection",
     "evaluate_bias",
     "evaluate_drift",
     "evaluate_every_row",

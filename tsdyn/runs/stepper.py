@@ -11,7 +11,7 @@ from ..maths.dense_linalg import copy
 from ..methods.explicit import call_step
 from ..model.equations import is_rheonomic, remember, set_time
 from ..model.joint_turns import count_turns
-from ..rows.interface import is_singular_within_a_step
+from ..rows.interface import doubt_selection, is_singular_within_a_step
 from ..workspaces.run_state import AGAIN, load_run
 from ..workspaces.workspace import load
 from .breakpoints import amend, fixed_end, is_sampled, next_stop, take_pieces
@@ -193,6 +193,7 @@ def _change_chart(context, c, r, log, h, status, driven):
         r.clock.h = QUARTERED * h
         if driven:  # nothing else keeps the next step from being as long
             r.clock.turn_share *= HALVED
+    doubt_selection(c.tangent)
     return begin_chart(context, c, r, log, BY_FAILURE)
 
 

@@ -7,6 +7,8 @@ TRIAL = 20
 # steps the implicit method may take (SETTLED / steps)^2 times the work of the explicit one: its steps are short until
 # fast modes have decayed, which steps at the limit of stability have kept alive.
 FIRST_WINDOW, SETTLED = 10, 80
+# Share of what the explicit method would take for the rest of a run that the implicit one may lose before it gains.
+RISKED = 0.25
 # Implicit steps after which the explicit method is tried, and its steps in such a trial.
 PATIENCE, TRIED = 30, 20
 # Factor of the steps until a method that did not pay is considered again, and until the explicit one is tried though

@@ -2,9 +2,10 @@
 
 Each goes on from where the other stands. Work for a second of motion decides, in evaluations, and after numbers of
 steps: no clock. The explicit method turns where it finds the motion stiff (runs/step_control.py, taylor/stepper.py).
-The implicit method turns back where it takes more work than the explicit one did. Otherwise the explicit one is tried
-for some steps, at growing intervals, and earlier where the derivatives of the forces had to be taken anew: as long as
-old ones serve, the motion is as stiff as it was.
+What the implicit method takes more than the explicit one would have taken for the same motion is lost: fast modes have
+to be followed until they have decayed. It turns back where more is lost than a share of what the explicit method would
+take for the rest. Otherwise the explicit one is tried for some steps, at growing intervals, and earlier where the
+derivatives of the forces had to be taken anew: as long as old ones serve, the motion is as stiff as it was.
 """
 
 from functools import cached_property
@@ -18,6 +19,7 @@ from .tolerances import (
     COST,
     FIRST_WINDOW,
     PATIENCE,
+    RISKED,
     SERIES_COST,
     SETTLED,
     SHARP_COST,
@@ -27,7 +29,7 @@ from .tolerances import (
     TRIED,
 )
 
-KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "began", "lasted"
+KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "began", "lasted", "lost", "most_lost"
 
 
 def implicit(method, prepared, form):
@@ -58,15 +60,17 @@ class Turns:
         Steps of the segment after which it is asked; of an explicit method not before it has found the motion stiff.
     """
 
-    ask, window = 0, (0.0, 0.0)  # where the steps that are judged begin: time, work
+    ask = 0
     known = 0.0  # work of the method before for a second of motion
     patience = PATIENCE  # implicit steps before the explicit method is tried
     taken, tried = 0, False  # explicit steps so far; whether the explicit method is on trial
     jacobians = 0  # of the implicit method's first steps
     began = lasted = 0.0  # s: of the segment, and length of the one before
+    lost = most_lost = 0.0  # work, by the implicit method, since it was last even; the most so far
 
     def __init__(self, scene, prepared, method, options):
         self.scene, self.prepared, self.method, self.options = scene, prepared, method, options
+        self.window = options.span[0], 0.0  # where the steps that are judged begin: time, work
 
     @cached_property
     def implicit(self):
@@ -105,15 +109,16 @@ class Turns:
         (before, done), self.window = self.window, (t, work)
         rate = (work - done) / (t - before) if t > before else 0.0
         if to_explicit:
+            self.lost = max(self.lost + (work - done) - self.known * (t - before), 0.0)
+            self.most_lost = max(self.most_lost, self.lost)
             return self._back(memory, steps, min(rate, work / steps / run.clock.h))
         if self.tried:
             return self._tried(steps, rate)
-        return bool(run.numbers.stiff) and self._to_implicit(run, steps, t)
+        return bool(run.numbers.stiff) and self._to_implicit(run, steps, t, max(rate, self._step / run.clock.h))
 
-    def _to_implicit(self, run, steps, t):
-        """Whether the implicit method is to go on; not for what little is left."""
+    def _to_implicit(self, run, steps, t, ours):
+        """Whether the implicit method is to go on, for all the work that the explicit one takes; not for little."""
         self.ask = AGAIN * steps
-        ours = self._step / run.clock.h
         if run.numbers.at_limit == 0 or not self._pays(ours, t):
             return False
         self.known, self.taken = ours, self.taken + steps
@@ -126,16 +131,22 @@ class Turns:
         return rate * (self.options.span[1] - t) > self._cost * TRIAL * STEP_EVALUATIONS
 
     def _back(self, memory, steps, rate):
-        """Whether the explicit method is to go on: it takes less work, or is to be tried."""
+        """Whether the explicit method is to go on: it would take less work for the rest, or is to be tried.
+
+        A trial may cost as much as was lost before: steps at the limit of stability keep fast modes alive.
+        """
+        left = self.options.span[1] - memory.run.clock.t
         jacobians = memory.work.counters.jacobians
         if steps <= FIRST_WINDOW:
             self.jacobians = jacobians
         patience = self.patience if jacobians > self.jacobians else AGAIN * self.patience
-        self.tried = steps >= patience and self._pays(rate, memory.run.clock.t)
+        may_win = rate <= self.known and RISKED * rate * left > self.most_lost
+        self.tried = steps >= patience and may_win and self._pays(rate, memory.run.clock.t)
         if self.tried:
             self.known = rate
         self.ask = 2 * steps if steps >= self.patience else min(2 * steps, self.patience)
-        return self.tried or rate > max(SETTLED / steps, 1.0) ** 2 * self.known
+        dear = rate > max(SETTLED / steps, 1.0) ** 2 * self.known
+        return self.tried or (dear and self.lost > RISKED * self.known * left)
 
     def _tried(self, steps, rate):
         """Whether the explicit method, after some steps, has failed to take less work."""

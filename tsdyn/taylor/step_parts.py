@@ -211,7 +211,6 @@ def is_singular(c, status):
 def state_within(context, c, kernels, t, h):
     """q, qd, qdd at t, h after the series' origin, which leaves the selection of rows as it is. Status."""
     f = c.tangent
-    weakest = f.selection.weakest
     save_selection(f)
     status = call_reach(kernels.reach, context, t, h)
     if is_singular(c, status):
@@ -220,7 +219,6 @@ def state_within(context, c, kernels, t, h):
     elif status == 0:
         status = call_reach(kernels.accelerate_here, context, t, h)
     return_to_selection(f)
-    f.selection.weakest = weakest
     return status
 
 

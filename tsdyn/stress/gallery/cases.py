@@ -7,7 +7,7 @@ from typing import NamedTuple
 from . import rods
 from .bricard import bricard
 from .governor import governor
-from .planar_links import four_bars, six_bars, slider_crank
+from .planar_links import driven_six_bar, four_bars, six_bars, slider_crank
 from .single_bodies import kapitza, sleeping_top
 from .squeezer import squeezer
 
@@ -63,6 +63,13 @@ CASES = (
         "equal crank and rod: at its dead centre the slider may stay, and branches meet",
     ),
     Case("six-bars, 5 loops", six_bars, 5.0, (0.5, 100), "15 redundant rows; chaotic", agree=1.5),
+    Case(
+        "driven six-bar",
+        driven_six_bar,
+        2.0,
+        (0.5, 100),
+        "8 redundant rows, five of them of a doubled hinge; rows that are kept at the start become dependent",
+    ),
     Case("sleeping top", sleeping_top, 600.0, (0.5, 160), "upright, 7 % above the spin at which it falls"),
     Case("Kapitza's pendulum", kapitza, 10.0, (0.2, 200), "upside down, held up by a pivot that shakes at 19 Hz"),
     Case("hub of 500 bodies", hub, 1.0, (0.1, 10), "499 rods on one body: a dense block in the Schur complement"),

@@ -5,7 +5,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...constraints import Cylindrical, PlaneContact, Revolute, Spherical, Translational
+from ...constraints import Cylindrical, PlaneContact, Revolute, RotationMotor, Spherical, Translational
+from ...motions import Sine
 from ...simulation.scene import Scene
 
 AXIS = (0.0, 0.0, 1.0)
@@ -92,6 +93,29 @@ def six_bars(loops=5):
         coupler = rod(scene, near, far, name=f"coupler {i}")
         pin(scene, left, coupler, near)
         pin(scene, coupler, right, far)
+    return scene
+
+
+PINS = (0.0, 0.0), (-0.99, -0.68), (-1.13, -1.01), (0.15, -0.87), (0.37, -0.93), (0.43, -0.35)  # m, in the plane
+TILT = -1.54, 0.85, -0.75  # rad, rotation vector of the plane
+FRAMES = (0.4, 1.4, 2.0), (-2.4, 0.1, -1.8), (-2.2, 1.4, 0.0), (-0.6, 0.5, -1.6), (-0.4, -0.5, -0.6)  # of the rods
+
+
+def driven_six_bar():
+    """Loop of six links in a tilted plane, its third hinge doubled; a motor swings the first link by 0.27 rad.
+
+    Body frames are in general position: which rows of the loop are nearly dependent changes along the motion.
+    """
+    scene, tilt = Scene(gravity=(-8.2, 1.3, -5.2)), Rotation.from_rotvec(TILT)
+    pins, axis, links = tilt.apply([(*pin, 0.0) for pin in PINS]), tilt.apply(AXIS), [scene.ground]
+    for i, mass in enumerate((0.73, 0.58, 0.83, 2.14, 0.87)):
+        frame, middle = Rotation.from_rotvec(FRAMES[i]), (pins[i] + pins[i + 1]) / 2
+        links.append(scene.add_body(mass, (0.1, 0.12, 0.15), middle, frame, name=f"rod {i}"))
+    for i, pin in enumerate(pins):
+        scene.add(Revolute.at(links[i], links[(i + 1) % 6], point=pin, axis=axis))
+    scene.add(Revolute.at(links[2], links[3], point=pins[2] + 0.5 * axis, axis=axis))
+    scene.add(RotationMotor.at(scene.ground, links[1], point=pins[0], axis=axis, angle=Sine(0.27, 5.4), name="motor"))
+    scene.assemble()
     return scene
 
 

@@ -38,3 +38,7 @@ OFF, LAW_TOLERANCE, LAW_NOISE = 1000.0, 1e-12, 1e-13
 # Part of a normal load, relative to the whole: below it a part is rounding of the reactions, in a mechanism in a plane
 # for instance, and so are all its coefficients.
 NEGLIGIBLE_LOAD = 1e-13
+
+# 1 and m: directions and points of a motor and a joint, up to which the motor prescribes the coordinate of the joint.
+# Rounding of unit vectors that are made across axes again, and of files written by hand to nine digits.
+SAME_COORDINATE = 1e-9

@@ -18,7 +18,7 @@ from .infeasible_subset import refuse
 from .kinetic_metric import Metric, least_step, rotation_vectors
 from .loop_folds import Folds
 from .mirrored_branches import demand_aligned
-from .motor_starts import approach
+from .motor_starts import approach, has_motors
 from .start_violations import demand_finite, refuse_vanished
 from .tolerances import ASSEMBLED, LEAST_VELOCITY_TOL, ROUNDING, STAGES, STIFFER, UNFOLDED
 
@@ -120,13 +120,15 @@ def assemble(
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     one_of(folds, ("keep", "free"), "folds")
-    numbers, sketch, t = _fixed(scene, fixed, free), scene.start, float(t)
+    numbers, t, driven = _fixed(scene, fixed, free), float(t), has_motors(scene)
+    sketch = scene.start
 
     def assembled():
         return assembled_nearby(scene, numbers, t, tol, folds)
 
     try:
-        approach(scene, t, numbers, assembled)
+        if driven:
+            approach(scene, t, numbers, assembled)
         report = assembled()
     except BaseException:
         if not np.array_equal(scene.start[0], sketch[0]):

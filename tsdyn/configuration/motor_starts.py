@@ -62,6 +62,11 @@ def present_turn(handles, one, t, q):
     return float(np.broadcast_to(item.counted_from(t, *moved), len(one.joint.angles))[i])
 
 
+def has_motors(scene):
+    """Whether there are motors that `approach` may have to deal with."""
+    return any(isinstance(member.constraint, RotationMotor) for member in scene.packed.members)
+
+
 def approach(scene, t, fixed, assembled, besides=()):
     """Take the joints of motors that stand far from the angle prescribed at t there, or nearly so.
 
@@ -74,8 +79,6 @@ def approach(scene, t, fixed, assembled, besides=()):
     besides : sequence of RotationMotor, optional
         Those that are left where they stand.
     """
-    if not any(isinstance(member.constraint, RotationMotor) for member in scene.packed.members):
-        return
     motors = [each for each in scene.constraints if isinstance(each, RotationMotor) and each not in besides]
     threaded = any(isinstance(part, Thread) for part in scene.primitives)
     ways = [way for way in (Way(scene, motor, t, threaded) for motor in motors) if way.length > DRIVE_TURN]

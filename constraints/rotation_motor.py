@@ -12,7 +12,18 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..plugins import Angle, FramedJoint, InvalidConstraint, Motion, beside, fitting, turned_about
+from ..plugins import (
+    PARALLEL,
+    Angle,
+    FramedJoint,
+    InvalidConstraint,
+    Motion,
+    across,
+    angles,
+    beside,
+    fitting,
+    turned_about,
+)
 from .angle_driver import AngleDriver
 
 if TYPE_CHECKING:
@@ -21,6 +32,8 @@ if TYPE_CHECKING:
 
 class RotationMotor(FramedJoint):
     """Prescribed rotation about an axis, over any number of turns: a motor on a hinge.
+
+    `RotationMotor.of(joint, angle=)` prescribes the angle of a joint; `scene.assemble()` takes the joint there.
 
     Parameters
     ----------
@@ -40,9 +53,9 @@ class RotationMotor(FramedJoint):
 
     Notes
     -----
-    One row: turn. Reactions are about the points. `RotationMotor.of(joint, angle=)` drives a
-    joint that has an axis; `RotationMotor.at(a, b, axis=, angle=)` takes the axis in the ground frame. The torque on b
-    about the axis is that of `solution.reaction(motor, on=b)`, its power part of `solution.power`.
+    One row: turn. Reactions are about the points. `RotationMotor.at(a, b, axis=, angle=)` takes the axis in the ground
+    frame. The torque on b about the axis is that of `solution.reaction(motor, on=b)`, its power part of
+    `solution.power`.
 
     Examples
     --------
@@ -60,6 +73,7 @@ class RotationMotor(FramedJoint):
     """
 
     joint_coordinates = (Angle(reference="reference_a", direction="reference_b"),)
+    drives = "angle"
 
     def __init__(self, a: BodyLike, b: BodyLike, *, angle: Prescribed = 0.0, **places: Any) -> None:
         super().__init__(a, b, **places)
@@ -77,9 +91,26 @@ class RotationMotor(FramedJoint):
 
     @classmethod
     @fitting
-    def of(cls, joint: Joint, *, angle: Prescribed, name: str = "") -> Self:
-        """Make the motor of a joint: it rotates b relative to a about the axis of the joint, from the present poses."""
-        return cls(*geometry(joint), **axes(joint), angle=angle, name=name)
+    def of(cls, joint: Joint, *, angle: Prescribed, which: int = 0, name: str = "") -> Self:
+        """Make the motor of a joint, which prescribes its angle as `solution.angle(joint)` gives it.
+
+        Parameters
+        ----------
+        joint : Joint
+            With an angle: Revolute, Cylindrical, Screw, Universal, ...
+        angle : one of ts.motions, a function f of time or three (f, fd, fdd), or float, rad
+            The angle of b relative to a, zero where the joint's is, over any number of turns.
+        which : int
+            Index of the angle, of a joint with several (Universal).
+        """
+        own, other, f, g, h = chosen(angles, joint, which, "angle", "Revolute, Cylindrical, Screw or Universal")
+        axis_b = getattr(joint, "axis_b" if other is joint.b else "axis_a", h)
+        if np.linalg.norm(np.cross(axis_b, h)) < PARALLEL:  # the arm of a cross: any direction across it serves
+            axis_b = across(h)[0]
+        return cls(
+            own, other, point_a=point_on(joint, own), point_b=point_on(joint, other), axis_a=np.cross(f, g),
+            axis_b=axis_b, reference_a=f, reference_b=h, angle=angle, name=name,
+        )  # fmt: skip
 
     def compose(self):
         """Eq. (1)."""
@@ -87,8 +118,8 @@ class RotationMotor(FramedJoint):
         yield "turn", AngleDriver(self.a, self.b, reference_a=f, across_a=g, reference_b=h, angle=self.angle)
 
     def aligned(self):
-        """The axes."""
-        return ((self.axis_a, self.axis_b),)
+        """None: the joint keeps the axes, and the angle is about axis_a."""
+        return ()
 
     @classmethod
     def example(cls, rng, a, b):
@@ -97,23 +128,21 @@ class RotationMotor(FramedJoint):
         return cls(a, b, **places, angle=rng.normal())
 
 
-def geometry(joint):
-    """Return the two bodies of a joint; refuse a joint without an axis on both."""
-    given = [getattr(joint, name, np.zeros(3)) for name in ("axis_a", "axis_b")]
-    pairs = [[u, v] for (_, u), (_, v) in getattr(joint, "opposed", ()) if not callable(u)]
-    known = any(np.allclose(pair, given, rtol=0.0, atol=1e-12) for pair in pairs)
-    if not known:
+def chosen(geometries, joint, which, kind, kinds):
+    """Return the geometry of a coordinate of a joint, by `angles` or `displacements`."""
+    found = geometries(joint) if getattr(joint, "joint_coordinates", ()) else []
+    if not found:
+        raise InvalidConstraint(f"{joint!r} has no {kind} to be driven; give a {kinds} joint.")
+    if not isinstance(which, (int, np.integer)) or which not in range(len(found)):
         raise InvalidConstraint(
-            f"{joint!r} has no axis to be driven; give a Revolute, Cylindrical, Translational or another "
-            "joint that keeps axis_a along axis_b."
+            f"which must be from 0 to {len(found) - 1}, as {joint!r} has {len(found)} of {kind}; got {which!r}."
         )
-    return joint.a, joint.b
+    return found[which]
 
 
-def axes(joint):
-    """Return the points and axes of a joint, as arguments."""
-    names = ("point_a", "point_b", "axis_a", "axis_b")
-    return {name: place for name in names if isinstance(place := getattr(joint, name, None), np.ndarray)}
+def point_on(joint, body):
+    """Return where a joint is on one of its bodies, body frame."""
+    return getattr(joint, "point_a" if body is joint.a else "point_b", np.zeros(3))
 
 
 def set_apart(joint, places, angle):

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Self
 
-from ..plugins import Displacement, Joint, Motion, Point, Vector, fitting
+from ..plugins import Displacement, Joint, Motion, Point, Vector, displacements, fitting
 from .dot2 import Dot2
-from .rotation_motor import axes, geometry
+from .rotation_motor import chosen
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Prescribed
@@ -29,7 +29,7 @@ class TranslationMotor(Joint):
 
     Notes
     -----
-    One row: travel. `TranslationMotor.of(joint, displacement=)` drives a joint between its points;
+    One row: travel. `TranslationMotor.of(joint, displacement=)` prescribes the displacement of a joint;
     `TranslationMotor.at(a, b, point=, axis=, displacement=)` takes a point (or `point_a=`, `point_b=`) and the axis in
     the ground frame. The force on b along the axis is that of `solution.reaction(motor, on=b)`.
 
@@ -49,6 +49,7 @@ class TranslationMotor(Joint):
 
     markers = (Point("a"), Point("b"), Vector("a"))
     joint_coordinates = (Displacement(),)
+    drives = "displacement"
 
     def __init__(self, a: BodyLike, b: BodyLike, *, displacement: Prescribed = 0.0, **places: Any) -> None:
         super().__init__(a, b, **places)
@@ -64,10 +65,9 @@ class TranslationMotor(Joint):
     @classmethod
     @fitting
     def of(cls, joint: Joint, *, displacement: Prescribed, name: str = "") -> Self:
-        """Make the motor of a joint: it moves b relative to a along the axis, measured between the joint's points."""
-        bodies, given = geometry(joint), axes(joint)
-        given.pop("axis_b")
-        return cls(*bodies, **given, displacement=displacement, name=name)
+        """Make the motor of a joint, which prescribes its displacement as `solution.displacement(joint)` gives it."""
+        own, other, e, *points = chosen(displacements, joint, 0, "displacement", "Translational, Cylindrical or Screw")
+        return cls(own, other, axis_a=e, point_a=points[0], point_b=points[1], displacement=displacement, name=name)
 
     def compose(self):
         """Eq. (1)."""

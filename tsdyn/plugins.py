@@ -17,12 +17,14 @@ from .elements.friction_laws import (
     along_and_across,
     coefficient,
     direction_series,
+    optional,
     slip,
+    slip_of,
     slip_series,
 )
 from .elements.joint import Joint, across
 from .elements.joint_coordinates import Angle, Displacement, angles, displacements
-from .elements.joint_friction import AXIS, JointFriction, optional
+from .elements.joint_friction import AXIS, JointFriction
 from .elements.joint_load import JointLoad
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.normal_series import BEARING_ROWS, bearing_series, coefficient_series, magnitude
@@ -185,6 +187,7 @@ __all__ = [
     "shown",
     "sine_cosine",
     "slip",
+    "slip_of",
     "slip_series",
     "some",
     "specialised",

@@ -188,7 +188,10 @@ def test_a_motor_is_judged_by_where_it_has_turned_to():
     """More than a quarter of a turn from where it began; and its mirrored branch, there."""
     assert motorised(2.9).assemble(t=3.0).residual <= ROUNDING
     with pytest.raises(ts.InconsistentState, match=r"motor.*opposite ways"):
-        motorised(-0.1).assemble(t=3.0)
+        ts.simulate(motorised(3.0 - np.pi), (3.0, 3.1), initial_tol=2.0)
+    scene = motorised(-0.1)
+    scene.assemble(t=3.0)
+    assert abs(ts.simulate(scene, (3.0, 3.1)).angle("motor")[0] - 3.0) < ROUNDING
 
 
 @pytest.mark.parametrize("t", [0.0, 0.7, 2.0, -1.5])

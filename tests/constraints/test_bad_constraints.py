@@ -173,7 +173,7 @@ CONSTRAINTS = [
         case(f"{kind}.of {what}", lambda w, k=kind, n=name, j=joint: getattr(C, k).of(j(w), **{n: 0.0}), *rest)
         for kind, name in (("RotationMotor", "angle"), ("TranslationMotor", "displacement"))
         for what, joint in (("Spherical", lambda w: w.pivot), ("a body", lambda w: w.rod), ("None", lambda w: None))
-        for rest in [(ts.InvalidConstraint, "no axis", "Revolute")]
+        for rest in [(ts.InvalidConstraint, f"no {name} to be driven", "Cylindrical")]
     ),
     *(
         case(f"set {kind}.{name}", lambda w, k=kind, n=name: setattr(made(k)(w), n, "x"), ts.InvalidConstraint, name)

@@ -91,7 +91,7 @@ def everything():
     scene.add(C.Screw.at(scene.ground, screw, point=screw.position, axis=Z, lead=0.1, name="thread"))
     crank = scene.add_body(1.0, (0.02, 0.02, 0.01), (1.0, 1.0, 0.0), angular_velocity=(0, 0, 4.0), name="crank")
     hinge = scene.add(C.Revolute.at(scene.ground, crank, point=crank.position, axis=Z, name="hinge"))
-    scene.add(C.RotationMotor.of(hinge, angle=M.Ramp(0.3, 4.0) + M.Exponential(0.0, 1.0), name="motor"))
+    scene.add(C.RotationMotor.of(hinge, angle=M.Ramp(0.0, 4.0) + M.Exponential(0.0, 1.0), name="motor"))
     arm = scene.add_body(0.5, (0.02, 0.01, 0.02), (1.0, 1.3, 0.0), velocity=(0.0, 0.0, 0.0), name="arm")
     path = (1.0, M.Sine(0.1, 2.0, 0.0, 1.3), M.Polynomial((0.0, 0.0, 0.2)))
     arm.velocity = (0.0, 0.2, 0.0)

@@ -247,8 +247,8 @@ def test_a_motor_that_turns_is_refused_and_one_at_rest_holds():
     scene.remove(motor)
     scene.add(C.RotationMotor.of(scene["pin 0"], angle=0.4, name="brake"))
     found = scene.equilibrium()
-    moment = 1.3 * G * 0.7 * 1.5 * np.sin(0.3)  # link 0 is held in its pose, link 1 hangs down
-    assert found.state.angle("pin 0") == pytest.approx(0.0, abs=CLOSE)
+    moment = 1.3 * G * 0.7 * 1.5 * np.sin(0.7)  # link 0 is held 0.4 rad from its pose, link 1 hangs down
+    assert found.state.angle("pin 0") == pytest.approx(0.4, abs=CLOSE)
     assert abs(found.reaction("brake", on="link 0")[1][1]) == pytest.approx(moment, rel=CLOSE)
 
 

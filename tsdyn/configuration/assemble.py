@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,8 +18,9 @@ from .infeasible_subset import refuse
 from .kinetic_metric import Metric, least_energy, least_step, rotation_vectors
 from .loop_folds import Folds
 from .mirrored_branches import demand_aligned
+from .motor_starts import approach, has_motors
 from .start_violations import demand_finite, refuse_vanished
-from .tolerances import LEAST_VELOCITY_TOL, ROUNDING, STAGES, STIFFER, UNFOLDED
+from .tolerances import ASSEMBLED, LEAST_VELOCITY_TOL, ROUNDING, STAGES, STIFFER, UNFOLDED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,7 +60,7 @@ class AssemblyReport:
 @CollectionsDeferred()
 def assemble(
     scene: Scene,
-    tol: float = 1e-12,
+    tol: float = ASSEMBLED,
     fixed: Sequence[PointMass | str] = (),
     t: float = 0.0,
     folds: Folds = "keep",
@@ -97,6 +98,9 @@ def assemble(
 
     Notes
     -----
+    A joint that stands far from the angle that its motor prescribes is taken there first: in a tree, the bodies beyond
+    it move as one rigid body; in a loop it is driven in small steps, on the present branch.
+
     Springs hold the bodies at their poses in the sketch, in the metric of kinetic energy; the constraints are springs
     whose stiffness increases until they hold. Gauss-Newton steps follow. Redundant rows are allowed. For the positions
     a mass counts as 1e-8 of the largest at least, a moment of inertia also as 1e-6 of the body's mean. The velocity
@@ -117,11 +121,29 @@ def assemble(
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     one_of(folds, ("keep", "free"), "folds")
+    numbers, t, driven = _fixed(scene, fixed, free), float(t), has_motors(scene)
+    sketch = scene.start
+
+    def assembled():
+        return assembled_nearby(scene, numbers, t, tol, folds)
+
+    try:
+        if driven:
+            approach(scene, t, numbers, assembled)
+        report = assembled()
+    except BaseException:
+        if not np.array_equal(scene.start[0], sketch[0]):
+            scene.place(*sketch)
+        raise
+    return replace(report, moved=float(np.abs(scene.start[0] - sketch[0]).max()))
+
+
+def assembled_nearby(scene, fixed, t, tol=ASSEMBLED, folds="free"):
+    """Assemble without a way to the angles of motors; return the `AssemblyReport`."""
     packed, (sketch, qd) = scene.packed, scene.start
-    fixed = _fixed(scene, fixed, free)
-    metric = whole = Metric(packed, None, float(t))
+    metric = whole = Metric(packed, None, t)
     if fixed:
-        metric = Metric(packed, _held(packed, fixed), float(t))
+        metric = Metric(packed, _held(packed, fixed), t)
     demand_finite(scene, *metric.arrays(sketch))
     found = nearest(metric, sketch, tol)
     if not found.met:
@@ -134,7 +156,7 @@ def assemble(
     Phi, Phi_q, Phi_t = whole.arrays(q)
     A = whole.reduced(q, Phi_q[whole.own])
     _demand_regular(scene, whole, A)
-    demand_aligned(packed, q, float(t))
+    demand_aligned(packed, q, t)
     given, qd = _velocities(whole, q, (sketch, qd), A, Phi_q, Phi_t[whole.own])
     residual = Phi_q @ qd + Phi_t
     _demand_compatible(scene, residual, max(tol, LEAST_VELOCITY_TOL) * (1.0 + np.abs(qd).max()))

@@ -175,7 +175,7 @@ class _Start:
     def demand_velocities(self):
         """Refuse velocities that violate the constraints."""
         tol = self.tol * (1.0 + np.abs(self.qd).max())
-        demand_small(self.scene, self.velocity, tol, "velocity", "Phi_q qd + Phi_t")
+        demand_small(self.scene, self.velocity, tol, "velocity", "Phi_q qd + Phi_t", (self.t, self.q, self.qd))
 
     def failing_row(self):
         """Return the row at which the dynamics of the kept rows are singular, or -1: by masses, rows aside."""
@@ -224,7 +224,7 @@ class _Start:
         H = np.ones((self.m, 1))
         H[graph.row[real], 0] = tangent.rows.H.reshape(-1, 16)[real].sum(axis=1)
         demand_finite(scene, Phi, H, velocity)
-        demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi")
+        demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi", (self.t, q))
         self.velocity = velocity
         self.far = np.abs(Phi).max(initial=0.0) > ROUNDING * (1.0 + np.abs(q).max())
         self.fast = np.abs(velocity).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max())

@@ -4,10 +4,11 @@ import numpy as np
 
 from ..elements.bodies import IDENTITY, rotation_matrix
 from ..errors import InconsistentState
+from .motor_starts import demand_turns, elsewhere
 
 
 def demand_aligned(packed, q, t):
-    """Refuse positions q (n,) at t that meet the rows with directions opposed, by the joint's name."""
+    """Refuse positions q (n,) at t that meet the rows with directions opposed or turns away, by the joint's name."""
     opposed, titles = _opposed(packed, q, t)
     opposed = np.flatnonzero(opposed)
     if opposed.size:
@@ -16,8 +17,9 @@ def demand_aligned(packed, q, t):
         raise InconsistentState(
             f"{', '.join(names[:8])}{more}: directions that the joint keeps parallel point opposite ways here. Its "
             "rows hold so, too, but it is the mirrored joint. Give one of the axes (or references) the other sign, or "
-            "turn a body half a turn."
+            "turn a body half a turn." + "".join(f"\n{each}" for each in elsewhere(packed, t, q))
         )
+    demand_turns(packed, q, t)
 
 
 def are_aligned(packed, q, t):

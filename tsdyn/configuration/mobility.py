@@ -174,7 +174,7 @@ def mobility_at(scene, q, t):
     metric = Metric(packed, None, t, lengths=True)
     Phi, Phi_q, Phi_t = metric.arrays(q)
     demand_finite(scene, Phi, Phi_q, Phi_t)
-    demand_small(scene, Phi, CONSISTENT * (1.0 + np.abs(q).max()), "position", "Phi")
+    demand_small(scene, Phi, CONSISTENT * (1.0 + np.abs(q).max()), "position", "Phi", (float(t), q))
     rows, A = _core(metric, q, None)
     here = rank_of(A)
     beside, generic = A, here

@@ -19,12 +19,13 @@ from ..elements.joint_coordinates import Angle, AngleGeometry
 from ..elements.membership import settle
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
 from ..model import joint_motion
-from ..model.handles import handles_of
+from ..model.handles import counts, handles_of
 from ..motions.elementary import Polynomial
 from ..validation import floats, number, sequence
-from .assemble import assemble
+from .assemble import assembled_nearby
+from .motor_starts import approach, prescribed
 from .rigid_shift import RigidShift
-from .tolerances import DRIVE_LEAST, DRIVE_SHARE, DRIVE_TURN, LEAST_DIVISOR
+from .tolerances import DRIVE_LEAST, DRIVE_SHARE, DRIVE_TURN, ELSEWHERE, LEAST_DIVISOR
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,9 +36,9 @@ if TYPE_CHECKING:
 class Goal:
     """A joint coordinate: its present value, and the value to be reached."""
 
-    def __init__(self, geometry, value, rate, new_value, new_rate):
+    def __init__(self, geometry, value, rate, new_value, new_rate, motor=None):
         self.geometry, self.turns = geometry, isinstance(geometry, AngleGeometry)
-        self.value, self.rate = value, rate
+        self.value, self.rate, self.motor = value, rate, motor
         self.new_value = value if new_value is None else new_value
         self.new_rate = rate if new_rate is None else new_rate
 
@@ -126,8 +127,9 @@ def set_joint(  # by name: a value and a rate of each coordinate
     goals = [goal for kind, pair in given.items() for goal in _goals(scene, handles, joint, kind, pair, t)]
     others = [other for other in map(handles.item, keep) if other is not joint]
     held = [(other, goal) for other in others for goal in _present(scene, handles, other, t)]
-    before = scene.start
+    motors, before = [goal.motor for goal in goals if goal.motor is not None], scene.start
     try:
+        approach(scene, float(t), (), lambda: assembled_nearby(scene, (), t), motors)
         report = _drive(scene, joint, goals, held, t)
     except BaseException:
         scene.place(*before)
@@ -179,8 +181,26 @@ def _goals(scene, handles, joint, kind, pair, t):
         value, rate = (float(evaluate(geometry, *bodies, level)) for level in (0, 1))
         if kind == "angle":
             value = float(joint_motion.counted(value, near[row.first + i]))
-        goals.append(Goal(geometry, value, rate, *new))
+        motor = next((one.motor.item for one in handles.driven if one.geometry is geometry), None)
+        if motor is not None:
+            new = _as_prescribed(joint, motor, new, t)
+        goals.append(Goal(geometry, value, rate, *new, motor))
     return goals
+
+
+def _as_prescribed(joint, motor, given, t):
+    """Return the coordinate and the rate that a motor prescribes; refuse others, None being any."""
+    found = prescribed(motor, t)
+    for name, value, wanted in zip((motor.drives, "rate"), given, found, strict=True):
+        away = 0.0 if value is None else value - wanted
+        if name == "angle" and not counts(joint):
+            away = joint_motion.counted(away, 0.0)
+        if abs(away) > ELSEWHERE * (1.0 + abs(wanted)):
+            raise InconsistentState(
+                f"set: {name}={value:.9g} of {joint.title} contradicts {motor.title}, which prescribes {wanted:.9g} at "
+                f"t = {t:g} s. Leave {name} out, change the motion, or remove the motor."
+            )
+    return found
 
 
 def _numbers(joint, name, value, count):
@@ -219,7 +239,7 @@ def _drive(scene, joint, goals, held, t):
         if shift is not None:
             shift.move(goals, ahead - share)
         try:
-            report = _assembled(scene, drivers, t)
+            report = _assembled(scene, drivers, t, [goal.motor for goal in goals if ahead < 1.0])
         except (InconsistentState, SingularConfiguration) as error:
             scene.place(*before)
             step *= 0.5
@@ -233,16 +253,17 @@ def _drive(scene, joint, goals, held, t):
             return report
 
 
-def _assembled(scene, drivers, t):
-    """Assemble the scene with temporary constraints."""
+def _assembled(scene, drivers, t, motors):
+    """Assemble the scene with temporary constraints, and without motors that prescribe the same coordinates."""
     for driver in drivers:
         settle(driver)
-    scene._added.extend(drivers)
+    added = scene._added
+    scene._added = [*(each for each in added if each not in motors), *drivers]
     scene.touch()
     try:
-        return assemble(scene, t=t, folds="free")
+        return assembled_nearby(scene, (), float(t))
     finally:
-        del scene._added[-len(drivers) :]
+        scene._added = added
         scene.touch()
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..errors import InconsistentState, SingularConfiguration
+from .motor_starts import elsewhere
 
 
 def demand_finite(scene, *arrays):
@@ -16,8 +17,8 @@ def demand_finite(scene, *arrays):
             )
 
 
-def demand_small(scene, residual, tol, level, formula):
-    """Refuse residuals (m,) above tol, by name."""
+def demand_small(scene, residual, tol, level, formula, start):
+    """Refuse residuals (m,) above tol, by name; start is (t, q) or (t, q, qd)."""
     bad = np.flatnonzero(~(np.abs(residual) <= tol))
     if bad.size == 0:
         return
@@ -26,9 +27,10 @@ def demand_small(scene, residual, tol, level, formula):
     lines = [f"  {names[i]}: {formula} = {residual[i]:.6g}" for i in worst[:8]]
     if bad.size > 8:
         lines.append(f"  ... and {bad.size - 8} more rows")
+    said = elsewhere(scene.packed, *start)
     raise InconsistentState(
         f"the initial {level} breaks {bad.size} constraint row{'s' if bad.size > 1 else ''} (allowed: {tol:.2g}):\n"
-        + "\n".join(lines)
+        + "\n".join(lines + said)
         + f"\nCorrect the bodies' {'poses' if level == 'position' else 'velocities'}, or call scene.assemble() to move "
         "them to the nearest consistent ones."
     )

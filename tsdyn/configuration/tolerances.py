@@ -112,3 +112,10 @@ NO_AXIS = 1e-12
 # --- memory ---
 # Floats of rows and factors up to which the workspace of a start is kept for the next one (8 MB): a thousand bodies.
 KEPT_FLOATS = 1 << 20
+
+# rad, m and their rates, relative to what a motor prescribes: a joint further away is said to stand elsewhere; initial
+# conditions are as exact (initial_tol).
+ELSEWHERE = 1e-9
+
+# |Phi| relative to 1 + max |q| that `assemble` leaves by default: rounding of Phi along closed loops, two digits more.
+ASSEMBLED = 1e-12

@@ -85,6 +85,7 @@ class Attachment:
     joint_coordinates: tuple[Angle | Displacement, ...] = ()  # Angle and Displacement, see tsdyn/joint_coordinates.py
     permanent: tuple[str, ...] = ()  # arguments that can't be set later
     angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
+    drives = ""  # of a motor: the coordinate that it prescribes, and its attribute: "angle" or "displacement"
     added = False  # to its scene
     named = False  # by its user
     owner: Any = None  # the joint that it is a part of

@@ -105,6 +105,7 @@ class Force(Attachment):
     slots = 0
     no_series = ""
     sharp = False
+    slips = False  # whether it is friction, which changes at rest within a slip velocity
     analytic = True
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType({})
     loads: tuple[str, ...] = ()

@@ -12,6 +12,7 @@ import numpy as np
 from ..jit.kernels import kernel
 from ..maths.recurrences import cross, dot, inverse_root, scaled
 from .markers import Point, Turn
+from .tolerances import LEAST_SLIP, SLIP
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike
@@ -88,6 +89,16 @@ def along_and_across(x, f):
     f0, f1, f2 = f[0] - along * n0, f[1] - along * n1, f[2] - along * n2
     t0, t1, t2 = f[3] - turn * n0, f[4] - turn * n1, f[5] - turn * n2
     return along, turn, np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+
+
+def optional(check):
+    """The check of a value that may be None."""
+    return lambda value, what, error: None if value is None else check(value, what, error)
+
+
+def slip_of(given):
+    """The slip velocity of a law, m/s or rad/s: as given, no less than rounding resolves; None is the default."""
+    return SLIP if given is None else max(given, LEAST_SLIP)
 
 
 class BodyFriction:

@@ -19,7 +19,9 @@ import numpy as np
 from ..calls import fitting, unknown_argument
 from ..errors import InvalidForce
 from ..validation import label, not_negative, positive
+from .friction_laws import optional, slip_of
 from .markers import TURN, Marker, Point, Turn, Vector
+from .tolerances import STRIBECK
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -27,11 +29,6 @@ if TYPE_CHECKING:
     from ..hints import AnyBody, Attachment, Floats, Random
 
 AXIS = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("a"))
-
-
-def optional(check):
-    """The check of a value that may be None."""
-    return lambda value, what, error: None if value is None else check(value, what, error)
 
 
 class JointFriction:
@@ -48,11 +45,14 @@ class JointFriction:
         Coefficient of friction while sliding.
     static : float, optional
         Coefficient near rest, at least the kinetic one (default).
-    slip_velocity : float, m/s
-        Regularisation: velocity at which the friction is 71% of its magnitude. Sticking is replaced by slower creep.
+    slip_velocity : float, m/s, optional
+        Regularisation: velocity at which the friction is 71% of its magnitude. Sticking is replaced by slower creep: by
+        default 1e-9 m/s, so that a joint under nine tenths of its friction creeps by 2e-7 m in 100 s. Less than
+        1e-12 m/s acts as 1e-12 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in
+        proportion to it where the joint comes to rest: give 1e-3 m/s for them.
     stribeck_velocity : float, m/s, optional
         Velocity at which the excess of the static over the kinetic coefficient has fallen to 37%; by default
-        10 slip_velocity.
+        10 slip_velocity, or 0.01 m/s where that is left out.
     preload : float, N
         Normal load in addition to the reaction.
     name : str, optional
@@ -84,12 +84,12 @@ class JointFriction:
     sources = ("kinetic", "static")
     markers: tuple[Marker, ...] = ()
     particles = True
-    sharp = True  # at rest, and where a part of the normal load passes zero
+    slips = sharp = True  # at rest, and where a part of the normal load passes zero
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType(
         {
             "kinetic": not_negative,
             "static": optional(not_negative),
-            "slip_velocity": positive,
+            "slip_velocity": optional(positive),
             "stribeck_velocity": optional(positive),
             "preload": not_negative,
         }
@@ -102,7 +102,7 @@ class JointFriction:
         *,
         kinetic: float,
         static: float | None = None,
-        slip_velocity: float = 1e-3,
+        slip_velocity: float | None = None,
         stribeck_velocity: float | None = None,
         preload: float = 0.0,
         name: str = "",
@@ -154,8 +154,10 @@ class JointFriction:
     def parameters(self) -> tuple[Any, ...]:
         """(mu, mu_s, v_s, v_0, preload), then the geometry."""
         static = self.kinetic if self.static is None else self.static
-        stribeck = 10.0 * self.slip_velocity if self.stribeck_velocity is None else self.stribeck_velocity
-        return self.kinetic, static, stribeck, self.slip_velocity, self.preload, *self.geometry()
+        stribeck = self.stribeck_velocity
+        if stribeck is None:
+            stribeck = STRIBECK if self.slip_velocity is None else 10.0 * self.slip_velocity
+        return self.kinetic, static, stribeck, slip_of(self.slip_velocity), self.preload, *self.geometry()
 
     def geometry(self) -> tuple[float, ...]:
         """What `law` and `normal_load` need besides, floats."""

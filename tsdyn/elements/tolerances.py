@@ -38,3 +38,15 @@ OFF, LAW_TOLERANCE, LAW_NOISE = 1000.0, 1e-12, 1e-13
 # Part of a normal load, relative to the whole: below it a part is rounding of the reactions, in a mechanism in a plane
 # for instance, and so are all its coefficients.
 NEGLIGIBLE_LOAD = 1e-13
+
+# 1 and m: directions and points of a motor and a joint, up to which the motor prescribes the coordinate of the joint.
+# Rounding of unit vectors that are made across axes again, and of files written by hand to nine digits.
+SAME_COORDINATE = 1e-9
+
+# m/s and rad/s: velocity at which friction is 71% of its magnitude, where none is given. A joint under nine tenths of
+# its friction creeps by 2e-7 m in 100 s. Less costs more: chains with friction in all joints twice as much at 1e-10.
+SLIP = 1e-9
+# The least that acts: the iteration of a stage leaves 1e-14 of velocities, and less than a hundred times that is noise.
+LEAST_SLIP = 1e-12
+# m/s: the Stribeck velocity where neither it nor the slip velocity is given.
+STRIBECK = 0.01

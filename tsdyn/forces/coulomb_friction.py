@@ -15,7 +15,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import BodyFriction, Force, act, act_series, direction_series, not_negative, positive, slip, slip_series
+from ..plugins import (
+    BodyFriction,
+    Force,
+    act,
+    act_series,
+    direction_series,
+    not_negative,
+    optional,
+    positive,
+    slip,
+    slip_of,
+    slip_series,
+)
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
@@ -30,10 +42,12 @@ class CoulombFriction(BodyFriction, Force):
         Magnitude of the friction force: coefficient of friction times normal force.
     torque : float, N m
         Magnitude of the friction torque.
-    slip_velocity : float, m/s
-        Regularisation: velocity at which the force is 71% of its magnitude.
-    slip_rate : float, rad/s
-        Regularisation of the torque.
+    slip_velocity : float, m/s, optional
+        Regularisation: velocity at which the force is 71% of its magnitude; by default 1e-9 m/s, and less than
+        1e-12 m/s acts as 1e-12 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in
+        proportion to it where the bodies come to rest: give 1e-3 m/s for them.
+    slip_rate : float, rad/s, optional
+        The same of the torque.
 
     Examples
     --------
@@ -49,9 +63,15 @@ class CoulombFriction(BodyFriction, Force):
     """
 
     sources = ("force", "torque")
-    slots, sharp = 19, True  # at rest
+    slots = 19
+    slips = sharp = True  # at rest
     quantities = MappingProxyType(
-        {"force": not_negative, "torque": not_negative, "slip_velocity": positive, "slip_rate": positive}
+        {
+            "force": not_negative,
+            "torque": not_negative,
+            "slip_velocity": optional(positive),
+            "slip_rate": optional(positive),
+        }
     )
 
     def __init__(
@@ -61,11 +81,15 @@ class CoulombFriction(BodyFriction, Force):
         *,
         force: float = 0.0,
         torque: float = 0.0,
-        slip_velocity: float = 1e-3,
-        slip_rate: float = 1e-3,
+        slip_velocity: float | None = None,
+        slip_rate: float | None = None,
         **given: Any,
     ) -> None:
         super().__init__(a, b, force=force, torque=torque, slip_velocity=slip_velocity, slip_rate=slip_rate, **given)
+
+    def parameters(self):
+        """(R, N0, v0, w0)."""
+        return self.force, self.torque, slip_of(self.slip_velocity), slip_of(self.slip_rate)
 
     @staticmethod
     def law(x, xd, par, t, out):

@@ -41,6 +41,7 @@ from .tolerances import (
     MATRICES,
     RESIDUAL_FLOOR,
     SAME_G,
+    SLIP_LEFT,
     SLOW,
     SLOW_SPARSE,
     TOO_FAR,
@@ -180,7 +181,7 @@ def _solve_stage(context, c, r, i, t, g):
     eager, sparse = l.numbers.eager > 0, l.numbers.every_chart == 1
     is_last = i + 1 == int(r.tableau[0])  # its contraction is measured: stiffness that has gone makes corrections small
     # what stages of fixed steps leave adds up over thousands of steps
-    limit, kappa = (SLOW_SPARSE, KAPPA_SPARSE) if sparse and r.numbers.adaptive == 1 else (SLOW, KAPPA)
+    limit = SLOW_SPARSE if sparse and r.numbers.adaptive == 1 else SLOW
     l.numbers.eager -= 1
     for _ in range(ITERATIONS if r.numbers.adaptive == 1 else FIXED_ITERATIONS):
         _set_stage(g, k, known, xs, ys)
@@ -219,7 +220,7 @@ def _solve_stage(context, c, r, i, t, g):
         left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
         if trusted and not measured:
             left = min(left, _expected(l.numbers, size, r.numbers.adaptive == 1))
-        if size <= floor or stuck or (left <= kappa and (measured or not is_last)):
+        if size <= floor or stuck or (left <= l.numbers.kappa and (measured or not is_last)):
             _learn(l.numbers, first, second, renewed)
             _set_stage(g, k, known, xs, ys)
             return 0 if _is_near(context, c, g, k, guess, f, dx) else STAGE_FAILED
@@ -248,18 +249,22 @@ def implicit_step(context, run, t, h):
     h_before = _see_step_before(context, c.linear, t, n, scratch)
     own = scratch[SCRATCH * n + 1 :]
     ratio = begin_prediction(memory, own, stages, n, t, h, float(c.work.counters.charts))
+    part = 1 - c.linear.numbers.slips
     copy(r.y, memory[2 * n : 3 * n])
     copy(r.yd, memory[3 * n : 4 * n])
     for i in range(1, stages):
         row = tableau[1 + i * width :]
         k = memory[(1 + i) * 2 * n + n :][:n]
-        # the prediction of k_i, then the known parts of v_i and vd_i
-        predict(tableau, memory, own, i, ratio, extrapolated(own, i), k)
+        # the prediction of k_i or vd_i, then the known parts of v_i and vd_i
+        predict(tableau, memory, own, i, ratio, extrapolated(own, i), part, k)
         combine(row[2:], i, h, 2 * n, memory, memory)
         for j in range(n):
             x[j] += r.x[j]
             y[j] += r.y[j]
-        if i == 1 and ratio == 0.0 and h_before > 0.0:  # along the line through the step before
+        if part == 0:
+            for j in range(n):
+                k[j] = (k[j] - y[j]) / (h * row[2 + i])
+        elif i == 1 and ratio == 0.0 and h_before > 0.0:  # along the line through the step before
             for j in range(n):
                 k[j] += row[1] * h / h_before * (r.yd[j] - k_before[j])
         status = _solve_stage(context, c, r, i, t + h * row[1], h * row[2 + i])
@@ -267,7 +272,7 @@ def implicit_step(context, run, t, h):
             c.linear.numbers.rates_of = 0
             return status
         if i == 1 and ratio > 0.0:
-            choose_points(tableau, memory, own, ratio, scratch[:n])
+            choose_points(tableau, memory, own, ratio, part, scratch[:n])
     combine(tableau[1 + stages * width :], stages, h, 2 * n, memory, memory)
     copy(x, r.dx)
     copy(y, r.dy)
@@ -293,11 +298,18 @@ def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):  # nine: as plug
     return 0
 
 
-def prepare_implicit(linear, method, addresses, every_chart):
-    """Give the step kernel its tolerances and the addresses that it calls, by name; whether P serves every chart."""
+def prepare_implicit(linear, method, addresses, every_chart, slips):
+    """Give the step kernel its tolerances and the addresses that it calls, by name.
+
+    every_chart: whether P serves every chart; slips: whether there is friction, to be resolved at rest.
+    """
     numbers = linear.numbers
     numbers.every_chart = int(every_chart)
     numbers.rtol, numbers.atol = (FIXED_TOL, FIXED_TOL) if method.step else method.step_tolerances()
+    numbers.slips = int(slips)
+    numbers.kappa = KAPPA_SPARSE if every_chart and not method.step else KAPPA
+    if slips:
+        numbers.kappa = min(numbers.kappa, SLIP_LEFT / (numbers.rtol + numbers.atol))
     numbers.left, numbers.first, numbers.t_before = math.inf, 1.0, -math.inf
     for name, address in addresses.items():
         setattr(linear.kernels, name, address)

@@ -4,7 +4,10 @@ Known are the earlier stages of the step, and those of the step before while the
 taken: how many, the first implicit stage of the last step has told, since a stiff transient is no polynomial.
 
 The memory of it: t, h and the counter of charts of the last attempt; h of the step before, 0 where there is none; the
-number of points; then k_i of the step before, n floats each.
+number of points; then vd_i and k_i of each stage of the step before, n floats each.
+
+With friction velocities are predicted in place of accelerations: at rest they are smooth to a part of the slip
+velocity, and friction beyond it says nothing of them.
 """
 
 import math
@@ -19,21 +22,20 @@ LEAST_POINTS, MOST_POINTS = 2, 4
 
 def prediction_memory(stages, n):
     """Floats of memory that predictions need."""
-    return BEFORE + stages * n
+    return BEFORE + 2 * stages * n
 
 
 @kernel
 def begin_prediction(memory, own, stages, n, t, h, charts):
     """Keep the stages of the last attempt if it led to t; the ratio of their step to h, 0 where there are none.
 
-    memory is that of the stages, of which stage i has k_i at (2 i + 3) n; own is that of predictions.
+    memory is that of the stages, of which stage i has vd_i at (2 i + 2) n and k_i behind; own is that of predictions.
     """
     if own[CHART_LAST] != charts:
         own[H_BEFORE] = 0.0
     elif own[H_LAST] > 0.0 and abs(own[T_LAST] + own[H_LAST] - t) <= SAME_TIME * h:
         own[H_BEFORE] = own[H_LAST]
-        for i in range(stages):
-            copy(memory[(2 * i + 3) * n :][:n], own[BEFORE + i * n :])
+        copy(memory[2 * n :][: 2 * stages * n], own[BEFORE:])
     elif own[T_LAST] != t:
         own[H_BEFORE] = 0.0
     own[T_LAST], own[H_LAST], own[CHART_LAST] = t, h, charts
@@ -41,8 +43,11 @@ def begin_prediction(memory, own, stages, n, t, h, charts):
 
 
 @kernel
-def predict(tableau, memory, own, i, ratio, points, k):
-    """k_i on the polynomial through the `points` nearest of the stages known, of the step before if ratio > 0."""
+def predict(tableau, memory, own, i, ratio, points, part, k):  # eight: what is known, and what is asked for
+    """k_i (part 1) or vd_i (part 0) on the polynomial through the `points` nearest of the stages known.
+
+    Of the step before, too, if ratio > 0.
+    """
     n, stages = k.size, int(tableau[0])
     times, places = stack(MOST_POINTS), stack(MOST_POINTS)
     found, target = 0, _time(tableau, i)
@@ -67,7 +72,7 @@ def predict(tableau, memory, own, i, ratio, points, k):
         for l in range(found):
             if l != m:
                 weight *= (target - times[l]) / (times[m] - times[l])
-        known = memory[(2 * j + 3) * n :] if j < i else own[BEFORE + (j - i) * n :]
+        known = memory[(2 * j + 2 + part) * n :] if j < i else own[BEFORE + (2 * (j - i) + part) * n :]
         for e in range(n):
             k[e] += weight * known[e]
 
@@ -85,12 +90,12 @@ def extrapolated(own, i):
 
 
 @kernel
-def choose_points(tableau, memory, own, ratio, scratch):
+def choose_points(tableau, memory, own, ratio, part, scratch):
     """Take the number of points that would have predicted the first implicit stage best; scratch is of n floats."""
     n, least = scratch.size, math.inf
-    k = memory[5 * n :]
+    k = memory[(4 + part) * n :]
     for points in range(LEAST_POINTS, MOST_POINTS + 1):
-        predict(tableau, memory, own, 1, ratio, points, scratch)
+        predict(tableau, memory, own, 1, ratio, points, part, scratch)
         off = 0.0
         for e in range(n):
             off += (k[e] - scratch[e]) * (k[e] - scratch[e])

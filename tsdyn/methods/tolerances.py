@@ -17,6 +17,10 @@ ITERATIONS, FIXED_ITERATIONS = 20, 40
 # hundredth shows in the number of steps at the loosest tolerances.
 KAPPA, KAPPA_SPARSE = 1e-3, 3e-3
 
+# m/s: what it may leave of a velocity where there is friction. At rest friction balances the loads at some velocity
+# below the slip velocity, 1e-12 m/s at least: what is left there changes the friction by a hundredth of it.
+SLIP_LEFT = 1e-14
+
 # Contraction above which the iteration matrix is rebuilt: up to it three corrections reach KAPPA
 # (docs/design-decisions.md, one Jacobian for many steps; benchmarks/stiff.py counts matrices).
 # The matrix of the tangent form costs as much as eight iterations: kept up to SLOW_SPARSE, a quarter as many matrices

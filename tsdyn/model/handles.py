@@ -8,8 +8,10 @@ import numpy as np
 
 from ..elements.bodies import PointMass
 from ..elements.element import Attachment
+from ..elements.force import Force
 from ..elements.joint_coordinates import angles, displacements
 from ..elements.names import named
+from ..elements.tolerances import SAME_COORDINATE
 from ..errors import InvalidBody, InvalidConstraint
 from .joint_motion import BodyMotion, displacement
 
@@ -23,6 +25,15 @@ class Row(NamedTuple):
     angles: tuple  # AngleGeometry each
     displacements: tuple  # DisplacementGeometry each
     first: int  # of its angles among all
+
+
+class Driven(NamedTuple):
+    """A coordinate of a joint that a motor prescribes."""
+
+    motor: Row
+    joint: Row
+    geometry: object  # of the joint
+    place: int  # of an angle among all; -1 for a displacement
 
 
 class Handles:
@@ -40,6 +51,7 @@ class Handles:
         Where the coordinates of the own and of the other body begin, and how many they are.
     frames : ndarray (count, 9)
         f, g and h of each angle.
+    driven : list of Driven
     """
 
     def __init__(self, packed):
@@ -58,6 +70,9 @@ class Handles:
                     joints.append([*self.where(angle.own), *self.where(angle.other)])
                     frames.append([*angle.f, *angle.g, *angle.h])
         self.rows, self.count = tuple(rows), len(joints)
+        motors = [row for row in rows if row.item.drives]
+        joints_only = [row for row in rows if not row.item.drives and not isinstance(row.item, Force)]
+        self.driven = [one for motor in motors for joint in joints_only for one in _driven(motor, joint)]
         self._begins = [row for row in rows if row.angles and _begins(row.item)]
         self.joints = np.array(joints, np.int64).reshape(-1, 4)
         self.frames = np.array(frames, float).reshape(-1, 9)
@@ -137,12 +152,30 @@ class Handles:
         for row in self._begins:
             moved = [displacement(g, *self.motions(g, (q,)), 0) for g in row.displacements]
             near[row.first : row.first + len(row.angles)] = row.item.counted_from(t, *moved)
+        for motor, joint, _, place in self.driven:
+            if place >= 0 and not counts(joint.item):
+                near[place] = near[motor.first]
         return near
+
+
+def _driven(motor, joint):
+    """Yield the coordinates of a joint that are those of a motor, to rounding."""
+    kind = f"{motor.item.drives}s"
+    (own,) = getattr(motor, kind)
+    for i, geometry in enumerate(getattr(joint, kind)):
+        same = geometry[:2] == own[:2]
+        if same and np.allclose(geometry[2:], own[2:], rtol=SAME_COORDINATE, atol=SAME_COORDINATE):
+            yield Driven(motor, joint, geometry, joint.first + i if kind == "angles" else -1)
+
+
+def counts(item):
+    """Whether an item says itself where counting begins: its displacement counts turns, or its motor does."""
+    return type(item).counted_from is not Attachment.counted_from
 
 
 def _begins(item):
     """Return True if the angles of an item may begin elsewhere than near zero."""
-    return type(item).counted_from is not Attachment.counted_from or np.any(item.angle_near)
+    return counts(item) or np.any(item.angle_near)
 
 
 def handles_of(packed):

@@ -24,6 +24,7 @@ class StepEngine:
         self.interpolant = method.interpolant(form.first_order)
         lengths = self.tableau.size, scratch(*self.sizes), self.interpolant.size(n, *self.sizes)
         self.lengths = dict(zip(("tableau", "memory", "block"), lengths, strict=True))
+        self.slips = prepared.slips
         self.system, kept = prepared.system(method.implicit)
         self.saddle = saddle_of(packed, self.graph, self.system) if method.implicit and form.basis_free else None
         rows = len(self.graph.row) if form.basis_free else None
@@ -55,7 +56,8 @@ class StepEngine:
                 run.clock.stability_limit = method.stability_limit
                 run.numbers.last_stage = 2 * len(method.tableau.c) * nx
         if method.implicit:
-            prepare_implicit(memory.context.linear, method, form.implicit(method.coupled > 0), form.basis_free)
+            addresses = form.implicit(method.coupled > 0)
+            prepare_implicit(memory.context.linear, method, addresses, form.basis_free, self.slips)
             run.numbers.stage_at = (2 * len(method.tableau.c) + 1) * nx
 
     def reading(self, memory, prepared, constraint_tol):

@@ -99,7 +99,12 @@ def _demand_consistent(scene, kept, q, t):
     from ..configuration.start_violations import demand_small
 
     demand_small(
-        scene, Metric(kept.packed, None, t).arrays(q)[0], INITIAL_TOL * (1.0 + np.abs(q).max()), "position", "Phi"
+        scene,
+        Metric(kept.packed, None, t).arrays(q)[0],
+        INITIAL_TOL * (1.0 + np.abs(q).max()),
+        "position",
+        "Phi",
+        (t, q),
     )
 
 

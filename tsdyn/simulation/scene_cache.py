@@ -99,6 +99,11 @@ class Prepared:
         return any(load.force.sharp for load in self.packed.loads)
 
     @cached_property
+    def slips(self):
+        """Whether there is friction, which changes at rest within the slip velocity."""
+        return any(load.force.slips for load in self.packed.loads)
+
+    @cached_property
     def rough(self):
         """Titles of the forces that depend on reactions."""
         return [load.force.title for load in self.packed.loads if "normal_load" in load.force.kernels]

@@ -1,6 +1,7 @@
 """Segments of a run, each by one method: what a segment begins with, and how all of them make one outcome.
 
-A segment ends with Status.STIFF where the default method turns to its implicit method, or back (turns.py), and with
+A segment ends with Status.STIFF where the default method turns to its implicit method, or back (turns.py); with
+Status.STEP_COLLAPSED where friction comes to rest within a step, and the implicit method goes on; and with
 Status.PASSAGE where series go on past a singular configuration, or have done so (singularity_crossing.py). All other
 runs have one segment.
 """
@@ -53,7 +54,8 @@ def run_segments(task, engine, observe=None, unfinished=None):
             return segments.go_on()
         first = task if task.report is silent else task._replace(report=_until_its_end(task.report))
         outcome = run(first, engine, relay=relay, briefly=briefly, unfinished=unfinished)
-        return _Segments(task, engine, relay, [outcome]).go_on() if outcome.status in (PASSAGE, STIFF) else outcome
+        ended = outcome.status in (PASSAGE, STIFF) or came_to_rest(task, outcome.status)
+        return _Segments(task, engine, relay, [outcome]).go_on() if ended else outcome
     finally:
         task.report(None)
 
@@ -67,6 +69,11 @@ def asks_little(task):
 def is_relayed(task, engine):
     """Whether a run may have more than one segment."""
     return task.choose is not None or (engine is StepEngine and may_pass(task))
+
+
+def came_to_rest(task, status):
+    """Whether explicit steps collapse where friction changes within them: the implicit method may go on."""
+    return status is Status.STEP_COLLAPSED and task.choose is not None and task.prepared.slips
 
 
 def may_pass(task):
@@ -164,6 +171,8 @@ class _Segments:
         role = self.roles[-1]
         if status is PASSAGE:
             return CROSSING if role != CROSSING else self.roles[-2]
+        if role == METHOD and self.turns is not None and came_to_rest(self.task, status):
+            return IMPLICIT
         return None if status is not STIFF else METHOD if role == IMPLICIT else IMPLICIT
 
     def _run(self, rest, role):

@@ -9,6 +9,8 @@ TRIAL = 20
 FIRST_WINDOW, SETTLED = 10, 80
 # Share of what the explicit method would take for the rest of a run that the implicit one may lose before it gains.
 RISKED = 0.25
+# The same where there is friction, which may come to rest: 30 halvings of a step to 1e-9 s, and 15 steps to grow again.
+RESTING = 80
 # Implicit steps after which the explicit method is tried, and its steps in such a trial.
 PATIENCE, TRIED = 30, 20
 # Factor of the steps until a method that did not pay is considered again, and until the explicit one is tried though

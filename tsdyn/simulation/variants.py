@@ -113,7 +113,7 @@ def family_of(scene):
     kept = prepared(scene)
     known = kept.packed.derived
     if known.family is None:
-        _ = kept.refusal, kept.pays, kept.sharp, kept.sampled  # for `Prepared.like`
+        _ = kept.refusal, kept.pays, kept.sharp, kept.slips, kept.sampled  # for `Prepared.like`
         known.family = Family(kept.packed, scene._initial(), scene.copy()), {}, kept
     return known.family[:2]
 

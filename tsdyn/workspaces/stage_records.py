@@ -8,6 +8,8 @@ class StageNumbers(Record):
 
     rtol: float
     atol: float
+    kappa: float  # error norm that the iteration of a stage may leave
+    slips: int  # whether there is friction, and so velocities of stages are predicted
     g: float  # h a_ii of the factors in P; 0 where there are none
     chart: int  # counter of charts when P was made, for a form whose P serves one chart only
     every_chart: int  # 1 for one whose P serves every chart

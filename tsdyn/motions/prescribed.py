@@ -20,7 +20,7 @@ from .elementary import Constant, Piecewise, time
 from .expressions import FUNCTIONS, Smooth
 from .knots import demand_covered, demand_followed
 from .program import run_program
-from .tables import is_data
+from .tables import Table, is_data
 from .tolerances import QUOTIENT_ERROR, QUOTIENT_NOISE, QUOTIENT_STEPS, SAME_VALUE, TIMES
 from .tracing import Untraceable, of_time, retold
 
@@ -144,6 +144,8 @@ class Motion:
     def components(value: Data, count: int, what: str) -> tuple[Piecewise, ...]:
         """Return the motions of the components of data; each a `Piecewise`."""
         try:
+            if isinstance(value, Table):
+                value.demand_motion()
             motions = Piecewise.each(value)
         except InvalidArgument as reason:
             raise InvalidConstraint(f"{what}: {reason}") from reason

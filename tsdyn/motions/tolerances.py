@@ -18,3 +18,8 @@ QUOTIENT_ERROR = 1e-3
 # time is compared.
 SAME_VALUE = 1e-9
 TIMES = (0.37, 1.3, 11.0)
+
+# Of the range of a table's values, how far a cubic spline may leave two neighbouring values without a warning: where
+# the values are monotone (a step of evenly spaced values: 0.13; a sine of seven values a period at its ends: 0.05), and
+# where they have an extremum (a sine of four values a period: 0.21).
+OVERSHOOT, EXTREMUM = 0.1, 0.25

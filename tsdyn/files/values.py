@@ -145,8 +145,8 @@ def _decode_table(value, names):
             except (InvalidArgument, ValueError, IndexError) as error:
                 raise Misread(str(error)) from error
     raise Misread(
-        "such a table has the keys times, values and kind; or knots, coefficients and beyond; or expression and its parts; "
-        f"got {', '.join(value) or 'none'}."
+        "such a table has the keys times, values and kind; or knots, coefficients and beyond; or expression and its "
+        f"parts; got {', '.join(value) or 'none'}."
     )
 
 

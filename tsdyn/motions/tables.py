@@ -189,11 +189,11 @@ def _overshoot(spline, values):
     worst = np.unravel_index(int(np.argmax(excess - allowed)), excess.shape)
     if not (excess - allowed)[worst] > 0.0:
         return ""
-    i = worst[1]
+    i, at = worst[1], spline.x[worst[1]] + places[worst]
     return (
-        f"Table: the cubic spline overshoots: it reaches {peaks[worst]:.4g} at t = {spline.x[i] + places[worst]:.6g} s, "
-        f"between the values {values[i][worst[2:]]:.4g} and {values[i + 1][worst[2:]]:.4g}. Give kind='pchip', which "
-        "stays within the values, 'linear' or 'previous', and a time twice for a jump; or an own CubicSpline of SciPy's."
+        f"Table: the cubic spline overshoots: it reaches {peaks[worst]:.4g} at t = {at:.6g} s, between the values "
+        f"{values[i][worst[2:]]:.4g} and {values[i + 1][worst[2:]]:.4g}. Give kind='pchip', which stays within the "
+        "values, 'linear' or 'previous', and a time twice for a jump; or an own CubicSpline of SciPy's."
     )
 
 

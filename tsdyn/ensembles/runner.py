@@ -58,7 +58,7 @@ class Study:
         self.kept, settings, default = scene._prepared, options.settings, (given["rtol"], given["atol"], options.series)
         prepare_first_run(scene, options.method, settings.form, options.within, default)
         self.method, self.n = method_of(self.kept, options, default), self.kept.n
-        self.stops = self.kept.stops(*options.span)
+        self.stops = self.kept.stops(*options.span, self.method.step is None)
         self.names = None if cases.names is None else {*self.changes, *cases.names}
         if self.names is not None and free is not None:
             self.names |= start_names(self.kept.packed)

@@ -14,7 +14,7 @@ from ..calls import fitting
 from ..errors import InvalidArgument, InvalidConstraint
 from ..jit.compiled_once import compiled_once
 from ..jit.complaints import complaint
-from ..jit.kernels import Callback, caller, kernel, specialised
+from ..jit.kernels import Callback, caller, entry, kernel, specialised
 from ..validation import number, shown
 from .elementary import Constant, Piecewise, time
 from .expressions import FUNCTIONS, Smooth
@@ -32,6 +32,13 @@ if TYPE_CHECKING:
 SIGNATURE = "d"
 UNNAMED = "motion"
 call_motion = caller(SIGNATURE, "d")
+
+
+@entry
+def sample_motion(address, t, out):
+    """The values (k,) of a compiled function at times t (k,)."""
+    for i in range(t.size):
+        out[i] = call_motion(address, t[i])
 
 
 class Motion:
@@ -211,6 +218,15 @@ class Motion:
         if self.smooth is not None:
             return np.array([function(times) for function in self.functions])
         return np.array([[function(t) for t in times] for function in self.functions], dtype=float)
+
+    def sampled(self, t: Floats) -> list[Floats]:
+        """Values and accelerations that may have short changes, at times t: a list of arrays (k,)."""
+        if self.series is not None:
+            return [] if self.series.is_even else [self.series(t), self.series.acceleration(t)]
+        found = [np.empty(t.size), np.empty(t.size)]
+        for address, out in zip(self.addresses[::2], found, strict=True):
+            sample_motion(address, t, out)
+        return found
 
     def _at(self, i, times):
         try:

@@ -13,6 +13,8 @@ from ..methods.integrator import is_plain
 from ..model.handles import handles_of
 from ..model.packed import with_curvatures
 from ..model.packed_forces import with_force_jacobians
+from ..model.state_loads import sampled_loads, user_kinds
+from ..motions.changes import NO_CHANGES, changes, sample_times
 from ..motions.knots import NO_STOPS, stops_of
 from ..observables.friction_unique import demand_unique
 from ..runs.sampling import instants_of, sampled
@@ -114,11 +116,27 @@ class Prepared:
     def _has_stops(self):
         return bool(self.sampled) or any(each.pieces for given in self.motions for each in given.motions)
 
-    def stops(self, t0, t1):
-        """The stops of a run from t0 to t1, as of `stops_of`; refuses a motion that the run can't follow."""
+    @cached_property
+    def _user_kinds(self):
+        return user_kinds(self.packed)
+
+    def stops(self, t0, t1, adaptive=False):
+        """The stops of a run from t0 to t1, as of `stops_of`; refuses a motion that the run can't follow.
+
+        adaptive: whether steps may be cut where functions change shortly.
+        """
         for motion in self.motions:
             motion.check(t0, t1)
-        return stops_of(self.motions, instants_of(self.packed, t0, t1), t0, t1) if self._has_stops else NO_STOPS
+        found = self._changes(t0, t1) if adaptive and (self.motions or self._user_kinds) else NO_CHANGES
+        if not (self._has_stops or found.size):
+            return NO_STOPS
+        return stops_of(self.motions, instants_of(self.packed, t0, t1), found, t0, t1)
+
+    def _changes(self, t0, t1):
+        t = sample_times(t0, t1)
+        with np.errstate(all="ignore"):
+            samples = [values for motion in self.motions for values in motion.sampled(t)]
+            return changes(t, [*samples, *sampled_loads(self.packed, self._user_kinds, t)])
 
     def engine(self, kind, method, form, within):
         """The engine of a method, as `frozen` returns it, in a form; see runs/run.py.

@@ -237,7 +237,7 @@ def _run_stored(task, given, options, found, archive):
 def _request(scene, kept, method, options, state, choose):
     """Return the run request, with a start that is consistent with the constraints."""
     span, settings, form = options.span, options.settings, options.settings.form
-    stops = kept.stops(*span)
+    stops = kept.stops(*span, method.step is None)
     start = scene._initial() if state is None else state_arrays(state, kept.n)
     memory = remembered(state, kept, span[0], start[0])
     q, qd = kept.start(scene, start, span[0], settings.initial_tol, memory, settings.drop)

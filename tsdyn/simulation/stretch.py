@@ -39,7 +39,7 @@ class Stretch(NamedTuple):
         demand_steps_seen(method, *span)
         return cls(
             t_span if _is_fixed(t_span) else MUTABLE, t_eval if t_eval is None or _is_fixed(t_eval) else MUTABLE, span,
-            times, times.tobytes(), prepared.stops(*span), 0 if step is None else step_count(*span, step),
+            times, times.tobytes(), prepared.stops(*span, step is None), 0 if step is None else step_count(*span, step),
             between(times, span),
         )  # fmt: skip
 

@@ -12,7 +12,7 @@ from .equations import set_time
 
 @entry
 def _sample(s, q, qd, t, at, Q, out):
-    """out (k,): sums of the forces of all kinds on the coordinates `at`, with weights, at times t (k,); Q (n,): zeros."""
+    """out (k,): weighted sums of all forces on the coordinates `at`, at times t (k,); Q (n,): zeros."""
     set_time(s, t[0])
     for i in range(t.size):
         for j in range(s.forces.shape[0]):

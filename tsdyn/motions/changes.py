@@ -1,17 +1,20 @@
 """Short changes of functions of time: pulses, bumps, edges, kinks. Found by samples, so that no step passes over them.
 
 A step sees a function at its stages alone, and flies over a pulse between them. So functions are sampled before a run,
-at SAMPLES + 1 times of it, and each sixth difference of samples is compared with the WINDOW before it that share none of
-its samples:
+at SAMPLES + 1 times of it, and each sixth difference of samples is compared with the WINDOW before it that share none
+of its samples:
 
     |d_i| > CLEAR max(|d_j|, i - ORDER - WINDOW <= j < i - ORDER) + FAINT max |f|
 
-is a change. The same on every STRIDE-th sample: a bump is found where the stride shows it in few samples. What varies as
+is a change. The same on each stride-th sample: a bump is found where the stride shows it in few samples. What varies as
 much before, as a sine or noise does, is no change: it keeps the steps short itself.
 """
 
+import math
+
 import numpy as np
 
+from ..jit.kernels import entry, kernel
 from .tolerances import CLEAR, FAINT, SAMPLES, STRIDES
 
 ORDER, WINDOW = 6, 5  # of the differences; how many one is compared with
@@ -25,35 +28,45 @@ def sample_times(t0, t1):
 
 def changes(t, functions):
     """Intervals (k, 2), s, that no step may pass over, from samples of functions (each (k,)) at times t (k,)."""
-    found = [NO_CHANGES]
+    strides, found, d = np.array(STRIDES), [NO_CHANGES], np.empty(t.size)
     for samples in functions:
-        values = np.where(np.isfinite(samples), samples, np.nan)
-        size = np.nanmax(np.abs(values), initial=0.0) or 1.0
-        values = np.nan_to_num(values / size, nan=2.0)  # what is not finite for some time is a change
-        for stride in STRIDES:
-            at, ends = t[::stride], _ends(values[::stride], stride == 1)
-            found.append(np.column_stack((at[ends - 1], at[ends])))
-    return np.unique(np.concatenate(found), axis=0)
+        finite = np.isfinite(samples)
+        size = np.abs(samples[finite]).max(initial=0.0) or 1.0
+        values = np.where(finite, samples / size, 2.0)  # what is not finite for some time is a change
+        marks = np.zeros((strides.size, t.size), np.int64)
+        mark_changes(values, strides, d, marks)
+        row, end = np.nonzero(marks)
+        end *= strides[row]
+        found.append(np.column_stack((t[end - strides[row]], t[end])))
+    return np.unique(np.concatenate(found), axis=0) if len(found) > 1 else NO_CHANGES
 
 
-def _ends(values, finest):
-    """The samples at which intervals with a change end; those that begin with one count on the finest grid."""
-    d = np.abs(np.diff(values, ORDER))
-    before = np.full(d.size, np.inf)
-    before[ORDER + 1 :] = _largest(np.concatenate((np.zeros(WINDOW - 1), d)))[: -ORDER - 1]
-    if finest:
-        before[: ORDER + 1] = _largest(d[ORDER + 1 :])[: ORDER + 1]
-    high = np.flatnonzero(d > CLEAR * before + FAINT)
-    if not high.size:
-        return high
-    groups = np.split(high, np.flatnonzero(np.diff(high) > ORDER) + 1)
-    ends = [range(min(i[0] + ORDER, i[-1] + 1), max(i[0] + ORDER, i[-1] + 1) + 1) for i in groups]
-    return np.concatenate(ends)
+@kernel
+def _before(d, i, finest):
+    """The largest difference before the i-th; the first ones on the finest grid are compared with those after them."""
+    if i <= ORDER and not finest:
+        return math.inf
+    begin = i - ORDER - WINDOW if i > ORDER else i + ORDER + 1
+    largest = 0.0
+    for j in range(max(begin, 0), begin + WINDOW):
+        largest = max(largest, d[j])
+    return largest
 
 
-def _largest(d):
-    """The largest of each WINDOW in a row."""
-    found, size = d[WINDOW - 1 :], d.size - WINDOW + 1
-    for i in range(WINDOW - 1):
-        found = np.maximum(found, d[i : i + size])
-    return found
+@entry
+def mark_changes(values, strides, d, marks):
+    """Mark the samples, each `stride`-th of values (k,), at which an interval with a change ends; d: scratch."""
+    for row in range(strides.size):
+        s = strides[row]
+        count, first, last = (values.size - 1) // s + 1 - ORDER, -1, -1
+        for i in range(count):
+            v = values[i * s :]
+            d[i] = abs(v[0] + v[6 * s] - 6.0 * (v[s] + v[5 * s]) + 15.0 * (v[2 * s] + v[4 * s]) - 20.0 * v[3 * s])
+        for i in range(count + ORDER + 1):
+            if first >= 0 and i > last + ORDER:  # differences first to last are large
+                for end in range(min(first + ORDER, last + 1), max(first + ORDER, last + 1) + 1):
+                    marks[row, end] = 1
+                first = -1
+            if i < count and d[i] > CLEAR * _before(d, i, s == 1) + FAINT:
+                first = i if first < 0 else first
+                last = i

@@ -219,10 +219,15 @@ class Motion:
             return np.array([function(times) for function in self.functions])
         return np.array([[function(t) for t in times] for function in self.functions], dtype=float)
 
+    @property
+    def may_change(self) -> bool:
+        """Whether it may change shortly, but at knots."""
+        return self.series is None or not self.series.is_even
+
     def sampled(self, t: Floats) -> list[Floats]:
-        """Values and accelerations that may have short changes, at times t: a list of arrays (k,)."""
+        """Values and accelerations at times t: a list of arrays (k,)."""
         if self.series is not None:
-            return [] if self.series.is_even else [self.series(t), self.series.acceleration(t)]
+            return [self.series(t), self.series.acceleration(t)]
         found = [np.empty(t.size), np.empty(t.size)]
         for address, out in zip(self.addresses[::2], found, strict=True):
             sample_motion(address, t, out)

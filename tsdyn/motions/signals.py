@@ -174,8 +174,16 @@ class Signal:
             values = np.array([self.source(time) for time in t], dtype=float).reshape(t.size, self.width)
         return list(values.T)
 
+    @property
+    def may_change(self):
+        """Whether the values may change shortly, but at knots."""
+        try:
+            return not all(f.is_even for f in self.smooth)
+        except Untraceable:
+            return True
+
     def sampled(self, t):
-        """The values that may have short changes, at times t: a list of arrays (k,)."""
+        """The values that may do so at times t: a list of arrays (k,)."""
         try:
             return [f(t) for f in self.smooth if not f.is_even]
         except Untraceable:

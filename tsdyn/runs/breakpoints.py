@@ -1,8 +1,8 @@
 """Stops: times at which a step must end, such as knots of motions and loads and sampling times.
 
-A short change of a function is a stop for a step that begins before it, and would pass over it. A step that would pass a stop is shortened to end there. At the stop all piecewise functions switch to their next piece,
+A step that would pass a stop is shortened to end there. At the stop all piecewise functions switch to their next piece,
 and accelerations are re-evaluated for the output and for the next step. After a shortened step of fixed length, the
-next step ends on the original time grid.
+next step ends on the original time grid. A short change of a function is a stop for steps that begin before it alone.
 """
 
 import math

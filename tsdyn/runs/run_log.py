@@ -11,9 +11,7 @@ class RunLog(NamedTuple):
     """Arrays of a run's own, unlike those of `Run`: room for a slice of it."""
 
     t_eval: np.ndarray  # output times, or empty: every step
-    stops: (
-        np.ndarray
-    )  # (stops, 3)  times at which a step ends, increasing; whether Python is asked; see motions/knots.py
+    stops: np.ndarray  # (stops, 3)  times at which a step ends, increasing, as of `motions.knots.stops_of`
     out: np.ndarray  # (rows, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (rows, 3)  of each step tried: t, h, whether it was accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left

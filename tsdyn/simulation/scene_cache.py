@@ -117,8 +117,9 @@ class Prepared:
         return bool(self.sampled) or any(each.pieces for given in self.motions for each in given.motions)
 
     @cached_property
-    def _user_kinds(self):
-        return user_kinds(self.packed)
+    def _changing(self):
+        """The functions of time that may change shortly, and the kinds of forces that run what a user has written."""
+        return [motion for motion in self.motions if motion.may_change], user_kinds(self.packed)
 
     def stops(self, t0, t1, adaptive=False):
         """The stops of a run from t0 to t1, as of `stops_of`; refuses a motion that the run can't follow.
@@ -127,16 +128,16 @@ class Prepared:
         """
         for motion in self.motions:
             motion.check(t0, t1)
-        found = self._changes(t0, t1) if adaptive and (self.motions or self._user_kinds) else NO_CHANGES
+        found = self._changes(t0, t1) if adaptive and any(self._changing) else NO_CHANGES
         if not (self._has_stops or found.size):
             return NO_STOPS
         return stops_of(self.motions, instants_of(self.packed, t0, t1), found, t0, t1)
 
     def _changes(self, t0, t1):
-        t = sample_times(t0, t1)
+        t, (motions, kinds) = sample_times(t0, t1), self._changing
         with np.errstate(all="ignore"):
-            samples = [values for motion in self.motions for values in motion.sampled(t)]
-            return changes(t, [*samples, *sampled_loads(self.packed, self._user_kinds, t)])
+            samples = [values for motion in motions for values in motion.sampled(t)]
+            return changes(t, [*samples, *sampled_loads(self.packed, kinds, t)])
 
     def engine(self, kind, method, form, within):
         """The engine of a method, as `frozen` returns it, in a form; see runs/run.py.

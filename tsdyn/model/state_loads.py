@@ -25,19 +25,20 @@ def _sample(s, q, qd, t, at, Q, out):
         out[i] = total
 
 
+def is_of_user(item):
+    """Whether the law of a force, or a function of time and state in it, is a user's."""
+    return hasattr(item, "function_of_state") or not is_ours(type(item).__module__)
+
+
 def user_kinds(packed):
-    """The rows of System.forces, by their numbers, that run what a user has written."""
-    first = {(one.force, one.stride): load.force for load in packed.loads for one in load.alone}
+    """The rows of System.forces that run what a user has written: their numbers, and the title of a force of each."""
+    first = {(one.force, one.stride): load.force for load in reversed(packed.loads) for one in load.alone}
     forces = [first[row.force, row.stride] for row in packed.system.forces]
-    return [
-        i
-        for i, force in enumerate(forces)
-        if hasattr(force, "function_of_state") or not is_ours(type(force).__module__)
-    ]
+    return [(i, force.title) for i, force in enumerate(forces) if is_of_user(force)]
 
 
 def sampled_loads(packed, kinds, t):
-    """Sums of the forces of each kind at times t (k,), at the bodies' start and at a state nearby: arrays (k,).
+    """Titles of the forces of each kind, and their sums (k,) at times t (k,), at the bodies' start and at a state nearby.
 
     At the start a force may be zero at all times that is not so in motion. A state nearby may be none for the function.
     """
@@ -46,7 +47,7 @@ def sampled_loads(packed, kinds, t):
         return found
     q, qd = (np.concatenate([getattr(body, x) for body in packed.bodies]) for x in ("q", "qd"))
     near = 0.5 * np.cos(np.arange(q.size))
-    for i in kinds:
+    for i, title in kinds:
         row = system.forces[i]
         places = system.table[row.table : row.table + row.count * INTS].reshape(-1, INTS)
         spans = zip(places[:, AT : AT + 2].ravel(), places[:, DIMENSION : DIMENSION + 2].ravel(), strict=True)
@@ -56,5 +57,5 @@ def sampled_loads(packed, kinds, t):
             out = np.empty(t.size)
             _sample(own, q + move, qd + move, t, at, np.zeros(q.size), out)
             if move is not near or np.isfinite(out).all():
-                found.append(out)
+                found.append((title, out))
     return found

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from ..jit.kernels import entry, kernel
-from .tolerances import CLEAR, FAINT, SAMPLES, STRIDES
+from .tolerances import CLEAR, FAINT, OF_STEP, SAMPLES, STRIDES
 
 ORDER, WINDOW = 6, 5  # of the differences; how many one is compared with
 NO_CHANGES = np.empty((0, 2))
@@ -39,6 +39,17 @@ def changes(t, functions):
         end *= strides[row]
         found.append(np.column_stack((t[end - strides[row]], t[end])))
     return np.unique(np.concatenate(found), axis=0) if len(found) > 1 else NO_CHANGES
+
+
+def within_step(t, h):
+    """The times within a step at which `is_noise` is asked."""
+    return np.linspace(t, t + h, OF_STEP + 1)
+
+
+def is_noise(samples):
+    """Whether most differences of samples within a step are as large as what they vary by."""
+    varies = np.ptp(samples)
+    return bool(FAINT * np.abs(samples).max() < varies < np.median(np.abs(np.diff(samples, ORDER))))
 
 
 @kernel

@@ -31,3 +31,5 @@ SAMPLES, STRIDES = 2048, (1, 4, 16, 64)
 # two and what is nine samples away it grows by 20, in a pulse on a sine of 26 samples a period by 1e5. Of the largest
 # value, below which a change is none.
 CLEAR, FAINT = 100.0, 1e-9
+# Samples of a step that tell noise.
+OF_STEP = 64

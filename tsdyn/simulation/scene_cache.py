@@ -14,7 +14,7 @@ from ..model.handles import handles_of
 from ..model.packed import with_curvatures
 from ..model.packed_forces import with_force_jacobians
 from ..model.state_loads import sampled_loads, user_kinds
-from ..motions.changes import NO_CHANGES, changes, sample_times
+from ..motions.changes import NO_CHANGES, changes, is_noise, sample_times, within_step
 from ..motions.knots import NO_STOPS, stops_of
 from ..observables.friction_unique import demand_unique
 from ..runs.sampling import instants_of, sampled
@@ -128,16 +128,26 @@ class Prepared:
         """
         for motion in self.motions:
             motion.check(t0, t1)
-        found = self._changes(t0, t1) if adaptive and any(self._changing) else NO_CHANGES
+        found = NO_CHANGES
+        if adaptive and any(self._changing):
+            t = sample_times(t0, t1)
+            found = changes(t, [values for _, values in self._sampled(t)])
         if not (self._has_stops or found.size):
             return NO_STOPS
         return stops_of(self.motions, instants_of(self.packed, t0, t1), found, t0, t1)
 
-    def _changes(self, t0, t1):
-        t, (motions, kinds) = sample_times(t0, t1), self._changing
+    def _sampled(self, t):
+        """The functions that may change shortly: what they are, and values (k,) at times t (k,)."""
+        motions, kinds = self._changing
         with np.errstate(all="ignore"):
-            samples = [values for motion in motions for values in motion.sampled(t)]
-            return changes(t, [*samples, *sampled_loads(self.packed, kinds, t)])
+            found = [(motion.what, values) for motion in motions for values in motion.sampled(t)]
+            return found + sampled_loads(self.packed, kinds, t)
+
+    def noise(self, t, h):
+        """What is noise within a step from t to t + h; "" for nothing."""
+        if not any(self._changing):
+            return ""
+        return next((what for what, values in self._sampled(within_step(t, h)) if is_noise(values)), "")
 
     def engine(self, kind, method, form, within):
         """The engine of a method, as `frozen` returns it, in a form; see runs/run.py.

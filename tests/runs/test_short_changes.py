@@ -247,3 +247,12 @@ def test_what_ends_a_run(force, reached, words):
     assert solution.state.t == pytest.approx(reached, abs=1e-3)
     with pytest.raises(ts.StepFailure, match=words):
         solution.raise_if_failed()
+
+
+def test_fixed_steps_say_what_they_dont_resolve():
+    scene = ts.Scene(gravity=(0, 0, 0))
+    scene.add(F.PointForce(scene.add_point_mass(1.0), force=box_up, name="push"))
+    said = ts.simulate(scene, SPAN, integrator=I.Nystrom4(step=0.5)).message
+    assert "push: force: the function changes within 0.049 s at t = 50.0" in said
+    assert "max_step, or an adaptive method" in said
+    assert ts.simulate(scene, SPAN, integrator=I.Nystrom4(step=0.04)).message == ts.Status.SUCCESS.sentence

@@ -38,7 +38,7 @@ def user_kinds(packed):
 
 
 def sampled_loads(packed, kinds, t):
-    """Titles of the forces of each kind, and their sums (k,) at times t (k,), at the bodies' start and at a state nearby.
+    """Titles of the forces of each kind, and their sums (k,) at times t (k,): at the bodies' start, and nearby.
 
     At the start a force may be zero at all times that is not so in motion. A state nearby may be none for the function.
     """

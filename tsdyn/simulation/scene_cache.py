@@ -143,6 +143,19 @@ class Prepared:
             found = [(motion.what, values) for motion in motions for values in motion.sampled(t)]
             return found + sampled_loads(self.packed, kinds, t)
 
+    def unresolved(self, t0, t1, h):
+        """Say what changes within less than steps of a fixed length h; "" for nothing."""
+        if any(self._changing):
+            t = sample_times(t0, t1)
+            for what, values in self._sampled(t):
+                for begin, end in changes(t, [values]):
+                    if end - begin < h:
+                        return (
+                            f"{what}: the function changes within {end - begin:.2g} s at t = {end:.6g} s, which steps "
+                            f"of {h:g} s don't resolve: give a shorter step or max_step, or an adaptive method."
+                        )
+        return ""
+
     def noise(self, t, h):
         """What is noise within a step from t to t + h; "" for nothing."""
         if not any(self._changing):

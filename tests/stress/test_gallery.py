@@ -21,6 +21,7 @@ FREE = {  # degrees of freedom, redundant rows
     "six-bars, 5 loops": (7, 15),
     "sleeping top": (5, 0),
     "Kapitza's pendulum": (3, 0),
+    "struck pendulum": (1, 0),
 }
 
 

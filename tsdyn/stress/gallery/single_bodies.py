@@ -1,4 +1,4 @@
-"""One body each: a top asleep on its tip, Kapitza's pendulum, upside down on a pivot that shakes, one that is struck."""
+"""One body each: a sleeping top, Kapitza's pendulum, upside down on a pivot that shakes, and one that is struck."""
 
 import numpy as np
 

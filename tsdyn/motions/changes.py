@@ -6,7 +6,7 @@ of its samples:
 
     |d_i| > CLEAR max(|d_j|, i - ORDER - WINDOW <= j < i - ORDER) + FAINT max |f|
 
-is a change. The same on each stride-th sample: a bump is found where the stride shows it in few samples. What varies as
+is a change; after a pause, too, what is larger than before the one before it. The same on each stride-th sample: a bump is found where the stride shows it in few samples. What varies as
 much before, as a sine or noise does, is no change: it keeps the steps short itself.
 """
 
@@ -18,6 +18,7 @@ from ..jit.kernels import entry, kernel
 from .tolerances import CLEAR, FAINT, OF_STEP, SAMPLES, STRIDES
 
 ORDER, WINDOW = 6, 5  # of the differences; how many one is compared with
+REACH = 30  # differences after a change among which another one is compared with those before both
 NO_CHANGES = np.empty((0, 2))
 
 
@@ -70,6 +71,7 @@ def mark_changes(values, strides, d, marks):
     for row in range(strides.size):
         s = strides[row]
         count, first, last = (values.size - 1) // s + 1 - ORDER, -1, -1
+        least, until, quiet = 0.0, -1, False
         for i in range(count):
             v = values[i * s :]
             d[i] = abs(v[0] + v[6 * s] - 6.0 * (v[s] + v[5 * s]) + 15.0 * (v[2 * s] + v[4 * s]) - 20.0 * v[3 * s])
@@ -78,6 +80,18 @@ def mark_changes(values, strides, d, marks):
                 for end in range(min(first + ORDER, last + 1), max(first + ORDER, last + 1) + 1):
                     marks[row, end] = 1
                 first = -1
-            if i < count and d[i] > CLEAR * _before(d, i, s == 1) + FAINT:
-                first = i if first < 0 else first
-                last = i
+            if i >= count:
+                continue
+            limit = CLEAR * _before(d, i, s == 1) + FAINT
+            if d[i] > limit:
+                least = least if i <= until else limit
+                until, quiet = i + REACH, False
+            elif d[i] <= least:
+                quiet = True  # what is large from here on is another change
+                continue
+            elif not (quiet and i <= until):
+                continue
+            elif last < i - 1:
+                until = i + REACH
+            first = i if first < 0 else first
+            last = i

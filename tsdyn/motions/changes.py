@@ -6,8 +6,9 @@ of its samples:
 
     |d_i| > CLEAR max(|d_j|, i - ORDER - WINDOW <= j < i - ORDER) + FAINT max |f|
 
-is a change; after a pause, too, what is larger than before the one before it. The same on each stride-th sample: a bump is found where the stride shows it in few samples. What varies as
-much before, as a sine or noise does, is no change: it keeps the steps short itself.
+is a change; after a pause, too, what is large beside those before the last change. The same on each stride-th sample:
+a bump is found where the stride shows it in few samples. What varies as much before, as a sine or noise does, is no
+change: it keeps the steps short itself.
 """
 
 import math

@@ -21,8 +21,8 @@ TIMES = (0.37, 1.3, 11.0)
 
 # Of the range of a table's values, how far a cubic spline may leave two neighbouring values without a warning: where
 # the values are monotone (a step of evenly spaced values: 0.13; a sine of seven values a period at its ends: 0.05), and
-# where they have an extremum (a sine of four values a period: 0.21).
-OVERSHOOT, EXTREMUM = 0.1, 0.25
+# where they have an extremum (a sine of four values a period: 0.21; four values of a hump, unevenly spaced: 0.37).
+OVERSHOOT, EXTREMUM = 0.1, 0.5
 
 # Samples of a function over a run, of which there are two or more in a pulse of a thousandth of the run; and strides
 # at which they are looked at, up to a 32nd of the run: steps are that long.

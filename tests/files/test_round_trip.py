@@ -117,7 +117,7 @@ def test_loads_of_three_components(tmp_path):
     scene, t = ts.Scene(), ts.motions.time
     ball = scene.add_point_mass(1.0, position=(0, 0, 1), name="ball")
     scene.add(ts.forces.PointForce(ball, force=(0.0, np.sin(t), 1.0), name="swing"))
-    scene.add(ts.forces.PointForce(ball, force=ts.Table((0, 1, 2), np.eye(3)), name="table"))
+    scene.add(ts.forces.PointForce(ball, force=ts.Table((0, 1, 2), np.arange(9.0).reshape(3, 3)), name="table"))
     for kind in ("linear", "previous", "pchip"):
         table = ts.Table((0, 1, 1, 2), (0.1, 0.2, 0.4, 0.7), kind=kind)
         scene.add(ts.forces.PointForce(ball, force=(0, table, 0), name=f"{kind} component"))

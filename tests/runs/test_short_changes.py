@@ -195,6 +195,26 @@ def test_steps_that_see_a_change_stay_as_they_are(monkeypatch):
     np.testing.assert_array_equal(run(), found)
 
 
+@pytest.mark.parametrize("ulps", [-2, -1, 0, 1, 2])
+def test_a_change_beside_a_knot(ulps):
+    """A knot that differs by rounding from the end of an interval with a change leaves no step of nothing."""
+    t = sample_times(0.1, 0.7)
+    ((_, end),) = changes(t, [np.where(t > 0.4, 1.0, 0.0)])[-1:]
+    for _ in range(abs(ulps)):
+        end = np.nextafter(end, math.copysign(1.0, ulps))
+    scene = ts.Scene(gravity=(0, 0, 0))
+    body = scene.add_point_mass(1.0)
+    scene.add(F.PointForce(body, force=edge))
+    scene.add(F.PointForce(body, force=(ts.Table((0, end, end, 1), (0, 0, 2, 2), kind="linear"), 0, 0)))
+    solution = ts.simulate(scene, (0.1, 0.7), integrator="dop853")
+    assert solution.success, solution.message
+    np.testing.assert_allclose(solution.state.velocity(body), (2.0 * (0.7 - end), 0.0, 0.3), rtol=ROUGH)
+
+
+def edge(t):
+    return (0.0, 0.0, 1.0 if t > 0.4 else 0.0)
+
+
 def test_a_change_in_cases_of_an_ensemble():
     scene = ts.Scene(gravity=(0, 0, 0))
     body = scene.add_point_mass(1.0, name="ball")

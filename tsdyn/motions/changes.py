@@ -50,8 +50,9 @@ def within_step(t, h):
 
 def is_noise(samples):
     """Whether most differences of samples within a step are as large as what they vary by."""
-    varies = np.ptp(samples)
-    return bool(FAINT * np.abs(samples).max() < varies < np.median(np.abs(np.diff(samples, ORDER))))
+    with np.errstate(all="ignore"):
+        varies = np.ptp(samples)
+        return bool(FAINT * np.abs(samples).max() < varies < np.median(np.abs(np.diff(samples, ORDER))))
 
 
 @kernel

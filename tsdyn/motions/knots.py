@@ -54,23 +54,25 @@ def stops_of(parameters, instants, changes, t0, t1):
     sampling times, at which a Python function is called. A step ends at a stop if it begins at the time in the third
     column at the latest, which is that of the stop but for intervals (k, 2) of changes.
     """
-    hard = _hard_stops(parameters, instants, t0, t1)
+    near = TOGETHER * max(abs(t0), abs(t1), LEAST_SPAN * (t1 - t0))
+    hard = _hard_stops(parameters, instants, t0, t1, near)
     if not changes.size:
         return hard
-    begins, ends = changes[changes[:, 1] < t1].T
-    soft = np.column_stack((ends, np.zeros(ends.size), begins))
+    begins, ends = changes.T
+    known = np.concatenate((hard[:, 0], [t1]))
+    apart = np.abs(ends - known[np.searchsorted(known, ends - near).clip(max=known.size - 1)]) > near
+    soft = np.column_stack((ends, np.zeros(ends.size), begins))[apart]
     stops = np.concatenate((hard, soft))
     return stops[np.argsort(stops[:, 0], kind="stable")]
 
 
-def _hard_stops(parameters, instants, t0, t1):
+def _hard_stops(parameters, instants, t0, t1, near):
     found = [joints(motion, t0, t1) for given in parameters for motion in given.motions if motion.pieces]
     if not (instants.size or found):
         return NO_STOPS
     times = np.concatenate([instants, *found])
     order = np.argsort(times, kind="stable")
     times, asked = times[order], np.where(order < instants.size, 1.0, 0.0)
-    near = TOGETHER * max(abs(t0), abs(t1), LEAST_SPAN * (t1 - t0))
     late = t1 - times <= near
     times, asked = np.where(late, t1, times), np.where(late, 0.0, asked)
     kept = times - t0 > near

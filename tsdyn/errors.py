@@ -42,7 +42,7 @@ class InvalidCall(InvalidArgument, TypeError):
     >>> import tsdyn as ts
     >>> ts.Table(time=(0, 1), values=(0, 1))
     Traceback (most recent call last):
-    tsdyn.errors.InvalidCall: Table() has no argument time; did you mean times? It has times, values.
+    tsdyn.errors.InvalidCall: Table() has no argument time; did you mean times? It has times, values, kind.
     """
 
 

@@ -85,6 +85,7 @@ Redundancy: TypeAlias = Literal["drop", "refuse"]
 Folds: TypeAlias = Literal["keep", "free"]
 Frame: TypeAlias = Literal["ground", "body"]
 Axis: TypeAlias = Literal["x", "y", "z"]
+TableKind: TypeAlias = Literal["cubic", "linear", "previous", "pchip"]
 Method: TypeAlias = Integrator | type[Integrator] | str
 Methods: TypeAlias = Sequence[str | Callable[..., Integrator]] | Mapping[str, str | Callable[..., Integrator]]
 StepKernel: TypeAlias = tuple[Any, Floats, Callable[[int, int], int]]  # with its numbers, and floats of memory
@@ -208,6 +209,7 @@ __all__ = [
     "Steps",
     "System",
     "Table",
+    "TableKind",
     "TimeFunction",
     "TsdynError",
     "Value",

@@ -45,7 +45,7 @@ MOTIONS = {
     "shared": PULSE * PULSE / (1.0 + PULSE) - np.sinh(PULSE),
     "root": np.sqrt(1.0 + ts.motions.time**2) - np.cosh(ts.motions.time) ** -1.5,
     "deep": sum((np.cos(PULSE + 0.01 * i) for i in range(60)), 0.1),
-    "table": ts.Table((0.0, 1.0, 2.0, 5.0), (0.1, 0.4, 0.2, 0.3)),
+    "table": ts.Table((0.0, 1.0, 2.0, 3.5), (0.1, 0.3, 0.4, 0.2)),
     "arrays": (np.arange(4.0), np.array([0.1, 0.2, 0.2, 0.5])),
     "spline": CubicSpline((0.0, 1.0, 2.0, 3.0), (0.1, 0.4, 0.2, 0.1), bc_type="periodic"),
     "spline, extrapolated": PchipInterpolator((0.0, 1.0, 2.0), (0.1, 0.4, 0.2)),
@@ -117,7 +117,12 @@ def test_loads_of_three_components(tmp_path):
     scene, t = ts.Scene(), ts.motions.time
     ball = scene.add_point_mass(1.0, position=(0, 0, 1), name="ball")
     scene.add(ts.forces.PointForce(ball, force=(0.0, np.sin(t), 1.0), name="swing"))
-    scene.add(ts.forces.PointForce(ball, force=ts.Table((0, 1, 2), np.eye(3)), name="table"))
+    scene.add(ts.forces.PointForce(ball, force=ts.Table((0, 1, 2), np.arange(9.0).reshape(3, 3)), name="table"))
+    for kind in ("linear", "previous", "pchip"):
+        table = ts.Table((0, 1, 1, 2), (0.1, 0.2, 0.4, 0.7), kind=kind)
+        scene.add(ts.forces.PointForce(ball, force=(0, table, 0), name=f"{kind} component"))
+        vectors = ts.Table((0, 1, 1, 2), np.outer(table.values, (1, 2, 3)), kind=kind)
+        scene.add(ts.forces.PointForce(ball, force=vectors, name=kind))
     scene.add(ts.forces.PointForce(ball, force=CubicSpline((0, 1, 2), np.eye(3)), name="spline"))
     scene.add(ts.constraints.PointDriver("ground", ball, path=(0.0, 0.1 * np.sin(t), 1.0), name="lead"))
     assert outcome(there_and_back(scene, tmp_path / "scene.toml")) == outcome(scene)

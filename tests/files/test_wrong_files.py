@@ -127,7 +127,7 @@ WRONG = {  # name: (what is replaced, by what, line, words of the message)
     "friction lacks a number": ("kinetic = 0.1\n", "", 26, ("lacks kinetic",)),
     "negative friction": ("kinetic = 0.1", "kinetic = -0.1", 30, ("not negative",)),
     "load of two": ("[0, 0, { times", "[0, { times", 34, ("force",)),
-    "table without values": ("values = [0, 1]", "value = [0, 1]", 34, ("times and values",)),
+    "table without values": ("values = [0, 1]", "value = [0, 1]", 34, ("times, values and kind",)),
     "times go back": ("times = [0, 1]", "times = [1, 0]", 34, ("each after the one before",)),
     "unknown frame": ('frame = "body"', 'frame = "boddy"', 35, ("write 'body'",)),
     "assemble is a number": ("assemble = true", "assemble = 1", 37, ("true or false",)),

@@ -23,6 +23,7 @@ FREE = {  # degrees of freedom, redundant rows
     "driven six-bar": (2, 8),
     "sleeping top": (5, 0),
     "Kapitza's pendulum": (3, 0),
+    "struck pendulum": (1, 0),
 }
 
 

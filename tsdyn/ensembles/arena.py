@@ -50,7 +50,7 @@ class Arena:
         )  # fmt: skip
         self.is_unequal = are_unequal(system)
         self.written, self.starts = set(), Starts(self)
-        self._slice = FirstSlice(study) if FirstSlice.serves(study) else None
+        self._slice = FirstSlice(study) if FirstSlice.serves(study) and not study.retimes else None
         self.pen = None if study.names is None else pen_of(self, study.names)
         self._chunk, self._batch = None, None
 
@@ -191,10 +191,11 @@ class Arena:
         choose = None
         if study.given["integrator"] is None:
             choose = method_choice.turns_of(study.scene, self.kept, method, options)
+        stops = self.kept.stops(*options.span, method.step is None) if study.retimes else study.stops
         task = Task(
             self.kept, method, settings.form, options.span, q, qd, memory, options.times, settings.dense_output,
             options.events, settings.constraint_tol, settings.max_steps, settings.chart_interval or 0, study.report,
-            options.history, choose, study.stops,
+            options.history, choose, stops,
         )  # fmt: skip
         outcome = None if self._slice is None or self.is_immobile else self._slice.run(task)
         if outcome is not None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..ahead.first_run import prepare_first_run
 from ..errors import Status, TsdynError
+from ..model.state_loads import is_of_user
 from ..simulation.options import checked
 from ..simulation.simulate import run_from
 from ..simulation.solution import Solution
@@ -58,12 +59,19 @@ class Study:
         self.kept, settings, default = scene._prepared, options.settings, (given["rtol"], given["atol"], options.series)
         prepare_first_run(scene, options.method, settings.form, options.within, default)
         self.method, self.n = method_of(self.kept, options, default), self.kept.n
-        self.stops = self.kept.stops(*options.span)
+        self.stops = self.kept.stops(*options.span, self.method.step is None)
         self.names = None if cases.names is None else {*self.changes, *cases.names}
         if self.names is not None and free is not None:
             self.names |= start_names(self.kept.packed)
+        self.retimes = self._retimes()
         self.has_arena = settings.drop and serves(self.family, self.kept, self.names)
         self.halt, self.idle = np.zeros(1, np.int64), []  # runners of the threads of an executor
+
+    def _retimes(self):
+        """Whether the times of short changes of functions may differ from case to case, for scenes of one family."""
+        if not any(is_of_user(load.force) for load in self.kept.packed.loads):
+            return False
+        return self.names is None or any(is_of_user(self.family.field(name).owner) for name in self.names)
 
     @property
     def stopped(self):

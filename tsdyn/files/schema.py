@@ -3,6 +3,7 @@
 import inspect
 import json
 
+from ..motions.tables import MAKERS
 from . import run_table, study_tables, types
 from .build import KEYS
 from .describe import BUILT, VERSION
@@ -27,7 +28,8 @@ DEFINITIONS = {
     "data": {
         "anyOf": [
             {"type": "object", "required": ["times", "values"], "additionalProperties": False,
-             "properties": {"times": {"$ref": "#/$defs/array"}, "values": {"$ref": "#/$defs/array"}}},
+             "properties": {"times": {"$ref": "#/$defs/array"}, "values": {"$ref": "#/$defs/array"},
+                            "kind": {"enum": list(MAKERS)}}},
             {"type": "object", "required": ["knots", "coefficients"], "additionalProperties": False,
              "properties": {"knots": {"$ref": "#/$defs/array"}, "coefficients": {"$ref": "#/$defs/array"},
                             "beyond": {"enum": [True, False, "periodic"]}}},

@@ -13,7 +13,8 @@ from . import expressions
 from .expressions import Misread
 
 EXPRESSION = "expression"  # the key of a motion whose parts have names of their own
-TABLE = ("times", "values")  # keys of a table
+TABLE = ("times", "values")  # keys of a table, and
+KIND = "kind"
 PIECES = ("knots", "coefficients")  # keys of a piecewise polynomial, and
 BEYOND = "beyond"
 MOTION = "a number, an expression of the time such as '0.1 * sin(2 * t)', or { times = [...], values = [...] }"
@@ -40,7 +41,8 @@ def encode(value):
     if isinstance(value, Smooth):
         return _encode_smooth(value)
     if isinstance(value, Table):
-        return {"times": value.times.tolist(), "values": value.values.tolist()}
+        found = {"times": value.times.tolist(), "values": value.values.tolist()}
+        return found | ({} if value.kind == "cubic" else {KIND: value.kind})
     if is_data(value):
         motions = Piecewise.each(value)
         return _encode_smooth(motions[0]) if len(motions) == 1 else [_encode_smooth(motion) for motion in motions]
@@ -136,21 +138,20 @@ def _decode_table(value, names):
     """A motion of a table of plain data."""
     if EXPRESSION in value:
         return _decode_parts(value, names)
-    keys = set(value) - {BEYOND} if PIECES[0] in value else set(value)
-    for known, make in ((TABLE, _table), (PIECES, _pieces)):
-        if keys == set(known):
+    for known, more, make in ((TABLE, KIND, _table), (PIECES, BEYOND, _pieces)):
+        if set(value) - {more} == set(known):
             try:
                 return make(value, names)
             except (InvalidArgument, ValueError, IndexError) as error:
                 raise Misread(str(error)) from error
     raise Misread(
-        "such a table has the keys times and values; or knots, coefficients and beyond; or expression and its parts; "
-        f"got {', '.join(value) or 'none'}."
+        "such a table has the keys times, values and kind; or knots, coefficients and beyond; or expression and its "
+        f"parts; got {', '.join(value) or 'none'}."
     )
 
 
 def _table(value, names):
-    return Table(*(decode_array(value[key], names) for key in TABLE))
+    return Table(*(decode_array(value[key], names) for key in TABLE), value.get(KIND, "cubic"))
 
 
 def _pieces(value, names):

@@ -65,6 +65,9 @@ OPERATIONS = {
 }
 
 
+EVEN = frozenset(("polynomial", "piecewise", "add", "subtract", "multiply", "sin", "cos"))
+
+
 def _operators(operation: str) -> tuple[Operator, Operator]:
     """Return a binary operator of motions, and the same with a number on the left."""
     return lambda self, other: _binary(operation, self, other), lambda self, other: _binary(operation, other, self)
@@ -111,6 +114,11 @@ class Smooth:
     def pieces(self) -> list[Any]:
         """The `Pieces` among its nodes."""
         return [node._numbers for node in self._order() if node._operation == "piecewise"]
+
+    @property
+    def is_even(self) -> bool:
+        """Whether it has no short change within a piece: it consists of polynomials and sines."""
+        return EVEN.issuperset(node._operation for node in self._order())
 
     def sides(self, t: ArrayLike) -> Floats:
         """Value and rate at times t (k,), by the pieces that end there and by those that begin: (2, 2, k)."""

@@ -5,7 +5,7 @@ import numpy as np
 from ..errors import InvalidConstraint
 from .tolerances import JUMP, LEAST_SPAN, ROUNDING, TOGETHER
 
-NO_STOPS = np.empty((0, 2))
+NO_STOPS = np.empty((0, 3))
 
 
 def demand_covered(motion, t0, t1, what, error):
@@ -47,12 +47,26 @@ def demand_followed(motion, t0, t1, what):
             )
 
 
-def stops_of(parameters, instants, t0, t1):
-    """Return the stops of a run from t0 to t1: knots of a scene's Motions and Signals, and sampling times; (k, 2).
+def stops_of(parameters, instants, changes, t0, t1):
+    """Return the stops of a run from t0 to t1: knots of a scene's Motions and Signals, sampling times, changes; (k, 3).
 
-    Times that differ by rounding are merged into the last, or into t1. The second column marks sampling times, at
-    which a Python function is called.
+    Knots and sampling times that differ by rounding are merged into the last, or into t1. The second column marks
+    sampling times, at which a Python function is called. A step ends at a stop if it begins at the time in the third
+    column at the latest, which is that of the stop but for intervals (k, 2) of changes.
     """
+    near = TOGETHER * max(abs(t0), abs(t1), LEAST_SPAN * (t1 - t0))
+    hard = _hard_stops(parameters, instants, t0, t1)
+    if not changes.size:
+        return hard
+    begins, ends = changes.T
+    known = np.concatenate((hard[:, 0], [t1]))
+    apart = np.abs(ends - known[np.searchsorted(known, ends - near).clip(max=known.size - 1)]) > near
+    soft = np.column_stack((ends, np.zeros(ends.size), begins))[apart]
+    stops = np.concatenate((hard, soft))
+    return stops[np.argsort(stops[:, 0], kind="stable")]
+
+
+def _hard_stops(parameters, instants, t0, t1):
     found = [joints(motion, t0, t1) for given in parameters for motion in given.motions if motion.pieces]
     if not (instants.size or found):
         return NO_STOPS
@@ -67,4 +81,4 @@ def stops_of(parameters, instants, t0, t1):
     if not times.size:
         return NO_STOPS
     ends = np.flatnonzero(np.append(np.diff(times) > near[1:], True))  # of each group
-    return np.column_stack((times[ends], np.maximum.reduceat(asked, np.append(0, ends[:-1] + 1))))
+    return np.column_stack((times[ends], np.maximum.reduceat(asked, np.append(0, ends[:-1] + 1)), times[ends]))

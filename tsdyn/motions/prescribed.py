@@ -13,13 +13,13 @@ from numba.core.errors import NumbaError
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidConstraint
 from ..jit.compiled_once import compiled_once
-from ..jit.kernels import Callback, caller, kernel, specialised
+from ..jit.kernels import Callback, caller, entry, kernel, specialised
 from ..validation import number, shown
 from .elementary import Constant, Piecewise, time
 from .expressions import FUNCTIONS, Smooth
 from .knots import demand_covered, demand_followed
 from .program import run_program
-from .tables import is_data
+from .tables import Table, is_data
 from .tolerances import QUOTIENT_ERROR, QUOTIENT_NOISE, QUOTIENT_STEPS, SAME_VALUE, TIMES
 from .tracing import Untraceable, of_time, retold
 
@@ -31,6 +31,13 @@ if TYPE_CHECKING:
 SIGNATURE = "d"
 UNNAMED = "motion"
 call_motion = caller(SIGNATURE, "d")
+
+
+@entry
+def sample_motion(address, t, out):
+    """The values (k,) of a compiled function at times t (k,)."""
+    for i in range(t.size):
+        out[i] = call_motion(address, t[i])
 
 
 class Motion:
@@ -143,6 +150,8 @@ class Motion:
     def components(value: Data, count: int, what: str) -> tuple[Piecewise, ...]:
         """Return the motions of the components of data; each a `Piecewise`."""
         try:
+            if isinstance(value, Table):
+                value.demand_motion()
             motions = Piecewise.each(value)
         except InvalidArgument as reason:
             raise InvalidConstraint(f"{what}: {reason}") from reason
@@ -208,6 +217,20 @@ class Motion:
         if self.smooth is not None:
             return np.array([function(times) for function in self.functions])
         return np.array([[function(t) for t in times] for function in self.functions], dtype=float)
+
+    @property
+    def may_change(self) -> bool:
+        """Whether it may change shortly, but at knots."""
+        return self.series is None or not self.series.is_even
+
+    def sampled(self, t: Floats) -> list[Floats]:
+        """Values and accelerations at times t: a list of arrays (k,)."""
+        if self.series is not None:
+            return [self.series(t), self.series.acceleration(t)]
+        found = [np.empty(t.size), np.empty(t.size)]
+        for address, out in zip(self.addresses[::2], found, strict=True):
+            sample_motion(address, t, out)
+        return found
 
     def _at(self, i, times):
         try:

@@ -9,7 +9,7 @@ from numba.core.errors import NumbaError
 
 from ..errors import InvalidArgument
 from ..jit.compiled_once import compiled_once
-from ..jit.kernels import Callback, caller, kernel, specialised, vector
+from ..jit.kernels import Callback, caller, entry, kernel, specialised, vector
 from ..validation import floats, number, shown
 from .elementary import Constant, Piecewise, Polynomial
 from .expressions import Smooth
@@ -21,6 +21,13 @@ from .tracing import Untraceable, of_time
 
 SIGNATURE = "dp"  # t, where the values go
 call_signal = caller(SIGNATURE)
+
+
+@entry
+def sample_signal(address, t, out):
+    """The values (k, width) of a compiled function at times t (k,)."""
+    for i in range(t.size):
+        call_signal(address, t[i], out[i])
 
 
 class Signal:
@@ -165,6 +172,23 @@ class Signal:
         with np.errstate(all="ignore"):
             values = np.array([self.source(time) for time in t], dtype=float).reshape(t.size, self.width)
         return list(values.T)
+
+    @property
+    def may_change(self):
+        """Whether the values may change shortly, but at knots."""
+        try:
+            return not all(f.is_even for f in self.smooth)
+        except Untraceable:
+            return True
+
+    def sampled(self, t):
+        """The values that may do so at times t: a list of arrays (k,)."""
+        try:
+            return [f(t) for f in self.smooth if not f.is_even]
+        except Untraceable:
+            out = np.empty((t.size, self.width))
+            sample_signal(self.address, t, out)
+            return [*out.T]
 
     def check(self, t0, t1):
         """Refuse an interval that data don't cover."""

@@ -5,38 +5,52 @@ from __future__ import annotations
 import math
 import reprlib
 import sys
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..calls import fitting
 from ..errors import InvalidArgument
-from ..validation import floats
+from ..validation import floats, one_of
 from .piecewise import Pieces
+from .tolerances import EXTREMUM, OVERSHOOT, SAME_VALUE
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, Value
+    from ..hints import ArrayLike, TableKind, Value
 
 
 class Table:
-    """Values at given times, interpolated by a cubic spline (SciPy's CubicSpline, not-a-knot): a load or a motion.
+    """Values at given times, interpolated: a load or a motion.
 
     Parameters
     ----------
     times : array_like (k,), s
-        Increasing, at least two.
+        Two or more, none before the one before. A time that is given twice is a jump, from its first value to its
+        second.
     values : array_like (k,) or (k, 3)
         Numbers or vectors, in the unit of the load or motion.
+    kind : {"cubic", "linear", "previous", "pchip"}
+        Between the times, and from jump to jump: a cubic spline (SciPy's CubicSpline, not-a-knot), which is smooth and
+        may overshoot; straight lines; the value of the time before; a monotone cubic (SciPy's PchipInterpolator), which
+        never leaves the range of neighbouring values.
 
     Raises
     ------
     InvalidArgument
-        If the times don't increase, or a number is not finite, or the shapes don't match.
+        If a time is before the one before or given more than twice, a number is not finite, the shapes don't match, or
+        the kind is unknown.
+
+    Warns
+    -----
+    UserWarning
+        If a cubic spline overshoots its values.
 
     Notes
     -----
-    A run must stay within the times. For other interpolation, or for extrapolation, give a SciPy
-    object instead: CubicSpline, PchipInterpolator, make_interp_spline(...), any PPoly or BSpline.
+    Steps of a run end at the times, so every method keeps its order. A run must stay within the times. For other
+    interpolation, or for extrapolation, give a SciPy object instead: CubicSpline, make_interp_spline(...), any PPoly or
+    BSpline. Constraints follow motions "cubic" and "pchip" without jumps; "linear" and "previous" are for loads.
 
     Examples
     --------
@@ -44,36 +58,143 @@ class Table:
     >>> table = ts.Table(times=(0, 1, 2, 3), values=(0, 1, 4, 9))
     >>> print(f"{table(1.5):.4f}")
     2.2500
+    >>> pulse = ts.Table((0, 1, 1, 1.5, 1.5, 9), (0, 0, 8, 8, 0, 0), kind="linear")
+    >>> print(pulse((0.9, 1.0, 1.2, 1.5)))
+    [0. 8. 8. 0.]
     """
 
     @fitting
-    def __init__(self, times: ArrayLike, values: ArrayLike) -> None:
+    def __init__(self, times: ArrayLike, values: ArrayLike, kind: TableKind = "cubic") -> None:
         self.times, self.values = floats(times), floats(values)
+        self.kind = one_of(kind, tuple(MAKERS), "Table: kind")
         k = self.times.size
-        if self.times.ndim != 1 or k < 2 or not np.isfinite(self.times).all() or not (np.diff(self.times) > 0.0).all():
-            raise InvalidArgument("Table: times must be two or more finite times in s, each after the one before.")
+        if self.times.ndim != 1 or k < 2 or not np.isfinite(self.times).all() or not _increase(self.times):
+            raise InvalidArgument(
+                "Table: times must be two or more finite times in s, each after the one before; two that are the same "
+                "are a jump."
+            )
         if self.values.shape not in ((k,), (k, 3)) or not np.isfinite(self.values).all():
             raise InvalidArgument(
                 f"Table: values must be {k} finite numbers or {k} vectors of three, one for each time, got "
                 f"{reprlib.repr(values)}."
             )
-        from scipy.interpolate import CubicSpline  # slow to import
-
-        self._spline = CubicSpline(self.times, self.values, extrapolate=False)
+        self._spline, said = _interpolated(self.times, self.values, self.kind)
         self.motions = None  # of `ts.motions`, on demand
         self.times.setflags(write=False)
         self.values.setflags(write=False)
+        if said:
+            warnings.warn(said, UserWarning, stacklevel=3)  # where the table is made
 
     def __call__(self, t: ArrayLike) -> Value:
         """The values at a time or times; NaN outside the table."""
-        return self._spline(t)
+        found, end = self._spline(t), self.times[-1]
+        if self.kind == "previous" or self.times[-2] == end:  # no piece begins at the end
+            at_end = np.asarray(t) == end
+            found = np.where(at_end[..., None] if self.values.ndim == 2 else at_end, self.values[-1], found)
+        return found
 
     def pieces(self) -> list[Any]:
         """A `Pieces` for each component."""
         return pieces_of(self._spline)
 
+    def demand_motion(self) -> None:
+        """Refuse interpolation that no constraint can follow."""
+        if self.kind in ("linear", "previous"):
+            raise InvalidArgument(
+                f"a {self!r} is no motion, as its accelerations are infinite; give kind='cubic' or 'pchip'. As a load "
+                "it is admissible."
+            )
+
     def __repr__(self) -> str:
-        return f"<Table of {self.times.size} values, {self.times[0]:g} to {self.times[-1]:g} s>"
+        kind = "" if self.kind == "cubic" else f"{self.kind}, "
+        return f"<Table of {self.times.size} values, {kind}{self.times[0]:g} to {self.times[-1]:g} s>"
+
+
+def _increase(times):
+    """Whether times increase but for jumps, at each of which one is given twice."""
+    return times[-1] > times[0] and (np.diff(times) >= 0.0).all() and (times[2:] > times[:-2]).all()
+
+
+def _interpolated(times, values, kind):
+    """A piecewise polynomial of SciPy's, and what there is to warn of."""
+    jumps, said = np.flatnonzero(np.diff(times) == 0.0) + 1, ""
+    parts = []
+    for t, v in zip(np.split(times, jumps), np.split(values, jumps), strict=True):
+        if t.size > 1:
+            parts.append(MAKERS[kind](t, v))
+            said = said or (_overshoot(parts[-1], v) if kind == "cubic" else "")
+    if len(parts) == 1:
+        return parts[0], said
+    from scipy.interpolate import PPoly
+
+    size = max(len(part.c) for part in parts)
+    c = [np.concatenate((np.zeros((size - len(part.c), *part.c.shape[1:])), part.c)) for part in parts]
+    knots = np.concatenate([parts[0].x[:1], *(part.x[1:] for part in parts)])
+    return PPoly(np.concatenate(c, axis=1), knots, extrapolate=False), said
+
+
+def _cubic(times, values):
+    from scipy.interpolate import CubicSpline  # slow to import
+
+    return CubicSpline(times, values, extrapolate=False)
+
+
+def _pchip(times, values):
+    from scipy.interpolate import PchipInterpolator
+
+    return PchipInterpolator(times, values, extrapolate=False)
+
+
+def _linear(times, values):
+    return _lines(times, values, np.diff(values, axis=0) / _column(np.diff(times), values))
+
+
+def _previous(times, values):
+    return _lines(times, values, np.zeros_like(values[1:]))
+
+
+def _lines(times, values, slopes):
+    from scipy.interpolate import PPoly
+
+    return PPoly(np.stack((slopes, values[:-1])), times, extrapolate=False)
+
+
+MAKERS = {"cubic": _cubic, "linear": _linear, "previous": _previous, "pchip": _pchip}  # by kind
+
+
+def _column(numbers, values):
+    """Numbers (k,), one for each row of values."""
+    return numbers.reshape(-1, *[1] * (values.ndim - 1))
+
+
+def _overshoot(spline, values):
+    """Say where a cubic spline leaves the range of its values; "" where it doesn't.
+
+    Between two values it may have an extremum where the values have one. Where they are monotone, and beyond a part of
+    their whole range, the curve is not that of the values.
+    """
+    a, b, c, _ = spline.c
+    h, rise = _column(np.diff(spline.x), values), np.diff(values, axis=0)
+    low, high = np.minimum(values[1:], values[:-1]), np.maximum(values[1:], values[:-1])
+    with np.errstate(all="ignore"):  # 3 a x^2 + 2 b x + c = 0
+        q = -(b + np.copysign(np.sqrt(b * b - 3.0 * a * c), b))
+        places = np.stack([q / (3.0 * a), c / q])
+        peaks = ((a * places + b) * places + c) * places + values[:-1]
+        beyond = np.maximum(peaks - high, low - peaks)
+    excess = np.where((places > 0.0) & (places < h) & np.isfinite(peaks), beyond, 0.0)
+    still = np.zeros((1, *rise.shape[1:]))
+    before, after = np.concatenate((still, rise[:-1])), np.concatenate((rise[1:], still))
+    monotone = (before * rise >= 0.0) & (rise * after >= 0.0) & (before * after >= 0.0)
+    allowed = np.where(monotone, OVERSHOOT, EXTREMUM) * np.ptp(values, axis=0) + SAME_VALUE * np.abs(values).max()
+    worst = np.unravel_index(int(np.argmax(excess - allowed)), excess.shape)
+    if not (excess - allowed)[worst] > 0.0:
+        return ""
+    i, at = worst[1], spline.x[worst[1]] + places[worst]
+    return (
+        f"Table: the cubic spline overshoots: it reaches {peaks[worst]:.4g} at t = {at:.6g} s, between the values "
+        f"{values[i][worst[2:]]:.4g} and {values[i + 1][worst[2:]]:.4g}. Give kind='pchip', which stays within the "
+        "values, 'linear' or 'previous', and a time twice for a jump; or an own CubicSpline of SciPy's."
+    )
 
 
 def is_data(value):

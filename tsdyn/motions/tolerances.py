@@ -18,3 +18,18 @@ QUOTIENT_ERROR = 1e-3
 # time is compared.
 SAME_VALUE = 1e-9
 TIMES = (0.37, 1.3, 11.0)
+
+# Of the range of a table's values, how far a cubic spline may leave two neighbouring values without a warning: where
+# the values are monotone (a step of evenly spaced values: 0.13; a sine of seven values a period at its ends: 0.05), and
+# where they have an extremum (a sine of four values a period: 0.21; four values of a hump, unevenly spaced: 0.37).
+OVERSHOOT, EXTREMUM = 0.1, 0.5
+
+# Samples of a function over a run, of which there are two or more in a pulse of a thousandth of the run; and strides
+# at which they are looked at, up to a 32nd of the run: steps are that long.
+SAMPLES, STRIDES = 2048, (1, 4, 16, 64)
+# How much larger than on either side a sixth difference of samples is where there is a change: between a zero of order
+# two and what is nine samples away it grows by 20, in a pulse on a sine of 26 samples a period by 1e5. Of the largest
+# value, below which a change is none.
+CLEAR, FAINT = 100.0, 1e-9
+# Samples of a step that tell noise.
+OF_STEP = 64

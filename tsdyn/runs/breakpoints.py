@@ -2,7 +2,7 @@
 
 A step that would pass a stop is shortened to end there. At the stop all piecewise functions switch to their next piece,
 and accelerations are re-evaluated for the output and for the next step. After a shortened step of fixed length, the
-next step ends on the original time grid.
+next step ends on the original time grid. A short change of a function is a stop for steps that begin before it alone.
 """
 
 import math
@@ -18,7 +18,7 @@ from .tolerances import SLIVER
 def next_stop(r, log):
     """The next time at which a step has to end, but for the end of the run; inf where there is none."""
     i = r.numbers.next_stop
-    while i < log.stops.shape[0] and log.stops[i, 0] <= r.clock.t:
+    while i < log.stops.shape[0] and (log.stops[i, 0] <= r.clock.t or log.stops[i, 2] < r.clock.t):
         i += 1
     r.numbers.next_stop = i
     return log.stops[i, 0] if i < log.stops.shape[0] else math.inf

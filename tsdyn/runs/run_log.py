@@ -11,7 +11,7 @@ class RunLog(NamedTuple):
     """Arrays of a run's own, unlike those of `Run`: room for a slice of it."""
 
     t_eval: np.ndarray  # output times, or empty: every step
-    stops: np.ndarray  # (stops, 2)  times at which a step ends, increasing, and whether Python is asked there
+    stops: np.ndarray  # (stops, 3)  times at which a step ends, increasing, as of `motions.knots.stops_of`
     out: np.ndarray  # (rows, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
     history: np.ndarray  # (rows, 3)  of each step tried: t, h, whether it was accepted
     charts: np.ndarray  # (rows, 5)  t, reason, condition, contraction, steps in it; rows are closed when it is left
@@ -22,7 +22,7 @@ class RunLog(NamedTuple):
 def no_log():
     """An example of its type, of no rows."""
     none = np.zeros((0, 1))
-    return RunLog(np.zeros(0), np.zeros((0, 2)), none, none, none, none, none)
+    return RunLog(np.zeros(0), np.zeros((0, 3)), none, none, none, none, none)
 
 
 @kernel

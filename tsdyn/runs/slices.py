@@ -17,7 +17,7 @@ from ..observables.not_finite import not_finite
 from ..rows.interface import redundant_of
 from . import snapshot
 from .recorder import Recorder
-from .tolerances import GETTING_ON, HOPELESS, PACED, SLICE_SECONDS
+from .tolerances import GETTING_ON, HOPELESS, NOISY, PACED, SLICE_SECONDS
 
 SLICE_DONE = Status.SLICE_DONE  # which takes longer to look up than to compare
 FIRST_SLICE, FIRST_WORK = 1024, 1 << 15  # steps; coordinates stepped on, unless that is less than a step
@@ -164,10 +164,24 @@ class Slices:
             return
         if task.max_steps is None and run.numbers.adaptive:
             self.status, self.reason = self.pace.judge(run.clock.t, run.numbers.history, end)
+            if self.status is SLICE_DONE and end - t > NOISY * run.clock.h:
+                self._look_for_noise(t)
         if task.archive is not None and self.status is SLICE_DONE:
             with deferred_interrupts():
                 self.recorder.collect()
                 task.archive.look_up(self.saved)
+
+    def _look_for_noise(self, t):
+        """End a run whose short steps follow noise."""
+        h = float(self.run.clock.h)
+        what = self.task.prepared.noise(float(t), h)
+        if what:
+            self.status = Status.STEP_COLLAPSED
+            self.reason = (
+                f"{what}: the function is noise, which varies within a step of {h:.1e} s as it does from step to step: "
+                "no tolerance and no max_step resolves it. Let it hold its values for some time, as a ts.Table of "
+                "kind='previous' does, or take fixed steps, such as integrator=ts.integrators.Nystrom4(step=...)."
+            )
 
     def saved(self):
         """The state between two slices: numbers, and arrays by name."""

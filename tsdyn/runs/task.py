@@ -41,7 +41,7 @@ class Task(NamedTuple):
     report: object  # a function of the fraction done (None at the end), the time, s, and the steps of the segment
     history: bool  # whether the histories of steps and charts are kept
     choose: object  # says after how many steps, and whether, another method goes on: see simulation/turns.py; or None
-    stops: np.ndarray = NO_STOPS  # times at which a step ends, s, and whether a function is asked there
+    stops: np.ndarray = NO_STOPS  # times at which a step ends, as of `motions.knots.stops_of`
     sampling: object = None  # a `sampling.Sampling`, or None
     archive: object = None  # a `storage.archive.Archive` that outputs and histories go to, or None
 

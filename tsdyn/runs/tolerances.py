@@ -99,6 +99,9 @@ PIECE = 1 << 22
 # Steps tried over which the pace of a run is taken; a run with HOPELESS as many to go would take days.
 PACED, HOPELESS = 1000, 1e10
 
+# Steps to go, at the present length, from which noise is looked for in functions: they take a second or more.
+NOISY = 1e6
+
 # A run whose pace, in s a step, has more than doubled since it was taken last gets on.
 GETTING_ON = 2.0
 

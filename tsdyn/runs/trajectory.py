@@ -54,7 +54,7 @@ class Trajectory:
         q, qd, qdd there, for a run that has made no step.
     angles : ndarray (count,)
         Of the joints, there.
-    stops : ndarray (stops, 2)
+    stops : ndarray (stops, 3)
         Of the `Task`: at one where a function is asked the step counts that begins there, as for outputs.
     """
 

@@ -79,7 +79,7 @@ class Plan:
         if stretch is None or t_span is not stretch.t_span or t_eval is not stretch.t_eval:
             stretch = Stretch.of(stretch, t_span, t_eval, kept, self.task.method)
             self._stretch = stretch if stretch.times.size <= FEW_TIMES else None
-        engine = self._engines.get(stretch.within or self.task.dense_output)
+        engine = None if stretch.unresolved else self._engines.get(stretch.within or self.task.dense_output)
         start = None if engine is None else self._start_of(scene, state, stretch.span[0])
         memory = None if start is None else self._memory(engine)
         if memory is None:

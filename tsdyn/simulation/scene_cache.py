@@ -14,6 +14,8 @@ from ..methods.integrator import is_plain
 from ..model.handles import handles_of
 from ..model.packed import with_curvatures
 from ..model.packed_forces import with_force_jacobians
+from ..model.state_loads import sampled_loads, user_kinds
+from ..motions.changes import NO_CHANGES, changes, is_noise, sample_times, within_step
 from ..motions.knots import NO_STOPS, stops_of
 from ..observables.friction_unique import demand_unique
 from ..runs.sampling import instants_of, sampled
@@ -122,11 +124,51 @@ class Prepared:
     def _has_stops(self):
         return bool(self.sampled) or any(each.pieces for given in self.motions for each in given.motions)
 
-    def stops(self, t0, t1):
-        """The stops of a run from t0 to t1, as of `stops_of`; refuses a motion that the run can't follow."""
+    @cached_property
+    def _changing(self):
+        """The functions of time that may change shortly, and the kinds of forces that run what a user has written."""
+        return [motion for motion in self.motions if motion.may_change], user_kinds(self.packed)
+
+    def stops(self, t0, t1, adaptive=False):
+        """The stops of a run from t0 to t1, as of `stops_of`; refuses a motion that the run can't follow.
+
+        adaptive: whether steps may be cut where functions change shortly.
+        """
         for motion in self.motions:
             motion.check(t0, t1)
-        return stops_of(self.motions, instants_of(self.packed, t0, t1), t0, t1) if self._has_stops else NO_STOPS
+        found = NO_CHANGES
+        if adaptive and any(self._changing):
+            t = sample_times(t0, t1)
+            found = changes(t, [values for _, values in self._sampled(t)])
+        if not (self._has_stops or found.size):
+            return NO_STOPS
+        return stops_of(self.motions, instants_of(self.packed, t0, t1), found, t0, t1)
+
+    def _sampled(self, t):
+        """The functions that may change shortly: what they are, and values (k,) at times t (k,)."""
+        motions, kinds = self._changing
+        with np.errstate(all="ignore"):
+            found = [(motion.what, values) for motion in motions for values in motion.sampled(t)]
+            return found + sampled_loads(self.packed, kinds, t)
+
+    def unresolved(self, t0, t1, h):
+        """Say what changes within less than steps of a fixed length h; "" for nothing."""
+        if any(self._changing):
+            t = sample_times(t0, t1)
+            for what, values in self._sampled(t):
+                for begin, end in changes(t, [values]):
+                    if end - begin < h:
+                        return (
+                            f"{what}: the function changes within {end - begin:.2g} s at t = {end:.6g} s, which steps "
+                            f"of {h:g} s don't resolve: give a shorter step or max_step, or an adaptive method."
+                        )
+        return ""
+
+    def noise(self, t, h):
+        """What is noise within a step from t to t + h; "" for nothing."""
+        if not any(self._changing):
+            return ""
+        return next((what for what, values in self._sampled(within_step(t, h)) if is_noise(values)), "")
 
     def engine(self, kind, method, form, within):
         """The engine of a method, as `frozen` returns it, in a form; see runs/run.py.

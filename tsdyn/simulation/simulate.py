@@ -117,7 +117,8 @@ def simulate(  # many arguments, by name: each is an option of a run
     max_steps : int, optional
         Largest number of steps; the run ends there.
     max_step : float, s, optional
-        Longest step, for every method; a longer fixed step is reduced to it.
+        Longest step, for every method; a longer fixed step is reduced to it. Changes of functions of time within a
+        thousandth of t_span are found without it; for shorter ones give half of their duration.
     history : bool, optional
         Keep `solution.steps` and `solution.charts`: 8 bytes per step, 16 to 40 more per rejected step and chart. By
         default they are kept, but for runs with a store, whose histories go to the store if they are asked for.
@@ -240,7 +241,7 @@ def _run_stored(task, given, options, found, archive):
 def _request(scene, kept, method, options, state, choose):
     """Return the run request, with a start that is consistent with the constraints."""
     span, settings, form = options.span, options.settings, options.settings.form
-    stops = kept.stops(*span)
+    stops = kept.stops(*span, method.step is None)
     start = scene._initial() if state is None else state_arrays(state, kept.n)
     memory = remembered(state, kept, span[0], start[0])
     q, qd = kept.start(scene, start, span[0], settings.initial_tol, memory, settings.drop)
@@ -267,6 +268,8 @@ def run_task(task, scene, initial_tol):
         return run_near(driver, task, scene, origin, initial_tol)
     limited, said = within_rounding(task.method, packed, task.q)
     outcome = driver(task if limited is task.method else task._replace(method=limited))
+    if task.method.step is not None:
+        said = task.prepared.unresolved(*task.span, task.method.step)
     if said:
         outcome = outcome._replace(reason=" ".join(part for part in (outcome.reason, said) if part))
     return outcome

@@ -24,6 +24,7 @@ class Stretch(NamedTuple):
     stops: np.ndarray  # as of a `Task`
     steps: int  # of a fixed length; 0 for an adaptive method
     within: bool  # whether there are times between the ends
+    unresolved: str  # by fixed steps, as of `Prepared.unresolved`
 
     @classmethod
     def of(cls, known, t_span, t_eval, prepared, method):
@@ -39,8 +40,8 @@ class Stretch(NamedTuple):
         demand_steps_seen(method, *span)
         return cls(
             t_span if _is_fixed(t_span) else MUTABLE, t_eval if t_eval is None or _is_fixed(t_eval) else MUTABLE, span,
-            times, times.tobytes(), prepared.stops(*span), 0 if step is None else step_count(*span, step),
-            between(times, span),
+            times, times.tobytes(), prepared.stops(*span, step is None), 0 if step is None else step_count(*span, step),
+            between(times, span), "" if step is None else prepared.unresolved(*span, step),
         )  # fmt: skip
 
 

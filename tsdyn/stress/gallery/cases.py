@@ -8,7 +8,7 @@ from . import rods
 from .bricard import bricard
 from .governor import governor
 from .planar_links import driven_six_bar, four_bars, six_bars, slider_crank
-from .single_bodies import kapitza, sleeping_top
+from .single_bodies import kapitza, sleeping_top, struck
 from .squeezer import squeezer
 
 
@@ -72,6 +72,7 @@ CASES = (
     ),
     Case("sleeping top", sleeping_top, 600.0, (0.5, 160), "upright, 7 % above the spin at which it falls"),
     Case("Kapitza's pendulum", kapitza, 10.0, (0.2, 200), "upside down, held up by a pivot that shakes at 19 Hz"),
+    Case("struck pendulum", struck, 100.0, (2.0, 20), "a torque acts for a thousandth of the run"),
     Case("hub of 500 bodies", hub, 1.0, (0.1, 10), "499 rods on one body: a dense block in the Schur complement"),
     Case("net of 500 loops", net, 0.25, (0.02, 4), "1045 rods, 500 loops: the factors of the Schur complement fill"),
 )

@@ -1,0 +1,61 @@
+"""Samples of forces that depend on time by a function or a law of the user's, at states that stay the same."""
+
+import numpy as np
+
+from ..elements.loops.coordinate_rows import call_kind
+from ..elements.loops.forces import INTS
+from ..elements.loops.template import AT, DIMENSION
+from ..jit.code_hash import is_ours
+from ..jit.kernels import entry
+from .equations import set_time
+
+
+@entry
+def _sample(s, q, qd, t, at, Q, out):
+    """out (k,): weighted sums of all forces on the coordinates `at`, at times t (k,); Q (n,): zeros."""
+    set_time(s, t[0])
+    for i in range(t.size):
+        for j in range(s.forces.shape[0]):
+            kind = s.forces[j]
+            call_kind(kind.force, kind.count, kind.stride, s.table[kind.table :], s.reals[kind.reals :], q, qd, t[i], Q)
+        total = 0.0
+        for j in range(at.size):
+            total += (1.0 + 0.37 * j) * Q[at[j]]
+            Q[at[j]] = 0.0
+        out[i] = total
+
+
+def is_of_user(item):
+    """Whether the law of a force, or a function of time and state in it, is a user's."""
+    return hasattr(item, "function_of_state") or not is_ours(type(item).__module__)
+
+
+def user_kinds(packed):
+    """The rows of System.forces that run what a user has written: their numbers, and the title of a force of each."""
+    first = {(one.force, one.stride): load.force for load in reversed(packed.loads) for one in load.alone}
+    forces = [first[row.force, row.stride] for row in packed.system.forces]
+    return [(i, force.title) for i, force in enumerate(forces) if is_of_user(force)]
+
+
+def sampled_loads(packed, kinds, t):
+    """Titles of the forces of each kind, and their sums (k,) at times t (k,): at the bodies' start, and nearby.
+
+    At the start a force may be zero at all times that is not so in motion. A state nearby may be none for the function.
+    """
+    system, found = packed.system, []
+    if not kinds:
+        return found
+    q, qd = (np.concatenate([getattr(body, x) for body in packed.bodies]) for x in ("q", "qd"))
+    near = 0.5 * np.cos(np.arange(q.size))
+    for i, title in kinds:
+        row = system.forces[i]
+        places = system.table[row.table : row.table + row.count * INTS].reshape(-1, INTS)
+        spans = zip(places[:, AT : AT + 2].ravel(), places[:, DIMENSION : DIMENSION + 2].ravel(), strict=True)
+        at = np.unique(np.concatenate([np.arange(begin, begin + size) for begin, size in spans]))
+        own = system._replace(forces=system.forces[i : i + 1], reals=system.reals.copy())
+        for move in (0.0, near):
+            out = np.empty(t.size)
+            _sample(own, q + move, qd + move, t, at, np.zeros(q.size), out)
+            if move is not near or np.isfinite(out).all():
+                found.append((title, out))
+    return found

@@ -78,6 +78,7 @@ def step_length(c, r):
     top, orders = x.order.top, x.order.room
     tol = r.clock.atol + r.clock.rtol
     far, fast, rate = weights(c, r)
+    c.trial.rate = rate
     h = _held(radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2)), rate, top + 2)
     if x.order.highest > x.order.lowest:
         lower = _held(radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top), rate, top)

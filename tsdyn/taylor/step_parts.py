@@ -179,7 +179,8 @@ def _may_differ(c, t, limits):
                 x.loads[kind.values :], left,
             )  # fmt: skip
             kind.near = 0 if left[0] > (STILL if is_short else 0.0) else 1
-            c.trial.left = min(c.trial.left, left[0])
+            if not left[0] >= c.trial.left:
+                c.trial.left = left[0]
         elif kind.check != 0 and kind.sharp == 0:
             _set_place(c, t, limits[LENGTH], limits)
             kind.near = 1 if _is_off(c, i, limits) else 0

@@ -19,7 +19,7 @@ from ..runs.breakpoints import fixed_end
 from ..runs.run_log import note_try
 from ..runs.step_control import gets_on, stretch
 from ..runs.tolerances import FROM_ZERO, SHORTEST
-from .step_length import is_near, longest, loosest, step_length
+from .step_length import finite_top, is_near, longest, loosest, step_length
 from .step_parts import call_expand, call_laws, call_reach, is_singular
 from .tolerances import (
     APART,
@@ -43,6 +43,7 @@ from .tolerances import (
 )
 
 STEP_COLLAPSED, PASSAGE, UNHELD = int(Status.STEP_COLLAPSED), int(Status.PASSAGE), int(Status.UNHELD)
+NOT_FINITE = int(Status.NOT_FINITE)
 
 
 @kernel
@@ -96,6 +97,8 @@ def _propose(c, r, tol):
     if r.numbers.steps == 0 and r.clock.h > 0.0:
         s.limit = min(s.limit, r.clock.h)
     s.h = min(s.h, s.limit)
+    if s.h == math.inf:  # halving it would go on for ever
+        s.h = r.clock.t_end - r.clock.t
     s.own_h, s.own_top, s.own_tol = s.h, order.top, s.tol
 
 
@@ -165,12 +168,25 @@ def _choose_next(c, r, landed, tol):
 
 
 @kernel
+def _lower_order(c, r):
+    """Leave out coefficients that are not finite, and choose the step anew; False if there are none of them."""
+    s, order, top = c.trial, c.expansion.order, finite_top(c)
+    if top < 1 or top == order.top:
+        return False
+    order.top = s.own_top = s.highest = top
+    s.h = s.own_h = min(step_length(c, r), s.limit)
+    return True
+
+
+@kernel
 def _follows_laws(context, c, r):
     """Whether the forces' series are those of their laws all along the step tried; else it is shortened."""
     s, order, h = c.trial, c.expansion.order, c.trial.t1 - r.clock.t
     call_laws(s.check, context, r.clock.t, h, r.clock.atol, r.clock.rtol)
     if s.good == 1.0:
         return True
+    if s.good == 0.0 and _lower_order(c, r):
+        return False
     s.h = max(s.good, 0.5 / PLACES) * h
     s.limit, s.own_h = min(s.limit, s.h), min(s.own_h, s.h)
     if s.sharp == 0:
@@ -183,9 +199,10 @@ def _hop(context, c, r, log, stop):
     """Go over a place where a law is not analytic: r + rd h + rdd h^2 / 2, and likewise rotations. Status."""
     s, t = c.trial, r.clock.t
     s.h = HOP * SHORTEST * max(abs(t), FROM_ZERO * (r.clock.t_end - r.clock.t_origin))
-    s.hops = 1 if t > s.hopped + APART * s.h else s.hops + 1
+    s.hops = 0 if t > s.hopped + APART * s.h else s.hops + 1
     if s.hops > MOST_HOPS or s.check == 0 or r.numbers.adaptive == 0:
         return STEP_COLLAPSED
+    s.h *= 2.0**s.hops
     s.hopped, c.expansion.order.top = t, 1
     _end(s, r, stop)
     note_try(r, log, t, s.t1 - t)
@@ -221,6 +238,10 @@ def make_step(context, c, r, log, stop):
             if status == 0:
                 status = call_expand(r.kernels.expand, context, 0, 1)
             return PASSAGE if status == 0 else status
+        if status == NOT_FINITE and adaptive and s.check != 0 and _lower_order(c, r):
+            go_to_start(c, r)
+            _reject(r, log)
+            continue
         landed = status == 0 and (not adaptive or f.landing.residual <= MISSED * (s.tol + c.work.control.floor))
         if landed:
             f.indicator.end = singularity_indicator(c.graph, f.rows)

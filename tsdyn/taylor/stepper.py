@@ -106,7 +106,7 @@ def _mind_singular(c, r):
 def _watch_stiffness(c, r, h):
     """Return True if the motion has just been found stiff: many steps in which nothing rotates or moves far."""
     far, p, most = extent(c.work) / h, c.tangent.poses, 0.0
-    if c.trial.left < STILL:
+    if not c.trial.left > STILL:
         most = math.inf
     for b in range(c.graph.bodies.shape[0]):
         at = b * POSE

@@ -35,8 +35,8 @@ STIFF_RATES = 1000.0
 PLACES, LEAST_STEPS = 4, 8
 
 # Length of a step over a place where a law is not analytic, relative to t as SHORTEST: forces there are bounded, so its
-# error is rounding. So many of them, each within the last number of lengths of the one before, are too many: the
-# motion comes to rest there.
+# error is rounding. Those within the last number of lengths of the one before are twice as long as that; more of them
+# are too many: the motion comes to rest there.
 HOP, MOST_HOPS, APART = 16.0, 8, 1e3
 
 # Angular velocity (rad/s) that counts as none.

@@ -106,7 +106,7 @@ def longest(c, r, tol, most):
 
 @long_kernel
 def finite_top(c):
-    """The highest top up to which the coefficients are finite: next to a place where a law is not analytic they grow."""
+    """The highest top up to which the coefficients are finite: they grow next to where a law is not analytic."""
     x, orders = c.expansion, c.expansion.order.room
     for k in range(2, x.order.top + 2):
         rest = splat(0.0)
@@ -116,7 +116,7 @@ def finite_top(c):
                 rest = fma(four(x.bodies, i), splat(0.0), rest)
             rest = fma(four(x.bodies, at + S_R * orders + 4 * k), splat(0.0), rest)
             rest = fma(four(x.bodies, at + S_OMEGA * orders + 4 * (k - 1)), splat(0.0), rest)
-        if not first(rest) + second(rest) + third(rest) == 0.0:
+        if first(rest) + second(rest) + third(rest) != 0.0:
             return k - 2
     return x.order.top
 

@@ -65,6 +65,13 @@ OPERATIONS = {
 }
 
 
+PLAIN = "polynomial", "piecewise", "add", "subtract", "multiply", "sin", "cos"
+
+
+def _is_linear(node):
+    return node._operation == "polynomial" and len(node._numbers) <= 2
+
+
 def _operators(operation: str) -> tuple[Operator, Operator]:
     """Return a binary operator of motions, and the same with a number on the left."""
     return lambda self, other: _binary(operation, self, other), lambda self, other: _binary(operation, other, self)
@@ -111,6 +118,14 @@ class Smooth:
     def pieces(self) -> list[Any]:
         """The `Pieces` among its nodes."""
         return [node._numbers for node in self._order() if node._operation == "piecewise"]
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether its coefficients at any time tell of all others: polynomials, waves, exponentials of a rate."""
+        return all(
+            node._operation in PLAIN or (node._operation == "exp" and _is_linear(node._operands[0]))
+            for node in self._order()
+        )
 
     def sides(self, t: ArrayLike) -> Floats:
         """Value and rate at times t (k,), by the pieces that end there and by those that begin: (2, 2, k)."""

@@ -87,6 +87,11 @@ class Spring(Force):
     InvalidForce
         If a number is negative or not finite, the points coincide, or stiffness, damping and actuator are all zero.
 
+    Notes
+    -----
+    Points may pass each other at speed, at any distance or none: the direction turns. At rest at zero length the force
+    has no direction: a start there is refused, and a run ends.
+
     Examples
     --------
     A mass of 1 kg hangs on a spring of 100 N/m and is released at its free length of 1 m:

@@ -146,13 +146,31 @@ def test_a_law_with_a_kink_at_rest_is_followed_past_it():
     assert solution.state.q[2] == pytest.approx(height(5.0, 3.0), abs=1e-10)
 
 
-def test_the_default_method_serves_where_series_end():
+def test_series_begin_where_a_law_has_none():
+    """From rest: |v| is divided by."""
     scene, link = arm()
-    scene.add(F.UserForce(link, function=resist))  # from rest: 1 / |v|
-    assert not ts.simulate(scene, (0, 1), integrator="taylor").success
+    scene.add(F.UserForce(link, function=resist))
+    expected = ts.simulate(scene, (0, 1), integrator=I.DOP853(rtol=1e-12, atol=1e-12)).state.q
+    for method in ("taylor", None):
+        solution = ts.simulate(scene, (0, 1), integrator=method)
+        assert solution.method.startswith("Taylor")
+        np.testing.assert_allclose(solution.state.q, expected, atol=1e-8)
+
+
+def across(t, a, b, par, out):
+    out[0] = -a[0] * (1.0 + np.sqrt(a[8] ** 2))
+
+
+def test_the_default_method_serves_where_series_end():
+    """The velocity across the slide is zero for ever, and |v| has no series there."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    body = scene.add_body(1.0, (1, 1, 1), (0.3, 0, 0))
+    scene.add(ts.constraints.Translational.at(scene.ground, body, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(F.UserForce(body, function=across))
+    assert ts.simulate(scene, (0, 1), integrator="taylor").status == ts.Status.STEP_COLLAPSED
     solution = ts.simulate(scene, (0, 1))
-    assert solution.success
     assert solution.method.startswith("DOP853")
+    assert solution.state.q[0] == pytest.approx(0.3 * math.cos(1.0), abs=1e-8)
 
 
 def test_a_pulse_is_not_stepped_over():

@@ -48,7 +48,8 @@ def of_scene(scene, method, form, far, rough):
             yield from ELIMINATION["unsymmetric"]
     for kind, moving in _kinds(scene).items():
         yield from of_constraint(kind, moving, series, far, implicit)
-    if series and any(force.sharp or _moves(force) for force in scene.forces):
+    driven = any(_kinds(scene).values())
+    if series and (driven or any(_is_checked(force) for force in scene.forces)):
         yield step_parts.check_laws
     for force in scene.forces:
         signals = [value for value in vars(force).values() if isinstance(value, Signal)]
@@ -72,7 +73,7 @@ def of_constraint(kind, moving, series=True, far=False, implicit=False):
 def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"], driven=""):
     """The loops over forces that have these kernels; driven: "driven_" for the series of those with loads of time."""
     names = ["force", "remember", "normal_load", "unit_friction", *["jacobian"] * implicit]
-    names += [driven + "series", driven + "check", "load_slope"] * series
+    names += [driven + "series", driven + "check", driven + "margin", "load_slope"] * series
     found = [kernels[name] for name in names if name in kernels]
     if "normal_load" in kernels and not series:
         found.append((friction_solve if form.basis_free else friction_basis).rub)
@@ -105,9 +106,10 @@ def of_method(method, form, within, far=False, rough=False):
         yield from (method.second,) if method.implicit else ()
 
 
-def _moves(force):
-    """Whether a load of a force is a function of time whose series are checked."""
-    return any(isinstance(value, Signal) and not value.entire for value in vars(force).values())
+def _is_checked(force):
+    """Whether series of a force may differ from its law."""
+    sharp = force.sharp or any(isinstance(value, Signal) and not value.entire for value in vars(force).values())
+    return sharp or force.positive != ()
 
 
 def _kinds(scene):

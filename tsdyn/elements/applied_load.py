@@ -33,7 +33,7 @@ class Given:
         If a torque is on a point mass.
     """
 
-    given = ""
+    given, positive = "", ()
 
     def __new__(cls, *others: Any, frame: str = "ground", **more: Any) -> Self:
         """Choose the kernel by frame and by the sort of the vector."""

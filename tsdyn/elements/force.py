@@ -65,6 +65,10 @@ class Force(Attachment):
     sharp : bool
         Whether the law may change within less than its series shows, as |v| does at v = 0: steps by series are then
         checked against the law.
+    positive : tuple of int, or None
+        Rows of the scratch memory that `series` divides by or takes roots or angles of: a law is analytic while they
+        are positive, and a step in which one may vanish is checked against the law. () for a law that is analytic
+        everywhere, such as a polynomial; None where nothing is known, and the end of every step is checked.
     analytic : bool
         Whether `law` can be run on complex numbers.
     particles : bool
@@ -106,6 +110,7 @@ class Force(Attachment):
     no_series = ""
     sharp = False
     slips = False  # whether it is friction, which changes at rest within a slip velocity
+    positive: tuple[int, ...] | None = None
     analytic = True
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType({})
     loads: tuple[str, ...] = ()
@@ -241,13 +246,18 @@ def _series_callbacks(cls, label, names, functions):
     for before, driven in (("", False), ("driven_", True)):
         if before + "series" not in functions:
             continue
-        function, sharp = functions[before + "series"], cls.sharp or driven
+        function = functions[before + "series"]
+        sharp = cls.sharp or driven
         own = {**names, "kernel_series": inlined(function), "SLOTS": cls.slots, "SHARP": sharp}
         own |= {"DRIVEN": driven, "TRACED": traced, "RUBS": "normal_series" in functions}
+        own |= {"POSITIVE": cls.positive or ()}
         home = getattr(function, "py_func", function)
         copy = specialised(force_series.series, f"{label}.{before}series_loop", home, **own)
         result[before + "series"] = Callback(copy, constraint_series.SIGNATURE)
-        if sharp:
+        if sharp or cls.positive != ():
             copy = specialised(law_check.check, f"{label}.{before}check_loop", home, **own)
             result[before + "check"] = Callback(copy, law_check.SIGNATURE)
+        if cls.positive:
+            copy = specialised(law_check.margin, f"{label}.{before}margin_loop", home, **own)
+            result[before + "margin"] = Callback(copy, law_check.MARGIN)
     return result

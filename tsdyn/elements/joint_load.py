@@ -36,7 +36,7 @@ class JointLoad:
 
     loads = ("function",)
     permanent = ("joint", "which")
-    memory = 1
+    memory, positive = 1, ()
     quantities = MappingProxyType({"function": law_of_joint, "period": instants})
     coordinate = ""  # "angle" or "displacement"
     kind_of_example: Any = None  # a class of joints with such a coordinate and an axis

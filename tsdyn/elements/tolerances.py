@@ -31,9 +31,9 @@ FORCE_STEP = 1e-40
 FORCE_QUOTIENT = 7e-4
 
 # Series of forces against their laws (loops/law_check.py). What they are off by at most, as a velocity over the
-# tolerance of a step; least of it, m/s or rad/s, below which terms that cancel within a law count. Rounding of a law,
-# relative to the terms of its series.
-OFF, LAW_TOLERANCE, LAW_NOISE = 1000.0, 1e-12, 1e-13
+# tolerance of a step; the same of laws that are analytic but at few places. Least of both, m/s or rad/s, below which
+# terms that cancel within a law count. Rounding of a law, relative to the terms of its series.
+OFF, OFF_SELDOM, LAW_TOLERANCE, LAW_NOISE = 1000.0, 20.0, 1e-12, 1e-13
 
 # Part of a normal load, relative to the whole: below it a part is rounding of the reactions, in a mechanism in a plane
 # for instance, and so are all its coefficients.

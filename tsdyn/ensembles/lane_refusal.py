@@ -83,6 +83,8 @@ def _of_scene(arena):
             found.append(f"{force.name} follows from a reaction")
         elif force.sharp:
             found.append(f"{force.name} changes within less than its series shows")
+        elif force.positive is None:
+            found.append(f"{force._kind()} doesn't say where it is analytic (`positive`)")
         elif force.memory:
             found.append(f"{force.name} remembers a number from step to step")
     if redundant_rows(packed).size:

@@ -83,7 +83,7 @@ class Bushing(Force):
     """
 
     markers = (Point("a"), Point("b"), Parameters("a"), Parameters("b"), Turn("a"), Turn("b"))
-    slots = 45
+    slots, positive = 45, ()
     sources = ("stiffness", "damping", "torsional_stiffness", "torsional_damping")
     quantities = MappingProxyType(dict.fromkeys(sources, _three))
 

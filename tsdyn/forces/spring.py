@@ -6,7 +6,7 @@
     U = k (l - l0)^2 / 2                 (3)
     dissipation = c ld^2                 (4)
 
-Singular at l = 0: a run ends there.
+At l = 0 the direction of d is that of dd, as it is just after; at rest there is none, and a run ends.
 """
 
 from __future__ import annotations
@@ -36,11 +36,23 @@ if TYPE_CHECKING:
     from ..hints import BodyLike, Load
 
 
+BEYOND = 1e-100  # s; d at zero length is that of so much later
+
+
 @kernel
-def spread(x, k, s):
+def separation(x, xd):
+    """Vector d, a tuple of three."""
+    d0, d1, d2 = x[0] - x[3], x[1] - x[4], x[2] - x[5]
+    return d0 + BEYOND * (xd[0] - xd[3]), d1 + BEYOND * (xd[1] - xd[4]), d2 + BEYOND * (xd[2] - xd[5])
+
+
+@kernel
+def spread(x, xd, k, s):
     """Coefficient k of d, d.d and 1 / l, in rows 0 to 4."""
     for i in range(3):
         s[i, k] = x[i] - x[3 + i]
+    if k == 0:
+        s[0, 0], s[1, 0], s[2, 0] = separation(x, xd)
     s[3, k] = dot(s, 0, 0, k)
     s[4, k] = inverse_root(s[3], s[4], k)
 
@@ -75,6 +87,11 @@ class Spring(Force):
     InvalidForce
         If a number is negative or not finite, the points coincide, or stiffness, damping and actuator are all zero.
 
+    Notes
+    -----
+    Points may pass each other at speed, at any distance or none: the direction turns. At rest at zero length the force
+    has no direction: a start there is refused, and a run ends.
+
     Examples
     --------
     A mass of 1 kg hangs on a spring of 100 N/m and is released at its free length of 1 m:
@@ -95,7 +112,7 @@ class Spring(Force):
     )
     loads = ("actuator",)
     sources = ("stiffness", "damping", "actuator")
-    slots = 11
+    slots, positive = 11, (3,)
 
     def __init__(
         self,
@@ -126,7 +143,7 @@ class Spring(Force):
     @staticmethod
     def law(x, xd, par, t, out):
         """Eqs. (1), (2)."""
-        d0, d1, d2 = x[0] - x[3], x[1] - x[4], x[2] - x[5]
+        d0, d1, d2 = separation(x, xd)
         l = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
         ld = (d0 * (xd[0] - xd[3]) + d1 * (xd[1] - xd[4]) + d2 * (xd[2] - xd[5])) / l
         f = (par[0] * (l - par[2]) + par[1] * ld + par[3]) / l
@@ -136,14 +153,14 @@ class Spring(Force):
     @staticmethod
     def series(x, xd, par, k, s, out):
         """Of Eq. (2), as (k + (actuator - k l0) / l + c d.dd / l^2) d."""
-        spread(x, k, s)
+        spread(x, xd, k, s)
         s[5, k] = (par[3] - par[0] * par[2]) * s[4, k] + (par[0] if k == 0 else 0.0)
         pull(xd, par, k, s, out)
 
     @staticmethod
     def driven_series(x, xd, par, k, s, out):
         """The same; the actuator is in row 14."""
-        spread(x, k, s)
+        spread(x, xd, k, s)
         s[5, k] = product(s[14], s[4], k) - par[0] * par[2] * s[4, k] + (par[0] if k == 0 else 0.0)
         pull(xd, par, k, s, out)
 
@@ -157,7 +174,7 @@ class Spring(Force):
     @staticmethod
     def dissipation(x, xd, par, t):
         """Eq. (4)."""
-        d0, d1, d2 = x[0] - x[3], x[1] - x[4], x[2] - x[5]
+        d0, d1, d2 = separation(x, xd)
         rate = d0 * (xd[0] - xd[3]) + d1 * (xd[1] - xd[4]) + d2 * (xd[2] - xd[5])
         return par[1] * rate * rate / (d0 * d0 + d1 * d1 + d2 * d2)
 

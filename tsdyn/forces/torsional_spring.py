@@ -52,6 +52,8 @@ def twist(x, xd, par, k, s, out):
     if par[0] != 0.0:
         angle_series(par[4], k, s)
         s[19, k] -= par[0] * s[18, k]
+    else:
+        s[17, k] = 1.0 if k == 0 else 0.0
     if par[1] != 0.0:
         for i in range(3):
             s[12 + i, k] = xd[12 + i] - xd[9 + i]
@@ -104,7 +106,7 @@ class TorsionalSpring(Force):
     markers = (Vector("a"), Vector("a", "reference_a"), Vector("b", "reference_b"), Turn("a"), Turn("b"))
     joint_coordinates = (Angle(reference="reference_a", direction="reference_b"),)
     memory = 1
-    slots = 20
+    slots, positive = 20, (17,)
     conservative = False  # unless a joint holds the axis
     quantities = MappingProxyType(
         {"stiffness": not_negative, "damping": not_negative, "free_angle": finite, "actuator": load}

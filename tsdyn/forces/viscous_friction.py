@@ -38,7 +38,7 @@ class ViscousFriction(BodyFriction, Force):
     """
 
     sources = ("damping", "torsional_damping")
-    slots = 9
+    slots, positive = 9, ()
     quantities = MappingProxyType(dict.fromkeys(sources, not_negative))
 
     def __init__(

@@ -33,8 +33,9 @@ from ..workspaces.workspace import plain_context
     MOVED,  # the largest displacement in it, m or rad
     BEFORE,  # |Phi| before the last correction
     DONE,  # whether the projection has ended
+    LEFT,  # share of what laws divide by, or take roots of, that the step can't use up
     ROWS,
-) = range(19)
+) = range(20)
 
 
 class LaneNumbers(Record):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..elements.element import address
-from ..elements.loops import constraint_rows, constraint_series, force_series, template
+from ..elements.loops import constraint_rows, constraint_series, force_series, law_check, template
 from ..elements.markers import PARAMETERS
 from ..errors import InvalidConstraint, InvalidForce
 from ..jit.compiled import Callback
@@ -17,6 +17,7 @@ CONSTRAINT_LOOPS = {
     "values": constraint_rows.values,
     "series": constraint_series.series,
 }
+FORCE_LOOPS = ("series", force_series.series), ("margin", law_check.margin)
 _NAMES = [name for name in vars(template) if name.isupper() or name.startswith("kernel_")]
 _known = {}  # (callback, width): that of lanes
 
@@ -45,13 +46,14 @@ def constraint_loops(kinds, width):
 
 
 def force_loops(packed, width):
-    """Addresses of the series loops of forces for lanes, in the order of System.forces.
+    """Addresses of the loops of forces for lanes, (kinds, 2), in the order of System.forces: series, margin or 0.
 
     Raises InvalidForce where Numba can't compile one.
     """
     found = []
     for row in packed.system.forces:
         force = members_of(row, packed.loads)[0].force
-        own = {"series": _loop(force.kernels["series"], force_series.series, force.markers, width)}
-        found.append(address(own, "series", force.name, InvalidForce))
-    return np.array(found, np.int64)
+        loops = FORCE_LOOPS if force.positive else FORCE_LOOPS[:1]
+        own = {name: _loop(force.kernels[name], loop, force.markers, width) for name, loop in loops}
+        found.append([address(own, name, force.name, InvalidForce) if name in own else 0 for name, _ in FORCE_LOOPS])
+    return np.array(found, np.int64).reshape(-1, len(FORCE_LOOPS))

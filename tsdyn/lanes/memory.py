@@ -38,7 +38,7 @@ class LaneMemory:
         kinds, loops = many.graph.kinds, constraint_loops(series.kinds, width)
         kinds["reduced"], kinds["values"], many.expansion.places["loop"] = loops.T
         kinds["bias"] = kinds["drift"] = 0
-        many.expansion.forces["loop"] = force_loops(packed, width)
+        many.expansion.forces["loop"], many.expansion.forces["margin"] = force_loops(packed, width).T
         if spinning:
             many.graph.spins[many.graph.bodies[:, 1] == 7] = 1
         self._set_numbers(memory.run)

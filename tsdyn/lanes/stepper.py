@@ -5,6 +5,7 @@ projected together. A lane that can't go on as any other is LOST: its case is to
 """
 
 from ..elements.loops.body_poses import OMEGA, POSE, RD
+from ..elements.loops.law_check import call_margin
 from ..formulations.chart_validity import ROUNDING
 from ..jit.kernels import kernel, long_kernel, specialised
 from ..jit.lane_masks import below, both, choose, either, opposite
@@ -14,11 +15,12 @@ from ..runs.step_control import stretch
 from ..runs.tolerances import FROM_ZERO, SHORTEST
 from ..taylor import coefficients
 from ..taylor.step_end import keep_start, project_rates
-from ..taylor.tolerances import HALVED, MISSED, SMALL, SMALL_STEPS, WARY
+from ..taylor.tolerances import HALVED, MISSED, SMALL, SMALL_STEPS, STIFF_RATES, STILL, WARY
 from .context import (
     BAD,
     FLOOR,
     INDICATOR,
+    LEFT,
     LOST,
     NEXT,
     RESIDUAL,
@@ -102,6 +104,27 @@ def _is_missed(c, again):
 
 
 @kernel
+def _find_lost(c, mask):
+    let(c.state, LOST, choose(mask, 1.0, get(c.state, LOST)))
+
+
+@kernel
+def _keep_away(c, most):
+    """Lanes whose laws may not be analytic all along the step are LOST: alone, a case is checked against them."""
+    x, s = c.expansion, c.state
+    for i in range(x.forces.shape[0]):
+        kind = x.forces[i]
+        if kind.margin != 0:
+            let(s, LEFT, 0.0 * get(s, H) + 1.0)
+            call_margin(
+                kind.margin, kind.count, kind.stride, kind.width, x.order.room, most, s[H:],
+                x.loads[kind.values :], s[LEFT:],
+            )  # fmt: skip
+            short = below(STIFF_RATES * get(s, H), get(s, TOP))
+            _find_lost(c, opposite(below(choose(short, STILL, 0.0 * get(s, H)), get(s, LEFT))))
+
+
+@kernel
 def try_step(c):
     """Expand the series of all lanes and reach the ends of their steps; returns the lowest and highest order."""
     let(c.state, TOP, get(c.state, NEXT))
@@ -109,6 +132,7 @@ def try_step(c):
     _expand(c, most)
     propose(c, least, most)
     _set_ends(c)
+    _keep_away(c, most)
     for i in range(HALVINGS + 1):
         reach(c, least, most)
         if not _is_missed(c, i < HALVINGS):
@@ -125,11 +149,6 @@ def _weakest(c):
         share = get(values, graph.diagonal[e]) * get(values, kept + e)
         least = choose(below(share * least, 1.0), least, 1.0 / share)
     return least
-
-
-@kernel
-def _find_lost(c, mask):
-    let(c.state, LOST, choose(mask, 1.0, get(c.state, LOST)))
 
 
 @long_kernel

@@ -65,7 +65,11 @@ OPERATIONS = {
 }
 
 
-EVEN = frozenset(("polynomial", "piecewise", "add", "subtract", "multiply", "sin", "cos"))
+PLAIN = frozenset(("polynomial", "piecewise", "add", "subtract", "multiply", "sin", "cos"))
+
+
+def _is_linear(node):
+    return node._operation == "polynomial" and len(node._numbers) <= 2
 
 
 def _operators(operation: str) -> tuple[Operator, Operator]:
@@ -118,7 +122,15 @@ class Smooth:
     @property
     def is_even(self) -> bool:
         """Whether it has no short change within a piece: it consists of polynomials and sines."""
-        return EVEN.issuperset(node._operation for node in self._order())
+        return PLAIN.issuperset(node._operation for node in self._order())
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether its coefficients at any time tell of all others: polynomials, waves, exponentials of a rate."""
+        return all(
+            node._operation in PLAIN or (node._operation == "exp" and _is_linear(node._operands[0]))
+            for node in self._order()
+        )
 
     def sides(self, t: ArrayLike) -> Floats:
         """Value and rate at times t (k,), by the pieces that end there and by those that begin: (2, 2, k)."""

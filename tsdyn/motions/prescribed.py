@@ -105,6 +105,11 @@ class Motion:
         return found
 
     @property
+    def is_plain(self) -> bool:
+        """As of its series."""
+        return self.series.is_plain
+
+    @property
     def has_series(self) -> bool:
         """Whether there is a Taylor series."""
         return self.series is not None

@@ -7,12 +7,13 @@ import numpy as np
 
 from ..errors import TsdynError
 from ..simulation.simulate import simulate
-from . import comparisons
+from . import comparisons, passages
 from .laws import findings
 from .random_scenes import generate
 
 MOST_STEPS = 3_000  # of a run
 COMPARED = 0.7  # of the cases are run in another way, too
+PASSAGES = 4
 FAULT = "FAULT"
 
 
@@ -32,7 +33,9 @@ class Outcome(NamedTuple):
 
 
 def judge_scene(seed, least=None, most=None):
-    """Return the `Outcome` of the scene of a seed."""
+    """Return the `Outcome` of the scene of a seed; one in PASSAGES passes places where a law is not analytic."""
+    if least is None and seed % PASSAGES == PASSAGES - 1:
+        return judge_case(passages.draw(seed), (comparisons.another_method,), seed)
     return judge_case(generate(seed, least, most), comparison(np.random.default_rng((seed, 1))), seed)
 
 

@@ -5,6 +5,7 @@ lists those of a single run; agreement.py compares runs.
 """
 
 from copy import copy
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree

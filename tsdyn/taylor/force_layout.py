@@ -30,7 +30,8 @@ class ForceLayout(NamedTuple):
 class _Kind(NamedTuple):
     """How the series of some instances of a kind are run."""
 
-    names: tuple  # of the kernels of series and check; None for no check
+    names: tuple  # of the kernels of series, check and margin; None for none
+    sharp: bool  # whether every step is checked at all places
     rows: int  # of the scratch of each
     program: list  # of a traced function
 
@@ -46,10 +47,12 @@ def lay_out_forces(packed, orders):
             members = list(group)
             force = members[0].force
             kind = _kind(members)
-            loop, check = (address(force.kernels, name, force.name, InvalidForce) if name else 0 for name in kind.names)
-            width = _width(force, kind, orders, check != 0 or force.sharp or _is_driven(members[0]))
+            found = (address(force.kernels, name, force.name, InvalidForce) if name else 0 for name in kind.names)
+            loop, check, margin = found
+            width = _width(force, kind, orders, force.sharp or _is_driven(members[0]))
             run = run_order.address if kind.program else 0
-            rows.append([loop, total, width, len(members), row.stride, len(table), reals, check, run])
+            rows.append([loop, total, width, len(members), row.stride, len(table), reals])
+            rows[-1] += [check, margin, int(kind.sharp), 0, run]
             written.append((total, kind.program))
             total += len(kind.program)
             for i, load in enumerate(members):
@@ -75,16 +78,16 @@ def _kind(members):
     load, force = members[0], members[0].force
     if hasattr(force.kernels, "program"):
         program = force.kernels.program(len(load.parameters))
-        return _Kind(("series", "check"), int(program[ROWS]), program)
+        return _Kind(("series", "check", None), True, int(program[ROWS]), program)
     if load.normal >= 0:
         size = sum(marker.size for marker in force.markers)
-        return _Kind(("series", "check"), force.slots + size + FRICTION_ROWS, [])
-    if not _is_driven(load):
-        return _Kind(("series", "check" if force.sharp else None), force.slots, [])
+        return _Kind(("series", "check", None), True, force.slots + size + FRICTION_ROWS, [])
     signals = [value for each in members for value in each.parameters if isinstance(value, Signal)]
-    checked = force.sharp or not all(signal.entire for signal in signals)
-    numbers = load.alone[0].stride - 3 * len(force.markers)
-    return _Kind(("driven_series", "driven_check" if checked else None), force.slots + numbers, [])
+    sharp = force.sharp or not all(signal.entire for signal in signals)
+    before, numbers = ("driven_", load.alone[0].stride - 3 * len(force.markers)) if signals else ("", 0)
+    check = before + "check" if sharp or force.positive != () else None
+    margin = before + "margin" if force.positive and not sharp else None
+    return _Kind((before + "series", check, margin), sharp, force.slots + numbers, [])
 
 
 def _width(force, kind, orders, keeps):
@@ -99,6 +102,6 @@ def _drive(load, first, orders, drives, written):
     numbers = [x for value in load.parameters for x in ([None] * value.width if isinstance(value, Signal) else [value])]
     for j, (number, program) in enumerate(zip(numbers, load.programs, strict=True)):
         if number is None:
-            drives.append([run_program.address, program, first + j * orders])
+            drives.append([run_program.address, program, first + j * orders, 0])
         else:
             written.append((first + j * orders, [float(number)]))

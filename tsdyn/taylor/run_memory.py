@@ -76,8 +76,9 @@ class SeriesMemory(Memory):
         graph, system = self.series.graph, System(*(array.copy() for array in packed.system))
         expansion = allocate_expansion(graph, self.series.kinds, packed, highest)
         tangent, trial = allocate_tangent(graph, n), Trial()
-        if expansion.forces["check"].any():
-            trial.check = check_laws.address
+        trial.left = 1.0
+        if expansion.forces["check"].any() or expansion.motions["check"].any():
+            trial.check, trial.sharp = check_laws.address, int(expansion.forces["sharp"].any())
         block = 1 + n + expansion.bodies.size
         run = lay_out(n, 0, 0, prepared.handles.count, system.memory.size, block=block)
         context = SeriesContext(system, plain_work(n), graph, tangent, expansion, trial)

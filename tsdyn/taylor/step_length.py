@@ -5,7 +5,7 @@ import math
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..formulations.chart_validity import ROUNDING
 from ..jit.kernels import kernel, long_kernel
-from ..jit.simd import first, four, larger, second, splat, third
+from ..jit.simd import first, fma, four, larger, second, splat, third
 from ..rows.interface import is_near_singular
 from .tolerances import FAINT, FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST, STIFF_RATES, VAST
 
@@ -103,6 +103,7 @@ def step_length(c, r):
     tol = r.clock.atol + r.clock.rtol
     far, fast, rate = weights(c, r)
     x.order.top = top = order_in_range(x.bodies, nb, orders, x.order.top, far, fast)
+    c.trial.rate = rate
     h = _held(radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2)), rate, top + 2)
     if x.order.highest > x.order.lowest:
         lower = _held(radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top), rate, top)
@@ -126,6 +127,23 @@ def longest(c, r, tol, most):
         if longer > h:
             h, x.order.top = longer, k
     return h
+
+
+@long_kernel
+def finite_top(c):
+    """The highest top up to which the coefficients are finite: they grow next to where a law is not analytic."""
+    x, orders = c.expansion, c.expansion.order.room
+    for k in range(2, x.order.top + 2):
+        rest = splat(0.0)
+        for b in range(c.graph.bodies.shape[0]):
+            at = b * orders * BODY_ROW
+            for i in range(at + 12 * k, at + 12 * k + 12, 4):
+                rest = fma(four(x.bodies, i), splat(0.0), rest)
+            rest = fma(four(x.bodies, at + S_R * orders + 4 * k), splat(0.0), rest)
+            rest = fma(four(x.bodies, at + S_OMEGA * orders + 4 * (k - 1)), splat(0.0), rest)
+        if first(rest) + second(rest) + third(rest) != 0.0:
+            return k - 2
+    return x.order.top
 
 
 @kernel

@@ -5,7 +5,8 @@ Their argument is the address of a `SeriesContext`.
 
 from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
-from ..elements.loops.law_check import ATOL, LENGTH, LIMITS, RTOL, TAU, TIME, call_check
+from ..elements.loops.law_check import ATOL, LENGTH, LIMITS, MOST, RTOL, TAU, TIME, call_check, call_margin
+from ..elements.tolerances import OFF, OFF_SELDOM
 from ..errors import Status
 from ..formulations.accelerations import accelerate_bodies
 from ..formulations.chart_validity import ROUNDING
@@ -14,6 +15,7 @@ from ..jit.kernels import callback, caller, kernel, stack
 from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import set_time
+from ..motions.program import call_smooth
 from ..rows.interface import (
     accelerations_hold,
     evaluate_bias,
@@ -29,7 +31,7 @@ from ..rows.interface import (
 from .coefficients import begin, expand
 from .prescribed_series import expand_motions
 from .step_end import keep_start, project_rates, sum_series
-from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, UNEQUAL
+from .tolerances import GONE, ILL_ORDERS, INSTANTS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL, UNEQUAL
 from .workspace import load_series
 
 NOT_FINITE, SINGULAR, UNHELD = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.UNHELD)
@@ -128,26 +130,83 @@ def reach(context, t, h):
 
 @callback(LAWS)
 def check_laws(context, t, h, atol, rtol):
-    """Compare the series of sharp forces with their laws at places of a step from t to t + h; sets `Trial.good`."""
+    """Compare the series of motions and forces with what they are, at places from t to t + h; sets `Trial.good`."""
     c = load_series(context)
-    x, limits = c.expansion, stack(LIMITS)
+    limits = stack(LIMITS)
     limits[LENGTH], limits[ATOL], limits[RTOL] = h, atol, rtol
-    for j in range(PLACES):
-        limits[TAU] = h * (j + 1) / PLACES
-        limits[TIME] = t + limits[TAU]
-        set_time(c.system, limits[TIME])
-        c.trial.good = j / PLACES
-        for i in range(x.forces.shape[0]):
-            kind = x.forces[i]
-            if kind.check != 0:
-                off = call_check(
-                    kind.check, kind.run, kind.count, kind.stride, kind.width, x.order.room, x.order.top, limits,
-                    x.table[kind.table :], c.system.reals[kind.reals :], x.loads[kind.values :], c.graph.inverse,
-                )  # fmt: skip
-                if off != 0:
-                    return 1
     c.trial.good = 1.0
+    for j in range(INSTANTS):
+        if _is_motion_off(c, t, h * (j + 1) / INSTANTS, atol, rtol):
+            c.trial.good = j / INSTANTS
+            return 1
+    if not _may_differ(c, t, limits):
+        return 0
+    for j in range(PLACES):
+        _set_place(c, t, h * (j + 1) / PLACES, limits)
+        for i in range(c.expansion.forces.shape[0]):
+            if c.expansion.forces[i].near != 0 and _is_off(c, i, limits):
+                c.trial.good = j / PLACES
+                return 1
     return 0
+
+
+@kernel
+def _is_motion_off(c, t, tau, atol, rtol):
+    """Whether a prescribed motion is not its series at t + tau."""
+    x, value = c.expansion, stack(1)
+    for i in range(x.motions.shape[0]):
+        row = x.motions[i]
+        if row.check != 0:
+            call_smooth(row.run, c.system.reals[row.program :], t + tau, 1, value)
+            total = 0.0
+            for k in range(x.order.top + 1, -1, -1):
+                total = total * tau + x.constraints[row.values + k]
+            if not abs(total - value[0]) <= OFF_SELDOM * (atol + rtol * abs(value[0])):
+                return True
+    return False
+
+
+@kernel
+def _set_place(c, t, tau, limits):
+    limits[TAU], limits[TIME] = tau, t + tau
+    set_time(c.system, limits[TIME])
+
+
+@kernel
+def _is_off(c, i, limits):
+    """Whether the series of a kind of force are not its laws at a place of the step."""
+    x, kind = c.expansion, c.expansion.forces[i]
+    limits[MOST] = OFF if kind.sharp == 1 else OFF_SELDOM
+    off = call_check(
+        kind.check, kind.run, kind.count, kind.stride, kind.width, x.order.room, x.order.top, limits,
+        x.table[kind.table :], c.system.reals[kind.reals :], x.bodies, x.loads[kind.values :], c.graph.inverse,
+    )  # fmt: skip
+    return off != 0
+
+
+@kernel
+def _may_differ(c, t, limits):
+    """Set which kinds of forces are to be compared with their laws within the step; whether there are any."""
+    x, left, found = c.expansion, stack(1), False
+    c.trial.left = 1.0
+    is_short = STIFF_RATES * c.trial.rate * limits[LENGTH] < x.order.top + 2  # coefficients of places show no rates
+    for i in range(x.forces.shape[0]):
+        kind = x.forces[i]
+        kind.near = kind.sharp
+        if kind.margin != 0:
+            left[0] = 1.0
+            call_margin(
+                kind.margin, kind.count, kind.stride, kind.width, x.order.room, x.order.top, limits[LENGTH:],
+                x.loads[kind.values :], left,
+            )  # fmt: skip
+            kind.near = 0 if left[0] > (STILL if is_short else 0.0) else 1
+            if not left[0] >= c.trial.left:
+                c.trial.left = left[0]
+        elif kind.check != 0 and kind.sharp == 0:
+            _set_place(c, t, limits[LENGTH], limits)
+            kind.near = 1 if _is_off(c, i, limits) else 0
+        found = found or kind.near != 0
+    return found
 
 
 @callback("pdd")

@@ -2,6 +2,9 @@
 
 A step that ends near a singular configuration is lengthened, at looser tolerances, until it ends beyond; if no length
 passes, the step that the tolerance of the run asks for is taken where it serves, or is shortened to end before.
+
+Steps become shorter towards a place where the law of a force is not analytic, such as zero length of a spring. Where
+the rounding of time is reached, a step of first order goes over it (`_hop`); the next series have the law beyond.
 """
 
 import math
@@ -15,17 +18,21 @@ from ..rows.interface import is_near_singular, singularity_indicator
 from ..runs.breakpoints import fixed_end
 from ..runs.run_log import note_try
 from ..runs.step_control import gets_on, stretch
-from .step_length import is_near, longest, loosest, step_length
+from ..runs.tolerances import FROM_ZERO, SHORTEST
+from .step_length import finite_top, is_near, longest, loosest, step_length
 from .step_parts import call_expand, call_laws, call_reach, is_singular
 from .tolerances import (
+    APART,
     AVOID,
     AVOIDING,
     CLOSE,
     CLOSER,
     HALVED,
+    HOP,
     LEAST_STEPS,
     LOOSER,
     MISSED,
+    MOST_HOPS,
     MOST_TURN,
     NO_SPEED,
     PASSED,
@@ -36,6 +43,7 @@ from .tolerances import (
 )
 
 STEP_COLLAPSED, PASSAGE, UNHELD = int(Status.STEP_COLLAPSED), int(Status.PASSAGE), int(Status.UNHELD)
+NOT_FINITE = int(Status.NOT_FINITE)
 
 
 @kernel
@@ -80,7 +88,7 @@ def _propose(c, r, tol):
         s.tol = max(TIGHTER * tol, min(tol, TIGHTEST))
         s.h = longest(c, r, s.tol, s.highest)
     s.limit = r.clock.max_step
-    if s.check != 0:
+    if s.sharp == 1:
         s.h *= min(1.0, RATES * s.h / (order.top + 2)) ** (1.0 / (order.top + 2))
         s.limit = min(s.limit, (r.clock.t_end - r.clock.t_origin) / LEAST_STEPS)
     if c.system.memory.size > 0:  # what counts turns must see each of them
@@ -88,6 +96,8 @@ def _propose(c, r, tol):
     if r.numbers.steps == 0 and r.clock.h > 0.0:
         s.limit = min(s.limit, r.clock.h)
     s.h = min(s.h, s.limit)
+    if s.h == math.inf:  # halving it would go on for ever
+        s.h = r.clock.t_end - r.clock.t
     s.own_h, s.own_top, s.own_tol = s.h, order.top, s.tol
 
 
@@ -157,15 +167,48 @@ def _choose_next(c, r, landed, tol):
 
 
 @kernel
+def _lower_order(c, r):
+    """Leave out coefficients that are not finite, and choose the step anew; False if there are none of them."""
+    s, order, top = c.trial, c.expansion.order, finite_top(c)
+    if top < 1 or top == order.top:
+        return False
+    order.top = s.own_top = s.highest = top
+    s.h = s.own_h = min(step_length(c, r), s.limit)
+    return True
+
+
+@kernel
 def _follows_laws(context, c, r):
     """Whether the forces' series are those of their laws all along the step tried; else it is shortened."""
-    s, h = c.trial, c.trial.t1 - r.clock.t
+    s, order, h = c.trial, c.expansion.order, c.trial.t1 - r.clock.t
     call_laws(s.check, context, r.clock.t, h, r.clock.atol, r.clock.rtol)
     if s.good == 1.0:
         return True
+    if s.good == 0.0 and _lower_order(c, r):
+        return False
     s.h = max(s.good, 0.5 / PLACES) * h
     s.limit, s.own_h = min(s.limit, s.h), min(s.own_h, s.h)
+    if s.sharp == 0:
+        order.next = min(order.top + 2, order.highest)
     return False
+
+
+@kernel
+def _hop(context, c, r, log, stop):
+    """Go over a place where a law is not analytic: r + rd h + rdd h^2 / 2, and likewise rotations. Status."""
+    s, t = c.trial, r.clock.t
+    s.h = HOP * SHORTEST * max(abs(t), FROM_ZERO * (r.clock.t_end - r.clock.t_origin))
+    s.hops = 0 if t > s.hopped + APART * s.h else s.hops + 1
+    if s.hops > MOST_HOPS or s.check == 0 or r.numbers.adaptive == 0:
+        return STEP_COLLAPSED
+    s.h *= 2.0**s.hops
+    s.hopped, c.expansion.order.top = t, 1
+    _end(s, r, stop)
+    note_try(r, log, t, s.t1 - t)
+    status = _attempt(context, c, r)
+    if status == 0:
+        c.tangent.indicator.end = singularity_indicator(c.graph, c.tangent.rows)
+    return status
 
 
 @kernel
@@ -183,7 +226,7 @@ def make_step(context, c, r, log, stop):
     _propose(c, r, tol)
     while True:
         if not _end(s, r, stop):
-            return UNHELD if s.failed == UNHELD else STEP_COLLAPSED
+            return UNHELD if s.failed == UNHELD else _hop(context, c, r, log, stop)
         note_try(r, log, r.clock.t, s.t1 - r.clock.t)
         if adaptive and s.check != 0 and not _follows_laws(context, c, r):
             _reject(r, log)
@@ -194,6 +237,10 @@ def make_step(context, c, r, log, stop):
             if status == 0:
                 status = call_expand(r.kernels.expand, context, 0, 1)
             return PASSAGE if status == 0 else status
+        if status == NOT_FINITE and adaptive and s.check != 0 and _lower_order(c, r):
+            go_to_start(c, r)
+            _reject(r, log)
+            continue
         landed = status == 0 and (not adaptive or f.landing.residual <= MISSED * (s.tol + c.work.control.floor))
         if landed:
             f.indicator.end = singularity_indicator(c.graph, f.rows)

@@ -5,6 +5,8 @@ along W Phi_q^T returns both to the constraint manifold. A step is proposed from
 end reached), and taken or tried again with another length: the same series serves all of them.
 """
 
+import math
+
 from ..elements.loops.body_poses import OMEGA, POSE, RD
 from ..errors import Status
 from ..formulations.chart_validity import AT_START, BY_SERIES, extent
@@ -23,7 +25,7 @@ from .breakpoints import cross_stop, lower_order
 from .step_length import radius, weights
 from .step_parts import call_expand, call_reach, hold_accelerations, set_floor, state_within
 from .step_trials import go_to_start, make_step, stand_at
-from .tolerances import FASTER, SHARP_STEPS, SMALL, SMALL_STEPS, SPARE, TIGHTEST, TINY, WARY
+from .tolerances import FASTER, SHARP_STEPS, SMALL, SMALL_STEPS, SPARE, STILL, TIGHTEST, TINY, WARY
 from .workspace import load_series
 
 SLICE_DONE, NOT_FINITE = int(Status.SLICE_DONE), int(Status.NOT_FINITE)
@@ -67,7 +69,8 @@ def _enter(context, c, r, log):
     set_floor(c, w.q)
     c.expansion.low[:] = 0.0
     w.control.condition = 1.0
-    c.trial.singular = 0
+    c.trial.singular = c.trial.hops = 0
+    c.trial.hopped = t
     status = stand_at(context, c, r, t)
     f.indicator.end = singularity_indicator(c.graph, f.rows) if status == 0 else 0.0
     _open_chart(w, r, log, t, AT_START)
@@ -103,6 +106,8 @@ def _mind_singular(c, r):
 def _watch_stiffness(c, r, h):
     """Return True if the motion has just been found stiff: many steps in which nothing rotates or moves far."""
     far, p, most = extent(c.work) / h, c.tangent.poses, 0.0
+    if not c.trial.left > STILL:
+        most = math.inf
     for b in range(c.graph.bodies.shape[0]):
         at = b * POSE
         for i in range(3):
@@ -111,9 +116,9 @@ def _watch_stiffness(c, r, h):
             r.numbers.at_limit = 0
             return False
     before, enough = r.numbers.at_limit, SMALL_STEPS
-    if c.trial.check != 0:
+    if c.trial.sharp == 1:
         enough = SHARP_STEPS
-    r.numbers.at_limit += FASTER if most < TINY and c.trial.check == 0 else 1
+    r.numbers.at_limit += FASTER if most < TINY and c.trial.sharp == 0 else 1
     if before < enough <= r.numbers.at_limit:
         r.numbers.stiff = 1
         return r.numbers.leave_when_stiff == 1

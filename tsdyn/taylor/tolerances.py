@@ -36,6 +36,13 @@ STIFF_RATES = 1000.0
 # Places of a step, equally far apart, at which series of sharp forces are compared with their laws; steps of a run at
 # least, since a pulse between two places is missed.
 PLACES, LEAST_STEPS = 4, 8
+# The same of prescribed motions that are no polynomials or waves, which cost less than forces.
+INSTANTS = 16
+
+# Length of a step over a place where a law is not analytic, relative to t as SHORTEST: forces there are bounded, so its
+# error is rounding. Those within the last number of lengths of the one before are twice as long as that; more of them
+# are too many: the motion comes to rest there.
+HOP, MOST_HOPS, APART = 16.0, 8, 1e3
 
 # Angular velocity (rad/s) that counts as none.
 NO_SPEED = 1e-300
@@ -44,6 +51,8 @@ NO_SPEED = 1e-300
 # rad, and part of the scene's size: a step that turns and moves everything by less is limited by something that can't
 # be seen. So many of them in a row, and the motion may be stiff (docs/design-decisions.md).
 SMALL, SMALL_STEPS = 0.02, 40
+# Nor by a place where a law is not analytic: a step leaves more than this share of what the law divides by.
+STILL = 0.9
 # A step by less than TINY counts for so many.
 TINY, FASTER = 0.002, 4
 # The same in scenes with sharp forces, which need some ten short steps wherever a velocity reverses.

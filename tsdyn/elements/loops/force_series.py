@@ -66,7 +66,7 @@ def _turning(bodies, at, orders, k):
 
 
 @kernel
-def _place(code, bodies, at, orders, k, s):
+def place(code, bodies, at, orders, k, s):
     """Order k of the x of a Point or Vector; its body's series begins at bodies[at]."""
     f = turned(bodies, at + 12 * k, s[0], s[1], s[2])
     return add(f, four(bodies, at + S_R * orders + 4 * k)) if code == POINT else f
@@ -144,8 +144,8 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
                 put(x, c, splat(0.0))
                 put(xd, c, _turning(bodies, at, orders, k))
             else:
-                put(x, c, _place(CODES[j], bodies, at, orders, k, s))
-                put(xd, c, times(_place(CODES[j], bodies, at, orders, k + 1, s), splat(k + 1.0)))
+                put(x, c, place(CODES[j], bodies, at, orders, k, s))
+                put(xd, c, times(place(CODES[j], bodies, at, orders, k + 1, s), splat(k + 1.0)))
         for c in range(SIZE):
             f[c] = 0.0
         scratch = matrix(data_of(values[first + own_scratch :]), rows, orders)

@@ -5,25 +5,48 @@ reversal at v = 0, that of |v| at v > 0 is v, and a pulse is zero to any order l
 program of a traced function, is therefore evaluated at x(tau) and xd(tau), and must be f(tau). What f lacks may be as
 large as
 
-    OFF (atol + rtol |xd|) / (w h)      w: what the force accelerates by, so that w f h is a velocity
+    MOST (atol + rtol |xd|) / (w h)     w: what the force accelerates by, so that w f h is a velocity
     a small part of the terms of f      rounding
+
+Where a law is analytic while some rows a of its scratch are positive (`Force.positive`), and
+
+    a_0 > sum_{k>0} |a_k| h^k                                                                                  (1)
+
+none of them vanishes within the step, and nothing else is evaluated. Past a zero of d the series of |d| goes on as
+-|d|, of which no coefficient tells.
 """
 
-from ...jit.kernels import ANY, caller, data_of, integers, matrix, part, stack, vector
-from ...jit.simd import fma, four, put, splat
+from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, vector
+from ...jit.simd import first, fma, four, get, let, put, second, splat, third, times
 from ...motions.state_program import LENGTH as PROGRAM_LENGTH
 from ...motions.state_program import T
 from ..markers import PARAMETERS, POINT, TURN
-from ..tolerances import LAW_NOISE, LAW_TOLERANCE, OFF
-from .force_series import BODY, INTS, MASK, run_traced, scratch_rows
+from ..tolerances import LAW_NOISE, LAW_TOLERANCE
+from .constraint_series import BODY_ROW, S_OMEGA
+from .force_series import BODY, INTS, MASK, place, run_traced, scratch_rows
 from .friction_series import load_at
-from .template import CODES, MARKERS, OWNERS, ROOM, RUBS, SIZE, STARTS, TRACED, kernel_law, kernel_series
+from .template import (
+    CODES,
+    MARKERS,
+    OWNERS,
+    POSITIVE,
+    ROOM,
+    RUBS,
+    SHARP,
+    SIZE,
+    STARTS,
+    TRACED,
+    kernel_law,
+    kernel_series,
+)
 
-# what runs a program, count, reals and floats per instance, orders, how many are known, limits, table, reals, values,
-# inverse
-SIGNATURE = "iiiiiippppp"
-TAU, TIME, LENGTH, ATOL, RTOL, LIMITS = range(6)  # numbers of `limits`: place and length of the step, tolerances
-call_check = caller(SIGNATURE)
+# what runs a program, count, reals and floats per instance, orders, how many are known, limits, table, reals, bodies,
+# values, inverse
+SIGNATURE = "iiiiiipppppp"
+# numbers of `limits`: place and length of the step, tolerances, velocity that f may be off by over them
+TAU, TIME, LENGTH, ATOL, RTOL, MOST, LIMITS = range(7)
+MARGIN = "iiiiippp"  # count, reals and floats per instance, orders, how many are known; h, values, least
+call_check, call_margin = caller(SIGNATURE), caller(MARGIN)
 
 
 @part
@@ -50,7 +73,7 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
             off = gap
         speed = max(speed, abs(xd[c + i]))
     tol = limits[ATOL] + limits[RTOL] * speed
-    if weight * off * limits[LENGTH] <= max(OFF * tol, LAW_TOLERANCE):
+    if weight * off * limits[LENGTH] <= max(limits[MOST] * tol, LAW_TOLERANCE):
         return False
     for i in range(size):
         power = 1.0
@@ -60,23 +83,53 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
     return not off <= max(LAW_NOISE, limits[ATOL] + limits[RTOL]) * terms
 
 
-def check(run, count, stride, size, orders, known, limits, table, reals, values, inverse):
+@kernel
+def _sums(code, bodies, at, orders, known, tau, s, values, p):
+    """The x of a marker at tau, and xd; its body's series begins at bodies[at], p at values[p]."""
+    x, xd, h = splat(0.0), splat(0.0), splat(tau)
+    if code == TURN:
+        a0, a1, a2, w, o = x, x, x, x, at + S_OMEGA * orders
+        for k in range(known, -1, -1):
+            c = at + 12 * k
+            a0, a1, a2 = fma(a0, h, four(bodies, c)), fma(a1, h, four(bodies, c + 4)), fma(a2, h, four(bodies, c + 8))
+            w = fma(w, h, four(bodies, o + 4 * k))
+        return x, fma(a0, splat(first(w)), fma(a1, splat(second(w)), times(a2, splat(third(w)))))
+    for k in range(known, -1, -1):
+        xd = fma(xd, h, x)
+        x = fma(x, h, four(values, p + 4 * k) if code == PARAMETERS else place(code, bodies, at, orders, k, s))
+    return x, xd
+
+
+@part
+def _sum_markers(own, real, bodies, orders, known, tau, values, x, xd):
+    """Set x and xd at tau from the series of the bodies; those of p begin at values."""
+    for j in range(MARKERS):
+        at, c = own[BODY + OWNERS[j]] * BODY_ROW * orders, STARTS[j]
+        f, fd = _sums(CODES[j], bodies, at, orders, known, tau, real[3 * j : 3 * j + 3], values, 4 * orders * j)
+        put(x, c, f)
+        put(xd, c, fd)
+
+
+def check(run, count, stride, size, orders, known, limits, table, reals, bodies, values, inverse):
     """1 if the series of an instance is not what its law is at a place of the step, else 0; time has been set."""
     table, reals, values = integers(table, ANY), vector(reals, ANY), vector(values, ANY)
-    limits, inverse = vector(limits, LIMITS), vector(inverse, ANY)
+    limits, bodies, inverse = vector(limits, LIMITS), vector(bodies, ANY), vector(inverse, ANY)
     x, xd, f, wide = stack(ROOM), stack(ROOM), stack(ROOM), 4 * orders
     rows, program = scratch_rows(stride, values), int(values[PROGRAM_LENGTH]) if TRACED else 0
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
-        first = program + i * size
-        kept = first + 2 * MARKERS * wide + rows * orders + MARKERS
+        own_values = program + i * size
+        kept = own_values + 2 * MARKERS * wide + rows * orders + MARKERS
         for c in range(SIZE):
             x[c], xd[c], f[c] = 0.0, 0.0, 0.0
-        for k in range(known - 1, -1, -1):
-            at = kept + 2 * SIZE * k
-            for c in range(SIZE):
-                x[c] = x[c] * limits[TAU] + values[at + c]
-                xd[c] = xd[c] * limits[TAU] + values[at + SIZE + c]
+        if SHARP:
+            for k in range(known - 1, -1, -1):
+                at = kept + 2 * SIZE * k
+                for c in range(SIZE):
+                    x[c] = x[c] * limits[TAU] + values[at + c]
+                    xd[c] = xd[c] * limits[TAU] + values[at + SIZE + c]
+        else:
+            _sum_markers(own, real, bodies, orders, known, limits[TAU], values[own_values:], x, xd)
         par = real[3 * MARKERS : stride]
         if TRACED:
             own_scratch = values[kept + 2 * SIZE * orders :]
@@ -85,13 +138,30 @@ def check(run, count, stride, size, orders, known, limits, table, reals, values,
             kernel_series(x, xd, par, 0, matrix(data_of(own_scratch), rows, 1), f)
         else:
             if RUBS:
-                scratch = matrix(data_of(values[first + 2 * MARKERS * wide :]), rows, orders)
+                scratch = matrix(data_of(values[own_values + 2 * MARKERS * wide :]), rows, orders)
                 par[stride - 3 * MARKERS - 1] = load_at(limits[TAU], known, x, par, scratch)
             kernel_law(x, xd, par, limits[TIME], f)
         for j in range(MARKERS):
-            forces = first + (MARKERS + j) * wide
+            forces = own_values + (MARKERS + j) * wide
             if own[MASK] >> OWNERS[j] & 1:
                 continue
             if _is_off(j, own, real[3 * j : 3 * j + 3], f, xd, limits, known, values, forces, inverse):
                 return 1
+    return 0
+
+
+def margin(count, stride, size, orders, known, h, values, least):
+    """least = its minimum with the share of any a that Eq. (1) leaves: no zero within a step h while it is positive."""
+    h, values, least = vector(h, 1), vector(values, ANY), vector(least, 1)
+    rows, left, step = scratch_rows(stride, values), get(least, 0), get(h, 0)
+    rest = 0.0 * step  # not a number where one of them isn't
+    for i in range(count):
+        s = matrix(data_of(values[i * size + 8 * MARKERS * orders :]), rows, orders)
+        for a in POSITIVE:
+            change = 0.0 * step
+            for k in range(known - 1, 0, -1):
+                change = (change + abs(s[a, k])) * step
+            change = 1.0 - change / s[a, 0]
+            left, rest = min(left, change), rest + 0.0 * change
+    let(least, 0, left + rest)
     return 0

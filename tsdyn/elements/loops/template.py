@@ -19,6 +19,7 @@ AHEAD = False  # whether each instance has the next one's numbers brought into t
 DRIVEN = False  # whether the series depend on time
 TRACED = False  # whether a force is given by a program
 SHARP = False  # whether the series of a force are checked against its law
+POSITIVE = ()  # rows of the scratch of `series` that are positive where the law of a force is analytic
 RUBS = False  # whether a force is in proportion to a normal load
 KEPT = 1  # floats of a force's derivatives kept from step to step
 ALONG = -1  # where in x the direction ends that a force's frame follows, or -1: the frame of a body

@@ -171,6 +171,25 @@ def test_models_that_contain_each_other(tmp_path):
             ts.load(tmp_path / f"{name}.xml")
 
 
+def test_files_that_include_each_other_in_a_long_chain(tmp_path):
+    pytest.importorskip("mujoco")
+    for i in range(600):
+        nested = "<body>" * 9 + f"<include file='{i + 1}.xml'/>" + "</body>" * 9
+        (tmp_path / f"{i}.xml").write_text(f"<mujoco><worldbody>{nested}</worldbody></mujoco>")
+    (tmp_path / "600.xml").write_text("<mujoco><worldbody/></mujoco>")
+    with pytest.raises(ts.InvalidFile, match="too deeply"):
+        ts.load(tmp_path / "0.xml")
+
+
+def test_names_that_no_file_has(tmp_path):
+    pytest.importorskip("mujoco")
+    for name in ("x" * 5000, "a/" * 3000):
+        for case in OUTSIDE.values():
+            assert "no file" in str(refusal(tmp_path, f"<mujoco>{case.format(name)}</mujoco>", "m.xml"))
+    folders = "".join(f"<compiler meshdir='{i}'/>" for i in range(99))
+    assert "folders of meshes" in str(refusal(tmp_path, f"<mujoco>{folders}</mujoco>", "m.xml"))
+
+
 OUTSIDE = {
     "include": "<include file='{0}'/>",
     "model": "<asset><model name='m' file='{0}'/></asset>",

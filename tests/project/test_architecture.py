@@ -17,10 +17,10 @@ PLACES = {"tsdyn": ROOT / "tsdyn", "tsdyn.constraints": ROOT / "constraints", "t
 # lowest first: a module imports from its own package and those (or modules that lie flat in tsdyn/) before it
 ORDER = [
     "errors",
+    "regular_files",
     "_discovery",
     "_moved",
     "_version",
-    "regular_files",
     "validation",
     "calls",
     "docstrings",

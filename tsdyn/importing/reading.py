@@ -63,8 +63,8 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool
         if not np.abs(numbers).max() < HUGE:
             mistakes.add((link.line or 1, 1), f"link {link.name!r}: mass, inertia or place is beyond {HUGE:g}.")
     for joint in description.joints:
-        if joint.point is not None and not np.abs(joint.point).max() < HUGE:
-            mistakes.add((1, 1), f"joint {joint.name!r}: its place is beyond {HUGE:g} m.")
+        if not np.abs((joint.start, *(() if joint.point is None else joint.point))).max() < HUGE:
+            mistakes.add((1, 1), f"joint {joint.name!r}: its place or its offset is beyond {HUGE:g}.")
     mistakes.demand_none()
     return _scene(description, make, report, mistakes)
 

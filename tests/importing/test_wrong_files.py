@@ -37,6 +37,10 @@ WRONG = {
     "huge mass": (ARM.replace('value="2.5"', 'value="1e60"'), "is beyond 1e+50"),
     "huge inertia": (ARM.replace('ixx="0.1"', 'ixx="1e307"'), "is beyond 1e+50"),
     "huge place": (ARM.replace('xyz="0.3 0 0"', 'xyz="1e200 1e200 0"'), "is beyond 1e+50"),
+    "huge offset": (
+        ARM.replace('<child link="ram"/>', '<child link="ram"/><mimic joint="turn" multiplier="2" offset="-1e300"/>'),
+        "its offset is beyond 1e+50",
+    ),
     "two numbers": (ARM.replace('xyz="0.3 0 0"', 'xyz="0.3 0"'), "must be 3 finite numbers"),
     "negative mass": (ARM.replace('value="2.5"', 'value="-2.5"'), "the mass -2.5 kg is negative"),
     "two parents": (ARM.replace('child link="camera"', 'child link="arm"'), "two parents"),
@@ -93,7 +97,10 @@ def test_sdf(wrong, message, tmp_path):
         ("<mujoco><include file='nothing.xml'/></mujoco>", "nothing.xml"),
         ("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "mass and inertia"),
         ("<mujoco/>", "no link moves"),
-        (LEG.replace('pos="0 0.01 0"', 'pos="1e308 1e308 1e308"'), "joint 'hip_y': its place is beyond 1e+50 m"),
+        (
+            LEG.replace('pos="0 0.01 0"', 'pos="1e308 1e308 1e308"'),
+            "joint 'hip_y': its place or its offset is beyond 1e+50",
+        ),
         (LEG.replace('kp="30"', 'kp="30" gear="1e200"'), "stiffness"),
         (
             "<mujoco><asset><mesh name='m' file='gone.stl'/></asset><worldbody><body name='b'><joint/>"
@@ -169,6 +176,25 @@ def test_models_that_contain_each_other(tmp_path):
     for name, word in (("16", "objects"), ("self", "contains itself"), ("again", "included twice")):
         with pytest.raises(ts.InvalidFile, match=word):
             ts.load(tmp_path / f"{name}.xml")
+
+
+def test_files_that_include_each_other_in_a_long_chain(tmp_path):
+    pytest.importorskip("mujoco")
+    for i in range(600):
+        nested = "<body>" * 9 + f"<include file='{i + 1}.xml'/>" + "</body>" * 9
+        (tmp_path / f"{i}.xml").write_text(f"<mujoco><worldbody>{nested}</worldbody></mujoco>")
+    (tmp_path / "600.xml").write_text("<mujoco><worldbody/></mujoco>")
+    with pytest.raises(ts.InvalidFile, match="too deeply"):
+        ts.load(tmp_path / "0.xml")
+
+
+def test_names_that_no_file_has(tmp_path):
+    pytest.importorskip("mujoco")
+    for name in ("x" * 5000, "a/" * 3000):
+        for case in OUTSIDE.values():
+            assert "no file" in str(refusal(tmp_path, f"<mujoco>{case.format(name)}</mujoco>", "m.xml"))
+    folders = "".join(f"<compiler meshdir='{i}'/>" for i in range(99))
+    assert "folders of meshes" in str(refusal(tmp_path, f"<mujoco>{folders}</mujoco>", "m.xml"))
 
 
 OUTSIDE = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Generic, Never, TypeVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..errors import InvalidBody
 from ..validation import demand_known, floats, positive, shown, vector3
@@ -141,6 +140,8 @@ def _orientation(value, body):
 
 def _of_matrix(A, body):
     """Euler parameters of a rotation matrix, e0 >= 0."""
+    from scipy.spatial.transform import Rotation
+
     with np.errstate(over="ignore", invalid="ignore"):
         skew = np.abs(A.T @ A - np.eye(3)).max()
     if not skew <= UNIT_LENGTH:

@@ -45,7 +45,7 @@ def build(description, make, report):
         )  # fmt: skip
     couple(scene, description, bodies, report)
     if any(joint.start for joint in description.joints):
-        _start(scene, description, bodies)
+        _start(description, bodies)
     for name, (owner, at) in description.frames.items():
         body = bodies[owner]
         centroid = np.zeros(3) if owner == GROUND else description.links[owner].centroid
@@ -84,7 +84,7 @@ def _add_body(scene, link, report):
     return body
 
 
-def _start(scene, description, bodies):
+def _start(description, bodies):
     """Move bodies to where they start; joints count their coordinates from where they were added."""
     for name, link in description.links.items():
         bodies[name].position = link.start.point(link.centroid)

@@ -11,7 +11,8 @@ from typing import Any
 
 from .. import regular_files
 from ..errors import StorageError
-from .tolerances import CELLS, OBJECTS, PARTS, TEXT
+from ..validation import LONG
+from .tolerances import CELLS, FOLDERS, OBJECTS, PARTS, TEXT
 from .xml_file import LARGEST, Node, OutsideFiles, read
 
 NEEDED = ("mesh", "hfield", "flexcomp")  # elements whose files the compiler reads; textures and skins are dropped
@@ -82,7 +83,7 @@ class Sources:
         name = node.demand("file")
         node.mistakes.demand_none()
         for folder in dict.fromkeys(file.parent for file in files):
-            if (folder / name).exists():
+            if self._exists(node, folder / name):
                 self._demand_inside(node, folder / name)
                 return folder / name
         self._refuse(node, f"there is no file {name!r}")
@@ -94,13 +95,15 @@ class Sources:
     def _judge_data(self, trees, path):
         """Files of meshes, height fields and flexible bodies, wherever the compiler may look for them; their cells."""
         nodes = [(node, file) for tree, file in trees for node in tree.walk()]
-        folders = [node.element.get(key, "") for node, _ in nodes if node.tag == "compiler"
-                   for key in ("meshdir", "assetdir")]  # fmt: skip
+        folders = {node.element.get(key, "") for node, _ in nodes if node.tag == "compiler"
+                   for key in ("meshdir", "assetdir")} | {""}  # fmt: skip
+        if len(folders) > FOLDERS:
+            self._refuse(trees[0][0], f"there are more than {FOLDERS} folders of meshes")
         for node, file in nodes:
             name = node.element.get("file") or node.element.get("filename")
             if node.tag in NEEDED and name:
                 for top in dict.fromkeys((path.parent, file.parent)):
-                    for place in {top / folder / one for folder in ("", *folders) for one in (name, Path(name).name)}:
+                    for place in {top / folder / one for folder in folders for one in (name, Path(name).name)}:
                         self._judge_file(node, name, place)
             if node.tag == "hfield" and _number(node, "nrow") * _number(node, "ncol") > CELLS:
                 self._refuse(node, f"<hfield> has more than {CELLS} cells")
@@ -109,11 +112,8 @@ class Sources:
                 self._refuse(node, f"<mesh params>: the mesh has more than {OBJECTS} vertices")
 
     def _judge_file(self, node, name, place):
-        try:
-            if not place.exists():
-                return
-        except (OSError, ValueError) as error:
-            self._refuse(node, f"{name[:60]!r} is no file: {getattr(error, 'strerror', None) or error}")
+        if not self._exists(node, place):
+            return
         if node.tag == "mesh" and self._outside.reason(place):
             self.hidden.add(name)
             return
@@ -126,6 +126,12 @@ class Sources:
             self._refuse(node, str(error).rstrip("."))
         if place.stat().st_size > LARGEST:
             self._refuse(node, f"{name!r} has more than {LARGEST} bytes")
+
+    def _exists(self, node, path):
+        try:
+            return path.exists()
+        except (OSError, ValueError) as error:
+            self._refuse(node, f"{str(path)[:LONG]!r} is no file: {getattr(error, 'strerror', None) or error}")
 
     @staticmethod
     def _refuse(node, message):

@@ -32,7 +32,7 @@ def drop_missing_meshes(mujoco, spec, sources, root, report):
         body, file = geom.parent, missing[geom.meshname].file
         if not body.explicitinertial and body.name != "world":
             reason = OUTSIDE if file in sources.hidden else "is not found"
-            root.wrong(f"mesh {file!r} {reason}; the inertia of {body.name!r} needs it.")
+            root.wrong(f"mesh {file!r} {reason}; the inertia of {body.name or 'a body without name'} needs it.")
         report.leave(f"mesh that {OUTSIDE if file in sources.hidden else 'is not found'}", body.name or "body", file)
         geom.type, geom.meshname, geom.size = int(mujoco.mjtGeom.mjGEOM_SPHERE), "", (1.0, 0.0, 0.0)
         geom.mass, geom.contype, geom.conaffinity, geom.group = 0.0, 0, 0, SHOWN

@@ -4,11 +4,11 @@ from .xml_file import Node
 
 # what places and sizes things, and what the compiler alone reads
 COMPILED = ("compiler", "default", "size", "include", "worldbody", "asset", "frame", "replicate", "attach", "model",
-            "mesh", "inertial", "composite", "equality", "tendon", "actuator", "contact", "sensor", "keyframe",
+            "mesh", "inertial", "composite", "equality", "tendon", "actuator", "contact", "keyframe",
             "custom", "deformable", "pulley", "freejoint")  # fmt: skip
 # listed by name, with all that they contain
 LISTED = ("camera", "light", "texture", "skin", "pair", "exclude", "key", "numeric", "text", "tuple", "flexcomp",
-          "flex", "plugin", "hfield")  # fmt: skip
+          "flex", "plugin", "hfield", "sensor")  # fmt: skip
 COMMON = "name class group "
 PLACE = "pos quat axisangle xyaxes zaxis euler "
 SPRING = "springdamper springref stiffness damping frictionloss armature limited range "
@@ -48,7 +48,7 @@ def _read(root: Node, report):
     """Mark as read what the rest of the import reads, or lists."""
     known = (*COMPILED, *LISTED, *READ)
     for node in root.walk():
-        if node.tag in LISTED or (node.tag == "sensor" and node is not root):
+        if node.tag in LISTED:
             node.skip()
             continue
         node.all(*known)

@@ -47,20 +47,24 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool
     if free_base and kind != "URDF":
         raise InvalidArgument(f"free_base is for URDF, where the file doesn't say it; {path} is {kind}.")
     report = ImportReport(str(path), kind)
-    with np.errstate(over="ignore", invalid="ignore"):
-        if kind == "URDF":
-            description = urdf.describe(root, files, report, free_base)
-        elif kind == "SDF":
-            description = sdf.describe(root, files, report)
-        else:
-            description = mjcf.describe(root, path, report, files)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            if kind == "URDF":
+                description = urdf.describe(root, files, report, free_base)
+            elif kind == "SDF":
+                description = sdf.describe(root, files, report)
+            else:
+                description = mjcf.describe(root, path, report, files)
+    except RecursionError:
+        root.wrong("elements or files are nested too deeply.")
+        mistakes.demand_none()
     for link in description.links.values():
         numbers = (link.mass, *link.centroid, *link.inertia.flat, *link.frame.p, *link.start.p)
         if not np.abs(numbers).max() < HUGE:
             mistakes.add((link.line or 1, 1), f"link {link.name!r}: mass, inertia or place is beyond {HUGE:g}.")
     for joint in description.joints:
-        if joint.point is not None and not np.abs(joint.point).max() < HUGE:
-            mistakes.add((1, 1), f"joint {joint.name!r}: its place is beyond {HUGE:g} m.")
+        if not np.abs((joint.start, *(() if joint.point is None else joint.point))).max() < HUGE:
+            mistakes.add((1, 1), f"joint {joint.name!r}: its place or its offset is beyond {HUGE:g}.")
     mistakes.demand_none()
     return _scene(description, make, report, mistakes)
 

@@ -19,3 +19,4 @@ OBJECTS = 1 << 16  # elements of MJCF, copies included: half a gigabyte in MuJoC
 CELLS = 1 << 22  # of a height field: 16 MB
 TEXT = 1000  # characters of attributes that count as one object more
 PARTS = 8  # objects a body of <composite> or <flexcomp>: joint, geom, edges, elements
+FOLDERS = 32  # of meshes in an MJCF file, in each of which each mesh is looked for

@@ -196,18 +196,22 @@ def _couple(found, joints, report):
     q = c q' + d,  q' = c' q'' + d'  ->  q = c c' q'' + c d' + d
     """
     mimics = {joint.name: mimic for joint, mimic in joints}
+    chains = {name: (name, 1.0, 0.0) for name, mimic in mimics.items() if mimic is None}
     for joint, mimic in joints:
+        path, name = {}, joint.name
+        while name in mimics and name not in chains and name not in path:
+            path[name] = None
+            name = mimics[name][0]
+        end = chains.get(name)
+        for name in reversed(path):
+            _, ratio, offset = mimics[name]
+            end = chains[name] = end and (end[0], ratio * end[1], ratio * end[2] + offset)
         if mimic is None:
             continue
-        driver, ratio, offset = mimic
-        seen = {joint.name}
-        while driver not in seen and mimics.get(driver) is not None:
-            seen.add(driver)
-            driver, c, d = mimics[driver]
-            ratio, offset = ratio * c, ratio * d + offset
-        if driver in seen or driver not in mimics:
-            reason = "they mimic each other in a circle" if driver in seen else f"there is no other joint {driver!r}"
-            report.leave("joint that mimics another one", joint.name, reason)
+        if end := chains[joint.name]:
+            joint.start = end[2]
+            found.couplings.append(Coupling(f"{joint.name} mimics {mimic[0]}", end[0], joint.name, *end[1:]))
         else:
-            joint.start = offset
-            found.couplings.append(Coupling(f"{joint.name} mimics {mimic[0]}", driver, joint.name, ratio, offset))
+            reason = "it follows joints that mimic each other in a circle, or one that isn't there"
+            reason = reason if mimic[0] in mimics else f"there is no other joint {mimic[0]!r}"
+            report.leave("joint that mimics another one", joint.name, reason)

@@ -60,9 +60,9 @@ def read(path: Any) -> tuple[Node, Mistakes]:
                 mistakes.add((element.sourceline or 1, 1), f"the file has more than {MOST} elements and attributes.")
                 mistakes.demand_none()
         root = elements.root
+    except InvalidFile:
+        raise
     except (etree.XMLSyntaxError, ValueError) as error:
-        if isinstance(error, InvalidFile):
-            raise
         place = getattr(error, "position", None) or (1, 1)
         mistakes.add((max(place[0], 1), max(place[1], 1)), f"this is no XML: {getattr(error, 'msg', None) or error}.")
         mistakes.demand_none()

@@ -166,6 +166,16 @@ def test_ensembles(unit):
     np.testing.assert_allclose(other.qd * unit, one.qd, rtol=0, atol=10 * FAIR)
 
 
+@pytest.mark.parametrize("unit", [1e-15, 1e-3, 1e15], ids="{:g} s".format)
+def test_from_rest_to_a_tight_tolerance(unit):
+    """Accelerations over atol asked for a first step of 1e-20 of the run."""
+    scene = ts.Scene(gravity=(0.0, 0.0, -9.81 / unit**2))
+    arm = scene.add_body(1.0, (0.1, 0.2, 0.3), (0.5, 0, 0))
+    scene.add(C.Revolute.at(arm, scene.ground, point=(0, 0, 0), axis=(0, 1, 0)))
+    solution = ts.simulate(scene, (0.0, 10.0 * unit), integrator=I.DOP853(1e-12, 1e-12)).raise_if_failed()
+    assert np.abs(solution.energy).max() < NEAR * solution.kinetic_energy.max()
+
+
 # knots and events much nearer to the start than the end is
 
 

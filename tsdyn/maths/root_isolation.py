@@ -28,7 +28,6 @@ from .tolerances import (
     SHORTEST,
     TIGHT,
     TINY,
-    VAST,
     WIDEST_NOISE,
 )
 
@@ -92,7 +91,7 @@ class Search:
         self._shortest = max(DEEPEST * (b - a), SHORTEST * max(abs(a), abs(b)))
         self._measure_by(SAFE)
         whole = self._fit(a, b, SAFE * value, None, degree)
-        if whole.scale < FAINT or whole.scale > VAST:
+        if whole.scale < FAINT:
             exponent = -math.frexp(whole.scale)[1] if whole.scale else MOST_SCALED  # denormal numbers times SAFE are 0
             self._measure_by(math.ldexp(SAFE, min(exponent, MOST_SCALED)))
             whole = self._fit(a, b, self._unit * value, None, degree)

@@ -34,8 +34,8 @@ TINY, SHORTEST, DEEPEST = 1e-7, 1e4 * EPS, 2.0**-24
 # third share of the scale is none.
 NOISE_RATIO, WIDEST_NOISE, NO_NOISE = 1e-3, 1e-3, 1e-12
 # Values are multiplied by a power of two: by SAFE, so that no sum of them is infinite; by one that makes the largest
-# about SAFE where it is below FAINT or above VAST then, since their products would vanish; its exponent is limited.
-SAFE, FAINT, VAST, MOST_SCALED = 2.0**-16, 2.0**-500, 2.0**500, 1000
+# about SAFE where it is below FAINT then, since parts of it would vanish; its exponent is limited.
+SAFE, FAINT, MOST_SCALED = 2.0**-16, 2.0**-500, 1000
 # Position of a minimum, as a share of the interval: the root of rounding, twice.
 EXTREME = 1e-9
 # Imaginary part, on the interval -1 to 1, up to which a root of a polynomial is real: double roots split by the root of

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
+from ..maths.tolerances import MOST_SCALED
 from ..model.handles import handles_of
 from ..workspaces.run_state import B_END, STORED
 from .event_states import Inside
@@ -292,10 +293,10 @@ class Watch:
         from scipy.optimize import brentq  # takes a while to import
 
         known, (t0, a), (t1, b) = dict((first, last)), first, last
-        exponent = math.frexp(max(abs(a), abs(b)))[1]
+        unit = math.ldexp(1.0, min(-math.frexp(max(abs(a), abs(b)))[1], MOST_SCALED))
 
         def value(t):  # of size one: Brent's method multiplies three of them
-            return math.ldexp(known[t] if t in known else self._at(i, step, t), -exponent)
+            return unit * (known[t] if t in known else self._at(i, step, t))
 
         least = max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
         root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)

@@ -11,7 +11,9 @@ from .tolerances import (
     AT_LONGEST,
     FIRST_ERROR,
     FIRST_GROWTH,
+    FIRST_LEAST,
     FIRST_PART,
+    FIRST_SEEN,
     FROM_ZERO,
     GROW,
     HARDLY,
@@ -80,7 +82,8 @@ def first_step(context, w, r):
     d2 = call_norm(r.kernels.error_norm, context, r.dx, r.dy, r.now, rtol, atol) / h
     # h^(order + 1) max(d1, d2) = FIRST_ERROR
     size, most = max(d1, d2), FIRST_GROWTH * h
-    return min(most, (FIRST_ERROR / size) ** r.clock.exponent if size * span > NO_SLOPE else most, span)
+    h = min(most, (FIRST_ERROR / size) ** r.clock.exponent if size * span > NO_SLOPE else most, span)
+    return max(h, FIRST_LEAST * span, FIRST_SEEN * SHORTEST * abs(r.clock.t))
 
 
 @kernel

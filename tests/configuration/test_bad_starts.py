@@ -135,3 +135,16 @@ def test_every_inconsistent_row_is_listed_or_counted():
     listed = str(caught.value).count("Phi = ")
     assert f"and {12 - listed} more" in str(caught.value)
     assert "level 11: Phi = -12" in str(caught.value)
+
+
+def test_a_flat_parallelogram_is_refused_with_its_degrees_of_freedom():
+    scene = ts.Scene()
+    links = [scene.add_body(1.0, (1e-5, 0.01, 0.01), position=(x, 0, 0)) for x in (0.2, 0.525, 0.45)]
+    joints = zip(
+        (scene.ground, *links), (*links, scene.ground), (0.0, 0.4, 0.65, 0.25), ("hip", "A", "B", "D"), strict=True
+    )
+    for a, b, x, name in joints:
+        scene.add(ts.constraints.Revolute.at(a, b, point=(x, 0, 0), axis=(0, 1, 0), name=name))
+    said = "17 are independent here, so 1 direction is free at this point and none next to it.* just here"
+    with pytest.raises(ts.SingularConfiguration, match=said):
+        scene.inverse_dynamics({"hip": 0.0}, ["hip"], [0.0])

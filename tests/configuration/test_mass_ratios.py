@@ -133,6 +133,14 @@ def test_velocities_of_assembly_share_out_spin_by_true_inertias(j):
         assert body.angular_velocity[2] == pytest.approx(j / (j + 1e-7), abs=ROUNDING)
 
 
+def test_a_run_that_masses_end_is_said_to_end_of_them():
+    masses = [1.591948041596244e-05, 48.477112141354716, 821466.8695683902, 511.711948631808, 1.1600604209217517e-06]
+    run = ts.simulate(random_scene(330792, masses, 10.0), (0.0, 1e-3), max_steps=50)
+    assert not run.success
+    assert "mass ratio" in run.message
+    assert "rank" not in run.message
+
+
 # laws of random scenes
 
 

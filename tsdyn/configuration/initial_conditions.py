@@ -1,5 +1,7 @@
 """Initial conditions of scenes of any size, by the constraint graph instead of matrices, in O(N)."""
 
+from contextlib import suppress
+
 import numpy as np
 
 from ..errors import InvalidArgument, RedundantConstraints, SingularConfiguration, Status
@@ -11,7 +13,6 @@ from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..sparse.constraint_graphs import graph_of, set_redundant
 from ..sparse.length_metric import coordinate_scales
 from ..sparse.massless_axes import axis_of
-from ..validation import counted
 from .mobility import mobility_at
 from .rank import check_rank
 from .start_kernels import (
@@ -178,9 +179,9 @@ class _Start:
         demand_small(self.scene, self.velocity, tol, "velocity", "Phi_q qd + Phi_t", (self.t, self.q, self.qd))
 
     def failing_row(self):
-        """Return the row at which the dynamics of the kept rows are singular, or -1: by masses, rows aside."""
-        looked_at = len(self.graph.axes.rows) or self.workspace.unequal
-        return failing_row(self.context, self.q, self.t) if looked_at else -1
+        """Return the row at which the dynamics of the kept rows are singular, or -1."""
+        some = len(self.graph.axes.rows) or self.workspace.unequal
+        return failing_row(self.context, self.q, self.t) if some else -1
 
     def loose_axis(self):
         """Return the row of a massless axis about which the kept rows leave rotation free, or -1."""
@@ -264,21 +265,19 @@ class _Start:
         chosen = self.chosen_of_all()
         if chosen.size and self.serve(chosen) and self.hold_near_by(way.ravel()):
             return chosen
-        which = [names[i] for i in sorted(row[rows])]
-        raise SingularConfiguration(self._singular(which) + STRAIGHT * (int((row >= 0).sum()) > MANY_ROWS))
+        long = int((row >= 0).sum()) > MANY_ROWS
+        raise SingularConfiguration(self._singular([names[i] for i in sorted(row[rows])]) + STRAIGHT * long)
 
     def _singular(self, which):
         """What to say of a configuration in which rows, by name, are dependent that don't hold nearby."""
-        try:
+        found, counts = None, ""
+        with suppress(InvalidArgument):  # too large
             found = mobility_at(self.scene, self.q, self.t)
-        except InvalidArgument:  # too large
-            found = None
-        counts = ""
         if found is not None and found.singular:
             real, free = int((self.graph.row >= 0).sum()), found.degrees_of_freedom
             counts = (
-                f": of {real} rows of the joints {real - found.rows + found.rank} are independent here, so "
-                f"{counted(free, 'direction')} {'is' if free == 1 else 'are'} free at this point and "
+                f": of {real} rows of the joints {real - found.rows + found.rank} are independent here, so {free} "
+                f"direction{'s are' if free != 1 else ' is'} free at this point and "
                 f"{found.generic_degrees_of_freedom or 'none'} next to it"
             )
             which = [each.name for each in found.dependent_here]

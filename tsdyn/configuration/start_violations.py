@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..errors import InconsistentState, SingularConfiguration
+from ..sparse.length_metric import MASS_REMEDY, mass_ratio
 from .motor_starts import elsewhere
 
 
@@ -46,16 +47,5 @@ def refuse_vanished(row):
 
 def refuse_masses(scene, graph, row):
     """Refuse masses so unequal that S is singular to rounding at a row of the graph."""
-    system = scene.packed.system
-    rigid = np.flatnonzero(system.bodies[:, 1] == 7)
-    found = [(np.arange(len(system.mass)), system.mass, "kg")]
-    found += [(rigid, np.abs(system.inertia[rigid]).max(axis=1), "kg m^2")] * bool(rigid.size)
-    which, sizes, unit = min(found, key=lambda each: each[1].min() / each[1].max())
-    light, heavy = int(sizes.argmin()), int(sizes.argmax())
-    bodies, names = [scene.bodies[i] for i in which], scene.row_names()
-    where = names[graph.row[row]] if graph.row[row] >= 0 else "a body with many joints"
-    raise SingularConfiguration(
-        f"the mass ratio of these bodies is too large for accelerations in double precision: {bodies[light].name} "
-        f"({sizes[light]:.3g} {unit}) beside {bodies[heavy].name} ({sizes[heavy]:.3g} {unit}), found at {where}. Give "
-        "light bodies that carry heavy ones more mass, or make them one body with what they carry."
-    )
+    where = scene.row_names()[graph.row[row]] if graph.row[row] >= 0 else "a body with many joints"
+    raise SingularConfiguration(f"{mass_ratio(scene.packed)}, found at {where}. {MASS_REMEDY}")

@@ -56,7 +56,7 @@ from .redundant_rows import (
     save_selection,
     take_noted_selection,
 )
-from .reselection import doubt_selection, factorise_rows, select_rows, selection_serves
+from .reselection import choosing_anew, doubt_selection, factorise_rows, select_rows, selection_serves
 from .row_memory import (
     allocate_rows,
     allocate_tangent,
@@ -123,6 +123,7 @@ __all__ = [
     "allocate_tangent",
     "apply_multipliers",
     "balance_loads",
+    "choosing_anew",
     "clear_redundant",
     "constrain",
     "constrain_accelerations",

@@ -15,6 +15,8 @@ from ..errors import InconsistentState, SingularConfiguration, Status
 from ..jit.interrupts import deferred_interrupts
 from ..observables.not_finite import not_finite
 from ..rows.interface import redundant_of
+from ..sparse.length_metric import MASS_REMEDY, mass_ratio
+from ..sparse.tolerances import TOO_UNEQUAL
 from . import snapshot
 from .recorder import Recorder
 from .tolerances import GETTING_ON, HOPELESS, NOISY, PACED, SLICE_SECONDS
@@ -127,6 +129,10 @@ class Slices:
         """Take the status of a slice; refuse a run that could not begin."""
         if not self.run.numbers.begun:
             singular = status in (Status.SINGULAR, Status.MASS_SINGULAR)
+            if status in (Status.SINGULAR, Status.UNHELD):
+                masses = mass_ratio(self.task.prepared.packed, TOO_UNEQUAL)
+                if masses:
+                    raise SingularConfiguration(f"no step could be made from the start: {masses}. {MASS_REMEDY}")
             kind = SingularConfiguration if singular else InconsistentState
             *why, cause = self._why(status)
             raise kind(" ".join(filter(None, ("no step could be made from the start.", *why)))) from cause

@@ -8,6 +8,8 @@ from ..formulations.dependent_rows import dependent_rows
 from ..observables.evaluate import constraint_arrays
 from ..observables.not_finite import NotFinite, not_finite
 from ..sparse.constraint_graphs import redundant_rows
+from ..sparse.length_metric import MASS_REMEDY, mass_ratio
+from ..sparse.tolerances import TOO_UNEQUAL
 from ..taylor.layout import without_series
 from ..validation import counted
 from .step_limits import step_limit
@@ -25,6 +27,9 @@ def account(solution, scene, reason, goes_on=""):
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
     steps = counted(solution.stats.steps, "step")
     where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
+    masses = mass_ratio(solution.packed, TOO_UNEQUAL) if solution.status is Status.SINGULAR else ""
+    if masses:
+        return " ".join(part for part in (f"T{masses[1:]}.", reason, where, MASS_REMEDY) if part)
     found, limit = suspect(solution, scene), step_limit(solution)
     remedy = Status.SINGULAR.remedy if found else limit.remedy or solution.status.remedy
     if solution.status == Status.INTERRUPTED:

@@ -11,6 +11,8 @@ from .constraint_graph import W_MASS, W_ROTATION, WEIGHTS
 from .massless_axes import AXIS_OWN, levers
 from .tolerances import LEAST_ARM, UNEQUAL
 
+MASS_REMEDY = "Give light bodies that carry heavy ones more mass, or make them one body with what they carry."
+
 
 def arms(packed):
     """L of each body, (bodies,), m: no less than a share of the longest; one in a scene without arms."""
@@ -42,3 +44,16 @@ def are_unequal(system):
     """Whether heavy bodies may load light ones: the factors of S, and accelerations, lose digits to their ratio."""
     largest = np.abs(system.inertia).max(axis=1)  # zero for a point mass
     return any(x.max() > UNEQUAL * x.min() for x in (system.mass, largest[largest > 0.0]) if x.size)
+
+
+def mass_ratio(packed, least=0.0):
+    """The lightest and the heaviest body by mass or inertia, for messages; empty where their ratio is below `least`."""
+    system, bodies = packed.system, np.arange(len(packed.bodies))
+    rigid = bodies[system.bodies[:, 1] == 7]
+    found = [(bodies, system.mass, "kg"), (rigid, np.abs(system.inertia[rigid]).max(axis=1), "kg m^2")]
+    which, sizes, unit = min((each for each in found if each[0].size), key=lambda each: each[1].min() / each[1].max())
+    light, heavy = sizes.argmin(), sizes.argmax()
+    if sizes[heavy] < least * sizes[light]:
+        return ""
+    one, other = (f"{packed.bodies[which[i]].name} ({sizes[i]:.3g} {unit})" for i in (light, heavy))
+    return f"the mass ratio of these bodies is too large for accelerations in double precision: {one} beside {other}"

@@ -21,6 +21,8 @@ LEAST_ARM = 1e-3
 # Ratio of masses, or of the largest inertias of bodies, above which factors of S lose as many digits: the start is
 # looked at once more, and multipliers of series are refined.
 UNEQUAL = 1e4
+# The same above which it is masses that a run which can't begin has failed of: half of the digits are lost.
+TOO_UNEQUAL = 1e8
 
 # --- axes with next to no inertia, docs/design-decisions.md, "Inertia is added and taken back"
 # Moment of inertia over the largest of the body, about its centroid or by its lever arms: less takes an axis row. The

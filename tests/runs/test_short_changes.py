@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.tolerances import FAIR, LOOSE, ROUGH
+from tests.helpers.tolerances import FAIR, LOOSE, ROUGH, ROUNDING
 from tsdyn.motions.changes import changes, sample_times
 
 C, F, I, M = ts.constraints, ts.forces, ts.integrators, ts.motions
@@ -207,7 +207,7 @@ def test_a_change_beside_a_knot(ulps):
     scene.add(F.PointForce(body, force=edge))
     scene.add(F.PointForce(body, force=(ts.Table((0, end, end, 1), (0, 0, 2, 2), kind="linear"), 0, 0)))
     solution = ts.simulate(scene, (0.1, 0.7), integrator="dop853")
-    assert solution.success, solution.message
+    assert np.diff(solution.t).min() > ROUNDING
     np.testing.assert_allclose(solution.state.velocity(body), (2.0 * (0.7 - end), 0.0, 0.3), rtol=ROUGH)
 
 

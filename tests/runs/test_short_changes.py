@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.tolerances import FAIR, LOOSE, ROUGH, ROUNDING
+from tests.helpers.tolerances import FAIR, LOOSE, ROUGH
 from tsdyn.motions.changes import changes, sample_times
+from tsdyn.motions.knots import stops_of
 
 C, F, I, M = ts.constraints, ts.forces, ts.integrators, ts.motions
 SPAN, AREA, BUMP = (0, 100), 0.1, 0.05 * math.sqrt(math.pi)  # N s: the impulses of box and bump
@@ -196,23 +197,11 @@ def test_steps_that_see_a_change_stay_as_they_are(monkeypatch):
 
 
 @pytest.mark.parametrize("ulps", [-2, -1, 0, 1, 2])
-def test_a_change_beside_a_knot(ulps):
-    """A knot that differs by rounding from the end of an interval with a change leaves no step of nothing."""
-    t = sample_times(0.1, 0.7)
-    ((_, end),) = changes(t, [np.where(t > 0.4, 1.0, 0.0)])[-1:]
-    for _ in range(abs(ulps)):
-        end = np.nextafter(end, math.copysign(1.0, ulps))
-    scene = ts.Scene(gravity=(0, 0, 0))
-    body = scene.add_point_mass(1.0)
-    scene.add(F.PointForce(body, force=edge))
-    scene.add(F.PointForce(body, force=(ts.Table((0, end, end, 1), (0, 0, 2, 2), kind="linear"), 0, 0)))
-    solution = ts.simulate(scene, (0.1, 0.7), integrator="dop853")
-    assert np.diff(solution.t).min() > ROUNDING
-    np.testing.assert_allclose(solution.state.velocity(body), (2.0 * (0.7 - end), 0.0, 0.3), rtol=ROUGH)
-
-
-def edge(t):
-    return (0.0, 0.0, 1.0 if t > 0.4 else 0.0)
+def test_a_change_that_ends_beside_another_stop_is_none(ulps):
+    """Times that differ by rounding leave no step of nothing."""
+    instant = 0.4 + ulps * np.spacing(0.4)
+    stops = stops_of([], np.array([instant]), np.array([(0.3, 0.4), (0.4, 0.5), (0.9, 1.0)]), 0.0, 1.0)
+    np.testing.assert_array_equal(stops, [(instant, 1.0, instant), (0.5, 0.0, 0.4)])
 
 
 def test_a_change_in_cases_of_an_ensemble():

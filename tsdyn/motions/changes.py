@@ -35,6 +35,8 @@ def changes(t, functions):
         finite = np.isfinite(samples)
         size = np.abs(samples[finite]).max(initial=0.0) or 1.0
         values = np.where(finite, samples / size, 2.0)  # what is not finite for some time is a change
+        if not np.ptp(values):
+            continue
         marks = np.zeros((strides.size, t.size), np.int64)
         mark_changes(values, strides, d, marks)
         row, end = np.nonzero(marks)

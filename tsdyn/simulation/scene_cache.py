@@ -119,7 +119,8 @@ class Prepared:
     @cached_property
     def _changing(self):
         """The functions of time that may change shortly, and the kinds of forces that run what a user has written."""
-        return [motion for motion in self.motions if motion.may_change], user_kinds(self.packed)
+        found = [(getattr(motion, "source", None) or (motion.given, motion.smooth), motion) for motion in self.motions]
+        return [*dict(pair for pair in found if pair[1].may_change).values()], user_kinds(self.packed)
 
     def stops(self, t0, t1, adaptive=False):
         """The stops of a run from t0 to t1, as of `stops_of`; refuses a motion that the run can't follow.

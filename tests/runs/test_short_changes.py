@@ -7,6 +7,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.tolerances import FAIR, LOOSE, ROUGH
+from tsdyn.model.state_loads import depends_on_time
 from tsdyn.motions.changes import changes, sample_times
 from tsdyn.motions.knots import stops_of
 
@@ -265,3 +266,19 @@ def test_fixed_steps_say_what_they_dont_resolve():
     assert "push: force: the function changes within 0.049 s at t = 50.0" in said
     assert "max_step, or an adaptive method" in said
     assert ts.simulate(scene, SPAN, integrator=I.Nystrom4(step=0.04)).message == ts.Status.SUCCESS.sentence
+
+
+def drag(t, state):
+    return (-state[7], -state[8], -state[9])
+
+
+def later(t, state):
+    return (lambda: (0.0, 0.0, t))()
+
+
+def test_what_doesnt_read_the_time_is_not_sampled():
+    scene = ts.Scene()
+    body = scene.add_point_mass(1.0)
+    told = [depends_on_time(scene.add(F.PointForce(body, force=force))) for force in (drag, box_of_state, later)]
+    assert told == [False, True, True]
+    assert depends_on_time(scene.add(Kick(body)))

@@ -37,12 +37,13 @@ def changes(t, functions):
         values = np.where(finite, samples / size, 2.0)  # what is not finite for some time is a change
         if not np.ptp(values):
             continue
-        marks = np.zeros((strides.size, t.size), np.int64)
+        marks = np.zeros((strides.size, t.size), np.int8)
         mark_changes(values, strides, d, marks)
         row, end = np.nonzero(marks)
         end *= strides[row]
         found.append(np.column_stack((t[end - strides[row]], t[end])))
-    return np.unique(np.concatenate(found), axis=0) if len(found) > 1 else NO_CHANGES
+    intervals = np.concatenate(found)
+    return np.unique(intervals, axis=0) if intervals.size else NO_CHANGES
 
 
 def within_step(t, h):

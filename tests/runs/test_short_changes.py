@@ -7,7 +7,9 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.tolerances import FAIR, LOOSE, ROUGH
+from tsdyn.model.state_loads import depends_on_time
 from tsdyn.motions.changes import changes, sample_times
+from tsdyn.motions.knots import stops_of
 
 C, F, I, M = ts.constraints, ts.forces, ts.integrators, ts.motions
 SPAN, AREA, BUMP = (0, 100), 0.1, 0.05 * math.sqrt(math.pi)  # N s: the impulses of box and bump
@@ -196,23 +198,11 @@ def test_steps_that_see_a_change_stay_as_they_are(monkeypatch):
 
 
 @pytest.mark.parametrize("ulps", [-2, -1, 0, 1, 2])
-def test_a_change_beside_a_knot(ulps):
-    """A knot that differs by rounding from the end of an interval with a change leaves no step of nothing."""
-    t = sample_times(0.1, 0.7)
-    ((_, end),) = changes(t, [np.where(t > 0.4, 1.0, 0.0)])[-1:]
-    for _ in range(abs(ulps)):
-        end = np.nextafter(end, math.copysign(1.0, ulps))
-    scene = ts.Scene(gravity=(0, 0, 0))
-    body = scene.add_point_mass(1.0)
-    scene.add(F.PointForce(body, force=edge))
-    scene.add(F.PointForce(body, force=(ts.Table((0, end, end, 1), (0, 0, 2, 2), kind="linear"), 0, 0)))
-    solution = ts.simulate(scene, (0.1, 0.7), integrator="dop853")
-    assert solution.success, solution.message
-    np.testing.assert_allclose(solution.state.velocity(body), (2.0 * (0.7 - end), 0.0, 0.3), rtol=ROUGH)
-
-
-def edge(t):
-    return (0.0, 0.0, 1.0 if t > 0.4 else 0.0)
+def test_a_change_that_ends_beside_another_stop_is_none(ulps):
+    """Times that differ by rounding leave no step of nothing."""
+    instant = 0.4 + ulps * np.spacing(0.4)
+    stops = stops_of([], np.array([instant]), np.array([(0.3, 0.4), (0.4, 0.5), (0.9, 1.0)]), 0.0, 1.0)
+    np.testing.assert_array_equal(stops, [(instant, 1.0, instant), (0.5, 0.0, 0.4)])
 
 
 def test_a_change_in_cases_of_an_ensemble():
@@ -276,3 +266,19 @@ def test_fixed_steps_say_what_they_dont_resolve():
     assert "push: force: the function changes within 0.049 s at t = 50.0" in said
     assert "max_step, or an adaptive method" in said
     assert ts.simulate(scene, SPAN, integrator=I.Nystrom4(step=0.04)).message == ts.Status.SUCCESS.sentence
+
+
+def drag(t, state):
+    return (-state[7], -state[8], -state[9])
+
+
+def later(t, state):
+    return (lambda: (0.0, 0.0, t))()
+
+
+def test_what_doesnt_read_the_time_is_not_sampled():
+    scene = ts.Scene()
+    body = scene.add_point_mass(1.0)
+    told = [depends_on_time(scene.add(F.PointForce(body, force=force))) for force in (drag, box_of_state, later)]
+    assert told == [False, True, True]
+    assert depends_on_time(scene.add(Kick(body)))

@@ -1,5 +1,7 @@
 """Samples of forces that depend on time by a function or a law of the user's, at states that stay the same."""
 
+import dis
+
 import numpy as np
 
 from ..elements.loops.coordinate_rows import call_kind
@@ -30,11 +32,20 @@ def is_of_user(item):
     return hasattr(item, "function_of_state") or not is_ours(type(item).__module__)
 
 
+def depends_on_time(force):
+    """Whether what a user has written for a force reads the time."""
+    function, place = (force.function_of_state, 0) if hasattr(force, "function_of_state") else (type(force).law, 3)
+    code = getattr(function, "py_func", function).__code__
+    t = code.co_varnames[place]
+    read = [each.argval for each in dis.get_instructions(code) if "LOAD" in each.opname]  # pairs in some versions
+    return any(t == name or (isinstance(name, tuple) and t in name) for name in read)
+
+
 def user_kinds(packed):
-    """The rows of System.forces that run what a user has written: their numbers, and the title of a force of each."""
+    """The rows of System.forces that run what a user has written: their numbers, a force of each."""
     first = {(one.force, one.stride): load.force for load in reversed(packed.loads) for one in load.alone}
     forces = [first[row.force, row.stride] for row in packed.system.forces]
-    return [(i, force.title) for i, force in enumerate(forces) if is_of_user(force)]
+    return [(i, force) for i, force in enumerate(forces) if is_of_user(force)]
 
 
 def sampled_loads(packed, kinds, t):
@@ -47,7 +58,7 @@ def sampled_loads(packed, kinds, t):
         return found
     q, qd = (np.concatenate([getattr(body, x) for body in packed.bodies]) for x in ("q", "qd"))
     near = 0.5 * np.cos(np.arange(q.size))
-    for i, title in kinds:
+    for i, force in kinds:
         row = system.forces[i]
         places = system.table[row.table : row.table + row.count * INTS].reshape(-1, INTS)
         spans = zip(places[:, AT : AT + 2].ravel(), places[:, DIMENSION : DIMENSION + 2].ravel(), strict=True)
@@ -57,5 +68,5 @@ def sampled_loads(packed, kinds, t):
             out = np.empty(t.size)
             _sample(own, q + move, qd + move, t, at, np.zeros(q.size), out)
             if move is not near or np.isfinite(out).all():
-                found.append((title, out))
+                found.append((force.title, out))
     return found

@@ -35,12 +35,15 @@ def changes(t, functions):
         finite = np.isfinite(samples)
         size = np.abs(samples[finite]).max(initial=0.0) or 1.0
         values = np.where(finite, samples / size, 2.0)  # what is not finite for some time is a change
-        marks = np.zeros((strides.size, t.size), np.int64)
+        if not np.ptp(values):
+            continue
+        marks = np.zeros((strides.size, t.size), np.int8)
         mark_changes(values, strides, d, marks)
         row, end = np.nonzero(marks)
         end *= strides[row]
         found.append(np.column_stack((t[end - strides[row]], t[end])))
-    return np.unique(np.concatenate(found), axis=0) if len(found) > 1 else NO_CHANGES
+    intervals = np.concatenate(found)
+    return np.unique(intervals, axis=0) if intervals.size else NO_CHANGES
 
 
 def within_step(t, h):

@@ -14,7 +14,7 @@ from ..methods.integrator import is_plain
 from ..model.handles import handles_of
 from ..model.packed import with_curvatures
 from ..model.packed_forces import with_force_jacobians
-from ..model.state_loads import sampled_loads, user_kinds
+from ..model.state_loads import depends_on_time, sampled_loads, user_kinds
 from ..motions.changes import NO_CHANGES, changes, is_noise, sample_times, within_step
 from ..motions.knots import NO_STOPS, stops_of
 from ..observables.friction_unique import demand_unique
@@ -125,9 +125,16 @@ class Prepared:
         return bool(self.sampled) or any(each.pieces for given in self.motions for each in given.motions)
 
     @cached_property
-    def _changing(self):
+    def _functions(self):
         """The functions of time that may change shortly, and the kinds of forces that run what a user has written."""
-        return [motion for motion in self.motions if motion.may_change], user_kinds(self.packed)
+        found = [(getattr(motion, "source", None) or (motion.given, motion.smooth), motion) for motion in self.motions]
+        return [*dict(pair for pair in found if pair[1].may_change).values()], user_kinds(self.packed)
+
+    @cached_property
+    def _changing(self):
+        """The same, but for kinds that don't depend on time."""
+        motions, kinds = self._functions
+        return motions, [(i, force) for i, force in kinds if depends_on_time(force)]
 
     def stops(self, t0, t1, adaptive=False):
         """The stops of a run from t0 to t1, as of `stops_of`; refuses a motion that the run can't follow.
@@ -139,14 +146,14 @@ class Prepared:
         found = NO_CHANGES
         if adaptive and any(self._changing):
             t = sample_times(t0, t1)
-            found = changes(t, [values for _, values in self._sampled(t)])
+            found = changes(t, [values for _, values in self._sampled(t, self._changing)])
         if not (self._has_stops or found.size):
             return NO_STOPS
         return stops_of(self.motions, instants_of(self.packed, t0, t1), found, t0, t1)
 
-    def _sampled(self, t):
-        """The functions that may change shortly: what they are, and values (k,) at times t (k,)."""
-        motions, kinds = self._changing
+    def _sampled(self, t, functions):
+        """What functions are, and values (k,) at times t (k,)."""
+        motions, kinds = functions
         with np.errstate(all="ignore"):
             found = [(motion.what, values) for motion in motions for values in motion.sampled(t)]
             return found + sampled_loads(self.packed, kinds, t)
@@ -155,7 +162,7 @@ class Prepared:
         """Say what changes within less than steps of a fixed length h; "" for nothing."""
         if any(self._changing):
             t = sample_times(t0, t1)
-            for what, values in self._sampled(t):
+            for what, values in self._sampled(t, self._changing):
                 for begin, end in changes(t, [values]):
                     if end - begin < h:
                         return (
@@ -166,9 +173,10 @@ class Prepared:
 
     def noise(self, t, h):
         """What is noise within a step from t to t + h; "" for nothing."""
-        if not any(self._changing):
+        if not any(self._functions):
             return ""
-        return next((what for what, values in self._sampled(within_step(t, h)) if is_noise(values)), "")
+        found = self._sampled(within_step(t, h), self._functions)
+        return next((what for what, values in found if is_noise(values)), "")
 
     def engine(self, kind, method, form, within):
         """The engine of a method, as `frozen` returns it, in a form; see runs/run.py.

@@ -140,8 +140,6 @@ def _orientation(value, body):
 
 def _of_matrix(A, body):
     """Euler parameters of a rotation matrix, e0 >= 0."""
-    from scipy.spatial.transform import Rotation
-
     with np.errstate(over="ignore", invalid="ignore"):
         skew = np.abs(A.T @ A - np.eye(3)).max()
     if not skew <= UNIT_LENGTH:
@@ -154,6 +152,8 @@ def _of_matrix(A, body):
             f"{body.name}: orientation is a reflection, of determinant -1; reverse one of its axes: they must be "
             "right-handed."
         )
+    from scipy.spatial.transform import Rotation  # half of the time that tsdyn takes to import
+
     return np.roll(Rotation.from_matrix(A).as_quat(canonical=True), 1)
 
 

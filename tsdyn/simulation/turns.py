@@ -123,7 +123,7 @@ class Turns:
         return bool(run.numbers.stiff) and self._to_implicit(run, steps, t, max(rate, self._step / run.clock.h))
 
     def _to_implicit(self, run, steps, t, ours):
-        """Whether the implicit method is to go on, for all the work that the explicit one takes; not for little."""
+        """Whether the implicit method is to go on where the explicit one takes `ours` for a second; not for little."""
         self.ask = AGAIN * steps
         if run.numbers.at_limit == 0 or not self._pays(ours, t):
             return False

@@ -128,3 +128,9 @@ def test_a_fixed_step_past_the_anchor_ends_the_run():
     assert solution.status == ts.Status.SERIES_ENDED
     assert solution.t[-1] == pytest.approx(0.4)
     assert ts.simulate(flight(), (0, 0.4), integrator=I.Taylor(step=0.1)).success
+
+
+@pytest.mark.parametrize("rows", [3, (4,), (-1,), (0.5,), [3]], ids=repr)
+def test_rows_that_there_are_not_are_refused(rows):
+    with pytest.raises(ts.TsdynError, match="positive must be a tuple of rows"):
+        type("Wrong", (Cone,), {"positive": rows})

@@ -316,6 +316,7 @@ class Status(IntEnum):
     STORE_FAILED = 18
     CASE_FAILED = 19
     NOT_RUN = 20
+    SERIES_ENDED = 21
 
     def __str__(self) -> str:
         return self.name.lower()
@@ -397,4 +398,9 @@ _SENTENCES = {
         "Run it alone: ensemble.case(i).",
     ),
     Status.NOT_RUN: ("The case has not been run.", "Go on: resume=True with a store, or run it: ensemble.case(i)."),
+    Status.SERIES_ENDED: (
+        "A fixed step by series passes a place where the law of a force or motion is not analytic, such as zero length "
+        "of a spring.",
+        "Leave out step=, so that steps end before such places, or take 'dop853' or 'nystrom4', which use no series.",
+    ),
 }

@@ -44,3 +44,10 @@ def test_a_scene_that_hypothesis_draws(data):
     case = drawn(numbers, 2, 8)
     found = judge_case(case, comparison(numbers))
     assert not found.fault, f"{found.name}: {found.word}: {found.said}"
+
+
+@pytest.mark.parametrize("seed", [3, 7, 11, 15, 19, 23])
+def test_scenes_that_pass_places_where_series_end_are_judged(seed):
+    outcome = judge_scene(seed)
+    assert outcome.name.endswith("by series")
+    assert outcome.word == "success", outcome.said

@@ -121,3 +121,16 @@ def test_a_length_that_changes_at_once_is_followed():
     scene.add(ts.constraints.Distance(scene.ground, mass, length=motion))
     expected = ts.simulate(scene, (0, 0.9), integrator=I.DOP853(rtol=1e-12, atol=1e-12)).state.q
     np.testing.assert_allclose(ts.simulate(scene, (0, 0.9)).state.q, expected, atol=FAIR)
+
+
+def test_a_fixed_step_past_the_anchor_ends_the_run():
+    solution = ts.simulate(flight(), (0, 1.0), integrator=I.Taylor(step=0.1))
+    assert solution.status == ts.Status.SERIES_ENDED
+    assert solution.t[-1] == pytest.approx(0.4)
+    assert ts.simulate(flight(), (0, 0.4), integrator=I.Taylor(step=0.1)).success
+
+
+@pytest.mark.parametrize("rows", [3, (4,), (-1,), (0.5,), [3]], ids=repr)
+def test_rows_that_there_are_not_are_refused(rows):
+    with pytest.raises(ts.TsdynError, match="positive must be a tuple of rows"):
+        type("Wrong", (Cone,), {"positive": rows})

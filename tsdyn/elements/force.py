@@ -129,6 +129,12 @@ class Force(Attachment):
         if cls.memory not in (0, 1) or (cls.memory == 1) != (getattr(cls, "remember", None) is not None):
             raise InvalidForce(f"{where}: memory = 1 needs a kernel remember, and remember needs memory = 1.")
         check_slots(cls, where, InvalidForce)
+        rows = () if cls.positive is None else cls.positive
+        if not isinstance(rows, tuple) or not all(type(row) is int and 0 <= row < cls.slots for row in rows):
+            raise InvalidForce(
+                f"{where}: positive must be a tuple of rows of the scratch memory, each from 0 to slots - 1, or None, "
+                f"got {cls.positive!r}."
+            )
         functions = {}
         for name, arguments in {**_KERNELS, **_OPTIONAL, **_SERIES}.items():
             if name not in _KERNELS and (getattr(cls, name, None) is None or _is_superseded(cls, name)):

@@ -27,6 +27,7 @@ from .tolerances import (
     AVOIDING,
     CLOSE,
     CLOSER,
+    COARSE,
     HALVED,
     HOP,
     LEAST_STEPS,
@@ -43,7 +44,7 @@ from .tolerances import (
 )
 
 STEP_COLLAPSED, PASSAGE, UNHELD = int(Status.STEP_COLLAPSED), int(Status.PASSAGE), int(Status.UNHELD)
-NOT_FINITE = int(Status.NOT_FINITE)
+NOT_FINITE, SERIES_ENDED = int(Status.NOT_FINITE), int(Status.SERIES_ENDED)
 
 
 @kernel
@@ -228,6 +229,10 @@ def make_step(context, c, r, log, stop):
         if not _end(s, r, stop):
             return UNHELD if s.failed == UNHELD else _hop(context, c, r, log, stop)
         note_try(r, log, r.clock.t, s.t1 - r.clock.t)
+        if not adaptive and s.check != 0:
+            call_laws(s.check, context, r.clock.t, s.t1 - r.clock.t, COARSE, COARSE)
+            if s.good < 1.0:
+                return SERIES_ENDED
         if adaptive and s.check != 0 and not _follows_laws(context, c, r):
             _reject(r, log)
             continue

@@ -36,7 +36,9 @@ STIFF_RATES = 1000.0
 # Places of a step, equally far apart, at which series of sharp forces are compared with their laws; steps of a run at
 # least, since a pulse between two places is missed.
 PLACES, LEAST_STEPS = 4, 8
-# The same of prescribed motions that are no polynomials or waves, which cost less than forces.
+# atol and rtol of that comparison with fixed steps, which have no tolerance: errors that no step length explains.
+COARSE = 1e-3
+# Places of prescribed motions that are no polynomials or waves; they cost less than forces.
 INSTANTS = 16
 
 # Length of a step over a place where a law is not analytic, relative to t as SHORTEST: forces there are bounded, so its

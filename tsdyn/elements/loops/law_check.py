@@ -154,14 +154,18 @@ def margin(count, stride, size, orders, known, h, values, least):
     """least = its minimum with the share of any a that Eq. (1) leaves: no zero within a step h while it is positive."""
     h, values, least = vector(h, 1), vector(values, ANY), vector(least, 1)
     rows, left, step = scratch_rows(stride, values), get(least, 0), get(h, 0)
+    square = step * step
     rest = 0.0 * step  # not a number where one of them isn't
     for i in range(count):
         s = matrix(data_of(values[i * size + 8 * MARKERS * orders :]), rows, orders)
         for a in POSITIVE:
-            change = 0.0 * step
-            for k in range(known - 1, 0, -1):
-                change = (change + abs(s[a, k])) * step
-            change = 1.0 - change / s[a, 0]
+            odd, even, top = 0.0 * step, 0.0 * step, (known - 1) // 2
+            if known % 2 == 0:
+                odd = abs(s[a, known - 1])
+            for k in range(top, 0, -1):  # two sums: each addition waits for the one before
+                odd = odd * square + abs(s[a, 2 * k - 1])
+                even = even * square + abs(s[a, 2 * k])
+            change = 1.0 - (odd + even * step) * step / s[a, 0]
             left, rest = min(left, change), rest + 0.0 * change
     let(least, 0, left + rest)
     return 0

@@ -58,7 +58,9 @@ def save(scene: Scene, path: Place) -> Path:
     partial = path.with_name(f"{path.name}-partial-{os.getpid()}")
     text = scene_text.write(scene, type(scene))
     try:
-        partial.write_text(text, encoding="utf-8", newline="\n")
+        partial.unlink(missing_ok=True)  # a link, perhaps
+        with open(partial, "x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
         os.replace(partial, path)
     except (OSError, UnicodeError) as error:
         with suppress(OSError):

@@ -181,14 +181,14 @@ def stopped(tmp_path, monkeypatch):
     monkeypatch.setattr(slices, "FIRST_SLICE", 4)
     path = tmp_path / "run.h5"
     scene, options = forging.scene(), {"integrator": "taylor", "store": path, "checkpoint": 0.0}
-    ts.simulate(scene, (0.0, 3.0), progress=forging.stopped_soon(), **options)
+    ts.simulate(scene, (0.0, 60.0), progress=forging.stopped_soon(), **options)
     return path
 
 
 def test_checkpoints_say_no_address_and_no_place_beyond_an_array(stopped):
     numbers, arrays = checkpoint.read(stopped)
     assert not [name for name in arrays if any(part in name for part in ("trial", "kernels", "graph", "table"))]
-    right = ts.resume(stopped).q
+    right = ts.resume(stopped, progress=forging.stopped_soon()).q
     checkpoint.write(stopped, numbers, arrays)
     forged = {
         "context.tangent.dropped": np.full_like(arrays["context.tangent.dropped"], 10**6),
@@ -202,7 +202,7 @@ def test_checkpoints_say_no_address_and_no_place_beyond_an_array(stopped):
         checkpoint.write(stopped, numbers, arrays | {name: array})
         refuse(lambda: ts.resume(stopped), ts.StorageError, ("checkpoint is damaged",), name)
     checkpoint.write(stopped, numbers, arrays)
-    np.testing.assert_array_equal(ts.resume(stopped).q, right)
+    np.testing.assert_array_equal(ts.resume(stopped, progress=forging.stopped_soon()).q, right)
 
 
 @pytest.mark.parametrize("shape", [[10**12], [10**6, 10**6], [-1], [2.5], ["a"], [1, -1]])

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .hints import Place
 
 FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)  # a pipe without a writer opens at once
+NO_LINKS = getattr(os, "O_NOFOLLOW", 0)
 
 
 def opened(path: Place, largest: int | None = None, flags: int = 0) -> int:

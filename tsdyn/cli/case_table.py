@@ -1,14 +1,17 @@
 """The table of `tsdyn ensemble --parameters`: a CSV file with a row for each case, a column for each number."""
 
 import csv
+import io
 import math
 import re
 
 import numpy as np
 
+from .. import regular_files
 from ..errors import InvalidArgument
 from ..validation import counted, unknown_parameter
 
+LARGEST = 1 << 28  # bytes of a table
 _INDEXED = re.compile(r"(.*)\[([^\[\]]*)\]")  # bob.velocity[2]; bodies may have names such as link[3]
 
 
@@ -32,10 +35,9 @@ def table_of(path, scene):
 def _lines(path):
     """Line number and cells of each row that is not blank."""
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            found = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if row]
-    except (OSError, UnicodeError, csv.Error) as error:
+        reader = csv.reader(io.StringIO(regular_files.read(path, LARGEST).decode("utf-8-sig"), newline=""))
+        found = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if row]
+    except (UnicodeError, csv.Error) as error:
         raise InvalidArgument(f"{path} can't be read: {getattr(error, 'strerror', None) or error}.") from error
     if len(found) < 2:
         raise InvalidArgument(f"{path} must have a row of names, and below it a row of numbers for each case.")
@@ -56,6 +58,7 @@ def _columns(where, head, fields):
 
 def _meant(where, word, fields):
     """The parameter that a column stands for, and the index of the component; None for a number."""
+    word = word if word in fields else word.removeprefix("'")  # as `output.text_cell` writes it
     match = None if word in fields else _INDEXED.fullmatch(word)
     name, index = match.groups() if match else (word, None)
     if not word:

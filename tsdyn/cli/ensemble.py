@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InvalidArgument, Status
 from .case_table import table_of
-from .output import print_json
+from .output import print_json, text_cell
 from .run import add_json, add_method, add_output, add_plot, add_scene, destinations, options_of, progress_of
 from .scene_file import load_document, robot_options
 
@@ -76,7 +76,9 @@ def write(found, path):
     if Path(path).suffix.lower() != ".csv":
         return found.save(path)
     try:
-        found.to_dataframe().to_csv(path)
+        frame = found.to_dataframe().rename(columns=text_cell)
+        words = [name for name in frame if frame[name].dtype == object or str(frame[name].dtype).startswith("str")]
+        frame.assign(**{name: frame[name].map(text_cell) for name in words}).to_csv(path)
     except OSError as error:
         raise InvalidArgument(f"{path} can't be written: {error.strerror}.") from error
     return path

@@ -1,9 +1,11 @@
-"""What commands print for machines: JSON, in which what is no finite number is null."""
+"""What commands give to machines: JSON, in which what is no finite number is null; text in cells of CSV."""
 
 import json
 import math
 
 import numpy as np
+
+FORMULA = tuple("=+-@\t\r")  # what a spreadsheet takes a cell for that begins so
 
 
 def print_json(data):
@@ -24,3 +26,8 @@ def plain(value):
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if isinstance(value, (int, str, type(None))) else str(value)
+
+
+def text_cell(text):
+    """Text for a cell of CSV: with a quote before what a spreadsheet would run as a formula."""
+    return f"'{text}" if text.startswith(FORMULA) else text

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InvalidArgument
 from ..files import run_table
 from ..storage.formats import SUFFIXES as SOLUTIONS
-from .output import print_json
+from .output import print_json, text_cell
 from .scene_file import load_document, robot_options
 
 TABLES = (".csv",)
@@ -184,7 +184,8 @@ def write(solution, path):
     try:
         with open(path, "w", newline="", encoding="utf-8") as file:
             rows = csv.writer(file)
-            rows.writerow(["time (s)", *(f"{' '.join(filter(None, key))} ({units[key]})" for key in columns)])
+            names = [f"{' '.join(filter(None, key))} ({units[key]})" for key in columns]
+            rows.writerow(["time (s)", *map(text_cell, names)])
             rows.writerows([t, *row] for t, row in zip(solution.t.tolist(), array.tolist(), strict=True))
     except OSError as error:
         raise InvalidArgument(f"{path} can't be written: {error.strerror}.") from error

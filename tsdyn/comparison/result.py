@@ -94,7 +94,7 @@ class Comparison(Drawn):
         return f"<Comparison with {self.engine}: error {self.error.max():.2e} m after {self.t[-1] - self.t[0]:g} s>"
 
     def _repr_html_(self) -> str:
-        heads = f"<tr><th></th><th>{html.escape(self.engine)}, {self.method}</th><th>tsdyn at 1e-12</th></tr>"
+        heads = f"<tr><th></th><th>{html.escape(f'{self.engine}, {self.method}')}</th><th>tsdyn at 1e-12</th></tr>"
         rows = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in self.rows())
         return f"<table>{heads}{rows}</table>"
 

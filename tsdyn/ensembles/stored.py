@@ -5,6 +5,7 @@ Messages are beside the store, a line of JSON for each case that has one of its 
 
 import hashlib
 import json
+import os
 import shutil
 import time
 from collections.abc import Mapping
@@ -12,10 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
+from .. import regular_files
 from .._version import __version__
 from ..errors import Status, StorageError
+from ..regular_files import NO_LINKS
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
-from ..storage.formats import Column, Table, demand_shapes, format_of
+from ..storage.formats import Column, Table, damaged, demand_shapes, format_of
 from ..storage.write_errors import demand_writable, writing
 from .chunks import empty, fitted
 from .keeping import TIMES
@@ -140,7 +143,7 @@ class StoredResults:
         with writing(self.path, GO_ON):
             self._store.write(chunk.first, rows)
             if chunk.messages:
-                with open(self._said, "a", encoding="utf-8") as file:
+                with open(self._said, "a", encoding="utf-8", opener=_unlinked) as file:
                     file.writelines(json.dumps([i, text]) + "\n" for i, text in sorted(chunk.messages.items()))
         self.first = end
 
@@ -172,8 +175,11 @@ class StoredResults:
         """As of `Collected`; of a case that was run twice the last."""
         if not self._said.exists():
             return {}
-        with open(self._said, encoding="utf-8") as file:
-            return dict(json.loads(line) for line in file)
+        with damaged(self._said):
+            pairs = [json.loads(line) for line in regular_files.read(self._said, flags=NO_LINKS).splitlines()]
+            if not all(type(i) is int and isinstance(said, str) for i, said in pairs):
+                raise ValueError("a line is no number of a case and its message")
+            return dict(pairs)
 
     @property
     def arrays(self):
@@ -231,6 +237,11 @@ def table_of(study, parameters, kept):
         labels |= {each: [str(i) for i in range(size)] for each, size in zip(dimensions, array.shape[1:], strict=True)}
         columns.append(Column(name, dimensions, _said(name, units)))
     return Table(CASE, tuple(columns), labels)
+
+
+def _unlinked(path, flags):
+    """Open a file, but not what a link leads to."""
+    return os.open(path, flags | NO_LINKS, 0o666)
 
 
 def _remove(path):

@@ -39,7 +39,6 @@ _KEEP = 30 * _DAY  # files that nothing has read for so long are deleted
 _told = []
 _CHECKSUM = hashlib.sha256().digest_size
 FORMAT = 2  # of the files
-NO_LINKS = getattr(os, "O_NOFOLLOW", 0)
 
 
 def _bases():
@@ -232,7 +231,7 @@ class KernelCache(_Cache):
         for path in folders():
             with contextlib.suppress(OSError, StorageError):
                 file = path / name
-                content = regular_files.read(file, flags=NO_LINKS)
+                content = regular_files.read(file, flags=regular_files.NO_LINKS)
                 try:
                     if _seal(name, content[_CHECKSUM:]) != content[:_CHECKSUM]:
                         raise ValueError("checksum")

@@ -5,7 +5,7 @@ import numpy as np
 from ..workspaces.run_state import STORED
 from .history import ChartLog, StepLog
 from .run_log import RunLog
-from .snapshot import demand, demand_noted
+from .snapshot import demand, demand_noted, is_count
 from .tolerances import TRIES
 
 CHART_ROOM = 64  # charts of a slice at first, half of what there is room for
@@ -90,6 +90,7 @@ class Recorder:
     def restore(self, count, arrays, rows):
         """As it was when it was saved; rows: how many there are to select from."""
         self._count, charts, points = count, arrays["recorder.charts"], arrays["recorder.points"]
+        demand(is_count(count), "the number of outputs")
         demand(charts.dtype == points.dtype == float and charts[0].shape == self.charts[0].shape, "the charts")
         demand(points.shape == (len(charts) if len(self.points) else 0, self.points.shape[1]), "the points of charts")
         demand_noted(points[:, self.run.now.shape[1] :], rows)

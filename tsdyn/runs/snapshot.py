@@ -44,6 +44,11 @@ def demand(fits, what):
         raise ValueError(f"{what} has values that no run leaves")
 
 
+def is_count(value):
+    """Whether a value is a whole number of things that a run may have."""
+    return type(value) is int and 0 <= value <= MOST
+
+
 def demand_counts(numbers, known):
     """Raise ValueError unless numbers have these names, and each is a number, a truth value or None."""
     demand(isinstance(numbers, dict) and numbers.keys() == set(known), "a table of numbers")

@@ -62,7 +62,9 @@ def write_text(path: Place, text: str) -> Path:
     path = Path(path)
     partial = path.with_name(f"{path.name}-partial-{os.getpid()}")
     try:
-        partial.write_text(text, encoding="utf-8", newline="\n")
+        partial.unlink(missing_ok=True)  # a link, perhaps
+        with open(partial, "x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
         os.replace(partial, path)
     except (OSError, UnicodeError) as error:
         with suppress(OSError):

@@ -15,7 +15,7 @@ from ..jit.cache import machine
 from ..jit.code_hash import platform_hash
 from ..model.packed import user_functions
 from ..runs import counts
-from ..runs.snapshot import demand, demand_counts
+from ..runs.snapshot import demand, demand_counts, is_count, restoring
 from ..runs.task import Outcome
 from ..validation import number
 from .run_requests import request_of
@@ -58,6 +58,9 @@ def archive_of(given, kept, history, numbers, arrays):
     if numbers is not None:
         format_of(given["store"]).demand_plain(given["store"])
         demand_shapes(given["store"], tables)
+        with restoring():
+            known = numbers["counts"]
+            demand(known.keys() == tables.keys() and all(map(is_count, known.values())), "the counts of rows")
     archive = Archive(Path(given["store"]).absolute(), tables, attributes, facts["interval"], _asked(given), facts)
     with writing(archive.path):
         if numbers is None:

@@ -2,8 +2,7 @@
 
 Imports observables and below. Loaded by runs with a store alone.
 
-Begin with archive.py, which a run writes to. hdf5.py and zarr.py are the formats, chosen by suffix in formats.py;
-checkpoint.py writes and reads checkpoints; restricted_pickle.py keeps the scene and the arguments of a run in them, and
-refuses code; stored_outputs.py reads outputs back, as a `Solution` asks for them. saved_file.py writes and reads a file
-of a whole solution.
+Begin with archive.py, which a run writes to. hdf5.py and zarr_folder.py are the formats, by suffix in formats.py;
+zarr_checks.py looks at a folder before the library does; checkpoint.py writes and reads checkpoints; stored_outputs.py
+reads outputs back, as a `Solution` asks for them. saved_file.py writes and reads a file of a whole solution.
 """

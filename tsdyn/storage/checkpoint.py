@@ -46,7 +46,8 @@ def write(store, numbers, arrays):
     content = b"".join([words, b"\n", *(array.tobytes() for array in arrays.values())])
     partial = newest.with_name(f"{newest.name}-partial")
     try:
-        with open(partial, "wb") as file:
+        partial.unlink(missing_ok=True)  # a link, perhaps
+        with open(partial, "xb") as file:
             file.write(FORMAT + hashlib.sha256(content).hexdigest().encode() + b"\n")
             file.write(content)
             file.flush()

@@ -206,8 +206,8 @@ def _opened(path):
 
     Of a damaged file that nobody writes, HDF5 would wait for the missing part for ever.
     """
-    written = ({"libver": "latest", "swmr": True, "locking": False},) if _is_being_written(path) else ()
     regular_files.demand(path)
+    written = ({"libver": "latest", "swmr": True, "locking": False},) if _is_being_written(path) else ()
     for options in (*written, {"locking": False}, {}):
         try:
             file = h5py.File(path, "r", **options)

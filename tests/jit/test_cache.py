@@ -146,3 +146,40 @@ def test_numba_settings_are_left_alone():
     assert tsdyn.__version__
     assert all(locator.__module__ == _CacheLocator.__module__ for locator in CacheImpl._locator_classes)
     assert os.environ.get("NUMBA_CACHE_LOCATOR_CLASSES", "") == numba.config.CACHE_LOCATOR_CLASSES
+
+
+TWO = (
+    TINY
+    + """
+@entry
+def thrice(x):
+    return 3.0 * x
+print(thrice(1.0), file=__import__("sys").stderr)
+"""
+)
+
+
+def test_a_kernel_under_the_name_of_another_is_compiled_again(tmp_path):
+    environment = {"TSDYN_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}
+    run(TWO, environment)
+    one, other = sorted(tmp_path.rglob("*.kernel"))
+    content = one.read_bytes()
+    one.write_bytes(other.read_bytes())
+    other.write_bytes(content)
+    mended, errors = run(TWO, environment)
+    assert (mended["value"], mended["damaged"], mended["misses"], errors) == (2.0, 1, 1, "3.0\n")
+
+
+@posix
+@pytest.mark.parametrize("which", ["kernels", "above"])
+def test_folders_that_others_can_write_to_are_refused(which, tmp_path):
+    folder = tmp_path / "above" / "kernels"
+    folder.mkdir(parents=True)
+    {"kernels": folder, "above": folder.parent}[which].chmod(0o777)
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    environment = {"TSDYN_CACHE_DIR": str(folder), "TSDYN_QUIET": "1", "TMPDIR": str(scratch)}
+    found, errors = run(TINY, environment)
+    assert found["value"] == 2.0
+    assert Path(found["folder"]).is_relative_to(scratch)
+    assert "others than you can write" in errors

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..errors import MissingDependency
 from ..storage.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
-from .outline_solution import labelled_rows
+from .held_results import labelled_rows
 from .saved_solutions import provenance
 
 ERRORS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}

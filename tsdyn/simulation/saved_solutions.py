@@ -18,7 +18,7 @@ from ..model.handles import handles_of
 from ..runs import counts
 from ..runs.snapshot import demand, demand_counts
 from ..storage.formats import damaged, demand_record
-from .outline_solution import HELD, Outline, held, labelled_rows
+from .held_results import HELD, held, labelled_rows
 from .stored_runs import demand_path, hash_of
 from .trajectory_records import derived_record, record_of, take_derived, trajectory_of
 
@@ -63,7 +63,7 @@ def save(solution: Solution, path: Place) -> Path:
     demand_path(path, "path")
     path = Path(path).absolute()
     saved_file.format_at(path)
-    if isinstance(solution, Outline):
+    if solution.lacks:
         remembered = solution._width
         content = solution._content
     else:
@@ -94,7 +94,7 @@ def _rows(solution, tables, logs, table, start, count):
     part = solution[start : start + count]
     found = {"time": part.t, "q": part.q, "qd": part.qd, "qdd": part.qdd}
     angles = part.anchor.angles
-    remembered = part._all_remembered if isinstance(part, Outline) else np.concatenate((angles, part._remembers), 1)
+    remembered = part._all_remembered if part.lacks else np.concatenate((angles, part._remembers), 1)
     return found | ({"remembered": remembered} if remembered.shape[1] else {})
 
 
@@ -161,8 +161,8 @@ def _plain(value):
     return value.item() if isinstance(value, np.generic) else value
 
 
-def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[type[Scene], type[Solution]]) -> Solution:
-    """Return the solution of a file; arguments as of `ts.load`, and the classes `Scene` and `Solution`."""
+def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[Any, ...]) -> Solution:
+    """Return the solution of a file; arguments as of `ts.load`, and the classes `Scene`, `Solution`, `Outline`."""
     from ..storage import saved_file
 
     path = Path(path).absolute()
@@ -176,7 +176,7 @@ def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[type[S
         except Lacking as lacking:
             if "outline" not in arrays:
                 raise StorageError(str(lacking)) from None
-            return _outlined(path, record, arrays, str(lacking), kinds[0])
+            return _outlined(path, record, arrays, str(lacking), kinds)
         packed = scene.packed
         if hash_of(packed) != record["provenance"]["scene"]:
             raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
@@ -205,22 +205,22 @@ def _scene(path, record, arrays, scene, allow_code, kind):
         ) from error
 
 
-def _outlined(path, record, arrays, why, kind):
+def _outlined(path, record, arrays, why, kinds):
     """The `Outline` of a file."""
     known = record["outline"]
     demand_record(known, {"left_out": list, "angles": list, "rows": list, "width": int})
-    scene = scene_text.read(arrays["outline"].tobytes().decode(), "its outline", kind, None)[0]
+    scene = scene_text.read(arrays["outline"].tobytes().decode(), "its outline", kinds[0], None)[0]
     scene._lacks = f"{why} Without it there is no {', '.join(map(str, known['left_out']))}."
     here = {row.item.name for row in handles_of(scene.packed).rows}
     columns = [i for i, name in enumerate(known["angles"]) if name in here]
     demand(0 <= len(known["angles"]) <= known["width"], "the angles of joints")
-    found = _solution(path, {**record, "trajectory": None}, arrays, scene, Outline, known["width"])
+    found = _solution(path, {**record, "trajectory": None}, arrays, scene, kinds[2], known["width"])
     held_arrays = {f"held_{name}": arrays[f"held_{name}"].astype(float) for name in HELD}
     count = found._length()
     for name, array in held_arrays.items():
         demand(array.shape == (count, *([len(known["rows"])] if name == "held_multipliers" else [])), name)
     labels = [[str(title), str(label)] for title, label in known["rows"]]
-    found._held, found._columns, found.lacks, found._row_labels = held_arrays, columns, scene._lacks, labels
+    found._held, found._columns, found._missing, found._row_labels = held_arrays, columns, scene._lacks, labels
     found._width, found._content = known["width"], (_again(record), arrays)
     return found
 

@@ -46,7 +46,7 @@ def demand_path(path, name):
 def archive_of(given, kept, history, numbers, arrays):
     """The `Archive` of a run, made or, with the numbers and arrays of a checkpoint, gone on with."""
     from ..storage.archive import Archive, tables_of
-    from ..storage.formats import demand_shapes, format_of
+    from ..storage.formats import demand_shapes, demand_size, format_of
     from ..storage.write_errors import writing
 
     facts = _facts(given, kept)
@@ -56,6 +56,7 @@ def archive_of(given, kept, history, numbers, arrays):
     tables = tables_of(kept.packed.bodies, remembered, history)
     attributes = {"source": f"tsdyn {__version__}", "scene": facts["scene"]}
     if numbers is not None:
+        demand_size(given["store"], numbers["size"])
         format_of(given["store"]).demand_plain(given["store"])
         demand_shapes(given["store"], tables)
         with restoring():

@@ -30,6 +30,7 @@ demand_plain comes first, before any function but `attributes` is asked about a 
 
 import contextlib
 import math
+import os
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
@@ -70,6 +71,13 @@ def demand_rows(path, column, found, count):
     """Raise StorageError if a column has fewer rows than were written."""
     if found < count:
         raise StorageError(f"{path}: {column} has {found} rows of {count} that were written.")
+
+
+def demand_size(path, size):
+    """Raise StorageError if a file has been cut: HDF5 would wait for the missing part for ever."""
+    found = os.path.getsize(path) if os.path.exists(path) else 0
+    if found < size:
+        raise StorageError(f"{path} is damaged: it has {found} bytes of {size} that were written.")
 
 
 def demand_shapes(path, tables):

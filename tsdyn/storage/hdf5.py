@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import regular_files
 from ..errors import StorageError
-from .formats import CHUNK, LONGEST, NUMBERS, ROOM, demand_rows, reading
+from .formats import CHUNK, LONGEST, NUMBERS, ROOM, demand_rows, demand_size, reading
 from .write_errors import code_of
 
 BUFFER = CHUNK
@@ -46,12 +46,10 @@ class Store:
     @classmethod
     def reopen(cls, path, tables, attributes, counts, size):
         """As formats.py says; a copy takes the place of the file, which a killed process may have left half-written."""
-        found = os.path.getsize(path) if os.path.exists(path) else 0
-        if found < size:  # HDF5 would wait for the missing part for ever
-            raise StorageError(f"{path} is damaged: it has {found} bytes of {size} that were written.")
+        demand_size(path, size)
         partial = Path(path).with_name(f"{Path(path).name}-partial")
         partial.unlink(missing_ok=True)
-        _demand_room(partial, found + _room_of(tables))
+        _demand_room(partial, os.path.getsize(path) + _room_of(tables))
         file = _laid_out(partial, tables, attributes)
         with _opened(path) as old:
             for name, table in tables.items():

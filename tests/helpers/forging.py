@@ -12,10 +12,10 @@ import hashlib
 import json
 import os
 import random
-import resource
 import shutil
 import sys
 from collections import Counter
+from importlib import import_module
 from pathlib import Path
 
 import h5py
@@ -287,6 +287,7 @@ def main(kind, count, seed, folder):
             faults.append(f"{event} {arguments!r:.200}")
 
     sys.addaudithook(watch)
+    resource = import_module("resource")  # there is none on Windows
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY,) * 2)
     here = folder / "forged"

@@ -36,12 +36,12 @@ def _stress(parsed):
     """Run the gallery of hard cases, random scenes and random calls, and judge every run.
 
     Print the largest constraint errors, the energy error and its growth, the observed order, the agreement of two
-    methods, and the laws that a run breaks, for each case; then how random scenes and calls came out. A fault is
-    printed with the command that repeats it. Ctrl-C ends with the figures so far. The exit code is 0 only if all went
-    well.
+    methods, and the laws that a run breaks, for each case; the errors of runs with closed forms; then how random scenes
+    and calls came out. A fault is printed with the command that repeats it. Ctrl-C ends with the figures so far. The
+    exit code is 0 only if all went well.
     """
     counts, processes = _counts(parsed)
-    indices = [] if parsed.fuzz else _cases(parsed.case)
+    indices, forms = ([], []) if parsed.fuzz else _cases(parsed.case)
     figure = plotted(parsed, "stress")
     if parsed.markdown:
         demand_folder(parsed.markdown)
@@ -54,6 +54,12 @@ def _stress(parsed):
         found, complete = campaign.run_gallery(indices, processes, show)
     if found and not parsed.json:
         print(report.gallery_text(found), flush=True)
+    closed = []
+    if complete and forms:
+        show = _shower(len(forms), lambda form: form.name)
+        closed, complete = campaign.run_closed_forms(forms, processes, show)
+    if closed and not parsed.json:
+        print(report.closed_forms_text(closed), flush=True)
     tally = None
     if complete and any(counts.values()):
         plan = list(campaign.jobs(**counts, seed=parsed.seed))
@@ -63,12 +69,13 @@ def _stress(parsed):
         if not parsed.json:
             print(report.tally_text(tally, parsed.seed))
     if parsed.json:
-        print(json.dumps(report.as_data(found, tally, parsed.seed), indent=1))
+        print(json.dumps(report.as_data(found, closed, tally, parsed.seed), indent=1))
     if parsed.markdown:
         _write(parsed.markdown, report.as_markdown(found, tally), report.MARKS)
     if figure:
         _draw(found, figure)
     failed = any(report.wrong(figures) for figures in found) or bool(tally and tally.faults)
+    failed = failed or not all(form.holds for form in closed)
     return 0 if complete and not failed else 1
 
 
@@ -91,17 +98,19 @@ def _counts(parsed):
 
 
 def _cases(words):
-    """Indices of the cases that contain one of the words; all without words."""
+    """Indices of the cases, and of the closed forms, that contain one of the words; all without words."""
+    from ..stress.closed_forms import CLOSED_FORMS
     from ..stress.gallery.cases import CASES
 
-    names = [case.name for case in CASES]
-    chosen = set()
+    names = [case.name for case in CASES], [form.name for form in CLOSED_FORMS]
+    known = [*names[0], *names[1]]
     for word in words:
-        fitting = {i for i, name in enumerate(names) if word.lower() in name.lower()}
-        if not fitting:
-            raise InvalidArgument(f"no case of the gallery contains {word!r}; there are: {'; '.join(names)}.")
-        chosen |= fitting
-    return sorted(chosen) if words else list(range(len(names)))
+        if not any(word.lower() in name.lower() for name in known):
+            raise InvalidArgument(f"no case of the gallery contains {word!r}; there are: {'; '.join(known)}.")
+    return [
+        [i for i, name in enumerate(own) if not words or any(word.lower() in name.lower() for word in words)]
+        for own in names
+    ]
 
 
 def _shower(total, text):

@@ -4,6 +4,7 @@ A `Job` is a scene, or a block of calls, of one seed; it comes out the same in e
 as they come; closing the generator, as Ctrl-C does, ends the processes.
 """
 
+import math
 import multiprocessing
 import os
 import signal
@@ -16,6 +17,7 @@ from multiprocessing.connection import wait
 from typing import NamedTuple
 
 from .checks import figures, without_figures
+from .closed_forms import CLOSED_FORMS, Measured, measured
 from .gallery.cases import CASES
 from .judgement import FAULT, Outcome, judge_scene
 from .random_calls import judge_calls
@@ -30,7 +32,7 @@ BLAS_THREADS = "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"
 class Job(NamedTuple):
     """What a worker does."""
 
-    kind: str  # "scenes" or "calls"; "gallery", whose seed is the index of a case
+    kind: str  # "scenes" or "calls"; "gallery" and "closed forms", whose seed is the index of a case
     seed: int
     count: int = 1
 
@@ -90,12 +92,26 @@ def run(plan, processes=1, report=None, limit=LIMIT):
 
 def run_gallery(indices, processes=1, report=None):
     """Return the figures of some of CASES in their order, those so far after Ctrl-C, and whether all were made."""
+    return _run_all("gallery", indices, processes, lambda i, said: without_figures(CASES[i], said), report)
+
+
+def run_closed_forms(indices, processes=1, report=None):
+    """Return the `Measured` of some of CLOSED_FORMS in their order, likewise."""
+    return _run_all("closed forms", indices, processes, lambda i, said: _unmeasured(CLOSED_FORMS[i], said), report)
+
+
+def _unmeasured(form, said):
+    return Measured(form.name, math.nan, form.allowed, said)
+
+
+def _run_all(kind, indices, processes, without, report):
+    """What the jobs of a kind give, in their order; without(index, said) where a process gave nothing."""
     found, complete = {}, True
     try:
-        with closing(work([Job("gallery", i) for i in indices], processes, GALLERY_LIMIT)) as done:
+        with closing(work([Job(kind, i) for i in indices], processes, GALLERY_LIMIT)) as done:
             for job, [result] in done:
                 failed = isinstance(result, Outcome)
-                found[job.seed] = without_figures(CASES[job.seed], f"{result.word} {result.said}") if failed else result
+                found[job.seed] = without(job.seed, f"{result.word} {result.said}") if failed else result
                 if report:
                     report(found[job.seed])
     except KeyboardInterrupt:
@@ -229,4 +245,5 @@ WAYS = {
     "scenes": lambda job: [judge_scene(job.seed)],
     "calls": lambda job: judge_calls(job.seed, job.count),
     "gallery": lambda job: [figures(CASES[job.seed])],
+    "closed forms": lambda job: [measured(CLOSED_FORMS[job.seed])],
 }

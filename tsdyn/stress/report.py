@@ -91,6 +91,18 @@ def gallery_text(found):
     return "\n".join([*lines, "", *LEGEND, *(text for figures in found for text in wrong(figures))])
 
 
+def closed_forms_text(found):
+    """Return the table of the closed forms, and why one could not be measured."""
+    rows = [("closed form", "error", "allowed", "")]
+    rows += [
+        (each.name, f"{each.error:.1e}", f"{each.allowed:.1e}", "holds" if each.holds else "OFF") for each in found
+    ]
+    sizes = widths(rows)
+    return "\n".join(
+        [*(line(row, sizes) for row in rows), *(f"{each.name}: {each.message}" for each in found if each.message)]
+    )
+
+
 def fault_text(job, outcome):
     """Return a fault, with the command that repeats it."""
     return f"{outcome.word}: {outcome.name}: {outcome.said[:LONGEST]}\n  repeat it: {job.command}"
@@ -110,7 +122,7 @@ def tally_text(tally, seed):
     return "\n".join([*lines, f"{len(tally.faults)} faults; {end} after {tally.seconds:.0f} s, seed {seed}."])
 
 
-def as_data(found, tally, seed):
+def as_data(found, closed, tally, seed):
     """Return everything as what JSON holds: NaN becomes None."""
 
     def plain(value):
@@ -122,6 +134,7 @@ def as_data(found, tally, seed):
         return None if isinstance(value, float) and not np.isfinite(value) else value
 
     data = {"seed": seed, "gallery": plain(found)}
+    data["closed_forms"] = [plain({**each._asdict(), "holds": each.holds}) for each in closed]
     if tally is not None:
         faults = [{**outcome._asdict(), "command": job.command} for job, outcome in tally.faults]
         data["fuzz"] = {

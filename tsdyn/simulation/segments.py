@@ -25,6 +25,7 @@ from ..taylor.series_engine import SeriesEngine
 from .progress import silent
 from .rounding_limit import within_rounding
 from .singularity_crossing import Carrier, by_series, crossings
+from .tolerances import GOT_ON, PASSES
 
 PASSAGE, STIFF = Status.PASSAGE, Status.STIFF
 METHOD, IMPLICIT, CROSSING = range(3)  # who makes a segment: the task's method, the implicit one, series
@@ -168,8 +169,12 @@ class _Segments:
         return role
 
     def _next(self, status):
-        role = self.roles[-1]
+        role, parts = self.roles[-1], self.parts
         if status is PASSAGE:
+            t0, t1 = self.task.span
+            if len(parts) > PASSES and parts[-1].reached - parts[-1 - PASSES].reached < GOT_ON * (t1 - t0):
+                parts[-1] = parts[-1]._replace(status=Status.STEP_COLLAPSED)
+                return None
             return CROSSING if role != CROSSING else self.roles[-2]
         if role == METHOD and self.turns is not None and came_to_rest(self.task, status):
             return IMPLICIT

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .. import regular_files
 from ..calls import fitting
 from ..errors import InvalidArgument, StorageError
+from .outline_solution import Outline
 from .resume import ended_run
 from .scene import Scene
 from .simulate import simulate
@@ -108,7 +109,7 @@ def load(
         return ended_run(path, scene)
     if kind in LOADERS:
         return LOADERS[kind](path, scene, allow_code)
-    return load_solution(path, scene, allow_code, (Scene, Solution))
+    return load_solution(path, scene, allow_code, (Scene, Solution, Outline))
 
 
 def scene_file(

@@ -26,7 +26,7 @@ DEFAULT, DOP853 = RUN.replace("METHOD", "None"), RUN.replace("METHOD", "'dop853'
 
 def process(code, folder):
     """Of a process: what it prints, how long it took, and processor time with that of its own processes; s."""
-    environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "TSDYN_QUIET": "1", "PYTHONPYCACHEPREFIX": f"{folder}/code"}
+    environment = {**os.environ, "TSDYN_CACHE_DIR": folder, "TSDYN_QUIET": "1", "PYTHONPYCACHEPREFIX": f"{folder}/code"}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     started, before = time.perf_counter(), os.times()
     result = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)

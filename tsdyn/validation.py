@@ -1,12 +1,13 @@
-"""Validation of users' numbers: no silent rounding, parsing or truncation."""
+"""Validation of users' numbers: no silent rounding, parsing or truncation. Validation of what files hold."""
 
+import contextlib
 import difflib
 import math
 from functools import lru_cache, wraps
 
 import numpy as np
 
-from .errors import InvalidArgument, UnknownAttribute
+from .errors import InvalidArgument, StorageError, UnknownAttribute
 
 EXACT = 2**53  # integers below it are floats
 MANY = 30  # names that a message lists
@@ -174,3 +175,38 @@ def demand_known(owner, attribute, known):
         return
     public = [name for name in {*known, *dir(type(owner))} if not name.startswith("_")]
     raise UnknownAttribute(f"{owner!r} has no attribute {attribute!r} to set{nearest(attribute, public)}")
+
+
+@contextlib.contextmanager
+def damaged(what):
+    """A block that takes what a file holds: StorageError in place of what Python says where something doesn't fit."""
+    try:
+        yield
+    except StorageError:
+        raise
+    except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
+        raise StorageError(f"{what} is damaged, or lacks something: {type(error).__name__}: {error}.") from error
+
+
+def demand(fits, what):
+    """Raise ValueError unless something of a file fits."""
+    if not fits:
+        raise ValueError(f"{what}: no run leaves such values")
+
+
+def is_count(value):
+    """Whether a value is a whole number of things that a run may have."""
+    return type(value) is int and 0 <= value <= EXACT
+
+
+def demand_numbers(table, known):
+    """Raise ValueError unless a table has these names alone, each with a number, a truth value or None."""
+    demand(isinstance(table, dict) and table.keys() == set(known), "the names of numbers")
+    demand(all(value is None or isinstance(value, (bool, int, float)) for value in table.values()), "numbers")
+
+
+def demand_record(record, kinds):
+    """Raise KeyError or TypeError unless a table of JSON has these names, each with a value of its type."""
+    for name, kind in kinds.items():
+        if not isinstance(record[name], kind) or (isinstance(record[name], bool) and kind is not bool):
+            raise TypeError(f"{name} is {type(record[name]).__name__}")

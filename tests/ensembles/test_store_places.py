@@ -77,7 +77,7 @@ def test_what_happens_later(code, words, tmp_path, monkeypatch):
 def test_a_folder_by_the_name_of_a_file(tmp_path):
     (tmp_path / "study.h5").mkdir()
     refused(tmp_path / "study.h5", ("study.h5 exists",))
-    refused(tmp_path / "study.h5", ("can't be read as HDF5: it is a folder.",), resume=True)
+    refused(tmp_path / "study.h5", ("can't be read: it is a folder, not a regular file.",), resume=True)
 
 
 def test_no_path_at_all():

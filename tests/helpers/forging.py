@@ -1,8 +1,6 @@
 """Forged files: mutations of valid ones, with their checksums sealed again, read in a process with bounded memory.
 
-    python -m tests.helpers.forging KIND COUNT SEED FOLDER
-
-prints, as JSON, how often each outcome was met. A mutation that ends in anything but a solution or a TsdynError, or
+`main` prints, as JSON, how often each outcome was met. A mutation that ends in anything but a solution or a TsdynError, or
 that does what files must not do (start a process, load a library), is printed with its number, and the exit
 code is 1.
 """
@@ -15,7 +13,6 @@ import random
 import shutil
 import sys
 from collections import Counter
-from importlib import import_module
 from pathlib import Path
 
 import h5py
@@ -268,8 +265,8 @@ def kernels(count, rng):
     return tally
 
 
-def main(kind, count, seed, folder):
-    """Read so many mutations; the exit code."""
+def main(limit, kind, count, seed, folder):
+    """Read so many mutations; the exit code. `limit` is called with the bytes that this process may have."""
     count, seed, folder = int(count), int(seed), Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     faulthandler.enable()
@@ -287,9 +284,8 @@ def main(kind, count, seed, folder):
             faults.append(f"{event} {arguments!r:.200}")
 
     sys.addaudithook(watch)
-    resource = import_module("resource")  # there is none on Windows
-    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY,) * 2)
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    limit(used + MEMORY)
     here = folder / "forged"
     for i in range(seed, seed + count):
         rng = random.Random(i)
@@ -318,8 +314,3 @@ def main(kind, count, seed, folder):
     print(json.dumps(tally))
     print("\n".join(faults[:40]), file=sys.stderr)
     return int(bool(faults))
-
-
-if __name__ == "__main__":
-    os.environ.setdefault("TSDYN_QUIET", "1")
-    sys.exit(main(*sys.argv[1:]))

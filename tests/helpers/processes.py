@@ -38,7 +38,7 @@ KERNELS = 4  # of SMALL: three loops of Distance and the one that Python calls
 
 def command(code, environment, cwd, before=()):
     """Start Python on the code, with the user's cache unless the environment names another one."""
-    full = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "TSDYN_QUIET")}
+    full = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "TSDYN_CACHE_DIR", "TSDYN_QUIET")}
     full.update(environment)
     if "NUMBA_CACHE_DIR" in environment and "TMPDIR" not in environment:
         full["TMPDIR"] = _scratch_beside(environment["NUMBA_CACHE_DIR"])

@@ -222,7 +222,7 @@ def test_damaged_folders(tmp_path):
 def test_foreign_and_later_files(tmp_path):
     path = tmp_path / "other.h5"
     path.write_bytes(b"no HDF5")
-    with pytest.raises(ts.StorageError, match="can't be read as HDF5"):
+    with pytest.raises(ts.StorageError, match="damaged, or can't be read as HDF5"):
         ts.load(path)
     with h5py.File(tmp_path / "foreign.h5", "w") as file:
         file["x"] = np.arange(3)

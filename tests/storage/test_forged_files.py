@@ -20,6 +20,11 @@ from tsdyn.runs import slices
 from tsdyn.storage import checkpoint, saved_file
 
 SECRET = 1234.5
+LIMITED = """
+import resource, sys
+from tests.helpers import forging
+sys.exit(forging.main(lambda size: resource.setrlimit(resource.RLIMIT_AS, (size, size)), *sys.argv[1:]))
+"""
 
 
 @pytest.fixture
@@ -36,7 +41,7 @@ def saved(tmp_path):
 
 def fuzz(kind, count, seed, folder):
     """Read so many mutations of a kind, in another process; its report."""
-    given = [sys.executable, "-W", "ignore", "-m", "tests.helpers.forging", kind, str(count), str(seed), str(folder)]
+    given = [sys.executable, "-W", "ignore", "-c", LIMITED, kind, str(count), str(seed), str(folder)]
     environment = {**os.environ, "TSDYN_QUIET": "1"}
     if kind == "kernel":
         environment["TSDYN_CACHE_DIR"] = str(folder / "kernels")

@@ -187,10 +187,11 @@ def _convert(parsed):
         found = load(parsed.scene)
         written = (write_ensemble if isinstance(found, Ensemble) else write)(found, parsed.target)
     elif source in SCENES and target in SCENES:
+        from ..simulation.load import text_of
         from ..simulation.scene_saving import write_text
 
         load_document(parsed.scene, parsed.allow_code, robot=robot_options(parsed))  # refuses mistakes
-        written = write_text(parsed.target, Path(parsed.scene).read_text(encoding="utf-8-sig"))
+        written = write_text(parsed.target, text_of(parsed.scene))
     elif target in SCENES:
         scene = load_scene(parsed.scene, parsed.allow_code, robot_options(parsed))
         written = scene.save(parsed.target)

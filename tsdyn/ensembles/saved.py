@@ -8,10 +8,9 @@ from typing import Any
 
 from ..errors import InvalidArgument, InvalidFile, Status, StorageError
 from ..files import scene_text
-from ..runs.snapshot import demand
 from ..simulation.scene import Scene
 from ..simulation.stored_runs import hash_of
-from ..storage.formats import damaged, demand_record
+from ..validation import damaged, demand, demand_record
 from .cases import Cases, started
 from .keeping import FINAL, TIMES
 from .results import Ensemble
@@ -106,13 +105,8 @@ def _demand_whole(record, arrays):
     demand_record(record, RECORD)
     count, names = record["count"], record["coordinates"]
     pairs, messages = record["parameters"], record["messages"]
-    words = [
-        *names,
-        *record["kept"],
-        *(word for pair in pairs for word in pair),
-        *messages.values(),
-        *record["lacking"],
-    ]
+    words = [*names, *record["kept"], *messages.values(), *record["lacking"]]
+    words += [word for pair in pairs for word in pair]
     demand(all(isinstance(word, str) for word in words), "words")
     times = arrays["times"]
     grid = times.shape if record["keep"] == TIMES else ()
@@ -121,10 +115,9 @@ def _demand_whole(record, arrays):
         demand(arrays[name].shape == (count, *grid, len(names)), name)
     demand(arrays["status"].shape == arrays["reached"].shape == (count,), "status")
     demand(set(arrays["status"].tolist()) <= {*map(int, Status)}, "status")
-    for name in (
-        f"{kind}_{i}" for kind, known in (("parameter", pairs), ("kept", record["kept"])) for i in range(len(known))
-    ):
-        demand(arrays[name].shape[:1] == (count,), name)
+    for kind, known in (("parameter", pairs), ("kept", record["kept"])):
+        for i in range(len(known)):
+            demand(arrays[f"{kind}_{i}"].shape[:1] == (count,), f"{kind}_{i}")
 
 
 def _lost(solution):

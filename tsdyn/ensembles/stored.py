@@ -18,8 +18,9 @@ from .._version import __version__
 from ..errors import Status, StorageError
 from ..regular_files import NO_LINKS
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
-from ..storage.formats import Column, Table, damaged, demand_shapes, format_of
+from ..storage.formats import Column, Table, demand_shapes, format_of
 from ..storage.write_errors import demand_writable, writing
+from ..validation import damaged
 from .chunks import empty, fitted
 from .keeping import TIMES
 from .tolerances import FLUSH, WAITING

@@ -14,7 +14,10 @@ from .equations import set_time
 
 @entry
 def _sample(s, q, qd, t, at, Q, out):
-    """out (k,): weighted sums of all forces on the coordinates `at`, at times t (k,); Q (n,): zeros."""
+    """out (k,): sums of all forces on the coordinates `at`, at times t (k,); Q (n,): zeros.
+
+    Weights 1 + 0.37 j: forces that cancel in a plain sum, such as those on both ends of a load, don't.
+    """
     set_time(s, t[0])
     for i in range(t.size):
         for j in range(s.forces.shape[0]):
@@ -51,7 +54,8 @@ def user_kinds(packed):
 def sampled_loads(packed, kinds, t):
     """Titles of the forces of each kind, and their sums (k,) at times t (k,): at the bodies' start, and nearby.
 
-    At the start a force may be zero at all times that is not so in motion. A state nearby may be none for the function.
+    At the start a force may be zero at all times that is not so in motion. Nearby all coordinates differ by up to a
+    half, of any unit; where the function is not finite there, that state is left out.
     """
     system, found = packed.system, []
     if not kinds:

@@ -6,9 +6,13 @@ of its samples:
 
     |d_i| > CLEAR max(|d_j|, i - ORDER - WINDOW <= j < i - ORDER) + FAINT max |f|
 
-is a change; after a pause, too, what is large beside those before the last change. The same on each stride-th sample:
-a bump is found where the stride shows it in few samples. What varies as much before, as a sine or noise does, is no
-change: it keeps the steps short itself.
+shows a change within f_i to f_{i + ORDER}. The same on each stride-th sample: a wide bump is found by the stride at
+which it has few samples. What varies as much before, as a sine or noise does, is no change: it keeps the steps short
+itself.
+
+The second edge of a pulse has the first one in its window, and a pulse of a train the one before. So REACH differences
+after a change are compared with the limit of that change, too: once one has been below it (`quiet`), larger ones are
+another change.
 """
 
 import math
@@ -19,7 +23,7 @@ from ..jit.kernels import entry, kernel
 from .tolerances import CLEAR, FAINT, OF_STEP, SAMPLES, STRIDES
 
 ORDER, WINDOW = 6, 5  # of the differences; how many one is compared with
-REACH = 30  # differences after a change among which another one is compared with those before both
+REACH = 30  # differences after a change that are compared with its limit, too
 NO_CHANGES = np.empty((0, 2))
 
 
@@ -72,7 +76,12 @@ def _before(d, i, finest):
 
 @entry
 def mark_changes(values, strides, d, marks):
-    """Mark the samples, each `stride`-th of values (k,), at which an interval with a change ends; d: scratch."""
+    """Mark the samples, each `stride`-th of values (k,), at which an interval with a change ends; d: scratch.
+
+    A jump between samples c - 1 and c makes the differences c - ORDER to c - 1 large. So of large ones in succession,
+    `first` to `last`, the intervals that end at samples first + ORDER to last + 1 are marked. least: the limit of the
+    change before, for differences up to `until`.
+    """
     for row in range(strides.size):
         s = strides[row]
         count, first, last = (values.size - 1) // s + 1 - ORDER, -1, -1

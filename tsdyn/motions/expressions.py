@@ -65,7 +65,7 @@ OPERATIONS = {
 }
 
 
-PLAIN = frozenset(("polynomial", "piecewise", "add", "subtract", "multiply", "sin", "cos"))
+PLAIN = frozenset(("polynomial", "piecewise", "add", "subtract", "multiply", "sin", "cos"))  # operations
 
 
 def _is_linear(node):
@@ -120,13 +120,16 @@ class Smooth:
         return [node._numbers for node in self._order() if node._operation == "piecewise"]
 
     @property
-    def is_even(self) -> bool:
-        """Whether it has no short change within a piece: it consists of polynomials and sines."""
-        return PLAIN.issuperset(node._operation for node in self._order())
+    def may_change(self) -> bool:
+        """Whether it may change shortly within a piece, as polynomials and sines don't."""
+        return not PLAIN.issuperset(node._operation for node in self._order())
 
     @property
     def is_plain(self) -> bool:
-        """Whether its coefficients at any time tell of all others: polynomials, waves, exponentials of a rate."""
+        """Whether its series at a time is that of the whole piece: of polynomials, sines, and exp of a linear function.
+
+        Series of other functions, such as 1 / (1 + t^2) and a bump exp(-t^2), tell little of later times.
+        """
         return all(
             node._operation in PLAIN or (node._operation == "exp" and _is_linear(node._operands[0]))
             for node in self._order()

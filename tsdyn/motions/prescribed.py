@@ -106,7 +106,7 @@ class Motion:
 
     @property
     def is_plain(self) -> bool:
-        """As of its series."""
+        """As of `Smooth`; of a motion with a series."""
         return self.series.is_plain
 
     @property
@@ -226,7 +226,7 @@ class Motion:
     @property
     def may_change(self) -> bool:
         """Whether it may change shortly, but at knots."""
-        return self.series is None or not self.series.is_even
+        return self.series is None or self.series.may_change
 
     def sampled(self, t: Floats) -> list[Floats]:
         """Values and accelerations at times t: a list of arrays (k,)."""

@@ -177,14 +177,14 @@ class Signal:
     def may_change(self):
         """Whether the values may change shortly, but at knots."""
         try:
-            return not all(f.is_even for f in self.smooth)
+            return any(f.may_change for f in self.smooth)
         except Untraceable:
             return True
 
     def sampled(self, t):
-        """The values that may do so at times t: a list of arrays (k,)."""
+        """The values that may change shortly at times t: a list of arrays (k,)."""
         try:
-            return [f(t) for f in self.smooth if not f.is_even]
+            return [f(t) for f in self.smooth if f.may_change]
         except Untraceable:
             out = np.empty((t.size, self.width))
             sample_signal(self.address, t, out)

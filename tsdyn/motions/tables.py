@@ -26,8 +26,7 @@ class Table:
     Parameters
     ----------
     times : array_like (k,), s
-        Two or more, none before the one before. A time that is given twice is a jump, from its first value to its
-        second.
+        Two or more, in order. A time that is given twice is a jump, from its first value to its second.
     values : array_like (k,) or (k, 3)
         Numbers or vectors, in the unit of the load or motion.
     kind : {"cubic", "linear", "previous", "pchip"}
@@ -193,7 +192,7 @@ def _overshoot(spline, values):
     return (
         f"Table: the cubic spline overshoots: it reaches {peaks[worst]:.4g} at t = {at:.6g} s, between the values "
         f"{values[i][worst[2:]]:.4g} and {values[i + 1][worst[2:]]:.4g}. Give kind='pchip', which stays within the "
-        "values, 'linear' or 'previous', and a time twice for a jump; or an own CubicSpline of SciPy's."
+        "values, 'linear' or 'previous', and a time twice for a jump; a CubicSpline of SciPy's is taken as it is."
     )
 
 

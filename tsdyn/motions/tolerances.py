@@ -27,9 +27,9 @@ OVERSHOOT, EXTREMUM = 0.1, 0.5
 # Samples of a function over a run, of which there are two or more in a pulse of a thousandth of the run; and strides
 # at which they are looked at, up to a 32nd of the run: steps are that long.
 SAMPLES, STRIDES = 2048, (1, 4, 16, 64)
-# How much larger than on either side a sixth difference of samples is where there is a change: between a zero of order
-# two and what is nine samples away it grows by 20, in a pulse on a sine of 26 samples a period by 1e5. Of the largest
+# Ratio of a sixth difference of samples to those before it, above which there is a change: beside a double zero
+# differences grow by 20 within nine samples, at a pulse on a sine of 26 samples a period by 1e5. Share of the largest
 # value, below which a change is none.
 CLEAR, FAINT = 100.0, 1e-9
-# Samples of a step that tell noise.
+# Intervals of a step at which a function is sampled for noise.
 OF_STEP = 64

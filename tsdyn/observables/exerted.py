@@ -23,7 +23,7 @@ def member(packed, constraint):
     """The `Member` of a constraint of the scene."""
     found = member_of(packed, constraint)
     if found is None:
-        raise InvalidConstraint(f"{constraint!r} is not a constraint or force of this solution's scene.")
+        raise InvalidConstraint(f"{constraint!r} is not a constraint or force of this scene.")
     return found
 
 
@@ -43,7 +43,10 @@ def acted(packed, item, on):
 
 
 def exerted(motion, item, on):
-    """Force and torque (k, 3) along a motion: packed, system, t (k,), q, qd (k, n), multipliers (k, m) and _memory."""
+    """Force and torque (k, 3) of an item along a motion, on a body of it.
+
+    A motion has packed, system, t (k,), q and qd (k, n), multipliers (k, m) and _memory (k, slots).
+    """
     item = handles_of(motion.packed).item(item)
     load = loads_of(motion.packed).get(id(item))
     if load is not None:

@@ -15,10 +15,10 @@ from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import MOST_SCALED
 from ..model.handles import handles_of
+from ..validation import demand, demand_numbers
 from ..workspaces.run_state import B_END, STORED
 from .event_states import Inside
 from .events import Failed, Instant
-from .snapshot import demand, demand_counts
 from .tolerances import EPS, FAST_TURN, LEAST_TIME, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
 
 
@@ -120,7 +120,7 @@ class Watch:
         self.tracks = [Track(0.0) for _ in self.events]
         for track, known in zip(self.tracks, numbers["tracks"], strict=True):
             significant = known.pop("significant")
-            demand_counts(known | {"significant": None}, vars(track))
+            demand_numbers(known | {"significant": None}, vars(track))
             vars(track).update(known | {"significant": significant and tuple(map(float, significant))})
         self.list = [[] for _ in self.events]
         for (t, index), state in zip(numbers["found"], arrays["watch.found"], strict=True):

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from ..validation import demand, is_count
 from ..workspaces.run_state import STORED
 from .history import ChartLog, StepLog
 from .run_log import RunLog
-from .snapshot import demand, demand_noted, is_count
+from .snapshot import demand_noted
 from .tolerances import TRIES
 
 CHART_ROOM = 64  # charts of a slice at first, half of what there is room for

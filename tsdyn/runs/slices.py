@@ -17,6 +17,7 @@ from ..observables.not_finite import not_finite
 from ..rows.interface import redundant_of
 from ..sparse.length_metric import MASS_REMEDY, mass_ratio
 from ..sparse.tolerances import TOO_UNEQUAL
+from ..validation import damaged, demand_numbers
 from . import snapshot
 from .recorder import Recorder
 from .tolerances import GETTING_ON, HOPELESS, NOISY, PACED, SLICE_SECONDS
@@ -206,14 +207,14 @@ class Slices:
 
     def restore(self, numbers, arrays):
         """Begin between two slices of a run that was left there."""
-        with snapshot.restoring():
+        with damaged("the checkpoint"):
             self.recorder.restore(numbers["outputs"], arrays, len(self.memory.context.graph.row))
             limits = {"next_eval": self.task.times.size, "next_stop": len(self.task.stops)}
             limits["chart_rows"] = len(arrays["recorder.charts"]) - 1
             snapshot.restore(self.memory, arrays, limits)
             if self.choose is not None:
                 self.choose.restore(numbers["turns"])
-            snapshot.demand_counts(numbers["pace"], vars(self.pace))
+            demand_numbers(numbers["pace"], vars(self.pace))
             vars(self.pace).update(numbers["pace"])
             self.memory.restore(numbers["memory"])
             if self.watch is not None:

@@ -5,13 +5,11 @@ the method (tables, programs, addresses, places in memory) is laid out anew by t
 saved. What comes from a file is checked before kernels see it: shapes, and each number that is a place or a count.
 """
 
-import contextlib
-
 import numpy as np
 
-from ..errors import StorageError
 from ..jit.kernels import Record
 from ..motions.state_program import LENGTH
+from ..validation import EXACT, damaged, demand
 
 LAID_OUT = (  # fields that follow from scene and method, or are filled in before they are read
     "system", "graph", "kernels", "rub", "anew", "joints", "tableau", "block", "own", "trial",
@@ -24,35 +22,7 @@ OWN = {  # numbers of records, likewise
         "history", "blocks",
     ),
 }  # fmt: skip
-MOST = 1 << 53  # of a count
 REMEMBERED = "context.system.remembered"  # reals of the forces that remember something
-
-
-@contextlib.contextmanager
-def restoring():
-    """A block that takes what a file holds: StorageError where it doesn't fit."""
-    try:
-        yield
-    except (KeyError, ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
-        said = f"{type(error).__name__}: {error}"
-        raise StorageError(f"the checkpoint is damaged, or of another run ({said}).") from error
-
-
-def demand(fits, what):
-    """Raise ValueError unless something of a file fits."""
-    if not fits:
-        raise ValueError(f"{what} has values that no run leaves")
-
-
-def is_count(value):
-    """Whether a value is a whole number of things that a run may have."""
-    return type(value) is int and 0 <= value <= MOST
-
-
-def demand_counts(numbers, known):
-    """Raise ValueError unless numbers have these names, and each is a number, a truth value or None."""
-    demand(isinstance(numbers, dict) and numbers.keys() == set(known), "a table of numbers")
-    demand(all(value is None or isinstance(value, (bool, int, float)) for value in numbers.values()), "a number")
 
 
 def demand_noted(noted, rows):
@@ -82,7 +52,7 @@ def restore(memory, arrays, limits):
     """
     system, rows = memory.context.system, len(memory.context.graph.row)
     found, most = {**parts(memory), REMEMBERED: system.reals[system.memory]}, max(rows, memory.context.work.Phi.size)
-    with restoring():
+    with damaged("the checkpoint"):
         for name, part in found.items():
             given, own = arrays[name], _array(part)
             demand(given.shape == own.shape and given.dtype == own.dtype, name)
@@ -105,7 +75,7 @@ def _restore_record(name, record, given, limits):
         if field in own:
             setattr(found, field, getattr(record, field))
             continue
-        low, high = (0, limits[field]) if field in limits else (-MOST, MOST)
+        low, high = (0, limits[field]) if field in limits else (-EXACT, EXACT)
         high = record.highest if (kind.__name__, field) == ("Orders", "next") else high
         demand(what is float or low <= getattr(found, field) <= high, f"{name}.{field}")
     given[...] = np.frombuffer(found, np.uint8)

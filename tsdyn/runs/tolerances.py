@@ -46,8 +46,8 @@ SECOND_ESTIMATE = 0.1
 # is to be FIRST_ERROR; x' and x'' below NO_SLOPE count as zero, times the run's length; it is FIRST_GROWTH times the
 # trial at most, and the trial FIRST_PART of the run.
 TOO_SMALL, TRIAL, FIRST_ERROR, NO_SLOPE, FIRST_GROWTH, FIRST_PART = 1e-5, 1e-6, 0.01, 1e-15, 100.0, 0.1
-# The least of it, of the run and over SHORTEST: from rest, x'' over atol asks for less where rates are 1e15 / s. A step
-# that is too long is rejected.
+# The first step is at least FIRST_LEAST of the run, and FIRST_SEEN times SHORTEST of the time: from rest, x'' over atol
+# asks for less where rates are 1e15 / s. A step that is too long is rejected.
 FIRST_LEAST, FIRST_SEEN = 1e-12, 4.0
 
 # Factors of the step after a stage that was not solved, and after a step that left a chart at once.

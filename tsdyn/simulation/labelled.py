@@ -4,8 +4,7 @@ import numpy as np
 
 from ..errors import MissingDependency
 from ..storage.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
-from .held_results import labelled_rows
-from .saved_solutions import provenance
+from .saved_solutions import labelled_rows, provenance
 
 ERRORS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 ENERGIES = ("kinetic_energy", "potential_energy", "energy")

@@ -140,8 +140,14 @@ def document_of(path: Place, allow_code: bool = False, study: Mapping[str, Any] 
     """
     from ..files import scene_text
 
+    return scene_text.read_all(text_of(path), os.fspath(path), Scene, simulate, allow_code, study)
+
+
+def text_of(path: Place) -> str:
+    """Return the text of a scene file; raises StorageError."""
+    from ..files.scene_text import LARGEST
+
     try:
-        text = regular_files.read(path, scene_text.LARGEST).decode("utf-8-sig").replace("\r\n", "\n")
+        return regular_files.read(path, LARGEST).decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise StorageError(f"{path} is no text in UTF-8: {error}.") from error
-    return scene_text.read_all(text, os.fspath(path), Scene, simulate, allow_code, study)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import StorageError
 from ..observables.diagnostics import ConstraintError
-from .held_results import LEVELS
+from .saved_solutions import LEVELS
 from .solution import Solution
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ class Outline(Solution):
     _content: Any  # numbers and arrays of the file
     _columns: list[int]  # of what is remembered: the angles of the joints that are here
     _row_labels: list[list[str]]  # title and label of each row of Phi
-    _missing: str  # what `lacks` says
 
     def _set_remembered(self, rest):
         self._all_remembered = rest
@@ -56,7 +55,7 @@ class Outline(Solution):
 
 def _refused(name):
     def refuse(self, *_, **__):
-        raise StorageError(f"solution.{name} needs the scene as it was run. {self.lacks}")
+        raise StorageError(f"solution.{name} needs the scene as it was run. {self._lacks}")
 
     return refuse
 

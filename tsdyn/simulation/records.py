@@ -15,11 +15,6 @@ if TYPE_CHECKING:
 class Records:
     """Mixed into `Solution`."""
 
-    @property
-    def lacks(self) -> str:
-        """Of a loaded solution: what is to be passed, and what isn't there without it; "" where nothing is missing."""
-        return vars(self).get("_missing", "")
-
     def save(self, path: Place) -> Path:
         """Write the solution to a file, from which `ts.load` returns it; without pickle.
 

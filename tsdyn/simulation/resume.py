@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidFile, StorageError
 from ..files import scene_text
-from ..runs.snapshot import restoring
+from ..validation import damaged
 from .run_requests import arguments_of
 from .scene import Scene
 from .simulate import run_from
@@ -72,7 +72,7 @@ def resume(
         scene = _scene_of(path, numbers, arrays)
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
-    with restoring():
+    with damaged("the checkpoint"):
         given = arguments_of(numbers["arguments"], arrays, scene)
     given |= {"events": events, "progress": progress, "store": path, "checkpoint": numbers["interval"]}
     return run_from(given, numbers, arrays)

@@ -15,10 +15,9 @@ from ..errors import InvalidArgument, InvalidFile, Status, StorageError
 from ..files import scene_text
 from ..jit.cache import machine
 from ..model.handles import handles_of
+from ..observables.diagnostics import ConstraintError
 from ..runs import counts
-from ..runs.snapshot import demand, demand_counts
-from ..storage.formats import damaged, demand_record
-from .held_results import HELD, held, labelled_rows
+from ..validation import damaged, demand, demand_numbers, demand_record
 from .stored_runs import demand_path, hash_of
 from .trajectory_records import derived_record, record_of, take_derived, trajectory_of
 
@@ -29,6 +28,8 @@ RECORD = {  # of every file, with the types of it
     "provenance": dict, "formulation": str, "span": list, "method": str, "status": int, "reason": str, "message": str,
     "reached": (int, float), "counts": dict, "seconds": dict, "derived": dict, "tables": dict,
 }  # fmt: skip
+LEVELS = tuple(f"{level}_error" for level in ConstraintError._fields)
+HELD = "multipliers", "power", "potential_energy", *LEVELS  # of an outline: its scene doesn't tell them
 LOGS = {"steps": "_step_log", "charts": "_chart_log"}
 SETTINGS = ("rtol", "atol", "step", "max_step")
 
@@ -63,7 +64,7 @@ def save(solution: Solution, path: Place) -> Path:
     demand_path(path, "path")
     path = Path(path).absolute()
     saved_file.format_at(path)
-    if solution.lacks:
+    if solution._lacks:
         remembered = solution._width
         content = solution._content
     else:
@@ -94,7 +95,7 @@ def _rows(solution, tables, logs, table, start, count):
     part = solution[start : start + count]
     found = {"time": part.t, "q": part.q, "qd": part.qd, "qdd": part.qdd}
     angles = part.anchor.angles
-    remembered = part._all_remembered if part.lacks else np.concatenate((angles, part._remembers), 1)
+    remembered = part._all_remembered if part._lacks else np.concatenate((angles, part._remembers), 1)
     return found | ({"remembered": remembered} if remembered.shape[1] else {})
 
 
@@ -137,6 +138,28 @@ def _content(solution):
     return numbers, arrays | _outline(solution, numbers)
 
 
+def labelled_rows(solution):
+    """Title and label of each row of Phi as they were run."""
+    if solution._lacks:
+        yield from solution._row_labels
+        return
+    seen = {}
+    for member in solution.packed.members:
+        title = member.constraint.title
+        seen[title] = seen.get(title, 0) + 1
+        again = "" if seen[title] == 1 else f" #{seen[title]}"
+        yield from ((title + again, label) for label in member.constraint.row_labels)
+
+
+def _held(solution, width):
+    """The arrays of an outline that its scene doesn't tell, of a solution with its scene."""
+    found = {"multipliers": solution.multipliers, "power": solution.power}
+    found |= {"potential_energy": solution.potential_energy}
+    found |= dict(zip(LEVELS, solution.constraint_error, strict=True))
+    shapes = {name: (solution.t.size, *([width] if name == "multipliers" else [])) for name in HELD}
+    return {f"held_{name}": np.asarray(array, float).reshape(shapes[name]) for name, array in found.items()}
+
+
 def _outline(solution, numbers):
     """The arrays of an `Outline`, and its numbers entered, of a scene with parts that only their owner has."""
     if hash_of(solution.scene.packed) != provenance(solution)["scene"]:
@@ -147,7 +170,7 @@ def _outline(solution, numbers):
     angles = [row.item.name for row in solution.handles.rows for _ in row.angles]
     rows = [list(labels) for labels in labelled_rows(solution)]
     numbers["outline"] = {"left_out": left, "angles": angles, "rows": rows, "width": _width(solution.packed)}
-    return {"outline": np.frombuffer(text.encode(), np.uint8), **held(solution, len(rows))}
+    return {"outline": np.frombuffer(text.encode(), np.uint8), **_held(solution, len(rows))}
 
 
 def _scene_as_run(solution):
@@ -161,8 +184,8 @@ def _plain(value):
     return value.item() if isinstance(value, np.generic) else value
 
 
-def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[Any, ...]) -> Solution:
-    """Return the solution of a file; arguments as of `ts.load`, and the classes `Scene`, `Solution`, `Outline`."""
+def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[type[Any], ...]) -> Solution:
+    """Return the solution of a file; arguments as of `ts.load`, and the classes `Scene` and `Solution`."""
     from ..storage import saved_file
 
     path = Path(path).absolute()
@@ -220,7 +243,7 @@ def _outlined(path, record, arrays, why, kinds):
     for name, array in held_arrays.items():
         demand(array.shape == (count, *([len(known["rows"])] if name == "held_multipliers" else [])), name)
     labels = [[str(title), str(label)] for title, label in known["rows"]]
-    found._held, found._columns, found._missing, found._row_labels = held_arrays, columns, scene._lacks, labels
+    found._held, found._columns, found._row_labels = held_arrays, columns, labels
     found._width, found._content = known["width"], (_again(record), arrays)
     return found
 
@@ -245,10 +268,10 @@ def _solution(path, record, arrays, scene, kind, width=None):
     n = int(packed.system.bodies[:, 1].sum())
     arrays = {name: array if name in ("scene", "outline") else array.astype(float) for name, array in arrays.items()}
     demand(arrays["last"].shape == (3, n) and arrays["angles"].size + arrays["memory"].size == width, "its last state")
-    demand_counts(record["counts"], counts.NAMES)
-    demand_counts(record["seconds"], ("prepare", "run"))
+    demand_numbers(record["counts"], counts.NAMES)
+    demand_numbers(record["seconds"], ("prepare", "run"))
     start, end = record["span"]
-    demand_counts({"start": start, "end": end, "error": record["energy_error"]}, ("start", "end", "error"))
+    demand_numbers({"start": start, "end": end, "error": record["energy_error"]}, ("start", "end", "error"))
     demand(all(isinstance(said, (str, int, float)) for said in record["provenance"].values()), "its provenance")
     events = None, None, None
     if record["events"] is not None:

@@ -17,11 +17,11 @@ from ..runs import counts
 from ..runs.history import ChartLog, StepLog
 from ..runs.run import run
 from ..runs.segments import Relay
-from ..runs.snapshot import MOST, demand, demand_counts, restoring
 from ..runs.step_engine import StepEngine
 from ..runs.task import Outcome
 from ..runs.trajectory import Pieces
 from ..taylor.series_engine import SeriesEngine
+from ..validation import damaged, demand, demand_numbers, is_count
 from .progress import silent
 from .rounding_limit import within_rounding
 from .singularity_crossing import Carrier, by_series, crossings
@@ -47,7 +47,7 @@ def run_segments(task, engine, observe=None, unfinished=None):
     passed = task.archive.passed if task.archive else []
     try:
         if passed:  # a run that goes on in a later segment
-            with restoring():
+            with damaged("the checkpoint"):
                 relay.share, relay.largest, relay.h = map(float, passed[-1]["relay"])
                 if passed[-1]["turns"] is not None:
                     task.choose.restore(passed[-1]["turns"])
@@ -91,8 +91,8 @@ def _recalled(known, task):
     """The `Outcome` of a segment that had ended when a checkpoint was written."""
     last, remembered = np.array(known["last"], float), np.array(known["remembered"], float)
     demand(last.shape == (3, task.q.size) and remembered.shape == task.remembered.shape, "the end of a segment")
-    demand(known["next"] in (METHOD, IMPLICIT, CROSSING) and 0 <= known["rows"] <= MOST, "the parts of the run")
-    demand_counts(known["counts"], counts.NAMES)
+    demand(known["next"] in (METHOD, IMPLICIT, CROSSING) and is_count(known["rows"]), "the parts of the run")
+    demand_numbers(known["counts"], counts.NAMES)
     return Outcome(
         Status(known["status"]), "", range(known["rows"]), None, None, float(known["reached"]), last, remembered,
         known["counts"], None, None, clock(),

@@ -16,10 +16,10 @@ from ..observables.state import remembered
 from ..runs.arguments import demand_steps_seen, state_arrays
 from ..runs.brief import Brief
 from ..runs.sampling import Sampling
-from ..runs.snapshot import restoring
 from ..runs.step_engine import StepEngine
 from ..runs.task import Task
 from ..taylor.series_engine import SeriesEngine
+from ..validation import damaged
 from . import method_choice, stored_runs
 from .local_origin import origin_of, run_near
 from .options import checked
@@ -220,7 +220,7 @@ def _run_stored(task, given, options, found, archive):
     archive = archive or stored_runs.archive_of(given, kept, options.history, numbers, arrays)
     started = clock()
     if numbers is not None and numbers.get("ended"):
-        with restoring():
+        with damaged("the checkpoint"):
             slots = kept.handles.count + kept.packed.system.memory.size
             outcome = stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
         return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})

@@ -130,6 +130,11 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         self.__dict__.update(state, system=state["packed"].system)
 
     @property
+    def _lacks(self):
+        """What is to be passed before the scene can be run; "" but for an `Outline`."""
+        return self.scene._lacks
+
+    @property
     def method(self) -> str:
         """The method with its settings; the methods of a run that turned, that of most of the motion first."""
         return self._turned or (self._method if isinstance(self._method, str) else repr(self._method))

@@ -15,9 +15,8 @@ from ..jit.cache import machine
 from ..jit.code_hash import platform_hash
 from ..model.packed import user_functions
 from ..runs import counts
-from ..runs.snapshot import demand, demand_counts, is_count, restoring
 from ..runs.task import Outcome
-from ..validation import number
+from ..validation import damaged, demand, demand_numbers, demand_record, is_count, number
 from .run_requests import request_of
 
 
@@ -46,7 +45,7 @@ def demand_path(path, name):
 def archive_of(given, kept, history, numbers, arrays):
     """The `Archive` of a run, made or, with the numbers and arrays of a checkpoint, gone on with."""
     from ..storage.archive import Archive, tables_of
-    from ..storage.formats import demand_shapes, demand_size, format_of
+    from ..storage.formats import demand_shapes, format_of
     from ..storage.write_errors import writing
 
     facts = _facts(given, kept)
@@ -56,10 +55,9 @@ def archive_of(given, kept, history, numbers, arrays):
     tables = tables_of(kept.packed.bodies, remembered, history)
     attributes = {"source": f"tsdyn {__version__}", "scene": facts["scene"]}
     if numbers is not None:
-        demand_size(given["store"], numbers["size"])
-        format_of(given["store"]).demand_plain(given["store"])
+        format_of(given["store"]).demand_plain(given["store"], 0 if numbers.get("ended") else numbers["size"])
         demand_shapes(given["store"], tables)
-        with restoring():
+        with damaged("the checkpoint"):
             known = numbers["counts"]
             demand(known.keys() == tables.keys() and all(map(is_count, known.values())), "the counts of rows")
     archive = Archive(Path(given["store"]).absolute(), tables, attributes, facts["interval"], _asked(given), facts)
@@ -139,15 +137,13 @@ def ended_outcome(numbers, arrays, archive, n, memory):
     KeyError, TypeError, ValueError
         If they are none of such a run.
     """
-    from ..storage.formats import demand_record
-
     events, (last, remembered) = None, (arrays[name].astype(float) for name in ("last", "remembered"))
     if "watched" in numbers:
         events = tuple([arrays[f"event {i}.{name}"] for i in range(numbers["watched"])] for name in ("t", "q", "qd"))
         shapes = [[each.shape for each in found] for found in zip(*events, strict=True)]
         demand(all(found == [(found[0][0],), *[(found[0][0], n)] * 2] for found in shapes), "the events")
     demand(last.shape == (3, n) and remembered.shape == (memory,), "the end of the run")
-    demand_counts(numbers["statistics"], counts.NAMES)
+    demand_numbers(numbers["statistics"], counts.NAMES)
     demand_record(numbers, {"reason": str, "method": str, "seconds": (int, float)})
     return Outcome(
         Status(numbers["status"]), numbers["reason"], *_stored(archive), float(numbers["t"]), last, remembered,

@@ -29,7 +29,7 @@ def account(solution, scene, reason, goes_on=""):
     where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
     masses = mass_ratio(solution.packed, TOO_UNEQUAL) if solution.status is Status.SINGULAR else ""
     if masses:
-        return " ".join(part for part in (f"T{masses[1:]}.", reason, where, MASS_REMEDY) if part)
+        return " ".join(part for part in (f"{masses[0].upper()}{masses[1:]}.", reason, where, MASS_REMEDY) if part)
     found, limit = suspect(solution, scene), step_limit(solution)
     remedy = Status.SINGULAR.remedy if found else limit.remedy or solution.status.remedy
     if solution.status == Status.INTERRUPTED:

@@ -7,11 +7,12 @@ from ..formulations.registry import formulation
 from ..model.handles import handles_of
 from ..rows.interface import redundancy
 from ..runs import step_engine
-from ..runs.snapshot import demand, demand_noted
+from ..runs.snapshot import demand_noted
 from ..runs.trajectory import Pieces, Trajectory
 from ..sparse.constraint_graphs import graph_of, set_redundant
 from ..taylor import series_engine
 from ..taylor.layout import series_width
+from ..validation import demand
 from ..workspaces.run_state import B_CHART, B_DATA, B_END
 from . import local_origin
 from .run_requests import method_of, own_record

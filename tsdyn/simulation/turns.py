@@ -13,7 +13,7 @@ from functools import cached_property
 from ..ahead.first_run import prepare_first_run
 from ..integrators import SDIRK54, Radau, Taylor
 from ..methods.integrator import frozen
-from ..runs.snapshot import demand_counts
+from ..validation import demand_numbers
 from .tolerances import (
     AGAIN,
     COST,
@@ -173,5 +173,5 @@ class Turns:
     def restore(self, numbers):
         """As it was when it was saved."""
         window = numbers["window"]
-        demand_counts(numbers | dict(zip(("window", "work"), window, strict=True)), (*KEPT, "work"))
+        demand_numbers(numbers | dict(zip(("window", "work"), window, strict=True)), (*KEPT, "work"))
         vars(self).update(numbers)

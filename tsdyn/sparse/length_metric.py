@@ -22,7 +22,7 @@ def arms(packed):
 
 
 def coordinate_scales(packed):
-    """What columns of Phi_q are multiplied by, (n,): dr, and 2 L dp, of which the length is that of L w'."""
+    """Factors (n,) that make columns of Phi_q those of dr and of 2 L dp, whose length is that of L w'."""
     bodies, L = packed.system.bodies, arms(packed)
     scales = np.ones(int(bodies[:, 1].sum()))
     rigid = bodies[:, 1] == 7

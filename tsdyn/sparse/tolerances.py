@@ -21,7 +21,8 @@ LEAST_ARM = 1e-3
 # Ratio of masses, or of the largest inertias of bodies, above which factors of S lose as many digits: the start is
 # looked at once more, and multipliers of series are refined.
 UNEQUAL = 1e4
-# The same above which it is masses that a run which can't begin has failed of: half of the digits are lost.
+# The same ratio, above which masses are named as the reason where a run can't begin, or ends singular: half of the
+# digits are lost.
 TOO_UNEQUAL = 1e8
 
 # --- axes with next to no inertia, docs/design-decisions.md, "Inertia is added and taken back"

@@ -17,8 +17,8 @@ import numpy as np
 
 from .. import regular_files
 from ..errors import StorageError
-from ..validation import nearest
-from .formats import NUMBERS, SUFFIXES, demand_record
+from ..validation import demand_record, nearest
+from .formats import NUMBERS, SUFFIXES
 
 FORMAT = b"tsdyn checkpoint 2\n"
 SEAL = 65  # bytes of a checksum and its line end

@@ -12,8 +12,9 @@ A format is a module with a class `Store`, which has
 
 BUFFER, how many floats are gathered before they are written, and functions for stores that may still be written
 
-    demand_plain(path)                         raises StorageError unless a store is such as this module writes: plain
-                                               numbers within it, of sizes that it holds
+    demand_plain(path, size=0)                 raises StorageError unless a store is such as this module writes: plain
+                                               numbers within it, of sizes that it holds; or a file of fewer
+                                               bytes than `size`, those of its checkpoint
     read(path, column, part)                   a slice of a column
     count(path, columns)                       rows that all of these columns have
     shapes(path)                               of all columns of floats, by name
@@ -30,7 +31,6 @@ demand_plain comes first, before any function but `attributes` is asked about a 
 
 import contextlib
 import math
-import os
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
@@ -73,13 +73,6 @@ def demand_rows(path, column, found, count):
         raise StorageError(f"{path}: {column} has {found} rows of {count} that were written.")
 
 
-def demand_size(path, size):
-    """Raise StorageError if a file has been cut: HDF5 would wait for the missing part for ever."""
-    found = os.path.getsize(path) if os.path.exists(path) else 0
-    if found < size:
-        raise StorageError(f"{path} is damaged: it has {found} bytes of {size} that were written.")
-
-
 def demand_shapes(path, tables):
     """Raise StorageError unless a store has the columns of these tables, of their shapes but for the rows."""
     found = format_of(path).shapes(path)
@@ -87,24 +80,6 @@ def demand_shapes(path, tables):
         if found.get(column.name, ())[1:] != shape[1:] or column.name not in found:
             said = f"of the shape {found[column.name]}" if column.name in found else "not there"
             raise StorageError(f"{path} is damaged, or of another scene: {column.name} is {said}.")
-
-
-def demand_record(record, kinds):
-    """Raise ValueError or TypeError unless a table of JSON has these names, each of its type."""
-    for name, kind in kinds.items():
-        if not isinstance(record[name], kind) or (isinstance(record[name], bool) and kind is not bool):
-            raise TypeError(f"{name} is {type(record[name]).__name__}")
-
-
-@contextlib.contextmanager
-def damaged(path):
-    """A block that takes what a file holds: StorageError in place of what Python says where something doesn't fit."""
-    try:
-        yield
-    except StorageError:
-        raise
-    except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
-        raise StorageError(f"{path} is damaged, or lacks something: {type(error).__name__}: {error}.") from error
 
 
 @contextlib.contextmanager

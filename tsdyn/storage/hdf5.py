@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import regular_files
 from ..errors import StorageError
-from .formats import CHUNK, LONGEST, NUMBERS, ROOM, demand_rows, demand_size, reading
+from .formats import CHUNK, LONGEST, NUMBERS, ROOM, demand_rows, reading
 from .write_errors import code_of
 
 BUFFER = CHUNK
@@ -46,7 +46,6 @@ class Store:
     @classmethod
     def reopen(cls, path, tables, attributes, counts, size):
         """As formats.py says; a copy takes the place of the file, which a killed process may have left half-written."""
-        demand_size(path, size)
         partial = Path(path).with_name(f"{Path(path).name}-partial")
         partial.unlink(missing_ok=True)
         _demand_room(partial, os.path.getsize(path) + _room_of(tables))
@@ -169,8 +168,11 @@ def shapes(path):
         }
 
 
-def demand_plain(path):
+def demand_plain(path, size=0):
     """As formats.py says; every function that reads asks for it, for it takes a millisecond."""
+    regular_files.demand(path)
+    if (found := os.path.getsize(path)) < size:  # HDF5 would wait for the missing part for ever
+        raise StorageError(f"{path} is damaged: it has {found} bytes of {size} that were written.")
     with reading(path), _opened(path):
         pass
 
@@ -220,8 +222,8 @@ def _opened(path):
             file.close()
             raise
         return file
-    said = "it is a folder" if os.path.isdir(path) else str(reason).partition(" (")[0]
-    raise StorageError(f"{path} can't be read as HDF5: {said}.") from reason
+    said = str(reason).partition(" (")[0]
+    raise StorageError(f"{path} is damaged, or can't be read as HDF5: {said}.") from reason
 
 
 def _is_being_written(path):

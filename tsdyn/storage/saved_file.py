@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidArgument, StorageError
+from ..validation import damaged
 from .checkpoint import LONGEST
-from .formats import SUFFIXES, damaged, format_of
+from .formats import SUFFIXES, format_of
 from .write_errors import demand_folder, unwritable, writing
 
 FORMAT, VERSION = "tsdyn solution", 1

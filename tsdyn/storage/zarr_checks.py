@@ -30,7 +30,7 @@ def attributes(path):
     return {name: value for name, value in known.items() if isinstance(value, (str, int))}
 
 
-def demand_plain(path):
+def demand_plain(path, size=0):
     """As formats.py says."""
     path, sizes = Path(path), {}
     for folder, folders, files in os.walk(path):
@@ -97,7 +97,7 @@ def _read(path, kind=None):
     try:
         found = json.loads(regular_files.read(file, LARGEST))
     except (ValueError, RecursionError) as error:
-        raise StorageError(f"{file} is damaged: it is no JSON ({error}).") from error
+        raise StorageError(f"{file} is damaged, or no JSON: {error}.") from error
     known = isinstance(found, dict) and found.get("zarr_format") == 3 and kind in (None, found.get("node_type"))
     if not known or found.get("consolidated_metadata"):
         raise StorageError(f"{file} is no metadata of Zarr 3 as tsdyn writes it.")

@@ -50,6 +50,7 @@ def order_in_range(bodies, nb, orders, top, far, fast):
     """The highest order up to top whose coefficients neither overflow nor vanish.
 
     They are in proportion to rate^k: 1e450 at order 30 where rates are 1e15 / s, and 1e-450 where they are 1e-15 / s.
+    A maximum can hide a body whose coefficients are no numbers: see `finite_top`.
     """
     k = top + 1
     size = size_of_order(bodies, nb, orders, k, far, fast)
@@ -131,7 +132,11 @@ def longest(c, r, tol, most):
 
 @long_kernel
 def finite_top(c):
-    """The highest top up to which the coefficients are finite: they grow next to where a law is not analytic."""
+    """The highest top up to which the coefficients of all bodies are finite, for steps that have failed.
+
+    Next to where a law is not analytic they overflow, down to the lowest orders, and become NaN (0 c of such a c is no
+    zero). `order_in_range` asks for less: maxima, above LEAST_ORDER.
+    """
     x, orders = c.expansion, c.expansion.order.room
     for k in range(2, x.order.top + 2):
         rest = splat(0.0)

@@ -169,6 +169,7 @@ def _is_motion_off(c, t, tau, atol, rtol):
 
 @kernel
 def _set_place(c, t, tau, limits):
+    """Go to t + tau for comparisons with laws."""
     limits[TAU], limits[TIME] = tau, t + tau
     set_time(c.system, limits[TIME])
 
@@ -187,10 +188,14 @@ def _is_off(c, i, limits):
 
 @kernel
 def _may_differ(c, t, limits):
-    """Set which kinds of forces are to be compared with their laws within the step; whether there are any."""
+    """Set which kinds of forces are to be compared with their laws within the step; whether there are any.
+
+    Sharp ones always are; those with a margin where it is used up; others where they are off at the end of the step.
+    """
     x, left, found = c.expansion, stack(1), False
     c.trial.left = 1.0
-    is_short = STIFF_RATES * c.trial.rate * limits[LENGTH] < x.order.top + 2  # coefficients of places show no rates
+    # so short a step is held by rates of fast modes, of which coefficients of places show little: STILL is asked for
+    is_short = STIFF_RATES * c.trial.rate * limits[LENGTH] < x.order.top + 2
     for i in range(x.forces.shape[0]):
         kind = x.forces[i]
         kind.near = kind.sharp

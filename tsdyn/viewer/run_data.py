@@ -135,7 +135,7 @@ def _place(frames, index, point):
 
 def _loads(frames, constraints, forces, reach):
     """Arrows, and the load, N or N m, that is their full scale."""
-    found = [] if getattr(frames.run, "lacks", "") else arrows(frames, constraints, forces, reach)
+    found = [] if getattr(frames.run, "_lacks", "") else arrows(frames, constraints, forces, reach)
     scales = {unit: max((size(one) for one in found if one.unit == unit), default=0.0) for unit in UNITS}
     values = [np.rint(one.values * (FULL / scales[one.unit])) for one in found]
     listed = [one._asdict() | {"values": None, "point": rounded(one.point)} for one in found]
@@ -166,7 +166,7 @@ def _note(frames, solution):
     p = frames.orientation
     turned = np.abs(np.einsum("kbi,kbi->kb", p[1:], p[:-1])).min(initial=1.0)
     notes = [] if solution.success else [solution.message]
-    notes += [solution.lacks] if getattr(solution, "lacks", "") else []
+    notes += [solution._lacks] if getattr(solution, "_lacks", "") else []
     if 2.0 * np.arccos(min(1.0, turned)) > FAST:
         notes.append("Bodies turn far between frames; solution[a:b].view() shows a part of the run.")
     return " ".join(notes)

@@ -151,11 +151,14 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
 
 
 def margin(count, stride, size, orders, known, h, values, least):
-    """least = its minimum with the share of any a that Eq. (1) leaves: no zero within a step h while it is positive."""
+    """least = the minimum of itself and of the share 1 - sum_{k>0} |a_k| h^k / a_0 of each a; Eq. (1) is share > 0.
+
+    Not a number where a share is none.
+    """
     h, values, least = vector(h, 1), vector(values, ANY), vector(least, 1)
     rows, left, step = scratch_rows(stride, values), get(least, 0), get(h, 0)
     square = step * step
-    rest = 0.0 * step  # not a number where one of them isn't
+    rest = 0.0 * step  # not a number where a share isn't: a minimum can lose that
     for i in range(count):
         s = matrix(data_of(values[i * size + 8 * MARKERS * orders :]), rows, orders)
         for a in POSITIVE:

@@ -60,7 +60,7 @@ class Jet:
         return self._chain(1.0 * x**n, n * x ** (n - 1.0), n * (n - 1.0) * x ** (n - 2.0))
 
     def _root(self):
-        """The square root; where value and rate are zero, of a length through zero, its rate just after: sqrt(x'' / 2)."""
+        """The square root; a length through zero has the rate sqrt(x'' / 2) just after."""
         root = self._chain(*_root(self.x))
         at_zero = (self.x == 0.0) & (self.xd == 0.0)
         return Jet(root.x, np.where(at_zero, np.sqrt(0.5 * self.xdd), root.xd), root.xdd)

@@ -266,3 +266,15 @@ def test_forces_leave_scenes_alone_that_have_none():
     assert not solution.power.any()
     assert not solution.dissipation.any()
     assert solution.state.memory.size == 0
+
+
+def test_power_of_a_spring_at_zero_length_is_that_of_its_rate_just_after():
+    scene = ts.Scene(gravity=(0, 0, 0))
+    mass = scene.add_point_mass(1.0, position=(1, 0, 0))
+    given = {"stiffness": 30.0, "damping": 0.2, "actuator": 3.0}
+    spring = scene.add(F.Spring(scene.ground, mass, free_length=0.5, **given))
+    mass.position, mass.velocity = (0, 0, 0), (2, 0, 0)
+    solution = ts.simulate(scene, (0, 0.01), dense_output=True)
+    lost = 0.2 * 2.0**2
+    assert solution.power[0] == pytest.approx(-3.0 * 2.0, rel=ROUNDING)
+    assert solution.power_of(spring)[0] == pytest.approx(-3.0 * 2.0 - lost, rel=ROUNDING)

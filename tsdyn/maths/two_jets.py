@@ -59,11 +59,19 @@ class Jet:
             return self._chain(x**n, n * x ** max(n - 1, 0), n * (n - 1) * x ** max(n - 2, 0))
         return self._chain(1.0 * x**n, n * x ** (n - 1.0), n * (n - 1.0) * x ** (n - 2.0))
 
+    def _root(self):
+        """The square root; a length through zero has the rate sqrt(x'' / 2) just after."""
+        root = self._chain(*_root(self.x))
+        at_zero = (self.x == 0.0) & (self.xd == 0.0)
+        return Jet(root.x, np.where(at_zero, np.sqrt(0.5 * self.xdd), root.xd), root.xdd)
+
     __radd__, __rmul__ = __add__, __mul__
 
     def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
         """NumPy's functions of a Jet, and its arithmetic with one on the right."""
         if method == "__call__" and not keywords:
+            if ufunc is np.sqrt:
+                return self._root()
             if len(inputs) == 1 and ufunc.__name__ in _FUNCTIONS:
                 return self._chain(*_FUNCTIONS[ufunc.__name__](self.x))
             if len(inputs) == 2 and ufunc.__name__ in _OPERATORS:

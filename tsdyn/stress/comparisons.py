@@ -32,10 +32,10 @@ def energy(case, solution, run):
 
 
 def momenta(case, solution, run):
-    """Linear momentum, and angular momentum about the centroid, of a scene that nothing holds."""
+    """Linear momentum, and angular momentum about the centroid, of a scene that nothing outside it holds or loads."""
     scene = solution.scene
     ends = {id(body) for item in (*scene.constraints, *scene.forces) for body in (item.a, item.b)}
-    if id(scene.ground) in ends:
+    if id(scene.ground) in ends or any(force.b is None for force in scene.forces):
         return []
     parts = enumerate(("linear momentum", "angular momentum"))
     return [

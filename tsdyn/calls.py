@@ -254,11 +254,12 @@ class Placing:
         def at(cls, *arguments, **keywords):
             try:
                 return self.function(cls, *arguments, **keywords)
-            except TsdynError:
-                raise
-            except Exception:
+            except Exception as error:
                 title, whole, known = f"{cls._kind()}.at", (cls, *arguments), at.__signature__
-                misfit = misfit_of(title, known, whole, keywords) or _unfit(title, owner, known, whole, keywords)
+                if isinstance(error, TsdynError):  # of a call of the class, its arguments are not those of `at`
+                    misfit = misfit_of(title, known, whole, keywords) if isinstance(error, InvalidCall) else None
+                else:
+                    misfit = misfit_of(title, known, whole, keywords) or _unfit(title, owner, known, whole, keywords)
                 if misfit is None:
                     raise
             raise misfit

@@ -92,9 +92,9 @@ def test_predictions_of_stages_are_exact_for_polynomials(power):
     assert begin_prediction(memory, own, stages, 1, before, 1.0, 1.0) == before
     memory[3::2] = (before + c) ** power
     for i in range(1, stages):
-        predict(tableau, memory, own, i, before, 4, k)
+        predict(tableau, memory, own, i, before, 4, 1, k)
         assert k[0] == pytest.approx((before + c[i]) ** power, rel=100 * EPS)
-        predict(tableau, memory, own, i, 0.0, 4, k)
+        predict(tableau, memory, own, i, 0.0, 4, 1, k)
         if power < min(i, 4):
             assert k[0] == pytest.approx((before + c[i]) ** power, rel=100 * EPS)
     assert begin_prediction(memory, own, stages, 1, before, 0.5, 1.0) == 2.0 * before  # the step was rejected

@@ -160,7 +160,7 @@ UNFIT = [  # arguments of another kind than their annotations say
         for path in ("", "a" * 1000, "\0", 3.0)
         for call, word in ((ts.resume, "path"), (ts.load, ""))
     ),
-    case("source with a null byte", lambda w: ts.shapes.Mesh("\0"), ts.InvalidArgument, "source"),
+    case("source with a null byte", lambda w: ts.shapes.Mesh("\0"), ts.InvalidArgument, "Mesh"),
     case("a list that holds itself", run(integrator=None, rtol=INSIDE), ts.InvalidArgument, "rtol"),
     case("times that are ragged", lambda w: run(dense_output=True)(w).at([[1, 2], [3]]), ts.InvalidArgument, "t must"),
     case("spin zero", lambda w: w.scene.equilibrium(spin=(0, 0, 0)), ts.InvalidArgument, "spin", "at rest"),
@@ -216,7 +216,7 @@ def test_results_of_what_is_no_constraint_of_the_scene():
         refuse(
             lambda c=constraint: solution.reaction(c),
             ts.InvalidConstraint,
-            ("not a constraint or force of this solution",),
+            ("not a constraint or force of this scene",),
         )
 
 

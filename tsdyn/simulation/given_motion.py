@@ -11,6 +11,7 @@ from ..calls import fitting_methods
 from ..errors import InvalidArgument, Status
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
+from ..runs.counts import NAMES
 from ..runs.task import Outcome
 from ..validation import counted
 from .scene_cache import prepared
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from ..hints import ArrayLike, Scene
 
 INITIAL_TOL = 1e-9  # of residuals of a start, as in `simulate`
-NO_COUNTS = ("charts", "evaluations", "placements", "steps_near_singular", "stiff")
 
 
 @fitting_methods
@@ -34,7 +34,7 @@ class GivenMotion(Solution):
         span = (float(followed.rows[0, 0]), followed.reached) if len(followed.rows) else (followed.reached,) * 2
         form = SimpleNamespace(name="constraints alone")
         task = SimpleNamespace(prepared=kept, method=None, form=form, span=span, q=followed.last[0])
-        counts = dict.fromkeys(NO_COUNTS, 0) | {
+        counts = dict.fromkeys(NAMES, 0) | {
             name: getattr(followed, name) for name in ("steps", "rejected", "factorizations", "newton_iterations")
         }
         outcome = Outcome(

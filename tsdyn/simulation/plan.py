@@ -8,7 +8,7 @@ import time
 from typing import NamedTuple
 
 from ..configuration.holonomic import demand_holonomic
-from ..jit.compiled import clock
+from ..jit.compiled import statistics
 from ..jit.interrupts import CollectionsDeferred
 from ..motions.knots import NO_STOPS
 from ..observables.state import remembered
@@ -37,7 +37,7 @@ class Unfinished(NamedTuple):
     start: Start
     memory: object
     begun: Begun
-    called: float  # clock()
+    called: float  # s, of `jit.compiled.clock`
     began: float
 
 
@@ -75,7 +75,7 @@ class Plan:
 
     def run(self, scene, t_span, t_eval, state):
         """Run it: a `Solution` or the `Unfinished` run; None if the call is to go the ordinary way."""
-        called, kept, stretch = clock(), self.kept, self._stretch
+        called, kept, stretch = time.perf_counter() - statistics["waited"], self.kept, self._stretch  # clock()
         if stretch is None or t_span is not stretch.t_span or t_eval is not stretch.t_eval:
             stretch = Stretch.of(stretch, t_span, t_eval, kept, self.task.method)
             self._stretch = stretch if stretch.times.size <= FEW_TIMES else None
@@ -85,7 +85,7 @@ class Plan:
         if memory is None:
             return None
         memory.enter_again(self, engine, stretch, start)
-        began = clock()
+        began = time.perf_counter() - statistics["waited"]
         begun = begin(memory, stretch.times, stretch.stops, limit_of(memory.run, stretch.stops, self.task.max_steps))
         if not has_ended_well(memory, begun):
             return Unfinished(self, stretch, start, memory, begun, called, began)
@@ -98,7 +98,7 @@ class Plan:
         vars(solution).update(
             self._told, span=stretch.span, _rows=(rows, kept.n), _remains=remains, _trajectory=trajectory,
             _made=time.time(),
-            _seconds={"prepare": began - called, "run": clock() - began},
+            _seconds={"prepare": began - called, "run": time.perf_counter() - statistics["waited"] - began},
         )  # fmt: skip
         return solution
 

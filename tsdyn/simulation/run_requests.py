@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InvalidArgument
-from ..files import scene_text
 from ..jit.code_hash import is_ours
 from ..methods.integrator import is_own, registered
 from ..observables.kinematics import Anchor
@@ -54,6 +53,8 @@ def request_of(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     foreign = {type(item) for item in (*scene._added, *scene.forces) if not is_ours(type(item).__module__)}
     numbers["lacks"] = ", ".join(sorted(f"{kind.__module__}.{kind.__qualname__}" for kind in foreign))
     if not foreign:
+        from ..files import scene_text  # what a run without a store imports none of
+
         try:
             arrays["scene"] = np.frombuffer(scene_text.write(scene, type(scene)).encode(), np.uint8)
         except InvalidArgument as error:

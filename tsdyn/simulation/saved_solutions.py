@@ -12,7 +12,6 @@ import numpy as np
 
 from .._version import __version__
 from ..errors import InvalidArgument, InvalidFile, Status, StorageError
-from ..files import scene_text
 from ..jit.cache import machine
 from ..model.handles import handles_of
 from ..observables.diagnostics import ConstraintError
@@ -101,6 +100,8 @@ def _rows(solution, tables, logs, table, start, count):
 
 def _content(solution):
     """Numbers and arrays of all that is no table."""
+    from ..files import scene_text  # what a plain run imports none of
+
     arrays = {"last": solution._last, "angles": solution._angles, "memory": solution._remembered}
     numbers = {
         "provenance": provenance(solution),
@@ -162,6 +163,8 @@ def _held(solution, width):
 
 def _outline(solution, numbers):
     """The arrays of an `Outline`, and its numbers entered, of a scene with parts that only their owner has."""
+    from ..files import scene_text
+
     if hash_of(solution.scene.packed) != provenance(solution)["scene"]:
         return {}
     text, left = scene_text.write_outline(solution.scene, type(solution.scene))
@@ -213,6 +216,8 @@ class Lacking(Exception):
 
 def _scene(path, record, arrays, scene, allow_code, kind):
     """The scene that a solution is of."""
+    from ..files import scene_text
+
     if scene is not None:
         return scene
     if "scene" not in arrays:
@@ -230,6 +235,8 @@ def _scene(path, record, arrays, scene, allow_code, kind):
 
 def _outlined(path, record, arrays, why, kinds):
     """The `Outline` of a file."""
+    from ..files import scene_text
+
     known = record["outline"]
     demand_record(known, {"left_out": list, "angles": list, "rows": list, "width": int})
     scene = scene_text.read(arrays["outline"].tobytes().decode(), "its outline", kinds[0], None)[0]

@@ -36,8 +36,8 @@ STIFF_RATES = 1000.0
 # Places of a step, equally far apart, at which series of sharp forces are compared with their laws; steps of a run at
 # least, since a pulse between two places is missed.
 PLACES, LEAST_STEPS = 4, 8
-# atol and rtol of that comparison where steps are fixed and have no tolerance. Series of too long a step are off by
-# less, series that have ended by more.
+# atol and rtol of that comparison where steps are fixed and have no tolerance: above the errors of series in too long a
+# step, below those of series that have ended.
 COARSE = 1e-3
 # Places of prescribed motions that are no polynomials or waves; they cost less than forces.
 INSTANTS = 16

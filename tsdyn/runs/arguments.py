@@ -79,16 +79,16 @@ def demand_steps_seen(method, t0, t1):
 
 
 def demand_one_state(value, rule):
-    """Refuse a solution or the like, whose q is that of many states."""
-    if np.ndim(getattr(value, "q", 0)) == 2 and hasattr(value, "state"):
+    """Refuse a solution or an equilibrium, which has a state and is none."""
+    if np.ndim(getattr(value, "q", 0)) != 1 and hasattr(value, "state"):
         raise InvalidArgument(f"{rule}: give the .state of {value!r}.")
 
 
 def state_arrays(state, n):
     """Positions and velocities (n,) of a state given to start from."""
+    demand_one_state(state, "state must be one State")
     if not (hasattr(state, "q") and hasattr(state, "qd")):
         raise InvalidArgument(f"state must have q and qd, such as solution.state, got {shown(state)}.")
-    demand_one_state(state, "state must be one State")
     return finite_vector(state.q, n, "state.q"), finite_vector(state.qd, n, "state.qd")
 
 

@@ -254,9 +254,9 @@ class Placing:
         def at(cls, *arguments, **keywords):
             try:
                 return self.function(cls, *arguments, **keywords)
-            except TsdynError:
-                raise
-            except Exception:
+            except Exception as error:
+                if isinstance(error, TsdynError) and not isinstance(error, InvalidCall):  # that names the constructor
+                    raise
                 title, whole, known = f"{cls._kind()}.at", (cls, *arguments), at.__signature__
                 misfit = misfit_of(title, known, whole, keywords) or _unfit(title, owner, known, whole, keywords)
                 if misfit is None:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidFile, StorageError
-from ..files import scene_text
 from ..validation import damaged
 from .run_requests import arguments_of
 from .scene import Scene
@@ -80,6 +79,8 @@ def resume(
 
 def _scene_of(path, numbers, arrays):
     """The scene that a checkpoint holds."""
+    from ..files import scene_text  # takes a while to import
+
     foreign = ", ".join(numbers["functions"]) or str(numbers["arguments"].get("lacks", ""))
     if not foreign and "scene" in arrays:
         try:

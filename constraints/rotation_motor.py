@@ -135,7 +135,7 @@ def chosen(geometries, joint, which, kind, kinds):
         raise InvalidConstraint(f"{joint!r} has no {kind} to be driven; give a {kinds} joint.")
     if not isinstance(which, (int, np.integer)) or which not in range(len(found)):
         raise InvalidConstraint(
-            f"which must be from 0 to {len(found) - 1}, as {joint!r} has {len(found)} of {kind}; got {which!r}."
+            f"which must be from 0 to {len(found) - 1}, an index of the {kind}s of {joint!r}; got {which!r}."
         )
     return found[which]
 

@@ -255,11 +255,12 @@ class Placing:
             try:
                 return self.function(cls, *arguments, **keywords)
             except Exception as error:
+                if isinstance(error, TsdynError) and not isinstance(error, InvalidCall):
+                    raise
                 title, whole, known = f"{cls._kind()}.at", (cls, *arguments), at.__signature__
-                if isinstance(error, TsdynError):  # of a call of the class, its arguments are not those of `at`
-                    misfit = misfit_of(title, known, whole, keywords) if isinstance(error, InvalidCall) else None
-                else:
-                    misfit = misfit_of(title, known, whole, keywords) or _unfit(title, owner, known, whole, keywords)
+                misfit = misfit_of(title, known, whole, keywords)
+                if misfit is None and not isinstance(error, TsdynError):
+                    misfit = _unfit(title, owner, known, whole, keywords)
                 if misfit is None:
                     raise
             raise misfit

@@ -34,7 +34,7 @@ def opened(path: Place, largest: int | None = None, flags: int = 0) -> int:
             raise StorageError(f"{path} can't be read: it is {what}, not a regular file.")
         if largest is not None and found.st_size > largest:
             raise StorageError(
-                f"{path} has {found.st_size} bytes, and {largest} are as many as are read of such a file."
+                f"{path} is too large: it has {found.st_size} bytes, and such a file may have {largest} at most."
             )
     except BaseException:
         os.close(handle)

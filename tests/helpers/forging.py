@@ -1,8 +1,8 @@
 """Forged files: mutations of valid ones, with their checksums sealed again, read in a process with bounded memory.
 
 `main` prints, as JSON, how often each outcome was met. A mutation that ends in anything but a solution or a TsdynError,
-or that does what files must not do (start a process, load a library), is printed with its number, and the exit code
-is 1.
+or that does what files must not do (start a process, load a library), is printed with its number, and the exit code is
+1.
 """
 
 import faulthandler

@@ -10,7 +10,7 @@ from tsdyn.jit.compiled import DEBUG
 
 
 def test_seconds_are_without_the_compilation_of_kernels():
-    """The function is new in every process, so that its kernels are compiled here."""
+    """The function is new in every process, so that its kernels are compiled: as it is added, others in the run."""
     number = float(np.random.default_rng().uniform())
     name = {}
     exec(f"def pull(t, a, b, par, out):\n    out[0] = {number!r} - a[0]\n", name)

@@ -30,23 +30,24 @@ FORCE_STEP = 1e-40
 # Of central differences of fourth order, relative to x: the fifth root of the rounding error, their optimum.
 FORCE_QUOTIENT = 7e-4
 
-# Series of forces against their laws (loops/law_check.py). What they are off by at most, as a velocity over the
-# tolerance of a step; the same of laws that are analytic but at few places. Least of both, m/s or rad/s, below which
-# terms that cancel within a law count. Rounding of a law, relative to the terms of its series.
+# Series of forces against their laws (loops/law_check.py). OFF: what sharp ones may be off by, as a velocity over the
+# tolerance of a step; OFF_SELDOM: the same of laws that are analytic but at few places. LAW_TOLERANCE: the least
+# velocity, m/s or rad/s, below which terms that cancel within a law count. LAW_NOISE: rounding of a law, relative to
+# the terms of its series.
 OFF, OFF_SELDOM, LAW_TOLERANCE, LAW_NOISE = 1000.0, 20.0, 1e-12, 1e-13
 
 # Part of a normal load, relative to the whole: below it a part is rounding of the reactions, in a mechanism in a plane
 # for instance, and so are all its coefficients.
 NEGLIGIBLE_LOAD = 1e-13
 
-# 1 and m: directions and points of a motor and a joint, up to which the motor prescribes the coordinate of the joint.
-# Rounding of unit vectors that are made across axes again, and of files written by hand to nine digits.
+# Differences of directions (1) and points (m) of a motor and a joint, up to which the motor prescribes the joint's
+# coordinate: rounding of unit vectors that are orthogonalised again, and of files written by hand to nine digits.
 SAME_COORDINATE = 1e-9
 
 # m/s and rad/s: velocity at which friction is 71% of its magnitude, where none is given. A joint under nine tenths of
 # its friction creeps by 2e-7 m in 100 s. Less costs more: chains with friction in all joints twice as much at 1e-10.
 SLIP = 1e-9
-# The least that acts: the iteration of a stage leaves 1e-14 of velocities, and less than a hundred times that is noise.
+# The same, at least: iterations of stages leave 1e-14 m/s of velocities; less than a hundred times that is noise.
 LEAST_SLIP = 1e-12
-# m/s: the Stribeck velocity where neither it nor the slip velocity is given.
+# m/s: the Stribeck velocity where neither it nor the slip velocity is given; 0.001 to 0.1 are those of most contacts.
 STRIBECK = 0.01

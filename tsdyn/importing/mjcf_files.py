@@ -71,10 +71,11 @@ class Sources:
         self._judge_data(self.trees[first:], path)
         objects = sum(attached) + _objects(root, included, max(attached))
         if objects > OBJECTS:
-            self._refuse(root, f"the file makes {objects:.3g} objects, and {OBJECTS} are as many as are read")
+            made = f"the file makes {objects:.3g} objects, copies included, and may make {OBJECTS} at most"
+            self._refuse(root, f"{made}; lower the counts")
         keys = sum(node.tag == "key" for tree, _ in self.trees[first:] for node in tree.walk())
         if keys * objects > CELLS:
-            self._refuse(root, f"{keys} keyframes of {objects:.3g} objects are more than are read")
+            self._refuse(root, f"{keys} keyframes of {objects:.3g} objects are more than are read; remove keyframes")
         self._objects[path.resolve()] = objects
         return objects
 

@@ -79,8 +79,8 @@ def demand_steps_seen(method, t0, t1):
 
 
 def demand_one_state(value, rule):
-    """Refuse a solution or the like, whose q is that of many states, and what has a state and no q."""
-    if np.ndim(getattr(value, "q", None)) != 1 and hasattr(value, "state"):
+    """Refuse a solution or an equilibrium, which has a state and is none."""
+    if np.ndim(getattr(value, "q", 0)) != 1 and hasattr(value, "state"):
         raise InvalidArgument(f"{rule}: give the .state of {value!r}.")
 
 

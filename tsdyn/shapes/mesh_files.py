@@ -38,10 +38,12 @@ def read(path: Any) -> tuple[Floats, Any]:
     try:
         path = Path(path)
     except TypeError as error:
-        raise InvalidArgument(f"Mesh: {path} can't be read: {error}.") from error
+        raise InvalidArgument(f"Mesh: source must be the path of a file or (vertices, faces): {error}.") from error
     kind = path.suffix.lower()
     if kind not in (".stl", ".obj"):
-        raise InvalidArgument(f"Mesh: {path.name} must be an .stl or .obj file; other formats can be converted.")
+        raise InvalidArgument(
+            f"Mesh: source must be an .stl or .obj file, got {path.name!r}; convert files of other formats."
+        )
     data = regular_files.read(path, LARGEST)
     try:
         vertices, faces = _obj(data) if kind == ".obj" else _stl(data)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from .. import regular_files
 from ..calls import fitting
 from ..errors import InvalidArgument, StorageError
-from .outline_solution import Outline
 from .resume import ended_run
 from .scene import Scene
 from .simulate import simulate
@@ -100,6 +99,7 @@ def load(
         raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
     from ..storage.formats import SUFFIXES
     from ..storage.saved_file import STORE, kind_of
+    from .outline_solution import Outline
     from .saved_solutions import load as load_solution
 
     if suffix not in SUFFIXES:

@@ -79,7 +79,7 @@ def resume(
 
 def _scene_of(path, numbers, arrays):
     """The scene that a checkpoint holds."""
-    from ..files import scene_text
+    from ..files import scene_text  # takes a while to import
 
     foreign = ", ".join(numbers["functions"]) or str(numbers["arguments"].get("lacks", ""))
     if not foreign and "scene" in arrays:

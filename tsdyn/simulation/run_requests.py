@@ -32,6 +32,8 @@ def request_of(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     InvalidArgument
         If the method is one of the user's own.
     """
+    from ..files import scene_text  # takes a while to import
+
     scene, method, state = given["scene"], given["integrator"], given["state"]
     rest = {name: np.asarray(value).tolist() if value is not None else None
             for name, value in given.items() if name not in OWN}  # fmt: skip

@@ -13,8 +13,8 @@ A format is a module with a class `Store`, which has
 BUFFER, how many floats are gathered before they are written, and functions for stores that may still be written
 
     demand_plain(path, size=0)                 raises StorageError unless a store is such as this module writes: plain
-                                               numbers within it, of sizes that it holds; or a file of fewer
-                                               bytes than `size`, those of its checkpoint
+                                               numbers within it, of sizes that it holds; a file has `size`
+                                               bytes at least, as its checkpoint says
     read(path, column, part)                   a slice of a column
     count(path, columns)                       rows that all of these columns have
     shapes(path)                               of all columns of floats, by name

@@ -1,7 +1,7 @@
 """Folders of Zarr, looked at before the library is: plain numbers in regular files of the folder, of sizes they hold.
 
-Zarr knows codecs that unpickle, links are followed by the file system, and a chunk unpacks to what it says. Here are
-allowed the codecs that tsdyn writes.
+Zarr knows codecs that unpickle, the file system follows links, and a chunk unpacks to what its head says. Codecs that
+tsdyn doesn't write are refused, and so are links.
 """
 
 import json
@@ -12,6 +12,7 @@ from pathlib import Path
 
 from .. import regular_files
 from ..errors import StorageError
+from ..validation import damaged
 from .formats import CHUNK
 
 TYPES = {"float64": 8, "int64": 8, "bool": 1, "uint8": 1}  # bytes of each
@@ -52,10 +53,8 @@ def _demand_arrays(path, sizes, within):
         if spec.get("node_type") == "group" and not within:
             _demand_arrays(child, sizes, within=True)
         elif within or spec.get("data_type") != "string":  # names along a dimension, which are not read
-            try:
+            with damaged(child):
                 _demand_array(child, spec, sizes)
-            except (KeyError, ValueError, TypeError, AttributeError, OverflowError) as error:
-                raise StorageError(f"{child} is damaged: {type(error).__name__}: {error}.") from error
 
 
 def _demand_array(path, spec, sizes):

@@ -7,7 +7,7 @@ Shares are values of the singularity indicator (rows/singularity.py), which fall
 # Cost of a step's end (projection, factors of S, poses), in orders of its series: benchmarks/measure.py, chain of 16.
 STEP_COST = 3
 
-# Sizes of the coefficients of a step's last order: beyond them products of others lose digits, or are infinite.
+# Range of the coefficients of a step's last order: products of smaller ones lose digits, those of larger ones overflow.
 FAINT, VAST = 1e-280, 1e280
 
 # Landing, over tolerance and rounding of Phi, beyond which the projection corrects no truncation error: the radius of
@@ -36,14 +36,15 @@ STIFF_RATES = 1000.0
 # Places of a step, equally far apart, at which series of sharp forces are compared with their laws; steps of a run at
 # least, since a pulse between two places is missed.
 PLACES, LEAST_STEPS = 4, 8
-# atol and rtol of that comparison with fixed steps, which have no tolerance: errors that no step length explains.
+# atol and rtol of that comparison where steps are fixed and have no tolerance: above the errors of series in too long a
+# step, below those of series that have ended.
 COARSE = 1e-3
 # Places of prescribed motions that are no polynomials or waves; they cost less than forces.
 INSTANTS = 16
 
-# Length of a step over a place where a law is not analytic, relative to t as SHORTEST: forces there are bounded, so its
-# error is rounding. Those within the last number of lengths of the one before are twice as long as that; more of them
-# are too many: the motion comes to rest there.
+# HOP: length of a step over a place where a law is not analytic, over the shortest step (runs/tolerances.py, SHORTEST):
+# forces are bounded there, so its error is rounding. Within APART lengths of the one before, such a step is twice as
+# long; after MOST_HOPS of them the run ends: the motion comes to rest there.
 HOP, MOST_HOPS, APART = 16.0, 8, 1e3
 
 # Angular velocity (rad/s) that counts as none.
@@ -53,7 +54,7 @@ NO_SPEED = 1e-300
 # rad, and part of the scene's size: a step that turns and moves everything by less is limited by something that can't
 # be seen. So many of them in a row, and the motion may be stiff (docs/design-decisions.md).
 SMALL, SMALL_STEPS = 0.02, 40
-# Nor by a place where a law is not analytic: a step leaves more than this share of what the law divides by.
+# Share of what a law divides by that a step leaves: where it is less, the law limits the step, not stiffness.
 STILL = 0.9
 # A step by less than TINY counts for so many.
 TINY, FASTER = 0.002, 4

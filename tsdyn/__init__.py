@@ -143,7 +143,7 @@ if TYPE_CHECKING:
 else:
     from ._discovery import refusing as _refusing
 
-    _refuse = _refusing("ts", __all__)
+    _refuse = _refusing("ts", __all__, constraints, forces, integrators, motions)
     _LATER = {
         "Ensemble": ".ensembles.results",
         "benchmark": ".benchmarking.benchmark",

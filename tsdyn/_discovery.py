@@ -20,12 +20,17 @@ def export_all(package, path, namespace, *bases):
     return names
 
 
-def refusing(where, known):
-    """Make the `__getattr__` of a module: what is missing is refused with what may have been meant."""
+def refusing(where, known, *inner):
+    """Make the `__getattr__` of a module: what is missing is refused with what may have been meant, also of `inner`."""
 
     def __getattr__(name):
         if name.startswith("_"):
             raise AttributeError(f"{where} has no {name}")
+        for module in inner:
+            if name in module.__all__:
+                raise UnknownAttribute(
+                    f"{where} has no {name}; here it is {where}.{module.__name__.split('.')[-1]}.{name}."
+                )
         raise UnknownAttribute(f"{where} has no {name}{hint(where, name, known)}")
 
     return __getattr__

@@ -161,6 +161,8 @@ def test_commands_have_one_vocabulary(command, capsys):
     [
         (["profile", "fall.toml", "--t-end", "1"], 2, "the end of the run is --to"),
         (["profile", "fall.toml", "--outputs", "5"], 2, "--every"),
+        (["run", "fall.toml", "--to", "run.h5"], 2, "it is a time in s. Results are written with --output"),
+        (["run", "fall.toml", "--hep"], 2, "did you mean --help?"),
         (["tables", "--no-figure"], 2, "drawn with --plot only"),
         (["run", "fall.toml", "--integrator", "rk45"], 2, "the integrator is --method"),
         (["rnu", "fall.toml"], 2, "did you mean run?"),

@@ -33,6 +33,8 @@ def test_classes_of_other_programs(where, name, here):
 def test_names_of_the_package():
     with pytest.raises(ts.UnknownAttribute, match=re.escape("ts.constraints.Revolute")):
         _ = ts.Hinge
+    with pytest.raises(ts.UnknownAttribute, match=re.escape("here it is ts.constraints.Revolute.")):
+        _ = ts.Revolute
     with pytest.raises(AttributeError, match=re.escape("scene.add_body")):
         _ = ts.Scene().add_rigid_body
 

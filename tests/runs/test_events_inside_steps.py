@@ -40,6 +40,14 @@ def test_every_zero_of_a_fast_function_of_time(method):
     np.testing.assert_array_equal(rising, both[1::2])
 
 
+@every_method
+def test_every_zero_of_the_step_that_begins_at_one(method):
+    events = [lambda t, state: np.sin(40.0 * t), lambda t, state: state.q[2]]
+    waves, heights = ts.simulate(thrown(), (0.0, 1.05), integrator=method, events=events).t_events
+    np.testing.assert_allclose(waves, np.arange(14) * np.pi / 40.0, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(heights, [0.0, 1.0], rtol=0, atol=ALGEBRA)
+
+
 @pytest.mark.parametrize("formulation", ["null-space", "maggi-kane"])
 @pytest.mark.parametrize("method", EXPLICIT, ids=repr)
 def test_by_every_form(method, formulation):

@@ -11,12 +11,14 @@ ELSEWHERE = {  # options of other programs, and of earlier versions
     "--no-figure": "a figure is drawn with --plot only",
     "--t-end": "the end of the run is --to",
     "--end": "the end of the run is --to",
+    "--until": "the end of the run is --to",
     "--duration": "the end of the run is --to",
     "--t-start": "the start of the run stands in the file: [run] start",
     "--outputs": "the interval of outputs is --every",
     "--dt": "the interval of outputs is --every; a fixed step stands in the file: [run] method",
     "--integrator": "the integrator is --method",
     "--solver": "the integrator is --method",
+    "--step": "a fixed step stands in the file: [run] method",
     "--tol": "tolerances are --rtol and --atol",
     "-o": "results are written with --output",
     "--overwrite": "files are overwritten with --force",
@@ -40,6 +42,8 @@ class Parser(argparse.ArgumentParser):
         choice = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)
         if choice:
             return _meant(choice[1], [word.strip(" '") for word in choice[2].split(",")])
+        if re.search(r"argument --(to|every): invalid float", message):
+            return "; it is a time in s. Results are written with --output"
         unknown = re.search(r"unrecognized arguments: (.*)", message)
         words = [word.partition("=")[0] for word in unknown[1].split() if word.startswith("-")] if unknown else []
         return "".join(f"; {ELSEWHERE[word]}" if word in ELSEWHERE else _meant(word, self._options()) for word in words)
@@ -51,7 +55,7 @@ class Parser(argparse.ArgumentParser):
             if isinstance(action, argparse._SubParsersAction):
                 for word in self.given:
                     if word in action.choices:
-                        return [*found, *action.choices[word]._option_string_actions]
+                        return [*dict.fromkeys([*found, *action.choices[word]._option_string_actions])]
         return found
 
 

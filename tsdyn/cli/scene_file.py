@@ -99,7 +99,10 @@ def _file(where):
 def _module(file):
     """The file's module, found again under its name as kernels in it need to be."""
     if not file.suffix == ".py":
-        raise InvalidArgument(f"{file} is no Python file.")
+        raise InvalidArgument(
+            f"{file} is neither a scene file ({', '.join(SCENES)}) nor a Python file; tsdyn info and tsdyn view read "
+            "solutions."
+        )
     spec = importlib.util.spec_from_file_location(file.stem, file)
     module = importlib.util.module_from_spec(spec)
     before = sys.modules.get(file.stem)

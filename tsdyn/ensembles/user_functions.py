@@ -28,4 +28,4 @@ def called(function, what, argument):
     except TsdynError:
         raise
     except Exception as error:
-        raise InvalidArgument(f"{what} raised {type(error).__name__}: {error}.") from error
+        raise InvalidArgument(f"{what} raised {type(error).__name__}: {str(error).rstrip('.')}.") from error

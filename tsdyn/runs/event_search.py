@@ -280,13 +280,13 @@ class Watch:
         if a == 0.0 or (a < 0.0) == (b < 0.0):
             return [Occurrence(t0, i, step.at(t0))]
         root = self._between(i, step, (t0, a), (t1, b))
-        return [] if self._is_start(i, step, root) else [Occurrence(root, i, step.at(root))]
+        return [] if self._is_start(i, step, root, a) else [Occurrence(root, i, step.at(root))]
 
-    def _is_start(self, i, step, t):
-        """Whether a zero at t is that of the run's start: by rounding of the time, or of the value there."""
+    def _is_start(self, i, step, t, before):
+        """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before."""
         if t - self.start <= START_ZERO * max(abs(self.start), step.t1 - step.t0):
             return True
-        return step.t0 == self.start and abs(self.tracks[i].value) <= self._shaken(i, step, step.t0)
+        return step.t0 == self.start and abs(before) <= self._shaken(i, step, step.t0)
 
     def _between(self, i, step, first, last):
         """Where event i changes its sign between two times with values."""

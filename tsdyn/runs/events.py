@@ -25,7 +25,9 @@ class Event(NamedTuple):
         try:
             given = self.function(t, instant)
         except Exception as error:
-            raise Failed(f"{self.name} raised {type(error).__name__} at t = {t:.9g} s: {error}.", t) from error
+            raise Failed(
+                f"{self.name} raised {type(error).__name__} at t = {t:.9g} s: {str(error).rstrip('.')}.", t
+            ) from error
         value = number(given)
         if not math.isfinite(value):
             raise Failed(f"{self.name} must return a finite number; at t = {t:.9g} s it gave {given!r}.", t)

@@ -60,7 +60,7 @@ class Sampling:
             given = force.function(t, x, rate)
         except Exception as error:
             raise Failed(
-                f"{force.name}: its function raised {type(error).__name__} at t = {t:.9g} s: {error}."
+                f"{force.name}: its function raised {type(error).__name__} at t = {t:.9g} s: {str(error).rstrip('.')}."
             ) from error
         value = number(given)
         if not math.isfinite(value):

@@ -165,7 +165,7 @@ class Slices:
         except Exception as error:  # what has been computed is worth more than a progress bar
             if self.status is SLICE_DONE:
                 self.status = Status.INTERRUPTED
-                self.reason = f"progress raised {type(error).__name__}: {error}."
+                self.reason = f"progress raised {type(error).__name__}: {str(error).rstrip('.')}."
                 _warn_of(error, t)
         if self.status is not SLICE_DONE:
             return

@@ -55,6 +55,20 @@ def test_a_fault_is_found(name, where, by, law):
     assert law in broken(solution)
 
 
+def test_a_motor_that_is_a_turn_off_is_found():
+    """No row tells whole turns."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    wheel = scene.add_body(1.0, (1, 1, 1), angular_velocity=(0, 0, 2))
+    hinge = scene.add(C.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1)))
+    motor = scene.add(C.RotationMotor.of(hinge, angle=ts.motions.Ramp(0.0, 2.0)))
+    solution = ts.simulate(scene, (0.0, 5.0))
+    found = list(laws.motors(solution))
+    assert len(found) == 2
+    assert not any(each.broken for each in found)
+    motor.angle = ts.motions.Ramp(2.0 * np.pi, 2.0)
+    assert all(each.broken for each in laws.motors(solution))
+
+
 def test_energy_that_is_lost_is_found():
     solution = run()
     sound, size = laws.energy_left(solution)

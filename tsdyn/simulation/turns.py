@@ -17,6 +17,7 @@ from .tolerances import (
     COST,
     FIRST_WINDOW,
     PATIENCE,
+    RESTING,
     SERIES_COST,
     SETTLED,
     SHARP_COST,
@@ -78,6 +79,11 @@ class Turns:
         return SERIES_COST if isinstance(self.method, Taylor) else COST
 
     @cached_property
+    def _first(self):
+        """Steps of the implicit method over which work is measured first."""
+        return RESTING if self.prepared.slips else FIRST_WINDOW
+
+    @cached_property
     def _step(self):
         """Work of a step of the explicit method."""
         series = isinstance(self.method, Taylor)
@@ -85,7 +91,7 @@ class Turns:
 
     def begin(self, to_implicit, t, turned):
         """A segment begins at t: after a turn, or after a singular configuration."""
-        self.window, self.ask = (t, 0.0), FIRST_WINDOW
+        self.window, self.ask = (t, 0.0), self._first if to_implicit else FIRST_WINDOW
         if to_implicit:
             prepare_first_run(self.scene, self.implicit, self.options.settings.form, self.options.within, None)
         elif not self.tried:
@@ -127,7 +133,7 @@ class Turns:
     def _back(self, memory, steps, rate):
         """Whether the explicit method is to go on: it takes less work, or is to be tried."""
         jacobians = memory.work.counters.jacobians
-        if steps <= FIRST_WINDOW:
+        if steps <= self._first:
             self.jacobians = jacobians
         patience = self.patience if jacobians > self.jacobians else AGAIN * self.patience
         self.tried = steps >= patience and self._pays(rate, memory.run.clock.t)

@@ -15,6 +15,8 @@ from ..elements.markers import POINT
 from ..model.sparse_jacobian import WIDTH, places, with_short_rows
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
+from .finding import Finding, some
+from .motor_law import motors
 from .tolerances import (
     BALANCE,
     BODIES,
@@ -35,29 +37,6 @@ from .tolerances import (
 )
 
 LEVELS = ("position", "velocity", "acceleration")
-
-
-class Finding(NamedTuple):
-    """What a law found."""
-
-    law: str
-    size: float
-    limit: float
-    where: str = ""
-
-    @property
-    def broken(self):
-        """True if the size exceeds the limit, or is no number."""
-        return not self.size <= self.limit
-
-    def __str__(self):
-        where = f" ({self.where})" if self.where else ""
-        return f"{self.law}: {self.size:.2e}, at most {self.limit:.2e}{where}"
-
-
-def some(count, most):
-    """Return indices of the first, the last, and some between, `most` at most."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
 
 
 def finite(solution):
@@ -307,7 +286,7 @@ def is_near_singular(solution):
     return solution.stats.steps_near_singular > 0 or not np.nanmax(condition, initial=0.0) < ILL_CONDITIONED
 
 
-LAWS = (finite, constraints, newton_euler, dense_output)
+LAWS = (finite, constraints, newton_euler, dense_output, motors)
 
 
 def findings(solution, laws=LAWS):

@@ -46,7 +46,7 @@ SAME_COORDINATE = 1e-9
 # m/s and rad/s: velocity at which friction is 71% of its magnitude, where none is given. A joint under nine tenths of
 # its friction creeps by 2e-7 m in 100 s. Less costs more: chains with friction in all joints twice as much at 1e-10.
 SLIP = 1e-9
-# The least that acts: the iteration of a stage leaves 1e-14 of velocities, and less than a hundred times that is noise.
-LEAST_SLIP = 1e-12
+# The least that acts: the iteration of a stage leaves 1e-13 of velocities, and less than a hundred times that is noise.
+LEAST_SLIP = 1e-11
 # m/s: the Stribeck velocity where neither it nor the slip velocity is given.
 STRIBECK = 0.01

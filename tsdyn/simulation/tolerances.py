@@ -7,8 +7,8 @@ TRIAL = 20
 # steps the implicit method may take (SETTLED / steps)^2 times the work of the explicit one: its steps are short until
 # fast modes have decayed, which steps at the limit of stability have kept alive.
 FIRST_WINDOW, SETTLED = 10, 80
-# The same where there is friction, which may come to rest: 30 halvings of a step to 1e-9 s, and 15 steps to grow again.
-RESTING = 80
+# The same where there is friction, which may come to rest: 8 steps to that, and 30 from 1e-8 s on to grow again.
+RESTING = 40
 # Implicit steps after which the explicit method is tried, and its steps in such a trial.
 PATIENCE, TRIED = 30, 20
 # Factor of the steps until a method that did not pay is considered again, and until the explicit one is tried though

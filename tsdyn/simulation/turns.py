@@ -95,7 +95,7 @@ class Turns:
         if to_implicit:
             prepare_first_run(self.scene, self.implicit, self.options.settings.form, self.options.within, None)
         elif not self.tried:
-            self.ask = (AGAIN - 1) * self.taken
+            self.ask = FIRST_WINDOW if self.prepared.slips else (AGAIN - 1) * self.taken
         if turned:
             self.lasted, self.began = t - self.began, t
 
@@ -123,7 +123,8 @@ class Turns:
             return False
         self.known, self.taken = ours, self.taken + steps
         if self.lasted > 0.0:  # the implicit method has been left for longer than it had lasted, or in vain
-            self.patience = PATIENCE if t - self.began > self.lasted else AGAIN * self.patience
+            longer = self.prepared.slips or t - self.began > self.lasted
+            self.patience = PATIENCE if longer else AGAIN * self.patience
         return True
 
     def _pays(self, rate, t):

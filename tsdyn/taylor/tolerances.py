@@ -43,8 +43,9 @@ NO_SPEED = 1e-300
 SMALL, SMALL_STEPS = 0.02, 40
 # A step by less than TINY counts for so many.
 TINY, FASTER = 0.002, 4
-# The same in scenes with sharp forces, which need some ten short steps wherever a velocity reverses.
-SHARP_STEPS = 400
+# The same in scenes with sharp forces, which need some ten short steps wherever a velocity reverses; steps by less than
+# MINUTE count for FASTER there.
+SHARP_STEPS, MINUTE = 400, 1e-6
 
 # --- singular configurations -----------------------------------------------------------------------------------------
 # Pivot of S, over its diagonal entry, below which accelerations by elimination have lost as many digits, so that those

@@ -252,7 +252,7 @@ def implicit_step(context, run, t, h):
     h_before = _see_step_before(context, c.linear, t, n, scratch)
     own = scratch[SCRATCH * n + 1 :]
     ratio = begin_prediction(memory, own, stages, n, t, h, float(c.work.counters.charts))
-    part = 1 - c.linear.numbers.slips
+    part = 0 if c.linear.numbers.slips == 1 and ratio > 0.0 else 1
     copy(r.y, memory[2 * n : 3 * n])
     copy(r.yd, memory[3 * n : 4 * n])
     for i in range(1, stages):

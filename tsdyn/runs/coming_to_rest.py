@@ -33,13 +33,19 @@ def _rubbed(c, friction, r, scale, ahead):
 
 @kernel
 def until_rest(c, r, h):
-    """The step h, or less of it: to just before the first joint comes to rest. c.work.qd is that of r.now after it."""
+    """The step h, or less of it: to just before the first joint comes to rest. Counts those at rest in r.numbers.still.
+
+    c.work.qd is that of r.now after it.
+    """
     if c.graph.frictions.shape[0] == 0:
         return h
+    r.numbers.still = 0
     for i in range(c.graph.frictions.shape[0]):
         friction = c.graph.frictions[i]
         now = _rubbed(c, friction, r, 1.0, 0.0)
-        if 0.0 < now < math.inf and _rubbed(c, friction, r, 2.0, 0.0) < SLIDES * now:
+        if not _rubbed(c, friction, r, 2.0, 0.0) < SLIDES * now:
+            r.numbers.still += 1
+        elif now < math.inf:
             slowing = now - _rubbed(c, friction, r, 1.0, LITTLE * h)
             if slowing > LITTLE * now:
                 h = min(h, LANDING * LITTLE * h * now / slowing)

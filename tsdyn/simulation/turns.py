@@ -133,14 +133,16 @@ class Turns:
 
     def _back(self, memory, steps, rate):
         """Whether the explicit method is to go on: it takes less work, or is to be tried."""
-        jacobians = memory.work.counters.jacobians
+        jacobians, slips = memory.work.counters.jacobians, self.prepared.slips
         if steps <= self._first:
             self.jacobians = jacobians
-        patience = self.patience if jacobians > self.jacobians else AGAIN * self.patience
+        may_pay = memory.run.numbers.still == 0 if slips else jacobians > self.jacobians
+        patience = self.patience if may_pay else AGAIN * self.patience
         self.tried = steps >= patience and self._pays(rate, memory.run.clock.t)
         if self.tried:
             self.known = rate
-        self.ask = 2 * steps if steps >= self.patience else min(2 * steps, self.patience)
+        later = steps + PATIENCE if slips else 2 * steps
+        self.ask = later if steps >= self.patience else min(later, self.patience)
         return self.tried or rate > max(SETTLED / steps, 1.0) ** 2 * self.known
 
     def _tried(self, steps, rate):

@@ -4,7 +4,7 @@ Each goes on from where the other stands. Work for a second of motion decides, i
 steps: no clock. The explicit method turns where it finds the motion stiff (runs/step_control.py, taylor/stepper.py).
 The implicit method turns back where it takes more work than the explicit one did. Otherwise the explicit one is tried
 for some steps, at growing intervals, and earlier where the derivatives of the forces had to be taken anew: as long as
-old ones serve, the motion is as stiff as it was.
+old ones serve, the motion is as stiff as it was. With friction of joints, where none is at rest.
 """
 
 from functools import cached_property
@@ -133,15 +133,15 @@ class Turns:
 
     def _back(self, memory, steps, rate):
         """Whether the explicit method is to go on: it takes less work, or is to be tried."""
-        jacobians, slips = memory.work.counters.jacobians, self.prepared.slips
+        jacobians, prepared = memory.work.counters.jacobians, self.prepared
         if steps <= self._first:
             self.jacobians = jacobians
-        may_pay = memory.run.numbers.still == 0 if slips else jacobians > self.jacobians
+        may_pay = memory.run.numbers.still == 0 if prepared.rough else jacobians > self.jacobians
         patience = self.patience if may_pay else AGAIN * self.patience
         self.tried = steps >= patience and self._pays(rate, memory.run.clock.t)
         if self.tried:
             self.known = rate
-        later = steps + PATIENCE if slips else 2 * steps
+        later = steps + PATIENCE if prepared.rough else 2 * steps
         self.ask = later if steps >= self.patience else min(later, self.patience)
         return self.tried or rate > max(SETTLED / steps, 1.0) ** 2 * self.known
 

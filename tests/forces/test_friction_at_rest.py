@@ -129,6 +129,21 @@ def test_a_chain_with_friction_in_all_joints_stays():
     assert max(abs(solution.angle(f"pin {i}")[-1]) * 0.02 for i in range(4)) < STILL
 
 
+def test_a_swinging_chain_lands_where_its_pins_come_to_rest():
+    """Sixty times a pin sticks within a second. The end is that at rtol 1e-10 and 1e-12 m/s, by halved steps."""
+    scene, last = ts.Scene(), None
+    for i in range(16):
+        link = scene.add_body(1.0, (0.01, 0.1, 0.1), (i + 0.5, 0.0, 0.0), name=f"link {i}")
+        pin = scene.add(C.Revolute.at(last or scene.ground, link, point=(i, 0, 0), axis=(0, 1, 0)))
+        scene.add(F.RevoluteFriction(pin, radius=0.02, kinetic=0.3))
+        last = link
+    solution = ts.simulate(scene, (0.0, 1.0))
+    np.testing.assert_allclose(solution.position(last)[-1], [13.55239608, 0.0, -4.90372608], atol=2e-7)
+    stats = solution.stats
+    assert stats.evaluations < 35000
+    assert stats.rejected < 0.1 * stats.steps
+
+
 def test_the_default_is_no_number_of_the_scene(tmp_path):
     """Left out in files and lists of parameters; a family may set it, to the bits of a scene that is made so."""
     scene, friction = on_a_slope(0.5)

@@ -81,20 +81,21 @@ def test_stability(method):
         assert far == pytest.approx(1.0, abs=COARSE)
 
 
+@pytest.mark.parametrize("part", [0, 1], ids=["velocities", "accelerations"])
 @pytest.mark.parametrize("power", range(4))
-def test_predictions_of_stages_are_exact_for_polynomials(power):
+def test_predictions_of_stages_are_exact_for_polynomials(power, part):
     """Of cubics from four stages of the step and of the one before; of those of lower order from the step's own."""
     tableau, c, before = SDIRK54.tableau.numbers, np.array(SDIRK54.tableau.c), 0.7  # h of the step before, over h
     stages, memory, k = len(c), np.zeros(2 * len(c) + 2), np.zeros(1)
     own = np.zeros(prediction_memory(stages, 1))
-    memory[3::2] = (before * c) ** power
+    memory[2 + part :: 2] = (before * c) ** power
     assert begin_prediction(memory, own, stages, 1, 0.0, before, 1.0) == 0.0
     assert begin_prediction(memory, own, stages, 1, before, 1.0, 1.0) == before
-    memory[3::2] = (before + c) ** power
+    memory[2 + part :: 2] = (before + c) ** power
     for i in range(1, stages):
-        predict(tableau, memory, own, i, before, 4, 1, k)
+        predict(tableau, memory, own, i, before, 4, part, k)
         assert k[0] == pytest.approx((before + c[i]) ** power, rel=100 * EPS)
-        predict(tableau, memory, own, i, 0.0, 4, 1, k)
+        predict(tableau, memory, own, i, 0.0, 4, part, k)
         if power < min(i, 4):
             assert k[0] == pytest.approx((before + c[i]) ** power, rel=100 * EPS)
     assert begin_prediction(memory, own, stages, 1, before, 0.5, 1.0) == 2.0 * before  # the step was rejected

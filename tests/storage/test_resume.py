@@ -197,6 +197,25 @@ def test_friction_of_joints(method, tmp_path):
     stop_and_go_on(build, 1.0, tmp_path / "run.h5", integrator=method)
 
 
+def stopping():
+    """A block that comes to rest, where explicit steps collapse, and is pushed with less than its friction."""
+    scene = ts.Scene()
+    block = scene.add_body(2.0, (0.01, 0.01, 0.01), velocity=(1, 0, 0))
+    guide = scene.add(ts.constraints.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(ts.forces.TranslationalFriction(guide, kinetic=0.4, slip_velocity=1e-11))
+    scene.add(ts.forces.PointForce(block, force=(ts.motions.Sine(0.9 * 0.4 * 2.0 * 9.81, 3.0), 0, 0)))
+    return scene
+
+
+@pytest.mark.slow
+def test_friction_that_comes_to_rest(tmp_path, short_slices):
+    stop_and_go_on(stopping, 3.0, tmp_path / "run.zarr")
+    for count in (3, 8):
+        path = tmp_path / f"{count}.zarr"
+        ts.simulate(stopping(), (0.0, 3.0), history=True, store=path, checkpoint=0.0, progress=Stop(count))
+        same(ts.simulate(stopping(), (0.0, 3.0), history=True), ts.resume(path))
+
+
 def controlled():
     scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
     rod = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))

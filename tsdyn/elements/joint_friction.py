@@ -48,7 +48,7 @@ class JointFriction:
     slip_velocity : float, m/s, optional
         Regularisation: velocity at which the friction is 71% of its magnitude. Sticking is replaced by slower creep: by
         default 1e-9 m/s, so that a joint under nine tenths of its friction creeps by 2e-7 m in 100 s. Less than
-        1e-12 m/s acts as 1e-12 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in
+        1e-11 m/s acts as 1e-11 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in
         proportion to it where the joint comes to rest: give 1e-3 m/s for them.
     stribeck_velocity : float, m/s, optional
         Velocity at which the excess of the static over the kinetic coefficient has fallen to 37%; by default

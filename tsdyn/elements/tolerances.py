@@ -47,7 +47,8 @@ SAME_COORDINATE = 1e-9
 # m/s and rad/s: velocity at which friction is 71% of its magnitude, where none is given. A joint under nine tenths of
 # its friction creeps by 2e-7 m in 100 s. Less costs more: chains with friction in all joints twice as much at 1e-10.
 SLIP = 1e-9
-# The same, at least: iterations of stages leave 1e-14 m/s of velocities; less than a hundred times that is noise.
-LEAST_SLIP = 1e-12
+# The least that acts, m/s and rad/s: iterations of stages leave 1e-13 of velocities; less than a hundred times that is
+# noise.
+LEAST_SLIP = 1e-11
 # m/s: the Stribeck velocity where neither it nor the slip velocity is given; 0.001 to 0.1 are those of most contacts.
 STRIBECK = 0.01

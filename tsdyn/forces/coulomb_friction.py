@@ -44,7 +44,7 @@ class CoulombFriction(BodyFriction, Force):
         Magnitude of the friction torque.
     slip_velocity : float, m/s, optional
         Regularisation: velocity at which the force is 71% of its magnitude; by default 1e-9 m/s, and less than
-        1e-12 m/s acts as 1e-12 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in
+        1e-11 m/s acts as 1e-11 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in
         proportion to it where the bodies come to rest: give 1e-3 m/s for them.
     slip_rate : float, rad/s, optional
         The same of the torque.

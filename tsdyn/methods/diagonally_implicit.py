@@ -24,6 +24,7 @@ from .stage_prediction import begin_prediction, choose_points, extrapolated, pre
 from .tolerances import (
     AGEING,
     APART,
+    APART_SLIPPING,
     AT_FLOOR,
     DIVERGING,
     EAGER_LOST,
@@ -178,7 +179,8 @@ def _solve_stage(context, c, r, i, t, g):
     floor = RESIDUAL_FLOOR / (l.numbers.rtol + l.numbers.atol)
     before, theta, measured, trusted, first, second = math.inf, GUESS, False, True, 0.0, math.inf
     slow, apart, stuck, renewed = 0, 0, False, False
-    eager, sparse = l.numbers.eager > 0, l.numbers.every_chart == 1
+    eager, sparse, slips = l.numbers.eager > 0, l.numbers.every_chart == 1, l.numbers.slips == 1
+    apart_at_most = APART_SLIPPING if slips else APART
     is_last = i + 1 == int(r.tableau[0])  # its contraction is measured: stiffness that has gone makes corrections small
     # what stages of fixed steps leave adds up over thousands of steps
     limit = SLOW_SPARSE if sparse and r.numbers.adaptive == 1 else SLOW
@@ -200,9 +202,10 @@ def _solve_stage(context, c, r, i, t, g):
                     l.numbers.eager = EAGER_STAGES if not sparse else EAGER_LOST if theta > DIVERGING else EAGER_SPARSE
                 slow += 1
             renewed = True
-            if _renew_matrix(context, c, t, g, f, slow == MATRICES, here) != 0:
+            if _renew_matrix(context, c, t, g, f, slips or slow == MATRICES, here) != 0:
                 return STAGE_FAILED
-            before, theta, measured, second = math.inf, GUESS, False, math.inf
+            if not slips:  # where friction changes within a correction, Newton's own contraction counts
+                before, theta, measured, second = math.inf, GUESS, False, math.inf
             trusted = trusted and not (was_eager or slow_now or off_chart)
         size = _correct(context, c, g, k, f, dx)
         if not size < math.inf:
@@ -211,11 +214,11 @@ def _solve_stage(context, c, r, i, t, g):
             if not measured:
                 first, second = before, size
             theta, measured = size / before, True
-            if sparse and slow == MATRICES and l.numbers.slow == 0.0:  # no other matrix contracts better
+            if sparse and not slips and slow == MATRICES and l.numbers.slow == 0.0:  # no other matrix contracts better
                 l.numbers.slow = min(WORSE * theta, DIVERGING)
             stuck = theta > DIVERGING and size <= AT_FLOOR * floor
             apart += 1 if renewed and theta > DIVERGING else 0
-            if apart == APART:
+            if apart == apart_at_most:
                 return STAGE_FAILED
         left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
         if trusted and not measured:
@@ -249,7 +252,7 @@ def implicit_step(context, run, t, h):
     h_before = _see_step_before(context, c.linear, t, n, scratch)
     own = scratch[SCRATCH * n + 1 :]
     ratio = begin_prediction(memory, own, stages, n, t, h, float(c.work.counters.charts))
-    part = 1 - c.linear.numbers.slips
+    part = 0 if c.linear.numbers.slips == 1 and ratio > 0.0 else 1
     copy(r.y, memory[2 * n : 3 * n])
     copy(r.yd, memory[3 * n : 4 * n])
     for i in range(1, stages):

@@ -18,8 +18,8 @@ ITERATIONS, FIXED_ITERATIONS = 20, 40
 KAPPA, KAPPA_SPARSE = 1e-3, 3e-3
 
 # m/s: what it may leave of a velocity where there is friction. At rest friction balances the loads at some velocity
-# below the slip velocity, 1e-12 m/s at least: what is left there changes the friction by a hundredth of it.
-SLIP_LEFT = 1e-14
+# below the slip velocity, 1e-11 m/s at least: what is left there changes the friction by a hundredth of it.
+SLIP_LEFT = 1e-13
 
 # Contraction above which the iteration matrix is rebuilt: up to it three corrections reach KAPPA
 # (docs/design-decisions.md, one Jacobian for many steps; benchmarks/stiff.py counts matrices).
@@ -43,8 +43,9 @@ APART_AT_LEAST, SAME_TIME = 0.1, 1e-9
 DIVERGING = 0.9
 
 # New matrices within one stage, of which the last has new stiffness and damping; diverging iterations, all with a new
-# matrix, with which a stage is given up.
-MATRICES, APART = 3, 3
+# matrix, with which a stage is given up. Where friction breaks loose, corrections grow from slip velocities of 1e-9 m/s
+# to the velocities of the motion, by the power of three each, before they contract.
+MATRICES, APART, APART_SLIPPING = 3, 3, 8
 
 # Contraction over that of a new matrix with new stiffness and damping, above which it is rebuilt in the tangent form:
 # where steps are long beside turns of bodies, no matrix contracts below SLOW_SPARSE.

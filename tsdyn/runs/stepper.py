@@ -16,6 +16,7 @@ from ..workspaces.run_state import AGAIN, load_run
 from ..workspaces.workspace import load
 from .breakpoints import amend, fixed_end, is_sampled, next_stop, take_pieces
 from .chart_changes import begin_chart, has_hardly_turned
+from .coming_to_rest import until_rest
 from .dense_output import bring_back, call_complete, evaluate, keep
 from .outputs import restore_now, store_now
 from .rotation_limit import longest_step, too_far
@@ -92,7 +93,7 @@ def _cross_stop(context, c, r, log, implicit):
 
 
 @kernel
-def _propose(c, r, stop, driven):
+def _propose(c, r, stop, driven, implicit):
     """Where the next step ends: a Status, its end t1, whether it is the last one, whether a stop cuts a fixed one."""
     if r.numbers.adaptive == 0:
         t1, last, cut = fixed_end(r, stop)
@@ -106,7 +107,9 @@ def _propose(c, r, stop, driven):
         if failed in OFF_CHART and r.numbers.may_pass == 1:
             return PASSAGE, t1, False, False
         return failed if failed in (NOT_FINITE, JAMMED, UNHELD) else STEP_COLLAPSED, t1, False, False
-    if t1 + stretch(r.clock.h, r.clock.max_step) >= end:
+    h = until_rest(c, r, r.clock.h) if implicit else r.clock.h
+    t1 = t0 + h if gets_on(r, t0, t0 + h) else t1
+    if t1 + stretch(h, r.clock.max_step) >= end:
         t1 = end
     return 0, t1, t1 == r.clock.t_end, False
 
@@ -249,7 +252,7 @@ def advance(context, run, log, most):
         t0, stop, wanted, before = r.clock.t, next_stop(r, log), r.clock.h, r.clock.error_before
         if t0 >= r.clock.t_end:
             break
-        status, t1, last, cut = _propose(c, r, stop, driven)
+        status, t1, last, cut = _propose(c, r, stop, driven, implicit)
         if status != 0:
             break
         h = t1 - t0

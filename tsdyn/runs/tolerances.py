@@ -53,6 +53,11 @@ FIRST_LEAST, FIRST_SEEN = 1e-12, 4.0
 # Factors of the step after a stage that was not solved, and after a step that left a chart at once.
 HALVED, QUARTERED = 0.5, 0.25
 
+# Where friction brings a joint to rest: part of the time until then that a step takes (at 0.99 velocities predicted for
+# stages have passed zero too often); part of a step in which the deceleration is measured; ratio of the powers at twice
+# the velocity and at it, below which a joint slides: 2.05 at four slip velocities, 4 at rest.
+LANDING, LITTLE, SLIDES = 0.9, 1e-3, 2.05
+
 # Steps at the limit of stability until a motion is called stiff; below it until they are forgotten: Solving ODEs II,
 # IV.2, takes 15 and 6.
 STIFF_STEPS, MILD_STEPS = 15, 6

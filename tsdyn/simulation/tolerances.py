@@ -7,8 +7,8 @@ TRIAL = 20
 # steps the implicit method may take (SETTLED / steps)^2 times the work of the explicit one: its steps are short until
 # fast modes have decayed, which steps at the limit of stability have kept alive.
 FIRST_WINDOW, SETTLED = 10, 80
-# The same where there is friction, which may come to rest: 30 halvings of a step to 1e-9 s, and 15 steps to grow again.
-RESTING = 80
+# The same where there is friction, which may come to rest: 8 steps to that, and 30 from 1e-8 s on to grow again.
+RESTING = 40
 # Share of what the explicit method would take for the rest of a run that the implicit one may lose before it gains: on
 # bushings and springs of 1e6 to 1e12 N/m the default method takes 1.9 times the better of both at most, 4 with 0.25.
 RISKED = 0.5

@@ -5,7 +5,8 @@ steps: no clock. The explicit method turns where it finds the motion stiff (runs
 What the implicit method takes more than the explicit one would have taken for the same motion is lost: fast modes have
 to be followed until they have decayed. It turns back where more is lost than a share of what the explicit method would
 take for the rest. Otherwise the explicit one is tried for some steps, at growing intervals, and earlier where the
-derivatives of the forces had to be taken anew: as long as old ones serve, the motion is as stiff as it was.
+derivatives of the forces had to be taken anew: as long as old ones serve, the motion is as stiff as it was. With
+friction of joints, where none is at rest.
 """
 
 from functools import cached_property
@@ -100,7 +101,7 @@ class Turns:
         if to_implicit:
             prepare_first_run(self.scene, self.implicit, self.options.settings.form, self.options.within, None)
         elif not self.tried:
-            self.ask = (AGAIN - 1) * self.taken
+            self.ask = FIRST_WINDOW if self.prepared.slips else (AGAIN - 1) * self.taken
         if turned:
             self.lasted, self.began = t - self.began, t
 
@@ -129,7 +130,8 @@ class Turns:
             return False
         self.known, self.taken = ours, self.taken + steps
         if self.lasted > 0.0:  # the implicit method has been left for longer than it had lasted, or in vain
-            self.patience = PATIENCE if t - self.began > self.lasted else AGAIN * self.patience
+            longer = self.prepared.slips or t - self.began > self.lasted
+            self.patience = PATIENCE if longer else AGAIN * self.patience
         return True
 
     def _pays(self, rate, t):
@@ -141,18 +143,20 @@ class Turns:
 
         A trial may cost as much as was lost before: steps at the limit of stability keep fast modes alive.
         """
-        left = self.options.span[1] - memory.run.clock.t
+        left, rough = self.options.span[1] - memory.run.clock.t, self.prepared.rough
         jacobians = memory.work.counters.jacobians
         if steps <= self._first:
             self.jacobians = jacobians
-        patience = self.patience if jacobians > self.jacobians else AGAIN * self.patience
-        may_win = rate <= self.known and RISKED * rate * left > self.most_lost
+        may_pay = memory.run.numbers.still == 0 if rough else jacobians > self.jacobians
+        may_win = rough or (rate <= self.known and RISKED * rate * left > self.most_lost)
+        patience = self.patience if may_pay else AGAIN * self.patience
         self.tried = steps >= patience and may_win and self._pays(rate, memory.run.clock.t)
         if self.tried:
             self.known = rate
-        self.ask = 2 * steps if steps >= self.patience else min(2 * steps, self.patience)
+        later = steps + PATIENCE if rough else 2 * steps
+        self.ask = later if steps >= self.patience else min(later, self.patience)
         dear = rate > max(SETTLED / steps, 1.0) ** 2 * self.known
-        return self.tried or (dear and self.lost > RISKED * self.known * left)
+        return bool(self.tried or (dear and (rough or self.lost > RISKED * self.known * left)))
 
     def _tried(self, steps, rate):
         """Whether the explicit method, after some steps, has failed to take less work."""

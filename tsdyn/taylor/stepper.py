@@ -25,7 +25,19 @@ from .breakpoints import cross_stop, lower_order
 from .step_length import radius, weights
 from .step_parts import call_expand, call_reach, hold_accelerations, set_floor, state_within
 from .step_trials import go_to_start, make_step, stand_at
-from .tolerances import FASTER, SHARP_STEPS, SMALL, SMALL_STEPS, SPARE, STILL, TIGHTEST, TINY, WARY
+from .tolerances import (
+    AT_REST,
+    FASTER,
+    MINUTE,
+    SHARP_STEPS,
+    SMALL,
+    SMALL_STEPS,
+    SPARE,
+    STILL,
+    TIGHTEST,
+    TINY,
+    WARY,
+)
 from .workspace import load_series
 
 SLICE_DONE, NOT_FINITE = int(Status.SLICE_DONE), int(Status.NOT_FINITE)
@@ -115,10 +127,10 @@ def _watch_stiffness(c, r, h):
         if most > SMALL:
             r.numbers.at_limit = 0
             return False
-    before, enough = r.numbers.at_limit, SMALL_STEPS
+    before, enough, tiny, faster = r.numbers.at_limit, SMALL_STEPS, TINY, FASTER
     if c.trial.sharp == 1:
-        enough = SHARP_STEPS
-    r.numbers.at_limit += FASTER if most < TINY and c.trial.sharp == 0 else 1
+        enough, tiny, faster = SHARP_STEPS, MINUTE, AT_REST
+    r.numbers.at_limit += faster if most < tiny else 1
     if before < enough <= r.numbers.at_limit:
         r.numbers.stiff = 1
         return r.numbers.leave_when_stiff == 1

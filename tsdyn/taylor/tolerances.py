@@ -58,8 +58,9 @@ SMALL, SMALL_STEPS = 0.02, 40
 STILL = 0.9
 # A step by less than TINY counts for so many.
 TINY, FASTER = 0.002, 4
-# The same in scenes with sharp forces, which need some ten short steps wherever a velocity reverses.
-SHARP_STEPS = 400
+# The same in scenes with sharp forces, which need some ten short steps wherever a velocity reverses; steps by less than
+# MINUTE count for AT_REST there: a reversal at a slip velocity of 1e-9 m/s takes 13, rest no end of them.
+SHARP_STEPS, MINUTE, AT_REST = 400, 1e-6, 8
 
 # --- singular configurations -----------------------------------------------------------------------------------------
 # Pivot of S, over its diagonal entry, below which accelerations by elimination have lost as many digits, so that those

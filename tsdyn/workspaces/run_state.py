@@ -59,7 +59,7 @@ class Numbers(Record):
     stage_at: int  # where in memory an implicit method leaves its last stage; 0 for others
     at_limit: int  # steps at the limit of stability, or in which little moves
     below_limit: int
-    still: int  # steps of a stage method in which hardly anything moves
+    still: int  # steps of an explicit stage method in which hardly anything moves; of an implicit one, joints at rest
     stiff: int
 
 

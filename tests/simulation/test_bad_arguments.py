@@ -216,7 +216,7 @@ def test_results_of_what_is_no_constraint_of_the_scene():
         refuse(
             lambda c=constraint: solution.reaction(c),
             ts.InvalidConstraint,
-            ("not a constraint or force of this scene",),
+            ("not a constraint or force of this solution",),
         )
 
 

@@ -147,3 +147,9 @@ def test_what_is_unusual_and_right():
     assert normalisation in w.scene.constraints
     solution = ts.simulate(w.scene, np.array([0, 1]), integrator="NYSTROM-4", max_steps=np.int64(3), progress=False)
     assert solution.status == ts.Status.MAX_STEPS
+
+
+@pytest.mark.parametrize("make", [lambda: ts.Body(1.0), lambda: ts.Body(mass=1.0), lambda: ts.PointMass(mass=1.0)])
+def test_bodies_are_made_by_their_scene(make):
+    with pytest.raises(ts.InvalidBody, match="are made by scene"):
+        make()

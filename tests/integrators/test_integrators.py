@@ -321,3 +321,20 @@ def test_wrong_weights_of_low_order_are_refused(name, b):
 def test_what_another_check_is_for(check, kind, words):
     with pytest.raises(ts.InvalidArgument, match=words):
         getattr(ts.testing, check)(kind)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"b": (0.5,)}, r"one number a stage, 2 by c, got \(0.5,\)"),
+        ({"a": ((), (1.0,), (1.0, 1.0))}, "one row a stage, 2 by c, got 3"),
+        ({"a": ((), (np.nan,))}, "row 1 .* got"),
+        ({"a": ((), ("x",))}, "row 1 .* got"),
+        ({"error": (0.5, np.nan, 0.5)}, "sum of the error weights"),
+        ({"order": "2"}, "order must be a whole number"),
+    ],
+)
+def test_wrong_tableaus_are_refused(wrong, said):
+    heun = {"a": ((), (1.0,)), "b": (0.5, 0.5), "c": (0.0, 1.0), "order": 2}
+    with pytest.raises(ts.InvalidArgument, match=said):
+        ts.RungeKuttaTableau(**heun | wrong)

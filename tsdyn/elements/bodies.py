@@ -182,7 +182,9 @@ class PointMass:
         _vector("velocity", "m/s"), "Velocity at the start, ground frame, m/s, shape (3,)."
     )
 
-    def __init__(self, scene: Scene, index: int, name: str, **values: Any) -> None:
+    def __init__(self, scene: Scene = None, index: int = -1, name: str = "", **values: Any) -> None:  # type: ignore[assignment]
+        if index < 0:
+            raise InvalidBody("bodies are made by scene.add_body(...) and scene.add_point_mass(...).")
         self.scene, self.index, self.name, self.values = scene, index, name, {}
         for attribute, value in values.items():
             setattr(self, attribute, value)

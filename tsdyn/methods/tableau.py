@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..calls import fitting_constructor
 from ..errors import InvalidArgument
+from ..validation import floats, shown
 from .tolerances import ORDER_CONDITION
 
 if TYPE_CHECKING:
@@ -17,33 +19,52 @@ if TYPE_CHECKING:
     from ..hints import Floats
 
 
+def _numbers(values, count, said):
+    """So many finite numbers; or InvalidArgument, what is due and what there is."""
+    found = floats(values)
+    if found.shape != (count,) or not np.isfinite(found).all():
+        raise InvalidArgument(f"{said}, got {shown(values)}.")
+    return found
+
+
+def _weights(values, stages, what):
+    """Numbers, one a stage."""
+    return _numbers(values, stages, f"{what}: b and c have one number a stage, {stages} by c")
+
+
+def _demand_stages(values, stages, what):
+    if len(values) != stages:
+        raise InvalidArgument(f"{what}: a has one row a stage, {stages} by c, got {len(values)}.")
+
+
 def _rows(values, stages, what):
     """A strictly lower triangular matrix from its rows below the diagonal."""
+    _demand_stages(values, stages, what)
     matrix = np.zeros((stages, stages))
     for i, row in enumerate(values):
-        if len(row) != i:
-            raise InvalidArgument(f"{what}: row {i} of an explicit tableau has {i} entries, got {len(row)}.")
-        matrix[i, :i] = row
+        matrix[i, :i] = _numbers(row, i, f"{what}: row {i} of an explicit tableau has {i} entries")
     return matrix
 
 
 def _lower(values, stages, what):
     """A lower triangular matrix from its rows up to the diagonal."""
+    _demand_stages(values, stages, what)
     matrix = np.zeros((stages, stages))
     for i, row in enumerate(values):
-        if len(row) != i + 1:
-            raise InvalidArgument(f"{what}: row {i} of a diagonally implicit tableau has {i + 1} entries.")
-        matrix[i, : i + 1] = row
+        matrix[i, : i + 1] = _numbers(
+            row, i + 1, f"{what}: row {i} of a diagonally implicit tableau has {i + 1} entries"
+        )
     return matrix
 
 
 def demand(what, size=1.0, **conditions):
     """Refuse what fails by more than rounding of coefficients of that size."""
     for name, value in conditions.items():
-        if np.abs(value).max() > ORDER_CONDITION * size:
+        if not np.abs(value).max() <= ORDER_CONDITION * size:
             raise InvalidArgument(f"{what}: the condition {name} fails by {np.abs(value).max():.3g}.")
 
 
+@fitting_constructor
 @dataclass(frozen=True)
 class RungeKuttaTableau:
     """An explicit Runge-Kutta method: stage times c, coefficients a (rows below the diagonal), weights b.
@@ -87,7 +108,8 @@ class RungeKuttaTableau:
     @property
     def arrays(self) -> tuple[Floats, ...]:
         """a (s, s), b (s,), c (s,)."""
-        return _rows(self.a, len(self.c), "RungeKuttaTableau"), np.array(self.b), np.array(self.c)
+        s, what = len(self.c), "RungeKuttaTableau"
+        return _rows(self.a, s, what), _weights(self.b, s, what), _weights(self.c, s, what)
 
     @cached_property
     def numbers(self) -> Floats:
@@ -97,6 +119,7 @@ class RungeKuttaTableau:
         return np.concatenate([[len(c)], np.ravel(stages), b, self.error, self.second_error])
 
 
+@fitting_constructor
 @dataclass(frozen=True)
 class ImplicitTableau:
     """A diagonally implicit Runge-Kutta method: rows of a up to the diagonal, the first row zero, the last the weights.
@@ -134,7 +157,7 @@ class ImplicitTableau:
     def arrays(self) -> tuple[Floats, ...]:
         """a (s, s), b (s,), c (s,)."""
         a = _lower(self.a, len(self.c), "ImplicitTableau")
-        return a, a[-1], np.array(self.c)
+        return a, a[-1], _weights(self.c, len(self.c), "ImplicitTableau")
 
     @cached_property
     def numbers(self) -> Floats:
@@ -145,6 +168,7 @@ class ImplicitTableau:
         return np.concatenate([[len(c)], np.ravel(stages), b, error])
 
 
+@fitting_constructor
 @dataclass(frozen=True)
 class NystromTableau:
     """An explicit Nystrom method for vdd = f(t, v, vd), with the velocity among f's arguments.
@@ -204,9 +228,9 @@ class NystromTableau:
     @property
     def arrays(self) -> tuple[Floats, ...]:
         """a (s, s), abar (s, s), b (s,), bbar (s,), c (s,)."""
-        s = len(self.c)
-        a, abar = _rows(self.a, s, "NystromTableau a"), _rows(self.abar, s, "NystromTableau abar")
-        return a, abar, np.array(self.b), np.array(self.bbar), np.array(self.c)
+        s, what = len(self.c), "NystromTableau"
+        weights = (_weights(values, s, what) for values in (self.b, self.bbar, self.c))
+        return _rows(self.a, s, f"{what} a"), _rows(self.abar, s, f"{what} abar"), *weights
 
     @cached_property
     def numbers(self) -> Floats:

@@ -48,7 +48,9 @@ def public(kind):
 
 
 def finite(value, where):
-    """No NaN in what isn't documented to have one."""
+    """No NaN in what isn't documented to have one; packed numbers of loads are NaN until a time is set."""
+    if where == "packed":
+        return
     for array in value if isinstance(value, (tuple, list)) else [value]:
         if isinstance(array, np.ndarray) and array.dtype.kind == "f":
             assert np.isfinite(array).all(), where

@@ -48,6 +48,20 @@ def motor():
     return scene
 
 
+def loads():
+    """A hinged bar turned by a matrix, under tables of all kinds, a short pulse, and a spring through its anchor."""
+    scene = ts.Scene()
+    turned = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    bar = scene.add_body(1.0, (0.1, 0.1, 0.05), position=(0.0, 0.0, -0.5), orientation=turned, name="bar")
+    scene.add(ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="pin"))
+    tables = [ts.Table((0.0, 0.01, 0.01, 0.05), (0, 1, 2, 2), kind=kind) for kind in ("linear", "previous", "pchip")]
+    scene.add(ts.forces.PointForce(bar, force=tuple(tables), name="pull"))
+    bob = scene.add_point_mass(1.0, position=(0.02, 1.0, 0.0), velocity=(-1.0, 0.0, 0.0), name="bob")
+    scene.add(ts.forces.Spring(scene.ground, bob, point_a=(0, 1, 0), stiffness=30.0, free_length=0.1, name="spring"))
+    scene.add(ts.forces.PointForce(bob, force=lambda t: (0.0, 0.0, 1.0 if 0.012 < t < 0.013 else 0.0), name="pulse"))
+    return scene
+
+
 SCENES = {
     "point masses": bobs,
     "one body": top.build,
@@ -55,6 +69,7 @@ SCENES = {
     "driven": motor,
     "friction": stick_slip.build,
     "loop": slider_crank.build,
+    "loads": loads,
 }
 
 

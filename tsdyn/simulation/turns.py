@@ -9,6 +9,7 @@ derivatives of the forces had to be taken anew: as long as old ones serve, the m
 friction of joints, where none is at rest.
 """
 
+import math
 from functools import cached_property
 
 from ..ahead.first_run import prepare_first_run
@@ -19,6 +20,7 @@ from .tolerances import (
     AGAIN,
     COST,
     FIRST_WINDOW,
+    LOOSEST,
     PATIENCE,
     RESTING,
     RISKED,
@@ -37,7 +39,8 @@ KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "beg
 def implicit(method, prepared, form):
     """Return the implicit method of the same tolerances: Radau, or SDIRK54 where all stages at once aren't served."""
     coupled = form.basis_free and not prepared.rough
-    found = (Radau if coupled else SDIRK54)(method.rtol, method.atol, max_step=method.max_step)
+    most = LOOSEST if coupled and prepared.sharp else math.inf
+    found = (Radau if coupled else SDIRK54)(min(method.rtol, most), min(method.atol, most), max_step=method.max_step)
     if not coupled:
         found.margin = STIFF_MARGIN
     return frozen(found)

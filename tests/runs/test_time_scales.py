@@ -36,7 +36,7 @@ def driven(unit):
     upper = scene.add_body(1.0, (0.1, 0.2, 0.3), (0.5, 0, 0), name="a")
     lower = scene.add_body(1.0, (0.1, 0.2, 0.3), (1.5, 0, 0), name="b")
     hinge = scene.add(C.Revolute.at(upper, scene.ground, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
-    table = ts.Table(np.array([0.0, 0.3, 0.7, 1.3, 2.5]) * unit, [0.0, 0.2, 0.1, 0.5, 0.3])
+    table = CubicSpline(np.array([0.0, 0.3, 0.7, 1.3, 2.5]) * unit, [0.0, 0.2, 0.1, 0.5, 0.3])
     scene.add(C.RotationMotor.of(hinge, angle=table))
     scene.add(C.Spherical(upper, lower, point_a=(0.5, 0, 0), point_b=(-0.5, 0, 0)))
     scene.assemble()

@@ -63,7 +63,7 @@ class Jet:
         """The square root; a length through zero has the rate sqrt(x'' / 2) just after."""
         root = self._chain(*_root(self.x))
         at_zero = (self.x == 0.0) & (self.xd == 0.0)
-        return Jet(root.x, np.where(at_zero, np.sqrt(0.5 * self.xdd), root.xd), root.xdd)
+        return Jet(root.x, np.where(at_zero, np.sqrt(np.where(at_zero, 0.5 * self.xdd, 0.0)), root.xd), root.xdd)
 
     __radd__, __rmul__ = __add__, __mul__
 

@@ -58,7 +58,7 @@ def fuzz(kind, count, seed, folder):
     ("kind", "count"),
     [
         *(pytest.param(kind, 12, id=kind) for kind in ("scene", "checkpoint", "ensemble.h5")),
-        *(pytest.param(kind, 1000, id=f"{kind}, many", marks=pytest.mark.slow) for kind in forging.KINDS),
+        *(pytest.param(kind, 300, id=f"{kind}, many", marks=pytest.mark.slow) for kind in forging.KINDS),
     ],
 )
 def test_mutations_of_every_kind(kind, count, tmp_path):

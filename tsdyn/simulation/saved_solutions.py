@@ -279,6 +279,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
     demand_numbers(record["seconds"], ("prepare", "run"))
     start, end = record["span"]
     demand_numbers({"start": start, "end": end, "error": record["energy_error"]}, ("start", "end", "error"))
+    demand(None not in (start, end, *record["counts"].values(), *record["seconds"].values()), "numbers")
     demand(all(isinstance(said, (str, int, float)) for said in record["provenance"].values()), "its provenance")
     events = None, None, None
     if record["events"] is not None:

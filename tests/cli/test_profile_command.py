@@ -43,7 +43,7 @@ def test_command_on_a_file(capsys, tmp_path):
         ("nowhere.py", None, "no file"),
         ("empty.py", "", "neither build() nor scene"),
         ("broken.py", "1 / 0", "can't be run: ZeroDivisionError"),
-        ("scene.txt", "", "is no Python file"),
+        ("scene.txt", "", "nor a Python file"),
     ],
 )
 def test_command_says_what_is_wrong_with_a_file(name, content, words, capsys, tmp_path):

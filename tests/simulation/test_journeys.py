@@ -48,6 +48,11 @@ def motor():
     return scene
 
 
+def pulse(t):
+    """A push of a millisecond."""
+    return 0.0, 0.0, np.exp(-(((t - 0.0125) / 2e-4) ** 2))
+
+
 def loads():
     """A hinged bar turned by a matrix, under tables of all kinds, a short pulse, and a spring through its anchor."""
     scene = ts.Scene()
@@ -58,7 +63,7 @@ def loads():
     scene.add(ts.forces.PointForce(bar, force=tuple(tables), name="pull"))
     bob = scene.add_point_mass(1.0, position=(0.02, 1.0, 0.0), velocity=(-1.0, 0.0, 0.0), name="bob")
     scene.add(ts.forces.Spring(scene.ground, bob, point_a=(0, 1, 0), stiffness=30.0, free_length=0.1, name="spring"))
-    scene.add(ts.forces.PointForce(bob, force=lambda t: (0.0, 0.0, 1.0 if 0.012 < t < 0.013 else 0.0), name="pulse"))
+    scene.add(ts.forces.PointForce(bob, force=pulse, name="pulse"))
     return scene
 
 

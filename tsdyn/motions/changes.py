@@ -38,7 +38,7 @@ def changes(t, functions):
     for samples in functions:
         finite = np.isfinite(samples)
         size = np.abs(samples[finite]).max(initial=0.0) or 1.0
-        values = np.where(finite, samples / size, 2.0)  # what is not finite for some time is a change
+        values = np.where(finite, samples, 2.0 * size) / size  # what is not finite for some time is a change
         if not np.ptp(values):
             continue
         marks = np.zeros((strides.size, t.size), np.int8)

@@ -13,7 +13,7 @@ import tsdyn as ts
 ROOT = Path(__file__).parents[2]
 NEEDED = ("sphinx", "myst_nb", "furo", "ipykernel")
 COPIED = ("docs", "tsdyn", "constraints", "integrators", "examples", "benchmarks")
-BESIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
+BESIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
 
 
 @pytest.mark.slow

@@ -72,7 +72,7 @@ def _room_for(memory):
 def _room_for_blocks(memory, rows):
     """Points and blocks of dense output, which no later run writes to."""
     n, redundant = memory.run.now.shape[1], len(redundant_of(memory.context.tangent))
-    return np.empty((2 * CHART_ROOM, n + redundant)), np.empty((rows, memory.run.block.size))
+    return np.zeros((2 * CHART_ROOM, n + redundant)), np.empty((rows, memory.run.block.size))
 
 
 def has_ended_well(memory, begun):

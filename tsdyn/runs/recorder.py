@@ -43,7 +43,7 @@ class Recorder:
         self.most = max(BLOCK_ROOM // run.block.size, 1) if self.dense else LARGEST_SLICE
         n, rooms = run.now.shape[1], 2 * CHART_ROOM
         self.charts = np.empty((rooms, 5))
-        self.points = np.empty((rooms, n + redundant)) if run.numbers.dense else NO_ROWS
+        self.points = np.zeros((rooms, n + redundant)) if run.numbers.dense else NO_ROWS  # series write none
         self._width = 1 + 3 * n + run.remembered.size
         self.out = NO_ROWS if self.per_step else np.empty((task.times.size, self._width))
         self.blocks, self.log = NO_ROWS, None
@@ -141,7 +141,7 @@ class Recorder:
 
 
 def _doubled(rows):
-    return np.concatenate((rows, np.empty_like(rows)))
+    return np.concatenate((rows, np.zeros_like(rows)))
 
 
 def _joined(parts, width):

@@ -178,8 +178,6 @@ def _fits(value, hint):
         return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if hint is bool:
         return isinstance(value, (bool, np.bool_))
-    if hint is None:
-        return value is None
     if origin is collections.abc.Sequence:
         return not isinstance(value, str) and isinstance(value, origin)
     if origin in (collections.abc.Callable, collections.abc.Mapping):

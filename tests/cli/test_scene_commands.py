@@ -63,6 +63,14 @@ def test_plot(folder, capsys):
     assert (folder / "fall.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_figure_that_the_file_asks_for_is_refused_before_the_run(folder, capsys):
+    pytest.importorskip("matplotlib")
+    (folder / "fall.toml").write_text(FALL + '[run]\nend = 0.1\n[output]\nplot = "nowhere/fall.png"\n')
+    code, out, err = called(capsys, "run", "fall.toml")
+    assert (code, out) == (1, "")
+    assert "there is no folder" in err
+
+
 def test_a_run_that_fails(folder, capsys):
     (folder / "fall.toml").write_text(
         FALL + "[run]\nmax_steps = 1\nend = 1.0\nmethod = { type = 'Nystrom4', step = 0.1 }\n"

@@ -134,18 +134,18 @@ def destinations(parsed, document):
     for path in outputs:
         demand_format(path)
         demand_new(path, parsed.force or not parsed.output)
-    return outputs, plotted(parsed, Path(parsed.scene).stem) or plot
+    return outputs, plotted(parsed, Path(parsed.scene).stem, plot)
 
 
-def plotted(parsed, stem):
-    """Where to draw a figure, None without one; refused at once, not after the run, if it can't be drawn."""
-    if parsed.plot is None:
-        return None
-    from ..drawing import demand_matplotlib
+def plotted(parsed, stem, path=None):
+    """Where to draw a figure, `path` without an option; refused at once, not after the run, if it can't be drawn."""
+    if parsed.plot is not None:
+        path = parsed.plot or f"{stem}.png"
+    if path is not None:
+        from ..drawing import demand_matplotlib
 
-    demand_matplotlib()
-    path = parsed.plot or f"{stem}.png"
-    demand_folder(path)
+        demand_matplotlib()
+        demand_folder(path)
     return path
 
 

@@ -22,7 +22,7 @@ def main(arguments=None):
     parser.add_argument("--budget", type=float, default=3.0, help="seconds that one run may take (3)")
     parser.add_argument("--largest", type=int, default=4096, help="bodies, for scaling (4096)")
     parser.add_argument("--folder", type=Path, default=Path("benchmarks") / "results", help="of JSON")
-    parser.add_argument("--figures", type=Path, help="of figures (the folder of JSON; docs/images for the README's)")
+    parser.add_argument("--figures", type=Path, help="of figures (the folder of JSON; docs/images for the pages)")
     given = parser.parse_args(arguments)
     unknown = set(given.parts) - set(PARTS)
     if unknown:

@@ -1,4 +1,4 @@
-"""The figures of the README, from recorded measurements; needs matplotlib: pip install '.[plot]'."""
+"""The figures of the documentation, from recorded measurements; needs matplotlib: pip install '.[plot]'."""
 
 import math
 

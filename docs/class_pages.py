@@ -1,16 +1,23 @@
-"""A page for each constraint, joint, force and integrator, and for each public name, from its file and docstring.
+"""The reference, from files and docstrings: a page for each class of a kind, entries of public names on topic pages.
 
 Classes are found through the registries that plug-ins use, so a plug-in that is imported gets a page, too:
 
     python -m docs.class_pages folder [module ...]
+
+A line `<!-- api: ... -->` of a page in docs/api stands for entries: `simulate`; `Solution`, or with its methods
+`Solution.`; `Scene.add`; `motions.`, all names of a module; `joints/`, the table of a kind.
 """
 
 import argparse
 import inspect
 import re
 import sys
+import tomllib
+from functools import cached_property
 from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
+from types import FunctionType, ModuleType
 
 import tsdyn as ts
 from docs.class_pictures import picture
@@ -25,7 +32,8 @@ KINDS = {  # folder: title, classes, what a page of the kind shows
 }
 LINE = 100  # characters of a signature in one line
 WRITTEN_IN = {"constraints": "constraint", "joints": "joint", "forces": "force", "integrators": "integrator"}
-MODULES = (ts, ts.motions, ts.shapes, ts.plots, ts.testing)
+ENTRIES = re.compile(r"^<!-- api: (.+) -->$", re.MULTILINE)
+URLS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["urls"]
 
 
 def classes(kind):
@@ -92,63 +100,73 @@ def file_of(cls):
 
 
 def _source(cls, kind):
-    where, file = file_of(cls), Path(inspect.getsourcefile(cls))
     how = f"[a {WRITTEN_IN[kind]} of your own](/plug-ins.md)".replace("[a i", "[an i")
-    code = fenced(file.read_text(encoding="utf-8").strip(), "python")
-    return f"## Source\n\n`{where}`; {how} has the same form.\n\n{code}"
+    code = fenced(Path(inspect.getsourcefile(cls)).read_text(encoding="utf-8").strip(), "python")
+    return f"## Source\n\n{source_link(cls)}; {how} has the same form.\n\n{code}"
 
 
-def kind_index(kind):
-    """The page that lists the classes of a kind."""
+def source_link(thing):
+    """A link to the lines of a class or function in the repository; the file's name alone for a plug-in elsewhere."""
+    file = file_of(thing)
+    line = inspect.getsourcelines(thing)[1]
+    return f"[{file}]({URLS['Repository']}/blob/main/{file}#L{line})" if (ROOT / file).exists() else f"`{file}`"
+
+
+def kind_table(kind):
+    """The table of the classes of a kind, whose pages follow in the navigation."""
     title, found = KINDS[kind][0], classes(kind)
-    lines = [f"# {title}", "", "| | |", "|---|---|"]
-    lines += [f"| [{cls.__name__}]({cls.__name__}.md) | {escaped(_summary(cls))} |" for cls in found]
-    return "\n".join([*lines, "", *_toctree([cls.__name__ for cls in found])])
-
-
-def _toctree(names):
-    return ["```{toctree}", ":hidden:", "", *names, "```", ""]
+    lines = [f"## {title}", "", "| | |", "|---|---|"]
+    pages = {cls: f"/reference/{kind}/{cls.__name__}" for cls in found}
+    lines += [f"| [{cls.__name__}]({pages[cls]}.md) | {escaped(_summary(cls))} |" for cls in found]
+    return "\n".join([*lines, "", "```{toctree}", ":hidden:", "", *pages.values(), "```"])
 
 
 def _summary(thing):
     return sections(thing.__doc__)[0].split("\n\n")[0].replace("\n", " ")
 
 
-def public_names(module):
-    """Functions and classes of a public module, by name."""
-    named = {name: getattr(module, name) for name in sorted(module.__all__)}
-    return {name: one for name, one in named.items() if isinstance(one, type) or inspect.isroutine(one)}
+def with_entries(text):
+    """A page of docs/api, with the entries that it names."""
+    return ENTRIES.sub(lambda found: "\n\n".join(each for name in found[1].split() for each in entries(name)), text)
 
 
-def module_page(module):
-    """Markdown of the public names of a module."""
-    name = module.__name__.replace("tsdyn", "ts", 1)
-    parts = [f"# {name}", paragraphs(inspect.getdoc(module) or "")]
-    for each, thing in public_names(module).items():
-        parts.append(_described(f"{name}.{each}", thing, 2))
-        if isinstance(thing, type):
-            parts += [_described(f"{each}.{method}", value, 3) for method, value in _methods(thing)]
-    return "\n\n".join(parts) + "\n"
-
-
-def _methods(cls):
-    """Public methods and properties that a class defines itself, or inherits within tsdyn."""
-    if issubclass(cls, BaseException):
+def entries(name):
+    """Markdown of the entries that a name stands for: see the head of this file."""
+    if name.endswith("/"):
+        yield kind_table(name[:-1])
         return
-    for name, value in inspect.getmembers(cls):
-        value = value.fget if isinstance(value, property) else value
-        if (
-            not name.startswith("_")
-            and inspect.isfunction(value)
-            and value.__doc__
-            and value.__module__.startswith("tsdyn")
-        ):
-            yield name, value
+    path = name.removesuffix(".")
+    thing = attrgetter(path)(ts)
+    if isinstance(thing, ModuleType):
+        yield f"## ts.{path}\n\n{paragraphs(inspect.getdoc(thing) or '')}"
+        members = [each for each in sorted(thing.__all__) if isinstance(getattr(thing, each), type | FunctionType)]
+    else:
+        yield _described(path, thing)
+        members = methods(thing)
+    if path != name:
+        for each in members:
+            yield from entries(f"{name}{each}{'.' * isinstance(thing, ModuleType)}")
 
 
-def _described(title, thing, level):
-    parts = [f"{'#' * level} `{title}`", fenced(signature(title, thing), "python"), page_of(thing.__doc__, level + 1)]
-    return "\n\n".join(parts)
+def methods(cls):
+    """Names of the documented methods and properties of a class that come from tsdyn."""
+    named = {name: _function(value) for name, value in inspect.getmembers(cls) if not name.startswith("_")}
+    functions = {name: value for name, value in named.items() if inspect.isfunction(value) and value.__doc__}
+    is_error = isinstance(cls, type) and issubclass(cls, BaseException)
+    return [] if is_error else [name for name, value in functions.items() if value.__module__.startswith("tsdyn")]
+
+
+def _function(value):
+    """What evaluates a property."""
+    return value.fget if isinstance(value, property) else value.func if isinstance(value, cached_property) else value
+
+
+def _described(path, thing):
+    thing, parts = _function(thing), path.split(".")
+    is_method = len(parts) > 1 and parts[-2][0].isupper()
+    title, level = ".".join(parts[-2:]) if is_method else f"ts.{path}", 1 + len(parts)
+    head = [f"{'#' * level} `{title}`", fenced(signature(title, thing), "python"), page_of(thing.__doc__, level + 1)]
+    return "\n\n".join([*head, f"Source: {source_link(inspect.unwrap(thing))}"])
 
 
 def write(folder):
@@ -158,9 +176,6 @@ def write(folder):
         (folder / kind).mkdir(parents=True, exist_ok=True)
         for cls in classes(kind):
             write_text(folder / kind / f"{cls.__name__}.md", class_page(cls, kind, folder / kind))
-        write_text(folder / kind / "index.md", kind_index(kind))
-    for module in MODULES:
-        write_text(folder / f"{module.__name__}.md", module_page(module))
 
 
 def write_text(path, text):

@@ -34,7 +34,7 @@ nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 suppress_warnings = ["misc.highlighting_failure"]
 BESIDE = re.compile(r"\]\(((?:\.\./)+)([\w/.-]+?)(#[\w-]+)?\)")  # links to files outside docs/
-PAGES = {"README.md": "/index.md", "CONTRIBUTING.md": "/contributing.md", "CHANGELOG.md": "/changelog.md"}
+PAGES = {"CONTRIBUTING.md": "/contributing.md", "CHANGELOG.md": "/changelog.md"}
 PAGES |= {"examples": "/gallery/index.md"} | {f"examples/{one.name}.py": f"/gallery/{one.name}.md" for one in ENTRIES}
 PAGES |= {
     class_pages.file_of(cls): f"/reference/{kind}/{cls.__name__}.md"
@@ -50,6 +50,8 @@ def within_site(app, name, source):
         return f"]({PAGES[match[2]]}{match[3] or ''})" if match[2] in PAGES else match[0]
 
     source[0] = BESIDE.sub(page, source[0])
+    if name.startswith("api/"):
+        source[0] = class_pages.with_entries(source[0])
     if name == "index":
         source[0] = with_every_page(source[0])
 

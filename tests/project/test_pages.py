@@ -23,7 +23,7 @@ def snippets():
             yield pytest.param(blocks, id=file.stem)
 
 
-@pytest.mark.slow_but("README", "parallel", "closed-loop", "events")
+@pytest.mark.slow_but("README", "index", "parallel", "closed-loop", "events")
 @pytest.mark.parametrize("blocks", list(snippets()))
 def test_snippets_run(blocks, request, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -9,7 +9,8 @@ import pytest
 
 import tsdyn as ts
 from docs import draw
-from tests.helpers.documents import pages
+from docs.class_pages import URLS
+from tests.helpers.documents import README, pages
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *pages()]
@@ -32,6 +33,43 @@ def test_links_between_pages_resolve(page):
         assert target.exists(), f"{page.name}: {link}"
         if anchor:
             assert anchor in set(anchors(target)), f"{page.name}: {link}"
+
+
+def test_links_of_the_readme_are_absolute_and_resolve():
+    """A package index shows README without the repository beside it."""
+    raw = URLS["Repository"].replace("https://github.com", "https://raw.githubusercontent.com") + "/main/"
+    places = {raw: ROOT, f"{URLS['Repository']}/blob/main/": ROOT, f"{URLS['Documentation']}/": ROOT / "docs"}
+    links = re.findall(r"\]\(([^)\s]+)\)", README.read_text())
+    assert len(links) > 8
+    for link in links:
+        assert link.startswith("https://"), link
+        for place, folder in places.items():
+            if link.startswith(place):
+                path, _, anchor = link.removeprefix(place).partition("#")
+                page = folder / re.sub(r"\.html$", ".md", path)
+                assert page.exists() or path == "gallery/index.html", link  # the build writes the gallery
+                assert not anchor or anchor in anchors(page), link
+                break
+        else:
+            assert link.startswith("https://doi.org/"), link
+
+
+def test_names_on_the_reading_page_exist():
+    rows = re.findall(r"^\| `(\w+)` \| `(\w+)` \|", (ROOT / "docs" / "reading-the-code.md").read_text(), re.MULTILINE)
+    assert len(rows) > 20
+    for package, name in rows:
+        files = draw.packages()[package].rglob("*.py")
+        defined = (node for file in files for node in ast.parse(file.read_text()).body)
+        assert any(getattr(node, "name", "") == name for node in defined), f"{package} has no {name}"
+
+
+def test_figures_of_the_landing_page_are_those_of_the_pages_it_names():
+    row = re.compile(r"^\| (\d[^|]+) \|[^|]+\| \[[^]]+\]\(([\w-]+\.md)", re.MULTILINE)
+    rows = row.findall((ROOT / "docs" / "index.md").read_text())
+    assert len(rows) == 5
+    for figure, page in rows:
+        text = (ROOT / "docs" / page).read_text()
+        assert all(number in text for number in re.findall(r"\d[\d.e-]*", figure)), (figure, page)
 
 
 def test_version_has_one_source():

@@ -33,7 +33,7 @@ def tables_figure(tables: Sequence[Any]) -> Any:
 
     Parameters
     ----------
-    tables : sequence of tables.Table
+    tables : sequence of haug_tables.Table
 
     Returns
     -------

@@ -1,7 +1,9 @@
 """The project's own pages and metadata: links lead somewhere, the version stands in one place."""
 
 import ast
+import io
 import re
+import tokenize
 import tomllib
 from pathlib import Path
 
@@ -107,3 +109,27 @@ def test_files_that_pages_name_exist(page):
     folders = "tsdyn|constraints|integrators|tests|examples|benchmarks|docs"
     for path in re.findall(rf"`((?:{folders})/[\w/.]*)`", page.read_text()):
         assert (ROOT / path).exists(), f"{page.name}: {path}"
+
+
+def texts_of(source):
+    """Docstrings and comments of a module."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            yield ast.get_docstring(node) or ""
+    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+    yield from (token.string for token in tokens if token.type == tokenize.COMMENT)
+
+
+def test_files_that_docstrings_and_comments_name_exist():
+    """A path, or the end of one, of a file of the project; `file.py` is one of the reader's."""
+    folders = [
+        ROOT / name for name in ("tsdyn", "constraints", "integrators", "tests", "examples", "benchmarks", "docs")
+    ]
+    modules = [file for folder in folders for file in folder.rglob("*.py")]
+    files = [*modules, *ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "file.py"]
+    paths = [file.relative_to(ROOT).parts for file in files]
+    ends = {"/".join(parts[i:]) for parts in paths for i in range(len(parts))}
+    for module in modules:
+        for text in texts_of(module.read_text(encoding="utf-8")):
+            for path in re.findall(r"(?<![\w/.*-])([\w/-]+\.(?:py|md))\b", text):
+                assert path in ends, f"{module.relative_to(ROOT)}: {path}"

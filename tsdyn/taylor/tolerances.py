@@ -71,7 +71,7 @@ NEXT_TO_SINGULAR, GONE = 1e-8, 1e-10
 UNEQUAL = 1e-4
 
 # Share of a step's end, over that of its start, from which the step has come closer; is too close to go on from; is
-# too close even if it has passed. Measured on rows of parallelograms (tests/test_singular_passage.py).
+# too close even if it has passed. Measured on rows of parallelograms (tests/simulation/test_singularity_crossing.py).
 CLOSER, CLOSE, PASSED = 0.3, 0.1, 0.02
 
 # A step that ends there is shortened by this factor, so many times: to 0.17 of its length.

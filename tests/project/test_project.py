@@ -60,9 +60,9 @@ def test_names_on_the_reading_page_exist():
     rows = re.findall(r"^\| `(\w+)` \| `(\w+)` \|", (ROOT / "docs" / "reading-the-code.md").read_text(), re.MULTILINE)
     assert len(rows) > 20
     for package, name in rows:
-        files = draw.packages()[package].rglob("*.py")
-        defined = (node for file in files for node in ast.parse(file.read_text()).body)
-        assert any(getattr(node, "name", "") == name for node in defined), f"{package} has no {name}"
+        defines = re.compile(rf"^(?:def|class) {name}\b", re.MULTILINE)
+        found = (defines.search(file.read_text()) for file in draw.packages()[package].rglob("*.py"))
+        assert any(found), f"{package} has no {name}"
 
 
 def test_figures_of_the_landing_page_are_those_of_the_pages_it_names():

@@ -44,7 +44,7 @@ PAGES |= {
 
 
 def within_site(app, name, source):
-    """Lead links to files beside docs/ to the pages that show these files."""
+    """Lead links to files beside docs/ to the pages that show these files; write the entries of the API's pages."""
 
     def page(match):
         return f"]({PAGES[match[2]]}{match[3] or ''})" if match[2] in PAGES else match[0]

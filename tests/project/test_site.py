@@ -13,7 +13,7 @@ import tsdyn as ts
 ROOT = Path(__file__).parents[2]
 NEEDED = ("sphinx", "myst_nb", "furo", "ipykernel")
 COPIED = ("docs", "tsdyn", "constraints", "integrators", "examples", "benchmarks")
-BESIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
+BESIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "pyproject.toml")
 
 
 @pytest.mark.slow
@@ -38,3 +38,4 @@ def test_the_site_builds_without_a_warning(tmp_path):
                 assert f"{cls.__name__}.png" in page
                 assert "Source" in page
     assert len([*(site / "gallery").glob("*.html")]) > 25
+    assert "constraint_error" in (site / "api" / "results.html").read_text(encoding="utf-8")

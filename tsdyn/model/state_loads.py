@@ -51,6 +51,21 @@ def user_kinds(packed):
     return [(i, force) for i, force in enumerate(forces) if is_of_user(force)]
 
 
+def _spans(system, row):
+    """Where the coordinates begin that the forces of a kind act on, and how many they are, (k, 2)."""
+    places = system.table[row.table : row.table + row.count * INTS].reshape(-1, INTS)
+    return np.column_stack((places[:, AT : AT + 2].ravel(), places[:, DIMENSION : DIMENSION + 2].ravel()))
+
+
+def watched_loads(packed):
+    """Rows of System.forces that are sampled along steps (k,), and the bodies that they act on (nb,)."""
+    rows = [i for i, force in user_kinds(packed) if "normal_load" not in force.kernels]
+    found = [_spans(packed.system, packed.system.forces[i]) for i in rows]
+    begins = np.unique([begin for spans in found for begin, size in spans if size])
+    bodies = np.searchsorted(packed.system.bodies[:, 0], begins)
+    return np.array(rows, np.int64), bodies.astype(np.int64)
+
+
 def sampled_loads(packed, kinds, t):
     """Titles of the forces of each kind, and their sums (k,) at times t (k,): at the bodies' start, and nearby.
 
@@ -63,9 +78,7 @@ def sampled_loads(packed, kinds, t):
     q, qd = (np.concatenate([getattr(body, x) for body in packed.bodies]) for x in ("q", "qd"))
     near = 0.5 * np.cos(np.arange(q.size))
     for i, force in kinds:
-        row = system.forces[i]
-        places = system.table[row.table : row.table + row.count * INTS].reshape(-1, INTS)
-        spans = zip(places[:, AT : AT + 2].ravel(), places[:, DIMENSION : DIMENSION + 2].ravel(), strict=True)
+        spans = _spans(system, system.forces[i])
         at = np.unique(np.concatenate([np.arange(begin, begin + size) for begin, size in spans]))
         own = system._replace(forces=system.forces[i : i + 1], reals=system.reals.copy())
         for move in (0.0, near):

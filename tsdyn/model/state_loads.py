@@ -9,6 +9,8 @@ from ..elements.loops.forces import INTS
 from ..elements.loops.template import AT, DIMENSION
 from ..jit.code_hash import is_ours
 from ..jit.kernels import entry
+from ..motions.state_program import may_change
+from ..motions.tracing import Untraceable
 from .equations import set_time
 
 
@@ -35,6 +37,17 @@ def is_of_user(item):
     return hasattr(item, "function_of_state") or not is_ours(type(item).__module__)
 
 
+def changes_with_state(load):
+    """Whether the law of a `Load` is a user's, and may change within any part of a step."""
+    force = load.force
+    if not is_of_user(force) or "normal_load" in force.kernels:
+        return False
+    try:
+        return not hasattr(force.kernels, "program") or may_change(force.kernels.program(len(load.parameters)))
+    except Untraceable:
+        return True
+
+
 def depends_on_time(force):
     """Whether what a user has written for a force reads the time."""
     function, place = (force.function_of_state, 0) if hasattr(force, "function_of_state") else (type(force).law, 3)
@@ -46,9 +59,13 @@ def depends_on_time(force):
 
 def user_kinds(packed):
     """The rows of System.forces that run what a user has written: their numbers, a force of each."""
-    first = {(one.force, one.stride): load.force for load in reversed(packed.loads) for one in load.alone}
-    forces = [first[row.force, row.stride] for row in packed.system.forces]
-    return [(i, force) for i, force in enumerate(forces) if is_of_user(force)]
+    return [(i, load.force) for i, load in enumerate(_first(packed)) if is_of_user(load.force)]
+
+
+def _first(packed):
+    """A `Load` of each row of System.forces."""
+    first = {(one.force, one.stride): load for load in reversed(packed.loads) for one in load.alone}
+    return [first[row.force, row.stride] for row in packed.system.forces]
 
 
 def _spans(system, row):
@@ -59,7 +76,7 @@ def _spans(system, row):
 
 def watched_loads(packed):
     """Rows of System.forces that are sampled along steps (k,), and the bodies that they act on (nb,)."""
-    rows = [i for i, force in user_kinds(packed) if "normal_load" not in force.kernels]
+    rows = [i for i, load in enumerate(_first(packed)) if changes_with_state(load)]
     found = [_spans(packed.system, packed.system.forces[i]) for i in rows]
     begins = np.unique([begin for spans in found for begin, size in spans if size])
     bodies = np.searchsorted(packed.system.bodies[:, 0], begins)

@@ -20,7 +20,7 @@ from ..model.equations import set_time
 from ..motions.tolerances import SAMPLES
 from ..workspaces.run_state import load_run
 from ..workspaces.workspace import load
-from .tolerances import DISTINCT, LEAST_PLACES, NOISE_OF_LOADS
+from .tolerances import DISTINCT, FEW_PLACES, NOISE_OF_LOADS, PLACES
 
 WATCH = "ppdd"
 ORDER = 8  # of the differences
@@ -54,8 +54,8 @@ def _gather(s, r, q, qd, qdd, d, weights):
 
 @kernel
 def _sample(s, r, h, t0, places, d, weights, f):
-    """f (places + 1,): the weighted sum of the loads at so many places of the step, equally far apart."""
-    n, k = r.now.shape[1], weights.size
+    """f (places + 1,): the weighted sum of the loads at so many places of the step, equally far apart. The largest."""
+    n, k, size = r.now.shape[1], weights.size, 0.0
     x, xd = r.path[7 * k : 8 * k], r.path[8 * k : 9 * k]
     q, qd, Q = r.path[9 * k : 9 * k + n], r.path[9 * k + n : 9 * k + 2 * n], r.path[9 * k + 2 * n :]
     for place in range(places + 1):
@@ -80,6 +80,8 @@ def _sample(s, r, h, t0, places, d, weights, f):
                 Q[c] = 0.0
                 j += 1
         f[place] = total
+        size = max(size, abs(total))
+    return size
 
 
 @kernel
@@ -94,28 +96,39 @@ def _first_large(f, places, stride, limit):
     return -1
 
 
+@kernel
+def _is_plain(f, places, limit):
+    """Whether all fourth differences are below a limit."""
+    for i in range(places - 3):
+        if not abs(f[i] + f[i + 4] - 4.0 * (f[i + 1] + f[i + 3]) + 6.0 * f[i + 2]) <= limit:
+            return False
+    return True
+
+
 @callback(WATCH, "d")
 def watch(context, run, t1, h):
     """The share of a step of h that ends at t1 up to which its stages see its loads; 1 for all of it."""
     c, r = load(context), load_run(run)
-    w, s, density = c.work, c.system, SAMPLES * h / (r.clock.t_end - r.clock.t_origin)
+    density = SAMPLES * h / (r.clock.t_end - r.clock.t_origin)
     if density < 1.0:
         return 1.0
-    places, k = min(max(LEAST_PLACES, math.ceil(density)), ROOM - 1), 0
+    k = 0
     for i in range(r.loaded.size):
-        k += s.bodies[r.loaded[i], 1]
+        k += c.system.bodies[r.loaded[i], 1]
     f, d, weights = stack(ROOM), r.path[: 6 * k], r.path[6 * k : 7 * k]
-    speed = _gather(s, r, w.q, w.qd, w.qdd, d, weights)
-    _sample(s, r, h, t1 - h, places, d, weights, f)
-    set_time(s, t1)
-    size = 0.0
-    for i in range(places + 1):
-        size = max(size, abs(f[i]))
-    tol, stride = r.clock.atol + r.clock.rtol * speed, 1
-    while ORDER * stride <= places:
-        limit = max(DISTINCT * tol * places / (stride * h), max(NOISE_OF_LOADS, r.clock.atol + r.clock.rtol) * size)
-        i = _first_large(f, places, stride, limit)
-        if i >= 0:
-            return (i + (ORDER - 1) * stride if i > 0 else stride) / places
-        stride *= 4
-    return 1.0
+    tol = r.clock.atol + r.clock.rtol * _gather(c.system, r, c.work.q, c.work.qd, c.work.qdd, d, weights)
+    share, places = 1.0, min(max(FEW_PLACES, math.ceil(density)), ROOM - 1)
+    size = _sample(c.system, r, h, t1 - h, places, d, weights, f)
+    noise = max(NOISE_OF_LOADS, r.clock.atol + r.clock.rtol)
+    if places >= PLACES or not _is_plain(f, places, max(DISTINCT * tol * places / h, noise * size)):
+        if places < PLACES:
+            places = PLACES
+            size = _sample(c.system, r, h, t1 - h, places, d, weights, f)
+        stride = 1
+        while ORDER * stride <= places and share == 1.0:
+            i = _first_large(f, places, stride, max(DISTINCT * tol * places / (stride * h), noise * size))
+            if i >= 0:
+                share = (i + (ORDER - 1) * stride if i > 0 else stride) / places
+            stride *= 4
+    set_time(c.system, t1)
+    return share

@@ -31,10 +31,11 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 # Exponents of the PI control, times 1 / (order of the estimate + 1): Gustafsson's, as in Solving ODEs II, IV.2.
 PI_ERROR, PI_BEFORE = 0.7, 0.4
 
-# Loads along a step (path_loads.py). DISTINCT: an eighth difference over the time between samples, as a velocity over the
-# tolerance: a bump at one sample makes 70 times its impulse, a cosine in a step of three radians at order 13 with
-# sixteen samples 1e-8. Samples at least; rounding of differences, relative to the load.
-DISTINCT, LEAST_PLACES, NOISE_OF_LOADS = 100.0, 16, 1e-13
+# Loads along a step (path_loads.py). DISTINCT: a difference over the time between samples, as a velocity over the
+# tolerance: a bump at one sample makes 70 times its impulse, a cosine in a step of three radians with PLACES intervals
+# 1e-8. FEW_PLACES: intervals of a step in which fourth differences are as small; NOISE_OF_LOADS: rounding of
+# differences, relative to the load.
+DISTINCT, FEW_PLACES, PLACES, NOISE_OF_LOADS = 100.0, 4, 16, 1e-13
 
 # Ratio of steps within which an implicit method goes on with the same step, and so with the same matrix: chains make
 # 0.04 to 0.5 matrices a step, not 0.5 to 0.8, and as many steps. A longer one only, as in Solving ODEs II, IV.8, takes

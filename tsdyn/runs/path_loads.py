@@ -20,7 +20,7 @@ from ..model.equations import set_time
 from ..motions.tolerances import SAMPLES
 from ..workspaces.run_state import load_run
 from ..workspaces.workspace import load
-from .tolerances import DISTINCT, FEW_PLACES, NOISE_OF_LOADS, PLACES
+from .tolerances import DISTINCT, IMPLICIT_PLACES, NOISE_OF_LOADS, PLACES
 
 WATCH = "ppdd"
 ORDER = 8  # of the differences
@@ -96,39 +96,25 @@ def _first_large(f, places, stride, limit):
     return -1
 
 
-@kernel
-def _is_plain(f, places, limit):
-    """Whether all fourth differences are below a limit."""
-    for i in range(places - 3):
-        if not abs(f[i] + f[i + 4] - 4.0 * (f[i + 1] + f[i + 3]) + 6.0 * f[i + 2]) <= limit:
-            return False
-    return True
-
-
 @callback(WATCH, "d")
 def watch(context, run, t1, h):
     """The share of a step of h that ends at t1 up to which its stages see its loads; 1 for all of it."""
     c, r = load(context), load_run(run)
-    density = SAMPLES * h / (r.clock.t_end - r.clock.t_origin)
+    density, k = SAMPLES * h / (r.clock.t_end - r.clock.t_origin), 0
     if density < 1.0:
         return 1.0
-    k = 0
     for i in range(r.loaded.size):
         k += c.system.bodies[r.loaded[i], 1]
     f, d, weights = stack(ROOM), r.path[: 6 * k], r.path[6 * k : 7 * k]
     tol = r.clock.atol + r.clock.rtol * _gather(c.system, r, c.work.q, c.work.qd, c.work.qdd, d, weights)
-    share, places = 1.0, min(max(FEW_PLACES, math.ceil(density)), ROOM - 1)
-    size = _sample(c.system, r, h, t1 - h, places, d, weights, f)
+    places = min(max(IMPLICIT_PLACES if r.numbers.stage_at > 0 else PLACES, math.ceil(density)), ROOM - 1)
     noise = max(NOISE_OF_LOADS, r.clock.atol + r.clock.rtol)
-    if places >= PLACES or not _is_plain(f, places, max(DISTINCT * tol * places / h, noise * size)):
-        if places < PLACES:
-            places = PLACES
-            size = _sample(c.system, r, h, t1 - h, places, d, weights, f)
-        stride = 1
-        while ORDER * stride <= places and share == 1.0:
-            i = _first_large(f, places, stride, max(DISTINCT * tol * places / (stride * h), noise * size))
-            if i >= 0:
-                share = (i + (ORDER - 1) * stride if i > 0 else stride) / places
-            stride *= 4
+    noise *= _sample(c.system, r, h, t1 - h, places, d, weights, f)
     set_time(c.system, t1)
-    return share
+    stride = 1
+    while ORDER * stride <= places:
+        i = _first_large(f, places, stride, max(DISTINCT * tol * places / (stride * h), noise))
+        if i >= 0:
+            return (i + (ORDER - 1) * stride if i > 0 else stride) / places
+        stride *= 4
+    return 1.0

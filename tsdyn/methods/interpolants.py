@@ -30,7 +30,7 @@ class Interpolant(NamedTuple):
 
 
 @kernel
-def _quintic(s, h, n, d, out, outd):
+def quintic(s, h, n, d, out, outd):
     """Quintic Hermite interpolation at s in (0, 1) of a step h, and its derivative.
 
     d holds n values, n first and n second derivatives of the start, then those of the end.
@@ -80,7 +80,7 @@ def fill_hermite(context, run):
 @callback(VALUE)
 def hermite(s, h, n, nx, ny, data, x, y):
     """Quintic Hermite interpolation of x, and of y by its derivative."""
-    _quintic(s, h, nx, vector(data, 6 * nx), vector(x, nx), vector(y, nx))
+    quintic(s, h, nx, vector(data, 6 * nx), vector(x, nx), vector(y, nx))
     return 0
 
 
@@ -104,7 +104,7 @@ def fill_hermite_first_order(context, run):
 def hermite_first_order(s, h, n, nx, ny, data, x, y):
     """Quintic for x = q, cubic for y, whose second derivative nothing gives."""
     d = vector(data, 6 * n + 4 * ny)
-    _quintic(s, h, n, d, vector(x, n), vector(y, 0))
+    quintic(s, h, n, d, vector(x, n), vector(y, 0))
     _cubic(s, h, d[6 * n :], vector(y, ny))
     return 0
 

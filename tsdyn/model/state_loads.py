@@ -9,6 +9,8 @@ from ..elements.loops.forces import INTS
 from ..elements.loops.template import AT, DIMENSION
 from ..jit.code_hash import is_ours
 from ..jit.kernels import entry
+from ..motions.state_program import may_change
+from ..motions.tracing import Untraceable
 from .equations import set_time
 
 
@@ -35,6 +37,17 @@ def is_of_user(item):
     return hasattr(item, "function_of_state") or not is_ours(type(item).__module__)
 
 
+def changes_with_state(load):
+    """Whether the law of a `Load` is a user's, and may change within any part of a step."""
+    force = load.force
+    if not is_of_user(force) or "normal_load" in force.kernels:
+        return False
+    try:
+        return not hasattr(force.kernels, "program") or may_change(force.kernels.program(len(load.parameters)))
+    except Untraceable:
+        return True
+
+
 def depends_on_time(force):
     """Whether what a user has written for a force reads the time."""
     function, place = (force.function_of_state, 0) if hasattr(force, "function_of_state") else (type(force).law, 3)
@@ -46,9 +59,28 @@ def depends_on_time(force):
 
 def user_kinds(packed):
     """The rows of System.forces that run what a user has written: their numbers, a force of each."""
-    first = {(one.force, one.stride): load.force for load in reversed(packed.loads) for one in load.alone}
-    forces = [first[row.force, row.stride] for row in packed.system.forces]
-    return [(i, force) for i, force in enumerate(forces) if is_of_user(force)]
+    return [(i, load.force) for i, load in enumerate(_first(packed)) if is_of_user(load.force)]
+
+
+def _first(packed):
+    """A `Load` of each row of System.forces."""
+    first = {(one.force, one.stride): load for load in reversed(packed.loads) for one in load.alone}
+    return [first[row.force, row.stride] for row in packed.system.forces]
+
+
+def _spans(system, row):
+    """Where the coordinates begin that the forces of a kind act on, and how many they are, (k, 2)."""
+    places = system.table[row.table : row.table + row.count * INTS].reshape(-1, INTS)
+    return np.column_stack((places[:, AT : AT + 2].ravel(), places[:, DIMENSION : DIMENSION + 2].ravel()))
+
+
+def watched_loads(packed):
+    """Rows of System.forces that are sampled along steps (k,), and the bodies that they act on (nb,)."""
+    rows = [i for i, load in enumerate(_first(packed)) if changes_with_state(load)]
+    found = [_spans(packed.system, packed.system.forces[i]) for i in rows]
+    begins = np.unique([begin for spans in found for begin, size in spans if size])
+    bodies = np.searchsorted(packed.system.bodies[:, 0], begins)
+    return np.array(rows, np.int64), bodies.astype(np.int64)
 
 
 def sampled_loads(packed, kinds, t):
@@ -63,9 +95,7 @@ def sampled_loads(packed, kinds, t):
     q, qd = (np.concatenate([getattr(body, x) for body in packed.bodies]) for x in ("q", "qd"))
     near = 0.5 * np.cos(np.arange(q.size))
     for i, force in kinds:
-        row = system.forces[i]
-        places = system.table[row.table : row.table + row.count * INTS].reshape(-1, INTS)
-        spans = zip(places[:, AT : AT + 2].ravel(), places[:, DIMENSION : DIMENSION + 2].ravel(), strict=True)
+        spans = _spans(system, system.forces[i])
         at = np.unique(np.concatenate([np.arange(begin, begin + size) for begin, size in spans]))
         own = system._replace(forces=system.forces[i : i + 1], reals=system.reals.copy())
         for move in (0.0, near):

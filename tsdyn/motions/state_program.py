@@ -12,7 +12,8 @@ are written by the caller at each order. A row is a series, one for each instanc
 from ..jit.kernels import ANY, callback, caller, matrix, vector
 from ..maths.recurrences import square
 from .expressions import OPERATIONS, ordered
-from .program import DIVIDE, MULTIPLY, POLYNOMIAL, STEP, operate
+from .program import ADD, DIVIDE, MULTIPLY, POLYNOMIAL, SINE, STEP, SUBTRACT, operate
+from .tolerances import PLAIN_DEGREE
 
 HEAD, ALIGNED = 9, 8  # numbers before the instructions; those of a program are a multiple of that
 T, COUNT, CONSTANTS, FIXED, RESULTS, GIVEN, PLACE, ROWS, LENGTH = range(HEAD)
@@ -40,6 +41,27 @@ def run_order(program, rows, count, orders, k):
     for i in range(int(p[GIVEN])):
         s[place + i, k] = s[int(p[results + i]), k]
     return 0
+
+
+def may_change(program):
+    """Whether the function may change within any part of a step, as sums, sines and products of a few factors don't."""
+    degree = [1] * int(program[ROWS])  # of rows in the arguments, a sine's being that of its own
+    for i in range(int(program[COUNT])):
+        what, y, a, b = (int(x) for x in program[HEAD + STEP * i :][:STEP])
+        if i < int(program[FIXED]):
+            degree[y] = 0
+        elif what in (ADD, SUBTRACT):
+            degree[y] = max(degree[a], degree[b])
+        elif what in (MULTIPLY, SQUARE):
+            degree[y] = degree[a] + degree[a if what == SQUARE else b]
+        elif what in (SINE, SCALE, DIVIDE_BY):
+            degree[y] = degree[b if what == SCALE else a]
+            degree[y + (what == SINE)] = degree[y]
+        else:
+            return True
+        if degree[y] > PLAIN_DEGREE:
+            return True
+    return False
 
 
 class Writer:

@@ -31,5 +31,7 @@ SAMPLES, STRIDES = 2048, (1, 4, 16, 64)
 # differences grow by 20 within nine samples, at a pulse on a sine of 26 samples a period by 1e5. Share of the largest
 # value, below which a change is none.
 CLEAR, FAINT = 100.0, 1e-9
+# Degree up to which a polynomial of the state is seen by the stages of a step; x^40 is a wall.
+PLAIN_DEGREE = 8
 # Intervals of a step at which a function is sampled for noise.
 OF_STEP = 64

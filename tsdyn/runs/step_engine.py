@@ -1,5 +1,7 @@
 """The engine of methods with a step kernel; see run.py."""
 
+import numpy as np
+
 from ..formulations.registry import formulation
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.plug_in import called_for
@@ -8,8 +10,11 @@ from ..sparse.saddle_graph import saddle_of
 from ..workspaces.run_state import lay_out
 from ..workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
 from .dense_output import read, warm_size
+from .path_loads import watch
 from .reader import Reading
 from .step_memory import StepMemory
+
+NOTHING = np.empty((2, 0), np.int64)
 
 
 class StepEngine:
@@ -22,8 +27,12 @@ class StepEngine:
         self.sizes = form.sizes(n, m, self.graph)
         self.step, self.tableau, scratch = method.kernel(form.first_order)
         self.interpolant = method.interpolant(form.first_order)
-        lengths = self.tableau.size, scratch(*self.sizes), self.interpolant.size(n, *self.sizes)
-        self.lengths = dict(zip(("tableau", "memory", "block"), lengths, strict=True))
+        self.watched, self.loaded = prepared.watched if method.step is None else NOTHING
+        path = 9 * int(packed.system.bodies[self.loaded, 1].sum()) + 3 * n if self.watched.size else 0
+        lengths = self.tableau.size, scratch(*self.sizes), self.interpolant.size(n, *self.sizes), path
+        lengths += self.watched.size, self.loaded.size
+        names = "tableau", "memory", "block", "path", "watched", "loaded"
+        self.lengths = dict(zip(names, lengths, strict=True))
         self.slips = prepared.slips
         self.system, kept = prepared.system(method.implicit)
         self.saddle = saddle_of(packed, self.graph, self.system) if method.implicit and form.basis_free else None
@@ -46,6 +55,9 @@ class StepEngine:
         method, form, run, nx = self.method, self.form, memory.run, self.sizes[0]
         memory.take_system(self.system)
         run.tableau[:] = self.tableau
+        run.watched[:], run.loaded[:] = self.watched, self.loaded
+        if self.watched.size:
+            run.kernels.watch = watch.address
         given = method, form, self.step, self.interpolant
         _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=self.within))
         run.numbers.first_order = form.first_order

@@ -19,6 +19,7 @@ from .chart_changes import begin_chart, has_hardly_turned
 from .coming_to_rest import until_rest
 from .dense_output import bring_back, call_complete, evaluate, keep
 from .outputs import restore_now, store_now
+from .path_loads import call_watch
 from .rotation_limit import longest_step, too_far
 from .run_log import is_full, no_log, note_accepted, note_try
 from .step_control import accept, first_step, gets_on, stretch, watch_stiffness
@@ -168,6 +169,20 @@ def _judge_chart(context, c, r, h, driven):
 
 
 @kernel
+def _is_accepted(context, run, c, r, t1, h):
+    """Accept or reject the step h to t1, by its error and by the loads along its path. True if accepted."""
+    before = r.clock.error_before
+    if not accept(context, c.linear, r, h):
+        return False
+    if r.kernels.watch == 0:
+        return True
+    share = call_watch(r.kernels.watch, context, run, t1, h)
+    if share < 1.0:
+        r.clock.h, r.clock.error_before, r.numbers.rejected_last = share * h, before, 1
+    return share == 1.0
+
+
+@kernel
 def _halve(c, r, h):
     """Reject a step with a stage that was not solved: the next one is half as long."""
     r.numbers.failed = STAGE_FAILED
@@ -268,7 +283,7 @@ def advance(context, run, log, most):
         if status != 0:
             status = _change_chart(context, c, r, log, h, status, driven)
             continue
-        if adaptive and not accept(context, c.linear, r, h):
+        if adaptive and not _is_accepted(context, run, c, r, t1, h):
             r.numbers.rejected += 1
             if t0 + r.clock.h >= t1:  # rounding would propose the same step for ever
                 r.clock.h = SHRINK * h

@@ -31,6 +31,12 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 # Exponents of the PI control, times 1 / (order of the estimate + 1): Gustafsson's, as in Solving ODEs II, IV.2.
 PI_ERROR, PI_BEFORE = 0.7, 0.4
 
+# Loads along a step (path_loads.py). DISTINCT: a difference over the time between samples, as a velocity over the
+# tolerance: a bump at one sample makes 70 times its impulse. PLACES: intervals of a step at least; differences of a
+# cosine in a step of one radian are 1e-9 then, and with IMPLICIT_PLACES in one of three radians, as at order 13, 1e-8.
+# NOISE_OF_LOADS: rounding of differences, relative to the load.
+DISTINCT, PLACES, IMPLICIT_PLACES, NOISE_OF_LOADS = 100.0, 8, 16, 1e-13
+
 # Ratio of steps within which an implicit method goes on with the same step, and so with the same matrix: chains make
 # 0.04 to 0.5 matrices a step, not 0.5 to 0.8, and as many steps. A longer one only, as in Solving ODEs II, IV.8, takes
 # a tenth more steps.

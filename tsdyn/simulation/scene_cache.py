@@ -14,7 +14,7 @@ from ..methods.integrator import is_plain
 from ..model.handles import handles_of
 from ..model.packed import with_curvatures
 from ..model.packed_forces import with_force_jacobians
-from ..model.state_loads import depends_on_time, sampled_loads, user_kinds
+from ..model.state_loads import depends_on_time, sampled_loads, user_kinds, watched_loads
 from ..motions.changes import NO_CHANGES, changes, is_noise, sample_times, within_step
 from ..motions.knots import NO_STOPS, stops_of
 from ..observables.friction_unique import demand_unique
@@ -119,6 +119,11 @@ class Prepared:
     def sampled(self):
         """The loads whose functions are sampled."""
         return sampled(self.packed)
+
+    @cached_property
+    def watched(self):
+        """What `watched_loads` gives."""
+        return watched_loads(self.packed)
 
     @cached_property
     def _has_stops(self):

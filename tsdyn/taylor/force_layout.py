@@ -12,6 +12,7 @@ from ..errors import InvalidForce
 from ..jit.aligned_arrays import zeros
 from ..jit.kernels import records
 from ..model.packed_forces import members_of
+from ..model.state_loads import changes_with_state
 from ..motions.program import run_program
 from ..motions.signals import Signal
 from ..motions.state_program import ROWS, run_order
@@ -52,7 +53,7 @@ def lay_out_forces(packed, orders):
             width = _width(force, kind, orders, force.sharp or _is_driven(members[0]))
             run = run_order.address if kind.program else 0
             rows.append([loop, total, width, len(members), row.stride, len(table), reals])
-            rows[-1] += [check, margin, int(kind.sharp), 0, run]
+            rows[-1] += [check, margin, int(kind.sharp), 0, run, int(kind.sharp and changes_with_state(members[0]))]
             written.append((total, kind.program))
             total += len(kind.program)
             for i, load in enumerate(members):

@@ -3,6 +3,8 @@
 Their argument is the address of a `SeriesContext`.
 """
 
+import math
+
 from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..elements.loops.law_check import ATOL, LENGTH, LIMITS, MOST, RTOL, TAU, TIME, call_check, call_margin
@@ -141,13 +143,25 @@ def check_laws(context, t, h, atol, rtol):
             return 1
     if not _may_differ(c, t, limits):
         return 0
-    for j in range(PLACES):
-        _set_place(c, t, h * (j + 1) / PLACES, limits)
+    every = _places_of_users(c, h)
+    places = every * PLACES
+    for j in range(places):
+        _set_place(c, t, h * (j + 1) / places, limits)
         for i in range(c.expansion.forces.shape[0]):
-            if c.expansion.forces[i].near != 0 and _is_off(c, i, limits):
-                c.trial.good = j / PLACES
+            kind = c.expansion.forces[i]
+            if kind.near != 0 and (kind.users == 1 or (j + 1) % every == 0) and _is_off(c, i, limits):
+                c.trial.good = j / places
                 return 1
     return 0
+
+
+@kernel
+def _places_of_users(c, h):
+    """Places of laws of users in a step of h, over PLACES: no further apart than `spacing`."""
+    for i in range(c.expansion.forces.shape[0]):
+        if c.expansion.forces[i].users == 1:
+            return max(1, math.ceil(h / (PLACES * c.trial.spacing)))
+    return 1
 
 
 @kernel

@@ -14,6 +14,7 @@ from ..errors import Status
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy
 from ..model.equations import set_time
+from ..motions.tolerances import SAMPLES
 from ..rows.interface import is_near_singular, singularity_indicator
 from ..runs.breakpoints import fixed_end
 from ..runs.run_log import note_try
@@ -82,9 +83,11 @@ def _propose(c, r, tol):
     s, order = c.trial, c.expansion.order
     s.failed, s.h = 0, step_length(c, r)
     s.shorter, s.share, s.serves, s.looser, s.tol, s.highest = 0, math.inf, 0, r.numbers.adaptive, tol, order.top
+    s.spacing = math.inf
     if r.numbers.adaptive == 0:
         s.h = r.clock.h
         return
+    s.spacing = (r.clock.t_end - r.clock.t_origin) / SAMPLES
     if is_near_singular(c.tangent, c.tangent.indicator.start):
         s.tol = max(TIGHTER * tol, min(tol, TIGHTEST))
         s.h = longest(c, r, s.tol, s.highest)

@@ -26,6 +26,7 @@ class ForceSeries(Record):
     sharp: int  # whether every step is checked at all places
     near: int  # whether the step tried is, too
     run: int  # address of what runs the program of a traced function; 0 for none
+    users: int  # whether the law is a user's, and may change within any part of a step
 
 
 class FrictionSeries(Record):

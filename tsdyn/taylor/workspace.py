@@ -71,6 +71,7 @@ class Trial(Record):
     singular: int  # whether it ends in a singular configuration
     check: int  # address of step_parts.check_laws; 0 where all laws are analytic everywhere
     sharp: int  # whether a force is sharp
+    spacing: float  # s, of the places at which laws of users are compared with their series, at most
     rate: float  # 1 + the largest of its start, m/s or rad/s
     left: float  # share of what laws divide by, or take roots of, that a step can't use up; 1 where they don't
     hops: int  # in close succession, over places where a law is not analytic

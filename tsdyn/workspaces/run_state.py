@@ -79,6 +79,7 @@ class Kernels(Record):
     fill: int
     value: int
     second: int
+    watch: int  # path_loads.watch, where functions of the state are loads
     expand: int  # of a Taylor step: see taylor/step_parts.py
     reach: int
     accelerate_here: int
@@ -111,6 +112,9 @@ class Run(NamedTuple):
     remembered: np.ndarray  # (angles + slots,)  angles of joints at the last accepted point, and what forces remember
     frames: np.ndarray  # (angles, 9)  f, g and h of each angle; see joint_turns.py
     joints: np.ndarray  # int64 (angles, 4)  where its two bodies' coordinates begin, and how many they are
+    watched: np.ndarray  # int64 (kinds,)  rows of System.forces that are sampled along steps; see path_loads.py
+    loaded: np.ndarray  # int64 (bodies,)  that they act on
+    path: np.ndarray  # scratch of it
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
     block: np.ndarray  # the present step's: start, h, end, chart; the interpolant's data; what is remembered
@@ -124,7 +128,7 @@ def enter_joints(run, handles, remembered):
     run.joints[:], run.frames[:], run.remembered[:] = handles.joints, handles.frames, remembered
 
 
-def lay_out(n, nx, ny, angles, slots, tableau=0, memory=0, warm=0, block=0):  # nine: lengths, each with its name
+def lay_out(n, nx, ny, angles, slots, tableau=0, memory=0, warm=0, block=0, path=0, watched=0, loaded=0):
     """The `Run` of a system of sizes nx, ny, whose forces remember so many `slots`.
 
     The other lengths are those of its arrays; a block is longer than its interpolant's data, which is what is given.
@@ -139,9 +143,11 @@ def lay_out(n, nx, ny, angles, slots, tableau=0, memory=0, warm=0, block=0):  # 
         "warm": (warm,),
         "memory": (memory,),
         "block": (B_DATA + block + angles + slots,),
+        "path": (path,),
     }
-    joints = np.zeros((angles, 4), np.int64)
-    return Run(**carve(shapes, clock=Clock, numbers=Numbers, kernels=Kernels), joints=joints)
+    whole = {"joints": (angles, 4), "watched": (watched,), "loaded": (loaded,)}
+    integers = {name: np.zeros(shape, np.int64) for name, shape in whole.items()}
+    return Run(**carve(shapes, clock=Clock, numbers=Numbers, kernels=Kernels), **integers)
 
 
 load_run = loader(lay_out(1, 1, 1, 1, 1))

@@ -237,6 +237,12 @@ class Ensemble:
         """Values of a case by name, with those of its start."""
         return self._study.values(i)
 
+    def _scene_record(self):
+        """Numbers and arrays of the scene, for a file."""
+        from .saving import scene_record
+
+        return scene_record(self._study.scene)
+
     @property
     def coordinates(self) -> list[str]:
         """Names of the coordinates, "crank.x" and so on, (n,)."""

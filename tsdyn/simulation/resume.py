@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING
 
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidFile, StorageError
-from ..validation import damaged
+from ..validation import clipped, damaged
+from .options import checked
 from .run_requests import arguments_of
 from .scene import Scene
+from .scene_cache import prepared
 from .simulate import run_from
-from .stored_runs import demand_path, demand_same_place
+from .stored_runs import demand_path, demand_same_place, demand_same_scene
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -71,8 +73,10 @@ def resume(
         scene = _scene_of(path, numbers, arrays)
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    demand_same_scene(path, prepared(scene).packed, numbers["scene"])
     with damaged("the checkpoint"):
         given = arguments_of(numbers["arguments"], arrays, scene)
+        checked({**given, "events": None, "progress": None, "store": path})
     given |= {"events": events, "progress": progress, "store": path, "checkpoint": numbers["interval"]}
     return run_from(given, numbers, arrays)
 
@@ -88,7 +92,7 @@ def _scene_of(path, numbers, arrays):
         except (InvalidFile, UnicodeDecodeError) as error:
             foreign = str(error)
     raise StorageError(
-        f"{path}: the scene has functions or classes of yours ({foreign}), and a file keeps no code. Pass "
+        f"{path}: the scene has functions or classes of yours ({clipped(foreign)}), and a file keeps no code. Pass "
         "the scene: ts.resume(path, scene=scene)."
     )
 

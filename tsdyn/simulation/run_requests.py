@@ -12,7 +12,7 @@ from ..errors import InvalidArgument
 from ..jit.code_hash import is_ours
 from ..methods.integrator import is_own, registered
 from ..observables.kinematics import Anchor
-from ..observables.state import RememberingState, State
+from ..observables.state import RememberingState, State, remembered
 from ..runs.arguments import state_arrays
 from .scene_cache import prepared
 
@@ -74,9 +74,11 @@ def arguments_of(numbers: dict[str, Any], arrays: dict[str, Any], scene: Scene) 
         nothing = np.empty(0)
         q, qd, qdd, lam = (nothing if found[name] is None else found[name] for name in STATE[:4])
         parts = numbers["t"], q, qd, qdd, lam
-        anchor = None if found["angles"] is None else Anchor(found["angles"])
-        handles, bare = prepared(scene).handles, found["memory"] is None and anchor is None
-        given["state"] = State(*parts) if bare else RememberingState.of(handles, found["memory"], anchor, *parts)
+        anchor, kept = None if found["angles"] is None else Anchor(found["angles"]), prepared(scene)
+        bare = found["memory"] is None and anchor is None
+        state = State(*parts) if bare else RememberingState.of(kept.handles, found["memory"], anchor, *parts)
+        given["state"], start = state, state_arrays(state, kept.n)
+        remembered(state, kept, float(numbers["t"]), start[0])
     return given
 
 

@@ -17,7 +17,7 @@ from ..model.handles import handles_of
 from ..observables.diagnostics import ConstraintError
 from ..runs import counts
 from ..validation import damaged, demand, demand_numbers, demand_record
-from .stored_runs import demand_path, hash_of
+from .stored_runs import demand_path, demand_same_scene, hash_of
 from .trajectory_records import derived_record, record_of, take_derived, trajectory_of
 
 if TYPE_CHECKING:
@@ -204,8 +204,7 @@ def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[type[A
                 raise StorageError(str(lacking)) from None
             return _outlined(path, record, arrays, str(lacking), kinds)
         packed = scene.packed
-        if hash_of(packed) != record["provenance"]["scene"]:
-            raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
+        demand_same_scene(path, packed, record["provenance"]["scene"])
         take_derived(packed, record["derived"])
         return _solution(path, record, arrays, scene, kinds[1])
 
@@ -278,8 +277,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
     demand_numbers(record["counts"], counts.NAMES)
     demand_numbers(record["seconds"], ("prepare", "run"))
     start, end = record["span"]
-    demand_numbers({"start": start, "end": end, "error": record["energy_error"]}, ("start", "end", "error"))
-    demand(None not in (start, end, *record["counts"].values(), *record["seconds"].values()), "numbers")
+    demand_numbers({"start": start, "end": end, "error": record["energy_error"]}, ("start", "end", "error"), ("error",))
     demand(all(isinstance(said, (str, int, float)) for said in record["provenance"].values()), "its provenance")
     events = None, None, None
     if record["events"] is not None:

@@ -16,7 +16,7 @@ from ..jit.code_hash import platform_hash
 from ..model.packed import user_functions
 from ..runs import counts
 from ..runs.task import Outcome
-from ..validation import damaged, demand, demand_numbers, demand_record, is_count, number
+from ..validation import clipped, damaged, demand, demand_numbers, demand_record, is_count, number
 from .run_requests import request_of
 
 
@@ -50,7 +50,7 @@ def archive_of(given, kept, history, numbers, arrays):
 
     facts = _facts(given, kept)
     if numbers is not None:
-        _demand_same_run(given["store"], facts, numbers)
+        _demand_same_functions(given["store"], facts, numbers)
     remembered = kept.handles.count + kept.packed.system.memory.size
     tables = tables_of(kept.packed.bodies, remembered, history)
     attributes = {"source": f"tsdyn {__version__}", "scene": facts["scene"]}
@@ -161,20 +161,25 @@ def demand_same_place(path, numbers):
     here = _here()
     if any(numbers[name] != here[name] for name in ("version", "kernels")):
         raise StorageError(
-            f"{path} was written by tsdyn {numbers['version']}, and other versions of it, NumPy or Numba are here: "
-            "the bits would differ. Go on there, or start anew from the last output: simulate(state=...)."
+            f"{path} was written by tsdyn {clipped(numbers['version'])}, and other versions of it, NumPy or Numba are "
+            "here: the bits would differ. Go on there, or start anew from the last output: simulate(state=...)."
         )
     if numbers["machine"] != here["machine"]:
+        there = clipped(", ".join(map(str, numbers["machine"][:3])))
         raise StorageError(
-            f"{path} was written on another machine ({', '.join(map(str, numbers['machine'][:3]))}): the bits would "
-            "differ. Go on there, or start anew from the last output: simulate(state=...)."
+            f"{path} was written on another machine ({there}): the bits would differ. Go on there, or start "
+            "anew from the last output: simulate(state=...)."
         )
 
 
-def _demand_same_run(path, facts, numbers):
-    """Raise StorageError unless the scene and the functions are those of the run that is gone on with."""
-    if facts["scene"] != numbers["scene"]:
+def demand_same_scene(path, packed, known):
+    """Raise StorageError unless a packed scene is that of a run, whose hash is known."""
+    if hash_of(packed) != known:
         raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
+
+
+def _demand_same_functions(path, facts, numbers):
+    """Raise StorageError unless the functions are those of the run that is gone on with."""
     for kind in ("functions", "events"):
         known, found = numbers[kind], facts[kind]
         missing = [name for name in known if name not in found]

@@ -36,6 +36,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import InvalidArgument, MissingDependency, StorageError
+from ..validation import reason
 from .write_errors import demand_folder, writing
 
 HDF5, ZARR = (".h5", ".hdf5", ".nc"), (".zarr",)  # suffixes of paths
@@ -90,7 +91,7 @@ def reading(path):
     except StorageError:
         raise
     except Exception as error:
-        raise StorageError(f"{path} is damaged, or gone: {type(error).__name__}: {error}.") from error
+        raise StorageError(f"{path} is damaged, or gone: {reason(error).rstrip('.')}.") from error
 
 
 def format_of(path):

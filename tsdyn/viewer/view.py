@@ -64,7 +64,12 @@ def show(solution: Any, path: str | Path | None, shapes: Any, trails: Any) -> Pa
 
 def page_of(data: dict[str, Any]) -> str:
     """The page of the data of a run."""
-    run = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    try:
+        run = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    except ValueError:
+        raise InvalidArgument(
+            "the outputs have numbers that aren't finite, which can't be drawn: view others, solution[a:b].view()."
+        ) from None
     parts = {
         "title": html.escape(data["title"]),
         "style": source("page.css"),

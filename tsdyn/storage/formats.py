@@ -78,7 +78,7 @@ def demand_shapes(path, tables):
     """Raise StorageError unless a store has the columns of these tables, of their shapes but for the rows."""
     found = format_of(path).shapes(path)
     for column, shape in ((column, table.shapes(column)[0]) for table in tables.values() for column in table.columns):
-        if found.get(column.name, ())[1:] != shape[1:] or column.name not in found:
+        if not found.get(column.name) or found[column.name][1:] != shape[1:]:
             said = f"of the shape {found[column.name]}" if column.name in found else "not there"
             raise StorageError(f"{path} is damaged, or of another scene: {column.name} is {said}.")
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InvalidArgument, InvalidFile, Status, StorageError
 from ..files import scene_text
-from ..simulation.options import checked
+from ..simulation.options import demand_arguments_of_file
 from ..simulation.scene import Scene
 from ..simulation.stored_runs import hash_of
 from ..validation import damaged, demand, demand_record
@@ -116,8 +116,8 @@ def _options(record):
     options = {name: value for name, value in record["options"].items() if name not in OWN}
     given = given_of(record["options"].get("t_span"), options)
     if not record["lacking"]:
-        checked(given)
-    demand(given["state"] is None, "the state")
+        demand_arguments_of_file(given)
+    demand(given["state"] is given["events"] is None, "functions and states")
     return given | dict.fromkeys(record["lacking"], _lost)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidFile, StorageError
 from ..validation import clipped, damaged
-from .options import checked
+from .options import demand_arguments_of_file
 from .run_requests import arguments_of
 from .scene import Scene
 from .scene_cache import prepared
@@ -76,7 +76,7 @@ def resume(
     demand_same_scene(path, prepared(scene).packed, numbers["scene"])
     with damaged("the checkpoint"):
         given = arguments_of(numbers["arguments"], arrays, scene)
-        checked({**given, "events": None, "progress": None, "store": path})
+        demand_arguments_of_file({**given, "store": path})
     given |= {"events": events, "progress": progress, "store": path, "checkpoint": numbers["interval"]}
     return run_from(given, numbers, arrays)
 

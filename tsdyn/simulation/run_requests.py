@@ -14,6 +14,7 @@ from ..methods.integrator import is_own, registered
 from ..observables.kinematics import Anchor
 from ..observables.state import RememberingState, State, remembered
 from ..runs.arguments import state_arrays
+from .outlines import outline_of
 from .scene_cache import prepared
 
 if TYPE_CHECKING:
@@ -55,12 +56,13 @@ def request_of(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     foreign = {type(item) for item in (*scene._added, *scene.forces) if not is_ours(type(item).__module__)}
     numbers["lacks"] = ", ".join(sorted(f"{kind.__module__}.{kind.__qualname__}" for kind in foreign))
     if not foreign:
-        from ..files import scene_text  # what a run without a store imports none of
-
         try:
             arrays["scene"] = np.frombuffer(scene_text.write(scene, type(scene)).encode(), np.uint8)
         except InvalidArgument as error:
             numbers["lacks"] = str(error)
+    if "scene" not in arrays:
+        found, text = outline_of(scene, prepared(scene).packed)
+        numbers, arrays = numbers | found, arrays | text
     return numbers, arrays
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
+import platform
+import time
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,8 @@ from ..runs import counts
 from ..runs.task import Outcome
 from ..validation import clipped, damaged, demand, demand_numbers, demand_record, is_count, number
 from .run_requests import request_of
+
+SETTINGS = ("rtol", "atol", "step", "max_step")  # of a method, as its provenance tells them
 
 
 def demand_storable(given):
@@ -84,14 +88,16 @@ def _asked(given):
     return {"arguments": numbers}, arrays
 
 
-def ended(archive, outcome, seconds):
+def ended(archive, outcome, seconds, task):
     """The `Outcome` of a run whose outputs are in an archive; the checkpoint says that it has ended."""
     if isinstance(outcome.rows, np.ndarray):  # of a driver of a user's
         archive.add("outputs", outcome.rows)
     try:
         archive.flush()
         if archive.has_checkpoints and outcome.status not in (Status.INTERRUPTED, Status.STORE_FAILED):
-            archive.checkpoint(*_ending(outcome, seconds))
+            method = task.method, outcome.method or repr(task.method)
+            told = provenance_of(archive.facts["scene"], *method, task.form.name, task.span, time.time())
+            archive.checkpoint(*_ending(outcome, seconds, told))
     except OSError as error:
         outcome = outcome._replace(status=Status.STORE_FAILED, reason=f"{error.strerror or error}.")
     rows, steps, charts = _stored(archive)
@@ -117,7 +123,7 @@ def _stored(archive):
     return outputs, StoredLog.of(outputs, "steps"), StoredLog.of(outputs, "charts")
 
 
-def _ending(outcome, seconds):
+def _ending(outcome, seconds, provenance):
     """The numbers and arrays of a checkpoint at the end of a run."""
     numbers = {"ended": True, "t": outcome.reached, "status": outcome.status, "reason": outcome.reason}
     numbers["method"] = outcome.method
@@ -126,7 +132,7 @@ def _ending(outcome, seconds):
         numbers["watched"] = len(outcome.events[0])
         for name, found in zip(("t", "q", "qd"), outcome.events, strict=True):
             arrays |= {f"event {i}.{name}": array for i, array in enumerate(found)}
-    return numbers | {"statistics": dict(outcome.counts), "seconds": seconds}, arrays
+    return numbers | {"statistics": dict(outcome.counts), "seconds": seconds, "provenance": provenance}, arrays
 
 
 def ended_outcome(numbers, arrays, archive, n, memory):
@@ -149,6 +155,25 @@ def ended_outcome(numbers, arrays, archive, n, memory):
         Status(numbers["status"]), numbers["reason"], *_stored(archive), float(numbers["t"]), last, remembered,
         numbers["statistics"], None, events, 0.0, numbers["method"],
     )  # fmt: skip
+
+
+def provenance_of(scene, method, said, formulation, span, made):
+    """As of `Records.provenance`: of a run of a scene (its hash) by a method, which is called so, made at a time."""
+    settings = {name: getattr(method, name, None) for name in SETTINGS}
+    return {
+        "source": f"tsdyn {__version__}",
+        "scene": scene,
+        "method": said,
+        **{name: float(value) for name, value in settings.items() if isinstance(value, (int, float))},
+        "formulation": formulation,
+        "t_start": float(span[0]),
+        "t_end": float(span[1]),
+        "created": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(made)),
+        "machine": " ".join(machine()[:3]),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
 
 
 def _here():

@@ -47,7 +47,7 @@ def fitting(function: Function, then: Callable[[Any], None] | None = None) -> Fu
     """Wrap a public function, or an `__init__`: a call that doesn't fit its signature raises InvalidCall.
 
     An argument of another kind than its annotation says raises InvalidArgument. `then` is called with an instance after
-    the `__init__` of its own class.
+    the `__init__` of its own class. Of a class with `_made_by`, the call that makes its instances is named.
     """
 
     @wraps(function)
@@ -62,10 +62,13 @@ def fitting(function: Function, then: Callable[[Any], None] | None = None) -> Fu
         except TsdynError:
             raise
         except Exception:
-            title, known = function.__qualname__, inspect.signature(call)
+            title, known = function.__qualname__.removesuffix(".__new__"), inspect.signature(call)
             if function.__name__ == "__init__":
                 title = getattr(arguments[0], "_kind", lambda: type(arguments[0]).__name__)()
             misfit = misfit_of(title, known, arguments, keywords) or _unfit(title, function, known, arguments, keywords)
+            made_by = getattr(arguments[0], "_made_by", None) if function.__name__ == "__init__" else None
+            if misfit is not None and made_by:
+                misfit = InvalidCall(f"{title}: make one by {made_by}, not by a call of the class.")
             if misfit is None:
                 raise
         raise misfit

@@ -68,7 +68,17 @@ def shown(value):
         text = repr(_plain(value))
     except Exception as error:  # a list that holds itself, a repr that raises
         text = f"<{type(value).__name__} without a repr: {type(error).__name__}>"
+    return clipped(text)
+
+
+def clipped(text):
+    """Return what a message quotes of a text, such as one of a file: of a long one the beginning."""
     return text if len(text) <= LONG else f"{text[:LONG]} ..."
+
+
+def reason(error):
+    """Return the kind of an error and what it says, for the message of another one."""
+    return clipped(f"{type(error).__name__}: {error}")
 
 
 def _plain(value):
@@ -185,7 +195,7 @@ def damaged(what):
     except StorageError:
         raise
     except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
-        raise StorageError(f"{what} is damaged, or lacks something: {type(error).__name__}: {error}.") from error
+        raise StorageError(f"{what} is damaged, or lacks something: {reason(error).rstrip('.')}.") from error
 
 
 def demand(fits, what):
@@ -196,17 +206,25 @@ def demand(fits, what):
 
 def is_count(value):
     """Whether a value is a whole number of things that a run may have."""
-    return type(value) is int and 0 <= value <= EXACT
+    return _is_whole(value) and value >= 0
 
 
-def demand_numbers(table, known):
-    """Raise ValueError unless a table has these names alone, each with a number, a truth value or None."""
+def _is_whole(value):
+    """Whether a value is a whole number that floats and 64-bit integers hold."""
+    return type(value) is int and abs(value) <= EXACT
+
+
+def demand_numbers(table, known, absent=()):
+    """Raise ValueError unless a table has these names alone, each with a number or a truth value; None for `absent`."""
     demand(isinstance(table, dict) and table.keys() == set(known), "the names of numbers")
-    demand(all(value is None or isinstance(value, (bool, int, float)) for value in table.values()), "numbers")
+    for name, value in table.items():
+        demand((value is None and name in absent) or isinstance(value, (bool, float)) or _is_whole(value), name)
 
 
 def demand_record(record, kinds):
-    """Raise KeyError or TypeError unless a table of JSON has these names, each with a value of its type."""
+    """Raise KeyError, TypeError or ValueError unless a table of JSON has these names, each a value of its type."""
     for name, kind in kinds.items():
-        if not isinstance(record[name], kind) or (isinstance(record[name], bool) and kind is not bool):
-            raise TypeError(f"{name} is {type(record[name]).__name__}")
+        value = record[name]
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+            raise TypeError(f"{name} is {type(value).__name__}")
+        demand(not isinstance(value, int) or _is_whole(int(value)), name)

@@ -58,6 +58,10 @@ def test_there_and_back(which, suffix, tmp_path):
     if which == "t_eval":
         assert again.case(2).q.tobytes() == found.case(2).q.tobytes()
     found.save(tmp_path / f"study{suffix}")  # replaces it
+    twice = ts.load(again.save(tmp_path / f"again{suffix}"))
+    assert twice.to_xarray().identical(found.to_xarray())
+    if which == "final":
+        assert twice.case(1).q.tobytes() == found.case(1).q.tobytes()
 
 
 def test_failures_assembled_starts_and_options_are_kept(tmp_path):

@@ -100,7 +100,7 @@ def read(kind, path):
     if kind == "scene":
         return found
     if isinstance(found, ts.Ensemble):
-        return found.q, found.status, repr(found), found.to_dataframe()
+        return found.q, found.status, repr(found), found.to_dataframe(), found.case(0).q
     looks = [found.t, found.q, found.multipliers, found.energy, found.angle("hinge"), str(found), found.message]
     if kind.startswith("solution"):
         looks += [found.at(0.25).q, found.steps, found.charts, found.t_events]
@@ -165,6 +165,16 @@ def mutate_text(path, rng):
         [str(part) for part in NASTY] + words + ["[", "'t**t'", "'1/0'", "\n[[body]]\n", "=", '"', "[a.b]\n"]
     )
     path.write_text(" ".join(words), encoding="utf-8")
+
+
+def rewritten(path, change):
+    """Change the record of a saved solution or ensemble in HDF5, and seal it again."""
+    with h5py.File(path, "r+") as file:
+        group = file[saved_file.GROUP]
+        record = json.loads(saved_file._unsealed(group[saved_file.RECORD][()].tobytes()))
+        change(record)
+        del group[saved_file.RECORD]
+        put(group, saved_file.RECORD, np.frombuffer(saved_file._sealed(json.dumps(record).encode()), np.uint8))
 
 
 def mutate_saved(path, rng):

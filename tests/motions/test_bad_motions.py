@@ -2,6 +2,7 @@
 
 import gc
 import math
+import re
 from functools import partial
 
 import numpy as np
@@ -131,3 +132,20 @@ def test_motion_that_numba_cannot_compile():
 def test_motion_object_is_named_after_its_constraint():
     refuse(lambda: lifted(ts.Motion(looked_up_too, zero, zero))(build()), ts.InvalidConstraint, ("lift", "Numba"))
     gc.collect()
+
+
+def test_defaults_without_a_star():
+    scene = ts.Scene()
+    arm = scene.add_body(1.0, (1.0, 1.0, 1.0), position=(1, 0, 0), name="arm")
+    hinge = scene.add(ts.constraints.Revolute.at(scene.ground, arm, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    for made, words in (
+        (lambda: ts.forces.PointForce(arm, force=lambda t, f=2.0: (f * t, 0.0, 0.0)), "lambda t, *, f=f: ..."),
+        (lambda: ts.forces.PointForce(arm, force=lambda t, s, f=2.0: (f, 0.0, 0.0)), "lambda t, s, *, f=f: ..."),
+        (lambda: ts.constraints.Distance(arm, scene.ground, length=lambda t, f=1: f + t), "lambda t, *, f=f: ..."),
+        (lambda: ts.forces.JointTorque(hinge, function=lambda t, a, w, k=2.0: -k * a), "lambda t, a, w, *, k=k: ..."),
+    ):
+        with pytest.raises(ts.TsdynError, match=re.escape(f"; defaults stand behind a star: {words}")):
+            made()
+    scene.add(ts.forces.PointForce(arm, force=lambda t, *, f=2.0: (f * t, 0.0, 0.0), name="push"))
+    np.testing.assert_array_equal(scene.evaluate(t=3.0).Q_A[:3], (6.0, 0.0, -9.81))
+    scene.add(ts.forces.PointForce(arm, force=lambda t, state=None: (t, 0.0, 0.0), name="pull"))

@@ -12,6 +12,7 @@ import zarr
 import tsdyn as ts
 from examples import four_bar, top
 from tests.helpers.scene_marks import there_and_back
+from tsdyn.cli import main
 from tsdyn.storage import saved_file
 
 TIMES = np.linspace(0.0, 0.2, 7)
@@ -138,14 +139,53 @@ def test_the_store_of_a_run_that_has_ended_is_loaded(tmp_path, name):
     np.testing.assert_array_equal(loaded.q, stored.q)
 
 
-def test_the_store_of_a_run_with_events_names_the_call(tmp_path):
+@pytest.mark.parametrize("name", ["run.h5", "run.zarr"])
+def test_a_store_of_a_run_that_has_ended_is_read_without_its_functions(tmp_path, name, capsys):
+    def build():
+        scene = ts.Scene(gravity=(0, 0, -10))
+        bob = scene.add_point_mass(2.0, position=(1, 0, 0), name="bob")
+        rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+        scene.add(ts.forces.PointForce(bob, force=pushed, name="wind"))
+        return scene, rod
+
+    def pushed(t):
+        return 0.1 * t, 0.0, 0.0
+
     def height(t, state):
-        return state.q[2] - 5.0
+        return state.q[2] + 0.5
+
+    (scene, rod), path = build(), tmp_path / name
+    run = ts.simulate(scene, (0.0, 1.0), events=height, store=path, checkpoint=60.0, history=True)
+    bare = ts.load(path)
+    for one, other in ((bare.t, run.t), (bare.q, run.q), (bare.qdd, run.qdd), (bare.t_events[0], run.t_events[0])):
+        np.testing.assert_array_equal(one, other)
+    assert (bare.method, bare.status, bare.reached) == (run.method, run.status, 1.0)
+    assert bare.provenance | {"created": ""} == run.provenance | {"created": ""}
+    np.testing.assert_array_equal(bare.steps.h, run.steps.h)
+    np.testing.assert_array_equal(bare.kinetic_energy, run.kinetic_energy)
+    assert bare.multipliers.shape == run.multipliers.shape
+    assert np.isnan(bare.multipliers).all()
+    assert np.isnan(bare.constraint_error.position).all()
+    with pytest.raises(ts.StorageError, match=r"no wind"):
+        bare.reaction("rod")
+    np.testing.assert_array_equal(ts.load(path, scene=scene).reaction(rod)[0], run.reaction(rod)[0])
+    for words in (["info", str(path)], ["convert", str(path), str(tmp_path / "run.csv")]):
+        assert main(words) == 0
+        assert "no wind" in capsys.readouterr().err
+    again = ts.load(bare.save(tmp_path / f"again{path.suffix}"))
+    np.testing.assert_array_equal(again.q, run.q)
+    assert np.isnan(again.power).all()
+
+
+def test_a_store_with_events_alone_is_loaded_without_them(tmp_path):
+    def height(t, state):
+        return state.q[2] - 0.95
 
     path = tmp_path / "run.h5"
-    ts.simulate(top.build(), (0.0, 1.0), integrator="dop853", events=height, store=path, checkpoint=60.0)
-    with pytest.raises(ts.StorageError, match=r"has events\. ts\.resume\(.*run\.h5', events=events\) returns"):
-        ts.load(path)
+    run = ts.simulate(top.build(), (0.0, 1.0), integrator="dop853", events=height, store=path, checkpoint=60.0)
+    loaded = ts.load(path)
+    np.testing.assert_array_equal(loaded.q_events[0], run.q_events[0])
+    np.testing.assert_array_equal(loaded.multipliers, run.multipliers)
 
 
 def test_the_store_of_a_run_that_has_not_ended_names_the_call(tmp_path):

@@ -169,15 +169,82 @@ def test_devices_and_pipes(tmp_path):
 
 def test_a_table_of_sums_says_all(saved):
     path = saved("h5")
+    forging.rewritten(path, lambda record: record["sums"].clear())
     with h5py.File(path, "r+") as file:
-        group = file[saved_file.GROUP]
-        record = json.loads(saved_file._unsealed(group[saved_file.RECORD][()].tobytes()))
-        record["sums"] = {}
-        del group[saved_file.RECORD]
-        words = saved_file._sealed(json.dumps(record).encode())
-        group[saved_file.RECORD] = np.frombuffer(words, np.uint8)
         file["q"][3] += 1.0
     refuse(lambda: ts.load(path), ts.StorageError, ("damaged", "checksum"))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("reached", 10**400),
+        ("reached", None),
+        ("counts", {"steps": None}),
+        ("counts", {"placements": 10**400}),
+        ("seconds", {"run": None}),
+        ("span", [None, 1.0]),
+    ],
+)
+def test_numbers_of_solutions_are_numbers(name, value, saved):
+    path = saved("h5")
+    forging.rewritten(
+        path, lambda record: record.update({name: record[name] | value if isinstance(value, dict) else value})
+    )
+    refuse(lambda: ts.load(path), ts.StorageError, ("damaged",), name)
+
+
+@pytest.fixture
+def study(tmp_path):
+    """A saved ensemble of two cases."""
+    scene = ts.Scene()
+    scene.add_point_mass(1.0, name="stone")
+    return ts.ensemble(scene, {"stone.mass": [1.0, 2.0]}, (0, 0.1)).save(tmp_path / "study.h5")
+
+
+def test_a_saved_ensemble_names_no_store(study):
+    outside = study.with_name("written.h5")
+    there = {"store": str(outside), "checkpoint": 0.0, "progress": True}
+    forging.rewritten(study, lambda record: record["options"].update(there))
+    assert ts.load(study).case(1).reached == 0.1
+    assert sorted(file.name for file in study.parent.iterdir()) == ["study.h5"]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"t_span": [0.0, "a"]}, {"t_span": 1.0}, {"formulation": "tangents"}, {"rtol": "a"}, {"nonsense": 1},
+        {"state": 3}, {"events": "a"}, {"history": []},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_options_of_ensembles_that_no_run_has(changes, study):
+    forging.rewritten(study, lambda record: record["options"].update(changes))
+    refuse(lambda: ts.load(study), ts.StorageError, ("study.h5 is damaged",))
+
+
+@pytest.mark.parametrize("absent", ["t_span", "lacks", "free", "messages"])
+def test_parts_of_ensembles_that_are_absent(absent, study):
+    if absent == "lacks":
+        with h5py.File(study, "r+") as file:
+            del file[saved_file.GROUP]["scene"]
+    forging.rewritten(
+        study,
+        lambda record: (
+            record["sums"].pop("scene", None) if absent == "lacks" else
+            record["options"].pop(absent) if absent == "t_span" else record.pop(absent)
+        ),
+    )  # fmt: skip
+    refuse(lambda: ts.load(study), ts.StorageError, ("study.h5 is damaged",))
+
+
+def test_outputs_that_are_not_finite_are_not_drawn(stopped):
+    ts.resume(stopped)
+    with h5py.File(stopped, "r+") as file:
+        file["q"][3] = np.nan
+    found = ts.load(stopped)
+    refuse(lambda: found.view(stopped.with_name("page.html")), ts.InvalidArgument, ("aren't finite", "[a:b]"))
+    assert found[:3].view(stopped.with_name("page.html")).exists()
 
 
 @pytest.fixture
@@ -222,6 +289,50 @@ def test_arrays_of_checkpoints_that_a_file_does_not_hold(shape, stopped):
     for place in checkpoint.place(stopped):
         place.write_bytes(checkpoint.FORMAT + seal + b"\n" + payload)
     refuse(lambda: ts.resume(stopped), ts.StorageError, ("damaged",))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"t_span": "a"}, {"t_span": [0.0, 10**400]}, {"redundancy": [0]}, {"formulation": None}, {"initial_tol": 0.0},
+        {"max_step": float("inf")}, {"rtol": 1e-6}, {"t_eval": []}, {"t_eval": [7.0, 6.0]}, {"dense_output": 2},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_arguments_of_checkpoints_that_no_run_has(changes, stopped):
+    numbers, arrays = checkpoint.read(stopped)
+    numbers["arguments"]["method"] = [numbers["arguments"]["method"], {}] if "rtol" in changes else "taylor"
+    numbers["arguments"]["options"] |= changes
+    checkpoint.write(stopped, numbers, arrays)
+    refuse(lambda: ts.resume(stopped), ts.StorageError, ("checkpoint is damaged",))
+
+
+def test_times_and_sizes_of_checkpoints_that_no_float_holds(stopped):
+    numbers, arrays = checkpoint.read(stopped)
+    for name in ("t", "interval", "size"):
+        for _ in range(2):  # the one before it, too
+            checkpoint.write(stopped, numbers | {name: 10**400}, arrays)
+        refuse(lambda: ts.resume(stopped), ts.StorageError, ("damaged", name), name)
+
+
+def test_long_texts_of_files_are_quoted_in_part(stopped):
+    numbers, arrays = checkpoint.read(stopped)
+    for changes in ({"version": "1" * 10**5}, {"machine": ["a" * 10**5]}, {"functions": {"f" * 10**5: ""}}):
+        checkpoint.write(stopped, numbers | changes, arrays)
+        with pytest.raises(ts.StorageError) as caught:
+            ts.resume(stopped)
+        assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("column", ["time", "q", "step_h"])
+def test_columns_without_rows(column, tmp_path):
+    path, scene = tmp_path / "run.h5", ts.Scene()
+    scene.add_point_mass(1.0)
+    ts.simulate(scene, (0.0, 1.0), store=path, checkpoint=0.0, history=True)
+    with h5py.File(path, "r+") as file:
+        del file[column]
+        file[column] = 1.0
+    refuse(lambda: ts.load(path), ts.StorageError, (f"{column} is of the shape ()",))
 
 
 def test_checkpoints_of_format_1(stopped):

@@ -1,5 +1,6 @@
 """The commands on scene files: check, info, new, convert."""
 
+import sys
 import textwrap
 from pathlib import Path
 
@@ -139,6 +140,7 @@ def _solution_info(parsed):
         else:
             print("\n".join([repr(solution), *table_lines(solution)]))
         return 0
+    _say_what_lacks(solution)
     if parsed.json:
         print_json(summary(solution))
         return 0
@@ -146,6 +148,12 @@ def _solution_info(parsed):
     for name, value in solution.provenance.items():
         print(f"  {name:12}{value}")
     return 0
+
+
+def _say_what_lacks(found):
+    """Print, where errors go, what a file doesn't tell for the want of functions, or classes, of its owner."""
+    if getattr(found, "_lacks", ""):
+        print(f"tsdyn: {found._lacks}", file=sys.stderr)
 
 
 def _new(parsed):
@@ -185,6 +193,7 @@ def _convert(parsed):
 
         demand_format(parsed.target)
         found = load(parsed.scene)
+        _say_what_lacks(found)
         written = (write_ensemble if isinstance(found, Ensemble) else write)(found, parsed.target)
     elif source in SCENES and target in SCENES:
         from ..simulation.load import text_of

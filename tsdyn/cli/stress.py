@@ -1,12 +1,12 @@
 """The command `tsdyn stress`: the gallery of hard cases, random scenes and random calls."""
 
-import json
 import os
 import sys
 from functools import partial
 from pathlib import Path
 
 from ..errors import InvalidArgument
+from .output import print_json
 from .run import add_json, add_plot, demand_folder, plotted
 
 BESIDE = {"scenes": 200, "calls": 400}  # random ones beside the gallery
@@ -69,7 +69,7 @@ def _stress(parsed):
         if not parsed.json:
             print(report.tally_text(tally, parsed.seed))
     if parsed.json:
-        print(json.dumps(report.as_data(found, closed, tally, parsed.seed), indent=1))
+        print_json(report.as_data(found, closed, tally, parsed.seed))
     if parsed.markdown:
         _write(parsed.markdown, report.as_markdown(found, tally), report.MARKS)
     if figure:

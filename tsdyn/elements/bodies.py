@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Generic, Never, TypeVar
 
 import numpy as np
 
+from ..calls import fitting
 from ..errors import InvalidBody
 from ..validation import demand_known, floats, positive, shown, vector3
 from .names import new_name
@@ -182,6 +183,9 @@ class PointMass:
         _vector("velocity", "m/s"), "Velocity at the start, ground frame, m/s, shape (3,)."
     )
 
+    _made_by = "scene.add_body(...) or scene.add_point_mass(...)"
+
+    @fitting
     def __init__(self, scene: Scene = None, index: int = -1, name: str = "", **values: Any) -> None:  # type: ignore[assignment]
         if index < 0:
             raise InvalidBody("bodies are made by scene.add_body(...) and scene.add_point_mass(...).")

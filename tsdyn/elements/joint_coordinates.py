@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from ..calls import fitting_constructor
 from ..jit.kernels import twin
 from ..maths import vectors
 from ..maths.vectors import IDENTITY, unit
@@ -21,6 +22,7 @@ from .tolerances import OPPOSED, PARALLEL_FOUND
 cross, dot, to_body, to_ground = map(twin, (vectors.cross, vectors.dot, vectors.to_body, vectors.to_ground))
 
 
+@fitting_constructor
 @dataclass(frozen=True)
 class Angle:
     """Declare an angle of b against a about an axis (right hand), by names of attributes of the joint.
@@ -65,6 +67,7 @@ class Angle:
         return AngleGeometry(own, other, f, g if own is item.a else tuple(-x for x in g), h)
 
 
+@fitting_constructor
 @dataclass(frozen=True)
 class Displacement:
     """Declare the displacement of the other body's point from the own body's point along a direction of the own body.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Never, Self
 import numpy as np
 
 from ..errors import InvalidForce
+from ..motions.keywords import starred
 from ..validation import label, positive
 from .markers import TURN
 from .user_functions import ByState, arguments_of, variant
@@ -97,7 +98,8 @@ class JointLoad:
         if self.__dict__.get("period") is None and arguments_of(self.function) != 3:
             raise self.error(
                 f"{self.name}: function must be a plain Python function of three arguments (t, {self.coordinate}, "
-                f"rate), got {self.function!r}. With period= it may be any object to be called so."
+                f"rate), got {self.function!r}{starred(self.function)}. With period= it may be any object to be called "
+                "so."
             )
 
     def parameters(self) -> tuple[Any, ...]:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..calls import fitting_constructor
 from ..errors import InvalidBody, InvalidConstraint
 from ..jit.kernels import kernel, stack
 from ..maths.euler_parameters import rotate, rotate_gradient, rotate_rate
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 POINT, VECTOR, PARAMETERS, TURN = 0, 1, 2, 3  # codes in kernels
 
 
+@fitting_constructor
 @dataclass(frozen=True)
 class Marker:
     """What one slot of a constraint or force is on: body "a" or "b", and the argument that places it there."""

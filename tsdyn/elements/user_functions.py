@@ -10,7 +10,7 @@ from typing import Any
 from ..jit.compiled_once import compiled_once
 from ..jit.kernels import kernel, part, specialised
 from ..jit.spread import spread
-from ..motions.keywords import numbers_of, positional
+from ..motions.keywords import numbers_of, positional, starred
 from ..motions.state_program import Writer
 from ..motions.tracing import Untraceable, demand_same, retold, traced
 from .force import callbacks
@@ -113,7 +113,9 @@ def _with_numbers(kind, plain, count):
 def arguments_of(function):
     """The number of arguments of a plain Python function, but for numbers by keyword; 0 for anything else."""
     plain = getattr(function, "py_func", function)
-    if not isinstance(plain, FunctionType) or plain.__code__.co_kwonlyargcount != len(numbers_of(function)):
+    if not isinstance(plain, FunctionType) or starred(function):
+        return 0
+    if plain.__code__.co_kwonlyargcount != len(numbers_of(function)):
         return 0
     return plain.__code__.co_argcount
 
@@ -141,7 +143,9 @@ def fill_state(x, xd, first, out):
 def state_load(value, what, error):
     """A plain function of (t, state)."""
     if arguments_of(value) != 2:
-        raise error(f"{what} must stay a plain Python function of two arguments (t, state), got {value!r}.")
+        raise error(
+            f"{what} must stay a plain Python function of two arguments (t, state), got {value!r}{starred(value)}."
+        )
     return value
 
 

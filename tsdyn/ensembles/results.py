@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calls import fitting_methods
+from ..calls import fitting, fitting_methods
 from ..errors import InvalidArgument, MissingDependency, Status
+from ..other_names import lacking
 from ..validation import counted
 from .keeping import TIMES
 
@@ -62,9 +63,16 @@ class Ensemble:
     [1. 2. 3.] 2.0
     """
 
+    _made_by = "ts.ensemble(scene, parameters, t_span), or read one by ts.load(path)"
+
+    @fitting
     def __init__(self, study: Any, results: Any, threads: int, interrupted: bool) -> None:
         self._study, self._results = study, results
         self.threads, self.interrupted, self.lanes = threads, bool(interrupted), getattr(study, "lanes", 1)
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse a name that there isn't, with what it is called here."""
+        raise lacking(self, name)
 
     def __len__(self) -> int:
         return self._study.cases.count
@@ -236,6 +244,12 @@ class Ensemble:
     def _values(self, i):
         """Values of a case by name, with those of its start."""
         return self._study.values(i)
+
+    def _scene_record(self):
+        """Numbers and arrays of the scene, for a file."""
+        from .saving import scene_record
+
+        return scene_record(self._study.scene)
 
     @property
     def coordinates(self) -> list[str]:

@@ -6,12 +6,16 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
 from ..errors import InvalidArgument, InvalidFile, Status, StorageError
 from ..files import scene_text
+from ..simulation.options import demand_arguments_of_file
 from ..simulation.scene import Scene
 from ..simulation.stored_runs import hash_of
 from ..validation import damaged, demand, demand_record
 from .cases import Cases, started
+from .ensemble import OWN, given_of
 from .keeping import FINAL, TIMES
 from .results import Ensemble
 from .saving import FORMAT, REDUCED
@@ -44,12 +48,14 @@ class SavedEnsemble(Ensemble):
         self._path, self._record, self._units = path, record, dict(record["parameters"])
         study = SimpleNamespace(
             cases=Cases(columns, {}, record["count"]), keep=_lost if record["keep"] == REDUCED else record["keep"],
-            options=SimpleNamespace(times=arrays["times"]), free=record["free"], given=record["options"], scene=None,
+            options=SimpleNamespace(times=arrays["times"].astype(float)), free=record["free"], given=_options(record),
+            scene=None,
         )  # fmt: skip
-        found = {"t": arrays["reached"], "q": arrays["q"], "qd": arrays["qd"]}
+        found = {name: arrays[name].astype(float) for name in ("q", "qd")} | {"t": arrays["reached"].astype(float)}
         found |= {f"kept {name}".removesuffix(" kept" if record["is_single"] else ""): a for name, a in kept.items()}
         messages = {int(i): said for i, said in record["messages"].items()}
-        results = SimpleNamespace(status=arrays["status"], messages=messages, arrays=found, reason=record["reason"])
+        status = arrays["status"].astype(int)
+        results = SimpleNamespace(status=status, messages=messages, arrays=found, reason=record["reason"])
         super().__init__(study, results, record["threads"], record["interrupted"])
         self.lanes = record["lanes"]
         text = arrays.get("scene")
@@ -95,9 +101,24 @@ class SavedEnsemble(Ensemble):
             self._study.scene = self._scene()
         return super().case(i)
 
+    def _scene_record(self):
+        """As of `Ensemble`: that of the file."""
+        known, text = {name: self._record[name] for name in ("scene", "lacks") if name in self._record}, self._given[0]
+        return known, {} if text is None else {"scene": np.frombuffer(text.encode(), np.uint8)}
+
     def _values(self, i):
         study = self._study
         return started(study.scene, study.cases.values(i), study.given["t_span"][0], study.free)
+
+
+def _options(record):
+    """The arguments of the cases, checked; none that is no option of an ensemble, such as where a run is stored."""
+    options = {name: value for name, value in record["options"].items() if name not in OWN}
+    given = given_of(record["options"].get("t_span"), options)
+    if not record["lacking"]:
+        demand_arguments_of_file(given)
+    demand(given["state"] is given["events"] is None, "functions and states")
+    return given | dict.fromkeys(record["lacking"], _lost)
 
 
 def _demand_whole(record, arrays):
@@ -107,10 +128,12 @@ def _demand_whole(record, arrays):
     pairs, messages = record["parameters"], record["messages"]
     words = [*names, *record["kept"], *messages.values(), *record["lacking"]]
     words += [word for pair in pairs for word in pair]
+    words += [*(record["free"] or ()), *([] if "scene" in arrays else [record["lacks"]])]
     demand(all(isinstance(word, str) for word in words), "words")
     times = arrays["times"]
     grid = times.shape if record["keep"] == TIMES else ()
-    demand(count >= 0 and times.ndim == 1 and record["keep"] in (FINAL, TIMES, REDUCED), "cases")
+    demand(count >= 0 and record["keep"] in (FINAL, TIMES, REDUCED), "cases")
+    demand(times.ndim == 1 and grid != (0,), "times")
     for name in ("q", "qd"):
         demand(arrays[name].shape == (count, *grid, len(names)), name)
     demand(arrays["status"].shape == arrays["reached"].shape == (count,), "status")

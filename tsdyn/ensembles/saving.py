@@ -58,13 +58,17 @@ def _content(ensemble):
         "threads": ensemble.threads, "lanes": ensemble.lanes, "interrupted": ensemble.interrupted,
         "free": study.free, "options": options, "lacking": lacking,
     }  # fmt: skip
+    numbers, held = ensemble._scene_record()
+    return record | numbers, {name: np.asarray(array) for name, array in (arrays | held).items()}
+
+
+def scene_record(scene):
+    """Numbers and arrays of a scene, or what keeps a file from holding it."""
+    record = {"scene": hash_of(scene.packed)}
     try:
-        scene = study.scene
-        record["scene"] = hash_of(scene.packed)
-        arrays["scene"] = np.frombuffer(scene_text.write(scene, type(scene)).encode(), np.uint8)
+        return record, {"scene": np.frombuffer(scene_text.write(scene, type(scene)).encode(), np.uint8)}
     except InvalidArgument as error:
-        record["lacks"] = str(error)
-    return record, {name: np.asarray(array) for name, array in arrays.items()}
+        return record | {"lacks": str(error)}, {}
 
 
 def _plain(given):

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
+from ..calls import fitting_constructor
 from ..errors import InvalidArgument
 from ..jit.kernels import kernel
 from .tableau import demand, quadrature
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 MOST_STAGES = 9  # the interpolant's polynomials are on the stack
 
 
+@fitting_constructor
 @dataclass(frozen=True)
 class CollocationTableau:
     """A collocation method: an odd number of nodes c in (0, 1], three to nine, the last one 1; its order.

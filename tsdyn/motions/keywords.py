@@ -17,6 +17,28 @@ def numbers_of(function):
     return {name: float(given[name]) for name in names if _is_number(given.get(name))}
 
 
+def starred(function):
+    """The end of a message on a plain function with defaults and no star, `lambda t, f=f: ...`; "" for any other."""
+    plain = getattr(function, "py_func", function)
+    defaults = plain.__defaults__ or () if isinstance(plain, FunctionType) else ()
+    if all(default is None for default in defaults):
+        return ""
+    names = plain.__code__.co_varnames[: plain.__code__.co_argcount]
+    first, given = names[: -len(defaults)], names[-len(defaults) :]
+    written = ", ".join([*first, "*", *(f"{name}={name}" for name in given)])
+    return f"; defaults stand behind a star: lambda {written}: ..."
+
+
+def demand_time_alone(function, what, error):
+    """Raise an error unless a function is a plain one of the time alone, but for numbers by keyword."""
+    plain, said = getattr(function, "py_func", function), starred(function)
+    if said or not isinstance(plain, FunctionType) or plain.__code__.co_argcount != 1:
+        raise error(
+            f"{what}: {function!r} is no plain Python function of one argument, the time"
+            f"{said or '; wrap it in one: lambda t: ...'}"
+        )
+
+
 def positional(function):
     """The function with its keyword-only arguments after the others, by position, for code that is compiled once."""
     plain = getattr(function, "py_func", function)

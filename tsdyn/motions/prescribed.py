@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import cached_property, partial
-from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from ..jit.kernels import Callback, caller, entry, kernel, specialised
 from ..validation import number, shown
 from .elementary import Constant, Piecewise, time
 from .expressions import FUNCTIONS, Smooth
+from .keywords import demand_time_alone
 from .knots import demand_covered, demand_followed
 from .program import run_program
 from .tables import Table, is_data
@@ -276,11 +276,7 @@ def _plain_function(function, what):
     """Return a user's function; refuse all but plain functions of one argument."""
     if not callable(function):
         raise InvalidConstraint(f"{what}: a motion is three functions of time (f, fd, fdd), got {function!r}.")
-    plain = getattr(function, "py_func", function)
-    if not isinstance(plain, FunctionType) or plain.__code__.co_argcount != 1:
-        raise InvalidConstraint(
-            f"{what}: {function!r} is no plain Python function of one argument, the time; wrap it in one: lambda t: ..."
-        )
+    demand_time_alone(function, what, InvalidConstraint)
     return function
 
 

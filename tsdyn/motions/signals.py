@@ -13,7 +13,7 @@ from ..jit.kernels import Callback, caller, entry, kernel, specialised, vector
 from ..validation import floats, number, shown
 from .elementary import Constant, Piecewise, Polynomial
 from .expressions import Smooth
-from .keywords import numbers_of
+from .keywords import demand_time_alone, numbers_of
 from .knots import demand_covered
 from .program import run_program
 from .tables import is_data
@@ -61,12 +61,7 @@ class Signal:
             if not any(motion.pieces for motion in self.motions):
                 self.value(0.0)
             return
-        plain = getattr(source, "py_func", source)
-        if not isinstance(plain, FunctionType) or plain.__code__.co_argcount != 1:
-            raise error(
-                f"{what}: {source!r} is no plain Python function of one argument, the time; wrap it in one, "
-                "lambda t: ..."
-            )
+        demand_time_alone(source, what, error)
         self.value(0.0)
         self._trace_numbers()
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
+from ..calls import fitting
 from ..errors import InvalidArgument
+from ..other_names import lacking
 from .exerted import Exerting
 from .kinematics import Kinematics
 
@@ -30,8 +32,16 @@ class State(Exerting, Kinematics["float | Any"], _Arrays):
     Parameters
     ----------
     t : float, s
-    q, qd, qdd : ndarray (n,)
+    q, qd : ndarray (n,)
+    qdd : ndarray (n,)
+        Not needed for a start.
     multipliers : ndarray (m,)
+        Not needed for a start.
+
+    Raises
+    ------
+    InvalidCall
+        If q or qd is missing, or there are more arguments.
 
     Notes
     -----
@@ -54,6 +64,17 @@ class State(Exerting, Kinematics["float | Any"], _Arrays):
     """
 
     __slots__ = ()
+
+    @fitting
+    def __new__(
+        cls, t: float | Floats, q: Floats, qd: Floats, qdd: Floats = NOTHING, multipliers: Floats = NOTHING
+    ) -> Self:
+        """Make a state of these arrays."""
+        return super().__new__(cls, t, q, qd, qdd, multipliers)
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse a name that there isn't, with what it is called here."""
+        raise lacking(self, name)
 
     @property
     def packed(self) -> Any:
@@ -83,7 +104,7 @@ class RememberingState(State):
     @classmethod
     def of(cls, packed, memory, anchor, *parts):
         """Make a state, or k states."""
-        state = cls(*parts)
+        state = cls._make(parts)
         state.packed, state.memory, state.anchor = packed, memory, anchor
         return state
 

@@ -15,7 +15,7 @@ from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import MOST_SCALED
 from ..model.handles import handles_of
-from ..validation import demand, demand_numbers
+from ..validation import demand, demand_numbers, is_count
 from ..workspaces.run_state import B_END, STORED
 from .event_states import Inside
 from .events import Failed, Instant
@@ -119,12 +119,15 @@ class Watch:
         demand(self.state.shape == (3, self._signs.shape[2]) and len(self.memory) >= self.angles, "the state of events")
         self.tracks = [Track(0.0) for _ in self.events]
         for track, known in zip(self.tracks, numbers["tracks"], strict=True):
-            significant = known.pop("significant")
-            demand_numbers(known | {"significant": None}, vars(track))
-            vars(track).update(known | {"significant": significant and tuple(map(float, significant))})
+            if known["significant"] is not None:
+                t, value = map(float, known["significant"])
+                known = known | {"significant": (t, value)}
+            demand_numbers(known | {"significant": None}, vars(track), ("significant", "zero"))
+            vars(track).update(known)
         self.list = [[] for _ in self.events]
         for (t, index), state in zip(numbers["found"], arrays["watch.found"], strict=True):
-            self.list[index].append(Occurrence(t, index, state))
+            demand(is_count(index), "the number of an event")
+            self.list[index].append(Occurrence(float(t), index, state))
 
     def go_back(self, run, log):
         """Let the run end where it has been looked at last."""

@@ -69,6 +69,12 @@ def checked(given):
     )
 
 
+def demand_arguments_of_file(given):
+    """Raise InvalidArgument unless arguments of a file, without functions, are such as `simulate` takes."""
+    named = "taylor" if given["integrator"] is None else given["integrator"]  # the tolerances are checked with it
+    checked({**given, "integrator": named, "events": None, "progress": None})
+
+
 @checked_once
 def _settings(  # nine: each is an argument of `simulate`
     formulation, constraint_tol, initial_tol, redundancy, dense_output, max_steps, max_step, history, chart_interval

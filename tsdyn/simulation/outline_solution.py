@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 class Outline(Solution):
     """A solution whose scene lacks the parts that a file names only: they are not drawn, and nothing is run.
 
-    Outputs, kinematics, momenta, energies, power, multipliers and constraint errors are those of the run.
+    Outputs, kinematics, momenta and kinetic energy are those of the run. So are potential energy, power, multipliers
+    and constraint errors of a saved solution; of a store they are NaN.
     """
 
     _held: dict[str, Any]  # arrays of the file

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..observables.kinematics import Anchor
+from ..other_names import lacking
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -59,7 +60,7 @@ class Outputs:
         if name in _REMAINS and "_remains" in self.__dict__:
             return self.__dict__.setdefault(name, _REMAINS[name](self._remains, self.handles.count))
         if stored is None or name not in _COLUMNS:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            raise lacking(self, name)
         found = stored.read(_COLUMNS[name], self._slice)
         if _COLUMNS[name] != "remembered":
             setattr(self, name, found)

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidFile, StorageError
-from ..validation import damaged
+from ..validation import clipped, damaged
+from .options import demand_arguments_of_file
+from .outlines import Lacking
 from .run_requests import arguments_of
 from .scene import Scene
+from .scene_cache import prepared
 from .simulate import run_from
-from .stored_runs import demand_path, demand_same_place
+from .stored_runs import demand_path, demand_same_place, demand_same_scene
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..hints import Event, Place, Progress, Solution
+NEEDED = ("scene", "functions"), ("events", "events")  # arguments that are passed again, and what says that they are
 
 
 @fitting
@@ -65,14 +70,20 @@ def resume(
     from ..storage import checkpoint
 
     demand_path(path, "path")
-    numbers, arrays = checkpoint.read(path)
+    return _resumed(path, *checkpoint.read(path), scene, events, progress)
+
+
+def _resumed(path, numbers, arrays, scene, events=None, progress=None):
+    """As of `resume`, with the numbers and the arrays of the checkpoint."""
     demand_same_place(path, numbers)
     if scene is None:
         scene = _scene_of(path, numbers, arrays)
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    demand_same_scene(path, prepared(scene).packed, numbers["scene"])
     with damaged("the checkpoint"):
         given = arguments_of(numbers["arguments"], arrays, scene)
+        demand_arguments_of_file({**given, "store": path})
     given |= {"events": events, "progress": progress, "store": path, "checkpoint": numbers["interval"]}
     return run_from(given, numbers, arrays)
 
@@ -87,8 +98,8 @@ def _scene_of(path, numbers, arrays):
             return scene_text.read(arrays["scene"].tobytes().decode(), "its scene", Scene, None)[0]
         except (InvalidFile, UnicodeDecodeError) as error:
             foreign = str(error)
-    raise StorageError(
-        f"{path}: the scene has functions or classes of yours ({foreign}), and a file keeps no code. Pass "
+    raise Lacking(
+        f"{path}: the scene has functions or classes of yours ({clipped(foreign)}), and a file keeps no code. Pass "
         "the scene: ts.resume(path, scene=scene)."
     )
 
@@ -97,6 +108,8 @@ def ended_run(path: Place, scene: Scene | None) -> Solution:
     """Return the solution of a store whose run has ended; raises StorageError that names the call for any other."""
     from ..storage import checkpoint
     from ..storage.formats import format_of
+    from .outline_solution import Outline
+    from .saved_solutions import outlined_run
 
     if not any(place.exists() for place in checkpoint.place(path)):
         if "ensemble" in format_of(path).attributes(path):
@@ -109,16 +122,17 @@ def ended_run(path: Place, scene: Scene | None) -> Solution:
             "them. Read the outputs by xarray (xarray.open_zarr, or xarray.open_dataset with engine='h5netcdf'), or "
             "run again with checkpoint=60.0; solution.save(path) writes a solution as a whole."
         )
-    numbers, _ = checkpoint.read(path)
-    if numbers.get("ended") and not numbers["events"]:
-        return resume(path, scene)
-    passed = "".join(
-        f", {name}={name}"
-        for name, needed in (("scene", numbers["functions"]), ("events", numbers["events"]))
-        if needed
-    )
-    done = "has events" if numbers.get("ended") else f"has not ended: its checkpoint is of t = {numbers['t']:.9g} s"
+    numbers, arrays = checkpoint.read(path)
+    if numbers.get("ended"):
+        try:
+            return _resumed(path, {**numbers, "events": {}}, arrays, scene)
+        except Lacking as error:
+            if "outline" not in arrays:
+                raise
+            with damaged(path):
+                return outlined_run(Path(path).absolute(), numbers, arrays, str(error), (Scene, Outline))
+    passed = "".join(f", {needed}={needed}" for needed, known in NEEDED if numbers[known])
     raise StorageError(
-        f"{path} is the store of a run that {done}. ts.resume({str(path)!r}{passed}) returns its solution"
-        f"{'' if numbers.get('ended') else ', once it has gone on to the end'}."
+        f"{path} is the store of a run that has not ended: its checkpoint is of t = {numbers['t']:.9g} s. "
+        f"ts.resume({str(path)!r}{passed}) returns its solution, once it has gone on to the end."
     )

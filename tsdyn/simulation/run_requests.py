@@ -12,8 +12,9 @@ from ..errors import InvalidArgument
 from ..jit.code_hash import is_ours
 from ..methods.integrator import is_own, registered
 from ..observables.kinematics import Anchor
-from ..observables.state import RememberingState, State
+from ..observables.state import RememberingState, State, remembered
 from ..runs.arguments import state_arrays
+from .outlines import outline_of
 from .scene_cache import prepared
 
 if TYPE_CHECKING:
@@ -55,12 +56,13 @@ def request_of(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     foreign = {type(item) for item in (*scene._added, *scene.forces) if not is_ours(type(item).__module__)}
     numbers["lacks"] = ", ".join(sorted(f"{kind.__module__}.{kind.__qualname__}" for kind in foreign))
     if not foreign:
-        from ..files import scene_text  # what a run without a store imports none of
-
         try:
             arrays["scene"] = np.frombuffer(scene_text.write(scene, type(scene)).encode(), np.uint8)
         except InvalidArgument as error:
             numbers["lacks"] = str(error)
+    if "scene" not in arrays:
+        found, text = outline_of(scene, prepared(scene).packed)
+        numbers, arrays = numbers | found, arrays | text
     return numbers, arrays
 
 
@@ -74,9 +76,11 @@ def arguments_of(numbers: dict[str, Any], arrays: dict[str, Any], scene: Scene) 
         nothing = np.empty(0)
         q, qd, qdd, lam = (nothing if found[name] is None else found[name] for name in STATE[:4])
         parts = numbers["t"], q, qd, qdd, lam
-        anchor = None if found["angles"] is None else Anchor(found["angles"])
-        handles, bare = prepared(scene).handles, found["memory"] is None and anchor is None
-        given["state"] = State(*parts) if bare else RememberingState.of(handles, found["memory"], anchor, *parts)
+        anchor, kept = None if found["angles"] is None else Anchor(found["angles"]), prepared(scene)
+        bare = found["memory"] is None and anchor is None
+        state = State(*parts) if bare else RememberingState.of(kept.handles, found["memory"], anchor, *parts)
+        given["state"], start = state, state_arrays(state, kept.n)
+        remembered(state, kept, float(numbers["t"]), start[0])
     return given
 
 

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import platform
-import time
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._version import __version__
-from ..errors import InvalidArgument, InvalidFile, Status, StorageError
-from ..jit.cache import machine
+from ..errors import InvalidArgument, InvalidFile, Status
 from ..model.handles import handles_of
 from ..observables.diagnostics import ConstraintError
 from ..runs import counts
 from ..validation import damaged, demand, demand_numbers, demand_record
-from .stored_runs import demand_path, hash_of
+from .outlines import Lacking, complete, outline_of, row_labels, scene_of, width_of
+from .stored_runs import demand_path, demand_same_scene, hash_of, provenance_of
 from .trajectory_records import derived_record, record_of, take_derived, trajectory_of
 
 if TYPE_CHECKING:
@@ -30,7 +27,6 @@ RECORD = {  # of every file, with the types of it
 LEVELS = tuple(f"{level}_error" for level in ConstraintError._fields)
 HELD = "multipliers", "power", "potential_energy", *LEVELS  # of an outline: its scene doesn't tell them
 LOGS = {"steps": "_step_log", "charts": "_chart_log"}
-SETTINGS = ("rtol", "atol", "step", "max_step")
 
 
 def provenance(solution: Solution) -> dict[str, Any]:
@@ -38,21 +34,8 @@ def provenance(solution: Solution) -> dict[str, Any]:
     known = vars(solution).get("_provenance")
     if known is not None:
         return dict(known)
-    settings = {name: getattr(solution._method, name, None) for name in SETTINGS}
-    return {
-        "source": f"tsdyn {__version__}",
-        "scene": hash_of(solution.packed),
-        "method": solution.method,
-        **{name: float(value) for name, value in settings.items() if isinstance(value, (int, float))},
-        "formulation": solution.formulation,
-        "t_start": float(solution.span[0]),
-        "t_end": float(solution.span[1]),
-        "created": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(solution._made)),
-        "machine": " ".join(machine()[:3]),
-        "system": platform.platform(),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-    }
+    told = solution._method, solution.method, solution.formulation, solution.span
+    return provenance_of(hash_of(solution.packed), *told, solution._made)
 
 
 def save(solution: Solution, path: Place) -> Path:
@@ -67,7 +50,7 @@ def save(solution: Solution, path: Place) -> Path:
         remembered = solution._width
         content = solution._content
     else:
-        remembered, content = _width(solution.packed), _content(solution)
+        remembered, content = width_of(solution.packed), _content(solution)
     tables = tables_of(solution.packed.bodies, remembered, solution._step_log is not None)
     logs = {name: _columns_of(getattr(solution, log)) for name, log in LOGS.items() if name in tables}
     counts = {"outputs": solution._length(), **{name: len(log[0]) for name, log in logs.items()}}
@@ -75,11 +58,6 @@ def save(solution: Solution, path: Place) -> Path:
     rows = partial(_rows, solution, tables, logs)
     saved_file.write(path, tables, rows, provenance(solution), content)
     return path
-
-
-def _width(packed):
-    """How many numbers are remembered with each output: angles of joints, and what forces remember."""
-    return handles_of(packed).count + packed.system.memory.size
 
 
 def _columns_of(log):
@@ -141,15 +119,7 @@ def _content(solution):
 
 def labelled_rows(solution):
     """Title and label of each row of Phi as they were run."""
-    if solution._lacks:
-        yield from solution._row_labels
-        return
-    seen = {}
-    for member in solution.packed.members:
-        title = member.constraint.title
-        seen[title] = seen.get(title, 0) + 1
-        again = "" if seen[title] == 1 else f" #{seen[title]}"
-        yield from ((title + again, label) for label in member.constraint.row_labels)
+    return solution._row_labels if solution._lacks else row_labels(solution.packed)
 
 
 def _held(solution, width):
@@ -163,17 +133,11 @@ def _held(solution, width):
 
 def _outline(solution, numbers):
     """The arrays of an `Outline`, and its numbers entered, of a scene with parts that only their owner has."""
-    from ..files import scene_text
-
     if hash_of(solution.scene.packed) != provenance(solution)["scene"]:
         return {}
-    text, left = scene_text.write_outline(solution.scene, type(solution.scene))
-    if not left or not text:
-        return {}
-    angles = [row.item.name for row in solution.handles.rows for _ in row.angles]
-    rows = [list(labels) for labels in labelled_rows(solution)]
-    numbers["outline"] = {"left_out": left, "angles": angles, "rows": rows, "width": _width(solution.packed)}
-    return {"outline": np.frombuffer(text.encode(), np.uint8), **_held(solution, len(rows))}
+    found, arrays = outline_of(solution.scene, solution.packed)
+    numbers |= found
+    return arrays | _held(solution, len(found["outline"]["rows"])) if found else {}
 
 
 def _scene_as_run(solution):
@@ -201,17 +165,12 @@ def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[type[A
             scene = _scene(path, record, arrays, scene, allow_code, kinds[0])
         except Lacking as lacking:
             if "outline" not in arrays:
-                raise StorageError(str(lacking)) from None
-            return _outlined(path, record, arrays, str(lacking), kinds)
+                raise
+            return _outlined(path, record, arrays, str(lacking), (kinds[0], kinds[2]))
         packed = scene.packed
-        if hash_of(packed) != record["provenance"]["scene"]:
-            raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
+        demand_same_scene(path, packed, record["provenance"]["scene"])
         take_derived(packed, record["derived"])
         return _solution(path, record, arrays, scene, kinds[1])
-
-
-class Lacking(Exception):
-    """Why a file alone doesn't give the scene."""
 
 
 def _scene(path, record, arrays, scene, allow_code, kind):
@@ -235,23 +194,47 @@ def _scene(path, record, arrays, scene, allow_code, kind):
 
 def _outlined(path, record, arrays, why, kinds):
     """The `Outline` of a file."""
-    from ..files import scene_text
-
     known = record["outline"]
-    demand_record(known, {"left_out": list, "angles": list, "rows": list, "width": int})
-    scene = scene_text.read(arrays["outline"].tobytes().decode(), "its outline", kinds[0], None)[0]
-    scene._lacks = f"{why} Without it there is no {', '.join(map(str, known['left_out']))}."
-    here = {row.item.name for row in handles_of(scene.packed).rows}
-    columns = [i for i, name in enumerate(known["angles"]) if name in here]
-    demand(0 <= len(known["angles"]) <= known["width"], "the angles of joints")
-    found = _solution(path, {**record, "trajectory": None}, arrays, scene, kinds[2], known["width"])
+    scene = scene_of(known, arrays["outline"], why, kinds[0])
+    found = _solution(path, {**record, "trajectory": None}, arrays, scene, kinds[1], known["width"])
     held_arrays = {f"held_{name}": arrays[f"held_{name}"].astype(float) for name in HELD}
     count = found._length()
     for name, array in held_arrays.items():
         demand(array.shape == (count, *([len(known["rows"])] if name == "held_multipliers" else [])), name)
-    labels = [[str(title), str(label)] for title, label in known["rows"]]
-    found._held, found._columns, found._row_labels = held_arrays, columns, labels
-    found._width, found._content = known["width"], (_again(record), arrays)
+    complete(found, known)
+    found._held, found._content = held_arrays, (_again(record), arrays)
+    return found
+
+
+def outlined_run(path, numbers, arrays, why, kinds):
+    """The `Outline` of the store of a run that has ended, from its checkpoint; what its scene doesn't tell is NaN."""
+    from ..storage.archive import tables_of
+    from ..storage.formats import format_of
+
+    known, told = numbers["arguments"]["outline"], numbers["provenance"]
+    scene = scene_of(known, arrays["outline"], why, kinds[0])
+    demand_record(told, {"method": str, "formulation": str, "t_start": (int, float), "t_end": (int, float)})
+    demand_record(numbers, {"reason": str, "seconds": (int, float)})
+    format_of(path).demand_plain(path)
+    tables = tables_of(scene.packed.bodies, known["width"], "steps" in numbers["counts"])
+    angles, remembered = len(known["angles"]), arrays["remembered"]
+    record = {
+        "provenance": told, "formulation": told["formulation"], "span": [told["t_start"], told["t_end"]],
+        "method": told["method"], "status": numbers["status"], "reason": numbers["reason"],
+        "message": f"{Status(numbers['status']).sentence} {numbers['reason']}".rstrip(), "reached": numbers["t"],
+        "counts": numbers["statistics"], "seconds": {"prepare": 0.0, "run": numbers["seconds"]}, "energy_error": None,
+        "derived": {"redundant": None, "turning": []}, "events": numbers.get("watched"), "outline": known,
+        "lacks": str(numbers["arguments"]["lacks"]).rstrip("."),
+        "tables": {name: [column.name for column in table.columns] for name, table in tables.items()},
+    }  # fmt: skip
+    held = {"last": arrays["last"], "angles": remembered[:angles], "memory": remembered[angles:]}
+    for i in range(numbers.get("watched", 0)):
+        held |= {f"event_{i}_{name}": arrays[f"event {i}.{name}"] for name in ("t", "q", "qd")}
+    found = _solution(path, record, held, scene, kinds[1], known["width"])
+    complete(found, known)
+    count, rows = found._length(), len(known["rows"])
+    found._held = {f"held_{name}": np.full((count, rows) if name == "multipliers" else count, np.nan) for name in HELD}
+    found._content = record, {**held, **found._held, "outline": arrays["outline"]}
     return found
 
 
@@ -268,7 +251,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
 
     found, packed = kind.__new__(kind), scene.packed
     outputs = StoredOutputs(path, record["tables"])
-    width = _width(packed) if width is None else width
+    width = width_of(packed) if width is None else width
     tables = tables_of(packed.bodies, width, "steps" in record["tables"])
     demand(record["tables"] == {name: [c.name for c in table.columns] for name, table in tables.items()}, "its tables")
     demand_shapes(path, tables)
@@ -278,8 +261,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
     demand_numbers(record["counts"], counts.NAMES)
     demand_numbers(record["seconds"], ("prepare", "run"))
     start, end = record["span"]
-    demand_numbers({"start": start, "end": end, "error": record["energy_error"]}, ("start", "end", "error"))
-    demand(None not in (start, end, *record["counts"].values(), *record["seconds"].values()), "numbers")
+    demand_numbers({"start": start, "end": end, "error": record["energy_error"]}, ("start", "end", "error"), ("error",))
     demand(all(isinstance(said, (str, int, float)) for said in record["provenance"].values()), "its provenance")
     events = None, None, None
     if record["events"] is not None:

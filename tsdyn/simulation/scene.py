@@ -27,7 +27,7 @@ from ..model.packed import pack, user_functions
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..observables.evaluate import evaluate as _evaluate
-from ..other_names import METHODS
+from ..other_names import lacking
 from ..validation import demand_known, label, vector3
 from .editing import WHAT, demand_present, found
 from .editing import copy as _copy
@@ -110,10 +110,7 @@ class Scene(OfFile):
     def __getattr__(self, name: str) -> Any:
         """Make the handles of a scene that `with_parameters` has returned."""
         if name not in HANDLES or "_later" not in self.__dict__:
-            here = METHODS.get(name)
-            raise AttributeError(
-                f"{type(self).__name__!r} object has no attribute {name!r}{f'; here it is {here}.' if here else ''}"
-            )
+            raise lacking(self, name)
         make_handles(self)
         return self.__dict__[name]
 

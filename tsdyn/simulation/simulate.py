@@ -231,7 +231,7 @@ def _run_stored(task, given, options, found, archive):
         if other is not None:
             given = _again(given, other)
             return run_from(given, archive=stored_runs.begin_again(archive, given))
-        outcome = stored_runs.ended(archive, outcome, seconds)
+        outcome = stored_runs.ended(archive, outcome, seconds, task)
     finally:
         archive.close()
     timed = {"prepare": outcome.began - started, "run": seconds}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-from ..calls import fitting_methods
+from ..calls import fitting, fitting_methods
 from ..errors import InvalidArgument, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
@@ -100,7 +100,9 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
     q_events: list[Floats] | Any
     qd_events: list[Floats] | Any
     _turned = ""  # the methods of a run that turned
+    _made_by = "ts.simulate(scene, t_span), or read one by ts.load(path)"
 
+    @fitting
     def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float], goes_on: str = "") -> None:
         self.scene, self.packed = scene, task.prepared.packed
         self.formulation, self.span = task.form.name, task.span

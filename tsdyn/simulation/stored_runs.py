@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
+import platform
+import time
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +18,10 @@ from ..jit.code_hash import platform_hash
 from ..model.packed import user_functions
 from ..runs import counts
 from ..runs.task import Outcome
-from ..validation import damaged, demand, demand_numbers, demand_record, is_count, number
+from ..validation import clipped, damaged, demand, demand_numbers, demand_record, is_count, number
 from .run_requests import request_of
+
+SETTINGS = ("rtol", "atol", "step", "max_step")  # of a method, as its provenance tells them
 
 
 def demand_storable(given):
@@ -50,7 +54,7 @@ def archive_of(given, kept, history, numbers, arrays):
 
     facts = _facts(given, kept)
     if numbers is not None:
-        _demand_same_run(given["store"], facts, numbers)
+        _demand_same_functions(given["store"], facts, numbers)
     remembered = kept.handles.count + kept.packed.system.memory.size
     tables = tables_of(kept.packed.bodies, remembered, history)
     attributes = {"source": f"tsdyn {__version__}", "scene": facts["scene"]}
@@ -84,14 +88,16 @@ def _asked(given):
     return {"arguments": numbers}, arrays
 
 
-def ended(archive, outcome, seconds):
+def ended(archive, outcome, seconds, task):
     """The `Outcome` of a run whose outputs are in an archive; the checkpoint says that it has ended."""
     if isinstance(outcome.rows, np.ndarray):  # of a driver of a user's
         archive.add("outputs", outcome.rows)
     try:
         archive.flush()
         if archive.has_checkpoints and outcome.status not in (Status.INTERRUPTED, Status.STORE_FAILED):
-            archive.checkpoint(*_ending(outcome, seconds))
+            method = task.method, outcome.method or repr(task.method)
+            told = provenance_of(archive.facts["scene"], *method, task.form.name, task.span, time.time())
+            archive.checkpoint(*_ending(outcome, seconds, told))
     except OSError as error:
         outcome = outcome._replace(status=Status.STORE_FAILED, reason=f"{error.strerror or error}.")
     rows, steps, charts = _stored(archive)
@@ -117,7 +123,7 @@ def _stored(archive):
     return outputs, StoredLog.of(outputs, "steps"), StoredLog.of(outputs, "charts")
 
 
-def _ending(outcome, seconds):
+def _ending(outcome, seconds, provenance):
     """The numbers and arrays of a checkpoint at the end of a run."""
     numbers = {"ended": True, "t": outcome.reached, "status": outcome.status, "reason": outcome.reason}
     numbers["method"] = outcome.method
@@ -126,7 +132,7 @@ def _ending(outcome, seconds):
         numbers["watched"] = len(outcome.events[0])
         for name, found in zip(("t", "q", "qd"), outcome.events, strict=True):
             arrays |= {f"event {i}.{name}": array for i, array in enumerate(found)}
-    return numbers | {"statistics": dict(outcome.counts), "seconds": seconds}, arrays
+    return numbers | {"statistics": dict(outcome.counts), "seconds": seconds, "provenance": provenance}, arrays
 
 
 def ended_outcome(numbers, arrays, archive, n, memory):
@@ -151,6 +157,25 @@ def ended_outcome(numbers, arrays, archive, n, memory):
     )  # fmt: skip
 
 
+def provenance_of(scene, method, said, formulation, span, made):
+    """As of `Records.provenance`: of a run of a scene (its hash) by a method, which is called so, made at a time."""
+    settings = {name: getattr(method, name, None) for name in SETTINGS}
+    return {
+        "source": f"tsdyn {__version__}",
+        "scene": scene,
+        "method": said,
+        **{name: float(value) for name, value in settings.items() if isinstance(value, (int, float))},
+        "formulation": formulation,
+        "t_start": float(span[0]),
+        "t_end": float(span[1]),
+        "created": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(made)),
+        "machine": " ".join(machine()[:3]),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+
+
 def _here():
     """What bits depend on beside the run: versions and machine."""
     return {"version": __version__, "kernels": platform_hash(), "machine": machine()}
@@ -161,20 +186,25 @@ def demand_same_place(path, numbers):
     here = _here()
     if any(numbers[name] != here[name] for name in ("version", "kernels")):
         raise StorageError(
-            f"{path} was written by tsdyn {numbers['version']}, and other versions of it, NumPy or Numba are here: "
-            "the bits would differ. Go on there, or start anew from the last output: simulate(state=...)."
+            f"{path} was written by tsdyn {clipped(numbers['version'])}, and other versions of it, NumPy or Numba are "
+            "here: the bits would differ. Go on there, or start anew from the last output: simulate(state=...)."
         )
     if numbers["machine"] != here["machine"]:
+        there = clipped(", ".join(map(str, numbers["machine"][:3])))
         raise StorageError(
-            f"{path} was written on another machine ({', '.join(map(str, numbers['machine'][:3]))}): the bits would "
-            "differ. Go on there, or start anew from the last output: simulate(state=...)."
+            f"{path} was written on another machine ({there}): the bits would differ. Go on there, or start "
+            "anew from the last output: simulate(state=...)."
         )
 
 
-def _demand_same_run(path, facts, numbers):
-    """Raise StorageError unless the scene and the functions are those of the run that is gone on with."""
-    if facts["scene"] != numbers["scene"]:
+def demand_same_scene(path, packed, known):
+    """Raise StorageError unless a packed scene is that of a run, whose hash is known."""
+    if hash_of(packed) != known:
         raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
+
+
+def _demand_same_functions(path, facts, numbers):
+    """Raise StorageError unless the functions are those of the run that is gone on with."""
     for kind in ("functions", "events"):
         known, found = numbers[kind], facts[kind]
         missing = [name for name in known if name not in found]

@@ -17,7 +17,7 @@ import numpy as np
 
 from .. import regular_files
 from ..errors import StorageError
-from ..validation import demand_record, nearest
+from ..validation import demand_record, nearest, reason
 from .formats import NUMBERS, SUFFIXES
 
 FORMAT = b"tsdyn checkpoint 2\n"
@@ -121,7 +121,7 @@ def _read(path):
         numbers, arrays = found["numbers"], _arrays(content, begin + 1, found["arrays"])
         demand_record(numbers, FACTS)
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError, MemoryError) as error:
-        raise StorageError(f"{path} is damaged: {type(error).__name__}: {error}.") from error
+        raise StorageError(f"{path} is damaged: {reason(error)}.") from error
     return numbers, arrays
 
 

@@ -36,6 +36,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import InvalidArgument, MissingDependency, StorageError
+from ..validation import reason
 from .write_errors import demand_folder, writing
 
 HDF5, ZARR = (".h5", ".hdf5", ".nc"), (".zarr",)  # suffixes of paths
@@ -77,7 +78,7 @@ def demand_shapes(path, tables):
     """Raise StorageError unless a store has the columns of these tables, of their shapes but for the rows."""
     found = format_of(path).shapes(path)
     for column, shape in ((column, table.shapes(column)[0]) for table in tables.values() for column in table.columns):
-        if found.get(column.name, ())[1:] != shape[1:] or column.name not in found:
+        if not found.get(column.name) or found[column.name][1:] != shape[1:]:
             said = f"of the shape {found[column.name]}" if column.name in found else "not there"
             raise StorageError(f"{path} is damaged, or of another scene: {column.name} is {said}.")
 
@@ -90,7 +91,7 @@ def reading(path):
     except StorageError:
         raise
     except Exception as error:
-        raise StorageError(f"{path} is damaged, or gone: {type(error).__name__}: {error}.") from error
+        raise StorageError(f"{path} is damaged, or gone: {reason(error).rstrip('.')}.") from error
 
 
 def format_of(path):

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidArgument, StorageError
-from ..validation import damaged
+from ..validation import clipped, damaged
 from .checkpoint import LONGEST
 from .formats import SUFFIXES, format_of
 from .write_errors import demand_folder, unwritable, writing
@@ -154,9 +154,10 @@ def read(path, kind=FORMAT):
             f"{path} is no saved {kind.rpartition(' ')[2]} of tsdyn: it has no attribute 'format' that says so."
         )
     if attributes.get("format_version") != VERSION:
+        version, source = attributes.get("format_version"), attributes.get("source", "another tsdyn")
         raise StorageError(
-            f"{path} has the format {kind} {attributes.get('format_version')}, and this tsdyn reads {VERSION}: "
-            f"{attributes.get('source', 'another tsdyn')} has written it. Install that, or a later one."
+            f"{path} has the format {kind} {clipped(str(version))}, and this tsdyn reads {VERSION}: "
+            f"{clipped(str(source))} has written it. Install that, or a later one."
         )
     form.demand_plain(path)
     arrays = form.get(path, GROUP)
@@ -169,7 +170,7 @@ def read(path, kind=FORMAT):
         found = _sums(arrays) | {c: _sum_of(form, path, c) for columns in tables.values() for c in columns}
         wrong = [name for name in sums.keys() | found.keys() if sums.get(name) != found.get(name)]
     if wrong:
-        names = ", ".join(sorted(wrong)[:5])
+        names = clipped(", ".join(sorted(wrong)[:5]))
         raise StorageError(f"{path} is damaged: {names} has another checksum than when it was written.")
     return record, arrays
 

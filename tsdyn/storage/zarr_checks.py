@@ -12,7 +12,7 @@ from pathlib import Path
 
 from .. import regular_files
 from ..errors import StorageError
-from ..validation import damaged
+from ..validation import clipped, damaged, reason
 from .formats import CHUNK
 
 TYPES = {"float64": 8, "int64": 8, "bool": 1, "uint8": 1}  # bytes of each
@@ -64,7 +64,7 @@ def _demand_array(path, spec, sizes):
     plain = grid["name"] == "regular" and codecs in CODECS and key["name"] == "default" and not others
     little = spec["codecs"][0].get("configuration", {}).get("endian", "little") == "little"
     if not (plain and little and key["configuration"]["separator"] == "/" and spec["node_type"] == "array"):
-        raise StorageError(f"{path} is written in a way that tsdyn doesn't: {', '.join(map(str, codecs))}.")
+        raise StorageError(f"{path} is written in a way that tsdyn doesn't: {clipped(', '.join(map(str, codecs)))}.")
     for shape, least in ((spec["shape"], 0), (chunk, 1)):
         if len(shape) != len(chunk) or not all(type(length) is int and least <= length < 1 << 53 for length in shape):
             raise ValueError("a shape is no list of lengths")
@@ -96,7 +96,7 @@ def _read(path, kind=None):
     try:
         found = json.loads(regular_files.read(file, LARGEST))
     except (ValueError, RecursionError) as error:
-        raise StorageError(f"{file} is damaged, or no JSON: {error}.") from error
+        raise StorageError(f"{file} is damaged, or no JSON: {reason(error)}.") from error
     known = isinstance(found, dict) and found.get("zarr_format") == 3 and kind in (None, found.get("node_type"))
     if not known or found.get("consolidated_metadata"):
         raise StorageError(f"{file} is no metadata of Zarr 3 as tsdyn writes it.")

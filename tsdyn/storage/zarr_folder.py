@@ -8,6 +8,7 @@ import zarr
 from zarr.codecs import BloscCodec
 
 from ..errors import StorageError
+from ..validation import reason
 from .formats import CHUNK, demand_rows, reading
 from .zarr_checks import attributes, demand_plain
 
@@ -131,7 +132,7 @@ def _group(path, mode):
     try:
         return zarr.open_group(path, mode=mode)
     except Exception as error:  # of many kinds
-        raise StorageError(f"{path} can't be read as Zarr: {error}.") from error
+        raise StorageError(f"{path} can't be read as Zarr: {reason(error)}.") from error
 
 
 def _add_labels(group, dimension, labels):

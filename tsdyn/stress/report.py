@@ -123,23 +123,14 @@ def tally_text(tally, seed):
 
 
 def as_data(found, closed, tally, seed):
-    """Return everything as what JSON holds: NaN becomes None."""
-
-    def plain(value):
-        if isinstance(value, dict):
-            return {key: plain(item) for key, item in value.items()}
-        if isinstance(value, (list, tuple)):
-            return [plain(item) for item in value]
-        value = value.item() if isinstance(value, np.generic) else value
-        return None if isinstance(value, float) and not np.isfinite(value) else value
-
-    data = {"seed": seed, "gallery": plain(found)}
-    data["closed_forms"] = [plain({**each._asdict(), "holds": each.holds}) for each in closed]
+    """Return everything as data."""
+    data = {"seed": seed, "gallery": found}
+    data["closed_forms"] = [{**each._asdict(), "holds": each.holds} for each in closed]
     if tally is not None:
         faults = [{**outcome._asdict(), "command": job.command} for job, outcome in tally.faults]
         data["fuzz"] = {
             **{kind: dict(counts) for kind, counts in tally.counts.items()},
-            "faults": plain(faults), "seconds": tally.seconds, "interrupted": tally.interrupted,
+            "faults": faults, "seconds": tally.seconds, "interrupted": tally.interrupted,
         }  # fmt: skip
     return data
 

@@ -34,7 +34,7 @@ class Frames(NamedTuple):
 
 
 def resample(solution: Solution, count: int) -> Frames:
-    """The `Frames` of a solution, at most `count`."""
+    """The `Frames` of a solution, at most `count`; raises InvalidArgument where it has numbers that aren't finite."""
     times = np.linspace(solution.t[0], solution.t[-1], count if solution.t[-1] > solution.t[0] else 1)
     run = _beside(solution, times)
     q = _dense(solution, times)
@@ -48,6 +48,10 @@ def resample(solution: Solution, count: int) -> Frames:
         if dimension == 7:
             p = q[:, at + 3 : at + 7]
             orientation[:, i] = p / np.linalg.norm(p, axis=1, keepdims=True)
+    if not all(np.isfinite(array).all() for array in (position, orientation, run.qd, run.qdd)):
+        raise InvalidArgument(
+            "the outputs have numbers that aren't finite, which can't be drawn: view others, solution[a:b].view()."
+        )
     return Frames(times, position, orientation, run)
 
 

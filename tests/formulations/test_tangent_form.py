@@ -229,3 +229,30 @@ def test_t_eval_and_dense_output_leave_the_run_alone():
     dense = ts.simulate(scene, (0.0, 2.0), integrator=I.DOP853(1e-8, 1e-8), dense_output=True, t_eval=plain.t[::3])
     np.testing.assert_array_equal(plain.q[::3], dense.q)
     np.testing.assert_array_equal(plain.steps.h, dense.steps.h)
+
+
+def nothing(t, a, b, par, out):
+    out[0] = 0.0
+
+
+def branch(t, a, b, par, out):
+    if a[0] > 1e9:
+        out[0] = 1.0
+
+
+@pytest.mark.parametrize("method", [I.DOP853(1e-9, 1e-9), I.Nystrom4(step=1e-2)], ids=repr)
+def test_a_scene_without_series_is_as_well_conditioned_as_it_is(method):
+    """The same bits, and so the same work, as with a force of zero that has a series."""
+
+    def last(function):
+        scene, before = ts.Scene(), None
+        for i in range(3):
+            link = scene.add_body(1.0, (0.1, 0.1, 0.1), (i + 0.5, 0, 0))
+            scene.add(C.Spherical.at(before or scene.ground, link, point=(i, 0, 0)))
+            before = link
+        scene.add(F.UserForce(before, function=function))
+        return ts.simulate(scene, (0.0, 1.0), integrator=method).state
+
+    one, other = last(nothing), last(branch)
+    assert one.q.tobytes() == other.q.tobytes()
+    assert one.qd.tobytes() == other.qd.tobytes()

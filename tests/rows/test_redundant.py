@@ -284,11 +284,11 @@ def test_a_redundant_row_is_found_wherever_a_loop_starts():
 
 def test_a_selection_of_redundant_rows_is_restored_whole():
     """After a passing one, of other rows and of another number."""
-    best, none = np.array([0.5, 1.0, 0.25, 1.0, 0.125]), np.zeros(5)
-    f = SimpleNamespace(dropped=np.array([2, 4, 1, 0, 0, 0]), saved=np.zeros(6, int), best=best.copy(), saved_best=none)
+    selection = SimpleNamespace(weakest=0.125, saved=0.0)
+    f = SimpleNamespace(dropped=np.array([2, 4, 1, 0, 0, 0]), saved=np.zeros(6, int), selection=selection)
     twin(save_selection)(f)
     f.dropped[:] = 3, 0, 2, 3, 0, 0
-    f.best[:] = 2.0
+    selection.weakest = 2.0
     twin(return_to_selection)(f)
     assert f.dropped[:3].tolist() == [2, 4, 1]
-    assert f.best.tolist() == best.tolist()
+    assert selection.weakest == 0.125

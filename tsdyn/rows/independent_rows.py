@@ -30,6 +30,20 @@ def weakest(graph, values):
     return least
 
 
+@kernel
+def weakest_of_all(graph, values):
+    """The same, or the smallest pivot of an axis row, which is the part of an inertia that the other rows account for.
+
+    In METRIC these pivots are one.
+    """
+    least = weakest(graph, values)
+    for i in range(graph.axes.rows.shape[0]):
+        share = abs(values[graph.diagonal[graph.axes.rows[i].row]])
+        if not share * least < 1.0:
+            least = 1.0 / share
+    return least
+
+
 @long_kernel
 def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
     """Select rows by global pivoting, A (m, m) scratch; return the number of rows with pivots below `least`."""

@@ -8,7 +8,7 @@ import numpy as np
 from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
 from ..sparse.constraint_graph import ConstraintGraph, no_graph
 from .evaluation import evaluate_all, evaluate_every_row
-from .independent_rows import select
+from .independent_rows import select, weakest_of_all
 from .redundant_rows import keep_every_row, leave_redundant_rows
 from .row_workspace import Rows, TangentWorkspace, no_tangent_workspace
 from .schur_complement import factorise_selected_rows
@@ -48,8 +48,7 @@ def _choose(graph, reals, f, rows, t, metric):
     leave_redundant_rows(graph, f, f.b, rows.H)
     regular = factorise_selected_rows(graph, f, rows, metric) < 0
     if found and regular:
-        for e in range(f.best.size):
-            f.best[e] = _share(graph, rows.S, e)
+        f.selection.weakest = weakest_of_all(graph, rows.S)
     return regular
 
 
@@ -75,29 +74,20 @@ else:
 @kernel
 def doubt_selection(f):
     """Have rows selected anew at the next chart."""
-    f.best[:] = math.inf
+    f.selection.weakest = math.inf
 
 
 @kernel
 def selection_serves(graph, f, rows):
-    """Return True if each selected row is nearly as independent as at its best, judged by the factors of S.
+    """Return True if the selected rows are nearly as independent as at their best, judged by the factors of S.
 
-    The smallest share of all doesn't tell: another row may fall by orders of magnitude until it is the smallest.
+    Another selection is also asked for, once, before a configuration would pass for one near a singular one.
     """
     if f.dropped[0] == 0:
         return True
-    serves = True
-    for e in range(f.best.size):
-        share = _share(graph, rows.S, e)
-        f.best[e] = max(f.best[e], share)  # a selection next to a singular configuration is no measure
-        serves = serves and share >= WORSE * f.best[e]
-    return serves
-
-
-@kernel
-def _share(graph, values, e):
-    """The pivot of row e over its diagonal entry; values are factors of S, with reciprocals of pivots."""
-    return 1.0 / abs(values[graph.diagonal[e]] * values[graph.pattern.shape[1] + e])
+    share, near = weakest_of_all(graph, rows.S), WORSE * f.indicator.largest
+    f.selection.weakest = max(f.selection.weakest, share)  # a selection next to a singular configuration is no measure
+    return share >= WORSE * f.selection.weakest and not share < near <= f.selection.weakest
 
 
 @long_kernel

@@ -30,9 +30,9 @@ def begin_chart(context, c, r, log, reason):
     status = call_chart(r.kernels.start_chart, context, r.clock.t, r.x, r.y, r.yd, r.xd)
     if kept:
         note_selection(c.tangent, log.points[r.numbers.chart_rows, w.q.size :])
-    if r.numbers.may_pass == 1:
+    if r.numbers.first_order == 0:
         note_indicator(c.graph, c.tangent, c.chart.rows0)
-        if status == 0 and reason != AT_START and is_next_to_singular(c.tangent):
+        if r.numbers.may_pass == 1 and status == 0 and reason != AT_START and is_next_to_singular(c.tangent):
             return PASSAGE
     return status
 

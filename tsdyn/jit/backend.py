@@ -227,15 +227,23 @@ class _Dispatcher(CPUDispatcher):
 def check():
     """Raise ImportError unless everything that is private is as it was seen."""
     for line in PRIVATE.strip().split("\n"):
-        home, _, attribute = line.partition(":")
-        home, _, parameters = home.partition("(")
+        demand(line)
+
+
+def demand(line):
+    """Raise ImportError unless a line of PRIVATE holds."""
+    home, _, attribute = line.partition(":")
+    home, _, parameters = home.partition("(")
+    try:
         found = importlib.import_module(f"numba.core.{home.partition('.')[0]}")
         for name in home.split(".")[1:]:
             found = getattr(found, name)
-        if attribute and attribute not in inspect.unwrap(found).__code__.co_names:
-            raise ImportError(f"numba.core.{home} has no {attribute}")
-        if parameters and ", ".join(inspect.signature(found).parameters) != parameters[:-1]:
-            raise ImportError(f"numba.core.{home} takes {inspect.signature(found)}, not ({parameters}")
+    except (ImportError, AttributeError) as error:
+        raise ImportError(f"numba.core.{home} is gone") from error
+    if attribute and attribute not in inspect.unwrap(found).__code__.co_names:
+        raise ImportError(f"numba.core.{home} has no {attribute}")
+    if parameters and ", ".join(inspect.signature(found).parameters) != parameters[:-1]:
+        raise ImportError(f"numba.core.{home} takes {inspect.signature(found)}, not ({parameters}")
 
 
 def tested(own):

@@ -140,6 +140,7 @@ def _prune_files():
                 file.unlink()
 
 
+@cache
 def machine():
     """The processor as machine code is made for it."""
     processor, features = numba.config.CPU_NAME, numba.config.CPU_FEATURES

@@ -39,6 +39,12 @@ def current():
     return _chosen[0]
 
 
+def described():
+    """Which way kernels are compiled, in words."""
+    way = "its public interface alone" if current() is stock else "tsdyn's own passes"
+    return f"Numba {numba.__version__}, {way}"
+
+
 def attempt(function, own, plain):
     """Return own(); plain() with Numba as it comes, and from then on, where tsdyn's own way fails."""
     if current() is stock:

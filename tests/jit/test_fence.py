@@ -173,6 +173,7 @@ BITS = (
     REPORT
     + """
 import hashlib
+import numpy as np
 import tsdyn as ts
 from benchmarks.stiff import jointed
 from examples import top
@@ -181,7 +182,8 @@ for form in ("null-space", "maggi-kane"):
     found.append(ts.simulate(top.build(), (0.0, 0.05), integrator="rk45", formulation=form))
 found.append(ts.simulate(jointed(), (0.0, 0.05), integrator="implicittrapezoid"))
 scene = top.build()
-cases = [{scene.bodies[0].name + ".mass": 30.0 + i} for i in range(4)]
+mass = next(name for name in scene.parameters() if name.endswith("mass"))
+cases = {mass: scene.parameters()[mass] * np.array([1.0, 1.1, 1.2, 1.3])}
 study = ts.ensemble(scene, cases, (0.0, 0.05), lanes=4)
 bits = [hashlib.sha256(one.q.tobytes() + one.multipliers.tobytes()).hexdigest() for one in found]
 report(bits=[*bits, hashlib.sha256(study.q.tobytes()).hexdigest()], lanes=study.lanes)

@@ -73,8 +73,8 @@ def _tell(error):
     cause = " ".join(f"{type(error).__name__}: {error}".split())[:300]
     warnings.warn(
         f"Numba {numba.__version__} compiles kernels as it comes, since tsdyn's own way fails with it ({cause}). "
-        "Results are the same to the bit; a first run takes two to three times as long, a new process half a second more. "
-        "An older Numba or a newer tsdyn mends it; TSDYN_JIT=stock in the environment accepts it.",
+        "Results are the same to the bit; a first run takes two to three times as long, a new process half a second "
+        "more. An older Numba or a newer tsdyn mends it; TSDYN_JIT=stock in the environment accepts it.",
         CompilerWarning,
         stacklevel=3,
     )

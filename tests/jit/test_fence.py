@@ -10,8 +10,7 @@ import pytest
 from numba.extending import intrinsic
 
 import tsdyn as ts
-from tests.helpers.processes import REPORT, ROOT, SMALL, TINY, command, run
-from tests.jit.test_edits import edit
+from tests.helpers.processes import REPORT, ROOT, SMALL, TINY, command, edit, run
 from tsdyn.jit import backend, cache, compilers, stock
 from tsdyn.jit.aligned_arrays import zeros
 from tsdyn.jit.arrays import stack

@@ -19,6 +19,7 @@ from .elements.joint_friction import JointFriction  # noqa: E402
 from .elements.markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .elements.primitive import Primitive  # noqa: E402
 from .errors import (  # noqa: E402
+    CompilerWarning,
     ImportLosses,
     InconsistentState,
     InvalidArgument,
@@ -74,6 +75,7 @@ __all__ = [
     "Body",
     "Collocation",
     "CollocationTableau",
+    "CompilerWarning",
     "DiagonallyImplicit",
     "Displacement",
     "Ensemble",

@@ -217,6 +217,17 @@ class ImportLosses(UserWarning):
     """
 
 
+class CompilerWarning(RuntimeWarning):
+    """Kernels are compiled in a slower way than usual, or a stored kernel is damaged; results are the same.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> issubclass(ts.CompilerWarning, RuntimeWarning)
+    True
+    """
+
+
 class InvalidFile(TsdynError, ValueError):
     r"""A scene file has mistakes; the message lists all, with line and column.
 

@@ -10,8 +10,10 @@ import pytest
 
 import tsdyn
 from tests.helpers.processes import KERNELS, REPORT, SMALL, TINY, command, finish, run
+from tsdyn.jit import compilers, stock
 
 ROOT = Path(__file__).parents[2]
+own = pytest.mark.skipif(compilers.current() is stock, reason="Numba's own cache has other files")
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX file permissions, limits or locks")
 
 
@@ -22,6 +24,7 @@ def test_first_compilation_is_announced_once(tmp_path):
     assert errors.count("compiling kernels") == 1
 
 
+@own
 @pytest.mark.slow_but("<lambda>0")
 @pytest.mark.parametrize("damage", [lambda b: b[: len(b) // 2], lambda b: b"", lambda b: b[:-9] + b"\0" * 9])
 def test_damaged_kernels_are_compiled_anew(tmp_path, damage):
@@ -121,6 +124,7 @@ def test_processes_starting_together_compile_once(tmp_path):
     assert sum(result["misses"] for result in results) == KERNELS
 
 
+@own
 def test_kernels_without_readable_source_are_stored(package):
     """Generated functions have the lines of a template in another file, which newer versions of Python don't read."""
     (package / "generated.py").write_text(
@@ -159,6 +163,7 @@ print(thrice(1.0), file=__import__("sys").stderr)
 )
 
 
+@own
 def test_a_kernel_under_the_name_of_another_is_compiled_again(tmp_path):
     environment = {"TSDYN_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}
     run(TWO, environment)
@@ -167,7 +172,9 @@ def test_a_kernel_under_the_name_of_another_is_compiled_again(tmp_path):
     one.write_bytes(other.read_bytes())
     other.write_bytes(content)
     mended, errors = run(TWO, environment)
-    assert (mended["value"], mended["damaged"], mended["misses"], errors) == (2.0, 1, 1, "3.0\n")
+    assert (mended["value"], mended["damaged"], mended["misses"]) == (2.0, 1, 1)
+    assert errors.count("under the name of another") == 1
+    assert errors.endswith("3.0\n")
 
 
 @posix

@@ -5,16 +5,8 @@ import os
 
 import pytest
 
-from tests.helpers.processes import REPORT, ROOT, SMALL, run
+from tests.helpers.processes import REPORT, ROOT, SMALL, edit, run
 from tests.helpers.tolerances import ROUNDING
-
-
-def edit(file, old, new):
-    """Python itself takes its bytecode for that of a file of the same size and second."""
-    text, before = file.read_text(), file.stat()
-    assert text.count(old) == 1
-    file.write_text(text.replace(old, new))
-    os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns + 10**9))
 
 
 @pytest.mark.slow

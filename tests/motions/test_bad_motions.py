@@ -10,7 +10,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.refusals import INF, NAN, STEP, branch, build, case, one, refuse, zero
-from tsdyn.jit import cache as _cache
+from tsdyn.jit import backend
 
 C = ts.constraints
 
@@ -116,7 +116,7 @@ def looked_up_too(t):
 
 def locked():
     """The kernels whose compilation still holds its lock."""
-    caches = [item for item in gc.get_objects() if issubclass(type(item), _cache.KernelCache)]
+    caches = [item for item in gc.get_objects() if issubclass(type(item), backend.KernelCache)]
     return [cache._name for cache in caches if "looked_up" in cache._name and cache._lock is not None]
 
 

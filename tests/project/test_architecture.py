@@ -253,18 +253,43 @@ def test_modules_import_each_other_relatively():
                 assert not any(alias.name.startswith("tsdyn") for alias in node.names), module
 
 
+PUBLIC = {  # what may be imported of Numba and llvmlite outside jit/backend.py: their documented interfaces
+    "numba",
+    "numba.types",
+    "numba.extending",
+    "llvmlite.ir",
+    "llvmlite.binding",
+}
+
+
+def _compiler_names(module):
+    """The names of Numba's and llvmlite's that a module imports, with the modules that they are in."""
+    for node in ast.walk(tree(module)):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, "") for alias in node.names if alias.name.startswith(("numba", "llvmlite")))
+        if isinstance(node, ast.ImportFrom) and not node.level and node.module.startswith(("numba", "llvmlite")):
+            for alias in node.names:
+                full = f"{node.module}.{alias.name}"
+                yield (full, "") if full in PUBLIC else (node.module, alias.name)
+
+
 def test_numba_is_used_in_one_place():
     for module in FILES:
-        if _district(module) == "jit":
+        if _district(module) != "jit":
+            assert not list(_compiler_names(module)), module
+
+
+def test_one_file_uses_what_is_private_of_numba():
+    """Imports, and attributes that begin with an underscore and aren't the object's own."""
+    for module, file in FILES.items():
+        if _district(module) != "jit" or module == "tsdyn.jit.backend":
             continue
-        names = {
-            alias.name
-            for node in ast.walk(tree(module))
-            if isinstance(node, (ast.Import, ast.ImportFrom))
-            for alias in node.names
-            if (getattr(node, "module", None) or alias.name).startswith(("numba", "llvmlite"))
-        }
-        assert names <= {"NumbaError"}, module
+        for home, name in _compiler_names(module):
+            assert home in PUBLIC, (module, home, name)
+            assert not name.startswith("_"), (module, home, name)
+        assert not re.search(r"numba\.core|llvmlite\.\w*\._|\b(_defn|_cache|_nrt|_numba_type_)\b", file.read_text()), (
+            module
+        )
 
 
 def test_files_stay_short():

@@ -13,7 +13,7 @@ import sys
 import threading
 from pathlib import Path
 
-from ..jit import cache
+from ..jit import cache, compilers, stock
 from ..jit.code_hash import is_ours
 from ..jit.compiled import DEBUG, is_loaded, is_stored, load
 from ..jit.waiting import Waiting
@@ -131,6 +131,7 @@ def _start():
         **os.environ,
         "PYTHONPATH": os.pathsep.join(path for path in paths if path),
         **cache.environment(),
+        "TSDYN_JIT": "stock" if compilers.current() is stock else "",
         "TSDYN_QUIET": "1",
         "TSDYN_WORKER": "1",
     }

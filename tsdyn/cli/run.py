@@ -59,11 +59,12 @@ def add_plot(parser, what):
     parser.add_argument("--plot", nargs="?", const="", metavar="PATH", help=f"draw {what} (default PNG)")
 
 
-def add_scene(parser, metavar="SCENE"):
+def add_scene(parser, metavar="SCENE", optional=False):
     """Add the file of a scene, and whether it may import plug-ins."""
     parser.add_argument(
         "scene",
         metavar=metavar,
+        nargs="?" if optional else None,
         help="a TOML, URDF, MJCF or SDF file; or a Python file with a function build(), or a scene, which is then "
         "executed; file.py:name takes another one; or an example's name",
     )

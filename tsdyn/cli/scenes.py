@@ -20,8 +20,9 @@ def add_check_options(parser):
 
 def add_info_options(parser):
     """Add the options of `tsdyn info`."""
-    add_scene(parser, "FILE")
+    add_scene(parser, "FILE", optional=True)
     parser.add_argument("--parameters", action="store_true", help="what may vary from run to run, too, with units")
+    parser.add_argument("--cache", action="store_true", help="the stored kernels instead, and those that are damaged")
     add_json(parser)
 
 
@@ -70,7 +71,14 @@ def _check(parsed):
 
 
 def _info(parsed):
-    """Print what is in a file: bodies, mobility, redundant rows, the method and why; or the facts of a solution."""
+    """Print what is in a file: bodies, mobility, redundant rows, the method and why; or the facts of a solution.
+
+    With --cache and no file: where compiled kernels are stored, how many, and which can't be loaded and why.
+    """
+    if parsed.cache == (parsed.scene is not None):
+        raise InvalidArgument("tsdyn info takes a FILE, or --cache, and not both.")
+    if parsed.cache:
+        return _cache_info(parsed)
     if Path(parsed.scene).suffix.lower() in SOLUTIONS:
         return _solution_info(parsed)
     from ..simulation.method_choice import reason
@@ -154,6 +162,27 @@ def _say_what_lacks(found):
     """Print, where errors go, what a file doesn't tell for the want of functions, or classes, of its owner."""
     if getattr(found, "_lacks", ""):
         print(f"tsdyn: {found._lacks}", file=sys.stderr)
+
+
+def _cache_info(parsed):
+    """Print what is in the folder of compiled kernels."""
+    from ..jit import cache
+    from ..jit.compilers import described
+
+    found = {"compiler": described(), **cache.contents()}
+    if parsed.json:
+        print_json(found)
+        return 0
+    print(f"Kernels are compiled by {found['compiler']}.")
+    if found["folder"] is None:
+        print("No folder can be written to, so every process compiles its kernels; set TSDYN_CACHE_DIR to one.")
+        return 0
+    print(f"{found['kernels']} kernels, {found['bytes'] / 1e6:.1f} MB, are in {found['folder']}")
+    for title, lines in (("damaged now", found["damaged"]), ("couldn't be loaded before", found["failures"])):
+        print(f"{title}: {len(lines)}")
+        for line in lines:
+            print(f"  {line if isinstance(line, str) else ': '.join(line)}")
+    return 0
 
 
 def _new(parsed):

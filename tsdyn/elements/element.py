@@ -8,12 +8,11 @@ from types import MethodType
 from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
-from numba.core.errors import NumbaError
 
 from ..calls import Placing, complete_signature, fitting
 from ..docstrings import complete_docstring
 from ..errors import InvalidConstraint
-from ..jit.kernels import kernel
+from ..jit.kernels import NumbaError, kernel
 from ..validation import demand_known, floats, label, number
 from .bodies import Ground, PointMass, rotation_matrix
 from .markers import PARAMETERS, POINT, TURN, Marker, entries

@@ -4,9 +4,7 @@ import platform
 
 import numpy as np
 from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.core.errors import RequireLiteralValue
+from numba import RequireLiteralValue, types
 from numba.extending import intrinsic
 
 from .compiled import DEBUG
@@ -21,16 +19,33 @@ _complex = types.Array(types.complex128, 1, "C")
 
 def array_over(context, builder, kind, pointer, shape):
     """An array over memory that somebody else owns."""
-    from numba.np.arrayobj import populate_array  # a third of the time to import tsdyn, and only to compile
-
     array = context.make_array(kind)(context, builder)
-    size = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
-    strides = [size]
+    array.itemsize = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
+    strides, count = [array.itemsize], context.get_constant(types.intp, 1)
     for length in reversed(shape[1:]):
         strides.insert(0, builder.mul(strides[0], length))
-    data = builder.bitcast(pointer, array.data.type)
-    populate_array(array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None, parent=None)
+    for length in shape:
+        count = builder.mul(count, length, flags=["nsw"])
+    array.data = builder.bitcast(pointer, array.data.type)
+    array.shape, array.strides, array.nitems = joined(builder, shape), joined(builder, strides), count
+    array.meminfo, array.parent = ir.Constant(array.meminfo.type, None), ir.Constant(array.parent.type, None)
     return array._getvalue()
+
+
+def joined(builder, parts):
+    """An array of values in registers."""
+    result = ir.Constant(ir.ArrayType(parts[0].type, len(parts)), ir.Undefined)
+    for i, part in enumerate(parts):
+        result = builder.insert_value(result, part, i)
+    return result
+
+
+def _on_stack(builder, kind):
+    """Memory on the stack, one for all passes of a loop."""
+    with builder.goto_entry_block():
+        pointer = builder.alloca(kind)
+        builder.store(ir.Constant(kind, None), pointer)
+    return pointer
 
 
 def _literal(value):
@@ -47,7 +62,7 @@ def make_stacker(kind, cell):
         length = _literal(n)
 
         def generate(context, builder, signature, arguments):
-            pointer = cgutils.alloca_once(builder, ir.ArrayType(cell, length))
+            pointer = _on_stack(builder, ir.ArrayType(cell, length))
             return array_over(
                 context, builder, signature.return_type, pointer, [context.get_constant(types.intp, length)]
             )
@@ -59,7 +74,7 @@ def make_stacker(kind, cell):
         shape = _literal(n), _literal(m)
 
         def generate(context, builder, signature, arguments):
-            pointer = cgutils.alloca_once(builder, ir.ArrayType(cell, shape[0] * shape[1]))
+            pointer = _on_stack(builder, ir.ArrayType(cell, shape[0] * shape[1]))
             lengths = [context.get_constant(types.intp, s) for s in shape]
             return array_over(context, builder, signature.return_type, pointer, lengths)
 
@@ -79,9 +94,9 @@ def make_viewer(kind):
     @intrinsic
     def view(typing, address, *shape):
         def generate(context, builder, signature, arguments):
-            pointer = builder.inttoptr(arguments[0], _f64.as_pointer())
-            parts = cgutils.unpack_tuple(builder, arguments[1]) if len(arguments) == 2 else list(arguments[1:])
-            return array_over(context, builder, kind, pointer, list(parts))
+            pointer = builder.inttoptr(arguments[0], ir.PointerType())
+            lengths = [builder.extract_value(arguments[1], i) for i in range(len(shape))]
+            return array_over(context, builder, kind, pointer, lengths)
 
         return kind(types.int64, types.StarArgTuple([types.intp] * len(shape))), generate
 

@@ -10,8 +10,8 @@ root can write to are refused.
 import contextlib
 import hashlib
 import os
-import pickle
 import platform
+import shutil
 import stat
 import sys
 import tempfile
@@ -19,21 +19,18 @@ import time
 import uuid
 import warnings
 from collections import Counter
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 
 import llvmlite.binding as llvm
 import numba
-from numba.core.caching import _Cache, dumps
-from numba.core.compiler import CompileResult
-from numba.core.registry import cpu_target
-from numba.core.runtime import rtsys
 
 from .. import regular_files
-from ..errors import StorageError
-from .code_hash import deep_hash, is_ours, platform_hash
+from ..errors import CompilerWarning
+from .code_hash import deep_hash, platform_hash
 
 statistics = Counter()  # "hits", "misses", "damaged", "seconds" of reading, "waited" (s) for kernels, of this process
+FAILURES = "failures.txt"  # in the folder of kernels: those that couldn't be loaded, a line each
 _DAY = 86400.0
 _KEEP = 30 * _DAY  # files that nothing has read for so long are deleted
 _told = []
@@ -131,9 +128,7 @@ def _prune(base, keep):
     for old in base.iterdir():
         with contextlib.suppress(OSError):
             if old.is_dir() and old != keep and time.time() - old.stat().st_mtime > _KEEP:
-                for file in old.iterdir():
-                    file.unlink()
-                old.rmdir()
+                shutil.rmtree(old, ignore_errors=True)
 
 
 @cache
@@ -145,114 +140,98 @@ def _prune_files():
                 file.unlink()
 
 
+@cache
 def machine():
     """The processor as machine code is made for it."""
-    return [platform.machine(), *map(str, cpu_target.target_context.codegen().magic_tuple())]
+    processor, features = numba.config.CPU_NAME, numba.config.CPU_FEATURES
+    if features is None:
+        with contextlib.suppress(RuntimeError):  # a processor that LLVM doesn't know
+            features = llvm.get_host_cpu_features().flatten()
+    found = llvm.get_process_triple(), processor or llvm.get_host_cpu_name(), features or ""
+    return [platform.machine(), *found, *["no AVX"][bool(numba.config.ENABLE_AVX) :]]
 
 
-class KernelCache(_Cache):
-    """The disk cache of one function, with a lock so that processes starting together compile once."""
+def name_of(function):
+    """The name of a kernel's file: its own, and the hash of all code that it depends on."""
+    home = Path(function.__code__.co_filename).stem
+    label = f"{home}.{function.__qualname__}".translate({ord(c): "" for c in '<>:"/\\|?*'})
+    return f"{label[:100]}-{deep_hash(function)}"
 
-    def __init__(self, function):
-        self._function = function
-        self._lock = None
 
-    @cached_property
-    def _name(self):
-        """Computed at first use, when all that the function names is defined."""
-        function = self._function
-        home = Path(function.__code__.co_filename).stem
-        label = f"{home}.{function.__qualname__}".translate({ord(c): "" for c in '<>:"/\\|?*'})
-        return f"{label[:100]}-{deep_hash(function)}"
+def key_of(signature):
+    """What tells a signature, and the processor, in the name of a kernel's file."""
+    return hashlib.sha256(repr((signature, machine())).encode()).hexdigest()[:12]
 
-    @property
-    def cache_path(self):
-        """The folder that kernels are written to."""
-        return str(folder())
 
-    def enable(self):
-        """Do nothing: kernels are always cached."""
-
-    disable = flush = enable
-
-    def load_overload(self, sig, target_context):
-        """Return the compiled function, or None; a miss takes the lock that save_overload gives back."""
-        started = time.perf_counter()
-        if is_ours(self._function.__module__):
-            rtsys.initialize(target_context)
-        else:  # libraries that a user's kernel calls, such as LAPACK, are found by what Numba imports here
-            target_context.refresh()
-        file = self._file(sig, target_context.codegen())
-        found = self._load(file, target_context)
-        if found is None:
-            self.release()  # of a compilation that was interrupted
-            self._lock = _acquire(file)
-            found = self._load(file, target_context)
-        if found is None:
-            target_context.refresh()  # before the compiler's own context stands over it
-            statistics["misses"] += 1
-            tell()
-        else:
-            statistics["hits"] += 1
-            self.release()
-        statistics["seconds"] += time.perf_counter() - started
-        return found
-
-    def has(self, sig, codegen):
-        """Whether there is a file of the compiled function."""
-        name = self._file(sig, codegen)
-        return any((path / name).exists() for path in folders())
-
-    def save_overload(self, sig, data):
-        """Store the compiled function and let waiting processes read it."""
+def load(name, rebuild):
+    """What `rebuild` makes of the content of a kernel's file; None where there is none, or none that can be loaded."""
+    for file in (path / name for path in folders()):
+        if not os.path.lexists(file):
+            continue
         try:
-            if not data.lifted and not data.library.has_dynamic_globals and folder() is not None:
-                plain = data._replace(type_annotation="")  # the source's text, which generated functions don't have
-                (name, kind, (code, bitcode)), *others = plain._reduce()
-                payload = dumps(((name, kind, (code, _without_bodies(bitcode))), *others))
-                _write(folder() / self._file(sig, data.codegen), payload)
-                _prune_files()
-        except OSError as error:
-            _warn(f"tsdyn can't store its compiled kernels in {folder()} ({error.strerror})")
-        finally:
-            self.release()
-
-    def release(self):
-        """Give the lock back, if it is held."""
-        if self._lock is not None:
-            self._lock.close()
-            self._lock = None
-
-    def _file(self, sig, codegen):
-        key = hashlib.sha256(repr((sig, codegen.magic_tuple())).encode()).hexdigest()
-        return f"{self._name}-{key[:12]}.kernel"
-
-    def _load(self, name, target_context):
-        for path in folders():
-            with contextlib.suppress(OSError, StorageError):
-                file = path / name
-                content = regular_files.read(file, flags=regular_files.NO_LINKS)
-                try:
-                    if _seal(name, content[_CHECKSUM:]) != content[:_CHECKSUM]:
-                        raise ValueError("checksum")
-                    found = CompileResult._rebuild(target_context, *pickle.loads(content[_CHECKSUM:]))
-                except Exception:  # whatever a damaged file makes of the loader
-                    statistics["damaged"] += 1
-                    file.unlink()
-                    continue
-                with contextlib.suppress(OSError):
-                    if time.time() - file.stat().st_mtime > _DAY:
-                        os.utime(file)
-                return found
-        return None
+            found = rebuild(_opened(name, regular_files.read(file, flags=regular_files.NO_LINKS)))
+        except Exception as error:  # whatever a damaged file makes of the loader
+            _report(file, error)
+            continue
+        with contextlib.suppress(OSError):
+            if time.time() - file.stat().st_mtime > _DAY:
+                os.utime(file)
+        return found
+    return None
 
 
-def _without_bodies(bitcode):
-    """LLVM's code with empty functions of the same names, which is all that is read of it: nothing links it in."""
-    functions = [found for found in llvm.parse_bitcode(bitcode).functions if not found.is_declaration]
-    return llvm.parse_assembly(
-        "\n".join(f'define void @"{found.name}"() {{ ret void }}' for found in functions)
-    ).as_bitcode()
+def save(name, payload):
+    """Write a kernel's file."""
+    _write(folder() / name, payload)
+    _prune_files()
+
+
+def _opened(name, content):
+    """The content of a kernel's file without its checksum."""
+    if _seal(name, content[_CHECKSUM:]) != content[:_CHECKSUM]:
+        raise ValueError("the checksum is wrong: the file is damaged, or under the name of another")
+    return content[_CHECKSUM:]
+
+
+def _report(file, error):
+    """Count a kernel that can't be loaded, note it in its folder, delete it; warn once a process."""
+    statistics["damaged"] += 1
+    cause = " ".join(f"{type(error).__name__}: {error}".split())
+    with contextlib.suppress(OSError), open(file.parent / FAILURES, "a", encoding="utf-8") as log:
+        log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {file.name} {cause[:200]}\n")
+    with contextlib.suppress(OSError):
+        file.unlink()
+    if statistics["damaged"] == 1:
+        warnings.warn(
+            f"a stored kernel can't be loaded, and is compiled again: {file} ({cause}). `tsdyn info --cache` counts "
+            "such files; where they become more, check the disk, or set TSDYN_CACHE_DIR to a folder on another one.",
+            CompilerWarning,
+            stacklevel=2,
+        )
+
+
+def contents():
+    """What is in the folder of kernels: {"folder", "kernels", "bytes", "damaged", "failures"}.
+
+    damaged: [(file, cause)] of files whose checksum is wrong; failures: lines on those that couldn't be loaded before.
+    """
+    path, damaged, failures, sizes = folder(), [], [], []
+    for file in sorted(path.glob("*.kernel")) if path else ():
+        try:
+            content = regular_files.read(file, flags=regular_files.NO_LINKS)
+            sizes.append(len(content))
+            _opened(file.name, content)
+        except (OSError, ValueError) as error:
+            damaged.append((file.name, f"{type(error).__name__}: {error}"))
+    with contextlib.suppress(OSError):
+        failures = (path / FAILURES).read_text(encoding="utf-8").splitlines() if path else []
+    return {
+        "folder": path and str(path),
+        "kernels": len(sizes) - len(damaged),
+        "bytes": sum(sizes),
+        "damaged": damaged,
+        "failures": failures,
+    }
 
 
 def _seal(name, payload):
@@ -294,6 +273,11 @@ def tell(line="tsdyn: compiling kernels, once for this version and machine ...")
             _warn("tsdyn found no writable folder for its compiled kernels")
 
 
+def warn_unwritable(error):
+    """Say, once a process, that kernels can't be stored."""
+    _warn(f"tsdyn can't store its compiled kernels in {folder()} ({error.strerror})")
+
+
 @cache
 def _warn(what):
     warnings.warn(
@@ -304,7 +288,7 @@ def _warn(what):
     )
 
 
-def _acquire(name, patience=300.0):
+def acquire(name, patience=300.0):
     """Lock a kernel, wait while another process compiles it; None where files can't be locked."""
     try:
         import fcntl

@@ -20,13 +20,6 @@ import numba
 from llvmlite import ir
 
 _LIBRARIES = ("numpy", "numba", "math", "cmath", "scipy")  # their versions say all about them
-_GENERATORS = (
-    "arrays.py",
-    "compiler.py",
-    "kernels.py",
-    "resident.py",
-    "simd.py",
-)  # code that no function names: types and their lowering
 _PACKAGE = __name__.partition(".")[0]
 _known = {}  # function: hash; the function is kept alive, so that the key stays its own
 
@@ -38,9 +31,10 @@ def platform_hash():
     for name in ("numba", "llvmlite", "numpy"):
         with contextlib.suppress(PackageNotFoundError):
             digest.update(f"{name} {version(name)}\0".encode())
-    for file in _GENERATORS:
-        with contextlib.suppress(OSError):
-            digest.update((Path(__file__).parent / file).read_bytes())
+    for file in sorted(Path(__file__).parent.glob("*.py")):  # code that no function names: types and their lowering
+        content = file.read_bytes()
+        if b"from numba.extending import" in content:
+            digest.update(content)
     return digest.hexdigest()[:16]
 
 
@@ -57,7 +51,10 @@ def deep_hash(function):
 
 
 def _plain(value):
-    return getattr(value, "py_func", getattr(value, "_defn", value))  # of a dispatcher, of an intrinsic
+    """The Python function of a dispatcher or of an intrinsic; whatever else as it is."""
+    if isinstance(value, (types.FunctionType, type)):
+        return value
+    return getattr(value, "py_func", getattr(value, "__wrapped__", value))
 
 
 def _function_hash(function, above):

@@ -8,16 +8,17 @@ import contextlib
 import os
 import threading
 import time
+from functools import cached_property, partial, update_wrapper
 
 import numba
-from numba.core.ccallback import CFunc
-from numba.core.registry import cpu_target
-from numba.core.typing import signature as numba_signature
+from numba.extending import typeof_impl
 
-from .cache import KernelCache, statistics
-from .compiler import OPTIONS, Compiler
+from . import stock
+from .cache import statistics
+from .compilers import attempt, callback_frames, current
 from .interrupts import prompt_interrupts
 
+OPTIONS = {"error_model": "numpy"}  # of every kernel
 DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
 _lock, _within = threading.RLock(), threading.local()
 table = [None]  # debug mode: what an address stands for; zero is no address
@@ -37,7 +38,7 @@ def _compiling():
     began, outermost = time.perf_counter(), not getattr(_within, "block", False)
     _within.block = True
     try:
-        with prompt_interrupts():
+        with prompt_interrupts(callback_frames()):
             yield
     finally:
         if outermost:
@@ -63,12 +64,55 @@ def entry(*arguments):
 
 
 def _entry(function):
-    if DEBUG:
-        return function
-    dispatcher = numba.njit(nogil=True, pipeline_class=Compiler, **OPTIONS)(function)
-    dispatcher._cache = KernelCache(function)
-    dispatcher.compile = _compiling()(dispatcher.compile)
-    return dispatcher
+    return function if DEBUG else _for_python(function, {"nogil": True, **OPTIONS})
+
+
+def _for_python(function, options):
+    """A kernel that Python calls, compiled or loaded at its first call for some types of arguments."""
+    plain = stock.entry(function, options, _compiling())
+    if current() is stock:
+        return plain
+
+    def guarded(compile_own):
+        def compile_for(arguments):
+            with _compiling():
+                return attempt(function, partial(compile_own, arguments), partial(plain.compile, arguments))
+
+        return compile_for
+
+    return current().entry(function, options, guarded)
+
+
+class Callee:
+    """A kernel that kernels call; what Numba needs to compile it is made when a caller is compiled."""
+
+    def __init__(self, py_func, options):
+        self.py_func, self.targetoptions, self._made = py_func, options, {}
+        update_wrapper(self, py_func)
+
+    def dispatcher(self):
+        """What Numba compiles it by."""
+        way = current()
+        if way not in self._made:
+            self._made[way] = way.callee(self.py_func, self.targetoptions)
+        return self._made[way]
+
+    @cached_property
+    def _from_python(self):
+        return _for_python(self.py_func, self.targetoptions)
+
+    def __call__(self, *arguments, **keywords):
+        """For whoever tries a kernel: it is compiled, or loaded, for Python."""
+        return self._from_python(*arguments, **keywords)
+
+    def __reduce__(self):
+        """By name, as functions are."""
+        return self.__qualname__
+
+
+@typeof_impl.register(Callee)
+def _type_of_callee(value, context):
+    return numba.types.Dispatcher(value.dispatcher())
 
 
 class Callback:
@@ -79,7 +123,7 @@ class Callback:
 
     def __init__(self, function, signature, result="i", allocates=False):
         self.py_func = getattr(function, "py_func", function)
-        self.options = {**OPTIONS, "_nrt": allocates}
+        self.allocates = allocates
         self.signature = signature
         self.result = result
         self._address = None
@@ -97,20 +141,15 @@ class Callback:
         table.append(self.py_func)
         return len(table) - 1
 
-    def types(self):
-        """Numba's types of the arguments, and of the result."""
-        return tuple(letters[c] for c in self.signature), letters[self.result]
+    def type(self):
+        """Numba's signature."""
+        return letters[self.result](*(letters[c] for c in self.signature))
 
     def _compile(self):
-        cfunc = CFunc(self.py_func, self.types(), locals={}, options=self.options, pipeline_class=Compiler)
-        cfunc._cache = cache = KernelCache(self.py_func)
-        try:
-            with _compiling():
-                cfunc.compile()
-        finally:
-            cache.release()
-        self._cfunc = cfunc  # keeps the code alive
-        return cfunc.address
+        given = self.py_func, self.type(), OPTIONS, self.allocates
+        with _compiling():
+            self._kept = attempt(self.py_func, lambda: current().callback(*given), partial(stock.callback, *given))
+        return self._kept.address
 
 
 def callback(signature, result="i"):
@@ -130,12 +169,7 @@ def is_loaded(kernel):
 
 def is_stored(kernel):
     """Whether the cache on disk has the machine code."""
-    if isinstance(kernel, Callback):
-        arguments, result = kernel.types()
-        key, cache = numba_signature(result, *arguments), KernelCache(kernel.py_func)
-    else:
-        key, cache = _types(kernel), kernel._cache
-    return cache.has(key, cpu_target.target_context.codegen())
+    return current().is_stored(kernel.py_func, kernel.type() if isinstance(kernel, Callback) else _types(kernel))
 
 
 def load(kernel):

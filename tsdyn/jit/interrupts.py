@@ -17,8 +17,11 @@ LOOK = 0.05  # s between two looks of a waiting thread, which Windows doesn't wa
 
 
 @contextlib.contextmanager
-def prompt_interrupts():
-    """Turn a Ctrl-C during the block into KeyboardInterrupt: at once, or at the end where LLVM calls back."""
+def prompt_interrupts(callbacks):
+    """Turn a Ctrl-C during the block into KeyboardInterrupt: at once, or at the end where LLVM calls back.
+
+    callbacks: how the names of the functions begin that LLVM calls.
+    """
     if not _raises_here():
         yield
         return
@@ -27,7 +30,7 @@ def prompt_interrupts():
     def handle(number, frame):
         nonlocal interrupted
         interrupted = True
-        if not _in_callback(frame):
+        if not _within(frame, callbacks):
             raise KeyboardInterrupt
 
     signal.signal(signal.SIGINT, handle)
@@ -115,9 +118,9 @@ def _raises_here():
     return in_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def _in_callback(frame):
+def _within(frame, callbacks):
     while frame is not None:
-        if frame.f_code.co_name.startswith("_raw_object_cache"):
+        if frame.f_code.co_name.startswith(callbacks):
             return True
         frame = frame.f_back
     return False

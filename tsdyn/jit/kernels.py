@@ -12,8 +12,7 @@ import dis
 
 import numba
 from llvmlite import ir
-from numba import types
-from numba.core import cgutils
+from numba import NumbaError, types
 from numba.extending import intrinsic
 
 from ..errors import InvalidConstraint
@@ -32,14 +31,15 @@ from .arrays import (
     vector,
 )
 from .code_hash import is_ours
-from .compiled import DEBUG, Callback, callback, entry, letters, table
-from .compiler import OPTIONS, Callee
+from .compiled import DEBUG, OPTIONS, Callback, Callee, callback, entry, letters, table
+from .compilers import current
 from .resident import Record, Seen, image_of, loader, records, resident, row_of
 
 __all__ = [  # what is to be found here, too
     "ANY",
     "HAS_CYCLES",
     "Callback",
+    "NumbaError",
     "Record",
     "callback",
     "complex_stack",
@@ -78,7 +78,7 @@ def kernel(function, allocates=False, inline=True):
     8.0
     """
     if allocates:
-        options = {**OPTIONS, "_nrt": True, "boundscheck": True}
+        options = {**OPTIONS, "boundscheck": True}
     elif RAISE in function.__code__.co_code[::2]:  # every second byte is an operation
         raise InvalidConstraint(
             f"{function.__qualname__}: a kernel can't raise or assert; write nan where there is no value."
@@ -87,7 +87,7 @@ def kernel(function, allocates=False, inline=True):
         options = {**OPTIONS, "forceinline": inline}
         if is_ours(function.__module__) and not DEBUG:
             return Callee(function, options)
-    return function if DEBUG else numba.njit(**options)(function)
+    return function if DEBUG else numba.njit(**options, **current().options(allocates))(function)
 
 
 def long_kernel(function):
@@ -154,19 +154,20 @@ def caller(signature, result="i", linked=None):
         ]
         own = None
         if linked is not None and any(isinstance(kind, types.Array) and kind.dtype != _FLOAT for kind in wanted):
-            own = linked._numba_type_.get_call_type(typing, tuple(wanted), {})
+            own = numba.typeof(linked).get_call_type(typing, tuple(wanted), {})
 
         def generate(context, builder, sig, values):
-            given = cgutils.unpack_tuple(builder, values[1])
+            given = [builder.extract_value(values[1], i) for i in range(len(wanted))]
             if own is not None:
-                return context.get_function(linked._numba_type_, own)(builder, given)
+                return context.get_function(numba.typeof(linked), own)(builder, given)
             words = []
             for kind, value in zip(wanted, given, strict=True):
                 if isinstance(kind, types.Array):
                     data = context.make_array(kind)(context, builder, value=value).data
                     value = builder.ptrtoint(data, native["p"])  # something seen is its address
                 words.append(value)
-            target = ir.FunctionType(native[result], [native[c] for c in signature]).as_pointer()
+            # the one typed pointer: llvmlite reads the signature of a call by address from it
+            target = ir.PointerType(ir.FunctionType(native[result], [native[c] for c in signature]))
             return builder.call(builder.inttoptr(values[0], target), words)
 
         return letters[result](types.int64, types.StarArgTuple(wanted)), generate

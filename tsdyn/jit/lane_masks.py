@@ -9,9 +9,9 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, register_model
 
+from .arrays import joined
 from .kernels import kernel
 from .lanes import FourLanes, Lane, of_register
-from .simd import joined
 
 _i64 = ir.IntType(64)
 _MANTISSA, _BIAS = 52, 1023  # bits of a float's fraction; what is added to its exponent

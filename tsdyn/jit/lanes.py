@@ -7,30 +7,27 @@ branches on must be the same in all lanes, so numbers of lanes can't be compared
     makers(width)        stack, vector, matrix, ... of them by the names of what they stand for in arrays.py
 """
 
-import hashlib
 import math
 import operator
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.core.imputils import lower_builtin, lower_cast
-from numba.core.typeconv import Conversion
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import models, register_model
+from numba.extending import lower_builtin, lower_cast, models, register_model, type_callable
 
 from . import aligned_arrays
-from .arrays import make_stacker, make_viewer
+from .arrays import joined, make_stacker, make_viewer
 from .resident import known_types
-from .simd import FOUR, joined, spread
+from .simd import FOUR, spread
 
 _f64 = ir.DoubleType()
-# by which kernels in the cache tell the lowering of lanes, that no function names
-_DIGEST = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
 WIDTHS = 4, 8  # lanes that there are types for
+
+
+def _as(typing, kind):
+    """What Numba says of the conversion of such a number to a float: exact of a float, safe of an integer."""
+    return typing.can_convert(kind, types.float64)
 
 
 class Lane(types.Type):
@@ -38,15 +35,15 @@ class Lane(types.Type):
 
     def __init__(self, width, threes=False):
         self.width, self.bitwidth, self.threes = width, 64 * width, threes
-        super().__init__(name=f"Lane({width}{', threes' * threes}) {_DIGEST}")
+        super().__init__(name=f"Lane({width}{', threes' * threes})")
         self.lane = lane_type(width) if threes else self
         self.four = FourLanes(self.lane, 3 if threes else 4)
 
     def can_convert_from(self, typing, other):
         """Plain numbers are the same in all lanes."""
         if isinstance(other, Lane):
-            return Conversion.exact
-        return Conversion.safe if isinstance(other, (types.Integer, types.Float)) else None
+            return _as(typing, types.float64)
+        return _as(typing, types.int32) if isinstance(other, (types.Integer, types.Float)) else None
 
     def unify(self, typing, other):
         """A variable that is a plain number and one of lanes is one of lanes."""
@@ -67,9 +64,8 @@ class FourLanes(types.Type):
 
     def can_convert_from(self, typing, other):
         """Four plain numbers are the same in all lanes; a fourth may be left out."""
-        if isinstance(other, FourLanes):
-            return Conversion.safe if other.count > self.count else None
-        return Conversion.safe if other is FOUR else None
+        fits = other.count > self.count if isinstance(other, FourLanes) else other is FOUR
+        return _as(typing, types.int32) if fits else None
 
     def unify(self, typing, other):
         """As of `Lane`."""
@@ -150,15 +146,14 @@ def _spread_four(context, builder, given, kind, value):
 def _typed(function, count):
     """Let the function take so many numbers, at least one of them of lanes."""
 
-    class Template(AbstractTemplate):
-        def generic(self, arguments, keywords):
-            kind = next((each for each in arguments if isinstance(each, Lane)), None)
-            plain = (Lane, types.Integer, types.Float)
-            if kind is None or keywords or len(arguments) != count or not all(isinstance(a, plain) for a in arguments):
-                return None
-            return signature(kind.lane, *[kind.lane] * count)
+    def kind_of(*arguments):
+        kind = next((each for each in arguments if isinstance(each, Lane)), None)
+        plain = (Lane, types.Integer, types.Float)
+        if kind is None or not all(isinstance(each, plain) for each in arguments):
+            return None
+        return kind.lane(*[kind.lane] * count)
 
-    infer_global(function)(Template)
+    type_callable(function)(lambda context: (lambda x: kind_of(x)) if count == 1 else (lambda x, y: kind_of(x, y)))
 
 
 def _operation(name, *functions):
@@ -179,8 +174,9 @@ _operation("fdiv", operator.truediv, operator.itruediv)
 def of_register(builder, name, *values):
     """A function that LLVM has for registers, of these."""
     kind = values[0].type
-    wanted = ir.FunctionType(kind, [kind] * len(values))
-    return builder.call(cgutils.get_or_insert_function(builder.module, wanted, f"llvm.{name}.v{kind.count}f64"), values)
+    wanted, full = ir.FunctionType(kind, [kind] * len(values)), f"llvm.{name}.v{kind.count}f64"
+    function = builder.module.globals.get(full) or ir.Function(builder.module, wanted, full)
+    return builder.call(function, values)
 
 
 def _of_registers(name, count, *functions):

@@ -22,13 +22,13 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core.typing.templates import AttributeTemplate
-from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model, typeof_impl
+from numba.extending import intrinsic, models, register_model, typeof_impl
 
 from .arrays import array_over
 from .compiled import DEBUG
+from .compilers import current
 
-_i64, _f64 = ir.IntType(64), ir.DoubleType()
+_i64 = ir.IntType(64)
 known_types = {}  # dtype: Numba's type of a number, where Numba knows none of itself
 _NUMBERS = {float: (ctypes.c_double, types.float64), int: (ctypes.c_int64, types.int64)}
 
@@ -113,6 +113,7 @@ class Seen(types.Type):
     def __init__(self, kind):
         self.kind = kind
         super().__init__(name=f"Seen({kind.instance_class.__name__} {sha256(str(kind).encode()).hexdigest()[:12]})")
+        _expose(self, kind.fields)
 
 
 @register_model(Seen)
@@ -121,35 +122,33 @@ class _SeenModel(models.PrimitiveModel):
         super().__init__(manager, kind, _i64)
 
 
-@infer_getattr
-class _SeenFields(AttributeTemplate):
-    key = Seen
-
-    def generic_resolve(self, seen, name):
-        """The type of a field: an array, a record, or again something seen."""
-        if name in seen.kind.fields:
-            field = seen.kind.types[seen.kind.fields.index(name)]
-            return Seen(field) if isinstance(field, types.BaseTuple) else field
+def _type_of_field(seen, name):
+    """The type of a field: an array, a record, or again something seen."""
+    if name not in seen.kind.fields:
         return None
+    field = seen.kind.types[seen.kind.fields.index(name)]
+    return Seen(field) if isinstance(field, types.BaseTuple) else field
 
 
-@lower_getattr_generic(Seen)
-def _seen_field(context, builder, seen, address, name):
+def _read_field(context, builder, seen, address, name):
     at = seen.kind.fields.index(name)
     field = seen.kind.types[at]
     place = builder.add(address, _i64(8 * sum(map(_words, seen.kind.types[:at]))))
     if isinstance(field, types.BaseTuple):
         return place
-    words = builder.inttoptr(place, _i64.as_pointer())
+    words = builder.inttoptr(place, ir.PointerType())
     if isinstance(field, types.Record):
         return builder.inttoptr(_word(builder, words, 0), context.get_value_type(field))
     pointer, *shape = (_word(builder, words, i) for i in range(1 + field.ndim))
-    return array_over(context, builder, field, builder.inttoptr(pointer, _f64.as_pointer()), shape)
+    return array_over(context, builder, field, builder.inttoptr(pointer, ir.PointerType()), shape)
+
+
+_expose = current().attributes(Seen, _type_of_field, _read_field)
 
 
 def _word(builder, words, i):
     """A word of memory that no kernel changes, which says so to the compiler."""
-    word = builder.load(builder.gep(words, [_i64(i)]))
+    word = builder.load(builder.gep(words, [_i64(i)], source_etype=_i64), typ=_i64)
     word.set_metadata("invariant.load", builder.module.add_metadata([]))
     return word
 

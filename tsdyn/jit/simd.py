@@ -19,6 +19,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, register_model
 
+from .arrays import joined
 from .kernels import DEBUG, kernel
 
 _WIDTH = 4
@@ -59,14 +60,6 @@ def _each(builder, kind, operation, values):
     return joined(builder, parts)
 
 
-def joined(builder, parts):
-    """Numbers of lanes from the register of each."""
-    result = ir.Constant(ir.ArrayType(parts[0].type, len(parts)), ir.Undefined)
-    for i, part in enumerate(parts):
-        result = builder.insert_value(result, part, i)
-    return result
-
-
 def _parts(builder, kind, value):
     """Each of four, or of three."""
     if kind is FOUR:
@@ -75,9 +68,12 @@ def _parts(builder, kind, value):
 
 
 def _pointer(context, builder, kind, array, index):
+    """Where array[index] is, and its type."""
     data = context.make_array(kind)(context, builder, value=array).data
-    place = builder.gep(data, [index])
-    return builder.bitcast(place, _quad.as_pointer()) if _fours(kind.dtype) is FOUR else place
+    element = context.get_value_type(kind.dtype)
+    place = builder.gep(data, [index], source_etype=element)
+    place.type = ir.PointerType()  # of no type: a bitcast of Numba's typed pointer would leave it as it is
+    return place, element
 
 
 @intrinsic
@@ -86,10 +82,11 @@ def four(typing, array, index):
     kind = _fours(array.dtype)
 
     def generate(context, builder, signature, arguments):
-        pointer = _pointer(context, builder, signature.args[0], *arguments)
+        pointer, element = _pointer(context, builder, signature.args[0], *arguments)
         if kind is FOUR:
-            return builder.load(pointer, align=8)
-        return joined(builder, [builder.load(builder.gep(pointer, [_i32(i)])) for i in range(kind.count)])
+            return builder.load(pointer, align=8, typ=_quad)
+        places = [builder.gep(pointer, [_i32(i)], source_etype=element) for i in range(kind.count)]
+        return joined(builder, [builder.load(place, typ=element) for place in places])
 
     return kind(array, types.int64), generate
 
@@ -100,12 +97,12 @@ def put(typing, array, index, value):
     kind = _fours(array.dtype, value)
 
     def generate(context, builder, signature, arguments):
-        pointer = _pointer(context, builder, signature.args[0], *arguments[:2])
+        pointer, element = _pointer(context, builder, signature.args[0], *arguments[:2])
         if kind is FOUR:
             builder.store(arguments[2], pointer, align=8)
         else:
             for i, part in enumerate(_parts(builder, kind, arguments[2])):
-                builder.store(part, builder.gep(pointer, [_i32(i)]))
+                builder.store(part, builder.gep(pointer, [_i32(i)], source_etype=element))
         return context.get_dummy_value()
 
     return types.none(array, types.int64, kind), generate
@@ -265,8 +262,8 @@ def get(typing, array, index):
     """array[index], index >= 0 and within: nothing is looked after."""
 
     def generate(context, builder, signature, arguments):
-        data = context.make_array(signature.args[0])(context, builder, value=arguments[0]).data
-        return builder.load(builder.gep(data, [arguments[1]]))
+        place, element = _pointer(context, builder, signature.args[0], *arguments)
+        return builder.load(place, typ=element)
 
     return getattr(array.dtype, "lane", array.dtype)(array, types.int64), generate
 
@@ -276,8 +273,8 @@ def let(typing, array, index, value):
     """array[index] = value, likewise."""
 
     def generate(context, builder, signature, arguments):
-        data = context.make_array(signature.args[0])(context, builder, value=arguments[0]).data
-        builder.store(arguments[2], builder.gep(data, [arguments[1]]))
+        place, _ = _pointer(context, builder, signature.args[0], *arguments[:2])
+        builder.store(arguments[2], place)
         return context.get_dummy_value()
 
     return types.none(array, types.int64, array.dtype), generate
@@ -286,11 +283,10 @@ def let(typing, array, index, value):
 @intrinsic
 def _fetch(typing, array, index):
     def generate(context, builder, signature, arguments):
-        data = context.make_array(signature.args[0])(context, builder, value=arguments[0]).data
-        byte = ir.IntType(8).as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [byte, _i32, _i32, _i32])
-        prefetch = builder.module.declare_intrinsic("llvm.prefetch", (byte,), kind)
-        place = builder.bitcast(builder.gep(data, [arguments[1]]), byte)
+        place, _ = _pointer(context, builder, signature.args[0], *arguments)
+        pointer = ir.PointerType()
+        kind = ir.FunctionType(ir.VoidType(), [pointer, _i32, _i32, _i32])
+        prefetch = builder.module.declare_intrinsic("llvm.prefetch", (pointer,), kind)
         builder.call(prefetch, [place, _i32(0), _i32(3), _i32(1)])
         return context.get_dummy_value()
 

@@ -7,12 +7,11 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba.core.errors import NumbaError
 
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidConstraint
 from ..jit.compiled_once import compiled_once
-from ..jit.kernels import Callback, caller, entry, kernel, specialised
+from ..jit.kernels import Callback, NumbaError, caller, entry, kernel, specialised
 from ..validation import number, shown
 from .elementary import Constant, Piecewise, time
 from .expressions import FUNCTIONS, Smooth

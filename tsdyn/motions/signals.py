@@ -5,11 +5,10 @@ from functools import partial
 from types import FunctionType
 
 import numpy as np
-from numba.core.errors import NumbaError
 
 from ..errors import InvalidArgument
 from ..jit.compiled_once import compiled_once
-from ..jit.kernels import Callback, caller, entry, kernel, specialised, vector
+from ..jit.kernels import Callback, NumbaError, caller, entry, kernel, specialised, vector
 from ..validation import floats, number, shown
 from .elementary import Constant, Piecewise, Polynomial
 from .expressions import Smooth

@@ -20,7 +20,7 @@ from ..elements.membership import admit, settle
 from ..elements.names import named
 from ..elements.primitive import Primitive
 from ..errors import InvalidArgument, InvalidBody, InvalidConstraint
-from ..jit.cache import deep_hash
+from ..jit.code_hash import deep_hash
 from ..model.compilable import demand_compilable
 from ..model.handles import handles_of
 from ..model.packed import pack, user_functions

@@ -7,12 +7,11 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba.core.errors import NumbaError
 
 from ..elements.joint import Joint
 from ..elements.primitive import Primitive
 from ..errors import CheckFailed, InvalidCall, TsdynError
-from ..jit.kernels import twin
+from ..jit.kernels import NumbaError, twin
 from ..maths.two_jets import Jet
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import constraint_rows

@@ -1,0 +1,417 @@
+"""How tsdyn has Numba compile kernels: to the same machine code as it always does, with less work.
+
+Numba optimises every function with all that it calls linked in, and makes machine code of it and of two wrappers, for
+Python and for C. Of a kernel that only kernels call all of that is lost: its callers link it in and do it again. Here
+such a kernel is lowered and left at that, operators are typed once for the same operands, and passes over the code that
+serve no kernel of tsdyn's are left out. Compiled kernels are stored under a hash of all code that they depend on.
+
+This file alone uses what isn't Numba's or llvmlite's public interface: SEEN lists it, `check` looks whether it is
+there. Where it isn't, or fails, stock.py takes its place (compilers.py).
+"""
+
+import ctypes
+import importlib
+import inspect
+import pickle
+import time
+from functools import cache, cached_property
+
+import llvmlite.binding as llvm
+import numba
+from numba import types
+from numba.core import typed_passes, untyped_passes
+from numba.core.caching import _Cache
+from numba.core.ccallback import CFunc
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
+
+from . import cache as files
+from .code_hash import is_ours
+
+CALLBACK_FRAMES = "_raw_object_cache"  # of llvmlite.binding.executionengine: how its callbacks' names begin
+SEEN = "0.63.1", "0.68.1"  # the oldest and the newest Numba that all of these were seen in, with llvmlite 0.46 to 0.50
+PRIVATE = """
+typed_passes.NativeLowering.run_pass(self, state)
+typed_passes.NopythonRewrites
+typed_passes.DumpParforDiagnostics
+untyped_passes.WithLifting
+untyped_passes.InlineClosureLikes
+untyped_passes.RewriteDynamicRaises
+untyped_passes.MakeFunctionToJitFunction
+untyped_passes.InlineInlinables
+untyped_passes.FindLiterallyCalls
+untyped_passes.LiteralUnroll
+untyped_passes.LiteralPropagationSubPipelinePass
+compiler.CompilerBase.__init__(self, typingctx, targetctx, library, args, return_type, flags, locals)
+compiler.CompilerBase.__init__:state
+compiler.CompilerBase.define_pipelines(self)
+compiler.DefaultPassBuilder.define_nopython_pipeline(state, name)
+compiler.CompileResult._reduce(self)
+compiler.CompileResult._rebuild:unserialize_library
+compiler.CompileResult._replace
+compiler.CompileResult.lifted
+compiler.CompileResult.library
+compiler_machinery.PassManager.add_pass(self, pss, description)
+compiler_machinery.PassManager.finalize(self)
+compiler_machinery.PassManager.__init__:passes
+compiler_machinery.register_pass(mutates_CFG, analysis_only)
+types.Function.get_call_type(self, context, args, kws)
+types.Function.get_impl_key(self, sig)
+types.Function.__init__:typing_key
+types.Dispatcher.__init__(self, dispatcher)
+typing.context.BaseContext._lookup_global(self, gv)
+typing.templates.AttributeTemplate.resolve(self, value, attr)
+typing.templates.AttributeTemplate.generic_resolve
+base.BaseContext.insert_user_function(self, func, fndesc, libs)
+base.BaseContext.refresh(self)
+cpu.CPUContext.codegen(self)
+codegen.CodeLibrary._raise_if_finalized(self)
+codegen.CodeLibrary.__init__:_reload_init
+codegen.CodeLibrary.finalize(self)
+codegen.CodeLibrary.has_dynamic_globals
+codegen.CPUCodeLibrary.__init__(self, codegen, name)
+codegen.CPUCodeLibrary.__init__:_linking_libraries
+codegen.CPUCodeLibrary.__init__:_final_module
+codegen.CPUCodeLibrary._get_module_for_linking(self)
+codegen.CPUCodeLibrary._finalize_final_module:_finalized
+codegen.JITCodeLibrary.serialize_using_object_code(self)
+registry.CPUDispatcher.__init__(self, py_func, locals, targetoptions, pipeline_class)
+registry.CPUDispatcher.__init__:_cache
+registry.CPUDispatcher.__init__:targetoptions
+registry.CPUDispatcher.compile(self, sig)
+registry.CPUDispatcher.get_call_template(self, args, kws)
+registry.CPUDispatcher.add_overload(self, cres)
+ccallback.CFunc.__init__(self, pyfunc, sig, locals, options, pipeline_class)
+ccallback.CFunc.__init__:_cache
+ccallback.CFunc.compile(self)
+caching._Cache.load_overload(self, sig, target_context)
+caching._Cache.save_overload(self, sig, data)
+options.DefaultOptions._nrt
+compiler.Flags.no_cpython_wrapper
+compiler.Flags.no_cfunc_wrapper
+compiler.Flags.no_compile
+runtime.rtsys.initialize(ctx)
+serialize.dumps(obj)
+"""  # below numba.core: a name, with the parameters that a call or an override counts on, or :attribute that code sets
+_SERVE_OTHERS = {  # passes for closures, with blocks, exceptions, literal_unroll, array expressions, parallel loops
+    untyped_passes.WithLifting,
+    untyped_passes.InlineClosureLikes,
+    untyped_passes.RewriteDynamicRaises,
+    untyped_passes.MakeFunctionToJitFunction,
+    untyped_passes.InlineInlinables,
+    untyped_passes.FindLiterallyCalls,
+    untyped_passes.LiteralUnroll,
+    untyped_passes.LiteralPropagationSubPipelinePass,
+    typed_passes.NopythonRewrites,
+    typed_passes.DumpParforDiagnostics,
+}
+
+
+class _Operator(types.Function):
+    """The type of an operator or built-in function, which remembers the types of results.
+
+    Numba tries the implementations for strings, lists, sets and so on at each call, in typing and again in lowering.
+    """
+
+    def get_call_type(self, context, args, kws):
+        """The signature, as Numba finds it."""
+        known = self.__dict__.setdefault("_known", {})
+        found = None if kws else known.get(args)
+        if found is None:
+            found = super().get_call_type(context, args, kws)
+            overloaded = found is None or self.get_impl_key(found) is not self.typing_key
+            if not kws and not overloaded:  # code of an overload in Python depends on its caller's options
+                known[args] = found
+        return found
+
+
+register_model(_Operator)(models.OpaqueModel)
+
+
+@cache
+def _operator(function):
+    return _Operator(function.templates)
+
+
+@cache
+def _remembering(context):
+    """A typing context that shares all with another, but for the types of operators."""
+
+    class Remembering(type(context)):
+        def __init__(self):
+            self.__dict__ = context.__dict__
+
+        def __hash__(self):
+            return hash(context)
+
+        def __eq__(self, other):
+            return other is self or other is context
+
+        def _lookup_global(self, value):
+            found = super()._lookup_global(value)
+            return _operator(found) if type(found) is types.Function else found
+
+    return Remembering()
+
+
+class Compiler(CompilerBase):
+    """The passes over a kernel."""
+
+    lowering = typed_passes.NativeLowering
+
+    def __init__(self, typingctx, *others):
+        typingctx = _remembering(typingctx)
+        super().__init__(typingctx, *others)
+        self.state.targetctx.typing_context = typingctx  # of a copy, which has the error model of the options
+
+    def define_pipelines(self):
+        """Numba's own passes, but those that serve others; all of them for a user's kernel."""
+        manager, seen = PassManager("kernel"), set()
+        ours = is_ours(self.state.func_id.modname)
+        for kind, what in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
+            if not ours or kind not in _SERVE_OTHERS | seen:
+                manager.add_pass(self.lowering if kind is typed_passes.NativeLowering else kind, what)
+            seen.add(kind)
+        manager.finalize()
+        return [manager]
+
+
+class _Library(JITCodeLibrary):
+    """The code of a kernel and of those that it calls, to be linked into others."""
+
+    def finalize(self):
+        """Link in what the kernel calls, and leave optimising to whoever links this in."""
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _CalleeLowering(typed_passes.NativeLowering):
+    _name = "callee_lowering"
+
+    def run_pass(self, state):
+        """As Numba's own, into a library of the kind above, without wrappers."""
+        flags, context = state.flags, state.targetctx
+        flags.no_cpython_wrapper = flags.no_cfunc_wrapper = flags.no_compile = True
+        state.library = _Library(context.codegen(), state.func_id.func_qualname)
+        super().run_pass(state)
+        key = object()  # by which its callers find it
+        context.insert_user_function(key, state.cr.fndesc, [state.library])
+        state.cr = state.cr._replace(cfunc=key)
+        return True
+
+
+class _CalleeCompiler(Compiler):
+    lowering = _CalleeLowering
+
+
+class _Dispatcher(CPUDispatcher):
+    def get_call_template(self, args, kws):
+        """One kernel for all constants that it is called with: what LLVM inlines, it makes anew for each of them."""
+        return super().get_call_template(tuple(map(types.unliteral, args)), kws)
+
+    def add_overload(self, found):
+        """Keep it from Numba's table of what Python can call."""
+        self.overloads[tuple(found.signature.args)] = found
+
+
+def check():
+    """Raise ImportError unless everything that is private is as it was seen."""
+    for line in PRIVATE.strip().split("\n"):
+        demand(line)
+
+
+def demand(line):
+    """Raise ImportError unless a line of PRIVATE holds."""
+    home, _, attribute = line.partition(":")
+    home, _, parameters = home.partition("(")
+    try:
+        found = importlib.import_module(f"numba.core.{home.partition('.')[0]}")
+        for name in home.split(".")[1:]:
+            found = getattr(found, name)
+    except (ImportError, AttributeError) as error:
+        raise ImportError(f"numba.core.{home} is gone") from error
+    if attribute and attribute not in inspect.unwrap(found).__code__.co_names:
+        raise ImportError(f"numba.core.{home} has no {attribute}")
+    if parameters and ", ".join(inspect.signature(found).parameters) != parameters[:-1]:
+        raise ImportError(f"numba.core.{home} takes {inspect.signature(found)}, not ({parameters}")
+
+
+def tested(own):
+    """Return own(), which compiles a kernel or loads it; run the kernel of the self-test once a process.
+
+    Before it where it is stored; after it, and stored, where the process compiles kernels.
+    """
+    if _untested and is_stored(_probe, _PROBE_TYPE, "probe"):
+        _test()
+    found = own()
+    if _untested and files.statistics["misses"] and files.folder() is not None:
+        _test()
+    return found
+
+
+def _test():
+    _untested.clear()
+    before = {name: files.statistics[name] for name in ("hits", "misses")}
+    address = callback(_probe, _PROBE_TYPE, {"error_model": "numpy"}, False, "probe").address
+    files.statistics.update({name: count - files.statistics[name] for name, count in before.items()})
+    found = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(20)
+    if found != 41:
+        raise ImportError(f"the kernel of the self-test gives {found}, not 41")
+
+
+def options(allocates):
+    """What kernels have beside the options that `njit` documents: Numba's runtime only where they allocate."""
+    return {"_nrt": allocates}
+
+
+def callee(function, options):
+    """What compiles a kernel that kernels call."""
+    return _Dispatcher(function, {}, {"nopython": True, **options, "_nrt": False}, pipeline_class=_CalleeCompiler)
+
+
+def _twice(i):
+    return 2 * i
+
+
+_twice = callee(_twice, {"error_model": "numpy"})
+
+
+def _probe(i):
+    return _twice(i) + 1
+
+
+_PROBE_TYPE = types.int64(types.int64)
+_untested = [True]
+
+
+def entry(function, options, around):
+    """What compiles a kernel that Python calls; `around` decorates what compiles it."""
+    dispatcher = numba.njit(pipeline_class=Compiler, _nrt=False, **options)(function)
+    dispatcher._cache = KernelCache(function)
+    dispatcher.compile = around(dispatcher.compile)
+    return dispatcher
+
+
+def callback(function, signature, options, allocates, suffix="kernel"):
+    """Compile a kernel that others call by address."""
+    kind = signature.args, signature.return_type
+    made = CFunc(function, kind, locals={}, options={**options, "_nrt": allocates}, pipeline_class=Compiler)
+    made._cache = store = KernelCache(function, suffix)
+    try:
+        made.compile()
+    finally:
+        store.release()
+    return made
+
+
+def is_stored(function, signature, suffix="kernel"):
+    """Whether the cache on disk has the machine code."""
+    name = KernelCache(function, suffix).file(signature)
+    return any((path / name).exists() for path in files.folders())
+
+
+def attributes(kind, resolve, lower):
+    """Give all types of a class attributes: of the types resolve(kind, name), by the code of `lower`.
+
+    Returns what to call with each type and the names of its attributes.
+    """
+
+    @infer_getattr
+    class Fields(AttributeTemplate):
+        key = kind
+
+        def generic_resolve(self, value, name):
+            return resolve(value, name)
+
+    lower_getattr_generic(kind)(lower)
+    return lambda kind, names: None
+
+
+class KernelCache(_Cache):
+    """The disk cache of one function, with a lock so that processes starting together compile once."""
+
+    def __init__(self, function, suffix="kernel"):
+        self._function, self._suffix = function, suffix
+        self._lock = None
+
+    @cached_property
+    def _name(self):
+        return files.name_of(self._function)  # at first use, when all that the function names is defined
+
+    @property
+    def cache_path(self):
+        """The folder that kernels are written to."""
+        return str(files.folder())
+
+    def enable(self):
+        """Do nothing: kernels are always cached."""
+
+    disable = flush = enable
+
+    def file(self, signature):
+        """The name of the file for a signature."""
+        return f"{self._name}-{files.key_of(signature)}.{self._suffix}"
+
+    def load_overload(self, sig, target_context):
+        """Return the compiled function, or None; a miss takes the lock that save_overload gives back."""
+        started = time.perf_counter()
+        if is_ours(self._function.__module__):
+            rtsys.initialize(target_context)
+        else:  # libraries that a user's kernel calls, such as LAPACK, are found by what Numba imports here
+            target_context.refresh()
+        file = self.file(sig)
+
+        def rebuild(payload):
+            return CompileResult._rebuild(target_context, *pickle.loads(payload))
+
+        found = files.load(file, rebuild)
+        if found is None:
+            self.release()  # of a compilation that was interrupted
+            self._lock = files.acquire(file)
+            found = files.load(file, rebuild)
+        if found is None:
+            target_context.refresh()  # before the compiler's own context stands over it
+            files.statistics["misses"] += 1
+            files.tell()
+        else:
+            files.statistics["hits"] += 1
+            self.release()
+        files.statistics["seconds"] += time.perf_counter() - started
+        return found
+
+    def save_overload(self, sig, data):
+        """Store the compiled function and let waiting processes read it."""
+        try:
+            if not data.lifted and not data.library.has_dynamic_globals and files.folder() is not None:
+                plain = data._replace(type_annotation="")  # the source's text, which generated functions don't have
+                (name, kind, (code, bitcode)), *others = plain._reduce()
+                payload = dumps(((name, kind, (code, _without_bodies(bitcode))), *others))
+                files.save(self.file(sig), payload)
+        except OSError as error:
+            files.warn_unwritable(error)
+        finally:
+            self.release()
+
+    def release(self):
+        """Give the lock back, if it is held."""
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+
+def _without_bodies(bitcode):
+    """LLVM's code with empty functions of the same names, which is all that is read of it: nothing links it in."""
+    functions = [found for found in llvm.parse_bitcode(bitcode).functions if not found.is_declaration]
+    return llvm.parse_assembly(
+        "\n".join(f'define void @"{found.name}"() {{ ret void }}' for found in functions)
+    ).as_bitcode()

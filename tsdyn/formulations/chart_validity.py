@@ -84,6 +84,7 @@ def touch(graph, system, w, f, l, t, largest):
 def measure_turns(graph, l, q):
     """l.d of positions q; (d0, d) = p0* o p."""
     for b in range(graph.bodies.shape[0]):
+        # d0 - 1, not d0, is kept: it is small
         if graph.bodies[b, 1] == 7:
             i, o = graph.bodies[b, 0] + 3, 8 * b + 4
             e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
@@ -116,6 +117,7 @@ def every_level_holds(c):
     w, f, graph = c.work, c.tangent, c.graph
     if not has_redundant_rows(f):
         return True
+    # Phi, Phi_q qd + Phi_t and Phi_q qdd + gamma of the dropped rows, against the sizes of their terms
     size = w.control.size
     held = redundant_rows_hold(graph, f, w.control.floor) and rates_hold(graph, f, w.q, w.qd, size)
     return held and accelerations_hold(graph, f, w.q, w.qd, w.qdd, size)

@@ -69,12 +69,15 @@ def recall(context, y, yd):
         put(y, o + 4, splat(0.0))
         put(yd, o + 4, splat(0.0))
         if graph.bodies[b, 1] == 7:
+            # omega' = 2 G pd of the point before, and omega'd likewise
             p, d = before[0, i + 3 : i + 7], lanes(l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2])
             wx, wy, wz = spin(p, before[1, i + 3 : i + 7])
             omega, d0 = lanes(wx, wy, wz), splat(1.0 + l.d[4 * b + 3])
             wx, wy, wz = spin(p, before[2, i + 3 : i + 7])
             change = lanes(wx, wy, wz)
+            # etad = (d0 I + d~) omega'
             put(y, o + 4, fma(omega, d0, cross(d, omega)))
+            # etadd = (d0 I + d~) omega'd - |omega'|^2 d / 2
             square = splat(-0.5 * total(times(omega, omega)))
             put(yd, o + 4, add(fma(change, d0, cross(d, change)), times(d, square)))
     return OK

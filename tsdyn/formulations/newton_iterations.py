@@ -22,11 +22,13 @@ def solve_positions(system, w, t, v):
     is rounding since it falls no more.
     """
     n, m, k = w.q.size, w.u.size, v.size
+    # u + T dv: first order in the change of v
     for i in range(m):
         d = 0.0
         for j in range(k):
             d += w.T[i, j] * (v[j] - w.v[j])
         w.u[i] += d
+    # base = q0 + V v
     for i in range(n):
         x = 0.0
         for j in range(k):
@@ -34,11 +36,13 @@ def solve_positions(system, w, t, v):
         w.base[i] = w.q0[i] + x
     for j in range(k):
         w.v[j] = v[j]
+    # Tolerance of |Phi|, and what may be left after the last correction: u_tol^(3/2), half as many digits again
     floor = w.control.floor
     tol = max(w.control.u_tol, floor)
     left = max(tol * math.sqrt(tol), floor)
     before, stuck = math.inf, False
     for _ in range(B_SWEEPS):
+        # Phi at q = base - U u
         _step_off(w, n, m)
         evaluate_dense_residuals(system, w, t)
         w.counters.newton += 1
@@ -48,18 +52,21 @@ def solve_positions(system, w, t, v):
             if not size < math.inf:
                 return NOT_FINITE
             worst = max(worst, size)
+        # Slow contraction: B is of a configuration too far away. If a new B did not help, the residual is rounding
         if worst > tol and worst > SLOW * before:
             if stuck and worst <= ROUNDING_AT_MOST * floor:
                 tol, floor = worst, worst  # a fresh B did not help: this is rounding
             elif not factorise_dense_rows(system, w, t):  # B was out of date
                 return SINGULAR
             stuck = True
+        # Eq. 29: u <- u + B Phi
         for i in range(m):
             d = 0.0
             for j in range(m):
                 d += w.B[i, j] * w.Phi[j]
             w.u[i] += d
             w.z[i] = d
+        # The last correction leaves worst * rate
         if before < math.inf:
             w.control.rate = worst / before
         rounding = STALLED * before < worst <= ROUNDING_AT_MOST * floor
@@ -92,6 +99,7 @@ def update_b(w):
     tol = w.control.b_tol * math.sqrt(w.control.b_tol)
     before = math.inf
     for _ in range(B_SWEEPS):
+        # R = N B - I, and its largest row sum
         worst = 0.0
         for i in range(m):
             total = 0.0
@@ -106,6 +114,7 @@ def update_b(w):
             if not total < math.inf:
                 return NOT_FINITE
             worst = max(worst, total)
+        # Eq. 28 converges from |R| < 1 only
         if worst > B_OUTDATED and before == math.inf:
             before = HUGE  # a factorisation is tried once
             if not invert_normal_matrix(w):

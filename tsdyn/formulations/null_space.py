@@ -81,6 +81,7 @@ def velocities(system, w, t, vd):
 def _refine_velocities(system, w):
     """qd -= U B (Phi_q qd + Phi_t)."""
     driven = is_rheonomic(system)
+    # B of Eq. 28 is exact to its tolerance: one correction leaves rounding of Eq. 2
     for i in range(w.Phi.size):
         w.Phi[i] = (w.Phi_t[i] if driven else 0.0) + multiply_dense_row(system, w, i, w.qd)
     correct(w, w.Phi, w.qd)
@@ -167,8 +168,10 @@ def place(context, t, v):
     c.chart.state.time = t
     if not set_time(system, t):
         return NOT_FINITE
+    # Eqs. 19, 20 and 29
     status = solve_positions(system, w, t, vector(v, w.v.size))
     if status == OK:
+        # Eqs. 7, 9 and 28 at the new q
         status = tangent_map(system, w, t)
     return reduced_mass(system, w) if status == OK else status
 
@@ -194,11 +197,13 @@ def complete(context, vdd):
 @kernel
 def find_accelerations(system, w, vdd):
     """Accelerations qdd = D vdd - U B gamma, Eq. 24, refined once by Phi_q qdd + gamma."""
+    # Eq. 24, h = -U B gamma
     for i in range(w.q.size):
         x = w.h[i]
         for j in range(vdd.size):
             x += w.D[i, j] * vdd[j]
         w.qdd[i] = x
+    # qdd <- qdd - U B (Phi_q qdd + gamma)
     for i in range(w.gamma.size):
         x = w.gamma[i]
         for part in range(0, 4, 2):
@@ -215,6 +220,7 @@ def check(context):
     c = load(context)
     w, f, graph = c.work, c.tangent, c.graph
     reason = look(c)
+    # The sparse rows of the basis-free form know which rows are dropped and judge them
     if has_redundant_rows(f):
         move_bodies(graph.bodies, w.q, w.qd, f.poses)
         evaluate_bias(graph, c.system, f, c.chart.state.time)
@@ -240,6 +246,7 @@ def weighted_square(w, values, at, e, old, rtol, atol):
     """((V e)_i / (atol + rtol |value|))^2 summed over the coordinates; old begins at old[at]."""
     total = 0.0
     for i in range(values.size):
+        # A change e of tangent coordinates displaces q by V e at the base point
         x = 0.0
         for j in range(e.size):
             x += w.V[i, j] * e[j]

@@ -79,16 +79,19 @@ def place(context, t, x):
         return NOT_FINITE
     x, status = vector(x, l.x.size - 8), NEWTON_FAILED
     for attempt in range(2):
+        # Start: x - Y0 u with u of the position before; if that fails, the step was long
         copy(x, l.x)
         if attempt == 1:  # a long step: from the tangent plane, P0 x
             multiply_rows(graph, l.rows0, l.x, w.u)
             solve_rows(graph, l.rows0, w.u)
+        # x - Y0 u
         apply_multipliers(graph, l.rows0, w.u, l.x)
         status = _solve_positions(graph, system, w, f, l, t, RENEWALS * attempt)
         if status == OK or f.b.size == 0:
             break
     if status != OK:
         return status
+    # S = H W H^T at the solution, for accelerations
     if f.b.size > 0:
         w.counters.factorizations += 1
         failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
@@ -166,20 +169,24 @@ def solve_velocities(graph, system, w, f, l, t):
     The factors are those of N at the start of the position solve, or, where it needed none, those of S as long as they
     do.
     """
+    # Residual of Eq. 2: H (rd, omega') + Phi_t
     rheonomic = is_rheonomic(system)
     if rheonomic:
         evaluate_drift(graph, system, f, t, l.drift)
     factored = l.state.factored == 1
+    # S is of another metric than the chart where massless axes are raised
     if not factored and graph.axes.rows.shape[0] > 0:  # S is of another metric than the chart
         if not factorise_normal(graph, w, f, l):
             return False
         factored, l.state.factored, l.state.off = True, 1, 0.0
+    # N where the position solve has factorised it; otherwise S, which is close to N near the base point
     lower, upper = l.lower if factored else f.rows.S, l.upper if factored else f.rows.S
     floor, before = 0.0, math.inf
     for sweep in range(SWEEPS):
         turn_rates(graph, l, l.y, f.poses)
         if f.b.size == 0:
             return True
+        # Rounding of Eq. 2 at these rates
         if sweep == 0:
             floor = velocity_floor(graph, w, f)
         multiply_rates(graph, f.rows, f.poses, f.b)
@@ -189,14 +196,17 @@ def solve_velocities(graph, system, w, f, l, t):
         worst = largest_residual(graph, w, f)
         if not worst < math.inf:
             return False
+        # Rounding; factors of S get no credit for a residual that has stopped falling
         if worst <= floor or (factored and worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
             w.counters.kept += 0 if factored else 1
             return True
+        # S is too far from N
         if not factored and worst > SLOW_VELOCITIES * before:
             if not factorise_normal(graph, w, f, l):
                 return False
             lower, upper, factored = l.lower, l.upper, True
             l.state.factored, l.state.off = 1, 0.0
+        # yd <- yd - Y0 N^-1 (H (rd, omega') + Phi_t)
         solve_product(graph, lower, upper, f.b)
         apply_multipliers(graph, l.rows0, f.b, l.y)
         before = worst
@@ -213,8 +223,10 @@ def accelerate(context, t, y, yd, unused):
     copy(vector(y, n), l.y)
     if not solve_velocities(graph, system, w, f, l, t):
         return NOT_FINITE
+    # Force laws read q and qd
     if system.forces.shape[0] > 0:
         write_velocities(graph.bodies, f.poses, w.qd)
+    # Friction depends on reactions: solved for with them
     if graph.frictions.shape[0] > 0:
         status = call_rub(graph.rub[0], context, t, yd)
         if status != OK:
@@ -223,6 +235,7 @@ def accelerate(context, t, y, yd, unused):
         solve_accelerations(graph, system, w, f, t)
         if refinements(f.indicator.start) > 1:
             refine_accelerations(graph, f)
+    # (rdd, omega'd) as xdd
     write_back(graph, l, f.poses, f.Z, yd)
     w.counters.evaluations += 1
     return OK if is_finite(yd) else NOT_FINITE
@@ -267,7 +280,9 @@ def start_chart(context, t, x, y, yd, unused):
     system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
     if not set_time(system, t):
         return NOT_FINITE
+    # q0, H0, Y0, S0
     regular = touch(graph, system, w, f, l, t, largest_coordinate(graph.bodies, w.q, w.control.size))
+    # At q0 rates of chart coordinates are (rd, omega'), their derivatives (rdd, omega'd)
     x, y, yd = vector(x, l.x.size - 8), vector(y, l.x.size - 8), vector(yd, l.x.size - 8)
     for i in range(x.size):
         x[i] = 0.0
@@ -304,6 +319,7 @@ def _spin(q, qd, i, out, o):
         low += (excess - (total - part)) + (square - part)
         excess = total
     f = 2.0 * (excess + low)
+    # 2 G pd (2 - p.p), since 1 / p.p = 2 - p.p to first order
     x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3
     y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
     z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3

@@ -81,10 +81,12 @@ def _renew_matrix(context, c, t, g, f, anew, here):
     Without here, from the matrices of stiffness and damping that the last P was made from.
     """
     l, status = c.linear, 0
+    # Derivatives of the force laws
     if anew or l.numbers.known == 0:
         status = call_linearise(l.kernels.linearise, context, t, f)
         l.numbers.known = 1 if status == 0 else 0
     if status == 0:
+        # K_hat and C_hat at the present configuration; otherwise those of the last matrix
         if here or anew:
             call_reduce(l.kernels.reduce, context, t)
         status = call_reduce(l.kernels.factorise, context, g)
@@ -111,8 +113,10 @@ def _is_direct(c):
 @kernel
 def _evaluate(context, c, r, t, g, xs, ys, k, f):  # nine: a stage and its equations
     """Evaluate the equations of a stage at (t, xs, ys) and k; f = the accelerations there, if it needs them. Status."""
+    # Positions, velocities, accelerations and reactions are unknowns together
     if _is_direct(c):
         return call_residual(c.linear.kernels.residual, context, t, g, xs, ys, k)
+    # Otherwise f is the right-hand side of the ODE
     status = call_place(r.kernels.place, context, t, xs)
     if status == 0:
         status = call_accelerate(r.kernels.accelerate, context, t, ys, f, f)
@@ -123,13 +127,16 @@ def _evaluate(context, c, r, t, g, xs, ys, k, f):  # nine: a stage and its equat
 def _correct(context, c, g, k, f, dx):
     """k += P^-1 A (f - k); the size of g times it, and of g^2 times it, in the error norm."""
     l = c.linear
+    # By the saddle-point matrix
     if _is_direct(c):
         return call_correct(l.kernels.correct, context, g, k)
+    # k += P^-1 A (f - k)
     for i in range(k.size):
         f[i] -= k[i]
     call_solve(l.kernels.solve, context, f)
     for i in range(k.size):
         k[i] += f[i]
+        # vd changes by g times the correction, v by g^2 times it
         f[i] *= g
         dx[i] = g * f[i]
     return call_norm(l.kernels.error_norm, context, dx, f, l.now, l.numbers.rtol, l.numbers.atol)
@@ -149,6 +156,7 @@ def _is_near(context, c, g, k, guess, f, dx):
 @kernel
 def _expected(numbers, size, adaptive):
     """What a first correction of that size is expected to leave: as last measured, and of a larger one the square."""
+    # A first correction leaves an error in proportion to its square, as far as the matrix is exact
     share = max(1.0, size / numbers.first)
     return max(numbers.left * share * share, (LEAST if adaptive else LEAST_FIXED) * size)
 
@@ -234,6 +242,7 @@ def _solve_stage(context, c, r, i, t, g):
 @kernel
 def _see_step_before(context, l, t, n, scratch):
     """h of the step before, 0 where there is none, and its start in this chart."""
+    # -inf: there is none
     h_before = t - l.numbers.t_before if l.numbers.t_before > -math.inf else 0.0
     scratch[H_BEFORE * n] = h_before
     if h_before > 0.0:
@@ -249,6 +258,7 @@ def implicit_step(context, run, t, h):
     stages = int(tableau[0])
     width = 2 + stages
     x, y, k_before = memory[:n], memory[n : 2 * n], scratch[K_BEFORE * n :]
+    # Predictions: polynomials through known stages, or at first the line through the step before
     h_before = _see_step_before(context, c.linear, t, n, scratch)
     own = scratch[SCRATCH * n + 1 :]
     ratio = begin_prediction(memory, own, stages, n, t, h, float(c.work.counters.charts))
@@ -256,14 +266,17 @@ def implicit_step(context, run, t, h):
     copy(r.y, memory[2 * n : 3 * n])
     copy(r.yd, memory[3 * n : 4 * n])
     for i in range(1, stages):
+        # Stage i at t + c_i h
         row = tableau[1 + i * width :]
         k = memory[(1 + i) * 2 * n + n :][:n]
         # the prediction of k_i or vd_i, then the known parts of v_i and vd_i
         predict(tableau, memory, own, i, ratio, extrapolated(own, i), part, k)
         combine(row[2:], i, h, 2 * n, memory, memory)
+        # v + h sum_j a_ij vd_j,  vd + h sum_j a_ij k_j, j < i
         for j in range(n):
             x[j] += r.x[j]
             y[j] += r.y[j]
+        # Predicted is vd_i; k_i follows
         if part == 0:
             for j in range(n):
                 k[j] = (k[j] - y[j]) / (h * row[2 + i])
@@ -271,11 +284,14 @@ def implicit_step(context, run, t, h):
             for j in range(n):
                 k[j] += row[1] * h / h_before * (r.yd[j] - k_before[j])
         status = _solve_stage(context, c, r, i, t + h * row[1], h * row[2 + i])
+        # u, z and lam of a failed stage are of no use
         if status != 0:
             c.linear.numbers.rates_of = 0
             return status
+        # The first implicit stage says how many points predict best
         if i == 1 and ratio > 0.0:
             choose_points(tableau, memory, own, ratio, part, scratch[:n])
+    # Increments h sum_i b_i (vd_i, k_i)
     combine(tableau[1 + stages * width :], stages, h, 2 * n, memory, memory)
     copy(x, r.dx)
     copy(y, r.dy)
@@ -294,6 +310,7 @@ def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):  # nine: as plug
     h_before = before[H_BEFORE * n]
     for c in range(n):
         for part, out in ((0, ex), (n, ey)):
+            # h^3 / 12 y''' from the values of y' at the starts of two steps and at the end of this one
             now, end, slope = memory[2 * n + part + c], memory[4 * n + part + c], 0.0
             if h_before > 0.0:
                 slope = (now - before[Y_BEFORE * n + part + c]) / h_before

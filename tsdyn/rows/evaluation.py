@@ -33,6 +33,7 @@ def clear_welds(graph, out):
 @kernel
 def evaluate_without_redundant(graph, reals, f, rows, t):
     """As `evaluate_rows`, where no row is redundant; reals being System.reals."""
+    # All kinds write their rows of Phi and H
     for i in range(graph.kinds.shape[0]):
         kind = graph.kinds[i]
         _run_loop(graph, reals, f, t, kind, kind.reduced, f.b, rows.H)
@@ -90,6 +91,7 @@ def evaluate_bias(graph, system, f, t):
 @kernel
 def evaluate_drift(graph, system, f, t, out):
     """out = Phi_t, with H (rd, omega') + Phi_t = 0."""
+    # Kinds without a motion write nothing
     for e in range(out.size):
         out[e] = 0.0
     for i in range(graph.kinds.shape[0]):

@@ -37,6 +37,7 @@ def rates_hold(graph, f, q, qd, size):
     """Return True if they hold for velocities, by H and Phi_t of the last evaluation; size that of the scene, m."""
     if f.dropped[0] == 0 or f.left.H.size == 0:
         return True
+    # Velocities of a scene at rest are compared with those of a fall through its extent
     speed, spin = _largest(graph, qd)
     far = _reach(graph, f, size)
     speed = max(speed, RESTING * math.sqrt(f.selection.push * far) + NO_RATE * far)
@@ -51,6 +52,7 @@ def accelerations_hold(graph, f, q, qd, qdd, size):
     """
     if f.dropped[0] == 0 or f.left.H.size == 0 or is_near_singular(f, f.indicator.start):
         return True
+    # Terms: accelerations of bodies, of free fall, and centripetal ones
     push, twist = _largest(graph, qdd)
     speed, spin = _largest(graph, qd)
     far = _reach(graph, f, size)
@@ -117,15 +119,18 @@ def _hold(graph, f, known, q, rates, most, fastest):
     """
     H = f.left.H
     for i in range(f.dropped[0]):
+        # |H (rd, omega') + known| against the sum of its absolute terms
         residual, terms = known[i], abs(known[i])
         for side in range(2):
             b, at = graph.sides[f.dropped[1 + i], side], 16 * i + 8 * side
             if b == graph.bodies.shape[0]:
                 continue
+            # H_r rd
             k = graph.bodies[b, 0]
             residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
             terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + FAINT * most * length(H, at)
             if graph.bodies[b, 1] == 7:
+                # H_pi' omega'
                 e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
                 d0, d1, d2, d3 = rates[k + 3], rates[k + 4], rates[k + 5], rates[k + 6]
                 x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3  # 2 (x, y, z) = omega'

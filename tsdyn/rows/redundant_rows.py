@@ -35,6 +35,7 @@ def leave_redundant_rows(graph, f, Phi, H):
     worst = -math.inf
     for i in range(f.dropped[0]):
         row = f.dropped[1 + i]
+        # Residual beyond HELD of the terms of the row
         over = abs(Phi[row]) - HELD * _position_terms(graph, f, H, row)
         if not over <= worst:
             worst = over
@@ -51,6 +52,7 @@ def _position_terms(graph, f, H, row):
     """Size of the terms of a row at the poses: |H_r| |r| + |H_pi'|."""
     terms = 0.0
     for side in range(2):
+        # |H_r| |r| + |H_pi'|
         b, at = graph.sides[row, side], 16 * row + 8 * side
         if b < graph.bodies.shape[0]:
             terms += math.sqrt(square(H, at) * square(f.poses, b * POSE + R)) + length(H, at + 4)

@@ -43,10 +43,12 @@ call_choose = caller(CHOOSE)
 @kernel
 def _choose(graph, reals, f, rows, t, metric):
     """Renew the selection of rows; f.b, H, Y and the factors of S follow it. True if S is nonsingular."""
+    # Every row, the dropped ones included, competes
     evaluate_all(graph, reals, f, rows, t)
     found = select(graph, f, rows, f.dropped[0], ZERO_PIVOT)
     leave_redundant_rows(graph, f, f.b, rows.H)
     regular = factorise_selected_rows(graph, f, rows, metric) < 0
+    # The new pivots are what later ones are measured by
     if found and regular:
         for e in range(f.best.size):
             f.best[e] = _share(graph, rows.S, e)
@@ -88,6 +90,7 @@ def selection_serves(graph, f, rows):
         return True
     serves = True
     for e in range(f.best.size):
+        # A pivot may grow: its largest value is the measure
         share = _share(graph, rows.S, e)
         f.best[e] = max(f.best[e], share)  # a selection next to a singular configuration is no measure
         serves = serves and share >= WORSE * f.best[e]

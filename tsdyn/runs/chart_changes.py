@@ -17,19 +17,23 @@ PASSAGE = int(Status.PASSAGE)
 def begin_chart(context, c, r, log, reason):
     """A new chart at the present q, qd, qdd; closes the record of the old one. PASSAGE next to a singular place."""
     w = c.work
+    # Record of the chart before
     if reason != AT_START:
         close_chart(r, log, w.control.condition, w.control.contraction)
     open_chart(r, log, r.clock.t, reason)
+    # Chart coordinates begin at zero: nothing is left to compensate
     for j in range(r.x.size):
         r.x_low[j] = 0.0
     for j in range(r.y.size):
         r.y_low[j] = 0.0
+    # Dense output rebuilds a chart from q0 and the selection of rows
     kept = log.points.shape[0] > 0
     if kept:
         copy(w.q, log.points[r.numbers.chart_rows])
     status = call_chart(r.kernels.start_chart, context, r.clock.t, r.x, r.y, r.yd, r.xd)
     if kept:
         note_selection(c.tangent, log.points[r.numbers.chart_rows, w.q.size :])
+    # Distance to a singular configuration
     if r.numbers.may_pass == 1:
         note_indicator(c.graph, c.tangent, c.chart.rows0)
         if status == 0 and reason != AT_START and is_next_to_singular(c.tangent):

@@ -79,6 +79,7 @@ class Watch:
     def advance(self, memory, log, most):
         """As `Memory.advance`; the Status, and what there is to say of it."""
         run = memory.run
+        # The first call begins the run and takes the values at its start
         if not run.numbers.begun:
             status = memory.advance(log, -1)
             if not run.numbers.begun:
@@ -91,6 +92,7 @@ class Watch:
                 except Failed as failure:
                     raise InvalidArgument(f"events: {failure}") from failure.__cause__
         stiff = run.numbers.stiff
+        # One step at a time, searched before the next one
         for _ in range(most):
             done = run.numbers.steps
             status = memory.advance(log, 1)
@@ -155,17 +157,21 @@ class Watch:
         found, failure, end = [], None, step.t1
         step.degree = self._degree(step)
         for i in range(len(self.events)):
+            # Times that bracket the zeros of event i
             points, failed = self._points(i, step, end)
             if failed is not None:
                 failure, end = failed, min(end, failed.t)
             try:
+                # Events among them
                 mine = self._walk(i, step, points)
             except Failed as failed:
                 mine, failure, end = [], failed, min(end, failed.t)
             found += mine
+            # The run ends with the event that reaches its limit
             last = self.events[i].limit - len(self.list[i])
             if len(mine) >= last:
                 end = min(end, mine[int(last) - 1].t)
+        # Events in order of time, up to the one that ends the run or the first failure
         for each in sorted(found, key=lambda each: each.t):
             if failure is not None and each.t >= failure.t:
                 break
@@ -192,6 +198,7 @@ class Watch:
                     good.append(t)
             return values
 
+        # A function that fails at some time is searched up to the last time before
         while end > step.t0:
             search = Search(sample, lambda t: self._shaken(i, step, t), track.noise)
             try:
@@ -219,6 +226,7 @@ class Watch:
         """The occurrences of event i among these points."""
         track, direction, found = self.tracks[i], self.events[i].direction, []
         (before, value), *rest = points
+        # A value near zero at the start of the run is a zero there, within rounding
         if track.sign == 0.0 and track.zero is None:  # the run's first step
             if 0.0 < abs(track.value) <= START_ZERO * max(abs(value) for _, value in points):
                 track.zero, track.passed, track.pending = before, value != 0.0, value == 0.0
@@ -226,6 +234,7 @@ class Watch:
                 rest = points
         for t, value in rest:
             sign = float(value > 0.0) - float(value < 0.0)
+            # A zero: an event at once, or when it is left, if the direction counts
             if value == 0.0:
                 if track.zero is None or track.passed:
                     late = track.sign == 0.0 and t > self.start  # the start's own zero, within rounding
@@ -233,6 +242,7 @@ class Watch:
                     if not track.pending:
                         found.append(self._zero(i, step, t, before))
                 track.zero = t
+            # A sign: leaves a zero, or changes
             elif abs(value) > track.noise:
                 if track.zero is not None:
                     if track.pending and direction * sign >= 0.0:
@@ -248,6 +258,7 @@ class Watch:
     def _shaken(self, i, step, t):
         """By how much the value of event i at t changes with rounding errors of the state."""
         try:
+            # Rounding of the state, in three random directions
             state, value = step.at(t), self._at(i, step, t)
             size = SHAKEN * np.abs(state).max(axis=1, keepdims=True)
             shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
@@ -258,6 +269,7 @@ class Watch:
     def _zero(self, i, step, t, other):
         """The `Occurrence` at a zero, or at the end next to another time of the zeros around it."""
         if t != other and self._at(i, step, t) == 0.0:
+            # Bisection for the end of an interval of zeros
             while t != (middle := 0.5 * (t + other)) != other:
                 if self._at(i, step, middle) == 0.0:
                     t = middle
@@ -276,6 +288,7 @@ class Watch:
     def _root(self, i, step, t1, b):
         """The change of sign up to t1, where event i has the value b; none if it is that of the run's start."""
         track = self.tracks[i]
+        # From the last value with a sign, or from the step's start
         t0, a = max(track.significant, (step.t0, track.value))
         if a == 0.0 or (a < 0.0) == (b < 0.0):
             return [Occurrence(t0, i, step.at(t0))]
@@ -292,17 +305,20 @@ class Watch:
         """Where event i changes its sign between two times with values."""
         from scipy.optimize import brentq  # takes a while to import
 
+        # Values of order one, by a power of two
         known, (t0, a), (t1, b) = dict((first, last)), first, last
         unit = math.ldexp(1.0, min(-math.frexp(max(abs(a), abs(b)))[1], MOST_SCALED))
 
         def value(t):  # of size one: Brent's method multiplies three of them
             return unit * (known[t] if t in known else self._at(i, step, t))
 
+        # Brent's method, as near as numbers of this size allow
         least = max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
         root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
         shift = least + ROOT * abs(root)
         # a run that goes on from a terminal event had better find it behind itself
         ends, side = self.events[i].limit < math.inf, math.copysign(1.0, b)
+        # A terminal event ends the run on its far side
         while ends and root + shift < t1 and side * value(root) <= 0.0:
             root, shift = root + shift, 2.0 * shift
         return root

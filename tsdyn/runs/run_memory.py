@@ -76,6 +76,7 @@ class Memory:
         self.mark = None
         self._clear_scratch()
         start = task.q, task.qd, task.constraint_tol
+        # A new engine lays out the memory; otherwise its image is restored
         if self.engine is not engine:
             self._lay_out(engine, task)
             self._images, self._start = [(array, array.copy()) for array in self._laid_out], start
@@ -85,6 +86,7 @@ class Memory:
             if not all(map(is_, start, self._start)):
                 self._enter_start(*start[:2])
                 self._hold(task)
+        # Motions, signals and memories of forces are among these numbers
         self.context.system.reals[...] = self.reals  # motions, signals and what forces remember are written there
         if task.remembered.size:
             self._remember(task.remembered, task.prepared.handles)
@@ -201,6 +203,7 @@ class Memory:
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver."""
         arguments = self._context, self._run, log, most
+        # Short steps: Ctrl-C waits for the end of a slice
         if self.weight < LONG_STEPS:
             return STATUSES[self.advance_kernel(*arguments)]
         if not self.run.numbers.begun and most > 0:

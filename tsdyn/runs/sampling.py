@@ -89,14 +89,17 @@ class Sampled:
         run, work = self.run, self.memory.context.work
         numbers = run.numbers
         try:
+            # The first values, before the first accelerations
             if not numbers.begun and most != 0:
                 self.sampling.ask(self.memory, float(run.clock.t), work.q.copy(), work.qd.copy())
             first = numbers.history
             while True:
+                # Up to the next instant, or to the end of the slice
                 done = int(numbers.history - first)
                 status = self.memory.advance(log, most - done if most > 0 else most)
                 if status != Status.SLICE_DONE or not numbers.waiting:
                     return status
+                # New values, and accelerations with them
                 self.sampling.ask(self.memory, float(run.clock.t), run.now[0].copy(), run.now[1].copy())
                 status = self.memory.advance(log, 0)
                 if status != Status.SLICE_DONE or numbers.history - first >= most:

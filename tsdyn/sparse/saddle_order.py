@@ -76,10 +76,12 @@ class _Sets:
         """The rows that can follow a body, in order."""
         name = self._new(self.at_body.get(body, ()))
         self.home[body] = name
+        # Sets whose anchor was this body
         for other in self.at_anchor.pop(body, ()):
             self.anchors[self._find(other)].discard(body)
             name = self._merge(name, self._find(other))
         found = []
+        # Rows become ready one after the other
         while (i := self._next(self._find(name))) is not None:
             found.append(i)
             name = self._join(i)

@@ -37,6 +37,7 @@ def radius(bodies, nb, orders, top, far, fast):
     """
     rho = math.inf
     for k in range(top + 1, max(top - 3, 1), -1):
+        # |c_k|^(-1/k), the least of the last orders
         size = size_of_order(bodies, nb, orders, k, far, fast)
         if not size < math.inf:
             return 0.0
@@ -52,19 +53,23 @@ def order_in_range(bodies, nb, orders, top, far, fast):
     They are in proportion to rate^k: 1e450 at order 30 where rates are 1e15 / s, and 1e-450 where they are 1e-15 / s.
     A maximum can hide a body whose coefficients are no numbers: see `finite_top`.
     """
+    # Nearly always the last coefficients are in range
     k = top + 1
     size = size_of_order(bodies, nb, orders, k, far, fast)
     if FAINT < size < VAST:
         return top
+    # Down to where they don't overflow
     while k > LEAST_ORDER and not size < VAST:
         k -= 1
         size = size_of_order(bodies, nb, orders, k, far, fast)
     held = k - 1
+    # Zero: either exactly, or by underflow of all orders from some on
     while k > 2 and size == 0.0:
         k -= 1
         size = size_of_order(bodies, nb, orders, k, far, fast)
     if size == 0.0 or size > FAINT:  # the zeros are exact
         return held
+    # Down to where they don't underflow
     while k > LEAST_ORDER and not size > FAINT:
         k -= 1
         size = size_of_order(bodies, nb, orders, k, far, fast)
@@ -78,11 +83,13 @@ def weights(c, r):
     rtol, atol = r.clock.rtol, r.clock.atol
     far, fast, speed = splat(0.0), splat(0.0), splat(0.0)
     for b in range(c.graph.bodies.shape[0]):
+        # Largest r, omega' and rd
         at = b * orders * BODY_ROW
         far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
         speed = larger(four(x.bodies, at + S_R * orders + 4), speed)
     far, fast = largest_of_three(far), largest_of_three(fast)
     c.work.control.floor = ROUNDING * (c.work.control.size + far)
+    # Errors are bounded by atol + rtol |value|, those of A by atol + rtol
     tol = atol + rtol
     return tol / (atol + rtol * far), tol / (atol + rtol * fast), 1.0 + max(fast, largest_of_three(speed))
 
@@ -93,6 +100,7 @@ def _held(h, rate, k):
 
     share: of what the error of rates, that of places over h / k, may be; squared, since short steps are many.
     """
+    # Velocity error over its bound: position error times k / h
     share = STIFF_RATES * rate * h / k
     return h * share ** (2.0 / k) if share < 1.0 else h
 
@@ -103,11 +111,13 @@ def step_length(c, r):
     x, nb, orders = c.expansion, c.graph.bodies.shape[0], c.expansion.order.room
     tol = r.clock.atol + r.clock.rtol
     far, fast, rate = weights(c, r)
+    # Longest step by all orders, then by two orders less
     x.order.top = top = order_in_range(x.bodies, nb, orders, x.order.top, far, fast)
     c.trial.rate = rate
     h = _held(radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2)), rate, top + 2)
     if x.order.highest > x.order.lowest:
         lower = _held(radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top), rate, top)
+        # Higher order if it advances further per unit of work
         change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
         x.order.next = min(max(top + change, x.order.lowest), x.order.highest)
     return h
@@ -124,6 +134,7 @@ def longest(c, r, tol, most):
     far, fast, _ = weights(c, r)
     h = 0.0
     for k in range(most, min(LEAST_ORDER, most - 1), -1):
+        # rho tol^(1 / (k + 2)) for every order
         longer = radius(x.bodies, nb, x.order.room, k, far, fast) * tol ** (1.0 / (k + 2))
         if longer > h:
             h, x.order.top = longer, k
@@ -139,6 +150,7 @@ def finite_top(c):
     """
     x, orders = c.expansion, c.expansion.order.room
     for k in range(2, x.order.top + 2):
+        # 0 c is not zero where c is infinite or not a number
         rest = splat(0.0)
         for b in range(c.graph.bodies.shape[0]):
             at = b * orders * BODY_ROW

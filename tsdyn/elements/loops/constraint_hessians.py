@@ -61,12 +61,14 @@ def _derive(x, xd, xdd, par, t, lam, J, a1, a2, g_xd, H):
     """
     z, zd = complex_stack(SIZE), complex_stack(SIZE)
     zJ, zg = complex_stack2(ROWS, SIZE), complex_stack(ROWS)
+    # Complex copies of x and xd, and Phi_x
     for c in range(SIZE):
         z[c], zd[c] = x[c], xd[c]
         for d in range(SIZE):
             H[c, d] = 0.0
     differentiate(x, par, t, J)
     for c in range(SIZE):
+        # Along x_c: slopes of Phi_x and gamma
         z[c] = complex(x[c], CONSTRAINT_STEP)
         for r in range(ROWS):
             for d in range(SIZE):
@@ -75,12 +77,14 @@ def _derive(x, xd, xdd, par, t, lam, J, a1, a2, g_xd, H):
         kernel_gamma(z, zd, par, t, zg)
         z[c] = x[c]
         for r in range(ROWS):
+            # a2 = Phi_xx xdd + gamma_x,  H = (Phi_x^T lam)_x
             total = zg[r].imag / CONSTRAINT_STEP
             for d in range(SIZE):
                 slope = zJ[r, d].imag / CONSTRAINT_STEP
                 total += slope * xdd[d]
                 H[d, c] += lam[r] * slope
             a2[r, c] = total
+        # Along xd_c: gamma is quadratic in xd, so gamma_xd = 2 (Phi_xx xd + Phi_xt)
         zd[c] = complex(xd[c], CONSTRAINT_STEP)
         kernel_gamma(z, zd, par, t, zg)
         zd[c] = xd[c]
@@ -96,6 +100,7 @@ def _fill_row(q, qd, own, real, along_x, along_second, out):
     for c in range(SPAN):
         row[c] = 0.0
     for j in range(MARKERS):
+        # First order: along_x x_q. Second order: along_second x_qq qd
         k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
         code, dimension, at = CODES[j], own[DIMENSION + k], own[AT + k]
         chain_rule(code, dimension, at, q, s, along_x[c:], 0, row[7 * k :])
@@ -110,9 +115,11 @@ def _pull_back(q, own, real, H, XHX):
     """XHX (SPAN, SPAN) = x_q^T H x_q."""
     HX, where, row = stack2(SIZE, SPAN), stack(4), stack(SPAN)
     for c in range(SPAN):
+        # HX = H x_q, row by row
         for d in range(SPAN):
             XHX[c, d] = 0.0
     for c in range(SIZE):
+        # x_q^T HX, column by column
         for d in range(SPAN):
             HX[c, d] = 0.0
         for j in range(MARKERS):
@@ -137,11 +144,13 @@ def _add_geometric(own, real, lam, J, XHX):
     for j in range(MARKERS):
         k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
         if own[DIMENSION + k] == 7 and CODES[j] != PARAMETERS:
+            # f = Phi_x^T lam, the force on the marker
             x, y, z = 0.0, 0.0, 0.0
             for r in range(ROWS):
                 x += lam[r] * J[r, c]
                 y += lam[r] * J[r, c + 1]
                 z += lam[r] * J[r, c + 2]
+            # (A(p) s)_p p is quadratic in p: its derivative by p_d is the pull-back of f at p = e_d
             for d in range(4):
                 for b in range(4):
                     where[b] = 1.0 if b == d else 0.0
@@ -159,12 +168,14 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, K, G1, G2):
     J, a1, a2, g_xd = stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE)
     H, XHX = stack2(SIZE, SIZE), stack2(SPAN, SPAN)
     for i in range(count):
+        # Markers at q and qd, and their accelerations with qdd
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         own_lam, n = lam[own[ROW] :], own[STRIDE]
         move_markers(q, qd, own, real, x, xd, xdd)
         _accelerate_markers(q, qdd, own, real, xdd)
         _derive(x, xd, xdd, real[3 * MARKERS :], t, own_lam, J, a1, a2, g_xd, H)
         for r in range(ROWS):
+            # Rows of G1 and G2
             row = (own[ROW] + r) * n
             _fill_row(q, qd, own, real, a1[r], J[r], G1[row:])
             _fill_row(q, qd, own, real, a2[r], g_xd[r], G2[row:])
@@ -172,6 +183,7 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, K, G1, G2):
                 k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
                 at = own[AT + k]
                 _chain_second(CODES[j], own[DIMENSION + k], at, qdd, s, J[r, c:], G2[row + at :])
+        # K += x_q^T H x_q + f x_qq
         _pull_back(q, own, real, H, XHX)
         _add_geometric(own, real, own_lam, J, XHX)
         for k in range(2):

@@ -76,6 +76,7 @@ def torque(bodies, at, k, forces, first):
     x, y, z = splat(0.0), splat(0.0), splat(0.0)
     u, v, w = splat(0.0), splat(0.0), splat(0.0)
     c, f = at, first + 4 * k
+    # sum_j A_j^T f_{k-j}
     for _ in range((k + 1) // 2):  # two at a time, on accumulators of their own: each waits for its last sum
         g, h = four(forces, f), four(forces, f - 4)
         x, u = fma(four(bodies, c), g, x), fma(four(bodies, c + 12), h, u)
@@ -131,10 +132,12 @@ def _differentiate(k, orders, table, own, reals, real, bodies, values, at, x, f,
     places, gradients, step = at, at + 4 * MARKERS, 4
     if k > 0:
         places, gradients, step = at + X + 4 * k, at + J + 4 * k, wide
+    # x_k
     for j in range(MARKERS):
         place = _place(j, k, orders, table, own, reals, real, bodies)
         put(values, places + j * step, place)
         put(x, STARTS[j], place)
+    # (Phi_x)_k by the primitive, (Phi_t)_k beside it
     for r in range(ROWS):
         for c in range(SIZE):
             f[r, c] = 0.0
@@ -144,6 +147,7 @@ def _differentiate(k, orders, table, own, reals, real, bodies, values, at, x, f,
         kernel_series_t(x, par, k, scratch, g)
         for r in range(ROWS):
             let(values, at + own_scratch + SLOTS * orders + r, g[r])
+    # Constant columns are stored at order zero only
     for j in range(MARKERS):
         if k == 0 or mask >> j & 1:
             for r in range(ROWS):
@@ -159,17 +163,20 @@ def _push(k, orders, table, own, reals, real, bodies, values, at, b, Z):
     for j in range(MARKERS):
         if mask >> (GROUND + j) & 1:
             continue
+        # f_{k-1} with the last term of Eq. (2), which lam_{k-1} gives
         forces, force = at + F + j * wide, splat(0.0)
         done = four(values, forces + 4 * k - 4) if k > 1 else splat(0.0)
         for r in range(ROWS):
             o = at + 4 * (MARKERS + r * MARKERS + j)
             done = fma(four(values, o), splat(-get(b, row + r)), done)
+            # f_k without lam_k: earlier multipliers times the varying part of Phi_x
             if mask >> j & 1:
                 o, multipliers = at + J + (r * MARKERS + j) * wide, at + L + r * orders + k
                 for l in range(1, k + 1):
                     force = fma(four(values, o + 4 * l), splat(-get(values, multipliers - l)), force)
         put(values, forces + 4 * k - 4, done)
         put(values, forces + 4 * k, force)
+        # Torque s x sum_j A_j^T f_{k-j} and force on the body
         body, s = get(table, own + OWNERS[j]), real + 3 * j
         if mask >> (UNTURNED + j) & 1 == 0:
             y = torque(bodies, body * BODY_ROW * orders, k, values, forces)
@@ -183,6 +190,7 @@ def _push(k, orders, table, own, reals, real, bodies, values, at, b, Z):
 def _residual(k, orders, table, own, reals, real, bodies, values, at, b, x):
     """b = (k + 1)(k + 2) Phi_{k+2}, Eq. (1)."""
     wide, (_F, _L, X, J, own_scratch), mask = 4 * orders, _offsets(orders), get(table, own + MASK)
+    # x_{k+2} as the bodies have it
     for j in range(MARKERS):
         if mask >> (GROUND + j) & 1 == 0:
             put(x, STARTS[j], _place(j, k + 2, orders, table, own, reals, real, bodies))
@@ -191,6 +199,7 @@ def _residual(k, orders, table, own, reals, real, bodies, values, at, b, x):
         for j in range(MARKERS):
             if mask >> (GROUND + j) & 1:
                 continue
+            # (k + 2) Phi_{k+2} = (k + 2) (Phi_x)_0 x_{k+2} + sum_l l (Phi_x)_{k+2-l} x_l + (Phi_t)_{k+1}
             highest = fma(four(values, at + 4 * (MARKERS + r * MARKERS + j)), four(x, STARTS[j]), highest)
             if mask >> j & 1:
                 places, gradients = at + X + j * wide, at + J + (r * MARKERS + j) * wide + 4 * (k + 2)
@@ -216,9 +225,11 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b
         if mode == RESIDUAL:
             _residual(k, orders, table, own, reals, real, bodies, values, at, b, x)
             continue
+        # Multipliers of the last order are kept where later orders need them
         varies = get(table, own + MASK) & ((1 << GROUND) - 1) != 0
         for r in range(ROWS if k > 0 and varies else 0):
             let(values, at + _offsets(orders)[1] + r * orders + k - 1, get(b, get(table, own + ROW) + r))
+        # Orders zero and one at first, then one more each time
         for now in range(0 if k == 0 else k + 1, k + 2 if varies or DRIVEN else 1):
             _differentiate(now, orders, table, own, reals, real, bodies, values, at, x, f, g)
         if k > 0:

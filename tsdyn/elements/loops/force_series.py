@@ -132,6 +132,7 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         first = program + i * size
         for j in range(MARKERS):
+            # x_k and xd_k of the markers
             at, s, c = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3], STARTS[j]
             if CODES[j] == PARAMETERS:
                 p = first + j * wide
@@ -148,13 +149,16 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
                 put(xd, c, times(place(CODES[j], bodies, at, orders, k + 1, s), splat(k + 1.0)))
         for c in range(SIZE):
             f[c] = 0.0
+        # f_k by the law
         scratch = matrix(data_of(values[first + own_scratch :]), rows, orders)
         if TRACED:
             run_traced(run, values, x, xd, real[3 * MARKERS :], k, rows, orders, values[first + own_scratch :])
         kernel_series(x, xd, real[3 * MARKERS :], k, scratch, f)
+        # In proportion to the normal load: what is known of it
         if RUBS:
             kept = values[first + own_scratch + rows * orders + MARKERS :]
             rub(k, wide, x, real[3 * MARKERS :], kept, scratch, values[first + MARKERS * wide :], f)
+        # x and xd are kept for the comparison with the law
         if SHARP:
             kept = first + own_scratch + rows * orders + MARKERS + 2 * SIZE * k
             for c in range(SIZE):
@@ -163,6 +167,7 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
         for j in range(MARKERS):
             if own[MASK] >> OWNERS[j] & 1:
                 continue
+            # The last order whose force is not zero bounds the sum of torques
             c, s, z = STARTS[j], real[3 * j : 3 * j + 3], 8 * own[OWNERS[j]]
             at, forces = own[OWNERS[j]] * body_size, first + (MARKERS + j) * wide
             ends = first + own_scratch + rows * orders + j
@@ -174,6 +179,7 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
             last = whole(values[ends])
             if last < 0:
                 continue
+            # Torque of order k, and the force itself, onto the body
             if wider:
                 y = _parameters_torque(values, first + j * wide, forces, k, last)
             else:

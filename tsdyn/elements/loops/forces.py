@@ -47,6 +47,7 @@ def forces(count, stride, table, reals, q, qd, t, out):
     x, xd, f = stack(SIZE), stack(SIZE), stack(SIZE)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        # f = law(x, xd), pulled back: Q += W^T f
         force_markers(q, qd, own, real, x, xd)
         for c in range(SIZE):
             f[c] = 0.0
@@ -73,6 +74,7 @@ def _complex_slope(z, zd, along, c, par, t, g, slope):
     """slope[:, c] = f_along, by a complex step of along (z or zd), whose imaginary parts are zero."""
     for r in range(SIZE):
         g[r] = 0.0
+    # Im f(x + i h) / h = f' + O(h^2), without cancellation
     here = along[c]
     along[c] = complex(here.real, FORCE_STEP)
     kernel_law(z, zd, par, t, g)
@@ -99,6 +101,7 @@ def _central_slope(x, xd, along, c, par, t, g, slope):
     for r in range(SIZE):
         slope[r, c] = 0.0
     for k in range(-2, 3):
+        # (f(-2h) - 8 f(-h) + 8 f(h) - f(2h)) / 12 h
         weight = (8.0 * k if k * k == 1 else -0.5 * k) / 12.0
         if k != 0:
             for r in range(SIZE):
@@ -134,6 +137,7 @@ def _differentiate_markers(q, qd, own, real, x, xd, W, X, Y):
 def _follow_frame(q, own, x, anew, frame, turn):
     """With anew keep the force's frame, a body's or the direction between two points; else set its turn since then."""
     if ALONG >= 0:
+        # A law along the line between two points: the frame follows the direction
         d = stack(3)
         for c in range(3):
             d[c] = x[ALONG + c] - x[c]
@@ -144,6 +148,7 @@ def _follow_frame(q, own, x, anew, frame, turn):
             turn_of_directions(frame[4:], d, turn)
         return
     turn[0], turn[1], turn[2], turn[3] = 1.0, 0.0, 0.0, 0.0
+    # A law in the axes of a body
     k = 0 if own[DIMENSION] != 3 else 1  # a law has the axes of a; those of the ground stay where they are
     if own[DIMENSION + k] == 7:
         p = q[own[AT + k] + 3 : own[AT + k] + 7]
@@ -164,6 +169,7 @@ def _law_derivatives(x, xd, q, own, par, t, anew, kept, fx, fxd):
             for c in range(SIZE):
                 old_x[k * SIZE + c], old_xd[k * SIZE + c] = fx[k, c], fxd[k, c]
     _follow_frame(q, own, x, anew, kept[2 * SIZE * SIZE :], turn)
+    # T f_x T^T with the rotation T of the frame since the derivatives were taken
     if anew == 0:
         for j in range(MARKERS):
             for k in range(MARKERS):
@@ -178,6 +184,7 @@ def _add_products(own, fx, fxd, W, X, Y, n, Q_q, Q_qd):
     for c in range(SPAN):
         if c % 7 >= own[DIMENSION + c // 7]:
             continue
+        # Columns of f_x X + f_xd Y and of f_xd W
         for r in range(SIZE):
             y, yd = 0.0, 0.0
             for k in range(SIZE):
@@ -185,6 +192,7 @@ def _add_products(own, fx, fxd, W, X, Y, n, Q_q, Q_qd):
                 yd += fxd[r, k] * W[k, c]
             h[r], hd[r] = y, yd
         column = own[AT + c // 7] + c % 7
+        # W^T times them
         for r in range(SPAN):
             if r % 7 < own[DIMENSION + r // 7]:
                 y, yd = 0.0, 0.0
@@ -212,9 +220,11 @@ def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         for r in range(SIZE):
             f[r] = 0.0
+        # W, X, Y; the force f; f_x and f_xd
         _differentiate_markers(q, qd, own, real, x, xd, W, X, Y)
         kernel_law(x, xd, real[3 * MARKERS :], t, f)
         _law_derivatives(x, xd, q, own, real[3 * MARKERS :], t, anew, kept[i * KEPT :], fx, fxd)
+        # (W^T f)_q at constant f, then the products
         for j in range(MARKERS):
             k, s = OWNERS[j], real[3 * j : 3 * j + 3]
             carry_back_derivative(CODES[j], own[DIMENSION + k], own[AT + k], s, f[STARTS[j] :], n, Q_q)

@@ -53,6 +53,7 @@ call_check, call_margin = caller(SIGNATURE), caller(MARGIN)
 def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
     """Whether the series of a marker's force, at values[forces], is not the law's f."""
     c, w, tau = STARTS[j], 16 * own[BODY + OWNERS[j]], limits[TAU]
+    # Acceleration per unit of force: 1 / m and s^2 J'^-1, bounded by the trace
     turning = inverse[w + 4] + inverse[w + 9] + inverse[w + 14]
     if CODES[j] == TURN:
         weight = turning
@@ -63,6 +64,7 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
     size = 4 if CODES[j] == PARAMETERS else 3
     off, terms, speed = 0.0, 0.0, 0.0
     total = splat(0.0)
+    # The series at tau, and the largest difference from the law
     for k in range(known - 1, -1, -1):
         total = fma(total, splat(tau), four(values, forces + 4 * k))
     series = stack(4)
@@ -72,9 +74,11 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
         if not gap <= off:  # or not a number
             off = gap
         speed = max(speed, abs(xd[c + i]))
+    # Within tolerance as a velocity over the step
     tol = limits[ATOL] + limits[RTOL] * speed
     if weight * off * limits[LENGTH] <= max(limits[MOST] * tol, LAW_TOLERANCE):
         return False
+    # or within rounding of the terms of the series
     for i in range(size):
         power = 1.0
         for k in range(known):
@@ -88,7 +92,9 @@ def _sums(code, bodies, at, orders, known, tau, s, values, p):
     """The x of a marker at tau, and xd; its body's series begins at bodies[at], p at values[p]."""
     x, xd, h = splat(0.0), splat(0.0), splat(tau)
     if code == TURN:
+        # xd = A omega' of a Turn
         a0, a1, a2, w, o = x, x, x, x, at + S_OMEGA * orders
+        # x and xd together by Horner's scheme
         for k in range(known, -1, -1):
             c = at + 12 * k
             a0, a1, a2 = fma(a0, h, four(bodies, c)), fma(a1, h, four(bodies, c + 4)), fma(a2, h, four(bodies, c + 8))
@@ -123,6 +129,7 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
         for c in range(SIZE):
             x[c], xd[c], f[c] = 0.0, 0.0, 0.0
         if SHARP:
+            # x and xd at tau, of stored series or from those of the bodies
             for k in range(known - 1, -1, -1):
                 at = kept + 2 * SIZE * k
                 for c in range(SIZE):
@@ -130,6 +137,7 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
                     xd[c] = xd[c] * limits[TAU] + values[at + SIZE + c]
         else:
             _sum_markers(own, real, bodies, orders, known, limits[TAU], values[own_values:], x, xd)
+        # The law there: a program at order zero, or a function
         par = real[3 * MARKERS : stride]
         if TRACED:
             own_scratch = values[kept + 2 * SIZE * orders :]
@@ -142,6 +150,7 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
                 par[stride - 3 * MARKERS - 1] = load_at(limits[TAU], known, x, par, scratch)
             kernel_law(x, xd, par, limits[TIME], f)
         for j in range(MARKERS):
+            # Its force against the series, marker by marker
             forces = own_values + (MARKERS + j) * wide
             if own[MASK] >> OWNERS[j] & 1:
                 continue
@@ -160,6 +169,7 @@ def margin(count, stride, size, orders, known, h, values, least):
     square = step * step
     rest = 0.0 * step  # not a number where a share isn't: a minimum can lose that
     for i in range(count):
+        # Share 1 - sum_{k>0} |a_k| h^k / a_0, odd and even orders apart
         s = matrix(data_of(values[i * size + 8 * MARKERS * orders :]), rows, orders)
         for a in POSITIVE:
             odd, even, top = 0.0 * step, 0.0 * step, (known - 1) // 2

@@ -93,7 +93,6 @@ def subtract_products(pivots, size, width, left, right, out, stride, rows, n, di
             for x in range(n - skip):
                 o[x] -= x0 * us[x] + x1 * vs[x] + x2 * ws[x]
             r += 1
-    # Two pivots
     elif size == 2:
         d0, d1 = pivots[0], pivots[width + 1]
         b, v = left[width:], right[width:]
@@ -104,7 +103,6 @@ def subtract_products(pivots, size, width, left, right, out, stride, rows, n, di
             for x in range(n - skip):
                 o[x] -= x0 * us[x] + x1 * vs[x]
     else:
-        # One pivot
         d0 = pivots[0]
         for r in range(rows):
             skip = r if diagonal else 0

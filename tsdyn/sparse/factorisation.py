@@ -278,7 +278,6 @@ def _forward_rest(size, width, u, own, b, here, end, segments):
             for i in range(n):
                 out[i] -= x * us[i]
             at += n
-    # Two unknowns
     elif size == 2:
         x, y = own[0], own[1]
         v = u[width:]
@@ -330,7 +329,6 @@ def _backward_rest(size, width, u, own, b, here, end, segments):
             for i in range(n):
                 x += us[i] * source[i]
             at += n
-    # Two unknowns
     elif size == 2:
         v = u[width:]
         at = 2

@@ -20,8 +20,8 @@ def body_forces(graph, system, w, f, t):
     has_forces = system.forces.shape[0] > 0
     # Q_A without gravity, in the coordinates q
     if has_forces:
-        for i in range(f.Q.size):
-            f.Q[i] = 0.0
+        for c in range(f.Q.size):
+            f.Q[c] = 0.0
         applied_forces(system, w.q, w.qd, t, f.Q)
     for b in range(graph.bodies.shape[0]):
         z, at, m = 8 * b, b * POSE, get(graph.mass, 16 * b)

@@ -140,8 +140,8 @@ def _take_bodies(w, s, one):
 
 
 @kernel
-def add_forces(system, w, s, t, anew, kept, Q):
-    """K and C of the forces; with anew the derivatives of the laws are taken and kept, else those kept serve."""
+def add_forces(system, w, s, t, renew, kept, Q):
+    """K and C of the forces; with `renew` derivatives of the laws are evaluated and stored, else stored ones serve."""
     for i in range(Q.size):
         Q[i] = 0.0
     applied_forces(system, w.q, w.qd, t, Q)
@@ -151,7 +151,7 @@ def add_forces(system, w, s, t, anew, kept, Q):
         _take_bodies(w, s, one)
         clear_matrix(s.Xd)
         reals, own = system.reals[one.reals :], kept[one.kept :]
-        call_jacobian(one.loop, 1, one.stride, s.own, reals, s.q, s.qd, t, 14, s.X, s.Xd, anew, own)
+        call_jacobian(one.loop, 1, one.stride, s.own, reals, s.q, s.qd, t, 14, s.X, s.Xd, renew, own)
         _spread(s, one, 1.0, True)
     # tau' = G Q_p / 2 of all applied forces turns with the body
     for b in range(system.bodies.shape[0]):

@@ -47,7 +47,7 @@ def extent(w):
 
 
 @kernel
-def touch(graph, system, w, f, l, t, largest):
+def set_base_point(graph, system, w, f, l, t, largest):
     """Make the chart at w.q: base, H0, Y0, factors of S0. True if the rows of H0 are independent.
 
     largest is the largest coordinate that enters Phi, m, as the form has it.
@@ -96,7 +96,7 @@ def measure_turns(graph, l, q):
 
 
 @kernel
-def turning(graph, w, f, l):
+def reason_to_leave(graph, w, f, l):
     """Return the reason to abandon the chart at l.d and f.rows, or STAY; records contraction and condition."""
     turn, contraction = turned_most(l), 0.0
     if f.b.size > 0:

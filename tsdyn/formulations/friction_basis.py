@@ -14,7 +14,7 @@ from ..jit.kernels import callback, kernel, stack, vector
 from ..maths.dense_linalg import cholesky_solve, copy, largest, lu, lu_solve
 from ..maths.euler_parameters import multiply_g
 from ..workspaces.workspace import load
-from .friction_loads import RUB, body_of, is_settled, normal_load, step_share, unit_friction
+from .friction_loads import SOLVE_FRICTION, body_of, has_converged, normal_load, step_share, unit_friction
 from .tolerances import BASIS_LOAD_ROUNDING, LOAD_SWEEPS
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
@@ -149,8 +149,8 @@ def _find_load(graph, system, w, friction, lam, t, out, by_row):
             normal_load(system, friction, w.q, w.qd, t, 1, reaction, out)
 
 
-@callback(RUB)
-def rub(context, t, vdd):
+@callback(SOLVE_FRICTION)
+def solve_friction(context, t, vdd):
     """Add joint friction to vdd. Status."""
     c = load(context)
     system, w, f, graph = c.system, c.work, c.tangent, c.graph
@@ -180,8 +180,8 @@ def rub(context, t, vdd):
             for j in range(frictions):
                 x = 1.0 if i == j else 0.0
                 for h in range(friction.first, friction.first + friction.count):
-                    e = graph.row[graph.friction_rows[h, 0]]
-                    x -= by_row[e] * r.basis[j, n + e]
+                    row = graph.row[graph.friction_rows[h, 0]]
+                    x -= by_row[row] * r.basis[j, n + row]
                 r.J[i, j] = x
         if not lu(r.J, r.pivots, frictions):
             return JAMMED
@@ -194,7 +194,7 @@ def rub(context, t, vdd):
         for i in range(frictions):
             loads[i] += share * b[i]
             size = max(size, abs(loads[i]))
-        done = is_settled(change, before, share, sweep, BASIS_LOAD_ROUNDING * size)
+        done = has_converged(change, before, share, sweep, BASIS_LOAD_ROUNDING * size)
         before = change
     # vdd += sum_i a_i F_n,i
     for i in range(frictions):

@@ -34,7 +34,7 @@ from ..rows.interface import (
 )
 from ..workspaces.workspace import load
 from .accelerations import body_forces
-from .friction_loads import RUB, body_of, forget_loads, is_settled, normal_load, step_share, unit_friction
+from .friction_loads import SOLVE_FRICTION, body_of, forget_loads, has_converged, normal_load, step_share, unit_friction
 from .tolerances import DAMPED, LOAD_ROUNDING, LOAD_SWEEPS, NEWTON_DONE, SLOW_LOADS
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
@@ -84,7 +84,7 @@ def _find_loads(graph, system, f, q, qd, t, derive):
 
 
 @kernel
-def _rub_bodies(graph, f):
+def _apply_loads(graph, f):
     """Z = r.Z + W g N - Y^T lam."""
     r = f.friction
     copy(r.Z, f.Z)
@@ -140,18 +140,18 @@ def find_reactions(graph, system, f, q, qd, t):
         for e in range(r.lam.size):
             r.lam[e] = 0.0
         size = 0.0
-    before, anew, done = math.inf, True, False
+    before, renew, done = math.inf, True, False
     for sweep in range(LOAD_SWEEPS):
         # Loads at the present lam, with derivatives where N~ is factorised
-        _find_loads(graph, system, f, q, qd, t, int(anew and size > 0.0 and not done))
+        _find_loads(graph, system, f, q, qd, t, int(renew and size > 0.0 and not done))
         # Z = W (F + sum_i g_i F_n,i - H^T lam)
-        _rub_bodies(graph, f)
+        _apply_loads(graph, f)
         if done:
             return True
         # dlam = N~^-1 (H Z + gamma)
         acceleration_residuals(graph, f.rows, f.gamma, f.Z, f.b)
         add_axis_multipliers(graph, r.lam, f.b)
-        if anew and not factorise_loads(graph, f, size == 0.0):
+        if renew and not factorise_loads(graph, f, size == 0.0):
             return False
         solve_product(graph, r.lower, r.upper, f.b)
         change, share = largest(f.b), step_share(sweep)
@@ -161,9 +161,9 @@ def find_reactions(graph, system, f, q, qd, t):
             r.lam[e] += share * f.b[e]
         # Converged: the correction is rounding, or that of a new matrix is so small that its square is
         cold, size = size == 0.0, largest(r.lam)
-        done = is_settled(change, before, share, sweep, LOAD_ROUNDING * size)
-        done = done or (anew and not cold and change <= NEWTON_DONE * size)
-        anew, before = cold or sweep >= DAMPED or change > SLOW_LOADS * before, change
+        done = has_converged(change, before, share, sweep, LOAD_ROUNDING * size)
+        done = done or (renew and not cold and change <= NEWTON_DONE * size)
+        renew, before = cold or sweep >= DAMPED or change > SLOW_LOADS * before, change
     return False
 
 
@@ -178,8 +178,8 @@ def accelerate_with_friction(graph, system, w, f, t):
     return find_reactions(graph, system, f, w.q, w.qd, t)
 
 
-@callback(RUB)
-def rub(context, t, unused):
+@callback(SOLVE_FRICTION)
+def solve_friction(context, t, unused):
     """Solve for accelerations as accelerations.solve_accelerations, with joint friction. Status."""
     c = load(context)
     system, f, graph = c.system, c.tangent, c.graph

@@ -205,11 +205,11 @@ def linearise(context, t, vdd):
 
 
 @kernel
-def _forces(system, w, linear, t, anew):
+def _forces(system, w, linear, t, renew):
     """Q_q and Q_qd of the forces."""
     clear_matrix(linear.Q_q)
     clear_matrix(linear.Q_qd)
-    force_jacobian(system, w.q, w.qd, t, linear.Q_q, linear.Q_qd, anew, linear.kept)
+    force_jacobian(system, w.q, w.qd, t, linear.Q_q, linear.Q_qd, renew, linear.kept)
 
 
 @callback("pd")

@@ -13,7 +13,7 @@ from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import set_time
 from ..workspaces.workspace import load
 from .newton_iterations import NOT_FINITE, OK
-from .null_space import frictional_acceleration, look, project, reduced_mass, velocities, weighted_square
+from .null_space import check_validity, frictional_acceleration, project, reduced_mass, velocities, weighted_square
 from .null_space_chart import new_chart, tangent_map
 
 
@@ -46,7 +46,7 @@ def accelerate(context, t, velocity, wd, xd):
 @callback("p")
 def check(context):
     """Reason to choose a new V, or zero."""
-    return look(load(context))
+    return check_validity(load(context))
 
 
 @callback(NORM, "d")

@@ -19,9 +19,9 @@ from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import applied_forces, is_rheonomic, set_time
 from ..rows.interface import evaluate_bias, evaluate_drift, evaluate_rows, has_redundant_rows, redundant_rows_hold
 from ..workspaces.workspace import load
-from .chart_validity import every_level_holds, measure_turns, turning
+from .chart_validity import every_level_holds, measure_turns, reason_to_leave
 from .dense_rows import correct, evaluate_dense_bias, evaluate_dense_drift, multiply_dense_row
-from .friction_loads import call_rub, forget_loads
+from .friction_loads import call_friction, forget_loads
 from .newton_iterations import NOT_FINITE, OK, solve_positions
 from .null_space_chart import new_chart, tangent_map
 from .tolerances import MASS_PIVOT
@@ -156,7 +156,7 @@ def frictional_acceleration(context, c, t, vdd):
     if frictions:
         forget_loads(system)
     status = reduced_acceleration(system, c.work, t, vdd)
-    return call_rub(graph.rub[0], context, t, vdd) if frictions and status == OK else status
+    return call_friction(graph.friction_solver[0], context, t, vdd) if frictions and status == OK else status
 
 
 @callback(PLACE)
@@ -219,7 +219,7 @@ def check(context):
     """Return the reason to abandon the chart, or zero; negative, a Status, where the state can't be taken."""
     c = load(context)
     w, f, graph = c.work, c.tangent, c.graph
-    reason = look(c)
+    reason = check_validity(c)
     # The sparse rows of the basis-free form know which rows are dropped and judge them
     if has_redundant_rows(f):
         move_bodies(graph.bodies, w.q, w.qd, f.poses)
@@ -232,13 +232,13 @@ def check(context):
 
 
 @kernel
-def look(c):
+def check_validity(c):
     """Return the reason to abandon the chart at the present q, or zero."""
     w, f, l, graph = c.work, c.tangent, c.chart, c.graph
     place_bodies(graph.bodies, w.q, f.poses)
     measure_turns(graph, l, w.q)
     evaluate_rows(graph, c.system, f, f.rows, l.state.time)
-    return turning(graph, w, f, l)
+    return reason_to_leave(graph, w, f, l)
 
 
 @kernel

@@ -72,7 +72,7 @@ def find_imbalance(c):
     for i in range(s.e.size):
         s.e[i] = s.loads[i] - f.Z[i]
     take_reactions(graph, f.rows, s.multipliers, s.e)
-    if f.b.size > 0 and not _settle_reactions(c):
+    if f.b.size > 0 and not _correct_multipliers(c):
         return False
     # In the order of elimination
     for i in range(s.x.size):
@@ -85,7 +85,7 @@ def find_imbalance(c):
 
 
 @kernel
-def _settle_reactions(c):
+def _correct_multipliers(c):
     """Correct lam by S^-1 H W e until H W e, e = F - M (a + C n) - H^T lam, is small; s.e = e. False if S is singular.
 
     H of the saddle-point matrix may be that of an older place: it would take a part of what is left for a load. S is of

@@ -15,7 +15,7 @@ import math
 
 from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..errors import Status
-from ..jit.kernels import callback, kernel, vector
+from ..jit.kernels import callback, kernel, long_kernel, vector
 from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import ACCELERATE, PLACE
 from ..model.equations import is_rheonomic, set_time
@@ -45,8 +45,8 @@ from .chart_coordinates import (
     turn_rates,
     write_back,
 )
-from .chart_validity import every_level_holds, touch, turning
-from .friction_loads import call_rub
+from .chart_validity import every_level_holds, reason_to_leave, set_base_point
+from .friction_loads import call_friction
 from .projection import largest_residual, velocity_floor
 from .tangent_error import error_norm
 from .tolerances import (
@@ -104,15 +104,16 @@ def place(context, t, x):
 
 @kernel
 def _solve_positions(graph, system, w, f, l, t, renewals):
-    """Newton's method for u, N being that of its start or made anew so often; poses and H at the solution. Status.
+    """Newton's method for u with N of the start, factorised again `renewals` times at most; poses and H there. Status.
 
-    It ends where what is left, |Phi| or what the convergence so far lets expect of it, is below u_tol^(3/2) or
-    rounding; H is taken there, with the last |Phi|.
+    Stops when |Phi|, measured or extrapolated from the convergence rate, is below u_tol^(3/2) or rounding. H is
+    evaluated with Phi in a sweep that is expected to be the last one.
     """
     floor = w.control.floor
     tol = max(w.control.u_tol, floor)
-    left = max(tol * math.sqrt(tol), floor)
-    with_H, before, rate, ending, anew = True, math.inf, 0.0, False, 0
+    goal = max(tol * math.sqrt(tol), floor)
+    # |Phi| of the last sweep; contraction by the present factors of N, zero until it is measured
+    before, rate, with_H = math.inf, 0.0, True
     l.state.factored = 0
     for sweep in range(SWEEPS):
         if not displace(graph, l, f.poses):
@@ -127,24 +128,26 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
         if not worst < math.inf:
             return NOT_FINITE
         slow = worst > SLOW * before
-        if worst <= left or ending or (slow and worst <= ROUNDING_AT_MOST * floor):
-            if with_H:
-                if sweep == 0:
-                    w.counters.at_rounding += 1
-                elif not ending:
-                    w.counters.unverified += 1
-                return OK
-            with_H = ending = True  # once more, for H
-            continue
-        if slow:  # N was that of another place
-            anew += 1
-            if anew > renewals:
-                return NEWTON_FAILED
-            l.state.factored = 0
+        # Solved, or as close as rounding allows
+        if worst <= goal or (slow and worst <= ROUNDING_AT_MOST * floor):
             if not with_H:
-                with_H, before = True, math.inf
-                continue
+                _add_rows(graph, system, f, t)
+            elif sweep == 0:
+                w.counters.at_rounding += 1
+            else:
+                w.counters.unverified += 1
+            return OK
+        if slow:
+            # N is of a configuration too far away: factorise it here
+            renewals -= 1
+            if renewals < 0:
+                return NEWTON_FAILED
+            if not with_H:
+                _add_rows(graph, system, f, t)
+            l.state.factored = 0
         elif before < math.inf:
+            # The first sweep with new factors measures the curvature |Phi| / |Phi before|^2, later sweeps measure the
+            # rate
             if worst > ROUNDING_AT_MOST * floor and rate == 0.0:
                 w.control.rate = worst / (before * before)
             rate = worst / before
@@ -152,14 +155,21 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
             if not factorise_normal(graph, w, f, l):
                 return SINGULAR
             l.state.factored, l.state.off, rate = 1, w.control.rate * worst, 0.0
+        # u <- u + N^-1 Phi,  x <- x - Y0 N^-1 Phi
         solve_product(graph, l.lower, l.upper, f.b)
         w.counters.newton += 1
         apply_multipliers(graph, l.rows0, f.b, l.x)
         for e in range(f.b.size):
             w.u[e] += f.b[e]
         expected = worst * (rate if rate > 0.0 else w.control.rate * worst)
-        with_H, before = expected <= left, worst
+        with_H, before = expected <= goal, worst
     return NEWTON_FAILED
+
+
+@long_kernel
+def _add_rows(graph, system, f, t):
+    """H where only Phi was evaluated: seldom needed, so not inlined."""
+    evaluate_rows(graph, system, f, f.rows, t)
 
 
 @kernel
@@ -228,7 +238,7 @@ def accelerate(context, t, y, yd, unused):
         write_velocities(graph.bodies, f.poses, w.qd)
     # Friction depends on reactions: solved for with them
     if graph.frictions.shape[0] > 0:
-        status = call_rub(graph.rub[0], context, t, yd)
+        status = call_friction(graph.friction_solver[0], context, t, yd)
         if status != OK:
             return status
     else:
@@ -268,7 +278,7 @@ def check(context):
 def check_chart(c):
     """As `check`."""
     w, f, l = c.work, c.tangent, c.chart
-    reason = turning(c.graph, w, f, l)
+    reason = reason_to_leave(c.graph, w, f, l)
     l.state.placement = w.counters.placements if w.control.contraction < CONTRACTION_LOST else 0
     return reason if every_level_holds(c) else -UNHELD
 
@@ -281,18 +291,18 @@ def start_chart(context, t, x, y, yd, unused):
     if not set_time(system, t):
         return NOT_FINITE
     # q0, H0, Y0, S0
-    regular = touch(graph, system, w, f, l, t, largest_coordinate(graph.bodies, w.q, w.control.size))
+    regular = set_base_point(graph, system, w, f, l, t, largest_coordinate(graph.bodies, w.q, w.control.size))
     # At q0 rates of chart coordinates are (rd, omega'), their derivatives (rdd, omega'd)
     x, y, yd = vector(x, l.x.size - 8), vector(y, l.x.size - 8), vector(yd, l.x.size - 8)
-    for i in range(x.size):
-        x[i] = 0.0
+    for j in range(x.size):
+        x[j] = 0.0
     for e in range(w.u.size):
         w.u[e] = 0.0
     w.control.rate = CURVATURE
     for b in range(graph.bodies.shape[0]):
         i, o = graph.bodies[b, 0], 8 * b
-        for c in range(3):
-            y[o + c], yd[o + c] = w.qd[i + c], w.qdd[i + c]
+        for k in range(3):
+            y[o + k], yd[o + k] = w.qd[i + k], w.qdd[i + k]
         if graph.bodies[b, 1] == 7:
             _spin(w.q, w.qd, i + 3, y, o + 4)
             _spin(w.q, w.qdd, i + 3, yd, o + 4)

@@ -262,7 +262,7 @@ def cross(typing, f, g):
 
 @intrinsic
 def get(typing, array, index):
-    """array[index], index >= 0 and within: nothing is looked after."""
+    """array[index], index >= 0 and within: bounds aren't checked."""
 
     def generate(context, builder, signature, arguments):
         data = context.make_array(signature.args[0])(context, builder, value=arguments[0]).data

@@ -7,7 +7,8 @@ are made anew where the step has changed by more than SAME_STEP, or contraction 
 damping; in the next step, or at once where iterations diverge, from those of the present configuration; then from new
 derivatives of the forces' laws.
 
-The first guess of a step is the polynomial through the last stages of the step before; how many, that step has told.
+The first guess of a step is the polynomial through the last stages of the step before: as many as would have predicted
+that step best.
 
 The memory of a step, n floats each: known part of v_i, of vd_i; (vd, k) of the start and of each stage; change of the
 last stage's positions, zeros; k of each stage of the step before; then the numbers below.
@@ -146,22 +147,22 @@ def _choose_points(c, r, own, h):
 @kernel
 def _renew_matrices(context, c, r, own, t, h, level):
     """Factors for a step of h; level 1: from new stiffness and damping, level 2: from new derivatives, too. Status."""
-    l, status = c.linear, 0
+    linear, status = c.linear, 0
     # Derivatives of the force laws
-    if level > 1 or l.numbers.known == 0:
-        status = call_linearise(l.kernels.linearise, context, t, r.yd)
-        l.numbers.known = 1 if status == 0 else 0
+    if level > 1 or linear.numbers.known == 0:
+        status = call_linearise(linear.kernels.linearise, context, t, r.yd)
+        linear.numbers.known = 1 if status == 0 else 0
         level = 2
     # Stiffness and damping at the present configuration
     if status == 0 and level > 0:
-        call_reduce(l.kernels.reduce, context, t)
+        call_reduce(linear.kernels.reduce, context, t)
     # Factors for every eigenvalue, at g = h times the eigenvalue
     for i in range(c.saddle.complex_upper.shape[0] + 1):
         if status == 0:
-            status = call_factorise(l.kernels.factorise_stages, context, h, r.tableau, i)
+            status = call_factorise(linear.kernels.factorise_stages, context, h, r.tableau, i)
     own[MADE_FOR] = h if status == 0 else 0.0
     own[RENEW] = 0.0
-    l.numbers.g = h * r.tableau[parts_of(r.tableau).shifts] if status == 0 else 0.0
+    linear.numbers.g = h * r.tableau[parts_of(r.tableau).shifts] if status == 0 else 0.0
     return status
 
 
@@ -180,7 +181,7 @@ def _set_rates(r, h):
 @kernel
 def _sweep(context, c, r, own, t, h, level):  # seven: as _renew_matrices
     """Evaluate the equations of all stages; with level >= 0, matrices are made anew at the middle one. Status."""
-    l, w, n, stages = c.linear, c.work, r.x.size, c.saddle.stages.shape[0]
+    linear, w, n, stages = c.linear, c.work, r.x.size, c.saddle.stages.shape[0]
     width, x = 3 + stages, r.memory[:n]
     _set_rates(r, h)
     for i in range(stages):
@@ -191,11 +192,13 @@ def _sweep(context, c, r, own, t, h, level):  # seven: as _renew_matrices
             x[e] += r.x[e]
         ti = t + h * row[1]
         # u, z and lam of this stage are where its solves begin
-        call_take(l.kernels.take_stage, context, i)
-        l.numbers.rates_of, l.numbers.time = w.counters.charts, ti  # as if it had begun already
+        call_take(linear.kernels.take_stage, context, i)
+        linear.numbers.rates_of, linear.numbers.time = w.counters.charts, ti  # as if it had begun already
         vd = r.memory[(2 * i + 4) * n : (2 * i + 5) * n]
         # Loads and residuals of the equations at the stage
-        status = call_residual(l.kernels.residual, context, ti, h * r.tableau[parts_of(r.tableau).shifts], x, vd, k)
+        status = call_residual(
+            linear.kernels.residual, context, ti, h * r.tableau[parts_of(r.tableau).shifts], x, vd, k
+        )
         if status != 0:
             return status
         w.counters.stage_iterations += 1
@@ -203,7 +206,7 @@ def _sweep(context, c, r, own, t, h, level):  # seven: as _renew_matrices
         if level >= 0 and i == stages // 2 and _renew_matrices(context, c, r, own, ti, h, level) != 0:
             return STAGE_FAILED
         # Right-hand side of Newton's equations
-        status = call_balance(l.kernels.balance_stage, context, i, k)
+        status = call_balance(linear.kernels.balance_stage, context, i, k)
         if status != 0:
             return STAGE_FAILED
     return 0
@@ -212,7 +215,7 @@ def _sweep(context, c, r, own, t, h, level):  # seven: as _renew_matrices
 @kernel
 def _iterate(context, c, r, own, t, h):
     """Newton's method for the stages, predicted on entry. Status."""
-    l, s, n, numbers = c.linear, c.saddle, r.x.size, c.linear.numbers
+    linear, s, n, numbers = c.linear, c.saddle, r.x.size, c.linear.numbers
     moved, zeros, adaptive = r.memory[_rest(r) :][:n], r.memory[_rest(r) + n :][:n], r.numbers.adaptive == 1
     # Sizes of corrections are error norms: rounding of 1 + |value| is RESIDUAL_FLOOR / tol
     tol = numbers.rtol + numbers.atol
@@ -235,7 +238,7 @@ def _iterate(context, c, r, own, t, h):
         if level >= 0:
             before, renewals = math.inf, renewals + 1
         level = -1
-        size = call_solve(l.kernels.solve_stages, context, h, r.tableau, r.memory)
+        size = call_solve(linear.kernels.solve_stages, context, h, r.tableau, r.memory)
         if not size < math.inf:
             return STAGE_FAILED
         # How far the last stage is from its prediction
@@ -259,7 +262,10 @@ def _iterate(context, c, r, own, t, h):
         if size <= floor or (before < math.inf and level < 0 and size * rate <= kappa * (1.0 - rate)):
             # Solved. Slow contraction renews the matrices of the next step
             own[RENEW] = 1.0 if theta > SLOW_COUPLED else 0.0
-            if adaptive and not call_norm(l.kernels.distance, context, moved, zeros, l.now, 1.0, 1.0) < TOO_FAR:
+            if (
+                adaptive
+                and not call_norm(linear.kernels.distance, context, moved, zeros, linear.now, 1.0, 1.0) < TOO_FAR
+            ):
                 return STAGE_FAILED
             return 0
         before = size

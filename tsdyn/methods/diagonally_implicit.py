@@ -75,23 +75,23 @@ def _scratch_at(r):
 
 
 @kernel
-def _renew_matrix(context, c, t, g, f, anew, here):
-    """P at the place last taken, f being the accelerations there; with anew, from new stiffness and damping. Status.
+def _renew_matrix(context, c, t, g, f, renew, here):
+    """P for a stage with accelerations f; with `renew` from new stiffness and damping. Status.
 
-    Without here, from the matrices of stiffness and damping that the last P was made from.
+    With `here` those are reduced at the present configuration; otherwise K_hat and C_hat of the last P serve.
     """
-    l, status = c.linear, 0
+    linear, status = c.linear, 0
     # Derivatives of the force laws
-    if anew or l.numbers.known == 0:
-        status = call_linearise(l.kernels.linearise, context, t, f)
-        l.numbers.known = 1 if status == 0 else 0
+    if renew or linear.numbers.known == 0:
+        status = call_linearise(linear.kernels.linearise, context, t, f)
+        linear.numbers.known = 1 if status == 0 else 0
     if status == 0:
         # K_hat and C_hat at the present configuration; otherwise those of the last matrix
-        if here or anew:
-            call_reduce(l.kernels.reduce, context, t)
-        status = call_reduce(l.kernels.factorise, context, g)
-    l.numbers.g, l.numbers.slow = g if status == 0 else 0.0, 0.0
-    l.numbers.chart = c.work.counters.charts
+        if here or renew:
+            call_reduce(linear.kernels.reduce, context, t)
+        status = call_reduce(linear.kernels.factorise, context, g)
+    linear.numbers.g, linear.numbers.slow = g if status == 0 else 0.0, 0.0
+    linear.numbers.chart = c.work.counters.charts
     return status
 
 
@@ -126,31 +126,31 @@ def _evaluate(context, c, r, t, g, xs, ys, k, f):  # nine: a stage and its equat
 @kernel
 def _correct(context, c, g, k, f, dx):
     """k += P^-1 A (f - k); the size of g times it, and of g^2 times it, in the error norm."""
-    l = c.linear
+    linear = c.linear
     # By the saddle-point matrix
     if _is_direct(c):
-        return call_correct(l.kernels.correct, context, g, k)
+        return call_correct(linear.kernels.correct, context, g, k)
     # k += P^-1 A (f - k)
     for i in range(k.size):
         f[i] -= k[i]
-    call_solve(l.kernels.solve, context, f)
+    call_solve(linear.kernels.solve, context, f)
     for i in range(k.size):
         k[i] += f[i]
         # vd changes by g times the correction, v by g^2 times it
         f[i] *= g
         dx[i] = g * f[i]
-    return call_norm(l.kernels.error_norm, context, dx, f, l.now, l.numbers.rtol, l.numbers.atol)
+    return call_norm(linear.kernels.error_norm, context, dx, f, linear.now, linear.numbers.rtol, linear.numbers.atol)
 
 
 @kernel
 def _is_near(context, c, g, k, guess, f, dx):
     """Return True if the positions of a solution are near to those of its prediction: another one may be far."""
-    l = c.linear
+    linear = c.linear
     for i in range(k.size):
         f[i] = 0.0  # of velocities a stiff transient may change any amount
         dx[i] = g * g * (k[i] - guess[i])
-    norm = l.kernels.distance if _is_direct(c) else l.kernels.error_norm
-    return call_norm(norm, context, dx, f, l.now, 1.0, 1.0) < TOO_FAR
+    norm = linear.kernels.distance if _is_direct(c) else linear.kernels.error_norm
+    return call_norm(norm, context, dx, f, linear.now, 1.0, 1.0) < TOO_FAR
 
 
 @kernel
@@ -177,76 +177,125 @@ def _learn(numbers, first, second, renewed):
 
 
 @kernel
+def _begin_iteration(c, r):
+    """Nothing is known of the contraction yet; limits of it for the form and the run."""
+    numbers, one = c.linear.numbers, c.linear.iteration
+    _restart(one)
+    one.first, one.trusted, one.renewed, one.poor, one.diverged = 0.0, 1, 0, 0, 0
+    one.floor = RESIDUAL_FLOOR / (numbers.rtol + numbers.atol)
+    # What stages of fixed steps leave adds up over thousands of steps
+    one.limit = SLOW_SPARSE if numbers.every_chart == 1 and r.numbers.adaptive == 1 else SLOW
+    one.eager = 1 if numbers.eager > 0 else 0
+    numbers.eager -= 1
+
+
+@kernel
+def _restart(one):
+    """Measure contraction afresh: the matrix is new."""
+    one.before, one.theta, one.measured, one.second = math.inf, GUESS, 0, math.inf
+
+
+@kernel
+def _renew_if_needed(context, c, t, g, f):
+    """Renew the iteration matrix if it is of another g or chart, or contracts poorly; False if it is singular."""
+    numbers, one = c.linear.numbers, c.linear.iteration
+    sparse, slips, eager = numbers.every_chart == 1, numbers.slips == 1, one.eager == 1
+    one.eager = 0
+    off_chart = not sparse and numbers.chart != c.work.counters.charts
+    poor = one.measured == 1 and one.theta > max(one.limit, numbers.slow)
+    stale = eager or off_chart or abs(g - numbers.g) > SAME_G * g
+    if not (stale or poor):
+        return True
+    if not stale:
+        # The first poor contraction: the stages to come begin with matrices of their own
+        if one.poor == 0 and one.renewed == 0:
+            lost = EAGER_LOST if one.theta > DIVERGING else EAGER_SPARSE
+            numbers.eager = lost if sparse else EAGER_STAGES
+        one.poor += 1
+    # The last matrix of a stage has new stiffness and damping
+    here = eager or poor or not sparse or numbers.g == 0.0 or numbers.known == 0
+    one.renewed = 1
+    if _renew_matrix(context, c, t, g, f, slips or one.poor == MATRICES, here) != 0:
+        return False
+    if not slips:  # where friction changes within a correction, Newton's own contraction counts
+        _restart(one)
+    if eager or poor or off_chart:
+        one.trusted = 0
+    return True
+
+
+@kernel
+def _measure(c, size):
+    """Contraction by the correction of this size; False if iterations diverge whatever the matrix."""
+    numbers, one = c.linear.numbers, c.linear.iteration
+    if not one.before < math.inf:
+        return True
+    if one.measured == 0:
+        one.first, one.second = one.before, size
+    one.theta, one.measured = size / one.before, 1
+    # No other matrix contracts better: that much contraction has to do
+    sparse, slips = numbers.every_chart == 1, numbers.slips == 1
+    if sparse and not slips and one.poor == MATRICES and numbers.slow == 0.0:
+        numbers.slow = min(WORSE * one.theta, DIVERGING)
+    one.diverged += 1 if one.renewed == 1 and one.theta > DIVERGING else 0
+    return one.diverged < (APART_SLIPPING if slips else APART)
+
+
+@kernel
+def _is_solved(c, size, adaptive, is_last):
+    """Whether a stage needs no further correction after one of this size.
+
+    The contraction of the last stage is always measured: where stiffness has gone, old matrices make corrections small.
+    """
+    numbers, one, theta = c.linear.numbers, c.linear.iteration, c.linear.iteration.theta
+    # Rounding
+    if size <= one.floor or (theta > DIVERGING and size <= AT_FLOOR * one.floor):
+        return True
+    # What is left: the sum of the corrections to come, or what first corrections have left before
+    left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
+    if one.trusted == 1 and one.measured == 0:
+        left = min(left, _expected(numbers, size, adaptive))
+    return left <= numbers.kappa and (one.measured == 1 or not is_last)
+
+
+@kernel
 def _solve_stage(context, c, r, i, t, g):
     """Solve stage i at time t: k_i, predicted on entry, and v_i, vd_i. Status."""
-    w, l, n, scratch = c.work, c.linear, r.x.size, r.memory[_scratch_at(r) :]
+    w, linear, n, scratch = c.work, c.linear, r.x.size, r.memory[_scratch_at(r) :]
     known, ys, k = r.memory[: 2 * n], r.memory[(1 + i) * 2 * n :][:n], r.memory[(1 + i) * 2 * n + n :][:n]
     f, dx, xs = scratch[F * n :][:n], scratch[DX * n :][:n], scratch[XS * n :][:n]
-    guess = scratch[H_BEFORE * n + 1 :][:n]
+    guess, adaptive = scratch[H_BEFORE * n + 1 :][:n], r.numbers.adaptive == 1
     copy(k, guess)
-    floor = RESIDUAL_FLOOR / (l.numbers.rtol + l.numbers.atol)
-    before, theta, measured, trusted, first, second = math.inf, GUESS, False, True, 0.0, math.inf
-    slow, apart, stuck, renewed = 0, 0, False, False
-    eager, sparse, slips = l.numbers.eager > 0, l.numbers.every_chart == 1, l.numbers.slips == 1
-    apart_at_most = APART_SLIPPING if slips else APART
-    is_last = i + 1 == int(r.tableau[0])  # its contraction is measured: stiffness that has gone makes corrections small
-    # what stages of fixed steps leave adds up over thousands of steps
-    limit = SLOW_SPARSE if sparse and r.numbers.adaptive == 1 else SLOW
-    l.numbers.eager -= 1
-    for _ in range(ITERATIONS if r.numbers.adaptive == 1 else FIXED_ITERATIONS):
+    _begin_iteration(c, r)
+    for _ in range(ITERATIONS if adaptive else FIXED_ITERATIONS):
+        # The equations at v_i, vd_i of the iterate
         _set_stage(g, k, known, xs, ys)
         status = _evaluate(context, c, r, t, g, xs, ys, k, f)
         if status != 0:
             return status
         w.counters.stage_iterations += 1
-        off_chart = not sparse and l.numbers.chart != w.counters.charts
-        slow_now = measured and theta > max(limit, l.numbers.slow)
-        stale = eager or off_chart or abs(g - l.numbers.g) > SAME_G * g
-        here = eager or slow_now or not sparse or l.numbers.g == 0.0 or l.numbers.known == 0
-        was_eager, eager = eager, False
-        if stale or slow_now:
-            if not stale:
-                if slow == 0 and not renewed:
-                    l.numbers.eager = EAGER_STAGES if not sparse else EAGER_LOST if theta > DIVERGING else EAGER_SPARSE
-                slow += 1
-            renewed = True
-            if _renew_matrix(context, c, t, g, f, slips or slow == MATRICES, here) != 0:
-                return STAGE_FAILED
-            if not slips:  # where friction changes within a correction, Newton's own contraction counts
-                before, theta, measured, second = math.inf, GUESS, False, math.inf
-            trusted = trusted and not (was_eager or slow_now or off_chart)
-        size = _correct(context, c, g, k, f, dx)
-        if not size < math.inf:
+        # k += P^-1 A (f - k)
+        if not _renew_if_needed(context, c, t, g, f):
             return STAGE_FAILED
-        if before < math.inf:
-            if not measured:
-                first, second = before, size
-            theta, measured = size / before, True
-            if sparse and not slips and slow == MATRICES and l.numbers.slow == 0.0:  # no other matrix contracts better
-                l.numbers.slow = min(WORSE * theta, DIVERGING)
-            stuck = theta > DIVERGING and size <= AT_FLOOR * floor
-            apart += 1 if renewed and theta > DIVERGING else 0
-            if apart == apart_at_most:
-                return STAGE_FAILED
-        left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
-        if trusted and not measured:
-            left = min(left, _expected(l.numbers, size, r.numbers.adaptive == 1))
-        if size <= floor or stuck or (left <= l.numbers.kappa and (measured or not is_last)):
-            _learn(l.numbers, first, second, renewed)
+        size = _correct(context, c, g, k, f, dx)
+        if not size < math.inf or not _measure(c, size):
+            return STAGE_FAILED
+        if _is_solved(c, size, adaptive, i + 1 == int(r.tableau[0])):
+            _learn(linear.numbers, linear.iteration.first, linear.iteration.second, linear.iteration.renewed == 1)
             _set_stage(g, k, known, xs, ys)
             return 0 if _is_near(context, c, g, k, guess, f, dx) else STAGE_FAILED
-        before = size
+        linear.iteration.before = size
     return STAGE_FAILED
 
 
 @kernel
-def _see_step_before(context, l, t, n, scratch):
+def _see_step_before(context, linear, t, n, scratch):
     """h of the step before, 0 where there is none, and its start in this chart."""
     # -inf: there is none
-    h_before = t - l.numbers.t_before if l.numbers.t_before > -math.inf else 0.0
+    h_before = t - linear.numbers.t_before if linear.numbers.t_before > -math.inf else 0.0
     scratch[H_BEFORE * n] = h_before
     if h_before > 0.0:
-        call_recall(l.kernels.recall, context, scratch[Y_BEFORE * n :], scratch[K_BEFORE * n :])
+        call_recall(linear.kernels.recall, context, scratch[Y_BEFORE * n :], scratch[K_BEFORE * n :])
     return h_before
 
 

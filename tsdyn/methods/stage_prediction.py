@@ -1,7 +1,7 @@
 """First guesses of the stages of a step, k_i = vdd, on the polynomial through stages that are known already.
 
-Known are the earlier stages of the step, and those of the step before while the chart lasts. The nearest in time are
-taken: how many, the first implicit stage of the last step has told, since a stiff transient is no polynomial.
+Known are the earlier stages of the step, and those of the step before on the same chart. The nearest in time are taken,
+as many as would have predicted the first implicit stage of the last step best: a stiff transient is no polynomial.
 
 The memory of it: t, h and the counter of charts of the last attempt; h of the step before, 0 where there is none; the
 number of points; then vd_i and k_i of each stage of the step before, n floats each.
@@ -74,11 +74,11 @@ def predict(tableau, memory, own, i, ratio, points, part, k):  # eight: what is 
         k[e] = 0.0
     for m in range(found):
         # Lagrange's polynomial through them
-        weight, j = 1.0, int(places[m])
+        weight, source = 1.0, int(places[m])
         for l in range(found):
             if l != m:
                 weight *= (target - times[l]) / (times[m] - times[l])
-        known = memory[(2 * j + 2 + part) * n :] if j < i else own[BEFORE + (2 * (j - i) + part) * n :]
+        known = memory[(2 * source + 2 + part) * n :] if source < i else own[BEFORE + (2 * (source - i) + part) * n :]
         for e in range(n):
             k[e] += weight * known[e]
 

@@ -85,7 +85,7 @@ def evaluate_bias(graph, system, f, t):
         kind = graph.kinds[i]
         _run_loop(graph, system.reals, f, t, kind, kind.bias, f.gamma, f.rows.H)
     _clear_other_rows(graph, f.gamma)
-    keep_redundant(f, f.gamma, f.left.gamma)
+    keep_redundant(f, f.gamma, f.redundant.gamma)
 
 
 @kernel
@@ -97,4 +97,4 @@ def evaluate_drift(graph, system, f, t, out):
     for i in range(graph.kinds.shape[0]):
         kind = graph.kinds[i]
         _run_loop(graph, system.reals, f, t, kind, kind.drift, out, f.rows.H)
-    keep_redundant(f, out, f.left.drift)
+    keep_redundant(f, out, f.redundant.drift)

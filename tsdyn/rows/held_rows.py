@@ -14,7 +14,7 @@ import math
 
 from ..elements.loops.body_poses import POSE, R
 from ..jit.kernels import kernel
-from ..jit.questions import most
+from ..jit.predicates import most
 from .redundant_rows import length, square
 from .singularity import is_near_singular
 from .tolerances import FAINT, HELD, NO_RATE, RESTING
@@ -29,19 +29,19 @@ def has_redundant_rows(f):
 @kernel
 def redundant_rows_hold(graph, f, floor):
     """Return True if the redundant rows hold on the manifold, by the residuals of the last evaluation."""
-    return f.dropped[0] == 0 or f.selection.unheld <= floor + HELD * FAINT * _extent(graph, f)
+    return f.dropped[0] == 0 or f.selection.excess <= floor + HELD * FAINT * _extent(graph, f)
 
 
 @kernel
 def rates_hold(graph, f, q, qd, size):
     """Return True if they hold for velocities, by H and Phi_t of the last evaluation; size that of the scene, m."""
-    if f.dropped[0] == 0 or f.left.H.size == 0:
+    if f.dropped[0] == 0 or f.redundant.H.size == 0:
         return True
     # Velocities of a scene at rest are compared with those of a fall through its extent
     speed, spin = _largest(graph, qd)
     far = _reach(graph, f, size)
     speed = max(speed, RESTING * math.sqrt(f.selection.push * far) + NO_RATE * far)
-    return _hold(graph, f, f.left.drift, q, qd, speed + far * spin, spin + speed / far)
+    return _hold(graph, f, f.redundant.drift, q, qd, speed + far * spin, spin + speed / far)
 
 
 @kernel
@@ -50,7 +50,7 @@ def accelerations_hold(graph, f, q, qd, qdd, size):
 
     Next to a singular configuration accelerations have lost digits that say nothing of the redundant rows.
     """
-    if f.dropped[0] == 0 or f.left.H.size == 0 or is_near_singular(f, f.indicator.start):
+    if f.dropped[0] == 0 or f.redundant.H.size == 0 or is_near_singular(f, f.indicator.start):
         return True
     # Terms: accelerations of bodies, of free fall, and centripetal ones
     push, twist = _largest(graph, qdd)
@@ -58,7 +58,7 @@ def accelerations_hold(graph, f, q, qd, qdd, size):
     far = _reach(graph, f, size)
     push = max(push, f.selection.push) + spin * (speed + far * spin) + NO_RATE * far
     twist = max(twist, f.selection.twist) + spin * spin
-    return _hold(graph, f, f.left.gamma, q, qdd, push + far * twist, twist + push / far)
+    return _hold(graph, f, f.redundant.gamma, q, qdd, push + far * twist, twist + push / far)
 
 
 @kernel
@@ -117,7 +117,7 @@ def _hold(graph, f, known, q, rates, most, fastest):
 
     A body whose rates are below FAINT of the largest, `most` and `fastest`, counts as one with these.
     """
-    H = f.left.H
+    H = f.redundant.H
     for i in range(f.dropped[0]):
         # |H (rd, omega') + known| against the sum of its absolute terms
         residual, terms = known[i], abs(known[i])

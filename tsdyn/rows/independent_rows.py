@@ -152,7 +152,7 @@ def _eliminate_choosing(graph, values, share, dropped, A, order):
 
 
 @kernel
-def _settle(f, count, wanted):
+def _accept(f, count, wanted):
     """Drop the selected rows if their number is the wanted one."""
     if count < 0 or (wanted >= 0 and count != wanted):
         return False
@@ -174,7 +174,7 @@ def select(graph, f, rows, wanted, least):
         weigh_rows(graph, rows.H, rows.Y)
         share = ZERO_PIVOT if wanted >= 0 else least
         count = _choose_of_all(graph, rows.H, rows.Y, wanted, share, f.chosen, f.block, f.order)
-        return _settle(f, count, wanted)
+        return _accept(f, count, wanted)
     # Many rows: within the blocks of the elimination order, with an ever smaller share until the number is right
     share = FIRST_SHARE if wanted >= 0 else least
     while True:
@@ -182,7 +182,7 @@ def select(graph, f, rows, wanted, least):
         form_schur_complement(graph, rows.H, rows.Y, rows.S)
         leave_axes_out(graph, rows.S)
         count = _eliminate_choosing(graph, rows.S, share, f.chosen, f.block, f.order)
-        if _settle(f, count, wanted):
+        if _accept(f, count, wanted):
             return True
         share *= FEWER
         if count < wanted or share < least:

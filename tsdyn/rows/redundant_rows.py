@@ -22,7 +22,7 @@ def clear_redundant(f, b):
 
 @kernel
 def keep_redundant(f, b, kept):
-    """Zero the right-hand sides of redundant rows, after keeping them; kept is one of `Left`."""
+    """Zero the right-hand sides of redundant rows, after storing them in `kept`, one of `RedundantRows`."""
     if kept.size > 0:
         for i in range(f.dropped[0]):
             kept[i] = b[f.dropped[1 + i]]
@@ -40,10 +40,10 @@ def leave_redundant_rows(graph, f, Phi, H):
         if not over <= worst:
             worst = over
         for c in range(0, 16, 4):
-            if f.left.H.size > 0:
-                put(f.left.H, 16 * i + c, four(H, 16 * row + c))
+            if f.redundant.H.size > 0:
+                put(f.redundant.H, 16 * i + c, four(H, 16 * row + c))
             put(H, 16 * row + c, splat(0.0))
-    f.selection.unheld = worst
+    f.selection.excess = worst
     clear_redundant(f, Phi)
 
 

@@ -5,8 +5,8 @@ import numpy as np
 from ..elements.loops.body_poses import POSE
 from ..jit.aligned_arrays import zeros
 from ..sparse.elimination import lu_factors
-from .reselection import choosing_anew
-from .row_workspace import Friction, Indicator, Landing, Left, Rows, Selection, TangentWorkspace
+from .reselection import with_reselection
+from .row_workspace import Friction, Indicator, Landing, RedundantRows, Rows, Selection, TangentWorkspace
 from .tolerances import MOST_ROWS
 
 
@@ -24,13 +24,13 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
     poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
     tangent = TangentWorkspace(
         poses, allocate_rows(graph), zeros(m), zeros(m), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n),
-        zeros(4), Landing(), Selection(), Indicator(), Left(*(zeros(k * left) for k in (16, 1, 1))),
+        zeros(4), Landing(), Selection(), Indicator(), RedundantRows(*(zeros(k * left) for k in (16, 1, 1))),
         np.zeros(m + 1, np.int64), zeros(left), np.zeros(m + 1, np.int64), zeros(left),
         *(np.zeros(size, np.int64) for size in (m + 1, m)),
         zeros(max(widest, m if choosing else 0) ** 2), _allocate_friction(graph, n, basis), np.zeros(2, np.int64),
     )  # fmt: skip
     reset_selection(graph, tangent)
-    return choosing_anew(graph, tangent) if redundant else tangent
+    return with_reselection(graph, tangent) if redundant else tangent
 
 
 def allocate_rows(graph):
@@ -60,8 +60,8 @@ def reset_selection(graph, tangent):
     selection = tangent.selection
     selection.push = selection.twist = 0.0
     tangent.best.fill(1.0)
-    if tangent.left[0].size:
-        for array in tangent.left:
+    if tangent.redundant[0].size:
+        for array in tangent.redundant:
             array.fill(0.0)
     indicator.start = indicator.end = indicator.largest = 0.0
 
@@ -69,7 +69,7 @@ def reset_selection(graph, tangent):
 def selection_parts(tangent):
     """The arrays and the records that `reset_selection` sets."""
     friction = tangent.friction
-    arrays = [friction.lam, friction.load, tangent.dropped, tangent.best, *tangent.left]
+    arrays = [friction.lam, friction.load, tangent.dropped, tangent.best, *tangent.redundant]
     return arrays, [tangent.selection, tangent.indicator]
 
 

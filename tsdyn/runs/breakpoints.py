@@ -45,7 +45,7 @@ def fixed_end(r, stop):
 @kernel
 def take_pieces(system, r, log):
     """Let piecewise motions and loads stay with their pieces up to the next stop."""
-    # Half way to the next stop tells the piece
+    # The piece is the one half way to the next stop
     end = min(next_stop(r, log), r.clock.t_end)
     hold_pieces(system, 0.5 * (r.clock.t + end))
 

@@ -16,7 +16,7 @@ from .tolerances import LANDING, LITTLE, SLIDES
 
 
 @kernel
-def _rubbed(c, friction, r, scale, ahead):
+def _friction_power(c, friction, r, scale, ahead):
     """-Q . qd of a friction at scale qd + ahead qdd."""
     graph, qd, Q, power = c.graph, c.work.qd, stack(14), 0.0
     # Power of friction for unit normal load at scaled velocities
@@ -45,13 +45,13 @@ def until_rest(c, r, h):
     for i in range(c.graph.frictions.shape[0]):
         friction = c.graph.frictions[i]
         # mu |v| now
-        now = _rubbed(c, friction, r, 1.0, 0.0)
+        now = _friction_power(c, friction, r, 1.0, 0.0)
         # At rest, friction grows faster than in proportion to velocity
-        if not _rubbed(c, friction, r, 2.0, 0.0) < SLIDES * now:
+        if not _friction_power(c, friction, r, 2.0, 0.0) < SLIDES * now:
             r.numbers.still += 1
         elif now < math.inf:
             # Deceleration by a small part of the step: rest is at h now / slowing parts from here
-            slowing = now - _rubbed(c, friction, r, 1.0, LITTLE * h)
+            slowing = now - _friction_power(c, friction, r, 1.0, LITTLE * h)
             if slowing > LITTLE * now:
                 h = min(h, LANDING * LITTLE * h * now / slowing)
     copy(r.now[1], c.work.qd)

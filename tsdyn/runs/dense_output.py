@@ -41,12 +41,12 @@ def between(context, w, r, t, block):
 
     Placed twice: Newton's method comes from further away than in a run, and ends nearer to rounding from nearby.
     """
-    status = _place(context, w, r, t, t, 1.0, block)
+    status = _place_share(context, w, r, t, t, 1.0, block)
     return _evaluate_there(context, w, r, t, block) if status == 0 else status
 
 
 @kernel
-def _place(context, w, r, t, when, share, block):
+def _place_share(context, w, r, t, when, share, block):
     """Place a share of the coordinates at t, at another time if the share is not all; x and y of the step. Status."""
     # Coordinates of the chart by the interpolant
     s = (t - block[B_START]) / block[B_H]
@@ -193,7 +193,7 @@ def _go_to(context, c, r, t, began, block):
             if status == 0:
                 # Chart coordinates in proportion, at a time in proportion
                 made, share = w.counters.factorizations, leg / legs
-                status = _place(context, w, r, t, began + share * (t - began) if leg < legs else t, share, block)
+                status = _place_share(context, w, r, t, began + share * (t - began) if leg < legs else t, share, block)
                 most = max(most, w.counters.factorizations - made)
         if status == 0 and most <= FEW:
             break

@@ -34,7 +34,7 @@ class Track:
     """What is known of one function up to the last step's end."""
 
     def __init__(self, value):
-        self.value = self.end = value  # at that time, and at the end of the step that is looked at
+        self.value = self.end = value  # at that time, and at the end of the present step
         self.sign = 0.0  # the last it had; 0 for none yet
         self.significant = None  # time and value at which it had that sign
         self.zero = None  # time of the last zero, if it has had no sign since
@@ -49,7 +49,7 @@ class Watch:
     Attributes
     ----------
     t : float, s
-        The time up to which the run has been looked at.
+        The time up to which events have been searched.
     """
 
     def __init__(self, events, packed, reader, start):
@@ -57,7 +57,7 @@ class Watch:
         self.start = self.t = start
         self.state = self.memory = None  # at t, and what is remembered of it: joints' angles, and what forces do
         self.angles = handles_of(packed).count
-        self.beside = None  # the start of the step that is looked at, for `Instant`
+        self.beside = None  # the start of the present step, for `Instant`
         self.tracks = None
         self.list = [[] for _ in events]
         rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
@@ -85,7 +85,7 @@ class Watch:
             if not run.numbers.begun:
                 return status, ""
             self.state, self.memory = run.now.copy(), run.remembered.copy()
-            self._look_from()
+            self._note_start()
             if self.tracks is None:
                 try:
                     self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
@@ -98,13 +98,13 @@ class Watch:
             status = memory.advance(log, 1)
             if run.numbers.steps > done:
                 try:
-                    last = self._look(run, log)
+                    last = self._search_step(run, log)
                 except Failed as failure:
                     return Status.EVENT_FAILED, str(failure)
                 if last is not None:
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
             full = run.numbers.chart_rows + 2 >= len(log.charts)
-            if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # what has been found stiff is told
+            if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
         return status, ""
 
@@ -129,12 +129,12 @@ class Watch:
             self.list[index].append(Occurrence(t, index, state))
 
     def go_back(self, run, log):
-        """Let the run end where it has been looked at last."""
+        """Let the run end where events were searched last."""
         if self.state is not None and run.clock.t > self.t:
             run.remembered[:] = self.memory
             self._end(run, log, self.t, self.state, self.t)
 
-    def _look_from(self):
+    def _note_start(self):
         self.beside = self.t, self.state, self.memory[: self.angles]
 
     def _instant(self, t, state):
@@ -143,17 +143,17 @@ class Watch:
     def _value(self, i, t, state):
         return self.events[i].value(t, self._instant(t, state))
 
-    def _look(self, run, log):
+    def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
-        self._look_from()
+        self._note_start()
         before, self.memory = self.memory, run.remembered.copy()
         try:
-            return self._looked(run, log, Inside(self.reader, run, log, self.t, self.state))
+            return self._locate(run, log, Inside(self.reader, run, log, self.t, self.state))
         except KeyboardInterrupt:
             self.memory = before
             raise
 
-    def _looked(self, run, log, step):
+    def _locate(self, run, log, step):
         found, failure, end = [], None, step.t1
         step.degree = self._degree(step)
         for i in range(len(self.events)):
@@ -246,7 +246,7 @@ class Watch:
             elif abs(value) > track.noise:
                 if track.zero is not None:
                     if track.pending and direction * sign >= 0.0:
-                        found.append(self._left(i, step, track.zero, (t, value)))
+                        found.append(self._leave(i, step, track.zero, (t, value)))
                     track.zero, track.passed, track.pending = None, False, False
                 elif sign == -track.sign and direction * sign >= 0.0:
                     found += self._root(i, step, t, value)
@@ -277,7 +277,7 @@ class Watch:
                     other = middle
         return Occurrence(t, i, step.at(t))
 
-    def _left(self, i, step, t, last):
+    def _leave(self, i, step, t, last):
         """The `Occurrence` where event i leaves a zero: that at t, or one that is so within rounding."""
         value = self._at(i, step, t)
         if value != 0.0 and (value < 0.0) != (last[1] < 0.0):

@@ -17,8 +17,8 @@ INTERRUPTED, PASSAGE = int(Status.INTERRUPTED), int(Status.PASSAGE)
 
 
 @callback(PLACE)
-def place(context, t, x):
-    """In place of `place` and `linearise`."""
+def place_interrupted(context, t, x):
+    """Stand-in of `place` and `linearise`."""
     return INTERRUPTED
 
 
@@ -65,9 +65,9 @@ def reach(context, t, h):
 
 
 STAND_INS = {
-    "place": place, "accelerate": accelerate, "start_chart": start_chart, "reach": reach, "accelerate_here": reach,
-    "pass_singular": reach, "expand": expand, "linearise": place, "reduce": factorise, "factorise": factorise,
-    "residual": residual, "factorise_stages": factorise_stages,
+    "place": place_interrupted, "accelerate": accelerate, "start_chart": start_chart, "reach": reach,
+    "accelerate_here": reach, "pass_singular": reach, "expand": expand, "linearise": place_interrupted,
+    "reduce": factorise, "factorise": factorise, "residual": residual, "factorise_stages": factorise_stages,
 }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from ..motions.state_program import LENGTH
 from ..validation import EXACT, damaged, demand
 
 LAID_OUT = (  # fields that follow from scene and method, or are filled in before they are read
-    "system", "graph", "kernels", "rub", "anew", "joints", "tableau", "block", "own", "trial",
+    "system", "graph", "kernels", "friction_solver", "reselection", "joints", "tableau", "block", "own", "trial",
     "table",
 )  # fmt: skip
 OWN = {  # numbers of records, likewise

@@ -100,13 +100,13 @@ def _size(context, r):
 
 
 @kernel
-def accept(context, l, r, h):
+def accept(context, linear, r, h):
     """Accept or reject the step h and choose the next one (Gustafsson's PI control). True if accepted."""
     end = r.xd if r.numbers.first_order == 1 else r.y
     # Error estimate, filtered by (I - g J)^-1 in stiff scenes
     _estimate(r, r.kernels.error, h, end)
-    if l.numbers.g > 0.0:
-        call_soften(l.kernels.soften, context, r.dx, l.numbers.g, r.dy)
+    if linear.numbers.g > 0.0:
+        call_soften(linear.kernels.soften, context, r.dx, linear.numbers.g, r.dy)
     error = _size(context, r)
     if r.kernels.second_error != 0:  # Hairer's combination of two orders; nan stays nan
         _estimate(r, r.kernels.second_error, h, end)
@@ -125,7 +125,7 @@ def accept(context, l, r, h):
     factor = SAFETY * error ** (-PI_ERROR * power) * r.clock.error_before ** (PI_BEFORE * power)
     factor = min(max(factor, SHRINK), 1.0 if r.numbers.rejected_last != 0 else GROW)
     # An unchanged step keeps the matrix
-    if l.numbers.g > 0.0 and SAME_FROM <= factor <= SAME_TO:
+    if linear.numbers.g > 0.0 and SAME_FROM <= factor <= SAME_TO:
         factor = 1.0
     r.clock.error_before = max(error, LEAST_BEFORE)
     r.clock.h = min(h * factor, r.clock.max_step)

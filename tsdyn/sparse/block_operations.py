@@ -8,7 +8,7 @@ that failed, or -1. `kept` holds the diagonal before elimination; its sign is th
 import math
 
 from ..jit.kernels import kernel
-from ..jit.questions import serves
+from ..jit.predicates import serves
 from ..jit.simd import get, let
 
 

@@ -40,4 +40,4 @@ def with_loops(graph, kinds, *columns):
         for loop in columns:
             if loop != DRIFT or table[DRIFT][i] != 0:
                 table[loop][i] = address(kind.kernels, loop, kind.__name__, InvalidConstraint)
-    return graph._replace(kinds=table, rub=np.zeros(1, np.int64))
+    return graph._replace(kinds=table, friction_solver=np.zeros(1, np.int64))

@@ -9,7 +9,7 @@ diagonal block is read. The diagonal before elimination is stored after the pane
 """
 
 from ..jit.kernels import kernel, long_kernel
-from ..jit.questions import or_one
+from ..jit.predicates import or_one
 from ..jit.simd import get, let
 from .block_operations import eliminate, eliminate_lu, link, link_lu, subtract_products
 
@@ -93,8 +93,8 @@ def update_later_blocks(pattern, values, panel, j, size, width):
 @kernel
 def record(pattern, e):
     """Which products go where: columns of a panel and how many, twice; place and row length of what they change."""
-    record = pattern.records[6 * e :]
-    return record[0], record[1], record[2], record[3], record[4], record[5]
+    one = pattern.records[6 * e :]
+    return one[0], one[1], one[2], one[3], one[4], one[5]
 
 
 @kernel

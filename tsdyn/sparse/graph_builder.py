@@ -300,7 +300,7 @@ class _Builder:
             dropped=dropped_rows(self.packed, self.still, self.places),
             frictions=frictions,
             friction_rows=friction_rows,
-            rub=np.zeros(1, np.int64),
+            friction_solver=np.zeros(1, np.int64),
             axes=axes,
         )
         return graph, used

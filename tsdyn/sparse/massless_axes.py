@@ -87,7 +87,7 @@ def _carriers(packed, light):
         ends = {number.get(id(constraint.body_of(marker)), -1) for marker in constraint.markers}
         for i in ends & light:
             near[i] |= ends - {i}
-    # Connected sets of light bodies; one that touches two others carries something
+    # Connected sets of light bodies; one with two neighbours outside carries something
     left = set(light)
     while left:
         together, queue = set(), [left.pop()]

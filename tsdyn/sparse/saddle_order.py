@@ -99,7 +99,7 @@ class _Sets:
         return name
 
     def _ends(self, i):
-        """The sets that rows i touch, and the anchors that all of them would have as one."""
+        """The sets that rows i connect, and the anchors of their union."""
         sets = {self._find(self.home[body]) for body in self.pairs[i] if body in self.home}
         anchors = {body for body in self.pairs[i] if body not in self.home}
         return sets, anchors.union(*(self.anchors[name] for name in sets))
@@ -113,7 +113,7 @@ class _Sets:
         return -1 if body in self.home else self.rank[body]
 
     def _join(self, i):
-        """Eliminate rows i: one set of those that they touch."""
+        """Eliminate rows i, and merge the sets that they connect."""
         sets, anchors = self._ends(i)
         name, *others = sets
         for other in others:

@@ -1,7 +1,7 @@
 """Choice of minimal coordinates: joint coordinates in the order of the joints, then displacements and rotations.
 
 What of a candidate is left when those taken before it are held is a diagonal entry of Z P Z^T, P the inverse mass of
-the motions that are still free. Candidates are looked at in batches: those taken in earlier batches are rows of the
+the motions that are still free. Candidates are examined in batches: those taken in earlier batches are rows of the
 sparse saddle-point matrix, those of the same batch pivots of Cholesky's factor of a small Z P Z^T. So the cost is that
 of a solution a candidate, and of a factorisation a batch.
 """

@@ -47,7 +47,7 @@ class Descent(Moves):
         super().__init__(*start)
         self.steps, self.mu = 0, FIRST_MU
 
-    def tell(self):
+    def report_steps(self):
         """Report the steps so far: the fraction is of the digits that are to be gained."""
         left = self.unbalanced
         digits = np.log(left) / np.log(BALANCED) if left > 0.0 else 1.0
@@ -55,12 +55,12 @@ class Descent(Moves):
             SEARCH * min(max(digits, 0.0), 1.0), f"{self.steps} steps, {left:.1e} of the loads are not balanced"
         )
 
-    def settle(self):
+    def balance(self):
         """Take steps until the loads are balanced to rounding; True if they are."""
         vain = 0
         while self.steps < MOST_STEPS and self.gone < FARTHEST * self.reach and self.turned < MOST_TURNED:
             before = self.unbalanced
-            self.tell()
+            self.report_steps()
             if before <= BALANCED or not self._step():
                 break
             self.steps += 1

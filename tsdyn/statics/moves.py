@@ -35,7 +35,7 @@ class Moves:
     q : ndarray (n,)
         Consistent.
     report : callable (fraction, said)
-        Is told how far the search is.
+        Called with the progress of the search.
 
     Attributes
     ----------

@@ -281,9 +281,9 @@ def change(graph, b, x, k, inverse, exact, Z):
         put(bodies, o, fma(push, h, four(bodies, o)))
     if graph.bodies[b, 1] == 7:
         # omega'_{k+1} += Z_omega / (k + 1), and A_{k+2} by Eq. (1)
-        change, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
+        twist, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
         if exact:
-            put(bodies, o, add(four(bodies, o), exact_product(change, g, g_low)))
+            put(bodies, o, add(four(bodies, o), exact_product(twist, g, g_low)))
         else:
-            put(bodies, o, fma(change, g, four(bodies, o)))
-        turn(bodies, at, k + 2, exact_product(change, h, h_low))
+            put(bodies, o, fma(twist, g, four(bodies, o)))
+        turn(bodies, at, k + 2, exact_product(twist, h, h_low))

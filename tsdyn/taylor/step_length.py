@@ -31,9 +31,9 @@ def size_of_order(bodies, nb, orders, k, far, fast):
 
 @long_kernel
 def radius(bodies, nb, orders, top, far, fast):
-    """The radius of convergence as the last coefficients up to top + 1 have it (Jorba, Zou, 2005); 0 if not finite.
+    """Radius of convergence from the last four coefficients up to top + 1; 0 if they are not finite.
 
-    More than their two: where a motion began at rest every fourth coefficient can vanish.
+    Jorba and Zou (2005) take two; in a motion that starts from rest every fourth coefficient can vanish.
     """
     rho = math.inf
     for k in range(top + 1, max(top - 3, 1), -1):
@@ -51,7 +51,7 @@ def order_in_range(bodies, nb, orders, top, far, fast):
     """The highest order up to top whose coefficients neither overflow nor vanish.
 
     They are in proportion to rate^k: 1e450 at order 30 where rates are 1e15 / s, and 1e-450 where they are 1e-15 / s.
-    A maximum can hide a body whose coefficients are no numbers: see `finite_top`.
+    A maximum doesn't show coefficients that are NaN: see `finite_top`.
     """
     # Nearly always the last coefficients are in range
     k = top + 1
@@ -96,9 +96,9 @@ def weights(c, r):
 
 @kernel
 def _held(h, rate, k):
-    """A step h whose error is term k, or a shorter one, so that rates are held to the tolerance, too.
+    """Shorten h, whose error is term k, so that the velocity error also meets the tolerance.
 
-    share: of what the error of rates, that of places over h / k, may be; squared, since short steps are many.
+    The velocity error is the position error times k / h. The bound is squared, since short steps are numerous.
     """
     # Velocity error over its bound: position error times k / h
     share = STIFF_RATES * rate * h / k
@@ -107,7 +107,7 @@ def _held(h, rate, k):
 
 @kernel
 def step_length(c, r):
-    """h = rho tol^(1 / (top + 2)), at most; and the order of the next step, that with the longer step for the work."""
+    """Longest step rho tol^(1 / (top + 2)); sets the order of the next step, by the longer step per unit of work."""
     x, nb, orders = c.expansion, c.graph.bodies.shape[0], c.expansion.order.room
     tol = r.clock.atol + r.clock.rtol
     far, fast, rate = weights(c, r)
@@ -127,8 +127,8 @@ def step_length(c, r):
 def longest(c, r, tol, most):
     """The longest step to a tolerance by any order up to `most`, which becomes the step's.
 
-    Next to a singular configuration rounding of lam grows from order to order as if the motion ended there: high orders
-    see no further than to it.
+    Near a singular configuration rounding errors of lam grow from order to order by the ratio of step length to
+    distance: high orders reach no further than the singularity.
     """
     x, nb = c.expansion, c.graph.bodies.shape[0]
     far, fast, _ = weights(c, r)
@@ -145,8 +145,8 @@ def longest(c, r, tol, most):
 def finite_top(c):
     """The highest top up to which the coefficients of all bodies are finite, for steps that have failed.
 
-    Next to where a law is not analytic they overflow, down to the lowest orders, and become NaN (0 c of such a c is no
-    zero). `order_in_range` asks for less: maxima, above LEAST_ORDER.
+    Near a singularity of a force law coefficients overflow, even of low orders, and become NaN. `order_in_range`
+    compares maxima only, above LEAST_ORDER.
     """
     x, orders = c.expansion, c.expansion.order.room
     for k in range(2, x.order.top + 2):

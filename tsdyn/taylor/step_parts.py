@@ -217,7 +217,7 @@ def _may_differ(c, t, limits):
             kind.near = 0 if left[0] > (STILL if is_short else 0.0) else 1
             if not left[0] >= c.trial.left:
                 c.trial.left = left[0]
-        # No such bound: the end of the step tells
+        # No such bound: compare at the end of the step
         elif kind.check != 0 and kind.sharp == 0:
             _set_place(c, t, limits[LENGTH], limits)
             kind.near = 1 if _is_off(c, i, limits) else 0

@@ -28,11 +28,11 @@ class ChartState(Record):
 class ChartWorkspace(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
 
-    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; chart_validity.touch
+    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; chart_validity.set_base_point
     d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 of the present place; chart_coordinates.displace
     x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
     y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
-    rows0: Rows  # H0, Y0, S0: the rows at q0; chart_validity.touch
+    rows0: Rows  # H0, Y0, S0: the rows at q0; chart_validity.set_base_point
     X: np.ndarray  # (m * 16,)  C Y0; chart_matrix.factorise_chart_matrix
     lower: np.ndarray  # factors of N = H C Y0; chart_matrix.factorise_chart_matrix
     upper: np.ndarray

@@ -26,6 +26,23 @@ class StageNumbers(Record):
     fresh: int  # 1 if the derivatives of the forces' laws are to be taken by saddle_point.reduce
 
 
+class StageIteration(Record):
+    """Newton's iteration of one stage: its limits, and what its corrections have shown so far."""
+
+    floor: float  # error norm of a correction that is rounding
+    limit: float  # contraction above which the matrix is renewed
+    before: float  # error norm of the correction before, by the same matrix; inf for none
+    theta: float  # contraction: the last one measured, or assumed
+    measured: int  # whether it has been measured
+    first: float  # size of the first correction, and of what it left; inf where that is unknown
+    second: float
+    trusted: int  # whether this stage's first correction leaves what those before it have left
+    renewed: int  # whether the matrix was renewed in this stage
+    poor: int  # matrices that were renewed for poor contraction
+    diverged: int  # iterations that diverged with a new matrix
+    eager: int  # whether the stage begins with a matrix of its own
+
+
 class StageKernels(Record):
     """Addresses of the kernels in formulations/linearisation.py or saddle_point.py, of `recall`, of the error norm.
 

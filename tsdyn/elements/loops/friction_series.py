@@ -38,7 +38,7 @@ def _complete(k, wide, par, kept, s, forces):
 
 
 @part
-def rub(k, wide, x, par, kept, s, forces, f):
+def known_friction(k, wide, x, par, kept, s, forces, f):
     """Replace f, order k of g, by what is known of f_k, Eq. (1), after order k - 1 has been completed."""
     g, N = stack(6), SLOTS + SIZE
     # The law has given g_k: keep it

@@ -13,7 +13,7 @@ Where a law is analytic while some rows a of its scratch are positive (`Force.po
     a_0 > sum_{k>0} |a_k| h^k                                                                                  (1)
 
 none of them vanishes within the step, and nothing else is evaluated. Past a zero of d the series of |d| goes on as
--|d|, of which no coefficient tells.
+-|d|, which no coefficient shows.
 """
 
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, vector
@@ -23,15 +23,15 @@ from ...motions.state_program import T
 from ..markers import PARAMETERS, POINT, TURN
 from ..tolerances import LAW_NOISE, LAW_TOLERANCE
 from .constraint_series import BODY_ROW, S_OMEGA
-from .force_series import BODY, INTS, MASK, place, run_traced, scratch_rows
+from .force_series import BODY, INTS, MASK, marker_coefficient, run_traced, scratch_rows
 from .friction_series import load_at
 from .template import (
     CODES,
+    FRICTIONAL,
     MARKERS,
     OWNERS,
     POSITIVE,
     ROOM,
-    RUBS,
     SHARP,
     SIZE,
     STARTS,
@@ -102,7 +102,9 @@ def _sums(code, bodies, at, orders, known, tau, s, values, p):
         return x, fma(a0, splat(first(w)), fma(a1, splat(second(w)), times(a2, splat(third(w)))))
     for k in range(known, -1, -1):
         xd = fma(xd, h, x)
-        x = fma(x, h, four(values, p + 4 * k) if code == PARAMETERS else place(code, bodies, at, orders, k, s))
+        x = fma(
+            x, h, four(values, p + 4 * k) if code == PARAMETERS else marker_coefficient(code, bodies, at, orders, k, s)
+        )
     return x, xd
 
 
@@ -145,7 +147,7 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
             run_traced(run, values, x, xd, par, 0, rows, 1, own_scratch)
             kernel_series(x, xd, par, 0, matrix(data_of(own_scratch), rows, 1), f)
         else:
-            if RUBS:
+            if FRICTIONAL:
                 scratch = matrix(data_of(values[own_values + 2 * MARKERS * wide :]), rows, orders)
                 par[stride - 3 * MARKERS - 1] = load_at(limits[TAU], known, x, par, scratch)
             kernel_law(x, xd, par, limits[TIME], f)

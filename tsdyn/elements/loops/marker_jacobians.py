@@ -7,9 +7,21 @@ W = xd_qd pulls a force f conjugate to the marker back to Q = W^T f. X = x_q equ
     Turn            xd = 2 E(p) pd = -2 E(pd) p,   E = [-e, e~ + e0 I]
 """
 
+from typing import NamedTuple
+
+import numpy as np
+
 from ...jit.kernels import kernel, stack
 from ...maths.euler_parameters import rotate_gradient, rotate_rate
 from ..markers import PARAMETERS, POINT, TURN, chain_rule, position, rate
+
+
+class MarkerDerivatives(NamedTuple):
+    """Derivatives of the markers of an instance by the coordinates of its two bodies."""
+
+    W: np.ndarray  # (size of x, 14)  xd_qd
+    X: np.ndarray  # (size of x, 14)  x_q
+    Y: np.ndarray  # (size of x, 14)  xd_q
 
 
 @kernel
@@ -66,8 +78,9 @@ def _rate(code, p, pd, s, out):
 
 
 @kernel
-def derivatives(code, dimension, at, q, qd, s, row, column, W, X, Y):
-    """W = xd_qd, X = x_q and Y = xd_q of one marker, from [row, column] on; zero on entry."""
+def derivatives(code, dimension, at, q, qd, s, row, column, out):
+    """Set the `MarkerDerivatives` of one marker, from [row, column] on; zero on entry."""
+    W, X, Y = out
     if dimension != 0 and code == POINT:
         # A point moves with r
         for i in range(3):

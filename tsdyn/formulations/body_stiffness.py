@@ -106,7 +106,7 @@ def _block(one, k, l):
 
 @long_kernel
 def _spread(s, one, scale, damped):
-    """Add scale s.X to K and, where there is damping, scale s.Xd to C and what it makes of turned velocities to K."""
+    """Add scale s.X to K; with damping, scale s.Xd to C and its effect on rotated velocities to K."""
     G0, G1, P0, P1 = stack2(3, 4), stack2(3, 4), stack2(3, 4), stack2(3, 4)
     # dp and dpd of a rotation, for both bodies
     _frames(s, s.own[2], 0, G0, P0)

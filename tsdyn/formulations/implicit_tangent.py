@@ -1,4 +1,4 @@
-"""The tangent form for implicit methods: accelerations that a stage gives, and rates of other places, in a chart.
+"""The tangent form for implicit methods: accelerations of a stage, and rates of another configuration, in a chart.
 
 Newton's method for its stages is that of stage_equations.py; the matrices are those of saddle_point.py.
 """
@@ -35,7 +35,7 @@ OK = int(Status.SUCCESS)
 
 @callback("p")
 def check(context):
-    """As tangent.check; N is factorised anew at the place, since the stages of the next step begin with its factors."""
+    """As tangent.check; N is factorised at the present configuration: the stages of the next step begin with it."""
     c = load(context)
     c.chart.state.factored = 0
     return check_chart(c)
@@ -43,7 +43,7 @@ def check(context):
 
 @callback("pp")
 def complete(context, yd):
-    """Write q, qd and qdd at the place and velocities of the last `accelerate`, yd being accelerations of the chart.
+    """Write q, qd and qdd after `accelerate`, yd being accelerations of chart coordinates.
 
     They are projected onto H (rdd, omega'd) + gamma = 0.
     """

@@ -181,7 +181,7 @@ def linearise(context, t, vdd):
     # r = Q_A + Q_v - M qdd is what the multipliers balance
     if system.forces.shape[0] > 0:
         applied_forces(system, w.q, w.qd, t, linear.r)
-        _forces(system, w, linear, t, 1)  # the laws' derivatives are kept; `reduce` takes the rest anew
+        _forces(system, w, linear, t, 1)  # stores derivatives of the laws; `reduce` evaluates the rest
     _inertia_terms(system, w, linear)
     # Phi_q^T lam = r;    Y = U B G1,    Z = U B G2
     multiply(w.U, w.B, linear.UB)

@@ -161,8 +161,8 @@ def _joints(packed):
 def _redundant(packed, omitted, spare):
     """Redundant rows among those that are left: as many as in the whole scene less the `spare` ones that are omitted.
 
-    Where too few redundant rows of the whole scene are left, some others: a run selects anew. None where that can't be
-    done.
+    If too few redundant rows of the whole scene are left, others are added: a run reselects rows. None where that can't
+    be done.
     """
     whole = redundant_rows(packed)
     if not len(whole):

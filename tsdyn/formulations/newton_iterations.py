@@ -17,9 +17,8 @@ SINGULAR = int(Status.SINGULAR)
 def solve_positions(system, w, t, v):
     """Find u and q = q0 + V v - U u with Phi(q, t) = 0, Eqs. 19, 20 and 29. Status.
 
-    The start is u + T dv, T = du/dv being left over from the place before. Sweeps go on until |Phi| <= u_tol and what
-    the last correction, which costs no further evaluation, is expected to leave is below u_tol^(3/2) or rounding, or
-    is rounding since it falls no more.
+    The start is u + T dv, with T = du/dv of the previous configuration. Stops when |Phi| <= u_tol and the residual
+    expected after the last correction is below u_tol^(3/2) or rounding, or when |Phi| has stopped falling at rounding.
     """
     n, m, k = w.q.size, w.u.size, v.size
     # u + T dv: first order in the change of v
@@ -91,9 +90,9 @@ def _step_off(w, n, m):
 def update_b(w):
     """Bring B to (Phi_q U)^-1 by Eq. 28, B <- 2 B - B (Phi_q U) B, N = Phi_q U being known. Status.
 
-    With R = N B - I the iteration is B <- B - B R and squares R: it ends when the R to come is below B_tol^(3/2), half
-    as many digits again as asked for, so that what the last square happens to be does not show in the velocities.
-    A start with |R| near one or above is replaced by a factorisation.
+    With R = N B - I the iteration is B <- B - B R, which squares R. It stops when the next R is below B_tol^(3/2), half
+    as many digits again as requested, so that the velocities don't depend on the size of the last square. If |R| is
+    near one or above at the start, B is factorised instead.
     """
     m = w.u.size
     tol = w.control.b_tol * math.sqrt(w.control.b_tol)

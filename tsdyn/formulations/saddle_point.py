@@ -7,8 +7,8 @@ positions by g^2 a and velocities by g a + B g^2 a:
     [ H                      0   ] [ dlam ]  =  [ 0   ]       r = f(k) - k, its tangent part
 
 K_b and C_b are those of body_stiffness.py and chart_derivatives.py. The normal part of a correction is that of r: the
-position solve removes it. What is left out are the changes of the normal parts of velocities and accelerations with the
-place, of the order of g omega.
+position solve removes it. Changes of the normal parts of velocities and accelerations with the configuration, of the
+order of g omega, are neglected.
 """
 
 from ..elements.loops.body_poses import OMEGA, POSE, write_positions, write_velocities
@@ -43,7 +43,7 @@ OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 
 @callback("pdp")
 def linearise(context, t, yd):
-    """Have the derivatives of the forces' laws taken anew by the next `reduce`, and find multipliers. Status."""
+    """Request new derivatives of the force laws from the next `reduce`, and solve for multipliers. Status."""
     c = load(context)
     system, w, f, graph = c.system, c.work, c.tangent, c.graph
     c.linear.numbers.fresh = 1
@@ -67,8 +67,8 @@ def is_direct(graph):
 def reduce(context, t):
     """Set K and C at the state of the last accelerations.
 
-    Multipliers and accelerations are those that the last Newton correction led to: of a state that is no solution yet,
-    stiff forces make them large. After `linearise` they are those of the state.
+    Multipliers and accelerations are those after the last Newton correction, since stiff forces make those of an
+    unconverged state large. After `linearise` they are those of the state.
     """
     c = load(context)
     system, w, f, s, graph = c.system, c.work, c.tangent, c.saddle, c.graph
@@ -140,7 +140,7 @@ def _mass(graph, b, r, c):
 
 @kernel
 def add_blocks(graph, s, upper, lower, g, masses):  # six: the graph, a matrix and what is added to it
-    """Add - g C_b - g^2 K_b, and M if asked for, in the places of the factors; g and the factors may be complex."""
+    """Add - g C_b - g^2 K_b, and M if asked for, to the entries of the factors; g and the factors may be complex."""
     for i in range(s.graph.blocks.shape[0]):
         block, o = s.graph.blocks[i], BLOCK * i
         rows, columns = degrees(graph, block.row), degrees(graph, block.column)

@@ -1,4 +1,4 @@
-"""What a Newton correction of a stage starts from: the normal part of accelerations, and loads that don't balance."""
+"""Right-hand side of a Newton correction of a stage: the normal part of accelerations, and the unbalanced loads."""
 
 import math
 
@@ -32,7 +32,7 @@ def add_to(x, out):
 
 @kernel
 def solve_normal(c):
-    """f.b <- N^-1 f.b, by factors that may be of an older place, such as q0 of the chart."""
+    """f.b <- N^-1 f.b, by factors that may be of an older configuration, such as q0."""
     l = c.chart
     lower, upper = (l.lower, l.upper) if l.state.made == 1 else (l.rows0.S, l.rows0.S)
     solve_product(c.graph, lower, upper, c.tangent.b)
@@ -88,8 +88,8 @@ def find_imbalance(c):
 def _correct_multipliers(c):
     """Correct lam by S^-1 H W e until H W e, e = F - M (a + C n) - H^T lam, is small; s.e = e. False if S is singular.
 
-    H of the saddle-point matrix may be that of an older place: it would take a part of what is left for a load. S is of
-    an older place, too, as long as it contracts: of the step's start at first.
+    The saddle-point matrix was formed with an older H, so the residual normal to the constraints is eliminated with the
+    present one. S may be older, too, as long as corrections contract: at first it is that of the step's start.
     """
     w, f, s, graph, least, before, renewed = c.work, c.tangent, c.saddle, c.graph, 0.0, math.inf, False
     lean = graph.axes.rows.shape[0] > 0  # S is of another metric than W

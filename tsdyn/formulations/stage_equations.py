@@ -5,15 +5,15 @@
     H a + gamma = 0                    a = (rdd, omega'd), the accelerations k of chart coordinates
     M a + H^T lam = F
 
-x and xd are those of k. `residual` solves the first two for u and z, as exactly as the stage needs it, and evaluates
-the others. `correct` takes n = -Y0 N^-1 (H a + gamma) for the normal part of the correction of k; the tangent part e
-follows with the multipliers from the saddle-point matrix (saddle_point.py):
+x and xd are those of k. `residual` solves the first two for u and z, to well below the tolerance of the stage, and
+evaluates the others. `correct` takes n = -Y0 N^-1 (H a + gamma) for the normal part of the correction of k; the tangent
+part e follows with the multipliers from the saddle-point matrix (saddle_point.py):
 
     [ M - g C_b - g^2 K_b    H^T ] [ C e  ]     [ F - M (a + C n) - H^T lam ]
     [ H                      0   ] [ dlam ]  =  [ 0                         ]
 
 Before, lam is corrected by S^-1 H W times the right-hand side, at the present H. The factors of N and S are those of an
-older place as long as they contract: of the step's start at first.
+older configuration as long as corrections contract: at first of the step's start.
 """
 
 import math
@@ -118,7 +118,7 @@ def _begin(numbers, s, charts, t):
 
 @kernel
 def _renew_normal(c):
-    """Factors of N at the present place; False if it is singular."""
+    """Factors of N at the present configuration; False if it is singular."""
     c.linear.numbers.lag = LEAST_LAG
     return factorise_normal(c.graph, c.work, c.tangent, c.chart)
 
@@ -144,7 +144,7 @@ def _rate_size(c, x):
 def _solve_positions(c, t, g):
     """Newton's method for u: poses and H. Status.
 
-    What it leaves of a position, over g, is to be no velocity that the stage would notice.
+    Stops when the position error over g is a velocity well below the tolerance of the stage.
     """
     system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
     floor, before, renewed = w.control.floor, math.inf, False
@@ -183,7 +183,7 @@ def _solve_positions(c, t, g):
 
 @kernel
 def _solve_rates(c, t):
-    """rd and omega' of the poses from the rates l.y, tangent as far as the stage notices. Status."""
+    """rd and omega' of the poses from the rates l.y, tangent to well below the tolerance of the stage. Status."""
     system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
     rheonomic, floor, before, renewed = is_rheonomic(system), 0.0, math.inf, False
     if rheonomic:

@@ -30,8 +30,8 @@ ROUNDING_AT_MOST = 100.0
 # corrections at most. Masses that are unequal by 1e10 need two.
 EXACT, REFINEMENTS = 1e-11, 3
 
-# m and rad: a correction of positions above it has changed H by more than rounding, so S is made anew. In scenes of
-# less than a metre it is in proportion to their size.
+# m and rad: a correction of positions above it has changed H by more than rounding, so S is factorised again. In scenes
+# of less than a metre it is in proportion to their size.
 LEAST_MOVE = 1e-15
 
 # |p.p - 1|: below it p is a unit quaternion to rounding, four squares of 1.1e-16 each and their sum.

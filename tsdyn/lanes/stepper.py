@@ -165,7 +165,7 @@ def accept(c):
     rest, still = 0.0 * h, below(-1.0, 0.0 * h)
     for b in range(c.graph.bodies.shape[0]):
         for i in range(3):
-            # Steps in which nothing moves, and numbers that are none
+            # Steps in which nothing moves; numbers that aren't finite
             spin, speed = abs(get(poses, b * POSE + OMEGA + i)), abs(get(poses, b * POSE + RD + i))
             still = both(still, opposite(either(below(SMALL, spin * h), below(far, speed))))
             rest += 0.0 * spin + 0.0 * speed

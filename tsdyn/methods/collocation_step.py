@@ -3,7 +3,7 @@
     vd_i = vd + h sum_j a_ij k_j,    v_i = v + h sum_j a_ij vd_j,    k_i = f(t + c_i h, v_i, vd_i)
 
 The iteration is that of formulations/coupled_stages.py. Its matrices are kept over iterations, steps and charts. They
-are made anew where the step has changed by more than SAME_STEP, or contraction is poor: from the same stiffness and
+are formed again where the step has changed by more than SAME_STEP, or contraction is poor: from the same stiffness and
 damping; in the next step, or at once where iterations diverge, from those of the present configuration; then from new
 derivatives of the forces' laws.
 
@@ -180,7 +180,7 @@ def _set_rates(r, h):
 
 @kernel
 def _sweep(context, c, r, own, t, h, level):  # seven: as _renew_matrices
-    """Evaluate the equations of all stages; with level >= 0, matrices are made anew at the middle one. Status."""
+    """Evaluate the equations of all stages; with level >= 0, matrices are renewed at the middle one. Status."""
     linear, w, n, stages = c.linear, c.work, r.x.size, c.saddle.stages.shape[0]
     width, x = 3 + stages, r.memory[:n]
     _set_rates(r, h)

@@ -155,7 +155,7 @@ def _is_near(context, c, g, k, guess, f, dx):
 
 @kernel
 def _expected(numbers, size, adaptive):
-    """What a first correction of that size is expected to leave: as last measured, and of a larger one the square."""
+    """Error expected after a first correction of this size: as last measured, growing with the square of the size."""
     # A first correction leaves an error in proportion to its square, as far as the matrix is exact
     share = max(1.0, size / numbers.first)
     return max(numbers.left * share * share, (LEAST if adaptive else LEAST_FIXED) * size)
@@ -163,9 +163,9 @@ def _expected(numbers, size, adaptive):
 
 @kernel
 def _learn(numbers, first, second, renewed):
-    """Remember what a first correction has left, the size of the second; or, without one, how long ago one was made.
+    """Store what a first correction has left, the size of the second; without a second one, let the old value grow.
 
-    A new matrix says little of what it leaves in the stages to come.
+    What a new matrix leaves in one stage doesn't predict the stages to come.
     """
     if renewed:
         numbers.left = math.inf

@@ -7,7 +7,7 @@ The memory of it: t, h and the counter of charts of the last attempt; h of the s
 number of points; then vd_i and k_i of each stage of the step before, n floats each.
 
 With friction velocities are predicted in place of accelerations: at rest they are smooth to a part of the slip
-velocity, and friction beyond it says nothing of them.
+velocity, and friction beyond it doesn't determine them.
 """
 
 import math

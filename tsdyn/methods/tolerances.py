@@ -18,7 +18,7 @@ ITERATIONS, FIXED_ITERATIONS = 20, 40
 KAPPA, KAPPA_SPARSE = 1e-3, 3e-3
 
 # m/s: what it may leave of a velocity where there is friction. At rest friction balances the loads at some velocity
-# below the slip velocity, 1e-11 m/s at least: what is left there changes the friction by a hundredth of it.
+# below the slip velocity, 1e-11 m/s at least: the error then changes the friction by a hundredth of it.
 SLIP_LEFT = 1e-13
 
 # Contraction above which the iteration matrix is rebuilt: up to it three corrections reach KAPPA

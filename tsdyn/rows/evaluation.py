@@ -17,7 +17,7 @@ def _run_loop(graph, reals, f, t, kind, loop, out, H):
 
 @kernel
 def _clear_other_rows(graph, out):
-    """out = 0 of welds and axis rows, which are none of Phi."""
+    """out = 0 of welds and axis rows, which aren't rows of Phi."""
     clear_welds(graph, out)
     if graph.axes.rows.shape[0] > 0:
         clear_axes(graph, out)

@@ -6,8 +6,8 @@
 
 2 p.pdd is the centripetal part of 2 pdd, which cancels in gamma.
 
-A row that depends on others wherever these hold is held by them. One that depends on them in places, or nearly, is left
-by the motion, however well the other rows hold.
+A row that depends on others wherever these hold is satisfied by them. If it depends on them at some configurations
+only, or nearly, the motion violates it, however well the other rows hold.
 """
 
 import math
@@ -48,7 +48,7 @@ def rates_hold(graph, f, q, qd, size):
 def accelerations_hold(graph, f, q, qd, qdd, size):
     """Return True if they hold for accelerations, as `rates_hold`, by gamma of the last evaluation.
 
-    Next to a singular configuration accelerations have lost digits that say nothing of the redundant rows.
+    Near a singular configuration accelerations have too few digits to judge the redundant rows.
     """
     if f.dropped[0] == 0 or f.redundant.H.size == 0 or is_near_singular(f, f.indicator.start):
         return True

@@ -118,7 +118,7 @@ def _choose(size, width, panel, kept, joints, share, A, order):
 def _eliminate_choosing(graph, values, share, dropped, A, order):
     """Factor S in place without rows whose relative pivots are below `share`; return the number of these rows.
 
-    As factorisation.factor; what is left in `values` serves nothing. Negative where a row that must be kept can't be.
+    As factorisation.factor; `values` are scratch afterwards. Negative if a row that must be kept depends on others.
     """
     pattern = graph.pattern
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths

@@ -1,4 +1,4 @@
-"""Selection of redundant rows during a run: a new one where the kept rows come close to dependence."""
+"""Selection of redundant rows during a run: renewed where the kept rows come close to dependence."""
 
 import math
 from typing import NamedTuple
@@ -23,12 +23,12 @@ class Choice(NamedTuple):
 
 
 def with_reselection(graph, tangent):
-    """The `TangentWorkspace` of a graph with which kernels can select rows anew."""
+    """The `TangentWorkspace` of a graph with which kernels can reselect rows."""
     if DEBUG:
         tangent.reselection[0] = 1
         return tangent
     words = len(image_of(Choice(graph, tangent)))
-    whole = np.zeros(words + 2, np.int64)  # what the view `anew` keeps alive
+    whole = np.zeros(words + 2, np.int64)  # kept alive by its view `reselection`
     tangent = tangent._replace(reselection=whole[words:])
     whole[:words] = image_of(Choice(graph, tangent))
     tangent.reselection[0], tangent.reselection[1] = reselect_rows.address, whole.ctypes.data
@@ -76,7 +76,7 @@ else:
 
 @kernel
 def doubt_selection(f):
-    """Have rows selected anew at the next chart."""
+    """Request a new selection of rows at the next chart."""
     f.best[:] = math.inf
 
 

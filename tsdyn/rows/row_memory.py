@@ -11,7 +11,7 @@ from .tolerances import MOST_ROWS
 
 
 def allocate_tangent(graph, n, redundant=False, basis=False):
-    """Allocate a `TangentWorkspace`; the ground's pose is set for good, and a point mass has that orientation.
+    """Allocate a `TangentWorkspace`; the ground's pose is set once, and a point mass has its orientation.
 
     Where rows may be `redundant`, there is room to select among all at once, if they aren't too many. A form with a
     basis needs room for its frictions, too.

@@ -15,7 +15,7 @@ PASSAGE = int(Status.PASSAGE)
 
 @long_kernel
 def begin_chart(context, c, r, log, reason):
-    """A new chart at the present q, qd, qdd; closes the record of the old one. PASSAGE next to a singular place."""
+    """New chart at the present q, qd, qdd; closes the record of the old one. PASSAGE near a singular configuration."""
     w = c.work
     # Record of the chart before
     if reason != AT_START:
@@ -43,5 +43,5 @@ def begin_chart(context, c, r, log, reason):
 
 @kernel
 def has_hardly_turned(c):
-    """Whether bodies have turned on the present chart, but by little."""
+    """Whether bodies have rotated on the present chart, by a small angle."""
     return 0.0 < turned_most(c.chart) < HARDLY_TURNED

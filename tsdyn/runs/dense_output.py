@@ -39,7 +39,8 @@ def evaluate(context, w, r, t, x, y, yd, xd):
 def between(context, w, r, t, block):
     """q, qd, qdd at a time within the step of this block. Status. xd, the next step's, is left alone.
 
-    Placed twice: Newton's method comes from further away than in a run, and ends nearer to rounding from nearby.
+    Positions are solved for twice: Newton's method starts further away than in a run, and ends closer to rounding when
+    repeated from nearby.
     """
     status = _place_share(context, w, r, t, t, 1.0, block)
     return _evaluate_there(context, w, r, t, block) if status == 0 else status
@@ -179,9 +180,9 @@ def read(context, run, t, rows, blocks, charts, points, out):
 
 @kernel
 def _go_to(context, c, r, t, began, block):
-    """`between`, from where the chart began, in so many legs that none of them needs new matrices again. Status.
+    """`between`, from the base point of the chart, in legs short enough to need no further factorisation. Status.
 
-    Where branches are close, Newton's method from far away may end on another one than that of the run.
+    Newton's method from far away may end on another branch of the constraints than that of the run.
     """
     w, status = c.work, 0
     # Fewer legs first; more where a leg needed many factorisations, a sign of a step too long

@@ -316,7 +316,7 @@ class Watch:
         least = max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
         root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
         shift = least + ROOT * abs(root)
-        # a run that goes on from a terminal event had better find it behind itself
+        # a run that continues from a terminal event must not find it again
         ends, side = self.events[i].limit < math.inf, math.copysign(1.0, b)
         # A terminal event ends the run on its far side
         while ends and root + shift < t1 and side * value(root) <= 0.0:

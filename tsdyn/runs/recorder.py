@@ -148,5 +148,5 @@ def _doubled(rows):
 
 
 def _joined(parts, width):
-    """The parts in one array, which is none of theirs."""
+    """A new array of all parts."""
     return parts[0].copy() if len(parts) == 1 else np.concatenate((np.empty((0, width)), *parts))

@@ -32,7 +32,7 @@ def first_slice(weight):
 
 
 class Pace:
-    """Whether a run gets on: an adaptive one whose steps stay so short that it would never end is ended.
+    """Progress of a run: an adaptive run whose steps stay too short to reach its end is ended.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Pace:
         self.t, self.tries, self.before = t, 0, 0.0  # since when, how many; s a try before that
 
     def judge(self, t, tries, end):
-        """Status, and what there is to say: of a run that is at t after so many more tries."""
+        """Status and reason of a run that is at t after `tries` more steps."""
         self.tries += tries
         if self.tries < PACED:
             return SLICE_DONE, ""

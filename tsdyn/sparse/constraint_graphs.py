@@ -19,7 +19,7 @@ def graph_of(packed, *columns):
 
 
 def set_redundant(packed, rows):
-    """Have the graphs of a scene made anew, with these rows of them redundant, int64 (k,); None where none are.
+    """Discard the graphs of a scene; new ones have these redundant rows, int64 (k,), or None.
 
     Hubs are left whole then: elimination may end with the row of a weld, which can't be left out.
     """

@@ -183,8 +183,8 @@ def expand(graph, system, k, last, ahead, refine, x, f):
     On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
     of the next order, unless this is the last one. lam_k stays in b until then.
 
-    low_r2 is what r_2 loses to rounding where factors are exact: gravity is rounded to the last place of a larger
-    acceleration, which has the same sign for many steps.
+    low_r2 is the rounding error of r_2 where factors are exact: gravity is rounded to the last place of a larger
+    acceleration, with an error of the same sign in many steps.
 
     The first `refine` orders of lam are refined, `order.sweeps` times each. If more than lam_0, factors 1 / n are exact
     as well: their rounding errors have the same sign in every step, and add up. With `ahead`, a constant, the next
@@ -246,9 +246,9 @@ def expand(graph, system, k, last, ahead, refine, x, f):
 
 @kernel
 def _solve(graph, system, k, x, f, refined, exact):
-    """b = lam_k, or what it lacks to gamma where it is `refined`, and with it Z = -W H^T lam_k.
+    """b = lam_k, or if `refined` its correction of gamma, and Z = -W H^T lam_k.
 
-    With `exact`, low_r2 counts in what lam_0 lacks.
+    With `exact`, the residual of lam_0 includes low_r2.
     """
     orders = x.order.room
     # (k + 1)(k + 2) Phi_{k+2} of the coefficients so far
@@ -265,7 +265,7 @@ def _solve(graph, system, k, x, f, refined, exact):
 
 @kernel
 def change(graph, b, x, k, inverse, exact, Z):
-    """Add what Z makes of a body's r_{k+2}, omega'_{k+1} and A_{k+2}; inverse and exact as of `inverses`."""
+    """Add the effect of accelerations Z to r_{k+2}, omega'_{k+1}, A_{k+2} of a body; inverse, exact: see `inverses`."""
     g, h, g_low, h_low = inverse
     bodies, orders = x.bodies, x.order.room
     at = b * orders * BODY_ROW

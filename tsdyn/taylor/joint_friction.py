@@ -86,7 +86,7 @@ def _find_slopes(graph, system, w, x, f):
 
 @kernel
 def _start(graph, system, w, x, f):
-    """Z <- accelerations, r.lam <- lam_0, from Z = W F without friction; False if there are none."""
+    """Z <- accelerations, r.lam <- lam_0, from Z = W F without friction; False if no reactions balance the friction."""
     r = f.friction
     x.low_r2[:] = 0.0
     note_loads(f)
@@ -102,7 +102,7 @@ def _start(graph, system, w, x, f):
 
 @kernel
 def _correct(graph, system, k, exact, x, f):
-    """Take from the series what Eq. (2) makes of its residuals; f.gamma is lam_k so far."""
+    """Correct the series by Eq. (2) for its residuals; f.gamma is lam_k so far."""
     orders, inverse = x.order.room, inverses(k, exact)
     # Residuals of Phi_{k+2}
     run_loops(graph, system.reals, RESIDUAL, k, x, f)

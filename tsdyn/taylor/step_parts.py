@@ -135,7 +135,7 @@ def reach(context, t, h):
 
 @callback(LAWS)
 def check_laws(context, t, h, atol, rtol):
-    """Compare the series of motions and forces with what they are, at places from t to t + h; sets `Trial.good`."""
+    """Compare the series of motions and forces with their definitions at times from t to t + h; sets `Trial.good`."""
     c = load_series(context)
     limits = stack(LIMITS)
     limits[LENGTH], limits[ATOL], limits[RTOL] = h, atol, rtol
@@ -177,7 +177,7 @@ def _is_motion_off(c, t, tau, atol, rtol):
 
 @kernel
 def _set_place(c, t, tau, limits):
-    """Go to t + tau for comparisons with laws."""
+    """Set time and limits for a comparison with laws at t + tau."""
     limits[TAU], limits[TIME] = tau, t + tau
     set_time(c.system, limits[TIME])
 
@@ -198,11 +198,12 @@ def _is_off(c, i, limits):
 def _may_differ(c, t, limits):
     """Set which kinds of forces are to be compared with their laws within the step; whether there are any.
 
-    Sharp ones always are; those with a margin where it is used up; others where they are off at the end of the step.
+    Sharp ones always; those with a margin of analyticity where it is used up; others if they differ at the step's end.
     """
     x, left, found = c.expansion, stack(1), False
     c.trial.left = 1.0
-    # so short a step is held by rates of fast modes, of which coefficients of places show little: STILL is asked for
+    # a step this short is limited by velocities of fast modes, which position coefficients don't show: STILL is
+    # required
     is_short = STIFF_RATES * c.trial.rate * limits[LENGTH] < x.order.top + 2
     for i in range(x.forces.shape[0]):
         kind = x.forces[i]
@@ -227,7 +228,7 @@ def _may_differ(c, t, limits):
 
 @callback("pdd")
 def accelerate_here(context, t, h):
-    """Qdd where `reach` has come to, between the steps: what it asks for outlives no step."""
+    """Qdd at the state of `reach`, between the steps; nothing of it is kept for the next step."""
     c = load_series(context)
     accelerate_bodies(c.graph, c.system, c.work, c.tangent, t)
     return 0
@@ -247,12 +248,12 @@ def hold_accelerations(c, t):
 def pass_singular(context, t, h):
     """The state at t next to a singular configuration, between the steps: qdd is that of the series. Status.
 
-    Rows that come near to depending on the others there are left to the series, which is right to the tolerance.
+    Nearly dependent rows aren't projected: the series satisfies them to the tolerance.
     """
     c = load_series(context)
     w, x, f, graph = c.work, c.expansion, c.tangent, c.graph
     orders, top = x.order.room, x.order.top
-    # A selection of rows for this place alone
+    # A selection of rows for this configuration only
     save_selection(f)
     sum_series(graph, x, h, f.poses, f.p)
     status = land(graph, c.system, w, f, t)
@@ -280,7 +281,7 @@ def pass_singular(context, t, h):
 
 @kernel
 def is_singular(c, status):
-    """Whether the state that `reach` has come to, or could not reach, is next to a singular configuration."""
+    """Whether the state of `reach`, or the one that it failed to reach, is near a singular configuration."""
     limit = NEXT_TO_SINGULAR * min(1.0, c.tangent.indicator.largest / UNEQUAL)
     return status == SINGULAR or (status == 0 and singularity_indicator(c.graph, c.tangent.rows) < limit)
 

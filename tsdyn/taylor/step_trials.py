@@ -4,7 +4,7 @@ A step that ends near a singular configuration is lengthened, at looser toleranc
 passes, the step that the tolerance of the run asks for is taken where it serves, or is shortened to end before.
 
 Steps become shorter towards a place where the law of a force is not analytic, such as zero length of a spring. Where
-the rounding of time is reached, a step of first order goes over it (`_hop`); the next series have the law beyond.
+the rounding of time is reached, a step of first order crosses it (`_hop`); the next series have the law beyond.
 """
 
 import math
@@ -181,7 +181,7 @@ def _choose_next(c, r, landed, tol):
 
 @kernel
 def _lower_order(c, r):
-    """Leave out coefficients that are not finite, and choose the step anew; False if there are none of them."""
+    """Omit coefficients that are not finite, and choose the step again; False if all are finite."""
     s, order, top = c.trial, c.expansion.order, finite_top(c)
     if top < 1 or top == order.top:
         return False
@@ -212,7 +212,7 @@ def _follows_laws(context, c, r):
 
 @kernel
 def _hop(context, c, r, log, stop):
-    """Go over a place where a law is not analytic: r + rd h + rdd h^2 / 2, and likewise rotations. Status."""
+    """Cross a point where a law is not analytic: r + rd h + rdd h^2 / 2, and likewise rotations. Status."""
     s, t = c.trial, r.clock.t
     # A few units in the last place of t; twice as long right after another one
     s.h = HOP * SHORTEST * max(abs(t), FROM_ZERO * (r.clock.t_end - r.clock.t_origin))

@@ -51,7 +51,7 @@ def _open_chart(w, r, log, t, reason):
 
 @long_kernel
 def _stand(context, c, r, log, t):
-    """The poses as they are now are the state at t: the series of order zero gives qdd. Status."""
+    """Take the present poses as the state at t, with qdd from the series of order zero. Status."""
     w, indicator = c.work, c.tangent.indicator
     # The end of the step is the start of the next
     indicator.start = indicator.end

@@ -56,10 +56,10 @@ NO_SPEED = 1e-300
 SMALL, SMALL_STEPS = 0.02, 40
 # Margin of analyticity of the force laws (law_check.py): where it is less, a law limits the step, not stiffness.
 STILL = 0.9
-# A step by less than TINY counts for so many.
+# A step by less than TINY counts as FASTER steps.
 TINY, FASTER = 0.002, 4
 # The same in scenes with sharp forces, which need some ten short steps wherever a velocity reverses; steps by less than
-# MINUTE count for AT_REST there: a reversal at a slip velocity of 1e-9 m/s takes 13, rest no end of them.
+# MINUTE count for AT_REST there: a reversal at a slip velocity of 1e-9 m/s takes 13, and rest any number.
 SHARP_STEPS, MINUTE, AT_REST = 400, 1e-6, 8
 
 # --- singular configurations -----------------------------------------------------------------------------------------
@@ -75,7 +75,7 @@ UNEQUAL = 1e-4
 # (tests/simulation/test_singularity_crossing.py).
 CLOSER, CLOSE, PASSED = 0.3, 0.1, 0.02
 
-# A step that ends there is shortened by this factor, so many times: to 0.17 of its length.
+# A step that ends there is shortened by AVOID, up to AVOIDING times: to 0.17 of its length.
 AVOID, AVOIDING = 0.7, 5
 
 # Factor of the tolerance between tries to cross a singular configuration; loosest tolerance of a crossing that starts

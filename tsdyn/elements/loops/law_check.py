@@ -1,6 +1,6 @@
 """Series of forces against their laws, at a place of a Taylor step.
 
-A law may change within less than a series shows: the series of v / sqrt(v^2 + v_0^2) at v >> v_0 knows nothing of the
+A law may change within less than a series shows: the series of v / sqrt(v^2 + v_0^2) at v >> v_0 doesn't contain the
 reversal at v = 0, that of |v| at v > 0 is v, and a pulse is zero to any order long before. The law itself, or the
 program of a traced function, is therefore evaluated at x(tau) and xd(tau), and must be f(tau). What f lacks may be as
 large as
@@ -164,7 +164,7 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
 def margin(count, stride, size, orders, known, h, values, least):
     """least = the minimum of itself and of the share 1 - sum_{k>0} |a_k| h^k / a_0 of each a; Eq. (1) is share > 0.
 
-    Not a number where a share is none.
+    NaN if a share is NaN.
     """
     h, values, least = vector(h, 1), vector(values, ANY), vector(least, 1)
     rows, left, step = scratch_rows(stride, values), get(least, 0), get(h, 0)

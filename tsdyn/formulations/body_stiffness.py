@@ -37,11 +37,11 @@ def _frames(s, dimension, i, G, P):
     _half_g(s.q, i + 3, G)
     # omega' = 2 G pd
     omega = stack(3)
-    # The same from here
     for c in range(3):
         omega[c] = 0.0
         for d in range(4):
             omega[c] += 4.0 * G[c, d] * s.qd[i + 3 + d]
+    # Row c is dpd for dpi' = e_c: G^T (e_c x omega') / 4 - omega'_c p / 4
     for c in range(3):
         x, y = (c + 1) % 3, (c + 2) % 3  # e_c x omega' = -omega'_y e_x + omega'_x e_y
         for d in range(4):

@@ -53,7 +53,7 @@ def _displace(c, mask):
     moved = get(c.state, MOVED)
     for b in range(graph.bodies.shape[0]):
         at, o = b * POSE, 8 * b
-        # Displacement of the largest lane and component, for the record
+        # Largest component of the displacement, lane by lane
         dr, turn = four(f.Z, o), four(f.Z, o + 4)
         for i in range(3):
             moved = max(moved, max(abs(get(f.Z, o + i)), abs(get(f.Z, o + 4 + i))))

@@ -36,7 +36,6 @@ def _multiply_both(graph, H, X, lower, upper):
         target, stride = product.target, product.stride
         # A primitive with itself shares both bodies
         if product.same != 0:
-            # Two primitives at one common body
             for r in range(rows):
                 more(upper, target + r, inner_both(H, left + 16 * r, X, right + 16 * r))
                 for c in range(r + 1, columns):
@@ -44,6 +43,7 @@ def _multiply_both(graph, H, X, lower, upper):
                     more(lower, target + c, inner_both(H, right + 16 * c, X, left + 16 * r))
                 target += stride
         else:
+            # Two primitives at one common body
             for r in range(rows):
                 for c in range(columns):
                     more(upper, target + c, inner(H, left + 16 * r, X, right + 16 * c))

@@ -84,12 +84,12 @@ def form_schur_complement(graph, H, Y, values):
         target, stride = product.target, product.stride
         # Rows of one primitive share both bodies: upper triangle of the block
         if product.same != 0:
-            # Rows of two primitives share one body
             for r in range(rows):
                 for c in range(r, columns):
                     more(values, target + c, inner_both(H, left + 16 * r, Y, right + 16 * c))
                 target += stride
         else:
+            # Rows of two primitives share one body
             for r in range(rows):
                 for c in range(columns):
                     more(values, target + c, inner(H, left + 16 * r, Y, right + 16 * c))

@@ -63,7 +63,7 @@ def _evaluate_there(context, w, r, t, block):
     h, data = block[B_H], block[B_DATA:]
     status = evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
     # Accelerations by the interpolant: the right-hand side of a stiff scene would amplify its error
-    if status == 0 and r.kernels.second != 0:  # what f would amplify in a stiff scene
+    if status == 0 and r.kernels.second != 0:
         s = (t - block[B_START]) / h
         call_value(r.kernels.second, s, h, w.q.size, r.xs.size, r.ys.size, data, r.xs, r.yds)
         call_complete(r.kernels.complete, context, r.yds)

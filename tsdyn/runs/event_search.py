@@ -318,7 +318,6 @@ class Watch:
         shift = least + ROOT * abs(root)
         # a run that continues from a terminal event must not find it again
         ends, side = self.events[i].limit < math.inf, math.copysign(1.0, b)
-        # A terminal event ends the run on its far side
         while ends and root + shift < t1 and side * value(root) <= 0.0:
             root, shift = root + shift, 2.0 * shift
         return root

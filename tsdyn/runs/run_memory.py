@@ -86,7 +86,6 @@ class Memory:
             if not all(map(is_, start, self._start)):
                 self._enter_start(*start[:2])
                 self._hold(task)
-        # Motions, signals and memories of forces are among these numbers
         self.context.system.reals[...] = self.reals  # motions, signals and what forces remember are written there
         if task.remembered.size:
             self._remember(task.remembered, task.prepared.handles)

@@ -217,7 +217,6 @@ def expand(graph, system, k, last, ahead, refine, x, f):
     refined = k < refine
     if refined:
         for sweep in range(x.order.sweeps):
-            # Eq. (4) for lam_k, or for the last correction of it
             _solve(graph, system, k, x, f, sweep > 0, exact)
             if sweep == 0:
                 copy(f.b, f.gamma)
@@ -226,6 +225,7 @@ def expand(graph, system, k, last, ahead, refine, x, f):
                     f.gamma[e] += f.b[e]
             for b in range(nb):
                 change(graph, b, x, k, inverse, exact, Z)
+    # Eq. (4) for lam_k, or for the last correction of it
     _solve(graph, system, k, x, f, refined, exact)
     if refined:
         for e in range(f.b.size):

@@ -62,7 +62,7 @@ def _moment(G, J, p, out):
 
 @kernel
 def _inertia_terms(system, w, linear):
-    """l.r += gravity + S - M qdd, K += (M qdd - S)_q, C += S_qd; S_p = 8 Gd^T J' Gd p, M_p = 4 G^T J' G."""
+    """Add gravity + Q_v - M qdd to r, (M qdd - Q_v)_q to K, Q_v,qd to C; on p, Q_v = 8 Gd^T J' Gd p, M = 4 G^T J' G."""
     G, Gd, Gdd, h, g = stack2(3, 4), stack2(3, 4), stack2(3, 4), stack(3), stack(3)
     for b in range(system.mass.size):
         at = system.bodies[b, 0]
@@ -124,7 +124,8 @@ def _to_body_frames(system, q, X, scratch, out):
     """out (l, l) = T^T X T, X (n, n): dr = A dr', dp = G^T dpi' / 2."""
     n, G, A = q.size, stack2(3, 4), stack2(3, 3)
     to = 0
-    for b in range(system.mass.size):  # X T
+    # X T
+    for b in range(system.mass.size):
         at = system.bodies[b, 0]
         if system.bodies[b, 1] == 7:
             matrix_g(q[at + 3 : at + 7], G)

@@ -95,7 +95,7 @@ class ImplicitWorkspace(NamedTuple):
     Y: np.ndarray  # (n, n)  U B G1; linearisation.linearise
     Z: np.ndarray  # (n, n)  U B G2; linearisation.linearise
     lam: np.ndarray  # (m,)  multipliers; linearisation.linearise
-    r: np.ndarray  # (n,)  Q_A + S - M qdd; linearisation.linearise
+    r: np.ndarray  # (n,)  Q_A + Q_v - M qdd; linearisation.linearise
     K_body: np.ndarray  # (l, l)  stiffness in body frames, kept over steps and charts; linearisation.linearise
     C_body: np.ndarray  # (l, l)  damping in body frames; linearisation.linearise
     F: np.ndarray  # (l, k)  D in body frames; linearisation.reduce

@@ -39,7 +39,7 @@ class Track:
         self.significant = None  # time and value at which it had that sign
         self.zero = None  # time of the last zero, if it has had no sign since
         self.passed = self.pending = False  # that zero is a start within rounding; may become an event on being left
-        self.noise = 0.0  # rounding error of the values, where it has been found out
+        self.noise = 0.0  # rounding error of the values, once measured
         self.degree = 0  # that the last step needed
 
 

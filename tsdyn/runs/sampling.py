@@ -31,7 +31,7 @@ class Sampling:
 
     def __init__(self, prepared, continued):
         self.packed, self.handles, self.loads = prepared.packed, prepared.handles, sampled(prepared.packed)
-        self.last = [-math.inf] * len(self.loads)  # when each was asked
+        self.last = [-math.inf] * len(self.loads)  # when each was evaluated
         self.begun = continued
         for load in self.loads:
             reset = getattr(load.force.function, "reset", None)
@@ -39,7 +39,7 @@ class Sampling:
                 reset()
 
     def ask(self, memory, t, q, qd):
-        """Ask those that are due at t, and hold what they say."""
+        """Evaluate the functions that are due at t, and hold their values."""
         for i, load in enumerate(self.loads):
             force = load.force
             if t > self.last[i] and (not self.begun or is_due(t, force.period)):
@@ -50,7 +50,7 @@ class Sampling:
         self.begun = True
 
     def _value(self, force, t, levels, angles):
-        """What the function of a force says; angles are those that the run has counted, roughly."""
+        """Value of a force's function; angles are the approximate ones that the run has counted."""
         row = self.handles.row(force.joint, force.coordinate)
         evaluate, geometry = getattr(joint_motion, force.coordinate), force.geometry
         x, rate = (float(evaluate(geometry, *self.handles.motions(geometry, levels), level)) for level in (0, 1))
@@ -77,7 +77,7 @@ class Sampled:
         self.reason = ""
 
     def saved(self):
-        """When each function was asked last."""
+        """When each function was evaluated last."""
         return {"last": self.sampling.last, "begun": self.sampling.begun}
 
     def restore(self, numbers):

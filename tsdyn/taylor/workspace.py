@@ -72,7 +72,7 @@ class Trial(Record):
     check: int  # address of step_parts.check_laws; 0 where all laws are analytic everywhere
     sharp: int  # whether a force is sharp
     rate: float  # 1 + the largest of its start, m/s or rad/s
-    left: float  # share of what laws divide by, or take roots of, that a step can't use up; 1 where they don't
+    left: float  # margin of analyticity of the force laws along the step; 1 where they are analytic everywhere
     hops: int  # in close succession, over places where a law is not analytic
     hopped: float  # time of the last one
     good: float  # share of the step up to which the series of forces are those of their laws

@@ -2,7 +2,7 @@
 
 A loop is a template. `specialised` copies it, and the parts that it calls, for one kind of constraint or force, with
 the names below replaced by the constants and kernels of that kind. Parts are inlined, so arguments cost nothing there;
-a loop is given each array by its address. Both may have up to twelve.
+a loop is given each array by its address, and may have up to twelve.
 """
 
 from ...jit.kernels import part

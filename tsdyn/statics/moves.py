@@ -78,7 +78,7 @@ class Moves:
         return self.rest.unbalanced
 
     def nothing(self, reduced):
-        """Move by an increment, or a fraction along which loads do the predicted work; return True if it moves."""
+        """Stiffness, 1/s^2, that counts as zero: rounding of its terms, and apparent stiffness of residual loads."""
         left = self.unbalanced * self.rest.acceleration_scale / self.reach
         return NO_STIFFNESS * reduced.scale + len(reduced.K_hat) * left
 

@@ -50,3 +50,22 @@ def test_a_name_is_bound_to_one_thing_in_a_function():
             if isinstance(node, ast.FunctionDef) and (names := double_names(node)):
                 found[f"{path.relative_to(ROOT)}: {node.name}"] = names
     assert found == {}
+
+
+# templates of callbacks, which are given each array by its address
+BY_ADDRESS = {
+    "elements/loops/constraint_hessians.py: loop", "elements/loops/constraint_series.py: series",
+    "elements/loops/force_series.py: series", "elements/loops/forces.py: jacobian",
+    "elements/loops/law_check.py: check", "profiling/timers.py: _series",
+}  # fmt: skip
+
+
+def test_functions_take_ten_positional_arguments_at_most():
+    found = set()
+    for path in ROOT.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                names = [argument.arg for argument in (*node.args.posonlyargs, *node.args.args)]
+                if len(names) - (names[:1] in (["self"], ["cls"])) > 10:
+                    found.add(f"{path.relative_to(ROOT).as_posix()}: {node.name}")
+    assert found <= BY_ADDRESS

@@ -75,7 +75,7 @@ def test_a_name_stands_for_the_class_that_has_it_now(scene):
     loose = [ts.simulate(scene, SPAN, integrator="rk45").stats.steps for _ in range(2)][-1]
 
     class RK45(ts.ExplicitRungeKutta):
-        order, tableau, safety = 5, I.RK45.tableau, 1e4
+        order, tableau, margin = 5, I.RK45.tableau, 1e4
 
     try:
         assert ts.simulate(scene, SPAN, integrator="rk45").stats.steps > loose

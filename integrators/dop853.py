@@ -54,7 +54,7 @@ class DOP853(ExplicitRungeKutta):
 
     order = 8
     stability_limit = 6.1
-    margin = 500.0  # measured: errors of the references at t <= 10 s stay below 30 tol, tol 1e-4 to 1e-12
+    safety = 500.0  # measured: errors of the references at t <= 10 s stay below 30 tol, tol 1e-4 to 1e-12
     embedded_order = 7  # of the combined estimate, by which the step is chosen
     errors = (embedded_error, second_embedded_error)
 

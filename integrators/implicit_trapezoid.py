@@ -23,10 +23,10 @@ class ImplicitTrapezoid(DiagonallyImplicit):
     """
 
     order = 2
-    margin = 100.0
+    safety = 100.0
     tableau = ImplicitTableau(a=((0,), (1 / 2, 1 / 2)), c=(0, 1), order=2, embedded_order=2)
     errors, second = (trapezoid_error,), linear_second
 
     def step_tolerances(self) -> tuple[float, float]:
         """A step's error has order 3 and a run's order 2: the power makes the latter follow the tolerance."""
-        return tuple(tol / self.margin * min(1.0, (tol / LOOSE) ** 0.5) for tol in (self.rtol, self.atol))
+        return tuple(tol / self.safety * min(1.0, (tol / LOOSE) ** 0.5) for tol in (self.rtol, self.atol))

@@ -49,7 +49,7 @@ class Radau(Collocation):
     """
 
     order, embedded_order, coupled = 9, 5, 5
-    margin = 10.0  # of stiff springs' errors: 1 tol
+    safety = 10.0  # of stiff springs' errors: 1 tol
 
     def __init__(
         self,

@@ -70,7 +70,7 @@ class SDIRK54(DiagonallyImplicit):
     """
 
     order = 5
-    margin = 500.0  # of the sliding top's errors: 13 tol
+    safety = 500.0  # of the sliding top's errors: 13 tol
     tableau = ImplicitTableau(
         a=tuple(tuple(map(float, _row(i))) for i in range(7)),
         c=tuple(map(float, _C)),

@@ -56,7 +56,7 @@ class Taylor(Integrator):
 
     order = embedded_order = 15
     driver = "series"
-    margin = 1000.0
+    safety = 1000.0
 
     def __init__(
         self,
@@ -84,10 +84,10 @@ class Taylor(Integrator):
     def step_tolerances(self) -> tuple[float, float]:
         """Return (rtol, atol) that each step's error is held to.
 
-        Truncation has one sign for many steps and adds up, rounding has either. So below TIGHT the margin grows, until
-        truncation is a small part of rounding.
+        Truncation errors keep their sign for many steps and add up, rounding errors don't. So below TIGHT the safety
+        factor grows, until truncation is a small part of rounding.
         """
-        return _step_tolerances(self.rtol, self.atol, self.margin)
+        return _step_tolerances(self.rtol, self.atol, self.safety)
 
     @property
     def refined(self) -> int:
@@ -119,10 +119,10 @@ def _is_tight(rtol, atol):
 
 
 @lru_cache
-def _step_tolerances(rtol, atol, margin):
+def _step_tolerances(rtol, atol, safety):
     if not _is_tight(rtol, atol):
-        return max(min(rtol, LOOSEST) / margin, FINE), max(min(atol, LOOSEST) / margin, FINE)
-    share = 0.5 * (rtol + atol) / TIGHT / margin
+        return max(min(rtol, LOOSEST) / safety, FINE), max(min(atol, LOOSEST) / safety, FINE)
+    share = 0.5 * (rtol + atol) / TIGHT / safety
     return max(rtol * share, FINEST), max(atol * share, FINEST)
 
 

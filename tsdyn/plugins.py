@@ -41,7 +41,7 @@ from .elements.user_functions import (
 )
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
-from .jit.questions import some
+from .jit.predicates import some
 from .maths import vectors
 from .maths.angles import angle_about, angle_near, angle_series
 from .maths.recurrences import (

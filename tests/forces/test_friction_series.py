@@ -21,7 +21,7 @@ def pendulum(slip, torque=0.5, links=1):
 
 
 def oscillator(slip):
-    """A mass on a spring that rubs; its velocity reverses every pi / 2 s."""
+    """A mass on a spring with friction; its velocity reverses every pi / 2 s."""
     scene = ts.Scene(gravity=(0, 0, 0))
     mass = scene.add_point_mass(mass=1.0, position=(2, 0, 0))
     scene.add(F.Spring(mass, scene.ground, stiffness=4.0, free_length=1.0))

@@ -132,7 +132,7 @@ def test_kept_derivatives_serve_where_a_body_has_turned_to(rng):
     ode.f(np.zeros(ode.k), np.zeros(ode.k), 0.0)
     ode.jacobians(0.0)
     ode.f(v, np.zeros(ode.k), 0.0)
-    kept = ode.jacobians(0.0, anew=False)
+    kept = ode.jacobians(0.0, renew=False)
     exact = ode.jacobians(0.0)
     size = np.abs(exact[1]).max()
     assert size > 1e5

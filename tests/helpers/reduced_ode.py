@@ -33,9 +33,9 @@ def _accelerations(context, at, t, v, vd, vdd):
 
 
 @entry
-def _linearise(context, at, t, anew, vdd):
+def _linearise(context, at, t, renew, vdd):
     status = 0
-    if anew:
+    if renew:
         status = call_linearise(at[5], context, t, vdd)
     return _call_number(at[6], context, t) if status == 0 else status
 
@@ -93,9 +93,9 @@ class Tangent:
         self.vdd = vdd
         return vdd
 
-    def jacobians(self, t, anew=True):
-        """(f_v, f_vd) at the place last taken; without anew, from the stiffness and damping kept."""
-        assert _linearise(self.address, self.at, t, int(anew), self.vdd) == 0
+    def jacobians(self, t, renew=True):
+        """(f_v, f_vd) at the place last taken; without `renew`, from the stiffness and damping kept."""
+        assert _linearise(self.address, self.at, t, int(renew), self.vdd) == 0
         work, linear = self.context.work, self.context.linear
         A = work.D.T @ mass_matrix(self.context.system, work.q) @ work.D
         return np.linalg.solve(A, -linear.K_hat), np.linalg.solve(A, linear.C_hat)

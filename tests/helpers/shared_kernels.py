@@ -13,7 +13,7 @@ from tsdyn.formulations.registry import FORMULATIONS
 from tsdyn.jit.compiled import is_declared
 from tsdyn.motions.program import run_program
 from tsdyn.observables.reactions import solve_multipliers
-from tsdyn.rows.reselection import choose_anew
+from tsdyn.rows.reselection import reselect_rows
 
 
 def shared_kernels():
@@ -26,7 +26,7 @@ def shared_kernels():
         for method in explicit:
             yield from of_method(method, form, True)
     yield from filter(is_declared, vars(start_kernels).values())  # those of assembly
-    yield from (choose_anew, run_program, solve_multipliers, dependent_rows._choose)
+    yield from (reselect_rows, run_program, solve_multipliers, dependent_rows._choose)
     for kind in PRIMITIVES:
         for moving in (False, *[True] * ("phi_t" in kind.kernels)):
             yield from of_constraint(kind, moving)

@@ -338,3 +338,16 @@ def test_wrong_tableaus_are_refused(wrong, said):
     heun = {"a": ((), (1.0,)), "b": (0.5, 0.5), "c": (0.0, 1.0), "order": 2}
     with pytest.raises(ts.InvalidArgument, match=said):
         ts.RungeKuttaTableau(**heun | wrong)
+
+
+def test_the_safety_factor_divides_the_tolerances_of_steps():
+    class Careful(ts.integrators.RK45):
+        order, safety = 0, 100.0  # order 0: in no registry
+
+    class Margin(ts.integrators.RK45):
+        order, margin = 0, 100.0  # another name of it
+
+    expected = (1e-6 / 100.0, 1e-8 / 100.0)
+    assert Careful(rtol=1e-6, atol=1e-8).step_tolerances() == expected
+    assert Margin(rtol=1e-6, atol=1e-8).step_tolerances() == expected
+    assert ts.integrators.RK45(rtol=1e-6, atol=1e-8).step_tolerances() != expected

@@ -76,7 +76,7 @@ def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"],
     names += [driven + "series", driven + "check", driven + "margin", "load_slope"] * series
     found = [kernels[name] for name in names if name in kernels]
     if "normal_load" in kernels and not series:
-        found.append((friction_solve if form.basis_free else friction_basis).rub)
+        found.append((friction_solve if form.basis_free else friction_basis).solve_friction)
     return found
 
 

@@ -13,7 +13,7 @@ from .run import add_json, add_method, add_output, add_plot, add_scene, destinat
 from .scene_file import load_document, robot_options
 
 SHOWN, LOW, HIGH = 12, 0.05, 0.95  # coordinates in the summary; its quantiles
-REASONS = 10  # failed cases that are told
+REASONS = 10  # failed cases that are listed
 
 
 def add_ensemble_options(parser):

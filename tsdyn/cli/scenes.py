@@ -115,7 +115,7 @@ def _print_table(title, rows):
 
 
 def _facts(scene, mobility, why, given):
-    """What `info` tells of a scene, for JSON."""
+    """What `info` reports about a scene, for JSON."""
     parameters = scene.parameters()
     units = parameters.units
     return {

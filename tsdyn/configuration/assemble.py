@@ -13,7 +13,7 @@ from ..errors import InconsistentState, InvalidArgument, InvalidBody
 from ..jit.interrupts import CollectionsDeferred
 from ..maths.row_rank import row_lengths
 from ..validation import number, one_of, positive, sequence
-from .continuation import Found, Kept, close, nearest, relax, settle, stuck
+from .continuation import Found, Kept, approach_sketch, close, nearest, relax, stuck
 from .infeasible_subset import refuse
 from .kinetic_metric import Metric, least_energy, least_step, rotation_vectors
 from .loop_folds import Folds
@@ -226,7 +226,7 @@ def _unfolded(metric, sketch, found, links, tol):
         if not met:
             turned = first
         elif not turned.size:
-            freed, Phi_freed, more = settle(metric, sketch, q)
+            freed, Phi_freed, more = approach_sketch(metric, sketch, q)
             total += more
             fits = np.abs(Phi_freed).max() <= tol * (1.0 + np.abs(freed).max())
             if fits and not links.turned(metric, freed, drawn).size:

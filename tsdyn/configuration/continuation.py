@@ -77,14 +77,14 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
         if met or (attempt == 1 and stuck(metric, q, Phi, rows).size):
             break
     if best.met:
-        q, Phi, more = settle(metric, sketch, best.q, rows)
+        q, Phi, more = approach_sketch(metric, sketch, best.q, rows)
         if np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max()):
             best = best._replace(q=q, Phi=Phi)
         total += more
     return best._replace(iterations=total)
 
 
-def settle(metric, sketch, q, rows=None):
+def approach_sketch(metric, sketch, q, rows=None):
     """Minimise the distance to the sketch along the constraints. Return q, Phi and the number of steps."""
     steps, last = 0, np.inf
     Phi, A = metric.linear(q, rows)

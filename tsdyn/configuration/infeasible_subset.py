@@ -15,7 +15,7 @@ from .continuation import nearest
 from .tolerances import LEFT_OVER
 
 FEW = 6  # constraints of which all sets are tried
-MOST = 60  # constraints among which a conflict is looked for
+MOST = 60  # constraints among which a conflict is searched
 LONGEST = 10.0  # s of search
 TRIAL_SHAKES = (0.1, 0.3, 0.6, 1.0)
 
@@ -29,14 +29,14 @@ def refuse(scene, metric, sketch, found, tol, held=()):
     sizes = np.array([left[member.rows].max() for member in members])
     suspects = [member for member, size in zip(members, sizes, strict=True) if size > LEFT_OVER * sizes.max()]
     trial = _Trial(metric, sketch, found.q, tol)
-    told = False
-    while len(suspects) <= MOST and not (told or trial.over):
-        told = not trial.met(suspects)
-        wider = suspects if told else _wider(suspects, members)
-        if not told and len(wider) == len(suspects):
+    conflict = False
+    while len(suspects) <= MOST and not (conflict or trial.over):
+        conflict = not trial.met(suspects)
+        wider = suspects if conflict else _wider(suspects, members)
+        if not conflict and len(wider) == len(suspects):
             break
         suspects = wider
-    conflicting, minimal = smallest(suspects, trial) if told else (suspects, False)
+    conflicting, minimal = smallest(suspects, trial) if conflict else (suspects, False)
     names, lines = scene.row_names(), []
     for member in sorted(conflicting, key=lambda member: -left[member.rows].max())[:8]:
         row = member.rows.start + int(np.argmax(left[member.rows]))
@@ -47,7 +47,7 @@ def refuse(scene, metric, sketch, found, tol, held=()):
         story = "This constraint is infeasible on its own"
     elif minimal:
         story = f"These {len(conflicting)} conflict; without any one of them, the others can be satisfied"
-    elif told:
+    elif conflict:
         story = f"These {len(conflicting)} conflict; whether fewer do was not found in {LONGEST:g} s"
     else:
         story = "These have non-zero residuals"

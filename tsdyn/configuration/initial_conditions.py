@@ -5,7 +5,7 @@ from contextlib import suppress
 import numpy as np
 
 from ..errors import InvalidArgument, RedundantConstraints, SingularConfiguration, Status
-from ..formulations.locked_orientations import keep_turning, settle, still
+from ..formulations.locked_orientations import keep_turning, release_loose_bodies, still
 from ..maths.row_rank import dependent
 from ..observables.evaluate import constraint_arrays
 from ..rows.interface import redundant_of, set_selection
@@ -61,7 +61,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     packed = scene.packed
     start = _Start(scene, system, q, qd, t, tol)
     if packed.derived.redundant is None and start.is_regular():
-        settle(packed, start.graph, start.tangent.rows.H)
+        release_loose_bodies(packed, start.graph, start.tangent.rows.H)
         give(packed, start.workspace)
         return q, qd
     dependent = start.check()
@@ -75,7 +75,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
             set_redundant(packed, None)
             start = start.again()
         start.demand_inertia()
-        settle(packed, start.graph, start.tangent.rows.H)
+        release_loose_bodies(packed, start.graph, start.tangent.rows.H)
         landed = start.landed()
         give(packed, start.workspace)
         return landed
@@ -89,7 +89,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         start = start.again()
     elif still(packed).bodies.size:
         start.check()  # for H where it starts
-    settle(packed, start.graph, start.tangent.rows.H)
+    release_loose_bodies(packed, start.graph, start.tangent.rows.H)
     return start.landed()
 
 
@@ -113,7 +113,7 @@ class RegularStarts:
         start.workspace.reals[...] = self._system.reals
         regular = start.is_regular()
         if regular and still(start.packed).bodies.size:
-            settle(start.packed, start.graph, start.tangent.rows.H)
+            release_loose_bodies(start.packed, start.graph, start.tangent.rows.H)
         return regular
 
     def kernel(self):
@@ -151,7 +151,7 @@ class RedundantStarts:
             return None
         again.demand_inertia()
         last.check()
-        settle(last.packed, last.graph, last.tangent.rows.H)
+        release_loose_bodies(last.packed, last.graph, last.tangent.rows.H)
         return last.landed()
 
 

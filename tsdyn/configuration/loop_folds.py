@@ -68,13 +68,13 @@ def _angle(fold, R, r, by_places):
     n = R[fold.axis[0]] @ fold.axis[1]
     u, v = R[a] @ fold.u, R[b] @ fold.v
     if by_places:
-        before, at, after = (None if sides is None else _place(sides, R, r) for sides in fold.places)
+        before, at, after = (None if sides is None else _joint_position(sides, R, r) for sides in fold.places)
         u, v = (u if before is None else before - at), (v if after is None else after - at)
     size = np.linalg.norm(u) * np.linalg.norm(v)
     return float(np.arcsin(np.clip(n @ np.cross(u, v) / size, -1.0, 1.0))) if size > 0.0 else 0.0
 
 
-def _place(sides, R, r):
+def _joint_position(sides, R, r):
     """Where a joint is: midway between its two sides."""
     return sum(r[body] + R[body] @ point for body, point in sides) / len(sides)
 

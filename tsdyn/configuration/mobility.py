@@ -124,7 +124,7 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
     q : array_like (n,), optional
         Positions, which must meet the constraints to 1e-9; default the start values of the bodies.
     t : float, s
-        The time at which constraints that depend on time are looked at.
+        The time at which constraints that depend on time are evaluated.
 
     Returns
     -------
@@ -194,7 +194,7 @@ def mobility_at(scene, q, t):
         [member.constraint for member in packed.members for _ in range(member.constraint.rows)],
     )
 
-    def told(found, among, matrix):
+    def described(found, among, matrix):
         for row, others in zip(found, partners(matrix, among, found), strict=True):
             place = metric.own[rows[row]]
             yield RedundantRow(names[place], tuple(names[metric.own[rows[i]]] for i in others), owners[place])
@@ -207,8 +207,8 @@ def mobility_at(scene, q, t):
         coordinates=n,
         rows=len(packed.system.segments),
         rank=aside + here,
-        redundant=tuple(told(redundant, always, beside)),
-        dependent_here=tuple(told(dependent, kept, A)) if dependent else (),
+        redundant=tuple(described(redundant, always, beside)),
+        dependent_here=tuple(described(dependent, kept, A)) if dependent else (),
         singular=generic > here,
     )
 

@@ -143,7 +143,7 @@ def prescribed(motor, t):
 
 
 def demand_turns(packed, q, t):
-    """Refuse a motor whose joint is whole turns away, by its displacement: the rows can't tell."""
+    """Refuse a motor whose joint is whole turns away, by its displacement: the rows don't distinguish turns."""
     if any(one.place >= 0 and counts(one.joint.item) for one in handles_of(packed).driven):
         said = elsewhere(packed, t, q)
         if said:

@@ -16,7 +16,7 @@ from ..constraints.angle_driver import AngleDriver
 from ..constraints.dot2 import Dot2
 from ..constraints.thread import Thread
 from ..elements.joint_coordinates import Angle, AngleGeometry
-from ..elements.membership import settle
+from ..elements.membership import stop_waiting
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
 from ..model import joint_motion
 from ..model.handles import counts, handles_of
@@ -256,7 +256,7 @@ def _drive(scene, joint, goals, held, t):
 def _assembled(scene, drivers, t, motors):
     """Assemble the scene with temporary constraints, and without motors that prescribe the same coordinates."""
     for driver in drivers:
-        settle(driver)
+        stop_waiting(driver)
     added = scene._added
     scene._added = [*(each for each in added if each not in motors), *drivers]
     scene.touch()

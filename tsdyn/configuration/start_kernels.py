@@ -159,7 +159,7 @@ def take_start(context, q, qd, velocity, at, count, t, tol):  # eight: addresses
     """Make q and qd consistent, in place, as `initial_conditions.consistent` does where all rows are independent.
 
     The workspace is as `StartWorkspace.enter` leaves it. Return PLAIN if q and qd were at rounding, LANDED if they have
-    been projected, and 0 if there is more to be looked at.
+    been projected, and 0 if the start needs further checks.
     """
     parts = load_start(context)
     c = parts.own

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..jit.kernels import resident
 from ..model.lengths import is_small
-from ..rows.interface import allocate_tangent, choosing_anew, reset_selection, selection_parts
+from ..rows.interface import allocate_tangent, reset_selection, selection_parts, with_reselection
 from ..sparse.length_metric import are_unequal, by_lengths
 from ..workspaces.carving import words
 from ..workspaces.workspace import parts
@@ -32,7 +32,7 @@ class StartWorkspace:
         self.reals, self.tangent, self.work, self.rates = own.reals, whole.tangent, whole.work, np.zeros(len(graph.row))
         measured = whole._replace(graph=by_lengths(packed, graph))
         if packed.derived.redundant is not None:  # rows are selected anew in the same metric
-            measured = measured._replace(tangent=choosing_anew(measured.graph, whole.tangent))
+            measured = measured._replace(tangent=with_reselection(measured.graph, whole.tangent))
         self.unequal = are_unequal(packed.system)
         self.address, *self._keep = resident(StartParts(whole, measured, np.array([self.unequal], np.int64)))
         rigid = graph.bodies[graph.bodies[:, 1] == 7, 0]

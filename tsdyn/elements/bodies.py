@@ -49,7 +49,7 @@ Kept = TypeVar("Kept")  # and what is kept of it
 
 
 class Attribute(Generic[Given, Kept]):
-    """A checked, read-only attribute of a body; setting it tells the scene that its packed numbers are out of date."""
+    """A checked, read-only attribute of a body; setting it marks the packed numbers of the scene as out of date."""
 
     def __init__(self, check: Callable[[Any, Any], Any], what: str) -> None:
         self.check, self.__doc__ = check, what

@@ -13,7 +13,7 @@ from ..errors import InvalidConstraint
 from ..validation import counted
 from .element import Attachment
 from .markers import TURN, Marker
-from .membership import settle
+from .membership import stop_waiting
 from .primitive import Primitive
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ class Joint(Attachment):
         for pair in self.compose():
             label, part = pair if isinstance(pair, tuple) and len(pair) == 2 else (None, None)
             self._demand_fit(part, pair)
-            settle(part)
+            stop_waiting(part)
             aligned += getattr(part, "opposed", ())
             parts += part.parts
             labels += [str(label)] * part.rows

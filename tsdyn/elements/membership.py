@@ -27,7 +27,7 @@ def note(item):
         item.scene._waiting[id(item)] = item
 
 
-def settle(item):
+def stop_waiting(item):
     """It waits no longer."""
     item.scene._waiting.pop(id(item), None)
 

@@ -32,7 +32,7 @@ class Starts:
         self._known, self._regular, self._redundant = (None, None), None, None
 
     def start(self, start):
-        """The memory of forces and a consistent start; None if more must be looked at."""
+        """The memory of forces and a consistent start; None if the start needs a scene of its own."""
         arena, kept, packed = self._arena, self._arena.kept, self._arena.kept.packed
         given, options = arena.study.given, arena.study.options
         t, tol, state = options.span[0], options.settings.initial_tol, given["state"]
@@ -58,7 +58,7 @@ class Starts:
         return self._regular.kernel()
 
     def _started(self, q, qd, t, tol):
-        """A start as `consistent` returns it; None if it must be looked at in a scene of its own."""
+        """A start as `consistent` returns it; None if it needs a scene of its own."""
         arena, derived = self._arena, self._arena.packed.derived
         if self._regular is None:
             self._regular = RegularStarts(arena.scene, q, qd, t, tol)

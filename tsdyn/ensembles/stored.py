@@ -76,7 +76,7 @@ class StoredResults:
         if callable(self.study.keep) and not any(map(_is_kept, self._format.shapes(self.path))):
             return 0
         count = self._format.count(self.path, [CASE, "status", "q", "qd"])
-        if count == self.study.cases.count:  # others are looked at when they are gone on with
+        if count == self.study.cases.count:  # others are read when the study is resumed
             names = [name for name in self._format.shapes(self.path) if _is_kept(name) or name.startswith(PARAMETER)]
             self._format.demand_whole(self.path, [CASE, "status", "reached", "q", "qd", *names], count)
         return count

@@ -10,7 +10,7 @@ MOST_CASES = 4096
 GROWTH = 8
 # s: an ensemble that takes less is run without threads of its own, each of which makes arrays of its own
 ALONE_SECONDS = 0.02
-# s: between looks at the progress
+# s: between reports of the progress
 LOOK = 0.1
 # chunks in the hands of an executor for each of its workers: none waits for the next
 AHEAD = 2

@@ -18,17 +18,20 @@ from .tolerances import EXACT, REFINEMENTS
 def body_forces(graph, system, w, f, t):
     """Set Z to applied forces, gravity and gyroscopic torques on the bodies, at w.q, w.qd and the poses."""
     has_forces = system.forces.shape[0] > 0
+    # Q_A without gravity, in the coordinates q
     if has_forces:
-        for i in range(f.Q.size):
-            f.Q[i] = 0.0
+        for c in range(f.Q.size):
+            f.Q[c] = 0.0
         applied_forces(system, w.q, w.qd, t, f.Q)
     for b in range(graph.bodies.shape[0]):
         z, at, m = 8 * b, b * POSE, get(graph.mass, 16 * b)
         i = graph.bodies[b, 0]
+        # Force on the centroid: gravity and Q_A,r
         put(f.Z, z, lanes(m * system.gravity[0], m * system.gravity[1], m * system.gravity[2]))
         if has_forces:
             for c in range(3):
                 let(f.Z, z + c, get(f.Z, z + c) + get(f.Q, i + c))
+        # Body torque: -omega' x J' omega', J' by columns; of a spherical inertia it is zero
         torque = splat(0.0)
         if graph.bodies[b, 1] == 7:
             if graph.spins[b] != 0:
@@ -38,6 +41,7 @@ def body_forces(graph, system, w, f, t):
                 spin = fma(four(graph.mass, o + 8), splat(get(f.poses, at + OMEGA + 2)), spin)
                 torque = sub(torque, cross(four(f.poses, at + OMEGA), spin))
             put(f.Z, z + 4, torque)
+            # + G Q_A,p / 2
             if has_forces:
                 add_torque(f.poses, at + P, f.Q, i + 3, f.Z, z + 4)
 
@@ -54,6 +58,7 @@ def accelerate_bodies(graph, system, w, f, t):
 def refine_accelerations(graph, f):
     """Project Z onto H Z + gamma = 0 until it holds: more than once where masses are unequal by 1e10."""
     if f.b.size > 0:
+        # lam = S^-1 (H Z + gamma),  Z <- Z - Y^T lam
         far = largest(f.Z)
         for _ in range(REFINEMENTS):
             if constrain(graph, f.rows, f.gamma, f.Z, f.b) <= EXACT * far:
@@ -63,10 +68,12 @@ def refine_accelerations(graph, f):
 @kernel
 def solve_accelerations(graph, system, w, f, t):
     """Solve for accelerations and multipliers, without qdd; w.q and w.qd are read if there are forces."""
+    # Z = W F
     body_forces(graph, system, w, f, t)
     weigh_bodies(graph, f.Z)
     note_loads(f)
     if f.b.size == 0:
         return
+    # Eqs. 3 and 4: lam = S^-1 (H Z + gamma),  qdd = Z - Y^T lam
     evaluate_bias(graph, system, f, t)
     constrain_accelerations(graph, f.rows, f.gamma, f.Z, f.b)

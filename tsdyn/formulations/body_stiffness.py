@@ -35,11 +35,13 @@ def _frames(s, dimension, i, G, P):
         clear_matrix(P)
         return
     _half_g(s.q, i + 3, G)
+    # omega' = 2 G pd
     omega = stack(3)
     for c in range(3):
         omega[c] = 0.0
         for d in range(4):
             omega[c] += 4.0 * G[c, d] * s.qd[i + 3 + d]
+    # Row c is dpd for dpi' = e_c: G^T (e_c x omega') / 4 - omega'_c p / 4
     for c in range(3):
         x, y = (c + 1) % 3, (c + 2) % 3  # e_c x omega' = -omega'_y e_x + omega'_x e_y
         for d in range(4):
@@ -49,6 +51,7 @@ def _frames(s, dimension, i, G, P):
 @kernel
 def _add_columns(X, i, j, G, scale, out):
     """Add to a block its columns of translations: scale times rows i and columns j on of X."""
+    # K_rr += X_rr,  K_pi'r += G X_pr / 2
     for c in range(3):
         for r in range(3):
             total = 0.0
@@ -63,10 +66,12 @@ def _add_turns(X, i, j, G, H, scale, out):
     """The same of its columns of rotations, H being dp or dpd by them, transposed."""
     y = stack(4)
     for c in range(3):
+        # X_pp times the change of p, or of pd, by a rotation about axis c
         for d in range(4):
             y[d] = 0.0
             for e in range(4):
                 y[d] += X[i + 3 + d, j + 3 + e] * H[c, e]
+        # K_r,pi' += X_rp dp,  K_pi',pi' += G X_pp dp / 2
         for r in range(3):
             total, turned = 0.0, 0.0
             for d in range(4):
@@ -80,6 +85,7 @@ def _add_turns(X, i, j, G, H, scale, out):
 def _add_turned_torque(Q, q, i, scale, out):
     """Add -scale G(Q_p) G(p)^T / 4, Q_p and p being at i + 3."""
     G, H = stack2(3, 4), stack2(3, 4)
+    # The torque G(p) Q_p / 2 changes with G at constant Q_p
     _half_g(Q, i + 3, G)
     _half_g(q, i + 3, H)
     for r in range(3):
@@ -100,18 +106,21 @@ def _block(one, k, l):
 
 @long_kernel
 def _spread(s, one, scale, damped):
-    """Add scale s.X to K and, where there is damping, scale s.Xd to C and what it makes of turned velocities to K."""
+    """Add scale s.X to K; with damping, scale s.Xd to C and its effect on rotated velocities to K."""
     G0, G1, P0, P1 = stack2(3, 4), stack2(3, 4), stack2(3, 4), stack2(3, 4)
+    # dp and dpd of a rotation, for both bodies
     _frames(s, s.own[2], 0, G0, P0)
     _frames(s, s.own[3], 7, G1, P1)
     for k in range(2):
         for l in range(2):
             block = _block(one, k, l)
             if block >= 0:
+                # Loads on body k by the motion of body l
                 G, H, P = G0 if k == 0 else G1, G0 if l == 0 else G1, P0 if l == 0 else P1
                 K, C = s.K[BLOCK * block :], s.C[BLOCK * block :]
                 _add_columns(s.X, 7 * k, 7 * l, G, scale, K)
                 _add_turns(s.X, 7 * k, 7 * l, G, H, scale, K)
+                # At constant omega' a rotation changes pd: that part of the damping is a stiffness
                 if damped:
                     _add_columns(s.Xd, 7 * k, 7 * l, G, scale, C)
                     _add_turns(s.Xd, 7 * k, 7 * l, G, H, scale, C)
@@ -131,18 +140,20 @@ def _take_bodies(w, s, one):
 
 
 @kernel
-def add_forces(system, w, s, t, anew, kept, Q):
-    """K and C of the forces; with anew the derivatives of the laws are taken and kept, else those kept serve."""
+def add_forces(system, w, s, t, renew, kept, Q):
+    """K and C of the forces; with `renew` derivatives of the laws are evaluated and stored, else stored ones serve."""
     for i in range(Q.size):
         Q[i] = 0.0
     applied_forces(system, w.q, w.qd, t, Q)
+    # Each instance has coordinates of its own, as if there were no other bodies
     for i in range(s.graph.forces.shape[0]):
         one = s.graph.forces[i]
         _take_bodies(w, s, one)
         clear_matrix(s.Xd)
         reals, own = system.reals[one.reals :], kept[one.kept :]
-        call_jacobian(one.loop, 1, one.stride, s.own, reals, s.q, s.qd, t, 14, s.X, s.Xd, anew, own)
+        call_jacobian(one.loop, 1, one.stride, s.own, reals, s.q, s.qd, t, 14, s.X, s.Xd, renew, own)
         _spread(s, one, 1.0, True)
+    # tau' = G Q_p / 2 of all applied forces turns with the body
     for b in range(system.bodies.shape[0]):
         if system.bodies[b, 1] == 7:
             _add_turned_torque(Q, w.q, system.bodies[b, 0], 1.0, s.K[BLOCK * b :])
@@ -157,13 +168,16 @@ def add_constraints(system, w, s, t, lam):
         copy(lam[one.row : one.row + one.rows], s.lam)
         for r in range(one.rows):
             size += abs(s.lam[r])
+        # No reaction, no geometric stiffness
         if size == 0.0:
             continue
         _take_bodies(w, s, one)
         clear_matrix(s.rows)
         reals, G1, G2 = system.reals[one.reals :], s.rows[most:], s.rows[2 * most :]
+        # Phi_q of the instance, then X = (Phi_q^T lam)_q
         call_kind(one.rows_loop, 1, one.stride, s.own, reals, s.q, s.qd, t, s.rows)
         call_curvature(one.loop, 1, one.stride, s.own, reals, s.q, s.qd, s.zero, t, s.lam, s.X, G1, G2)
+        # R = Phi_q^T lam, whose torque turns with the body
         for c in range(14):
             s.R[c] = 0.0
             for r in range(one.rows):

@@ -19,8 +19,10 @@ def displace(graph, l, poses):
     """Set the poses at chart coordinates l.x; False if a body has rotated too far for the chart."""
     for b in range(graph.bodies.shape[0]):
         at, o = b * POSE, 8 * b
+        # r = r0 + rho
         put(poses, at + R, fma(four(l.x, o), splat(1.0), four(l.base, o)))
         if graph.bodies[b, 1] == 7:
+            # d = eta / 2,  d0 = sqrt(1 - |d|^2)
             x, y, z = 0.5 * get(l.x, o + 4), 0.5 * get(l.x, o + 5), 0.5 * get(l.x, o + 6)
             square = x * x + y * y + z * z
             if not square < FARTHEST:
@@ -65,6 +67,7 @@ def write_back(graph, l, poses, Z, out):
         o, at = 8 * b, b * POSE
         put(out, o, four(Z, o))
         if graph.bodies[b, 1] == 7:
+            # etadd = (d0 I + d~) omega'd - |omega'|^2 d / 2
             x, y, z, w = get(l.d, 4 * b), get(l.d, 4 * b + 1), get(l.d, 4 * b + 2), get(l.d, 4 * b + 3)
             d, omega, change = lanes(x, y, z), four(poses, at + OMEGA), four(Z, o + 4)
             square = -0.5 * total(times(omega, omega))
@@ -78,6 +81,7 @@ def turn_accelerations(graph, l, poses, yd, Z):
         o, at = 8 * b, b * POSE + OMEGA
         put(Z, o, four(yd, o))
         if graph.bodies[b, 1] == 7:
+            # omega'd = C (etadd + |omega'|^2 d / 2)
             omega = four(poses, at)
             d = lanes(l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2])
             put(Z, o + 4, rotate_rate(l, b, fma(d, splat(0.5 * total(times(omega, omega))), four(yd, o + 4))))

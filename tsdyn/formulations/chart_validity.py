@@ -47,24 +47,27 @@ def extent(w):
 
 
 @kernel
-def touch(graph, system, w, f, l, t, largest):
+def set_base_point(graph, system, w, f, l, t, largest):
     """Make the chart at w.q: base, H0, Y0, factors of S0. True if the rows of H0 are independent.
 
     largest is the largest coordinate that enters Phi, m, as the form has it.
     """
     regular = True
-    same = l.state.placement > 0 and l.state.placement == w.counters.placements  # as the chart that was left last
+    # H, Y and S of the last position solve serve, unless S is of another metric
+    same = l.state.placement > 0 and l.state.placement == w.counters.placements
     if same and graph.axes.rows.shape[0] == 0 and selection_serves(graph, f, f.rows):
         copy(f.rows.H, l.rows0.H)
         copy(f.rows.Y, l.rows0.Y)
         copy(f.rows.S, l.rows0.S)
         w.counters.kept += 1 if f.b.size > 0 else 0
     else:
+        # H0, Y0 = W0 H0^T and S0 = H0 W0 H0^T
         place_bodies(graph.bodies, w.q, f.poses)
         evaluate_rows(graph, system, f, l.rows0, t)
         if f.b.size > 0:
             w.counters.factorizations += 1
             regular = factorise_rows(graph, system, f, l.rows0, t, METRIC)
+    # Base point (r0, p0), where d = 0
     for b in range(graph.bodies.shape[0]):
         at, o = b * POSE, 8 * b
         for c in range(3):
@@ -84,6 +87,7 @@ def touch(graph, system, w, f, l, t, largest):
 def measure_turns(graph, l, q):
     """l.d of positions q; (d0, d) = p0* o p."""
     for b in range(graph.bodies.shape[0]):
+        # d0 - 1, not d0, is kept: it is small
         if graph.bodies[b, 1] == 7:
             i, o = graph.bodies[b, 0] + 3, 8 * b + 4
             e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
@@ -95,14 +99,15 @@ def measure_turns(graph, l, q):
 
 
 @kernel
-def turning(graph, w, f, l):
+def reason_to_leave(graph, w, f, l):
     """Return the reason to abandon the chart at l.d and f.rows, or STAY; records contraction and condition."""
     turn, contraction = turned_most(l), 0.0
+    # max |1 - n / s|, by the factors of the last position solve if they are those of the present H
     if f.b.size > 0:
         known = l.state.factored == 1 and l.state.off < SAME
         w.counters.kept += 1 if known else 0
         contraction = pivot_loss(graph, l) if known or factorise_normal(graph, w, f, l) else math.inf
-    l.state.factored = 0  # dense output, if there is any, would come between
+    l.state.factored = 0  # dense output may change the factors before the next step
     w.control.contraction = max(contraction, TURN_SHARE * turn)
     w.control.condition = (1.0 + w.control.contraction) / max(1.0 - w.control.contraction, TINY)
     if not contraction < CONTRACTION_LIMIT:
@@ -116,6 +121,7 @@ def every_level_holds(c):
     w, f, graph = c.work, c.tangent, c.graph
     if not has_redundant_rows(f):
         return True
+    # Phi, Phi_q qd + Phi_t and Phi_q qdd + gamma of the dropped rows, against the sizes of their terms
     size = w.control.size
     held = redundant_rows_hold(graph, f, w.control.floor) and rates_hold(graph, f, w.q, w.qd, size)
     return held and accelerations_hold(graph, f, w.q, w.qd, w.qdd, size)

@@ -51,12 +51,15 @@ def balance_stage(context, i, k):
     """After `residual` at stage i, its accelerations being k: the right-hand side of Newton's equations. Status."""
     c = load(context)
     f, l, s, graph, m = c.tangent, c.chart, c.saddle, c.graph, c.saddle.z.size
+    # a = (rdd, omega'd) of k, its normal part n = -Y0 N^-1 (H a + gamma)
     turn_accelerations(graph, l, f.poses, vector(k, l.x.size - 8), s.a)
     find_normal_part(c)
     copy(f.b, s.normal[i])
+    # F - M (a + C n) - H^T lam
     if not find_imbalance(c):
         return SINGULAR
     copy(s.x, s.right[i])
+    # What the correction of this stage needs once all stages are solved
     copy(l.d, s.turns[i])
     copy(c.work.u, s.stages[i, :m])
     copy(s.z, s.stages[i, m : 2 * m])
@@ -72,15 +75,18 @@ def factorise_stages(context, h, tableau, i):
     """
     c, tableau = load(context), vector(tableau, ANY)
     f, s, graph, shifts = c.tangent, c.saddle, c.graph, tableau[parts_of(tableau).shifts :]
+    # M, H and H^T are common to all eigenvalues
     if i == 0:
         c.work.counters.iteration_matrices += 1
         write_saddle_rows(graph, f, s)
         add_blocks(graph, s, s.upper, s.lower, 0.0, True)
+    # The real eigenvalue comes last, since its factors take the place of the common part
     if i == s.complex_upper.shape[0]:
         add_blocks(graph, s, s.upper, s.lower, h * shifts[0], False)
         if f.b.size > 0 and not factorise_normal(graph, c.work, f, c.chart):
             return SINGULAR
         return OK if factorise_saddle(s) else SINGULAR
+    # A complex eigenvalue: the common part, then - g C_b - g^2 K_b
     size = s.graph.pattern.shape[1]
     lower, upper = complex_vector(data_of(s.complex_lower[i]), size), complex_vector(data_of(s.complex_upper[i]), size)
     for e in range(size):
@@ -98,8 +104,10 @@ def solve_stages(context, h, tableau, memory):
     c, tableau, memory = load(context), vector(tableau, ANY), vector(memory, ANY)
     p = parts_of(tableau)
     s, n, m, stages = c.saddle, c.chart.x.size - 8, c.saddle.z.size, c.saddle.stages.shape[0]
+    # [e_i, dlam_i] of all stages
     _solve(s, tableau, p)
     for i in range(stages):
+        # k_i += e_i + n_i
         k = memory[(2 * i + 5) * n :][:n]
         _take_correction(c, i, k)
         spread_normal(c, s.normal[i])
@@ -127,10 +135,12 @@ def _combine(weights, rows, out):
 def _solve(s, tableau, p):
     """s.right <- the solutions of Newton's equations for the right-hand sides s.right."""
     stages = s.right.shape[0]
+    # Coefficients of the real eigenvector
     _combine(tableau[p.there :], s.right, s.x)
     solve_saddle(s)
     copy(s.x, s.solved[0])
     for pair in range(s.complex_upper.shape[0]):
+        # Those of one eigenvector of each conjugate pair
         x, row = complex_vector(data_of(s.complex_x), s.x.size), 1 + 2 * pair
         real, imaginary = s.solved[row], s.solved[row + 1]
         _combine(tableau[p.there + stages * row :], s.right, real)
@@ -140,6 +150,7 @@ def _solve(s, tableau, p):
         solve_complex_saddle(s, pair)
         for e in range(x.size):
             real[e], imaginary[e] = x[e].real, x[e].imag
+    # Back to the stages
     for i in range(stages):
         _combine(tableau[p.back + stages * i :], s.solved, s.right[i])
 
@@ -150,9 +161,11 @@ def _take_correction(c, i, k):
     s, graph, l, m = c.saddle, c.graph, c.chart, c.saddle.z.size
     copy(s.right[i], s.x)
     copy(s.turns[i], l.d)
+    # lam_i += dlam_i
     for e in range(m):
         if s.graph.row_at[e] >= 0:
             s.stages[i, 2 * m + e] += s.x[s.graph.row_at[e]]
+    # k_i += (rhodd, C^-1 times the rotation)
     for b in range(graph.bodies.shape[0]):
         at, o = s.graph.body_at[b], 8 * b
         put(s.changes[i], o, lanes(s.x[at], s.x[at + 1], s.x[at + 2]))
@@ -167,6 +180,7 @@ def _size(c, h, tableau, p):
     """The error norm of what s.changes changes of positions and velocities, root mean square of the stages."""
     w, s, graph, l, numbers, total = c.work, c.saddle, c.graph, c.chart, c.linear.numbers, 0.0
     stages, now = s.stages.shape[0], c.linear.now
+    # Stage i moves by h^2 sum_j (A^2)_ij e_j, its velocities change by h sum_j a_ij e_j
     for i in range(stages):
         _combine(tableau[p.square + stages * i :], s.changes, s.e)
         _combine(tableau[p.a + stages * i :], s.changes, s.r)

@@ -71,6 +71,7 @@ def form_normal_matrix(system, w):
     """N = Phi_q U, over the nonzero columns of Phi_q."""
     m = w.u.size
     for i in range(m):
+        # Row i of Phi_q is zero but for the columns of its two bodies
         begin, middle = system.segments[i, 0], system.segments[i, 2]
         end, last = begin + system.segments[i, 1], middle + system.segments[i, 3]
         for j in range(m):
@@ -80,6 +81,7 @@ def form_normal_matrix(system, w):
             for c in range(middle, last):
                 x += w.Phi_q[i, c] * w.U[c, j]
             w.N[i, j] = x
+    # A redundant row has u = 0
     for i in range(w.redundant[0]):
         row = w.redundant[1 + i]
         w.N[row, row] = 1.0

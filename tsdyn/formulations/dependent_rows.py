@@ -26,7 +26,7 @@ def _choose(context, q, t, share):
 def dependent_rows(packed, q, t, share):
     """Rows of Phi that are left less than a share of their diagonal entries of H W H^T by elimination, int64 (k,).
 
-    None where no choice among them is independent. Normalisations are none of them. See independent_rows.py: of many
+    None where no choice among them is independent. Normalisations are not included. See independent_rows.py: of many
     rows the choice is made within blocks, and may have one too many or too few.
     """
     own, known = packed, packed.derived

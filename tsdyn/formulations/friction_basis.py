@@ -14,7 +14,7 @@ from ..jit.kernels import callback, kernel, stack, vector
 from ..maths.dense_linalg import cholesky_solve, copy, largest, lu, lu_solve
 from ..maths.euler_parameters import multiply_g
 from ..workspaces.workspace import load
-from .friction_loads import RUB, body_of, is_settled, normal_load, step_share, unit_friction
+from .friction_loads import SOLVE_FRICTION, body_of, has_converged, normal_load, step_share, unit_friction
 from .tolerances import BASIS_LOAD_ROUNDING, LOAD_SWEEPS
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
@@ -24,6 +24,7 @@ OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
 def _add_momentum(system, b, p, x, y, scale, out):
     """out += scale G(p)^T J' G(x) y of body b; out (4,)."""
     w, J = stack(3), system.inertia[b]
+    # h = scale J' G(x) y, then G(p)^T h
     multiply_g(x, y, w)
     h0 = scale * (J[0] * w[0] + J[1] * w[1] + J[2] * w[2])
     h1 = scale * (J[3] * w[0] + J[4] * w[1] + J[5] * w[2])
@@ -39,6 +40,7 @@ def _subtract_inertia(system, q, x, out):
     """out -= M x."""
     for b in range(system.mass.size):
         at = system.bodies[b, 0]
+        # m x on r, 4 G^T J' G x on p
         for c in range(at, at + 3):
             out[c] -= system.mass[b] * x[c]
         if system.bodies[b, 1] == 7:
@@ -50,11 +52,13 @@ def _subtract_inertia(system, q, x, out):
 def _multipliers(w, r, out):
     """out = B^T U^T r."""
     m = out.size
+    # z = U^T r
     for i in range(m):
         x = 0.0
         for c in range(r.size):
             x += w.U[c, i] * r[c]
         w.z[i] = x
+    # B^T z
     for j in range(m):
         x = 0.0
         for i in range(m):
@@ -119,9 +123,11 @@ def _find_load(graph, system, w, friction, lam, t, out, by_row):
     reaction, half, torque = stack(6), stack(4), stack(3)
     for c in range(6):
         reaction[c] = 0.0
+    # The normal load needs the whole reaction, its derivative the normal load: two passes over the joint's rows
     for only_sum in range(2):
         for j in range(friction.first, friction.first + friction.count):
             e = graph.row[graph.friction_rows[j, 0]]
+            # A unit multiplier exerts -(Phi_r, G Phi_p^T / 2) on the body
             row = w.Phi_q[e]
             for c in range(3):
                 torque[c] = 0.0
@@ -134,6 +140,7 @@ def _find_load(graph, system, w, friction, lam, t, out, by_row):
                     reaction[c] -= row[at + c] * lam[e]
                     reaction[3 + c] -= torque[c] * lam[e]
             else:
+                # dF_n / dlam_e = -(F_n,F . Phi_r + F_n,T . G Phi_p^T / 2)
                 x = 0.0
                 for c in range(3):
                     x -= row[at + c] * out[1 + c] + torque[c] * out[4 + c]
@@ -142,17 +149,19 @@ def _find_load(graph, system, w, friction, lam, t, out, by_row):
             normal_load(system, friction, w.q, w.qd, t, 1, reaction, out)
 
 
-@callback(RUB)
-def rub(context, t, vdd):
+@callback(SOLVE_FRICTION)
+def solve_friction(context, t, vdd):
     """Add joint friction to vdd. Status."""
     c = load(context)
     system, w, f, graph = c.system, c.work, c.tangent, c.graph
     r, n, m, frictions = f.friction, w.q.size, w.Phi.size, c.graph.frictions.shape[0]
     k = w.v.size
     vdd = vector(vdd, k)
+    # lam is linear in the loads: lam_0 + sum_j l_j F_n,j
     _find_bases(graph, system, w, f, t, vdd)
     lam_0, lam, by_row = r.numbers[:m], r.numbers[m : 2 * m], w.z
     b, loads = r.numbers[2 * (m + n) :], r.numbers[2 * (m + n) + frictions :]
+    # Start: the loads of the last evaluation
     for i in range(frictions):
         loads[i] = r.load[7 * i] if abs(r.load[7 * i]) < math.inf else 0.0
     done, before = False, math.inf
@@ -163,6 +172,7 @@ def rub(context, t, vdd):
                 lam[e] += r.basis[j, n + e] * loads[j]
         if done:
             break
+        # Residual F_n,i(lam) - F_n,i;  J_ij = delta_ij - F_n,i,lam . l_j
         for i in range(frictions):
             friction = graph.frictions[i]
             _find_load(graph, system, w, friction, lam, t, r.load[7 * i :], by_row)
@@ -170,20 +180,23 @@ def rub(context, t, vdd):
             for j in range(frictions):
                 x = 1.0 if i == j else 0.0
                 for h in range(friction.first, friction.first + friction.count):
-                    e = graph.row[graph.friction_rows[h, 0]]
-                    x -= by_row[e] * r.basis[j, n + e]
+                    row = graph.row[graph.friction_rows[h, 0]]
+                    x -= by_row[row] * r.basis[j, n + row]
                 r.J[i, j] = x
         if not lu(r.J, r.pivots, frictions):
             return JAMMED
         lu_solve(r.J, r.pivots, b, frictions)
+        # A load whose sign alternates is found by half steps
         change, share, size = largest(b[:frictions]), step_share(sweep), 0.0
         if not change < math.inf:
             return JAMMED
+        # Converged where the correction is rounding of the largest load
         for i in range(frictions):
             loads[i] += share * b[i]
             size = max(size, abs(loads[i]))
-        done = is_settled(change, before, share, sweep, BASIS_LOAD_ROUNDING * size)
+        done = has_converged(change, before, share, sweep, BASIS_LOAD_ROUNDING * size)
         before = change
+    # vdd += sum_i a_i F_n,i
     for i in range(frictions):
         N = loads[i]
         r.load[7 * i] = system.reals[system.normals[i]] = N

@@ -5,8 +5,8 @@ from ..elements.loops.friction import call_load_slope, call_normal_load, call_un
 from ..jit.kernels import caller, kernel
 from .tolerances import DAMPED, DAMPED_SHARE
 
-RUB = "pdp"  # context, t, vdd where the form has a basis: solves for friction and accelerations
-call_rub = caller(RUB)
+SOLVE_FRICTION = "pdp"  # context, t, vdd where the form has a basis: solves for friction and accelerations
+call_friction = caller(SOLVE_FRICTION)
 
 
 @kernel
@@ -61,6 +61,6 @@ def step_share(sweep):
 
 
 @kernel
-def is_settled(change, before, share, sweep, least):
+def has_converged(change, before, share, sweep, least):
     """Return True if a correction is at most `least`, or if quadratic convergence makes the next one so."""
     return change <= least or (share == 1.0 and sweep > 0 and change * change <= least * before)

@@ -34,7 +34,7 @@ from ..rows.interface import (
 )
 from ..workspaces.workspace import load
 from .accelerations import body_forces
-from .friction_loads import RUB, body_of, forget_loads, is_settled, normal_load, step_share, unit_friction
+from .friction_loads import SOLVE_FRICTION, body_of, forget_loads, has_converged, normal_load, step_share, unit_friction
 from .tolerances import DAMPED, LOAD_ROUNDING, LOAD_SWEEPS, NEWTON_DONE, SLOW_LOADS
 
 OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
@@ -46,6 +46,7 @@ def _weigh_units(graph, system, f, q, qd, t):
     r, Q = f.friction, stack(14)
     for i in range(graph.frictions.shape[0]):
         friction = graph.frictions[i]
+        # g_i on each body: force, and body torque G Q_p / 2
         unit_friction(system, friction, q, qd, t, Q)
         for k in range(2):
             body, at, o = body_of(friction, k), 16 * i + 8 * k, 7 * k
@@ -63,6 +64,7 @@ def body_reaction(graph, f, friction, lam, out):
     """out (6,) = what the joint of a friction exerts: force, ground frame; torque about the centroid, body frame."""
     for c in range(6):
         out[c] = 0.0
+    # -H^T lam over the rows of the joint
     for j in range(friction.first, friction.first + friction.count):
         e, side = graph.friction_rows[j]
         at = 16 * e + 8 * side
@@ -82,10 +84,11 @@ def _find_loads(graph, system, f, q, qd, t, derive):
 
 
 @kernel
-def _rub_bodies(graph, f):
+def _apply_loads(graph, f):
     """Z = r.Z + W g N - Y^T lam."""
     r = f.friction
     copy(r.Z, f.Z)
+    # + W g_i F_n,i on the two bodies of the joint
     for i in range(graph.frictions.shape[0]):
         N = splat(r.load[7 * i])
         for k in range(2):
@@ -99,11 +102,13 @@ def _rub_bodies(graph, f):
 def factorise_loads(graph, f, cold):
     """Factorise N~, or S if `cold`; False if the matrix is singular."""
     r, change = f.friction, stack(8)
+    # X^T = W (H^T - sum_i g_i F_n,i,lam),  N~ = H X^T
     copy(f.rows.Y, r.X)
     if not cold:
         for i in range(graph.frictions.shape[0]):
             friction = graph.frictions[i]
             a, b = friction.body_a, friction.body_b
+            # F_n,i by the reaction; a unit multiplier of row e changes the reaction by -H_e
             change[3] = change[7] = 0.0
             for c in range(3):
                 change[c], change[4 + c] = r.load[7 * i + 1 + c], r.load[7 * i + 4 + c]
@@ -128,21 +133,25 @@ def find_reactions(graph, system, f, q, qd, t):
     r = f.friction
     _weigh_units(graph, system, f, q, qd, t)
     copy(f.Z, r.Z)
+    # Start: the multipliers of the last evaluation, or none. Without any the first matrix is S, free of friction
     clear_redundant(f, r.lam)
     size = largest(r.lam)
     if not size < math.inf:
         for e in range(r.lam.size):
             r.lam[e] = 0.0
         size = 0.0
-    before, anew, done = math.inf, True, False
+    before, renew, done = math.inf, True, False
     for sweep in range(LOAD_SWEEPS):
-        _find_loads(graph, system, f, q, qd, t, int(anew and size > 0.0 and not done))
-        _rub_bodies(graph, f)
+        # Loads at the present lam, with derivatives where N~ is factorised
+        _find_loads(graph, system, f, q, qd, t, int(renew and size > 0.0 and not done))
+        # Z = W (F + sum_i g_i F_n,i - H^T lam)
+        _apply_loads(graph, f)
         if done:
             return True
+        # dlam = N~^-1 (H Z + gamma)
         acceleration_residuals(graph, f.rows, f.gamma, f.Z, f.b)
         add_axis_multipliers(graph, r.lam, f.b)
-        if anew and not factorise_loads(graph, f, size == 0.0):
+        if renew and not factorise_loads(graph, f, size == 0.0):
             return False
         solve_product(graph, r.lower, r.upper, f.b)
         change, share = largest(f.b), step_share(sweep)
@@ -150,10 +159,11 @@ def find_reactions(graph, system, f, q, qd, t):
             return False
         for e in range(f.b.size):
             r.lam[e] += share * f.b[e]
+        # Converged: the correction is rounding, or that of a new matrix is so small that its square is
         cold, size = size == 0.0, largest(r.lam)
-        done = is_settled(change, before, share, sweep, LOAD_ROUNDING * size)
-        done = done or (anew and not cold and change <= NEWTON_DONE * size)
-        anew, before = cold or sweep >= DAMPED or change > SLOW_LOADS * before, change
+        done = has_converged(change, before, share, sweep, LOAD_ROUNDING * size)
+        done = done or (renew and not cold and change <= NEWTON_DONE * size)
+        renew, before = cold or sweep >= DAMPED or change > SLOW_LOADS * before, change
     return False
 
 
@@ -168,8 +178,8 @@ def accelerate_with_friction(graph, system, w, f, t):
     return find_reactions(graph, system, f, w.q, w.qd, t)
 
 
-@callback(RUB)
-def rub(context, t, unused):
+@callback(SOLVE_FRICTION)
+def solve_friction(context, t, unused):
     """Solve for accelerations as accelerations.solve_accelerations, with joint friction. Status."""
     c = load(context)
     system, f, graph = c.system, c.tangent, c.graph

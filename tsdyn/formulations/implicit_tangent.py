@@ -1,4 +1,4 @@
-"""The tangent form for implicit methods: accelerations that a stage gives, and rates of other places, in a chart.
+"""The tangent form for implicit methods: accelerations of a stage, and rates of another configuration, in a chart.
 
 Newton's method for its stages is that of stage_equations.py; the matrices are those of saddle_point.py.
 """
@@ -35,7 +35,7 @@ OK = int(Status.SUCCESS)
 
 @callback("p")
 def check(context):
-    """As tangent.check; N is factorised anew at the place, since the stages of the next step begin with its factors."""
+    """As tangent.check; N is factorised at the present configuration: the stages of the next step begin with it."""
     c = load(context)
     c.chart.state.factored = 0
     return check_chart(c)
@@ -43,7 +43,7 @@ def check(context):
 
 @callback("pp")
 def complete(context, yd):
-    """Write q, qd and qdd at the place and velocities of the last `accelerate`, yd being accelerations of the chart.
+    """Write q, qd and qdd after `accelerate`, yd being accelerations of chart coordinates.
 
     They are projected onto H (rdd, omega'd) + gamma = 0.
     """
@@ -69,12 +69,15 @@ def recall(context, y, yd):
         put(y, o + 4, splat(0.0))
         put(yd, o + 4, splat(0.0))
         if graph.bodies[b, 1] == 7:
+            # omega' = 2 G pd of the point before, and omega'd likewise
             p, d = before[0, i + 3 : i + 7], lanes(l.d[4 * b], l.d[4 * b + 1], l.d[4 * b + 2])
             wx, wy, wz = spin(p, before[1, i + 3 : i + 7])
             omega, d0 = lanes(wx, wy, wz), splat(1.0 + l.d[4 * b + 3])
             wx, wy, wz = spin(p, before[2, i + 3 : i + 7])
             change = lanes(wx, wy, wz)
+            # etad = (d0 I + d~) omega'
             put(y, o + 4, fma(omega, d0, cross(d, omega)))
+            # etadd = (d0 I + d~) omega'd - |omega'|^2 d / 2
             square = splat(-0.5 * total(times(omega, omega)))
             put(yd, o + 4, add(fma(change, d0, cross(d, change)), times(d, square)))
     return OK

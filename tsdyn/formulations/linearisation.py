@@ -38,6 +38,7 @@ def _transposed_product(G, J, X, scale, out):
 @kernel
 def _crossed(h, scale, out):
     """out += scale H, where H p = G(p)^T h."""
+    # H = [0, -h^T; h, -h~]
     for i in range(3):
         out[0, 1 + i] -= scale * h[i]
         out[1 + i, 0] += scale * h[i]
@@ -61,14 +62,16 @@ def _moment(G, J, p, out):
 
 @kernel
 def _inertia_terms(system, w, linear):
-    """l.r += gravity + S - M qdd, K += (M qdd - S)_q, C += S_qd; S_p = 8 Gd^T J' Gd p, M_p = 4 G^T J' G."""
+    """Add gravity + Q_v - M qdd to r, (M qdd - Q_v)_q to K, Q_v,qd to C; on p, Q_v = 8 Gd^T J' Gd p, M = 4 G^T J' G."""
     G, Gd, Gdd, h, g = stack2(3, 4), stack2(3, 4), stack2(3, 4), stack(3), stack(3)
     for b in range(system.mass.size):
         at = system.bodies[b, 0]
+        # m (g - rdd)
         for c in range(3):
             linear.r[at + c] += system.mass[b] * (system.gravity[c] - w.qdd[at + c])
         if system.bodies[b, 1] == 7:
             p, pd, pdd, J = w.q[at + 3 : at + 7], w.qd[at + 3 : at + 7], w.qdd[at + 3 : at + 7], system.inertia[b]
+            # 8 Gd^T J' Gd p - 4 G^T J' G pdd
             matrix_g(p, G)
             matrix_g(pd, Gd)
             matrix_g(pdd, Gdd)
@@ -79,10 +82,12 @@ def _inertia_terms(system, w, linear):
                 for a in range(3):
                     total += 8.0 * Gd[a, i] * g[a] - 4.0 * G[a, i] * h[a]
                 linear.r[at + 3 + i] += total
+            # By p, with h = J' G pdd and G pdd = -Gdd p:  4 (G^T h)_p - 8 Gd^T J' Gd
             K, C = linear.K[at + 3 : at + 7, at + 3 : at + 7], linear.C[at + 3 : at + 7, at + 3 : at + 7]
             _crossed(h, 4.0, K)
             _transposed_product(G, J, Gdd, -4.0, K)
             _transposed_product(Gd, J, Gd, -8.0, K)
+            # By pd, with g = J' Gd p and Gd p = -G pd:  8 (Gd^T g)_pd
             _crossed(g, 8.0, C)
             _transposed_product(Gd, J, G, -8.0, C)
 
@@ -94,10 +99,12 @@ def _add_mass_times(system, q, scale, X, out):
     n = q.size
     for b in range(system.mass.size):
         at = system.bodies[b, 0]
+        # m X on r
         for c in range(at, at + 3):
             for j in range(n):
                 out[c, j] += scale * system.mass[b] * X[c, j]
         if system.bodies[b, 1] == 7:
+            # 4 G^T J' G X on p
             matrix_g(q[at + 3 : at + 7], G)
             J = system.inertia[b]
             for j in range(n):
@@ -117,7 +124,8 @@ def _to_body_frames(system, q, X, scratch, out):
     """out (l, l) = T^T X T, X (n, n): dr = A dr', dp = G^T dpi' / 2."""
     n, G, A = q.size, stack2(3, 4), stack2(3, 3)
     to = 0
-    for b in range(system.mass.size):  # X T
+    # X T
+    for b in range(system.mass.size):
         at = system.bodies[b, 0]
         if system.bodies[b, 1] == 7:
             matrix_g(q[at + 3 : at + 7], G)
@@ -135,6 +143,7 @@ def _to_body_frames(system, q, X, scratch, out):
                 for c in range(3):
                     scratch[i, to + c] = X[i, at + c]
             to += 3
+    # T^T (X T)
     width, to = to, 0
     for b in range(system.mass.size):
         at = system.bodies[b, 0]
@@ -170,9 +179,10 @@ def linearise(context, t, vdd):
     clear_matrix(linear.C)
     for i in range(n):
         linear.r[i] = 0.0
+    # r = Q_A + Q_v - M qdd is what the multipliers balance
     if system.forces.shape[0] > 0:
         applied_forces(system, w.q, w.qd, t, linear.r)
-        _forces(system, w, linear, t, 1)  # the laws' derivatives are kept; `reduce` takes the rest anew
+        _forces(system, w, linear, t, 1)  # stores derivatives of the laws; `reduce` evaluates the rest
     _inertia_terms(system, w, linear)
     # Phi_q^T lam = r;    Y = U B G1,    Z = U B G2
     multiply(w.U, w.B, linear.UB)
@@ -184,6 +194,7 @@ def linearise(context, t, vdd):
     _add_mass_times(system, w.q, 2.0, linear.Y, linear.C)
     _add_mass_times(system, w.q, -1.0, linear.Z, linear.K)
     add_product(1.0, linear.C, linear.Y, linear.K)
+    # An overflow shows in the sum of all entries
     total = 0.0
     for i in range(n):
         for j in range(n):
@@ -195,11 +206,11 @@ def linearise(context, t, vdd):
 
 
 @kernel
-def _forces(system, w, linear, t, anew):
+def _forces(system, w, linear, t, renew):
     """Q_q and Q_qd of the forces."""
     clear_matrix(linear.Q_q)
     clear_matrix(linear.Q_qd)
-    force_jacobian(system, w.q, w.qd, t, linear.Q_q, linear.Q_qd, anew, linear.kept)
+    force_jacobian(system, w.q, w.qd, t, linear.Q_q, linear.Q_qd, renew, linear.kept)
 
 
 @callback("pd")
@@ -208,6 +219,7 @@ def reduce(context, t):
     c = load(context)
     system, w, linear = c.system, c.work, c.linear
     k, to, A = w.v.size, 0, stack2(3, 3)
+    # F = [A^T D_r; 2 G D_p]: tangent velocities as velocities in body frames
     for b in range(system.mass.size):
         at = system.bodies[b, 0]
         if system.bodies[b, 1] == 7:
@@ -248,6 +260,7 @@ def factorise(context, g):
     c = load(context)
     w, linear = c.work, c.linear
     k = w.v.size
+    # A = D^T M D, formed again from its Cholesky factor
     for i in range(k):
         for j in range(i + 1):
             x = 0.0  # A = L L^T, the diagonal holding reciprocals
@@ -256,6 +269,7 @@ def factorise(context, g):
             x += (w.A[i, j] if i != j else 1.0 / w.A[i, i]) / w.A[j, j]
             linear.P[i, j] = x
             linear.P[j, i] = x
+    # P = A - g C_hat + g^2 K_hat
     for i in range(k):
         for j in range(k):
             linear.P[i, j] += g * (g * linear.K_hat[i, j] - linear.C_hat[i, j])
@@ -267,11 +281,13 @@ def factorise(context, g):
 def _times_mass(w, linear, rho):
     """rho <- A rho, by the Cholesky factor of A, whose diagonal holds reciprocals."""
     k = rho.size
+    # b = L^T rho
     for j in range(k):
         x = rho[j] / w.A[j, j]
         for i in range(j + 1, k):
             x += w.A[i, j] * rho[i]
         linear.b[j] = x
+    # rho = L b
     for i in range(k - 1, -1, -1):
         x = linear.b[i] / w.A[i, i]
         for j in range(i):
@@ -310,6 +326,7 @@ def soften(context, ex, g, ey):
     w, linear = c.work, c.linear
     k = w.v.size
     ex, ey = vector(ex, k), vector(ey, k)
+    # P y = A ey - g K_hat ex,  x = ex + g y
     _times_mass(w, linear, ey)
     for i in range(k):
         for j in range(k):

@@ -29,7 +29,7 @@ class Still(NamedTuple):
 
 
 def still(packed):
-    """The `Still` of a packed scene with its redundant rows as of now; where they hold is for `settle` to say."""
+    """The `Still` of a packed scene with its present redundant rows; `release_loose_bodies` checks if these hold."""
     known = packed.derived
     if known.locked is None:
         known.locked = _find(packed) if known.shared is None else _found_once(packed)
@@ -69,8 +69,8 @@ def moving_parts(packed):
     return build(packed, found if found.bodies.size else None)
 
 
-def settle(packed, graph, H):
-    """Have bodies turn, from now on, that the rows H of the whole graph, (m 16,), don't hold where they stand."""
+def release_loose_bodies(packed, graph, H):
+    """Let bodies rotate from now on whose orientation the rows H of the whole graph, (m 16,), don't hold."""
     while (found := still(packed)).bodies.size:
         place, real = np.full(len(packed.system.segments), -1), graph.row >= 0
         place[graph.row[real]] = np.flatnonzero(real)
@@ -115,7 +115,7 @@ def _find(packed):
     """From the ground outwards, body by body."""
     joints, held, holding = _joints(packed), {len(packed.bodies)}, {}
     ways = list(held) if joints[-1] else []
-    turning = packed.derived.turning | _rubbing(packed)
+    turning = packed.derived.turning | _bodies_with_friction(packed)
     while ways:
         for _, pair, rows in joints[ways.pop()]:
             for other in set(pair) - held - turning:
@@ -138,7 +138,7 @@ def _find(packed):
     )
 
 
-def _rubbing(packed):
+def _bodies_with_friction(packed):
     """The bodies whose joints have friction, which needs their whole reactions."""
     bodies = {id(body): i for i, body in enumerate(packed.bodies)}
     forces = [load.force for load in packed.loads if load.normal >= 0]
@@ -161,8 +161,8 @@ def _joints(packed):
 def _redundant(packed, omitted, spare):
     """Redundant rows among those that are left: as many as in the whole scene less the `spare` ones that are omitted.
 
-    Where too few redundant rows of the whole scene are left, some others: a run selects anew. None where that can't be
-    done.
+    If too few redundant rows of the whole scene are left, others are added: a run reselects rows. None where that can't
+    be done.
     """
     whole = redundant_rows(packed)
     if not len(whole):

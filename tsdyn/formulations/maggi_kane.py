@@ -13,7 +13,7 @@ from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import set_time
 from ..workspaces.workspace import load
 from .newton_iterations import NOT_FINITE, OK
-from .null_space import frictional_acceleration, look, project, reduced_mass, velocities, weighted_square
+from .null_space import check_validity, frictional_acceleration, project, reduced_mass, velocities, weighted_square
 from .null_space_chart import new_chart, tangent_map
 
 
@@ -27,6 +27,7 @@ def place(context, t, x):
     if not set_time(system, t):
         return NOT_FINITE
     copy(vector(x, w.q.size), w.q)
+    # B and D of Eqs. 7 and 9 at a q that need not satisfy Eq. 1
     status = tangent_map(system, w, t)
     return reduced_mass(system, w) if status == OK else status
 
@@ -45,7 +46,7 @@ def accelerate(context, t, velocity, wd, xd):
 @callback("p")
 def check(context):
     """Reason to choose a new V, or zero."""
-    return look(load(context))
+    return check_validity(load(context))
 
 
 @callback(NORM, "d")
@@ -54,6 +55,7 @@ def error_norm(context, eq, ew, old, rtol, atol):
     w = load(context).work
     n, k = w.q.size, w.v.size
     eq, old = vector(eq, n), vector(old, 3 * n)
+    # w is an error of velocities, qd = D w; V w at the base point
     total = weighted_square(w, w.qd, n, vector(ew, k), old, rtol, atol)
     for i in range(n):
         x = eq[i] / (atol + rtol * max(abs(w.q[i]), abs(old[i])))

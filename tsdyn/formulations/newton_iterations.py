@@ -17,16 +17,17 @@ SINGULAR = int(Status.SINGULAR)
 def solve_positions(system, w, t, v):
     """Find u and q = q0 + V v - U u with Phi(q, t) = 0, Eqs. 19, 20 and 29. Status.
 
-    The start is u + T dv, T = du/dv being left over from the place before. Sweeps go on until |Phi| <= u_tol and what
-    the last correction, which costs no further evaluation, is expected to leave is below u_tol^(3/2) or rounding, or
-    is rounding since it falls no more.
+    The start is u + T dv, with T = du/dv of the previous configuration. Stops when |Phi| <= u_tol and the residual
+    expected after the last correction is below u_tol^(3/2) or rounding, or when |Phi| has stopped falling at rounding.
     """
     n, m, k = w.q.size, w.u.size, v.size
+    # u + T dv: first order in the change of v
     for i in range(m):
         d = 0.0
         for j in range(k):
             d += w.T[i, j] * (v[j] - w.v[j])
         w.u[i] += d
+    # base = q0 + V v
     for i in range(n):
         x = 0.0
         for j in range(k):
@@ -34,11 +35,13 @@ def solve_positions(system, w, t, v):
         w.base[i] = w.q0[i] + x
     for j in range(k):
         w.v[j] = v[j]
+    # Tolerance of |Phi|, and what may be left after the last correction: u_tol^(3/2), half as many digits again
     floor = w.control.floor
     tol = max(w.control.u_tol, floor)
     left = max(tol * math.sqrt(tol), floor)
     before, stuck = math.inf, False
     for _ in range(B_SWEEPS):
+        # Phi at q = base - U u
         _step_off(w, n, m)
         evaluate_dense_residuals(system, w, t)
         w.counters.newton += 1
@@ -48,18 +51,21 @@ def solve_positions(system, w, t, v):
             if not size < math.inf:
                 return NOT_FINITE
             worst = max(worst, size)
+        # Slow contraction: B is of a configuration too far away. If a new B did not help, the residual is rounding
         if worst > tol and worst > SLOW * before:
             if stuck and worst <= ROUNDING_AT_MOST * floor:
                 tol, floor = worst, worst  # a fresh B did not help: this is rounding
             elif not factorise_dense_rows(system, w, t):  # B was out of date
                 return SINGULAR
             stuck = True
+        # Eq. 29: u <- u + B Phi
         for i in range(m):
             d = 0.0
             for j in range(m):
                 d += w.B[i, j] * w.Phi[j]
             w.u[i] += d
             w.z[i] = d
+        # The last correction leaves worst * rate
         if before < math.inf:
             w.control.rate = worst / before
         rounding = STALLED * before < worst <= ROUNDING_AT_MOST * floor
@@ -84,14 +90,15 @@ def _step_off(w, n, m):
 def update_b(w):
     """Bring B to (Phi_q U)^-1 by Eq. 28, B <- 2 B - B (Phi_q U) B, N = Phi_q U being known. Status.
 
-    With R = N B - I the iteration is B <- B - B R and squares R: it ends when the R to come is below B_tol^(3/2), half
-    as many digits again as asked for, so that what the last square happens to be does not show in the velocities.
-    A start with |R| near one or above is replaced by a factorisation.
+    With R = N B - I the iteration is B <- B - B R, which squares R. It stops when the next R is below B_tol^(3/2), half
+    as many digits again as requested, so that the velocities don't depend on the size of the last square. If |R| is
+    near one or above at the start, B is factorised instead.
     """
     m = w.u.size
     tol = w.control.b_tol * math.sqrt(w.control.b_tol)
     before = math.inf
     for _ in range(B_SWEEPS):
+        # R = N B - I, and its largest row sum
         worst = 0.0
         for i in range(m):
             total = 0.0
@@ -106,6 +113,7 @@ def update_b(w):
             if not total < math.inf:
                 return NOT_FINITE
             worst = max(worst, total)
+        # Eq. 28 converges from |R| < 1 only
         if worst > B_OUTDATED and before == math.inf:
             before = HUGE  # a factorisation is tried once
             if not invert_normal_matrix(w):

@@ -19,9 +19,9 @@ from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import applied_forces, is_rheonomic, set_time
 from ..rows.interface import evaluate_bias, evaluate_drift, evaluate_rows, has_redundant_rows, redundant_rows_hold
 from ..workspaces.workspace import load
-from .chart_validity import every_level_holds, measure_turns, turning
+from .chart_validity import every_level_holds, measure_turns, reason_to_leave
 from .dense_rows import correct, evaluate_dense_bias, evaluate_dense_drift, multiply_dense_row
-from .friction_loads import call_rub, forget_loads
+from .friction_loads import call_friction, forget_loads
 from .newton_iterations import NOT_FINITE, OK, solve_positions
 from .null_space_chart import new_chart, tangent_map
 from .tolerances import MASS_PIVOT
@@ -38,7 +38,8 @@ def reduced_mass(system, w):
             w.A[i, j] = 0.0
     for b in range(system.mass.size):
         at, mass = system.bodies[b, 0], system.mass[b]
-        for c in range(at, at + 3):  # D^T M D += m D_r^T D_r
+        # D^T M D += m D_r^T D_r
+        for c in range(at, at + 3):
             for i in range(k):
                 f = mass * w.D[c, i]
                 if f != 0.0:
@@ -48,12 +49,14 @@ def reduced_mass(system, w):
             e0, e1, e2, e3 = 2.0 * w.q[at + 3], 2.0 * w.q[at + 4], 2.0 * w.q[at + 5], 2.0 * w.q[at + 6]
             x, y, z = w.E[3 * b], w.E[3 * b + 1], w.E[3 * b + 2]
             d0, d1, d2, d3 = w.D[at + 3], w.D[at + 4], w.D[at + 5], w.D[at + 6]
-            for j in range(k):  # E = 2 G D_p
+            # E = 2 G D_p
+            for j in range(k):
                 x[j] = -e1 * d0[j] + e0 * d1[j] + e3 * d2[j] - e2 * d3[j]
                 y[j] = -e2 * d0[j] - e3 * d1[j] + e0 * d2[j] + e1 * d3[j]
                 z[j] = -e3 * d0[j] + e2 * d1[j] - e1 * d2[j] + e0 * d3[j]
             J = system.inertia[b]
-            for i in range(k):  # D^T M D += E^T J' E
+            # D^T M D += E^T J' E
+            for i in range(k):
                 f = J[0] * x[i] + J[1] * y[i] + J[2] * z[i]
                 g = J[3] * x[i] + J[4] * y[i] + J[5] * z[i]
                 h = J[6] * x[i] + J[7] * y[i] + J[8] * z[i]
@@ -81,6 +84,7 @@ def velocities(system, w, t, vd):
 def _refine_velocities(system, w):
     """qd -= U B (Phi_q qd + Phi_t)."""
     driven = is_rheonomic(system)
+    # B of Eq. 28 is exact to its tolerance: one correction leaves rounding of Eq. 2
     for i in range(w.Phi.size):
         w.Phi[i] = (w.Phi_t[i] if driven else 0.0) + multiply_dense_row(system, w, i, w.qd)
     correct(w, w.Phi, w.qd)
@@ -93,12 +97,14 @@ def reduced_acceleration(system, w, t, vdd):
     evaluate_dense_bias(system, w, t)
     for i in range(n):
         w.h[i] = 0.0
-    correct(w, w.gamma, w.h)  # h = -U B gamma, what qdd is at vdd = 0
+    # h = -U B gamma, what qdd is at vdd = 0
+    correct(w, w.gamma, w.h)
     for j in range(k):
         vdd[j] = 0.0
     for b in range(system.mass.size):
         at, mass = system.bodies[b, 0], system.mass[b]
-        for c in range(3):  # vdd += D_r^T m (g - h_r)
+        # vdd += D_r^T m (g - h_r)
+        for c in range(3):
             f = mass * (system.gravity[c] - w.h[at + c])
             for j in range(k):
                 vdd[j] += f * w.D[at + c, j]
@@ -107,23 +113,27 @@ def reduced_acceleration(system, w, t, vdd):
             d0, d1, d2, d3 = w.qd[at + 3], w.qd[at + 4], w.qd[at + 5], w.qd[at + 6]
             a0, a1, a2, a3 = -2.0 * w.h[at + 3], -2.0 * w.h[at + 4], -2.0 * w.h[at + 5], -2.0 * w.h[at + 6]
             J = system.inertia[b]
-            x = -e1 * a0 + e0 * a1 + e3 * a2 - e2 * a3  # 2 G (U B gamma)_p
+            # 2 G (U B gamma)_p
+            x = -e1 * a0 + e0 * a1 + e3 * a2 - e2 * a3
             y = -e2 * a0 - e3 * a1 + e0 * a2 + e1 * a3
             z = -e3 * a0 + e2 * a1 - e1 * a2 + e0 * a3
             f0 = J[0] * x + J[1] * y + J[2] * z
             f1 = J[3] * x + J[4] * y + J[5] * z
             f2 = J[6] * x + J[7] * y + J[8] * z
-            x = -d1 * e0 + d0 * e1 + d3 * e2 - d2 * e3  # Gd p
+            # Gd p
+            x = -d1 * e0 + d0 * e1 + d3 * e2 - d2 * e3
             y = -d2 * e0 - d3 * e1 + d0 * e2 + d1 * e3
             z = -d3 * e0 + d2 * e1 - d1 * e2 + d0 * e3
             g0 = 8.0 * (J[0] * x + J[1] * y + J[2] * z)
             g1 = 8.0 * (J[3] * x + J[4] * y + J[5] * z)
             g2 = 8.0 * (J[6] * x + J[7] * y + J[8] * z)
-            s0 = -d1 * g0 - d2 * g1 - d3 * g2  # S_p = 8 Gd^T J' Gd p
+            # Q_v on p, 8 Gd^T J' Gd p
+            s0 = -d1 * g0 - d2 * g1 - d3 * g2
             s1 = d0 * g0 - d3 * g1 + d2 * g2
             s2 = d3 * g0 + d0 * g1 - d1 * g2
             s3 = -d2 * g0 + d1 * g1 + d0 * g2
-            for j in range(k):  # vdd += E^T J' 2 G (U B gamma)_p + D_p^T Q_v
+            # vdd += E^T J' 2 G (U B gamma)_p + D_p^T Q_v
+            for j in range(k):
                 vdd[j] += (
                     f0 * w.E[3 * b, j]
                     + f1 * w.E[3 * b + 1, j]
@@ -137,12 +147,14 @@ def reduced_acceleration(system, w, t, vdd):
         for c in range(n):
             w.Q[c] = 0.0
         applied_forces(system, w.q, w.qd, t, w.Q)
-        for c in range(n):  # vdd += D^T Q_A
+        # vdd += D^T Q_A
+        for c in range(n):
             f = w.Q[c]
             if f != 0.0:
                 for j in range(k):
                     vdd[j] += f * w.D[c, j]
-    cholesky_solve(w.A, vdd, k)  # vdd <- (D^T M D)^-1 vdd
+    # vdd <- (D^T M D)^-1 vdd
+    cholesky_solve(w.A, vdd, k)
     w.counters.evaluations += 1
     return OK if is_finite(vdd[:k]) else NOT_FINITE
 
@@ -155,7 +167,7 @@ def frictional_acceleration(context, c, t, vdd):
     if frictions:
         forget_loads(system)
     status = reduced_acceleration(system, c.work, t, vdd)
-    return call_rub(graph.rub[0], context, t, vdd) if frictions and status == OK else status
+    return call_friction(graph.friction_solver[0], context, t, vdd) if frictions and status == OK else status
 
 
 @callback(PLACE)
@@ -167,8 +179,10 @@ def place(context, t, v):
     c.chart.state.time = t
     if not set_time(system, t):
         return NOT_FINITE
+    # Eqs. 19, 20 and 29
     status = solve_positions(system, w, t, vector(v, w.v.size))
     if status == OK:
+        # Eqs. 7, 9 and 28 at the new q
         status = tangent_map(system, w, t)
     return reduced_mass(system, w) if status == OK else status
 
@@ -194,11 +208,13 @@ def complete(context, vdd):
 @kernel
 def find_accelerations(system, w, vdd):
     """Accelerations qdd = D vdd - U B gamma, Eq. 24, refined once by Phi_q qdd + gamma."""
+    # Eq. 24, h = -U B gamma
     for i in range(w.q.size):
         x = w.h[i]
         for j in range(vdd.size):
             x += w.D[i, j] * vdd[j]
         w.qdd[i] = x
+    # qdd <- qdd - U B (Phi_q qdd + gamma)
     for i in range(w.gamma.size):
         x = w.gamma[i]
         for part in range(0, 4, 2):
@@ -214,7 +230,8 @@ def check(context):
     """Return the reason to abandon the chart, or zero; negative, a Status, where the state can't be taken."""
     c = load(context)
     w, f, graph = c.work, c.tangent, c.graph
-    reason = look(c)
+    reason = check_validity(c)
+    # The sparse rows of the basis-free form know which rows are dropped and judge them
     if has_redundant_rows(f):
         move_bodies(graph.bodies, w.q, w.qd, f.poses)
         evaluate_bias(graph, c.system, f, c.chart.state.time)
@@ -226,13 +243,13 @@ def check(context):
 
 
 @kernel
-def look(c):
+def check_validity(c):
     """Return the reason to abandon the chart at the present q, or zero."""
     w, f, l, graph = c.work, c.tangent, c.chart, c.graph
     place_bodies(graph.bodies, w.q, f.poses)
     measure_turns(graph, l, w.q)
     evaluate_rows(graph, c.system, f, f.rows, l.state.time)
-    return turning(graph, w, f, l)
+    return reason_to_leave(graph, w, f, l)
 
 
 @kernel
@@ -240,6 +257,7 @@ def weighted_square(w, values, at, e, old, rtol, atol):
     """((V e)_i / (atol + rtol |value|))^2 summed over the coordinates; old begins at old[at]."""
     total = 0.0
     for i in range(values.size):
+        # A change e of tangent coordinates displaces q by V e at the base point
         x = 0.0
         for j in range(e.size):
             x += w.V[i, j] * e[j]

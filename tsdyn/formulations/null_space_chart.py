@@ -11,7 +11,7 @@ import math
 
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import largest, null_space
-from .chart_validity import touch
+from .chart_validity import set_base_point
 from .dense_products import add_product, add_transposed_product, clear_matrix, multiply
 from .dense_rows import evaluate_dense_rows, form_normal_matrix, invert_normal_matrix, take_selection
 from .newton_iterations import OK, SINGULAR, update_b
@@ -22,16 +22,18 @@ from .tolerances import FIRST_RATE, RANK_LIMIT, USUAL
 def new_chart(graph, system, w, f, l, t):
     """Make a chart at the present q: q0, U, V by SVD, B, L; u = 0, v = 0. Status."""
     n, m, k = w.q.size, w.u.size, w.v.size
-    regular = touch(graph, system, w, f, l, t, largest(w.q))  # of p, too: Phi has the normalisations
+    regular = set_base_point(graph, system, w, f, l, t, largest(w.q))  # of p, too: Phi has the normalisations
     take_selection(graph, w, f)
     evaluate_dense_rows(system, w, t)
     kept, metres = 0, unit(w.control.size)
+    # Columns Phi_q0^T, positions in the unit of the scene
     for i in range(n):
         w.q0[i] = w.q[i]
         for j in range(m):
             w.householder[i, j] = w.Phi_q[j, i]
     _scale_positions(graph, metres, w.householder)
     for i in range(m):
+        # Columns of unit length; those of redundant rows are zero and left out
         x = 0.0
         for c in range(n):
             x += w.householder[c, i] * w.householder[c, i]
@@ -41,14 +43,17 @@ def new_chart(graph, system, w, f, l, t):
             for c in range(n):
                 w.householder[c, kept] = w.householder[c, i] * x
             kept += 1
+    # The number of redundant rows is that of the scene
     if kept != n - k:
         return SINGULAR
     for j in range(k):
         w.v[j] = 0.0
+    # V: the columns of Q that Householder QR of U adds; low and high are the extreme singular values
     low, high = null_space(w.householder, n, kept, w.V, w.R, w.z)
     if m > 0 and not (regular and low > RANK_LIMIT * high):
         return SINGULAR
     _scale_positions(graph, metres, w.V)
+    # U, B = (Phi_q0 U)^-1 with a step of Eq. 28, L
     _normal_space(graph, w, l)
     form_normal_matrix(system, w)
     if not invert_normal_matrix(w) or update_b(w) != OK:
@@ -80,10 +85,9 @@ def _scale_positions(graph, factor, A):
 @kernel
 def _normal_space(graph, w, l):
     """U from Y0 and p0."""
-    for i in range(w.U.shape[0]):
-        for j in range(w.U.shape[1]):
-            w.U[i, j] = 0.0
+    clear_matrix(w.U)
     diagonal = l.rows0.S[graph.pattern.shape[1] :]
+    # Normalisation rows: p0
     for b in range(graph.bodies.shape[0]):
         if graph.normals[b] >= 0:
             for c in range(4):
@@ -91,15 +95,16 @@ def _normal_space(graph, w, l):
     for e in range(graph.row.size):
         if graph.row[e] < 0:
             continue
+        # Other rows: (r, G^T pi' / 2) of Y0 = W0 H0^T, columns scaled to Phi_q0 U with a unit diagonal
         j, scale = graph.row[e], 1.0 / diagonal[e]
         for side in range(2):
-            b, y = graph.sides[e, side], 16 * e + 8 * side
-            if b == graph.bodies.shape[0]:
+            body, y = graph.sides[e, side], 16 * e + 8 * side
+            if body == graph.bodies.shape[0]:
                 continue
-            i, o = graph.bodies[b, 0], 8 * b + 4
+            i, o = graph.bodies[body, 0], 8 * body + 4
             for c in range(3):
                 w.U[i + c, j] = scale * l.rows0.Y[y + c]
-            if graph.bodies[b, 1] == 7:
+            if graph.bodies[body, 1] == 7:
                 e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
                 f = 0.5 * scale
                 a0, a1, a2 = f * l.rows0.Y[y + 4], f * l.rows0.Y[y + 5], f * l.rows0.Y[y + 6]
@@ -115,6 +120,7 @@ def _left_inverse(graph, w, metres):
     _copy_matrix(w.V, w.L)
     _scale_positions(graph, 1.0 / (metres * metres), w.L)
     clear_matrix(w.T)
+    # T = U^T V^+,  X = B^T T,  L = V^+ - Phi_q^T X
     add_transposed_product(1.0, w.U, w.L, w.T)
     clear_matrix(w.X)
     add_transposed_product(1.0, w.B, w.T, w.X)
@@ -136,6 +142,7 @@ def tangent_map(system, w, t):
     m, k = w.u.size, w.v.size
     evaluate_dense_rows(system, w, t)
     form_normal_matrix(system, w)
+    # N = Phi_q U, B by Eq. 28 from the B of the configuration before
     made = w.counters.factorizations
     status = update_b(w)
     if status != OK:

@@ -62,42 +62,45 @@ def factorise(graph, system, w, f, t):
 @long_kernel
 def land(graph, system, w, f, t):
     """Project positions onto the manifold along W H^T; H, Y and the factors of S are those of the result. Status."""
-    floor, before, moved, renew = w.control.floor, math.inf, 0.0, True
-    f.landing.residual, f.landing.moved = -1.0, 0.0
-    for _ in range(LAND_SWEEPS):
-        if renew:
-            status = factorise(graph, system, w, f, t)
-            if status != OK:
-                return status
-            if f.landing.residual >= 0.0:
-                return _settle(graph, w, f)
-            renew = False
-        else:
+    f.landing.residual = f.landing.moved = 0.0
+    status = factorise(graph, system, w, f, t)
+    if status == OK:
+        status = _correct_positions(graph, system, w, f, t)
+    # Bodies that have moved by more than rounding have another H
+    if status == OK and f.landing.moved > LEAST_MOVE * lever(w):
+        status = factorise(graph, system, w, f, t)
+    elif status == OK and f.landing.moved == 0.0:
+        w.counters.at_rounding += 1
+    return _finish(graph, w, f) if status == OK else status
+
+
+@kernel
+def _correct_positions(graph, system, w, f, t):
+    """Newton's method for Phi = 0 with H and S of the start, b being Phi on entry; b = Phi at the result. Status."""
+    floor, before = w.control.floor, math.inf
+    for sweep in range(LAND_SWEEPS):
+        if sweep > 0:
             evaluate_residuals(graph, system, f, t)
         worst = largest_residual(graph, w, f)
         f.landing.residual = max(f.landing.residual, worst)
         if not worst < math.inf:
             return NOT_FINITE
+        # Rounding, or a residual that has stopped falling: rounding, too, if it is near its floor
         if worst <= floor or worst > STALLED * before:
-            if worst > ROUNDING_AT_MOST * floor:
-                return NEWTON_FAILED
-            if moved <= LEAST_MOVE * lever(w):
-                w.counters.at_rounding += 1 if moved == 0.0 else 0
-                return _settle(graph, w, f)
-            renew = True
-            continue
+            return OK if worst <= ROUNDING_AT_MOST * floor else NEWTON_FAILED
+        # (r, pi') <- (r, pi') - Y^T S^-1 Phi
         before = worst
         w.counters.newton += 1
-        moved = max(moved, _displace(graph, f))
-        f.landing.moved = moved
+        f.landing.moved = max(f.landing.moved, _displace(graph, f))
     return NEWTON_FAILED
 
 
 @long_kernel
-def _settle(graph, w, f):
-    """End a landing, b being Phi: a residual that has walked close to its floor is corrected. Status.
+def _finish(graph, w, f):
+    """Finish the projection, b being Phi. Status.
 
-    Next to a singular configuration every residual is: it displaces bodies by the residual over the distance.
+    If |Phi| is close to its rounding floor, or the configuration is nearly singular, where an error in Phi moves bodies
+    by Phi over the distance, apply one last correction.
     """
     floor = w.control.floor
     if not redundant_rows_hold(graph, f, floor):

@@ -7,8 +7,8 @@ positions by g^2 a and velocities by g a + B g^2 a:
     [ H                      0   ] [ dlam ]  =  [ 0   ]       r = f(k) - k, its tangent part
 
 K_b and C_b are those of body_stiffness.py and chart_derivatives.py. The normal part of a correction is that of r: the
-position solve removes it. What is left out are the changes of the normal parts of velocities and accelerations with the
-place, of the order of g omega.
+position solve removes it. Changes of the normal parts of velocities and accelerations with the configuration, of the
+order of g omega, are neglected.
 """
 
 from ..elements.loops.body_poses import OMEGA, POSE, write_positions, write_velocities
@@ -43,11 +43,12 @@ OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 
 @callback("pdp")
 def linearise(context, t, yd):
-    """Have the derivatives of the forces' laws taken anew by the next `reduce`, and find multipliers. Status."""
+    """Request new derivatives of the force laws from the next `reduce`, and solve for multipliers. Status."""
     c = load(context)
     system, w, f, graph = c.system, c.work, c.tangent, c.graph
     c.linear.numbers.fresh = 1
     w.counters.jacobians += 1
+    # Multipliers of the present state, for the geometric stiffness
     if is_direct(graph):
         w.counters.factorizations += 1
         if f.b.size > 0 and factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0:
@@ -66,8 +67,8 @@ def is_direct(graph):
 def reduce(context, t):
     """Set K and C at the state of the last accelerations.
 
-    Multipliers and accelerations are those that the last Newton correction led to: of a state that is no solution yet,
-    stiff forces make them large. After `linearise` they are those of the state.
+    Multipliers and accelerations are those after the last Newton correction, since stiff forces make those of an
+    unconverged state large. After `linearise` they are those of the state.
     """
     c = load(context)
     system, w, f, s, graph = c.system, c.work, c.tangent, c.saddle, c.graph
@@ -76,6 +77,7 @@ def reduce(context, t):
         copy(f.Z, s.a)
     for i in range(s.K.size):
         s.K[i] = s.C[i] = 0.0
+    # K_b = (F - H^T lam)_(r, pi'),  C_b = F_(rd, omega')
     write_positions(graph.bodies, f.poses, w.q)
     write_velocities(graph.bodies, f.poses, w.qd)
     if system.forces.shape[0] > 0:
@@ -92,16 +94,19 @@ def _add_turns(graph, f, l, s):
     B, E = stack2(3, 3), stack2(3, 3)
     for b in range(graph.bodies.shape[0]):
         if graph.bodies[b, 1] == 7:
+            # C: the gyroscopic torque. B: omega' by pi' at constant rates of chart coordinates
             add_gyroscopic(graph.mass, WEIGHTS * b + W_ROTATION, f.poses, POSE * b + OMEGA, s.C[BLOCK * b :])
             rate_by_turn(l.d, 4 * b, l.y, 8 * b + 4, B)
             for i in range(9):
                 s.B[9 * b + i] = B[i // 3, i % 3]
     for i in range(s.graph.blocks.shape[0]):
+        # K += C B: velocities that a rotation changes are damped
         column = s.graph.blocks[i].column
         if graph.bodies[column, 1] == 7:
             _turn_damping(s, BLOCK * i, 9 * column)
     for b in range(graph.bodies.shape[0]):
         if graph.bodies[b, 1] == 7:
+            # J' times the change of C etadd
             acceleration_by_turn(l.d, 4 * b, f.poses, POSE * b + OMEGA, s.a, 8 * b + 4, E)
             for i in range(9):
                 B[i // 3, i % 3] = s.B[9 * b + i]
@@ -135,15 +140,17 @@ def _mass(graph, b, r, c):
 
 @kernel
 def add_blocks(graph, s, upper, lower, g, masses):  # six: the graph, a matrix and what is added to it
-    """Add - g C_b - g^2 K_b, and M if asked for, in the places of the factors; g and the factors may be complex."""
+    """Add - g C_b - g^2 K_b, and M if asked for, to the entries of the factors; g and the factors may be complex."""
     for i in range(s.graph.blocks.shape[0]):
         block, o = s.graph.blocks[i], BLOCK * i
         rows, columns = degrees(graph, block.row), degrees(graph, block.column)
         for r in range(rows):
             for c in range(columns):
+                # M - g C_b - g^2 K_b
                 x = -g * (s.C[o + 6 * r + c] + g * s.K[o + 6 * r + c])
                 if masses and block.place == OWN:
                     x += _mass(graph, block.row, r, c)
+                # A block on the diagonal is in both factors; `lower` holds its transpose
                 if block.place != LOWER:
                     more(upper, block.target + block.stride * r + c, x)
                 if block.place != UPPER:
@@ -156,14 +163,17 @@ def _write_frictions(graph, f, s):
     change = stack(8)
     for i in range(graph.frictions.shape[0]):
         friction = graph.frictions[i]
+        # F_n,i by the reaction
         change[3] = change[7] = 0.0
         for c in range(3):
             change[c], change[4 + c] = f.friction.load[7 * i + 1 + c], f.friction.load[7 * i + 4 + c]
         for k in range(2):
+            # g_i as a load: M times W g_i
             b = body_of(friction, k)
             if b < graph.bodies.shape[0]:
                 weigh(graph.mass, b, f.friction.g, 16 * i + 8 * k, s.e, 8 * b)
         for j in range(friction.first, friction.first + friction.count):
+            # - g_i F_n,i,lam in the columns of the joint's multipliers
             e, side = graph.friction_rows[j]
             n = inner(f.rows.H, 16 * e + 8 * side, change, 0)
             for k in range(2):
@@ -179,10 +189,12 @@ def factorise(context, g):
     """Factors of the saddle-point matrix at the present H. Status."""
     c = load(context)
     f, s, graph = c.tangent, c.saddle, c.graph
+    # H and H^T, then the blocks of bodies between them
     write_saddle_rows(graph, f, s)
     add_blocks(graph, s, s.upper, s.lower, g, True)
     _write_frictions(graph, f, s)
     c.work.counters.iteration_matrices += 1
+    # Stages that solve for u and z by themselves begin with these factors of N
     if is_direct(graph) and f.b.size > 0 and not factorise_normal(graph, c.work, f, c.chart):
         return SINGULAR
     return OK if factorise_saddle(s) else SINGULAR
@@ -194,12 +206,14 @@ def _take_tangent_part(graph, f, l, x, factored, out):
 
     Where there are no factors of N, those of S serve, twice: normal parts and those of stiff modes may be large.
     """
+    # x, the ground at rest
     for i in range(x.size):
         out[i] = x[i]
     for i in range(x.size, out.size):
         out[i] = 0.0
     lower, upper = l.lower if factored else f.rows.S, l.upper if factored else f.rows.S
     for _ in range((1 if factored else 2) if f.b.size > 0 else 0):
+        # n = N^-1 H x,  x <- x - Y0 n
         to_bodies(graph, l, out, f.Z)
         multiply_rows(graph, f.rows, f.Z, f.b)
         solve_product(graph, lower, upper, f.b)
@@ -213,6 +227,7 @@ def _weigh(graph, s, Z):
     for i in range(s.x.size):
         s.x[i] = 0.0
     for b in range(graph.bodies.shape[0]):
+        # Unknowns are in the order of elimination
         at, o, m = s.graph.body_at[b], 8 * b, WEIGHTS * b
         for c in range(3):
             s.x[at + c] = graph.mass[m + W_MASS] * Z[o + c]
@@ -250,6 +265,7 @@ def _correct(graph, l, s, x, r):
     """Solve for s.x, and replace the tangent part r of x by the solution in chart coordinates."""
     solve_saddle(s)
     for b in range(graph.bodies.shape[0]):
+        # x <- x - r + C^-1 times the solution
         at, o = s.graph.body_at[b], 8 * b
         for c in range(3):
             x[o + c] += s.x[at + c] - r[o + c]
@@ -275,10 +291,12 @@ def solve(context, x):
     c = load(context)
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     x = vector(x, l.x.size - 8)
+    # Accelerations and multipliers of the iterate k: those of the state, less the residual x
     copy(f.b, s.multipliers)
     to_bodies(graph, l, x, s.e)
     for i in range(s.a.size):
         s.a[i] = f.Z[i] - s.e[i]
+    # Right-hand side M r
     _take_tangent_part(graph, f, l, x, l.state.factored == 1, s.r)
     _weigh(graph, s, f.Z)
     _correct(graph, l, s, x, s.r)
@@ -295,8 +313,10 @@ def soften(context, ex, g, ey):
     c = load(context)
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     ex, ey = vector(ex, l.x.size - 8), vector(ey, l.x.size - 8)
+    # M ey
     _take_tangent_part(graph, f, l, ey, True, s.r)  # N is that of the chart's check
     _weigh(graph, s, f.Z)
+    # + g K ex
     _take_tangent_part(graph, f, l, ex, True, s.e)
     _add_stiffness(graph, s, g, f.Z)
     _correct(graph, l, s, ey, s.r)

@@ -5,15 +5,15 @@
     H a + gamma = 0                    a = (rdd, omega'd), the accelerations k of chart coordinates
     M a + H^T lam = F
 
-x and xd are those of k. `residual` solves the first two for u and z, as exactly as the stage needs it, and evaluates
-the others. `correct` takes n = -Y0 N^-1 (H a + gamma) for the normal part of the correction of k; the tangent part e
-follows with the multipliers from the saddle-point matrix (saddle_point.py):
+x and xd are those of k. `residual` solves the first two for u and z, to well below the tolerance of the stage, and
+evaluates the others. `correct` takes n = -Y0 N^-1 (H a + gamma) for the normal part of the correction of k; the tangent
+part e follows with the multipliers from the saddle-point matrix (saddle_point.py):
 
     [ M - g C_b - g^2 K_b    H^T ] [ C e  ]     [ F - M (a + C n) - H^T lam ]
     [ H                      0   ] [ dlam ]  =  [ 0                         ]
 
 Before, lam is corrected by S^-1 H W times the right-hand side, at the present H. The factors of N and S are those of an
-older place as long as they contract: of the step's start at first.
+older configuration as long as corrections contract: at first of the step's start.
 """
 
 import math
@@ -66,10 +66,12 @@ def residual(context, t, g, x, y, k):
     w.counters.evaluations += 1
     if not set_time(system, t):
         return NOT_FINITE
+    # Iterates u, z and lam go on from the stage before
     _begin(numbers, s, w.counters.charts, t)
     clear_redundant(f, s.multipliers)  # which no iteration corrects: extrapolation would amplify those of dropped rows
     copy(vector(x, n), l.x)
     copy(vector(y, n), l.y)
+    # x - Y0 u and xd - Y0 z
     apply_multipliers(graph, l.rows0, w.u, l.x)
     apply_multipliers(graph, l.rows0, s.z, l.y)
     status = _solve_positions(c, t, g)
@@ -82,6 +84,7 @@ def residual(context, t, g, x, y, k):
         write_velocities(graph.bodies, f.poses, w.qd)
     if f.b.size > 0:
         evaluate_bias(graph, system, f, t)
+    # F at the stage, and a of k
     body_forces(graph, system, w, f, t)
     copy(f.Z, s.loads)
     turn_accelerations(graph, l, f.poses, vector(k, n), s.a)
@@ -95,12 +98,14 @@ def _begin(numbers, s, charts, t):
         numbers.time = numbers.time_before = -math.inf
         for e in range(s.multipliers.size):
             s.multipliers[e] = s.before[e] = 0.0
+    # Normal velocities belong to a chart
     if numbers.rates_of != charts:
         numbers.rates_of, numbers.lag = charts, LAG
         for e in range(s.z.size):
             s.z[e] = 0.0
     if t == numbers.time:
         return
+    # Multipliers along the line through the last two stages
     span, ratio = numbers.time - numbers.time_before, 0.0
     if 0.0 < abs(span) < math.inf:
         ratio = min(max((t - numbers.time) / span, -FARTHEST_AHEAD), FARTHEST_AHEAD)
@@ -113,7 +118,7 @@ def _begin(numbers, s, charts, t):
 
 @kernel
 def _renew_normal(c):
-    """Factors of N at the present place; False if it is singular."""
+    """Factors of N at the present configuration; False if it is singular."""
     c.linear.numbers.lag = LEAST_LAG
     return factorise_normal(c.graph, c.work, c.tangent, c.chart)
 
@@ -139,7 +144,7 @@ def _rate_size(c, x):
 def _solve_positions(c, t, g):
     """Newton's method for u: poses and H. Status.
 
-    What it leaves of a position, over g, is to be no velocity that the stage would notice.
+    Stops when the position error over g is a velocity well below the tolerance of the stage.
     """
     system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
     floor, before, renewed = w.control.floor, math.inf, False
@@ -152,19 +157,24 @@ def _solve_positions(c, t, g):
         worst = largest_residual(graph, w, f)
         if not worst < math.inf:
             return NOT_FINITE
+        # Rounding, or a residual near it that falls no more
         if worst <= floor or (worst > SLOW * before and worst <= ROUNDING_AT_MOST * floor):
             return OK
         if before < math.inf:
+            # Contraction by factors of an older configuration
             numbers.lag = max(worst / before, LEAST_LAG)
             if numbers.lag > SLOW and renewed:
                 return NEWTON_FAILED
+            # Factors at the present H, once
             if not renewed:  # one correction was not enough
                 if not _renew_normal(c):
                     return SINGULAR
                 renewed = True
+        # x <- x - Y0 N^-1 Phi,  u <- u + N^-1 Phi
         _take_off(c, l.x)
         add_to(f.b, w.u)
         w.counters.newton += 1
+        # The expected error over g is a velocity below what the stage notices
         if numbers.lag * _rate_size(c, s.r) <= g * LEFT:
             return OK if displace(graph, l, f.poses) else CHART_LOST
         before = worst
@@ -173,7 +183,7 @@ def _solve_positions(c, t, g):
 
 @kernel
 def _solve_rates(c, t):
-    """rd and omega' of the poses from the rates l.y, tangent as far as the stage notices. Status."""
+    """rd and omega' of the poses from the rates l.y, tangent to well below the tolerance of the stage. Status."""
     system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
     rheonomic, floor, before, renewed = is_rheonomic(system), 0.0, math.inf, False
     if rheonomic:
@@ -182,6 +192,7 @@ def _solve_rates(c, t):
         turn_rates(graph, l, l.y, f.poses)
         if f.b.size == 0:
             return OK
+        # H (rd, omega') + Phi_t, and the size of its rounding
         if sweep == 0:
             floor = velocity_floor(graph, w, f)
         multiply_rates(graph, f.rows, f.poses, f.b)
@@ -192,12 +203,14 @@ def _solve_rates(c, t):
             return NOT_FINITE
         if worst <= floor or (worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
             return OK
+        # Factors at the present H, once
         if worst > SLOW * before:
             if renewed:
                 return NEWTON_FAILED
             if not _renew_normal(c):
                 return SINGULAR
             renewed = True
+        # xd <- xd - Y0 N^-1 (H (rd, omega') + Phi_t),  z likewise
         _take_off(c, l.y)
         add_to(f.b, s.z)
         if numbers.lag * _rate_size(c, s.r) <= LEFT:
@@ -213,12 +226,15 @@ def correct(context, g, k):
     c = load(context)
     w, f, l, s, graph, numbers = c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
     k, n = vector(k, l.x.size - 8), w.q.size
+    # k += n, the normal part
     turn_accelerations(graph, l, f.poses, k, s.a)
     _correct_normal_part(c, g, k)
+    # [e, dlam] of the saddle-point matrix
     if not find_imbalance(c):
         return math.inf
     solve_saddle(s)
     take_solution(graph, s)
+    # k += e in chart coordinates
     for b in range(graph.bodies.shape[0]):
         at, o = s.graph.body_at[b], 8 * b
         put(s.r, o, lanes(s.x[at], s.x[at + 1], s.x[at + 2]))
@@ -226,6 +242,7 @@ def correct(context, g, k):
         if graph.bodies[b, 1] == 7:
             put(s.r, o + 4, turned_back(l, b, s, at + 3))
             put(k, o + 4, add(four(k, o + 4), four(s.r, o + 4)))
+    # Positions move by g^2 e, velocities change by g e
     square = weighted_square(graph, l, s.r, w.q, c.linear.now[0], 0, numbers.rtol, numbers.atol)
     return g * math.sqrt(square * g * g / (2 * n) + _rate_size(c, s.r) ** 2)
 

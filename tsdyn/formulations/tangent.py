@@ -15,7 +15,7 @@ import math
 
 from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..errors import Status
-from ..jit.kernels import callback, kernel, vector
+from ..jit.kernels import callback, kernel, long_kernel, vector
 from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import ACCELERATE, PLACE
 from ..model.equations import is_rheonomic, set_time
@@ -45,8 +45,8 @@ from .chart_coordinates import (
     turn_rates,
     write_back,
 )
-from .chart_validity import every_level_holds, touch, turning
-from .friction_loads import call_rub
+from .chart_validity import every_level_holds, reason_to_leave, set_base_point
+from .friction_loads import call_friction
 from .projection import largest_residual, velocity_floor
 from .tangent_error import error_norm
 from .tolerances import (
@@ -79,16 +79,19 @@ def place(context, t, x):
         return NOT_FINITE
     x, status = vector(x, l.x.size - 8), NEWTON_FAILED
     for attempt in range(2):
+        # Start: x - Y0 u with u of the position before; if that fails, the step was long
         copy(x, l.x)
         if attempt == 1:  # a long step: from the tangent plane, P0 x
             multiply_rows(graph, l.rows0, l.x, w.u)
             solve_rows(graph, l.rows0, w.u)
+        # x - Y0 u
         apply_multipliers(graph, l.rows0, w.u, l.x)
         status = _solve_positions(graph, system, w, f, l, t, RENEWALS * attempt)
         if status == OK or f.b.size == 0:
             break
     if status != OK:
         return status
+    # S = H W H^T at the solution, for accelerations
     if f.b.size > 0:
         w.counters.factorizations += 1
         failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
@@ -101,15 +104,16 @@ def place(context, t, x):
 
 @kernel
 def _solve_positions(graph, system, w, f, l, t, renewals):
-    """Newton's method for u, N being that of its start or made anew so often; poses and H at the solution. Status.
+    """Newton's method for u with N of the start, factorised again `renewals` times at most; poses and H there. Status.
 
-    It ends where what is left, |Phi| or what the convergence so far lets expect of it, is below u_tol^(3/2) or
-    rounding; H is taken there, with the last |Phi|.
+    Stops when |Phi|, measured or extrapolated from the convergence rate, is below u_tol^(3/2) or rounding. H is
+    evaluated with Phi in a sweep that is expected to be the last one.
     """
     floor = w.control.floor
     tol = max(w.control.u_tol, floor)
-    left = max(tol * math.sqrt(tol), floor)
-    with_H, before, rate, ending, anew = True, math.inf, 0.0, False, 0
+    goal = max(tol * math.sqrt(tol), floor)
+    # |Phi| of the last sweep; contraction by the present factors of N, zero until it is measured
+    before, rate, with_H = math.inf, 0.0, True
     l.state.factored = 0
     for sweep in range(SWEEPS):
         if not displace(graph, l, f.poses):
@@ -124,24 +128,26 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
         if not worst < math.inf:
             return NOT_FINITE
         slow = worst > SLOW * before
-        if worst <= left or ending or (slow and worst <= ROUNDING_AT_MOST * floor):
-            if with_H:
-                if sweep == 0:
-                    w.counters.at_rounding += 1
-                elif not ending:
-                    w.counters.unverified += 1
-                return OK
-            with_H = ending = True  # once more, for H
-            continue
-        if slow:  # N was that of another place
-            anew += 1
-            if anew > renewals:
-                return NEWTON_FAILED
-            l.state.factored = 0
+        # Solved, or as close as rounding allows
+        if worst <= goal or (slow and worst <= ROUNDING_AT_MOST * floor):
             if not with_H:
-                with_H, before = True, math.inf
-                continue
+                _add_rows(graph, system, f, t)
+            elif sweep == 0:
+                w.counters.at_rounding += 1
+            else:
+                w.counters.unverified += 1
+            return OK
+        if slow:
+            # N is of a configuration too far away: factorise it here
+            renewals -= 1
+            if renewals < 0:
+                return NEWTON_FAILED
+            if not with_H:
+                _add_rows(graph, system, f, t)
+            l.state.factored = 0
         elif before < math.inf:
+            # The first sweep with new factors measures the curvature |Phi| / |Phi before|^2, later sweeps measure the
+            # rate
             if worst > ROUNDING_AT_MOST * floor and rate == 0.0:
                 w.control.rate = worst / (before * before)
             rate = worst / before
@@ -149,14 +155,21 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
             if not factorise_normal(graph, w, f, l):
                 return SINGULAR
             l.state.factored, l.state.off, rate = 1, w.control.rate * worst, 0.0
+        # u <- u + N^-1 Phi,  x <- x - Y0 N^-1 Phi
         solve_product(graph, l.lower, l.upper, f.b)
         w.counters.newton += 1
         apply_multipliers(graph, l.rows0, f.b, l.x)
         for e in range(f.b.size):
             w.u[e] += f.b[e]
         expected = worst * (rate if rate > 0.0 else w.control.rate * worst)
-        with_H, before = expected <= left, worst
+        with_H, before = expected <= goal, worst
     return NEWTON_FAILED
+
+
+@long_kernel
+def _add_rows(graph, system, f, t):
+    """H where only Phi was evaluated: seldom needed, so not inlined."""
+    evaluate_rows(graph, system, f, f.rows, t)
 
 
 @kernel
@@ -166,20 +179,24 @@ def solve_velocities(graph, system, w, f, l, t):
     The factors are those of N at the start of the position solve, or, where it needed none, those of S as long as they
     do.
     """
+    # Residual of Eq. 2: H (rd, omega') + Phi_t
     rheonomic = is_rheonomic(system)
     if rheonomic:
         evaluate_drift(graph, system, f, t, l.drift)
     factored = l.state.factored == 1
+    # S is of another metric than the chart where massless axes are raised
     if not factored and graph.axes.rows.shape[0] > 0:  # S is of another metric than the chart
         if not factorise_normal(graph, w, f, l):
             return False
         factored, l.state.factored, l.state.off = True, 1, 0.0
+    # N where the position solve has factorised it; otherwise S, which is close to N near the base point
     lower, upper = l.lower if factored else f.rows.S, l.upper if factored else f.rows.S
     floor, before = 0.0, math.inf
     for sweep in range(SWEEPS):
         turn_rates(graph, l, l.y, f.poses)
         if f.b.size == 0:
             return True
+        # Rounding of Eq. 2 at these rates
         if sweep == 0:
             floor = velocity_floor(graph, w, f)
         multiply_rates(graph, f.rows, f.poses, f.b)
@@ -189,14 +206,17 @@ def solve_velocities(graph, system, w, f, l, t):
         worst = largest_residual(graph, w, f)
         if not worst < math.inf:
             return False
+        # Rounding; factors of S get no credit for a residual that has stopped falling
         if worst <= floor or (factored and worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
             w.counters.kept += 0 if factored else 1
             return True
+        # S is too far from N
         if not factored and worst > SLOW_VELOCITIES * before:
             if not factorise_normal(graph, w, f, l):
                 return False
             lower, upper, factored = l.lower, l.upper, True
             l.state.factored, l.state.off = 1, 0.0
+        # yd <- yd - Y0 N^-1 (H (rd, omega') + Phi_t)
         solve_product(graph, lower, upper, f.b)
         apply_multipliers(graph, l.rows0, f.b, l.y)
         before = worst
@@ -213,16 +233,19 @@ def accelerate(context, t, y, yd, unused):
     copy(vector(y, n), l.y)
     if not solve_velocities(graph, system, w, f, l, t):
         return NOT_FINITE
+    # Force laws read q and qd
     if system.forces.shape[0] > 0:
         write_velocities(graph.bodies, f.poses, w.qd)
+    # Friction depends on reactions: solved for with them
     if graph.frictions.shape[0] > 0:
-        status = call_rub(graph.rub[0], context, t, yd)
+        status = call_friction(graph.friction_solver[0], context, t, yd)
         if status != OK:
             return status
     else:
         solve_accelerations(graph, system, w, f, t)
         if refinements(f.indicator.start) > 1:
             refine_accelerations(graph, f)
+    # (rdd, omega'd) as xdd
     write_back(graph, l, f.poses, f.Z, yd)
     w.counters.evaluations += 1
     return OK if is_finite(yd) else NOT_FINITE
@@ -255,7 +278,7 @@ def check(context):
 def check_chart(c):
     """As `check`."""
     w, f, l = c.work, c.tangent, c.chart
-    reason = turning(c.graph, w, f, l)
+    reason = reason_to_leave(c.graph, w, f, l)
     l.state.placement = w.counters.placements if w.control.contraction < CONTRACTION_LOST else 0
     return reason if every_level_holds(c) else -UNHELD
 
@@ -267,17 +290,19 @@ def start_chart(context, t, x, y, yd, unused):
     system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
     if not set_time(system, t):
         return NOT_FINITE
-    regular = touch(graph, system, w, f, l, t, largest_coordinate(graph.bodies, w.q, w.control.size))
+    # q0, H0, Y0, S0
+    regular = set_base_point(graph, system, w, f, l, t, largest_coordinate(graph.bodies, w.q, w.control.size))
+    # At q0 rates of chart coordinates are (rd, omega'), their derivatives (rdd, omega'd)
     x, y, yd = vector(x, l.x.size - 8), vector(y, l.x.size - 8), vector(yd, l.x.size - 8)
-    for i in range(x.size):
-        x[i] = 0.0
+    for j in range(x.size):
+        x[j] = 0.0
     for e in range(w.u.size):
         w.u[e] = 0.0
     w.control.rate = CURVATURE
     for b in range(graph.bodies.shape[0]):
         i, o = graph.bodies[b, 0], 8 * b
-        for c in range(3):
-            y[o + c], yd[o + c] = w.qd[i + c], w.qdd[i + c]
+        for k in range(3):
+            y[o + k], yd[o + k] = w.qd[i + k], w.qdd[i + k]
         if graph.bodies[b, 1] == 7:
             _spin(w.q, w.qd, i + 3, y, o + 4)
             _spin(w.q, w.qdd, i + 3, yd, o + 4)
@@ -304,6 +329,7 @@ def _spin(q, qd, i, out, o):
         low += (excess - (total - part)) + (square - part)
         excess = total
     f = 2.0 * (excess + low)
+    # 2 G pd (2 - p.p), since 1 / p.p = 2 - p.p to first order
     x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3
     y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
     z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3

@@ -28,10 +28,12 @@ def weighted_square(graph, l, Z, values, old, at, rtol, atol):
     total = 0.0
     for b in range(graph.bodies.shape[0]):
         i, o = graph.bodies[b, 0], 8 * b
+        # dr
         for c in range(3):
             x = Z[o + c] / (atol + rtol * max(abs(values[i + c]), abs(old[at + i + c])))
             total += x * x
         if graph.bodies[b, 1] == 7:
+            # dp = G(p0)^T eta / 2
             i += 3
             e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
             x, y, z = 0.5 * Z[o + 4], 0.5 * Z[o + 5], 0.5 * Z[o + 6]
@@ -56,6 +58,7 @@ def error_norm(context, ex, ey, old, rtol, atol):
     w, f, l, graph = c.work, c.tangent, c.chart, c.graph
     n, k = w.q.size, l.x.size - 8
     old = vector(old, 3 * n)
+    # The normal component of the error is removed by the position solve
     _tangent_part(graph, f, l, vector(ex, k))
     total = weighted_square(graph, l, f.Z, w.q, old, 0, rtol, atol)
     _tangent_part(graph, f, l, vector(ey, k))

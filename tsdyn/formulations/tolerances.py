@@ -8,15 +8,15 @@ ROUNDING = 1e-15
 # m: size of a scene at least, where no constraint has one, for what counts as hardly moved.
 NO_SIZE = 0.01
 
-# Share of the rounding of Phi above which a residual is corrected: sums over steps walk. Corrections of less would move
-# bodies by the rounding of Phi itself in every step, and energy with them.
+# Fraction of the rounding of Phi above which a residual is corrected, since residuals of successive steps add up.
+# Correcting smaller ones would displace bodies by the rounding of Phi in every step, and change the energy.
 WALK = 0.5
 
 # |Phi_q qd + Phi_t| over |rd| + size |omega'|, in the same way: one unit in the last place, since few terms of a row
 # are large.
 SPEED_ROUNDING = 2e-16
 
-# Multipliers over the largest: a correction below it is rounding of one number.
+# Correction of the multipliers over the largest multiplier: below it the correction is one rounding.
 LOAD_ROUNDING = 2e-16
 
 # The same for normal loads of the null-space form, which are sums over the multipliers of a joint.
@@ -30,8 +30,8 @@ ROUNDING_AT_MOST = 100.0
 # corrections at most. Masses that are unequal by 1e10 need two.
 EXACT, REFINEMENTS = 1e-11, 3
 
-# m and rad: a correction of positions above it has changed H by more than rounding, so S is made anew. In scenes of
-# less than a metre it is in proportion to their size.
+# m and rad: a correction of positions above it has changed H by more than rounding, so S is factorised again. In scenes
+# of less than a metre it is in proportion to their size.
 LEAST_MOVE = 1e-15
 
 # |p.p - 1|: below it p is a unit quaternion to rounding, four squares of 1.1e-16 each and their sum.
@@ -47,7 +47,7 @@ SLOW_LOADS = 0.1  # reactions with friction: the same for the matrix of the norm
 B_OUTDATED = 0.5
 
 # Sweeps until a solve is taken for failed. At the rate SLOW 24 sweeps take fourteen digits, as many as there are.
-SWEEPS, B_SWEEPS, LAND_SWEEPS = 24, 30, 12
+SWEEPS, B_SWEEPS, LAND_SWEEPS = 24, 30, 11
 RENEWALS = 4  # of N within one solve from the tangent plane, before the step counts as too long
 
 # Normal loads: full steps in the first ones, half ones then, for a load whose sign alternates.
@@ -57,22 +57,22 @@ LOAD_SWEEPS, DAMPED, DAMPED_SHARE = 40, 12, 0.5
 # leaves rounding; two digits less are asked for, since the matrix is that of the multipliers before.
 NEWTON_DONE = 1e-10
 
-# Error norm that the solves for u and z may leave at each place of a stage: less than the stage's iteration (KAPPA).
+# Error norm that the solves for u and z may leave at each iterate of a stage: less than the iteration itself (KAPPA).
 LEFT = 1e-4
 
-# Contraction of corrections by factors of N of an older place: assumed in a new chart, and the least that is trusted.
+# Contraction of corrections by factors of N of an older configuration: assumed in a new chart; least value trusted.
 LAG, LEAST_LAG = 0.1, 0.01
 
 # Distance in time of a stage from the last one, over that of the last two, up to which multipliers are extrapolated.
 FARTHEST_AHEAD = 2.0
 
-# Corrections of the multipliers in an iteration of a stage, and what may be left of the unbalanced loads along the
-# rows, relative: a change of H since the iteration matrix was made acts on that. With one iteration a stage, 1e-5
+# Corrections of the multipliers in an iteration of a stage, and the fraction of the unbalanced loads along the rows
+# that may remain: the iteration matrix, formed with an older H, acts on the remainder. With one iteration a stage, 1e-5
 # shows in the error of chains of 64 links at 1e-8: fourteen times as large.
 REACTION_SWEEPS, REACTIONS_LEFT = 8, 1e-7
 
-# 1 / m: what Newton's method leaves of an error, over its square, until it is measured. One over a metre: links of
-# usual size.
+# 1 / m: residual after a Newton step over the square of the residual before, until it is measured. One over a metre:
+# links of usual size.
 CURVATURE = 1.0
 
 # The same for the null-space form, as a ratio.
@@ -84,7 +84,7 @@ TURN_LIMIT = 0.25  # |d|: the sine of half the rotation of a body since q0; 29 d
 CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a rotation of 60 degrees
 FARTHEST = 0.9  # |d|^2: d0 = 0.32, and C grows as 1 / d0
 TURN_SHARE = 0.55  # of |d|, as a contraction: a rotation that no constraint depends on reaches 0.9 in a step, 0.5 here
-# Error of the factors of N at the end of a solve, relative: below it they tell the contraction (limit 0.15)
+# Relative error of the factors of N at the end of a solve, up to which their pivots give the contraction (limit 0.15)
 SAME = 1e-6
 
 # --- units

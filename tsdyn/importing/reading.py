@@ -1,4 +1,4 @@
-"""A scene of a file of another program; the kind of an .xml is told by its root element."""
+"""A scene of a file of another program; the root element of an .xml determines its kind."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ NEWTON, NEWTON_METRE = "N", "N m"
 
 
 class Actuator(NamedTuple):
-    """One load that is looked for, along a motion of k instants."""
+    """One unknown load, along a motion of k instants."""
 
     name: str
     unit: str

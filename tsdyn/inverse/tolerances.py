@@ -49,5 +49,5 @@ CONSISTENT = 1e-6
 DENSE = 120
 # Share of a unit load's own accelerations below which those under the constraints are rounding.
 NO_EFFECT = 1e-11
-# Share of the largest load below which one is idle, and looked at.
+# Fraction of the largest load below which a load counts as idle, and is examined.
 IDLE = 1e-9

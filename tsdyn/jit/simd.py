@@ -259,7 +259,7 @@ def cross(typing, f, g):
 
 @intrinsic
 def get(typing, array, index):
-    """array[index], index >= 0 and within: nothing is looked after."""
+    """array[index], index >= 0 and within: bounds aren't checked."""
 
     def generate(context, builder, signature, arguments):
         place, element = _pointer(context, builder, signature.args[0], *arguments)

@@ -33,7 +33,7 @@ from ..workspaces.workspace import plain_context
     MOVED,  # the largest displacement in it, m or rad
     BEFORE,  # |Phi| before the last correction
     DONE,  # whether the projection has ended
-    LEFT,  # share of what laws divide by, or take roots of, that the step can't use up
+    LEFT,  # margin of analyticity of the force laws along the step
     ROWS,
 ) = range(20)
 

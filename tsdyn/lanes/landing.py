@@ -37,6 +37,7 @@ def _largest_residual(c):
     b, turns, floor = c.tangent.b, c.graph.turns, get(c.state, FLOOR)
     worst = rest = 0.0 * floor
     for e in range(b.size):
+        # Not finite: 0 x is then no zero
         size = abs(get(b, e))
         if turns.size > 0 and turns[e] == 1.0:
             size *= min(floor / ROUNDING, 1.0)
@@ -52,11 +53,13 @@ def _displace(c, mask):
     moved = get(c.state, MOVED)
     for b in range(graph.bodies.shape[0]):
         at, o = b * POSE, 8 * b
+        # Largest component of the displacement, lane by lane
         dr, turn = four(f.Z, o), four(f.Z, o + 4)
         for i in range(3):
             moved = max(moved, max(abs(get(f.Z, o + i)), abs(get(f.Z, o + 4 + i))))
         put(f.poses, at + R, choose(mask, add(four(f.poses, at + R), dr), four(f.poses, at + R)))
         if graph.bodies[b, 1] == 7:
+            # Lanes outside of the mask keep their pose
             x, y, z = 0.5 * first(turn), 0.5 * second(turn), 0.5 * third(turn)
             p = four(f.poses, at + P)
             e0, e1, e2, e3 = first(p), second(p), third(p), fourth(p)
@@ -81,6 +84,7 @@ def _factorise(c):
 def land(c):
     """Project positions onto the manifold; H, Y and the factors of S are those of the result. Sets BAD and RESIDUAL."""
     s, floor = c.state, get(c.state, FLOOR)
+    # Numbers of lanes begin with 0.0 * floor, an array of the right width
     let(s, RESIDUAL, 0.0 * floor)
     let(s, MOVED, 0.0 * floor)
     let(s, DONE, 0.0 * floor)
@@ -90,8 +94,10 @@ def land(c):
             _factorise(c)
         else:
             evaluate_residuals(c.graph, c.system, c.tangent, 0.0)
+        # Lanes that are still corrected
         worst, active = _largest_residual(c), opposite(_is(c, DONE))
         let(s, RESIDUAL, choose(active, max(get(s, RESIDUAL), worst), get(s, RESIDUAL)))
+        # Converged, or falling no more; failed if that is above rounding
         ends = opposite(both(below(floor, worst), opposite(below(STALLED * get(s, BEFORE), worst))))
         fails = both(ends, below(ROUNDING_AT_MOST * floor, worst))
         _set(c, BAD, both(active, either(fails, opposite(below(worst, math.inf)))))
@@ -99,10 +105,13 @@ def land(c):
         _set(c, DONE, opposite(below(worst, math.inf)))
         if every(_is(c, DONE)):
             break
+        # The others take one more correction
         goes_on = opposite(_is(c, DONE))
         let(s, BEFORE, choose(goes_on, worst, get(s, BEFORE)))
         _displace(c, goes_on)
+    # Sweeps are used up
     _set(c, BAD, opposite(_is(c, DONE)))
+    # H and S of the result serve velocities and the next step
     _factorise(c)
     walks = below(WALK * floor, _largest_residual(c))
     if any_of(walks):

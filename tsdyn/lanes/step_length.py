@@ -22,6 +22,7 @@ def weights(c):
     x, nb, orders, n = c.expansion, c.graph.bodies.shape[0], c.expansion.order.room, c.numbers
     far, fast, speed = splat(0.0), splat(0.0), splat(0.0)
     for b in range(nb):
+        # Largest r, omega' and rd
         at = b * orders * BODY_ROW
         far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
         speed = larger(four(x.bodies, at + S_R * orders + 4), speed)
@@ -40,11 +41,14 @@ def _radii(c, least, most, far, fast):
     x, nb, top = c.expansion, c.graph.bodies.shape[0], get(c.state, TOP)
     rho, lower, finite = 0.0 * top + math.inf, 0.0 * top + math.inf, 0.0 * top + 1.0
     for k in range(most + 1, max(least - 4, 2) - 1, -1):
+        # Lanes whose order is lower ignore this coefficient
         size = size_of_order(x.bodies, nb, x.order.room, k, far, fast)
         own = below(k - 1.5, top)
         finite = choose(both(own, below(-1.0, 0.0 * size)), finite, choose(own, 0.0, finite))
         here = choose(below(LEAST_SIZE, size), binary_log(max(size, LEAST_SIZE)) * (-1.0 / k), math.inf)
+        # Orders top + 1 to top - 2
         rho = choose(both(own, below(top - 2.5, k)), min(rho, here), rho)
+        # Orders top - 1 to top - 4, for two orders less
         above = both(below(k - 0.5, top - 1.0), below(top - 4.5, k))
         lower = choose(above, min(lower, here), lower)
     likely = 0.0 * top - math.inf  # log2 of coefficient top + 1, from those of orders 4 and 5
@@ -59,6 +63,7 @@ def _radii(c, least, most, far, fast):
 @kernel
 def _held(h, rate, k):
     """As of taylor/step_length.py; h as log2."""
+    # Velocity error over its bound, as log2
     share = binary_log(STIFF_RATES * rate / k) + h
     return binary_power(choose(below(share, 0.0), h + 2.0 * share / k, h))
 
@@ -69,9 +74,11 @@ def propose(c, least, most):
     n, s, top, order = c.numbers, c.state, get(c.state, TOP), c.expansion.order
     far, fast, rate = weights(c)
     rho, lower = _radii(c, least, most, far, fast)
+    # log2 of tol
     accuracy = math.log(n.atol + n.rtol) / math.log(2.0)
     h = choose(below(-math.inf, rho), _held(rho + accuracy / (top + 2.0), rate, top + 2.0), NO_STEP)
     if order.highest > order.lowest:
+        # Higher order if it advances further per unit of work
         other = _held(lower + accuracy / top, rate, top)
         rises = below(other * (top + STEP_COST), h * (top + (STEP_COST - 2.0)))
         step = choose(rises, 1.0, -1.0 + 0.0 * top)

@@ -70,6 +70,7 @@ def _set_ends(c):
     for l in range(s.shape[1]):
         t, h, end = s[T, l], s[H, l], s[T, l]
         if s[RUNS, l] != 0.0:
+            # A step that is rounding of t loses the lane
             if t + h > t + SHORTEST * max(abs(t), FROM_ZERO * (n.t_end - n.t_start)):
                 end = t + h
                 if end + stretch(h, n.max_step) >= n.t_end:
@@ -92,6 +93,7 @@ def _is_missed(c, again):
     """Whether lanes have missed the manifold: their steps are halved, or, if not to be tried `again`, they are lost."""
     s, tol, missed = c.single, c.numbers.atol + c.numbers.rtol, False
     for l in range(s.shape[1]):
+        # As MISSED of taylor/step_trials.py
         lands = s[BAD, l] == 0.0 and s[RESIDUAL, l] <= MISSED * (tol + s[FLOOR, l])
         if s[RUNS, l] != 0.0 and s[LOST, l] == 0.0 and not lands:
             if not again:
@@ -115,6 +117,7 @@ def _keep_away(c, most):
     for i in range(x.forces.shape[0]):
         kind = x.forces[i]
         if kind.margin != 0:
+            # Share of what laws divide by
             let(s, LEFT, 0.0 * get(s, H) + 1.0)
             call_margin(
                 kind.margin, kind.count, kind.stride, kind.width, x.order.room, most, s[H:],
@@ -127,13 +130,16 @@ def _keep_away(c, most):
 @kernel
 def try_step(c):
     """Expand the series of all lanes and reach the ends of their steps; returns the lowest and highest order."""
+    # All lanes are expanded to the highest order
     let(c.state, TOP, get(c.state, NEXT))
     least, most = orders(c)
     _expand(c, most)
+    # Lengths, ends, and lanes that need a check of their laws
     propose(c, least, most)
     _set_ends(c)
     _keep_away(c, most)
     for i in range(HALVINGS + 1):
+        # Halve the steps that miss the manifold, then give these lanes up
         reach(c, least, most)
         if not _is_missed(c, i < HALVINGS):
             break
@@ -159,6 +165,7 @@ def accept(c):
     rest, still = 0.0 * h, below(-1.0, 0.0 * h)
     for b in range(c.graph.bodies.shape[0]):
         for i in range(3):
+            # Steps in which nothing moves; numbers that aren't finite
             spin, speed = abs(get(poses, b * POSE + OMEGA + i)), abs(get(poses, b * POSE + RD + i))
             still = both(still, opposite(either(below(SMALL, spin * h), below(far, speed))))
             rest += 0.0 * spin + 0.0 * speed
@@ -166,9 +173,11 @@ def accept(c):
     if c.numbers.leave_when_stiff == 1:
         _find_lost(c, below(SMALL_STEPS - 0.5, get(s, SLOW)))
     _find_lost(c, opposite(below(-1.0, rest)))
+    # Near a singular configuration a case is run alone
     indicator = _weakest(c)
     _find_lost(c, opposite(below(max(ILL_CONDITIONED, WARY * get(s, INDICATOR)), indicator)))
     let(s, INDICATOR, max(get(s, INDICATOR), indicator))
+    # The state moves on
     let(s, T, get(s, T_NEXT))
     let(s, STEPS, get(s, STEPS) + 1.0)
     for i in range(x.low.size):

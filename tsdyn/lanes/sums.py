@@ -51,6 +51,7 @@ def spin(graph, b, bodies, at, orders, k):
         o, spins = at + S_OMEGA * orders, at + S_SPIN * orders
         put_momentum(graph, b, bodies, o, spins, k)
         for j in range(k + 1):
+            # -omega'_j x (J' omega')_{k-j}, both products of the cross product in sums of their own
             f, g = four(bodies, spins + 4 * (k - j)), four(bodies, o + 4 * j)
             x = fma(lanes(second(f), third(f), first(f)), lanes(third(g), first(g), second(g)), x)
             y = fma(lanes(third(f), first(f), second(f)), lanes(second(g), third(g), first(g)), y)

@@ -80,6 +80,7 @@ def invert(A, X, n):
         for j in range(n):
             X[i, j] = 1.0 if i == j else 0.0
     for c in range(n):
+        # Largest entry of the column as pivot
         p = c
         for i in range(c + 1, n):
             if abs(A[i, c]) > abs(A[p, c]):
@@ -90,6 +91,7 @@ def invert(A, X, n):
             for j in range(n):
                 A[c, j], A[p, j] = A[p, j], A[c, j]
                 X[c, j], X[p, j] = X[p, j], X[c, j]
+        # Row c over the pivot, then eliminate column c from all other rows
         pivot = 1.0 / A[c, c]
         for j in range(n):
             A[c, j] *= pivot
@@ -113,6 +115,7 @@ def null_space(W, n, m, V, R, tau):
     Returns the smallest and the largest singular value.
     """
     for j in range(m):
+        # Reflector of column j: its part below the diagonal becomes zero
         s = 0.0
         for i in range(j, n):
             s += W[i, j] * W[i, j]
@@ -128,6 +131,7 @@ def null_space(W, n, m, V, R, tau):
         W[j, j] = s
         for c in range(j + 1, m):
             _reflect(W, j, tau[j], W, c, n)
+    # Q times the last unit vectors spans the complement
     for j in range(n - m):
         for i in range(n):
             V[i, j] = 0.0
@@ -158,6 +162,7 @@ def _jacobi(R, m):
         worst = 0.0
         for i in range(m - 1):
             for j in range(i + 1, m):
+                # Inner products of two rows
                 a, b, c = 0.0, 0.0, 0.0
                 for k in range(m):
                     a += R[i, k] * R[i, k]
@@ -169,12 +174,14 @@ def _jacobi(R, m):
                 worst = max(worst, size)
                 if size < ORTHOGONAL:
                     continue
+                # The smaller of the two rotations that make them orthogonal
                 zeta = (b - a) / (2.0 * c)
                 t = 1.0 / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
                 if zeta < 0.0:
                     t = -t
                 cosine = 1.0 / math.sqrt(1.0 + t * t)
                 sine = cosine * t
+                # Their lengths are the singular values
                 for k in range(m):
                     x, y = R[i, k], R[j, k]
                     R[i, k] = cosine * x - sine * y
@@ -195,6 +202,7 @@ def _jacobi(R, m):
 def lu(A, pivots, n):
     """Factor A (n, n) in place with partial pivoting; return False if it is singular or not finite."""
     for c in range(n):
+        # Largest entry of the column as pivot
         p = c
         for i in range(c + 1, n):
             if abs(A[i, c]) > abs(A[p, c]):
@@ -218,11 +226,13 @@ def lu(A, pivots, n):
 def lu_solve(A, pivots, b, n):
     """Solve in place with the factors of `lu`."""
     for i in range(n):
+        # L, with exchanges
         p = pivots[i]
         if p != i:
             b[i], b[p] = b[p], b[i]
         for j in range(i):
             b[i] -= A[i, j] * b[j]
+    # U
     for i in range(n - 1, -1, -1):
         for j in range(i + 1, n):
             b[i] -= A[i, j] * b[j]

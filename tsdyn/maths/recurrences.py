@@ -88,6 +88,7 @@ def rotation(s, p, a, k):
     """Write coefficient k of A(p) into rows a to a + 8 of s, column after column; p is in rows p to p + 3."""
     aa, bb, cc, dd, ab, ac, ad, bc, bd, cd = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for l in range(k + 1):
+        # All ten products of two components of p
         e0, e1, e2, e3 = s[p, l], s[p + 1, l], s[p + 2, l], s[p + 3, l]
         g0, g1, g2, g3 = s[p, k - l], s[p + 1, k - l], s[p + 2, k - l], s[p + 3, k - l]
         aa += e0 * g0

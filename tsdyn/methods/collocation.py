@@ -84,6 +84,7 @@ class CollocationTableau:
     def coefficients(self) -> Floats:
         """A (s, s); its last row holds the weights."""
         c, s = np.array(self.nodes), len(self.nodes)
+        # Q of A = Q P^-1
         integrals = [legendre.legval(2.0 * c - 1.0, legendre.legint(row, lbnd=-1)) / 2.0 for row in np.eye(s)]
         return np.linalg.solve(self.basis.T, np.array(integrals)).T
 
@@ -91,6 +92,7 @@ class CollocationTableau:
     def _eigen(self):
         """Eigenvalues, the real one first, then one of each pair and its conjugate; eigenvectors."""
         values, vectors = np.linalg.eig(self.coefficients)
+        # The real eigenvalue first, then by falling real part; of a pair the one with positive imaginary part first
         order = sorted(range(values.size), key=lambda i: (abs(values[i].imag) > 0.0, -values[i].real, -values[i].imag))
         return values[order], vectors[:, order]
 
@@ -110,6 +112,7 @@ class CollocationTableau:
         """Stages to real and imaginary parts of their eigenvectors' coefficients, and back, (s, s) each."""
         vectors = self._eigen[1]
         inverse, there, back = np.linalg.inv(vectors), [], []
+        # A real combination z + z* = 2 Re z of each pair: factors two and a sign go into the way back
         for m in range(0, vectors.shape[1], 2):  # the real one, then the first of each pair
             at = max(m - 1, 0)
             pair = m > 0
@@ -129,6 +132,7 @@ class CollocationTableau:
         """As `RungeKuttaTableau.numbers` with the start as first stage; then those of `parts_of`."""
         c, a, s = np.array(self.c), np.pad(self.coefficients, ((1, 0), (1, 0))), len(self.nodes)
         values = self.eigenvalues
+        # Of each pair one eigenvalue
         shifts = [values[0].real, *np.ravel([[z.real, z.imag] for z in values[1::2]])]
         parts = a[1:, 1:], a[1:, 1:] @ a[1:, 1:], shifts, *self.transformations(), self.output()
         rows = [[0.0, c[i], *a[i]] for i in range(s + 1)]

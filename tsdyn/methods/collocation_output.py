@@ -30,6 +30,7 @@ def fill_collocation(context, run):
     data = data[1:]
     copy(r.x_old, data)
     copy(r.y_old, data[n:])
+    # K_j = sum_i output_ji k_i: values at the nodes to Legendre coefficients
     for j in range(size):
         row, out = r.tableau[at + size * j :], data[(2 + j) * n :]
         for e in range(n):
@@ -45,6 +46,7 @@ def _polynomials(s, count, P):
     """P[j] = P_j(s) for j < count."""
     x = 2.0 * s - 1.0
     P[0], P[1] = 1.0, x
+    # (j + 1) P_{j+1} = (2 j + 1) x P_j - j P_{j-1}
     for j in range(1, count - 1):
         P[j + 1] = ((2 * j + 1) * x * P[j] - j * P[j - 1]) / (j + 1)
 
@@ -53,6 +55,7 @@ def _polynomials(s, count, P):
 def _integrate(first, count, P, Q):
     """Q[j], j < count, the integrals from 0 to s of P_j, or of the integrals that P holds; first is that of P[0]."""
     Q[0] = first
+    # int P_j = (P_{j+1} - P_{j-1}) / (2 (2 j + 1)) on [0, s]
     for j in range(1, count):
         Q[j] = (P[j + 1] - P[j - 1]) / (2.0 * (2 * j + 1))
 
@@ -62,10 +65,12 @@ def collocation(s, h, n, nx, ny, data, x, y):
     """x = x0 + s h x0' + h^2 sum_j K_j (second integral of P_j), and x'."""
     data, x, y = vector(data, ANY), vector(x, nx), vector(y, nx)
     P, Q, R, size = stack(ROOM), stack(ROOM), stack(ROOM), int(data[0])
+    # P_j at s, their first integrals Q and second integrals R from 0
     _polynomials(s, size + 2, P)
     _integrate(s, size + 1, P, Q)
     _integrate(0.5 * s * s, size, Q, R)
     data = data[1:]
+    # x = x0 + h (s x0' + h sum_j R_j K_j),  x' = x0' + h sum_j Q_j K_j
     for e in range(nx):
         a, b = 0.0, 0.0
         for j in range(size - 1, -1, -1):
@@ -83,6 +88,7 @@ def second_derivative(s, h, n, nx, ny, data, x, y):
     data, y = vector(data, ANY), vector(y, nx)
     P, size = stack(ROOM), int(data[0])
     _polynomials(s, size, P)
+    # sum_j P_j K_j, the smallest terms first
     for e in range(nx):
         y[e] = 0.0
         for j in range(size - 1, -1, -1):

@@ -75,21 +75,23 @@ def _scratch_at(r):
 
 
 @kernel
-def _renew_matrix(context, c, t, g, f, anew, here):
-    """P at the place last taken, f being the accelerations there; with anew, from new stiffness and damping. Status.
+def _renew_matrix(context, c, t, g, f, renew, here):
+    """P for a stage with accelerations f; with `renew` from new stiffness and damping. Status.
 
-    Without here, from the matrices of stiffness and damping that the last P was made from.
+    With `here` those are reduced at the present configuration; otherwise K_hat and C_hat of the last P serve.
     """
-    l, status = c.linear, 0
-    if anew or l.numbers.known == 0:
-        status = call_linearise(l.kernels.linearise, context, t, f)
-        l.numbers.known = 1 if status == 0 else 0
+    linear, status = c.linear, 0
+    # Derivatives of the force laws
+    if renew or linear.numbers.known == 0:
+        status = call_linearise(linear.kernels.linearise, context, t, f)
+        linear.numbers.known = 1 if status == 0 else 0
     if status == 0:
-        if here or anew:
-            call_reduce(l.kernels.reduce, context, t)
-        status = call_reduce(l.kernels.factorise, context, g)
-    l.numbers.g, l.numbers.slow = g if status == 0 else 0.0, 0.0
-    l.numbers.chart = c.work.counters.charts
+        # K_hat and C_hat at the present configuration; otherwise those of the last matrix
+        if here or renew:
+            call_reduce(linear.kernels.reduce, context, t)
+        status = call_reduce(linear.kernels.factorise, context, g)
+    linear.numbers.g, linear.numbers.slow = g if status == 0 else 0.0, 0.0
+    linear.numbers.chart = c.work.counters.charts
     return status
 
 
@@ -111,8 +113,10 @@ def _is_direct(c):
 @kernel
 def _evaluate(context, c, r, t, g, xs, ys, k, f):  # nine: a stage and its equations
     """Evaluate the equations of a stage at (t, xs, ys) and k; f = the accelerations there, if it needs them. Status."""
+    # Positions, velocities, accelerations and reactions are unknowns together
     if _is_direct(c):
         return call_residual(c.linear.kernels.residual, context, t, g, xs, ys, k)
+    # Otherwise f is the right-hand side of the ODE
     status = call_place(r.kernels.place, context, t, xs)
     if status == 0:
         status = call_accelerate(r.kernels.accelerate, context, t, ys, f, f)
@@ -122,42 +126,46 @@ def _evaluate(context, c, r, t, g, xs, ys, k, f):  # nine: a stage and its equat
 @kernel
 def _correct(context, c, g, k, f, dx):
     """k += P^-1 A (f - k); the size of g times it, and of g^2 times it, in the error norm."""
-    l = c.linear
+    linear = c.linear
+    # By the saddle-point matrix
     if _is_direct(c):
-        return call_correct(l.kernels.correct, context, g, k)
+        return call_correct(linear.kernels.correct, context, g, k)
+    # k += P^-1 A (f - k)
     for i in range(k.size):
         f[i] -= k[i]
-    call_solve(l.kernels.solve, context, f)
+    call_solve(linear.kernels.solve, context, f)
     for i in range(k.size):
         k[i] += f[i]
+        # vd changes by g times the correction, v by g^2 times it
         f[i] *= g
         dx[i] = g * f[i]
-    return call_norm(l.kernels.error_norm, context, dx, f, l.now, l.numbers.rtol, l.numbers.atol)
+    return call_norm(linear.kernels.error_norm, context, dx, f, linear.now, linear.numbers.rtol, linear.numbers.atol)
 
 
 @kernel
 def _is_near(context, c, g, k, guess, f, dx):
     """Return True if the positions of a solution are near to those of its prediction: another one may be far."""
-    l = c.linear
+    linear = c.linear
     for i in range(k.size):
         f[i] = 0.0  # of velocities a stiff transient may change any amount
         dx[i] = g * g * (k[i] - guess[i])
-    norm = l.kernels.distance if _is_direct(c) else l.kernels.error_norm
-    return call_norm(norm, context, dx, f, l.now, 1.0, 1.0) < TOO_FAR
+    norm = linear.kernels.distance if _is_direct(c) else linear.kernels.error_norm
+    return call_norm(norm, context, dx, f, linear.now, 1.0, 1.0) < TOO_FAR
 
 
 @kernel
 def _expected(numbers, size, adaptive):
-    """What a first correction of that size is expected to leave: as last measured, and of a larger one the square."""
+    """Error expected after a first correction of this size: as last measured, growing with the square of the size."""
+    # A first correction leaves an error in proportion to its square, as far as the matrix is exact
     share = max(1.0, size / numbers.first)
     return max(numbers.left * share * share, (LEAST if adaptive else LEAST_FIXED) * size)
 
 
 @kernel
 def _learn(numbers, first, second, renewed):
-    """Remember what a first correction has left, the size of the second; or, without one, how long ago one was made.
+    """Store what a first correction has left, the size of the second; without a second one, let the old value grow.
 
-    A new matrix says little of what it leaves in the stages to come.
+    What a new matrix leaves in one stage doesn't predict the stages to come.
     """
     if renewed:
         numbers.left = math.inf
@@ -169,75 +177,125 @@ def _learn(numbers, first, second, renewed):
 
 
 @kernel
+def _begin_iteration(c, r):
+    """Nothing is known of the contraction yet; limits of it for the form and the run."""
+    numbers, one = c.linear.numbers, c.linear.iteration
+    _restart(one)
+    one.first, one.trusted, one.renewed, one.poor, one.diverged = 0.0, 1, 0, 0, 0
+    one.floor = RESIDUAL_FLOOR / (numbers.rtol + numbers.atol)
+    # What stages of fixed steps leave adds up over thousands of steps
+    one.limit = SLOW_SPARSE if numbers.every_chart == 1 and r.numbers.adaptive == 1 else SLOW
+    one.eager = 1 if numbers.eager > 0 else 0
+    numbers.eager -= 1
+
+
+@kernel
+def _restart(one):
+    """Measure contraction afresh: the matrix is new."""
+    one.before, one.theta, one.measured, one.second = math.inf, GUESS, 0, math.inf
+
+
+@kernel
+def _renew_if_needed(context, c, t, g, f):
+    """Renew the iteration matrix if it is of another g or chart, or contracts poorly; False if it is singular."""
+    numbers, one = c.linear.numbers, c.linear.iteration
+    sparse, slips, eager = numbers.every_chart == 1, numbers.slips == 1, one.eager == 1
+    one.eager = 0
+    off_chart = not sparse and numbers.chart != c.work.counters.charts
+    poor = one.measured == 1 and one.theta > max(one.limit, numbers.slow)
+    stale = eager or off_chart or abs(g - numbers.g) > SAME_G * g
+    if not (stale or poor):
+        return True
+    if not stale:
+        # The first poor contraction: the stages to come begin with matrices of their own
+        if one.poor == 0 and one.renewed == 0:
+            lost = EAGER_LOST if one.theta > DIVERGING else EAGER_SPARSE
+            numbers.eager = lost if sparse else EAGER_STAGES
+        one.poor += 1
+    # The last matrix of a stage has new stiffness and damping
+    here = eager or poor or not sparse or numbers.g == 0.0 or numbers.known == 0
+    one.renewed = 1
+    if _renew_matrix(context, c, t, g, f, slips or one.poor == MATRICES, here) != 0:
+        return False
+    if not slips:  # where friction changes within a correction, Newton's own contraction counts
+        _restart(one)
+    if eager or poor or off_chart:
+        one.trusted = 0
+    return True
+
+
+@kernel
+def _measure(c, size):
+    """Contraction by the correction of this size; False if iterations diverge whatever the matrix."""
+    numbers, one = c.linear.numbers, c.linear.iteration
+    if not one.before < math.inf:
+        return True
+    if one.measured == 0:
+        one.first, one.second = one.before, size
+    one.theta, one.measured = size / one.before, 1
+    # No other matrix contracts better: that much contraction has to do
+    sparse, slips = numbers.every_chart == 1, numbers.slips == 1
+    if sparse and not slips and one.poor == MATRICES and numbers.slow == 0.0:
+        numbers.slow = min(WORSE * one.theta, DIVERGING)
+    one.diverged += 1 if one.renewed == 1 and one.theta > DIVERGING else 0
+    return one.diverged < (APART_SLIPPING if slips else APART)
+
+
+@kernel
+def _is_solved(c, size, adaptive, is_last):
+    """Whether a stage needs no further correction after one of this size.
+
+    The contraction of the last stage is always measured: where stiffness has gone, old matrices make corrections small.
+    """
+    numbers, one, theta = c.linear.numbers, c.linear.iteration, c.linear.iteration.theta
+    # Rounding
+    if size <= one.floor or (theta > DIVERGING and size <= AT_FLOOR * one.floor):
+        return True
+    # What is left: the sum of the corrections to come, or what first corrections have left before
+    left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
+    if one.trusted == 1 and one.measured == 0:
+        left = min(left, _expected(numbers, size, adaptive))
+    return left <= numbers.kappa and (one.measured == 1 or not is_last)
+
+
+@kernel
 def _solve_stage(context, c, r, i, t, g):
     """Solve stage i at time t: k_i, predicted on entry, and v_i, vd_i. Status."""
-    w, l, n, scratch = c.work, c.linear, r.x.size, r.memory[_scratch_at(r) :]
+    w, linear, n, scratch = c.work, c.linear, r.x.size, r.memory[_scratch_at(r) :]
     known, ys, k = r.memory[: 2 * n], r.memory[(1 + i) * 2 * n :][:n], r.memory[(1 + i) * 2 * n + n :][:n]
     f, dx, xs = scratch[F * n :][:n], scratch[DX * n :][:n], scratch[XS * n :][:n]
-    guess = scratch[H_BEFORE * n + 1 :][:n]
+    guess, adaptive = scratch[H_BEFORE * n + 1 :][:n], r.numbers.adaptive == 1
     copy(k, guess)
-    floor = RESIDUAL_FLOOR / (l.numbers.rtol + l.numbers.atol)
-    before, theta, measured, trusted, first, second = math.inf, GUESS, False, True, 0.0, math.inf
-    slow, apart, stuck, renewed = 0, 0, False, False
-    eager, sparse, slips = l.numbers.eager > 0, l.numbers.every_chart == 1, l.numbers.slips == 1
-    apart_at_most = APART_SLIPPING if slips else APART
-    is_last = i + 1 == int(r.tableau[0])  # its contraction is measured: stiffness that has gone makes corrections small
-    # what stages of fixed steps leave adds up over thousands of steps
-    limit = SLOW_SPARSE if sparse and r.numbers.adaptive == 1 else SLOW
-    l.numbers.eager -= 1
-    for _ in range(ITERATIONS if r.numbers.adaptive == 1 else FIXED_ITERATIONS):
+    _begin_iteration(c, r)
+    for _ in range(ITERATIONS if adaptive else FIXED_ITERATIONS):
+        # The equations at v_i, vd_i of the iterate
         _set_stage(g, k, known, xs, ys)
         status = _evaluate(context, c, r, t, g, xs, ys, k, f)
         if status != 0:
             return status
         w.counters.stage_iterations += 1
-        off_chart = not sparse and l.numbers.chart != w.counters.charts
-        slow_now = measured and theta > max(limit, l.numbers.slow)
-        stale = eager or off_chart or abs(g - l.numbers.g) > SAME_G * g
-        here = eager or slow_now or not sparse or l.numbers.g == 0.0 or l.numbers.known == 0
-        was_eager, eager = eager, False
-        if stale or slow_now:
-            if not stale:
-                if slow == 0 and not renewed:
-                    l.numbers.eager = EAGER_STAGES if not sparse else EAGER_LOST if theta > DIVERGING else EAGER_SPARSE
-                slow += 1
-            renewed = True
-            if _renew_matrix(context, c, t, g, f, slips or slow == MATRICES, here) != 0:
-                return STAGE_FAILED
-            if not slips:  # where friction changes within a correction, Newton's own contraction counts
-                before, theta, measured, second = math.inf, GUESS, False, math.inf
-            trusted = trusted and not (was_eager or slow_now or off_chart)
-        size = _correct(context, c, g, k, f, dx)
-        if not size < math.inf:
+        # k += P^-1 A (f - k)
+        if not _renew_if_needed(context, c, t, g, f):
             return STAGE_FAILED
-        if before < math.inf:
-            if not measured:
-                first, second = before, size
-            theta, measured = size / before, True
-            if sparse and not slips and slow == MATRICES and l.numbers.slow == 0.0:  # no other matrix contracts better
-                l.numbers.slow = min(WORSE * theta, DIVERGING)
-            stuck = theta > DIVERGING and size <= AT_FLOOR * floor
-            apart += 1 if renewed and theta > DIVERGING else 0
-            if apart == apart_at_most:
-                return STAGE_FAILED
-        left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
-        if trusted and not measured:
-            left = min(left, _expected(l.numbers, size, r.numbers.adaptive == 1))
-        if size <= floor or stuck or (left <= l.numbers.kappa and (measured or not is_last)):
-            _learn(l.numbers, first, second, renewed)
+        size = _correct(context, c, g, k, f, dx)
+        if not size < math.inf or not _measure(c, size):
+            return STAGE_FAILED
+        if _is_solved(c, size, adaptive, i + 1 == int(r.tableau[0])):
+            _learn(linear.numbers, linear.iteration.first, linear.iteration.second, linear.iteration.renewed == 1)
             _set_stage(g, k, known, xs, ys)
             return 0 if _is_near(context, c, g, k, guess, f, dx) else STAGE_FAILED
-        before = size
+        linear.iteration.before = size
     return STAGE_FAILED
 
 
 @kernel
-def _see_step_before(context, l, t, n, scratch):
+def _see_step_before(context, linear, t, n, scratch):
     """h of the step before, 0 where there is none, and its start in this chart."""
-    h_before = t - l.numbers.t_before if l.numbers.t_before > -math.inf else 0.0
+    # -inf: there is none
+    h_before = t - linear.numbers.t_before if linear.numbers.t_before > -math.inf else 0.0
     scratch[H_BEFORE * n] = h_before
     if h_before > 0.0:
-        call_recall(l.kernels.recall, context, scratch[Y_BEFORE * n :], scratch[K_BEFORE * n :])
+        call_recall(linear.kernels.recall, context, scratch[Y_BEFORE * n :], scratch[K_BEFORE * n :])
     return h_before
 
 
@@ -249,6 +307,7 @@ def implicit_step(context, run, t, h):
     stages = int(tableau[0])
     width = 2 + stages
     x, y, k_before = memory[:n], memory[n : 2 * n], scratch[K_BEFORE * n :]
+    # Predictions: polynomials through known stages, or at first the line through the step before
     h_before = _see_step_before(context, c.linear, t, n, scratch)
     own = scratch[SCRATCH * n + 1 :]
     ratio = begin_prediction(memory, own, stages, n, t, h, float(c.work.counters.charts))
@@ -256,14 +315,17 @@ def implicit_step(context, run, t, h):
     copy(r.y, memory[2 * n : 3 * n])
     copy(r.yd, memory[3 * n : 4 * n])
     for i in range(1, stages):
+        # Stage i at t + c_i h
         row = tableau[1 + i * width :]
         k = memory[(1 + i) * 2 * n + n :][:n]
         # the prediction of k_i or vd_i, then the known parts of v_i and vd_i
         predict(tableau, memory, own, i, ratio, extrapolated(own, i), part, k)
         combine(row[2:], i, h, 2 * n, memory, memory)
+        # v + h sum_j a_ij vd_j,  vd + h sum_j a_ij k_j, j < i
         for j in range(n):
             x[j] += r.x[j]
             y[j] += r.y[j]
+        # Predicted is vd_i; k_i follows
         if part == 0:
             for j in range(n):
                 k[j] = (k[j] - y[j]) / (h * row[2 + i])
@@ -271,11 +333,14 @@ def implicit_step(context, run, t, h):
             for j in range(n):
                 k[j] += row[1] * h / h_before * (r.yd[j] - k_before[j])
         status = _solve_stage(context, c, r, i, t + h * row[1], h * row[2 + i])
+        # u, z and lam of a failed stage are of no use
         if status != 0:
             c.linear.numbers.rates_of = 0
             return status
+        # The first implicit stage says how many points predict best
         if i == 1 and ratio > 0.0:
             choose_points(tableau, memory, own, ratio, part, scratch[:n])
+    # Increments h sum_i b_i (vd_i, k_i)
     combine(tableau[1 + stages * width :], stages, h, 2 * n, memory, memory)
     copy(x, r.dx)
     copy(y, r.dy)
@@ -294,6 +359,7 @@ def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):  # nine: as plug
     h_before = before[H_BEFORE * n]
     for c in range(n):
         for part, out in ((0, ex), (n, ey)):
+            # h^3 / 12 y''' from the values of y' at the starts of two steps and at the end of this one
             now, end, slope = memory[2 * n + part + c], memory[4 * n + part + c], 0.0
             if h_before > 0.0:
                 slope = (now - before[Y_BEFORE * n + part + c]) / h_before

@@ -87,6 +87,7 @@ def combine(weights, count, h, n, memory, out):
     out = out[:n]
     for c in range(n):
         out[c] = 0.0
+    # Zero coefficients are skipped
     for j in range(count):
         _add(out, h * weights[j], memory[(1 + j) * n :])
 
@@ -100,6 +101,7 @@ def stage(context, r, second, t, h, i, row):
     nx, ny, memory = r.x_old.size, r.y_old.size, r.memory
     n, ti = nx + ny, t + h * row[0]
     xs, ys, k = memory[:nx], memory[nx:n], memory[(1 + i) * n :][:n]
+    # (x, y) + h sum_j a_ij k_j
     combine(row[1:], i, h, n, memory, memory)
     for c in range(nx):
         xs[c] += r.x_old[c]
@@ -120,12 +122,15 @@ def _step(context, r, second, t, h):
     nx, ny, tableau, memory = r.x.size, r.y.size, r.tableau, r.memory
     n, stages = nx + ny, int(tableau[0])
     width = 2 + stages
+    # The first stage is the end of the step before
     copy(r.y if second else r.xd, memory[n:])
     copy(r.yd, memory[n + nx :])
+    # k_i = f(t + c_i h, (x, y) + h sum_j a_ij k_j)
     for i in range(1, stages):
         status = stage(context, r, second, t, h, i, tableau[1 + i * width + 1 :])
         if status != 0:
             return status
+    # h sum_i b_i k_i
     combine(tableau[1 + stages * width :], stages, h, n, memory, memory)
     copy(memory[:nx], r.dx)
     copy(memory[nx:n], r.dy)
@@ -147,6 +152,7 @@ def runge_kutta_step(context, run, t, h):
 @kernel
 def _weigh(weights, stages, h, n, memory, end, out):
     """out = h (sum_j w_j k_j + w_end k_end), one k every n floats of the memory."""
+    # The derivative at the step's end, then those of the stages
     for c in range(out.size):
         out[c] = h * weights[stages] * end[c]
     for j in range(stages):
@@ -157,6 +163,7 @@ def _weigh(weights, stages, h, n, memory, end, out):
 def _error(which, h, y, yd, tableau, memory, ex, ey):
     """Errors by a row of error weights; of the derivatives at the step's end, x' is y."""
     nx, n, stages = ex.size, ex.size + ey.size, int(tableau[0])
+    # Rows of error weights follow the row b of the tableau
     weights = tableau[1 + stages * (2 + stages) + stages + which * (stages + 1) :]
     _weigh(weights, stages, h, n, memory, y, ex)
     _weigh(weights, stages, h, n, memory[nx:], yd, ey)

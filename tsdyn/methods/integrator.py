@@ -52,8 +52,8 @@ class Integrator:
         Order of the error of v and vd at fixed time.
     step : float, s
         The fixed step; None for an adaptive run.
-    margin : float
-        How far below the tolerances one step's error is kept: errors of many steps add up.
+    safety : float
+        The tolerances over the error that one step may make: errors of many steps add up.
     errors : tuple of Callback
         The kernels of the error estimate; a second one tempers the first (Hairer's combination of two orders).
 
@@ -75,13 +75,15 @@ class Integrator:
     step: float | None
     max_step: float | None = None
     first_step: float | None = None
-    margin: float = 30.0
+    safety: float = 30.0
     errors: tuple[Any, ...] = (embedded_error,)
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         if "__init__" in vars(cls):
             cls.__init__ = fitting(cls.__init__)
+        if "margin" in vars(cls):  # another name of `safety`
+            cls.safety = cls.margin
         complete_docstring(cls)
         if cls.order:
             _registry[cls.__name__.lower().replace("_", "")] = cls
@@ -145,7 +147,7 @@ class Adaptive(Integrator):
     Parameters
     ----------
     rtol, atol : float; default 1e-6, 1e-8
-        The error of each step is kept below (atol + rtol |value|) / `margin`, in the root mean square over coordinates
+        The error of each step is kept below (atol + rtol |value|) / `safety`, in the root mean square over coordinates
         and velocities, so that the error accumulated over a run is of the size of the tolerances.
 
     Examples
@@ -177,7 +179,7 @@ class Adaptive(Integrator):
 
     def step_tolerances(self) -> tuple[float, float]:
         """Return (rtol, atol) that each step's error is held to."""
-        return self.rtol / self.margin, self.atol / self.margin
+        return self.rtol / self.safety, self.atol / self.safety
 
     def __repr__(self) -> str:
         settings = f"rtol={self.rtol:g}, atol={self.atol:g}" if self.step is None else f"step={self.step:g}"

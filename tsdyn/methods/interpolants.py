@@ -35,6 +35,7 @@ def quintic(s, h, n, d, out, outd):
 
     d holds n values, n first and n second derivatives of the start, then those of the end.
     """
+    # Weights of a value difference, of first derivatives (g) and of second ones (k) at both ends
     s2 = s * s
     s3 = s2 * s
     f = s3 * (10.0 + s * (6.0 * s - 15.0))
@@ -56,6 +57,7 @@ def quintic(s, h, n, d, out, outd):
 def _cubic(s, h, d, out):
     """Cubic Hermite interpolation; d holds values and derivatives of the start, then those of the end."""
     n = out.size
+    # Weights of the difference of values and of both derivatives
     f = s * s * (3.0 - 2.0 * s)
     g0, g1 = s * (s - 1.0) * (s - 1.0), s * s * (s - 1.0)
     for i in range(n):
@@ -113,6 +115,7 @@ def hermite_first_order(s, h, n, nx, ny, data, x, y):
 def hermite_second(s, h, n, nx, ny, data, x, y):
     """The second derivative of the quintic for x, as y; x is left alone."""
     d, k, y = vector(data, 6 * nx), nx, vector(y, nx)
+    # Second derivatives of the weights of `_quintic`, over h^2
     f = 60.0 * s * (1.0 + s * (2.0 * s - 3.0)) / (h * h)
     g0, g1 = s * (s * (96.0 - 60.0 * s) - 36.0) / h, s * (s * (84.0 - 60.0 * s) - 24.0) / h
     k0, k1 = 1.0 + s * (s * (18.0 - 10.0 * s) - 9.0), s * (3.0 + s * (10.0 * s - 12.0))
@@ -144,16 +147,19 @@ def fill_dop853(context, run):
     t, h, size, data = r.block[B_START], r.block[B_H], nx + ny, r.block[B_DATA:]
     stages = int(r.tableau[0])
     numbers = r.tableau[1 + stages * (2 + stages) + stages + 2 * (stages + 1) :]
+    # Derivatives at both ends
     first, last = memory[size:], memory[(1 + stages) * size :]
     copy(r.y if second else r.xd, last)
     copy(r.yd, last[nx:])
     copy(r.x_old, data)
     copy(r.y_old, data[nx:])
     for c in range(size):
+        # F0 = dx,  F1 = h k_1 - dx,  F2 = 2 dx - h (k_end + k_1)
         step = r.x[c] - r.x_old[c] if c < nx else r.y[c - nx] - r.y_old[c - nx]
         data[size + c] = step
         data[2 * size + c] = h * first[c] - step
         data[3 * size + c] = 2.0 * step - h * (last[c] + first[c])
+    # Three more stages
     total = stages + 4
     for i in range(stages + 1, total):
         if stage(context, r, second, t, h, i, numbers) != 0:
@@ -162,6 +168,7 @@ def fill_dop853(context, run):
                 data[c] = 0.0
             return 0
         numbers = numbers[1 + total :]
+    # F3 to F6 are combinations of all stages
     for row in range(4, 1 + POWER):
         combine(numbers, total, h, size, memory, data[row * size :])
         numbers = numbers[total:]
@@ -174,6 +181,7 @@ def dop853(s, h, n, nx, ny, data, x, y):
     size = nx + ny
     data, x, y = vector(data, (1 + POWER) * size), vector(x, nx), vector(y, ny)
     for c in range(size):
+        # Horner's scheme with factors s and 1 - s in turn
         z = 0.0
         for row in range(POWER, 0, -1):
             z = (z + data[row * size + c]) * (s if row % 2 == 1 else 1.0 - s)

@@ -1,6 +1,6 @@
 """Step kernels of plug-ins, written to the documented interface: docs/plug-ins.md.
 
-A plug-in's step kernel has its arrays as arguments and knows nothing of the `Run`. `plug_in_step` is what the driver
+A plug-in's step kernel has its arrays as arguments, not the `Run`. `plug_in_step` is what the driver
 calls in its place.
 """
 

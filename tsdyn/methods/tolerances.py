@@ -18,7 +18,7 @@ ITERATIONS, FIXED_ITERATIONS = 20, 40
 KAPPA, KAPPA_SPARSE = 1e-3, 3e-3
 
 # m/s: what it may leave of a velocity where there is friction. At rest friction balances the loads at some velocity
-# below the slip velocity, 1e-11 m/s at least: what is left there changes the friction by a hundredth of it.
+# below the slip velocity, 1e-11 m/s at least: the error then changes the friction by a hundredth of it.
 SLIP_LEFT = 1e-13
 
 # Contraction above which the iteration matrix is rebuilt: up to it three corrections reach KAPPA
@@ -31,12 +31,12 @@ SLOW, SLOW_SPARSE = 0.1, 0.25
 # what stages leave adds up over thousands of them.
 GUESS, LEAST, LEAST_FIXED = 0.3, 1e-6, 0.02
 
-# Part of the contraction known that a new measurement can fall to: a stage that converges by chance says nothing of the
-# next one. And how fast a contraction is forgotten from stage to stage, until it is measured again.
+# A new measurement lowers the known contraction by this factor at most: a stage may converge by chance. Growth of an
+# old contraction from stage to stage, until it is measured again.
 FORGET, AGEING = 0.1, 1.3
 
-# Stages of which a prediction is made: least distance in time, over the longer of two steps; and of two times that are
-# the same, over the step.
+# Stages that a prediction interpolates: least distance in time, over the longer of the two steps; distance of two equal
+# times, over the step.
 APART_AT_LEAST, SAME_TIME = 0.1, 1e-9
 
 # Contraction above which an iteration counts as diverging.
@@ -47,8 +47,8 @@ DIVERGING = 0.9
 # to the velocities of the motion, by the power of three each, before they contract.
 MATRICES, APART, APART_SLIPPING = 3, 3, 8
 
-# Contraction over that of a new matrix with new stiffness and damping, above which it is rebuilt in the tangent form:
-# where steps are long beside turns of bodies, no matrix contracts below SLOW_SPARSE.
+# Contraction over that of a matrix with new stiffness and damping, above which the matrix is rebuilt in the tangent
+# form: if bodies rotate far within a step, no matrix contracts below SLOW_SPARSE.
 WORSE = 2.0
 
 # Stages that begin with a matrix of their own after an older one has failed: five steps of SDIRK54. In the tangent form
@@ -79,7 +79,7 @@ FIXED_TOL = 1e-13
 # and from which stages don't count as solved before matrices have had new derivatives.
 COUPLED_ITERATIONS, KAPPA_COUPLED, SLOW_COUPLED, TRUSTED = 12, 3e-3, 0.1, 0.3
 
-# Corrections, relative to 1 + size, that contract no more, below which that is the rounding of large forces.
+# Corrections that no longer contract, relative to 1 + size: below it they are rounding of large forces.
 STALLED = 2e-12
 
 # Relative change of the step up to which matrices are kept.

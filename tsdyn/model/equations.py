@@ -117,15 +117,15 @@ def remember(s, q, qd, t, out):
 
 
 @kernel
-def force_jacobian(s, q, qd, t, Q_q, Q_qd, anew, kept):
+def force_jacobian(s, q, qd, t, Q_q, Q_qd, renew, kept):
     """Q_q, Q_qd (n, n) += the Jacobians of all forces but gravity, of a system from `with_force_jacobians`.
 
-    anew is 1 to take the derivatives of the laws and keep them, 0 to use those kept.
+    renew is 1 to evaluate and store the derivatives of the laws, 0 to use the stored ones.
     """
     for i in range(s.forces.shape[0]):
         kind = s.forces[i]
         table, reals, own = s.table[kind.table :], s.reals[kind.reals :], kept[kind.kept :]
-        call_jacobian(kind.jacobian, kind.count, kind.stride, table, reals, q, qd, t, q.size, Q_q, Q_qd, anew, own)
+        call_jacobian(kind.jacobian, kind.count, kind.stride, table, reals, q, qd, t, q.size, Q_q, Q_qd, renew, own)
 
 
 @kernel

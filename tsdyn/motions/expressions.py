@@ -128,7 +128,7 @@ class Smooth:
     def is_plain(self) -> bool:
         """Whether its series at a time is that of the whole piece: of polynomials, sines, and exp of a linear function.
 
-        Series of other functions, such as 1 / (1 + t^2) and a bump exp(-t^2), tell little of later times.
+        Series of other functions, such as 1 / (1 + t^2) and a bump exp(-t^2), say little about later times.
         """
         return all(
             node._operation in PLAIN or (node._operation == "exp" and _is_linear(node._operands[0]))

@@ -126,7 +126,7 @@ class Timekeeper(Stopwatch):
         elif memory.implicit:
             self._in_driver(c.linear.kernels, timers.OF_STAGES)
         self._in_driver(memory.run.kernels, timers.OF_DRIVERS)
-        memory.settle(c, (self.notes.ctypes.data,))
+        memory.bind(c, (self.notes.ctypes.data,))
 
     def _in_series(self, x, forces):
         rows = [

@@ -21,10 +21,12 @@ def multiply_axes(graph, H, Y, values):
     """Add the products of axis rows with all rows to the blocks of S."""
     axes = graph.axes
     for i in range(axes.products.shape[0]):
+        # c e . (J'^-1 H^T) of a row at the body; of a weld, a component of it
         product, scale = axes.products[i], axes.scales[i]
         side, y = product.side, 16 * axes.rows[product.axis].row + 4
         x = get(Y, y - 1 - side) if side < 0 else total(times(four(H, side + 4), four(Y, y)))
         let(values, product.target, scale * x)
+    # Diagonal: -j / J
     for i in range(axes.rows.shape[0]):
         let(values, graph.diagonal[axes.rows[i].row], axes.values[i, AXIS_OWN])
 
@@ -35,6 +37,7 @@ def multiply_axes_both(graph, H, X, lower, upper):
     multiply_axes(graph, H, X, upper)
     axes = graph.axes
     for i in range(axes.products.shape[0]):
+        # The lower factor takes c e . X
         product = axes.products[i]
         h = four(axes.values[product.axis], AXIS_H)
         let(lower, product.target, total(times(h, four(X, product.side + 4))))
@@ -55,6 +58,7 @@ def gather_axes(graph, values, at, stride, scale, out):
     """out = scale c e . z of the axis rows, z at values[at + stride * b] being of body b."""
     axes = graph.axes
     for i in range(axes.rows.shape[0]):
+        # c e . omega'd
         e, b = axes.rows[i].row, axes.rows[i].body
         out[e] = scale * total(times(four(axes.values[i], AXIS_H), four(values, at + stride * b)))
 

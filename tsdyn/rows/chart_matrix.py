@@ -26,6 +26,7 @@ from .tolerances import COMPENSATED, ZERO_PIVOT
 def _multiply_both(graph, H, X, lower, upper):
     """Set H X^T in the blocks of the pattern as `factor_lu` expects: upper triangle, lower triangle transposed."""
     products = graph.products
+    # Blocks that no product reaches are fill
     for i in range(graph.pattern.shape[1]):
         let(upper, i, 0.0)
         let(lower, i, 0.0)
@@ -33,6 +34,7 @@ def _multiply_both(graph, H, X, lower, upper):
         product = products[i]
         left, right, rows, columns = product.left, product.right, product.rows, product.columns
         target, stride = product.target, product.stride
+        # A primitive with itself shares both bodies
         if product.same != 0:
             for r in range(rows):
                 more(upper, target + r, inner_both(H, left + 16 * r, X, right + 16 * r))
@@ -41,6 +43,7 @@ def _multiply_both(graph, H, X, lower, upper):
                     more(lower, target + c, inner_both(H, right + 16 * c, X, left + 16 * r))
                 target += stride
         else:
+            # Two primitives at one common body
             for r in range(rows):
                 for c in range(columns):
                     more(upper, target + c, inner(H, left + 16 * r, X, right + 16 * c))
@@ -52,6 +55,7 @@ def _multiply_both(graph, H, X, lower, upper):
 def rotate_rate(l, b, rate):
     """Return C rate of body b, rate in four lanes."""
     x, y, z, w = get(l.d, 4 * b), get(l.d, 4 * b + 1), get(l.d, 4 * b + 2), get(l.d, 4 * b + 3)
+    # C = d0 I - d~ + d d^T / d0, with d0 - 1 = w
     d = lanes(x, y, z)
     along = total(times(d, rate)) / (1.0 + w)
     return add(rate, sub(fma(d, splat(along), times(rate, splat(w))), cross(d, rate)))
@@ -63,12 +67,14 @@ def factorise_chart_matrix(graph, f, l):
     Y0 = l.rows0.Y
     for e in range(graph.sides.shape[0]):
         for k in range(2):
+            # X^T = C Y0, body by body
             at = 16 * e + 8 * k
             put(l.X, at, four(Y0, at))
             put(l.X, at + 4, rotate_rate(l, graph.sides[e, k], four(Y0, at + 4)))
     _multiply_both(graph, f.rows.H, l.X, l.lower, l.upper)
     if graph.parts.shape[0] > 0:
         _multiply_parts(graph, f.rows.H, l)
+    # Dropped and axis rows: one, or minus one, on the diagonal
     for values in (l.lower, l.upper):
         set_redundant_diagonal(graph, f, values)
         leave_axes_out(graph, values)
@@ -98,6 +104,7 @@ def pivot_loss(graph, l):
     Single pivots of a spherical joint depend on the axes of the ground frame; their product does not.
     """
     worst, axes = 0.0, graph.axes.rows
+    # Primitives, then welds, then axes
     for i in range(graph.products.shape[0]):
         if graph.products[i].same == 0:
             break  # those of a primitive with itself come first
@@ -123,22 +130,26 @@ def _multiply_parts(graph, H, l):
     """Add the products at the parts of split bodies."""
     t, lower, upper = stack(12), l.lower, l.upper  # t: C W0 of a body
     for i in range(graph.parts.shape[0]):
+        # A part of a hub has 1 / scale of its mass and inertia, so W is `scale` times as large
         part, scale = graph.parts[i], graph.scales[i]
         left, rows, right, columns = part.left, part.rows, part.right, part.columns
         target, stride, kind, b = part.target, part.stride, part.kind, part.body
         light, w = graph.inverse[WEIGHTS * b + W_MASS], WEIGHTS * b + W_ROTATION
+        # C W0 of the rotations of a weld
         if kind != ROWS and graph.bodies[b, 1] == 7:
             for c in range(3):
                 put(t, 4 * c, rotate_rate(l, b, four(graph.inverse, w + 4 * c)))
         for r in range(rows):
             for c in range(columns):
                 at, h = target + r * stride + c, left + 16 * r
+                # Two sets of rows at the part
                 if kind == ROWS:
                     other = right + 16 * c
                     if left != right or c >= r:
                         more(upper, at, scale * inner(H, h, l.X, other))
                     if left != right or c > r:
                         more(lower, at, scale * inner(H, other, l.X, h))
+                # Two welds: +-W0 on the translations, +-C W0 on the rotations
                 elif kind == WELDS:
                     if r < 3 and r == c:
                         more(upper, at, scale * light)
@@ -147,6 +158,7 @@ def _multiply_parts(graph, H, l):
                         more(upper, at, scale * t[4 * (c - 3) + r - 3])
                         more(lower, at, scale * t[4 * (r - 3) + c - 3])
                 else:
+                    # Rows and a weld: H C W0 in one factor, W0 H^T C^T in the other
                     turned = light * H[h + c]
                     if c >= 3:
                         o = 4 * (c - 3)

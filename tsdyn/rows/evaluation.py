@@ -17,7 +17,7 @@ def _run_loop(graph, reals, f, t, kind, loop, out, H):
 
 @kernel
 def _clear_other_rows(graph, out):
-    """out = 0 of welds and axis rows, which are none of Phi."""
+    """out = 0 of welds and axis rows, which aren't rows of Phi."""
     clear_welds(graph, out)
     if graph.axes.rows.shape[0] > 0:
         clear_axes(graph, out)
@@ -33,6 +33,7 @@ def clear_welds(graph, out):
 @kernel
 def evaluate_without_redundant(graph, reals, f, rows, t):
     """As `evaluate_rows`, where no row is redundant; reals being System.reals."""
+    # All kinds write their rows of Phi and H
     for i in range(graph.kinds.shape[0]):
         kind = graph.kinds[i]
         _run_loop(graph, reals, f, t, kind, kind.reduced, f.b, rows.H)
@@ -84,15 +85,16 @@ def evaluate_bias(graph, system, f, t):
         kind = graph.kinds[i]
         _run_loop(graph, system.reals, f, t, kind, kind.bias, f.gamma, f.rows.H)
     _clear_other_rows(graph, f.gamma)
-    keep_redundant(f, f.gamma, f.left.gamma)
+    keep_redundant(f, f.gamma, f.redundant.gamma)
 
 
 @kernel
 def evaluate_drift(graph, system, f, t, out):
     """out = Phi_t, with H (rd, omega') + Phi_t = 0."""
+    # Kinds without a motion write nothing
     for e in range(out.size):
         out[e] = 0.0
     for i in range(graph.kinds.shape[0]):
         kind = graph.kinds[i]
         _run_loop(graph, system.reals, f, t, kind, kind.drift, out, f.rows.H)
-    keep_redundant(f, out, f.left.drift)
+    keep_redundant(f, out, f.redundant.drift)

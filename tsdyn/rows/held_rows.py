@@ -6,15 +6,15 @@
 
 2 p.pdd is the centripetal part of 2 pdd, which cancels in gamma.
 
-A row that depends on others wherever these hold is held by them. One that depends on them in places, or nearly, is left
-by the motion, however well the other rows hold.
+A row that depends on others wherever these hold is satisfied by them. If it depends on them at some configurations
+only, or nearly, the motion violates it, however well the other rows hold.
 """
 
 import math
 
 from ..elements.loops.body_poses import POSE, R
 from ..jit.kernels import kernel
-from ..jit.questions import most
+from ..jit.predicates import most
 from .redundant_rows import length, square
 from .singularity import is_near_singular
 from .tolerances import FAINT, HELD, NO_RATE, RESTING
@@ -29,34 +29,36 @@ def has_redundant_rows(f):
 @kernel
 def redundant_rows_hold(graph, f, floor):
     """Return True if the redundant rows hold on the manifold, by the residuals of the last evaluation."""
-    return f.dropped[0] == 0 or f.selection.unheld <= floor + HELD * FAINT * _extent(graph, f)
+    return f.dropped[0] == 0 or f.selection.excess <= floor + HELD * FAINT * _extent(graph, f)
 
 
 @kernel
 def rates_hold(graph, f, q, qd, size):
     """Return True if they hold for velocities, by H and Phi_t of the last evaluation; size that of the scene, m."""
-    if f.dropped[0] == 0 or f.left.H.size == 0:
+    if f.dropped[0] == 0 or f.redundant.H.size == 0:
         return True
+    # Velocities of a scene at rest are compared with those of a fall through its extent
     speed, spin = _largest(graph, qd)
     far = _reach(graph, f, size)
     speed = max(speed, RESTING * math.sqrt(f.selection.push * far) + NO_RATE * far)
-    return _hold(graph, f, f.left.drift, q, qd, speed + far * spin, spin + speed / far)
+    return _hold(graph, f, f.redundant.drift, q, qd, speed + far * spin, spin + speed / far)
 
 
 @kernel
 def accelerations_hold(graph, f, q, qd, qdd, size):
     """Return True if they hold for accelerations, as `rates_hold`, by gamma of the last evaluation.
 
-    Next to a singular configuration accelerations have lost digits that say nothing of the redundant rows.
+    Near a singular configuration accelerations have too few digits to judge the redundant rows.
     """
-    if f.dropped[0] == 0 or f.left.H.size == 0 or is_near_singular(f, f.indicator.start):
+    if f.dropped[0] == 0 or f.redundant.H.size == 0 or is_near_singular(f, f.indicator.start):
         return True
+    # Terms: accelerations of bodies, of free fall, and centripetal ones
     push, twist = _largest(graph, qdd)
     speed, spin = _largest(graph, qd)
     far = _reach(graph, f, size)
     push = max(push, f.selection.push) + spin * (speed + far * spin) + NO_RATE * far
     twist = max(twist, f.selection.twist) + spin * spin
-    return _hold(graph, f, f.left.gamma, q, qdd, push + far * twist, twist + push / far)
+    return _hold(graph, f, f.redundant.gamma, q, qdd, push + far * twist, twist + push / far)
 
 
 @kernel
@@ -115,17 +117,20 @@ def _hold(graph, f, known, q, rates, most, fastest):
 
     A body whose rates are below FAINT of the largest, `most` and `fastest`, counts as one with these.
     """
-    H = f.left.H
+    H = f.redundant.H
     for i in range(f.dropped[0]):
+        # |H (rd, omega') + known| against the sum of its absolute terms
         residual, terms = known[i], abs(known[i])
         for side in range(2):
             b, at = graph.sides[f.dropped[1 + i], side], 16 * i + 8 * side
             if b == graph.bodies.shape[0]:
                 continue
+            # H_r rd
             k = graph.bodies[b, 0]
             residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
             terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + FAINT * most * length(H, at)
             if graph.bodies[b, 1] == 7:
+                # H_pi' omega'
                 e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
                 d0, d1, d2, d3 = rates[k + 3], rates[k + 4], rates[k + 5], rates[k + 6]
                 x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3  # 2 (x, y, z) = omega'

@@ -24,6 +24,7 @@ def weakest(graph, values):
     pattern, least = graph.pattern, 1.0
     kept = values[pattern.shape[1] :]
     for e in range(graph.diagonal.size):
+        # Reciprocal pivot times diagonal entry; not a number counts as a vanishing pivot
         share = values[graph.diagonal[e]] * kept[e]
         if not share * least < 1.0 and not kept[e] < 0.0:
             least = 1.0 / share
@@ -53,6 +54,7 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
             order[count] = i
             count += 1
         for j in range(i + 1):
+            # A = H W H^T over the bodies that two rows share
             x = 0.0
             for k in range(2):
                 for l in range(2):
@@ -60,12 +62,14 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
                     if body == graph.sides[j, l] and body < graph.bodies.shape[0]:
                         x += inner(H, 16 * i + 8 * k, Y, 16 * j + 8 * l)
             A[i * m + j] = x
+    # Scaled to a unit diagonal: pivots are squared sines of angles between rows
     for i in range(m):
         for j in range(i):
             size = A[i * m + i] * A[j * m + j]
             A[i * m + j] = A[j * m + i] = A[i * m + j] / math.sqrt(size) if size > 0.0 else 0.0
     for i in range(m):
         A[i * m + i] = 1.0 if A[i * m + i] > 0.0 else 0.0
+    # Cholesky with diagonal pivoting, until the wanted number of rows, or only negligible pivots, are left
     rank = count
     for k in range(count):
         best, pivot = -1.0, k
@@ -76,6 +80,7 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
             rank = k
             break
         order[k], order[pivot] = order[pivot], order[k]
+        # Subtract the pivot row from the rows that are left
         own = A[order[k] * m :]
         for i in range(k + 1, count):
             other = A[order[i] * m :]
@@ -83,6 +88,7 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
             if f != 0.0:
                 for j in range(k + 1, count):
                     other[order[j]] -= f * own[order[j]]
+    # The rows that are left depend on the others
     for i in range(rank, count):
         dropped[1 + i - rank] = order[i]
     return count - rank
@@ -94,11 +100,13 @@ def _choose(size, width, panel, kept, joints, share, A, order):
 
     joints (size,) is negative for rows that are kept in any case, the welds of a hub and the rows of axes.
     """
+    # The diagonal block, as a symmetric matrix
     for i in range(size):
         order[i] = i
         for j in range(i, size):
             A[i * size + j] = A[j * size + i] = panel[i * width + j]
     for k in range(size):
+        # Largest pivot relative to its diagonal entry; rows that must stay go first
         best, pivot = -1.0, k
         for i in range(k, size):
             row = order[i]
@@ -110,6 +118,7 @@ def _choose(size, width, panel, kept, joints, share, A, order):
         if not best > share:
             return k
         order[k], order[pivot] = order[pivot], order[k]
+        # Eliminate it from the rows that are left
         row = order[k]
         d = 1.0 / A[row * size + row]
         for i in range(k + 1, size):
@@ -123,17 +132,19 @@ def _choose(size, width, panel, kept, joints, share, A, order):
 def _eliminate_choosing(graph, values, share, dropped, A, order):
     """Factor S in place without rows whose relative pivots are below `share`; return the number of these rows.
 
-    As factorisation.factor; what is left in `values` serves nothing. Negative where a row that must be kept can't be.
+    As factorisation.factor; `values` are scratch afterwards. Negative if a row that must be kept depends on others.
     """
     pattern = graph.pattern
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     keep_diagonal(pattern, values)
     kept, count = values[pattern.shape[1] :], 0
     for j in range(heads.size):
+        # Which rows of this block are independent of each other and of earlier blocks
         first, width, panel = starts[j], widths[j], values[heads[j] :]
         size = starts[j + 1] - first
         rank = _choose(size, width, panel, kept[first:], graph.row[first:], share, A, order)
         for i in range(rank, size):
+            # A dropped row: zero in its row and column, one on the diagonal
             row = order[i]
             dropped[1 + count] = first + row
             count += 1
@@ -142,6 +153,7 @@ def _eliminate_choosing(graph, values, share, dropped, A, order):
             for r in range(row):
                 panel[r * width + row] = 0.0
             panel[row * width + row] = kept[first + row] = 1.0
+        # Elimination of the block, three pivots at a time, as factorisation.factor_blocks
         for k in range(0, size, 3):
             u = panel[k * (width + 1) :]
             if eliminate(u, size - k, width, width - k, kept[first + k :], 0.0) >= 0:
@@ -154,7 +166,7 @@ def _eliminate_choosing(graph, values, share, dropped, A, order):
 
 
 @kernel
-def _settle(f, count, wanted):
+def _accept(f, count, wanted):
     """Drop the selected rows if their number is the wanted one."""
     if count < 0 or (wanted >= 0 and count != wanted):
         return False
@@ -171,18 +183,20 @@ def select(graph, f, rows, wanted, least):
     Return True if that many exist; f.dropped then lists them in elimination order. Y and S are scratch.
     """
     m, count = graph.row.size, -1
+    # Few rows: choose among all at once
     if f.block.size >= m * m and graph.welds.shape[0] == 0:
         weigh_rows(graph, rows.H, rows.Y)
         share = ZERO_PIVOT if wanted >= 0 else least
         count = _choose_of_all(graph, rows.H, rows.Y, wanted, share, f.chosen, f.block, f.order)
-        return _settle(f, count, wanted)
+        return _accept(f, count, wanted)
+    # Many rows: within the blocks of the elimination order, with an ever smaller share until the number is right
     share = FIRST_SHARE if wanted >= 0 else least
     while True:
         weigh_rows(graph, rows.H, rows.Y)
         form_schur_complement(graph, rows.H, rows.Y, rows.S)
         leave_axes_out(graph, rows.S)
         count = _eliminate_choosing(graph, rows.S, share, f.chosen, f.block, f.order)
-        if _settle(f, count, wanted):
+        if _accept(f, count, wanted):
             return True
         share *= FEWER
         if count < wanted or share < least:

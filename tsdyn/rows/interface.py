@@ -56,7 +56,7 @@ from .redundant_rows import (
     save_selection,
     take_noted_selection,
 )
-from .reselection import choosing_anew, doubt_selection, factorise_rows, select_rows, selection_serves
+from .reselection import doubt_selection, factorise_rows, select_rows, selection_serves, with_reselection
 from .row_memory import (
     allocate_rows,
     allocate_tangent,
@@ -123,7 +123,6 @@ __all__ = [
     "allocate_tangent",
     "apply_multipliers",
     "balance_loads",
-    "choosing_anew",
     "clear_redundant",
     "constrain",
     "constrain_accelerations",
@@ -186,5 +185,6 @@ __all__ = [
     "take_reactions",
     "weigh",
     "weigh_bodies",
+    "with_reselection",
     "write_saddle_rows",
 ]

@@ -21,7 +21,7 @@ def clear_redundant(f, b):
 
 @kernel
 def keep_redundant(f, b, kept):
-    """Zero the right-hand sides of redundant rows, after keeping them; kept is one of `Left`."""
+    """Zero the right-hand sides of redundant rows, after storing them in `kept`, one of `RedundantRows`."""
     if kept.size > 0:
         for i in range(f.dropped[0]):
             kept[i] = b[f.dropped[1 + i]]
@@ -34,14 +34,15 @@ def leave_redundant_rows(graph, f, Phi, H):
     worst = -math.inf
     for i in range(f.dropped[0]):
         row = f.dropped[1 + i]
+        # Residual beyond HELD of the terms of the row
         over = abs(Phi[row]) - HELD * _position_terms(graph, f, H, row)
         if not over <= worst:
             worst = over
         for c in range(0, 16, 4):
-            if f.left.H.size > 0:
-                put(f.left.H, 16 * i + c, four(H, 16 * row + c))
+            if f.redundant.H.size > 0:
+                put(f.redundant.H, 16 * i + c, four(H, 16 * row + c))
             put(H, 16 * row + c, splat(0.0))
-    f.selection.unheld = worst
+    f.selection.excess = worst
     clear_redundant(f, Phi)
 
 
@@ -50,6 +51,7 @@ def _position_terms(graph, f, H, row):
     """Size of the terms of a row at the poses: |H_r| |r| + |H_pi'|."""
     terms = 0.0
     for side in range(2):
+        # |H_r| |r| + |H_pi'|
         b, at = graph.sides[row, side], 16 * row + 8 * side
         if b < graph.bodies.shape[0]:
             terms += math.sqrt(square(H, at) * square(f.poses, b * POSE + R)) + length(H, at + 4)

@@ -1,4 +1,4 @@
-"""Selection of redundant rows during a run: a new one where the kept rows come close to dependence."""
+"""Selection of redundant rows during a run: renewed where the kept rows come close to dependence."""
 
 import math
 from typing import NamedTuple
@@ -16,22 +16,22 @@ from .tolerances import WORSE, ZERO_PIVOT
 
 
 class Choice(NamedTuple):
-    """What `choose_anew` gets by one address."""
+    """What `reselect_rows` gets by one address."""
 
     graph: ConstraintGraph
     tangent: TangentWorkspace
 
 
-def choosing_anew(graph, tangent):
-    """The `TangentWorkspace` of a graph with which kernels can select rows anew."""
+def with_reselection(graph, tangent):
+    """The `TangentWorkspace` of a graph with which kernels can reselect rows."""
     if DEBUG:
-        tangent.anew[0] = 1
+        tangent.reselection[0] = 1
         return tangent
     words = len(image_of(Choice(graph, tangent)))
-    whole = np.zeros(words + 2, np.int64)  # what the view `anew` keeps alive
-    tangent = tangent._replace(anew=whole[words:])
+    whole = np.zeros(words + 2, np.int64)  # kept alive by its view `reselection`
+    tangent = tangent._replace(reselection=whole[words:])
     whole[:words] = image_of(Choice(graph, tangent))
-    tangent.anew[0], tangent.anew[1] = choose_anew.address, whole.ctypes.data
+    tangent.reselection[0], tangent.reselection[1] = reselect_rows.address, whole.ctypes.data
     return tangent
 
 
@@ -43,17 +43,19 @@ call_choose = caller(CHOOSE)
 @kernel
 def _choose(graph, reals, f, rows, t, metric):
     """Renew the selection of rows; f.b, H, Y and the factors of S follow it. True if S is nonsingular."""
+    # Every row, the dropped ones included, competes
     evaluate_all(graph, reals, f, rows, t)
     found = select(graph, f, rows, f.dropped[0], ZERO_PIVOT)
     leave_redundant_rows(graph, f, f.b, rows.H)
     regular = factorise_selected_rows(graph, f, rows, metric) < 0
+    # The new pivots are what later ones are measured by
     if found and regular:
         f.selection.weakest = weakest_of_all(graph, rows.S)
     return regular
 
 
 @callback(CHOOSE)
-def choose_anew(choice, reals, t, H, Y, S, metric):
+def reselect_rows(choice, reals, t, H, Y, S, metric):
     """Call `_choose` by address, 1 or 0: few scenes need it, and its code is as long as all other row code."""
     c = load_choice(choice)
     graph, f = c.graph, c.tangent
@@ -63,17 +65,17 @@ def choose_anew(choice, reals, t, H, Y, S, metric):
 
 
 if DEBUG:
-    _choose_by_address = _choose
+    _reselect_by_address = _choose
 else:
 
     @kernel
-    def _choose_by_address(graph, reals, f, rows, t, metric):
-        return call_choose(f.anew[0], f.anew[1], reals, t, rows.H, rows.Y, rows.S, metric) != 0
+    def _reselect_by_address(graph, reals, f, rows, t, metric):
+        return call_choose(f.reselection[0], f.reselection[1], reals, t, rows.H, rows.Y, rows.S, metric) != 0
 
 
 @kernel
 def doubt_selection(f):
-    """Have rows selected anew at the next chart."""
+    """Request a new selection of rows at the next chart."""
     f.selection.weakest = math.inf
 
 
@@ -98,9 +100,9 @@ def factorise_rows(graph, system, f, rows, t, metric):
     renewed, and f.b and H are those of the new one.
     """
     regular = factorise_selected_rows(graph, f, rows, metric) < 0
-    if f.dropped[0] == 0 or f.anew[0] == 0 or (regular and selection_serves(graph, f, rows)):
+    if f.dropped[0] == 0 or f.reselection[0] == 0 or (regular and selection_serves(graph, f, rows)):
         return regular  # rows may be left out for a moment of a scene that has no redundant ones
-    return _choose_by_address(graph, system.reals, f, rows, t, metric)
+    return _reselect_by_address(graph, system.reals, f, rows, t, metric)
 
 
 @kernel

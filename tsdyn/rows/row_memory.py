@@ -5,13 +5,13 @@ import numpy as np
 from ..elements.loops.body_poses import POSE
 from ..jit.aligned_arrays import zeros
 from ..sparse.elimination import lu_factors
-from .reselection import choosing_anew
-from .row_workspace import Friction, Indicator, Landing, Left, Rows, Selection, TangentWorkspace
+from .reselection import with_reselection
+from .row_workspace import Friction, Indicator, Landing, RedundantRows, Rows, Selection, TangentWorkspace
 from .tolerances import MOST_ROWS
 
 
 def allocate_tangent(graph, n, redundant=False, basis=False):
-    """Allocate a `TangentWorkspace`; the ground's pose is set for good, and a point mass has that orientation.
+    """Allocate a `TangentWorkspace`; the ground's pose is set once, and a point mass has its orientation.
 
     Where rows may be `redundant`, there is room to select among all at once, if they aren't too many. A form with a
     basis needs room for its frictions, too.
@@ -24,12 +24,12 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
     poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
     tangent = TangentWorkspace(
         poses, allocate_rows(graph), zeros(m), zeros(m), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n),
-        zeros(4), Landing(), Selection(), Indicator(), Left(*(zeros(k * left) for k in (16, 1, 1))),
+        zeros(4), Landing(), Selection(), Indicator(), RedundantRows(*(zeros(k * left) for k in (16, 1, 1))),
         *(np.zeros(size, np.int64) for size in (m + 1, m + 1, m + 1, m)),
         zeros(max(widest, m if choosing else 0) ** 2), _allocate_friction(graph, n, basis), np.zeros(2, np.int64),
     )  # fmt: skip
     reset_selection(graph, tangent)
-    return choosing_anew(graph, tangent) if redundant else tangent
+    return with_reselection(graph, tangent) if redundant else tangent
 
 
 def allocate_rows(graph):
@@ -58,8 +58,8 @@ def reset_selection(graph, tangent):
     set_selection(tangent, graph.dropped)
     selection = tangent.selection
     selection.weakest, selection.push, selection.twist = 1.0, 0.0, 0.0
-    if tangent.left[0].size:
-        for array in tangent.left:
+    if tangent.redundant[0].size:
+        for array in tangent.redundant:
             array.fill(0.0)
     indicator.start = indicator.end = indicator.largest = 0.0
 
@@ -67,7 +67,7 @@ def reset_selection(graph, tangent):
 def selection_parts(tangent):
     """The arrays and the records that `reset_selection` sets."""
     friction = tangent.friction
-    return [friction.lam, friction.load, tangent.dropped, *tangent.left], [tangent.selection, tangent.indicator]
+    return [friction.lam, friction.load, tangent.dropped, *tangent.redundant], [tangent.selection, tangent.indicator]
 
 
 def set_selection(tangent, redundant):

@@ -34,7 +34,7 @@ class Friction(NamedTuple):
     numbers: np.ndarray  # (2 (rows of Phi + n + k),)  multipliers without and with friction, scratch; friction_basis
 
 
-class Left(NamedTuple):
+class RedundantRows(NamedTuple):
     """The redundant rows, in the order of `TangentWorkspace.dropped`; of no size where none may be redundant."""
 
     H: np.ndarray  # (m * 16,)  as in `Rows`, at the last evaluation
@@ -54,7 +54,7 @@ class Selection(Record):
 
     weakest: float  # the smallest relative pivot of the others: its largest value since the selection
     saved: float  # the same before a passing selection
-    unheld: float  # by how much |Phi| of the redundant rows exceeds HELD of its terms, at most
+    excess: float  # by how much |Phi| of the redundant rows exceeds HELD of its terms, at most
     push: float  # the largest |W F| of a body, m/s^2
     twist: float  # and rad/s^2
 
@@ -81,19 +81,19 @@ class TangentWorkspace(NamedTuple):
     landing: Landing
     selection: Selection
     indicator: Indicator
-    left: Left
+    redundant: RedundantRows
     dropped: np.ndarray  # int64 (m + 1,)  how many rows are redundant, and which; independent_rows.select
     saved: np.ndarray  # int64 (m + 1,)  the same before a passing selection; redundant_rows.save_selection
     chosen: np.ndarray  # int64 (m + 1,)  scratch of independent_rows.select, as the next two
     order: np.ndarray  # int64 (m,)
     block: np.ndarray  # (largest block, or m, squared)
     friction: Friction
-    anew: np.ndarray  # int64 (2,)  address of reselection.choose_anew, and of its `Choice`; zero where it isn't needed
+    reselection: np.ndarray  # int64 (2,)  addresses of reselect_rows and its `Choice`; 0: not needed
 
 
 def no_tangent_workspace():
     """The `TangentWorkspace` of nothing, for its type."""
     none, whole, square = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
     friction = Friction(*[none] * 7, square, square, whole, none)
-    rows, records = Rows(none, none, none), (Landing(), Selection(), Indicator(), Left(none, none, none))
+    rows, records = Rows(none, none, none), (Landing(), Selection(), Indicator(), RedundantRows(none, none, none))
     return TangentWorkspace(none, rows, *[none] * 6, *records, whole, whole, whole, whole, none, friction, whole)

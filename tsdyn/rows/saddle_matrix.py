@@ -13,6 +13,7 @@ from .tolerances import SADDLE_PIVOT
 @kernel
 def write_saddle_rows(graph, f, s):
     """Set the matrix to H and H^T at the present H, axis rows, and ones on the diagonal of redundant rows."""
+    # Zeros for fill
     for i in range(s.graph.pattern.shape[1]):
         let(s.upper, i, 0.0)
         let(s.lower, i, 0.0)
@@ -26,12 +27,14 @@ def _write_rows(graph, f, s):
     H = f.rows.H
     for e in range(graph.sides.shape[0]):
         for k in range(2):
+            # H of one side of the row; step is 1 along a row of the block and its width along a column
             base, step = s.graph.sides[e, k, 0], s.graph.sides[e, k, 1]
             if base >= 0:
                 for c in range(6 if graph.bodies[graph.sides[e, k], 1] == 7 else 3):
                     x = H[16 * e + 8 * k + c + c // 3]
                     let(s.upper, base + step * c, x)
                     let(s.lower, base + step * c, x)
+    # A dropped row has a zero multiplier
     for i in range(f.dropped[0]):
         at = s.graph.diagonal[f.dropped[1 + i]]
         s.upper[at] = s.lower[at] = 1.0
@@ -43,6 +46,7 @@ def _write_axes(s):
     axis = stack(3)
     for i in range(s.graph.axes.shape[0]):
         one = s.graph.axes[i]
+        # c e beside the block of the body, and - c^2 e e^T of the raised inertia taken back: J' + c^2 e e^T
         axis[0], axis[1], axis[2] = one.x, one.y, one.z
         for r in range(3):
             let(s.upper, one.base + one.step * r, axis[r])

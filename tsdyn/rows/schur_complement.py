@@ -75,18 +75,21 @@ def more(values, at, x):
 def form_schur_complement(graph, H, Y, values):
     """Set the upper triangle of S = H Y^T in the blocks of the pattern, with zeros for fill."""
     products = graph.products
+    # Fill is zero
     for i in range(graph.pattern.shape[1]):
         let(values, i, 0.0)
     for i in range(products.shape[0]):
         product = products[i]
         left, right, rows, columns = product.left, product.right, product.rows, product.columns
         target, stride = product.target, product.stride
+        # Rows of one primitive share both bodies: upper triangle of the block
         if product.same != 0:
             for r in range(rows):
                 for c in range(r, columns):
                     more(values, target + c, inner_both(H, left + 16 * r, Y, right + 16 * c))
                 target += stride
         else:
+            # Rows of two primitives share one body
             for r in range(rows):
                 for c in range(columns):
                     more(values, target + c, inner(H, left + 16 * r, Y, right + 16 * c))
@@ -99,11 +102,13 @@ def form_schur_complement(graph, H, Y, values):
 def _multiply_parts(graph, H, Y, values):
     """Add the products at the parts of split bodies."""
     for i in range(graph.parts.shape[0]):
+        # A part of a hub has 1 / scale of its mass and inertia, so W is `scale` times as large
         part, scale = graph.parts[i], graph.scales[i]
         left, rows, right, columns = part.left, part.rows, part.right, part.columns
         target, stride, kind, weights = part.target, part.stride, part.kind, WEIGHTS * part.body
         for r in range(rows):
             for c in range(columns):
+                # Rows with rows; with the welds of the part, whose H is +-I; welds with welds
                 if kind == ROWS:
                     if left != right or c >= r:
                         more(values, target + r * stride + c, scale * inner(H, left + 16 * r, Y, right + 16 * c))
@@ -124,10 +129,13 @@ def factorise_selected_rows(graph, f, rows, metric):
 
     metric as in `factorise_rows`.
     """
+    # Y = W H^T,  S = H Y
     weigh_rows(graph, rows.H, rows.Y)
     form_schur_complement(graph, rows.H, rows.Y, rows.S)
+    # Dropped rows are zero: one on the diagonal
     if f.dropped[0] > 0:
         set_redundant_diagonal(graph, f, rows.S)
+    # Axis rows, for dynamics only
     if graph.axes.rows.shape[0] > 0:
         weigh_axes(graph, rows.Y)
         if metric == METRIC:
@@ -147,6 +155,7 @@ def solve_rows(graph, rows, b):
 def _gather(graph, H, Z, out):
     """out = H Z."""
     for e in range(graph.sides.shape[0]):
+        # H_a Z_a + H_b Z_b
         at, a, b = 16 * e, 8 * graph.sides[e, 0], 8 * graph.sides[e, 1]
         f = fma(four(H, at), four(Z, a), times(four(H, at + 4), four(Z, a + 4)))
         g = fma(four(H, at + 8), four(Z, b), times(four(H, at + 12), four(Z, b + 4)))
@@ -157,6 +166,7 @@ def _gather(graph, H, Z, out):
 def _scatter(graph, Y, lam, Z):
     """Z <- Z - Y^T lam."""
     for e in range(graph.sides.shape[0]):
+        # Z_a and Z_b of each row
         f = splat(-lam[e])
         for k in range(2):
             at, z = 16 * e + 8 * k, 8 * graph.sides[e, k]
@@ -237,6 +247,7 @@ def constrain(graph, rows, c, Z, lam):
     lam = S^-1 (H Z + c),    Z <- Z - Y^T lam
     """
     _gather(graph, rows.H, Z, lam)
+    # Residual H Z + c
     worst = 0.0
     for e in range(lam.size):
         lam[e] += c[e]

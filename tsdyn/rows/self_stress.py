@@ -19,10 +19,12 @@ def self_stress(graph, f, H, i):
     row = f.dropped[1 + i]
     for c in range(f.Z.size):
         f.Z[c] = 0.0
+    # W h^T of the dropped row h
     for side in range(2):
         body = graph.sides[row, side]
         if body < graph.bodies.shape[0]:
             weigh(graph.inverse, body, H, 16 * row + 8 * side, f.Z, 8 * body)
+    # z = -S^-1 H W h^T for the kept rows
     multiply_rows(graph, f.rows, f.Z, f.b)
     solve_rows(graph, f.rows, f.b)
     largest = 1.0

@@ -29,6 +29,7 @@ def solve_friction_series(graph, f, omega, at, stride, k):
     """
     r = f.friction
     _complete(graph, f, omega, at, stride, k, True)
+    # N~ lam = residual,  Z = -X^T lam
     solve_product(graph, r.lower, r.upper, f.b)
     for i in range(f.Z.size):
         f.Z[i] = 0.0
@@ -38,6 +39,7 @@ def solve_friction_series(graph, f, omega, at, stride, k):
 @kernel
 def _complete(graph, f, omega, at, stride, k, correction):
     """The residuals f.b of all rows, from those of the primitives."""
+    # Welds: zero. Axis rows: (k + 1) c e . omega'_{k+1}, and lam_e of a first solution
     clear_welds(graph, f.b)
     gather_axes(graph, omega, at, stride, k + 1.0, f.b)
     if correction:

@@ -32,6 +32,7 @@ def is_near_singular(f, share):
 @kernel
 def refinements(indicator):
     """How often multipliers are refined for the condition of S."""
+    # S loses digits in proportion to the reciprocal of the indicator
     if indicator > WORST_CONDITIONED:
         return 0 if indicator > ILL_CONDITIONED else 1
     return 2 if indicator > HARDLY_CONDITIONED else 4

@@ -26,10 +26,10 @@ WORSE = 0.1
 # hold (docs/theory.md). Points and axes that are typed with ten digits hold. Laws of random scenes have 1e-9, but may
 # count the terms of a rotation as less than half.
 HELD = 2e-10
-# Terms that are themselves rounding: a row's are taken for this share of the largest in the scene at least.
+# Terms of a row count as at least this fraction of the largest in the scene: smaller ones are themselves rounding.
 FAINT = 1e-3
-# Velocities of a scene at rest, over those of a fall through its extent under its loads, and over that extent (1/s, or
-# 1/s^2 for accelerations): less is rounding of rounding.
+# Velocities of a scene at rest over those of a fall through its extent under its loads; rates over that extent (1/s, or
+# 1/s^2 for accelerations): smaller ones are rounding.
 RESTING, NO_RATE = 1e-9, 1e-20
 
 # Rows: scenes with more are searched for redundant rows within the blocks of the elimination order, not all at once

@@ -18,6 +18,7 @@ from .tolerances import SLIVER
 def next_stop(r, log):
     """The next time at which a step has to end, but for the end of the run; inf where there is none."""
     i = r.numbers.next_stop
+    # Stops behind, and changes of functions that begin before t
     while i < log.stops.shape[0] and (log.stops[i, 0] <= r.clock.t or log.stops[i, 2] < r.clock.t):
         i += 1
     r.numbers.next_stop = i
@@ -30,9 +31,11 @@ def fixed_end(r, stop):
 
     t_k = t_origin + k h, but for steps that end at stops; a stop within SLIVER h, or rounding, of t_k stands for it.
     """
+    # End k of the grid, counted without steps that stops have cut
     done, h = r.numbers.steps + 1 - r.numbers.cuts, r.clock.h
     last = done == r.numbers.steps_wanted
     t1 = r.clock.t_end if last else r.clock.t_origin + done * h
+    # A stop within a sliver of the grid point replaces it
     near = max(SLIVER * h, TOGETHER * abs(t1))
     if stop < t1 - near or (last and stop < t1):
         return stop, False, True
@@ -42,6 +45,7 @@ def fixed_end(r, stop):
 @kernel
 def take_pieces(system, r, log):
     """Let piecewise motions and loads stay with their pieces up to the next stop."""
+    # The piece is the one half way to the next stop
     end = min(next_stop(r, log), r.clock.t_end)
     hold_pieces(system, 0.5 * (r.clock.t + end))
 

@@ -16,13 +16,15 @@ from .tolerances import LANDING, LITTLE, SLIDES
 
 
 @kernel
-def _rubbed(c, friction, r, scale, ahead):
+def _friction_power(c, friction, r, scale, ahead):
     """-Q . qd of a friction at scale qd + ahead qdd."""
     graph, qd, Q, power = c.graph, c.work.qd, stack(14), 0.0
+    # Power of friction for unit normal load at scaled velocities
     for i in range(qd.size):
         qd[i] = scale * r.now[1, i] + ahead * r.now[2, i]
     unit_friction(c.system, friction, r.now[0], qd, r.clock.t, Q)
     for k in range(2):
+        # -Q.qd, body by body
         b = body_of(friction, k)
         if b < graph.bodies.shape[0]:
             at = graph.bodies[b, 0]
@@ -42,11 +44,14 @@ def until_rest(c, r, h):
     r.numbers.still = 0
     for i in range(c.graph.frictions.shape[0]):
         friction = c.graph.frictions[i]
-        now = _rubbed(c, friction, r, 1.0, 0.0)
-        if not _rubbed(c, friction, r, 2.0, 0.0) < SLIDES * now:
+        # mu |v| now
+        now = _friction_power(c, friction, r, 1.0, 0.0)
+        # At rest, friction grows faster than in proportion to velocity
+        if not _friction_power(c, friction, r, 2.0, 0.0) < SLIDES * now:
             r.numbers.still += 1
         elif now < math.inf:
-            slowing = now - _rubbed(c, friction, r, 1.0, LITTLE * h)
+            # Deceleration by a small part of the step: rest is at h now / slowing parts from here
+            slowing = now - _friction_power(c, friction, r, 1.0, LITTLE * h)
             if slowing > LITTLE * now:
                 h = min(h, LANDING * LITTLE * h * now / slowing)
     copy(r.now[1], c.work.qd)

@@ -24,6 +24,7 @@ call_chart = caller("pdpppp")
 @long_kernel
 def evaluate(context, w, r, t, x, y, yd, xd):
     """q, qd, qdd, yd (and xd) at (t, x, y). Status."""
+    # Positions, then velocities and accelerations, then qdd
     status = call_place(r.kernels.place, context, t, x)
     if status == 0:
         status = call_accelerate(r.kernels.accelerate, context, t, y, yd, xd)
@@ -38,15 +39,17 @@ def evaluate(context, w, r, t, x, y, yd, xd):
 def between(context, w, r, t, block):
     """q, qd, qdd at a time within the step of this block. Status. xd, the next step's, is left alone.
 
-    Placed twice: Newton's method comes from further away than in a run, and ends nearer to rounding from nearby.
+    Positions are solved for twice: Newton's method starts further away than in a run, and ends closer to rounding when
+    repeated from nearby.
     """
-    status = _place(context, w, r, t, t, 1.0, block)
+    status = _place_share(context, w, r, t, t, 1.0, block)
     return _evaluate_there(context, w, r, t, block) if status == 0 else status
 
 
 @kernel
-def _place(context, w, r, t, when, share, block):
+def _place_share(context, w, r, t, when, share, block):
     """Place a share of the coordinates at t, at another time if the share is not all; x and y of the step. Status."""
+    # Coordinates of the chart by the interpolant
     s = (t - block[B_START]) / block[B_H]
     call_value(r.kernels.value, s, block[B_H], w.q.size, r.xs.size, r.ys.size, block[B_DATA:], r.xs, r.ys)
     if share != 1.0:
@@ -59,7 +62,8 @@ def _place(context, w, r, t, when, share, block):
 def _evaluate_there(context, w, r, t, block):
     h, data = block[B_H], block[B_DATA:]
     status = evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
-    if status == 0 and r.kernels.second != 0:  # what f would amplify in a stiff scene
+    # Accelerations by the interpolant: the right-hand side of a stiff scene would amplify its error
+    if status == 0 and r.kernels.second != 0:
         s = (t - block[B_START]) / h
         call_value(r.kernels.second, s, h, w.q.size, r.xs.size, r.ys.size, data, r.xs, r.yds)
         call_complete(r.kernels.complete, context, r.yds)
@@ -92,6 +96,7 @@ def _move(part, store, i, out):
 @long_kernel
 def _warm(c, store, out):
     w, l, f, friction, i = c.work, c.chart, c.tangent, c.tangent.friction, 0
+    # Starts of Newton's methods: u, v, multipliers and normal loads
     for part in (w.u, w.v, friction.lam, friction.load):
         i = _move(part, store, i, out)
     if c.saddle.K.size > 0:  # stages begin with the factors of N and S
@@ -102,6 +107,7 @@ def _warm(c, store, out):
         else:
             l.state.made = int(store[i])
         i += 1
+    # B and T of the null-space form
     for part in (w.B, w.T):
         for a in range(part.shape[0]):
             for b in range(part.shape[1]):
@@ -148,10 +154,12 @@ def read(context, run, t, rows, blocks, charts, points, out):
     c, r = load(context), load_run(run)
     w, chart = c.work, -1
     for i in range(t.size):
+        # Every time begins at the same state of its chart
         block = blocks[rows[i]]
         if int(block[B_CHART]) == chart:
             bring_back(c, r.warm)
         else:
+            # A new chart: rebuilt at q0 with its selection of rows
             chart = int(block[B_CHART])
             copy(points[chart, : w.q.size], w.q)
             take_noted_selection(c.tangent, points[chart, w.q.size :])
@@ -161,6 +169,7 @@ def read(context, run, t, rows, blocks, charts, points, out):
             if status != 0:
                 return status
             keep(c, r.warm)
+        # The state at t
         recall(c.system, block)
         status = _go_to(context, c, r, t[i], charts[chart, 0], block)
         if status != 0:
@@ -171,19 +180,21 @@ def read(context, run, t, rows, blocks, charts, points, out):
 
 @kernel
 def _go_to(context, c, r, t, began, block):
-    """`between`, from where the chart began, in so many legs that none of them needs new matrices again. Status.
+    """`between`, from the base point of the chart, in legs short enough to need no further factorisation. Status.
 
-    Where branches are close, Newton's method from far away may end on another one than that of the run.
+    Newton's method from far away may end on another branch of the constraints than that of the run.
     """
     w, status = c.work, 0
+    # Fewer legs first; more where a leg needed many factorisations, a sign of a step too long
     for legs in LEGS:
         if legs > 1:
             bring_back(c, r.warm)
         status, most = 0, 0
         for leg in range(1, legs + 1):
             if status == 0:
+                # Chart coordinates in proportion, at a time in proportion
                 made, share = w.counters.factorizations, leg / legs
-                status = _place(context, w, r, t, began + share * (t - began) if leg < legs else t, share, block)
+                status = _place_share(context, w, r, t, began + share * (t - began) if leg < legs else t, share, block)
                 most = max(most, w.counters.factorizations - made)
         if status == 0 and most <= FEW:
             break

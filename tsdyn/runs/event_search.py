@@ -34,12 +34,12 @@ class Track:
     """What is known of one function up to the last step's end."""
 
     def __init__(self, value):
-        self.value = self.end = value  # at that time, and at the end of the step that is looked at
+        self.value = self.end = value  # at that time, and at the end of the present step
         self.sign = 0.0  # the last it had; 0 for none yet
         self.significant = None  # time and value at which it had that sign
         self.zero = None  # time of the last zero, if it has had no sign since
         self.passed = self.pending = False  # that zero is a start within rounding; may become an event on being left
-        self.noise = 0.0  # rounding error of the values, where it has been found out
+        self.noise = 0.0  # rounding error of the values, once measured
         self.degree = 0  # that the last step needed
 
 
@@ -49,7 +49,7 @@ class Watch:
     Attributes
     ----------
     t : float, s
-        The time up to which the run has been looked at.
+        The time up to which events have been searched.
     """
 
     def __init__(self, events, packed, reader, start):
@@ -57,7 +57,7 @@ class Watch:
         self.start = self.t = start
         self.state = self.memory = None  # at t, and what is remembered of it: joints' angles, and what forces do
         self.angles = handles_of(packed).count
-        self.beside = None  # the start of the step that is looked at, for `Instant`
+        self.beside = None  # the start of the present step, for `Instant`
         self.tracks = None
         self.list = [[] for _ in events]
         rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
@@ -79,30 +79,32 @@ class Watch:
     def advance(self, memory, log, most):
         """As `Memory.advance`; the Status, and what there is to say of it."""
         run = memory.run
+        # The first call begins the run and takes the values at its start
         if not run.numbers.begun:
             status = memory.advance(log, -1)
             if not run.numbers.begun:
                 return status, ""
             self.state, self.memory = run.now.copy(), run.remembered.copy()
-            self._look_from()
+            self._note_start()
             if self.tracks is None:
                 try:
                     self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
                 except Failed as failure:
                     raise InvalidArgument(f"events: {failure}") from failure.__cause__
         stiff = run.numbers.stiff
+        # One step at a time, searched before the next one
         for _ in range(most):
             done = run.numbers.steps
             status = memory.advance(log, 1)
             if run.numbers.steps > done:
                 try:
-                    last = self._look(run, log)
+                    last = self._search_step(run, log)
                 except Failed as failure:
                     return Status.EVENT_FAILED, str(failure)
                 if last is not None:
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
             full = run.numbers.chart_rows + 2 >= len(log.charts)
-            if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # what has been found stiff is told
+            if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
         return status, ""
 
@@ -130,12 +132,12 @@ class Watch:
             self.list[index].append(Occurrence(float(t), index, state))
 
     def go_back(self, run, log):
-        """Let the run end where it has been looked at last."""
+        """Let the run end where events were searched last."""
         if self.state is not None and run.clock.t > self.t:
             run.remembered[:] = self.memory
             self._end(run, log, self.t, self.state, self.t)
 
-    def _look_from(self):
+    def _note_start(self):
         self.beside = self.t, self.state, self.memory[: self.angles]
 
     def _instant(self, t, state):
@@ -144,31 +146,35 @@ class Watch:
     def _value(self, i, t, state):
         return self.events[i].value(t, self._instant(t, state))
 
-    def _look(self, run, log):
+    def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
-        self._look_from()
+        self._note_start()
         before, self.memory = self.memory, run.remembered.copy()
         try:
-            return self._looked(run, log, Inside(self.reader, run, log, self.t, self.state))
+            return self._locate(run, log, Inside(self.reader, run, log, self.t, self.state))
         except KeyboardInterrupt:
             self.memory = before
             raise
 
-    def _looked(self, run, log, step):
+    def _locate(self, run, log, step):
         found, failure, end = [], None, step.t1
         step.degree = self._degree(step)
         for i in range(len(self.events)):
+            # Times that bracket the zeros of event i
             points, failed = self._points(i, step, end)
             if failed is not None:
                 failure, end = failed, min(end, failed.t)
             try:
+                # Events among them
                 mine = self._walk(i, step, points)
             except Failed as failed:
                 mine, failure, end = [], failed, min(end, failed.t)
             found += mine
+            # The run ends with the event that reaches its limit
             last = self.events[i].limit - len(self.list[i])
             if len(mine) >= last:
                 end = min(end, mine[int(last) - 1].t)
+        # Events in order of time, up to the one that ends the run or the first failure
         for each in sorted(found, key=lambda each: each.t):
             if failure is not None and each.t >= failure.t:
                 break
@@ -195,6 +201,7 @@ class Watch:
                     good.append(t)
             return values
 
+        # A function that fails at some time is searched up to the last time before
         while end > step.t0:
             search = Search(sample, lambda t: self._shaken(i, step, t), track.noise)
             try:
@@ -222,6 +229,7 @@ class Watch:
         """The occurrences of event i among these points."""
         track, direction, found = self.tracks[i], self.events[i].direction, []
         (before, value), *rest = points
+        # A value near zero at the start of the run is a zero there, within rounding
         if track.sign == 0.0 and track.zero is None:  # the run's first step
             if 0.0 < abs(track.value) <= START_ZERO * max(abs(value) for _, value in points):
                 track.zero, track.passed, track.pending = before, value != 0.0, value == 0.0
@@ -229,6 +237,7 @@ class Watch:
                 rest = points
         for t, value in rest:
             sign = float(value > 0.0) - float(value < 0.0)
+            # A zero: an event at once, or when it is left, if the direction counts
             if value == 0.0:
                 if track.zero is None or track.passed:
                     late = track.sign == 0.0 and t > self.start  # the start's own zero, within rounding
@@ -236,10 +245,11 @@ class Watch:
                     if not track.pending:
                         found.append(self._zero(i, step, t, before))
                 track.zero = t
+            # A sign: leaves a zero, or changes
             elif abs(value) > track.noise:
                 if track.zero is not None:
                     if track.pending and direction * sign >= 0.0:
-                        found.append(self._left(i, step, track.zero, (t, value)))
+                        found.append(self._leave(i, step, track.zero, (t, value)))
                     track.zero, track.passed, track.pending = None, False, False
                 elif sign == -track.sign and direction * sign >= 0.0:
                     found += self._root(i, step, t, value)
@@ -251,6 +261,7 @@ class Watch:
     def _shaken(self, i, step, t):
         """By how much the value of event i at t changes with rounding errors of the state."""
         try:
+            # Rounding of the state, in three random directions
             state, value = step.at(t), self._at(i, step, t)
             size = SHAKEN * np.abs(state).max(axis=1, keepdims=True)
             shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
@@ -261,6 +272,7 @@ class Watch:
     def _zero(self, i, step, t, other):
         """The `Occurrence` at a zero, or at the end next to another time of the zeros around it."""
         if t != other and self._at(i, step, t) == 0.0:
+            # Bisection for the end of an interval of zeros
             while t != (middle := 0.5 * (t + other)) != other:
                 if self._at(i, step, middle) == 0.0:
                     t = middle
@@ -268,7 +280,7 @@ class Watch:
                     other = middle
         return Occurrence(t, i, step.at(t))
 
-    def _left(self, i, step, t, last):
+    def _leave(self, i, step, t, last):
         """The `Occurrence` where event i leaves a zero: that at t, or one that is so within rounding."""
         value = self._at(i, step, t)
         if value != 0.0 and (value < 0.0) != (last[1] < 0.0):
@@ -279,6 +291,7 @@ class Watch:
     def _root(self, i, step, t1, b):
         """The change of sign up to t1, where event i has the value b; none if it is that of the run's start."""
         track = self.tracks[i]
+        # From the last value with a sign, or from the step's start
         t0, a = max(track.significant, (step.t0, track.value))
         if a == 0.0 or (a < 0.0) == (b < 0.0):
             return [Occurrence(t0, i, step.at(t0))]
@@ -295,16 +308,18 @@ class Watch:
         """Where event i changes its sign between two times with values."""
         from scipy.optimize import brentq  # takes a while to import
 
+        # Values of order one, by a power of two
         known, (t0, a), (t1, b) = dict((first, last)), first, last
         unit = math.ldexp(1.0, min(-math.frexp(max(abs(a), abs(b)))[1], MOST_SCALED))
 
         def value(t):  # of size one: Brent's method multiplies three of them
             return unit * (known[t] if t in known else self._at(i, step, t))
 
+        # Brent's method, as near as numbers of this size allow
         least = max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
         root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
         shift = least + ROOT * abs(root)
-        # a run that goes on from a terminal event had better find it behind itself
+        # a run that continues from a terminal event must not find it again
         ends, side = self.events[i].limit < math.inf, math.copysign(1.0, b)
         while ends and root + shift < t1 and side * value(root) <= 0.0:
             root, shift = root + shift, 2.0 * shift

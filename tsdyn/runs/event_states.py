@@ -19,6 +19,7 @@ class Inside:
     def states(self, times):
         """States (3, n) at times (k,), None where there is none."""
         times, known = times.tolist(), self._known
+        # States that are known already are not read again
         missing = [t for t in times if t not in known]
         if missing:
             found = dict(zip(missing, self._read(np.array(missing)), strict=True))

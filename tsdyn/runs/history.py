@@ -21,6 +21,7 @@ class StepLog:
         if _few(rows, self.chunks):
             self.chunks.append(rows.copy())
             return
+        # An accepted step ends where the next one begins: its start is enough
         accepted = rows[:, 2] == 1.0
         t, other = rows[accepted, 0].copy(), np.flatnonzero(~accepted)
         ends = np.append(t[1:], np.nan)

@@ -17,8 +17,8 @@ INTERRUPTED, PASSAGE = int(Status.INTERRUPTED), int(Status.PASSAGE)
 
 
 @callback(PLACE)
-def place(context, t, x):
-    """In place of `place` and `linearise`."""
+def place_interrupted(context, t, x):
+    """Stand-in of `place` and `linearise`."""
     return INTERRUPTED
 
 
@@ -65,14 +65,15 @@ def reach(context, t, h):
 
 
 STAND_INS = {
-    "place": place, "accelerate": accelerate, "start_chart": start_chart, "reach": reach, "accelerate_here": reach,
-    "pass_singular": reach, "expand": expand, "linearise": place, "reduce": factorise, "factorise": factorise,
-    "residual": residual, "factorise_stages": factorise_stages,
+    "place": place_interrupted, "accelerate": accelerate, "start_chart": start_chart, "reach": reach,
+    "accelerate_here": reach, "pass_singular": reach, "expand": expand, "linearise": place_interrupted,
+    "reduce": factorise, "factorise": factorise, "residual": residual, "factorise_stages": factorise_stages,
 }  # fmt: skip
 
 
 def call(kernel, arguments, called):
     """Return kernel(*arguments); Ctrl-C ends it between two calls by the addresses in the records `called`."""
+    # Addresses that the driver calls, and their stand-ins
     places = [(record, name) for record in called for name in STAND_INS if getattr(record, name, 0)]
     addresses = [getattr(*place) for place in places]
     stand_ins = [STAND_INS[name].address for _, name in places]
@@ -90,6 +91,7 @@ def _enter(places, addresses):
 
 def advance(kernel, arguments, run, called):
     """`call` for some steps of a run: interrupted ones leave the run where it was before them."""
+    # State at the end of the last slice
     parts = run.now, run.remembered, words(run.clock), words(run.numbers)
     before = [part.copy() for part in parts]
     try:

@@ -9,12 +9,14 @@ from ..model.joint_turns import angle_after
 def record(r, log, t, q, qd, qdd):
     """Record one output, at the last accepted state or inside the step."""
     n, i = q.size, r.numbers.rows
+    # t, q, qd, qdd, angles of joints and memories of forces
     row = log.out[i]
     row[0] = t
     for j in range(n):
         row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]
     for j in range(r.remembered.size):
         row[1 + 3 * n + j] = r.remembered[j]
+    # Within a step angles are extrapolated from its start
     if t != r.clock.t:
         for j in range(r.joints.shape[0]):
             row[1 + 3 * n + j] = angle_after(r, j, q, qd, t - r.clock.t)

@@ -102,11 +102,13 @@ class Recorder:
     def collect(self):
         """Take what the slice has written, so that the driver begins at the first rows again."""
         run, (out, blocks) = self.run.numbers, self._parts
+        # A store takes outputs and steps at once
         if self.archive is not None:
             self.archive.add("outputs", self.out[: run.rows])
             self.archive.add("steps", self.log.history[: run.history])
             self._count += run.rows
             run.rows = 0
+        # Parts are joined at the end
         if self.per_step and run.rows:
             out.append(self.out[: run.rows])
             run.rows = 0
@@ -128,6 +130,7 @@ class Recorder:
     def _pass_charts(self):
         """Log the charts that have been left, and let the present one be the first."""
         run, charts, points = self.run.numbers, self.charts, self.points
+        # The chart that is still open goes on as the first
         left = run.chart_rows
         self._log_charts(charts[:left].copy())
         charts[0], points[:1] = charts[left], points[left : left + 1]
@@ -145,5 +148,5 @@ def _doubled(rows):
 
 
 def _joined(parts, width):
-    """The parts in one array, which is none of theirs."""
+    """A new array of all parts."""
     return parts[0].copy() if len(parts) == 1 else np.concatenate((np.empty((0, width)), *parts))

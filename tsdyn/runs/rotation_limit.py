@@ -16,12 +16,14 @@ def longest_step(bodies, now):
     longest = math.inf
     for b in range(bodies.shape[0]):
         if bodies[b, 1] == 7:
+            # |pd| and |pdd| of the Euler parameters
             speed, gain = 0.0, 0.0
             for c in range(bodies[b, 0] + 3, bodies[b, 0] + 7):
                 speed += now[1, c] * now[1, c]
                 gain += now[2, c] * now[2, c]
             gain = 2.0 * math.sqrt(max(gain - speed * speed, 0.0))  # pdd is pd.pd along p, alpha / 2 across
             speed = 2.0 * math.sqrt(speed)
+            # MOST_TURN = speed h + gain h^2 / 2, solved for h without cancellation
             fast = speed + math.sqrt(speed * speed + 2.0 * gain * MOST_TURN)
             if fast > 0.0:
                 longest = min(longest, 2.0 * MOST_TURN / fast)
@@ -33,6 +35,7 @@ def too_far(bodies, now, qd, h):
     """Whether a body has turned by more than TOO_FAR, from its speeds at both ends."""
     for b in range(bodies.shape[0]):
         if bodies[b, 1] == 7:
+            # Mean speed of both ends times h
             one, other = 0.0, 0.0
             for c in range(bodies[b, 0] + 3, bodies[b, 0] + 7):
                 one += now[1, c] * now[1, c]

@@ -42,7 +42,7 @@ class Memory:
     run : Run
     """
 
-    reason = ""  # of the end of a run: told by its status
+    reason = ""  # of the end of a run, beyond its status
     engine = None  # that it is laid out for
     room = None  # of a first slice: a `brief.Room`
     mark = None  # of the plan that has entered it last
@@ -51,7 +51,7 @@ class Memory:
     def __init__(self, prepared, graph, context, run):
         self.packed, self.weight, self.graph, self.run = prepared.packed, prepared.n, graph, run
         self.work = context.work
-        self.settle(context)
+        self.bind(context)
         self._run, *self._keep_run = resident(run)
         work, tables = context.work, (run.now, run.before, run.remembered, run.frames, run.tableau)
         self.state, rest = divided(work.q.base, work.control, work.counters, work.q, work.qd, work.qdd)
@@ -61,7 +61,7 @@ class Memory:
         self._images, self._start = [], ()
         self._entered, self._whole = (None, None), []
 
-    def settle(self, context, header=()):
+    def bind(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
         self.context = context
         self._context, *self._keep = resident(context, header)
@@ -76,6 +76,7 @@ class Memory:
         self.mark = None
         self._clear_scratch()
         start = task.q, task.qd, task.constraint_tol
+        # A new engine lays out the memory; otherwise its image is restored
         if self.engine is not engine:
             self._lay_out(engine, task)
             self._images, self._start = [(array, array.copy()) for array in self._laid_out], start
@@ -201,6 +202,7 @@ class Memory:
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver."""
         arguments = self._context, self._run, log, most
+        # Short steps: Ctrl-C waits for the end of a slice
         if self.weight < LONG_STEPS:
             return STATUSES[self.advance_kernel(*arguments)]
         if not self.run.numbers.begun and most > 0:

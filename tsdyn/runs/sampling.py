@@ -31,7 +31,7 @@ class Sampling:
 
     def __init__(self, prepared, continued):
         self.packed, self.handles, self.loads = prepared.packed, prepared.handles, sampled(prepared.packed)
-        self.last = [-math.inf] * len(self.loads)  # when each was asked
+        self.last = [-math.inf] * len(self.loads)  # when each was evaluated
         self.begun = continued
         for load in self.loads:
             reset = getattr(load.force.function, "reset", None)
@@ -39,7 +39,7 @@ class Sampling:
                 reset()
 
     def ask(self, memory, t, q, qd):
-        """Ask those that are due at t, and hold what they say."""
+        """Evaluate the functions that are due at t, and hold their values."""
         for i, load in enumerate(self.loads):
             force = load.force
             if t > self.last[i] and (not self.begun or is_due(t, force.period)):
@@ -50,7 +50,7 @@ class Sampling:
         self.begun = True
 
     def _value(self, force, t, levels, angles):
-        """What the function of a force says; angles are those that the run has counted, roughly."""
+        """Value of a force's function; angles are the approximate ones that the run has counted."""
         row = self.handles.row(force.joint, force.coordinate)
         evaluate, geometry = getattr(joint_motion, force.coordinate), force.geometry
         x, rate = (float(evaluate(geometry, *self.handles.motions(geometry, levels), level)) for level in (0, 1))
@@ -77,7 +77,7 @@ class Sampled:
         self.reason = ""
 
     def saved(self):
-        """When each function was asked last."""
+        """When each function was evaluated last."""
         return {"last": self.sampling.last, "begun": self.sampling.begun}
 
     def restore(self, numbers):
@@ -89,14 +89,17 @@ class Sampled:
         run, work = self.run, self.memory.context.work
         numbers = run.numbers
         try:
+            # The first values, before the first accelerations
             if not numbers.begun and most != 0:
                 self.sampling.ask(self.memory, float(run.clock.t), work.q.copy(), work.qd.copy())
             first = numbers.history
             while True:
+                # Up to the next instant, or to the end of the slice
                 done = int(numbers.history - first)
                 status = self.memory.advance(log, most - done if most > 0 else most)
                 if status != Status.SLICE_DONE or not numbers.waiting:
                     return status
+                # New values, and accelerations with them
                 self.sampling.ask(self.memory, float(run.clock.t), run.now[0].copy(), run.now[1].copy())
                 status = self.memory.advance(log, 0)
                 if status != Status.SLICE_DONE or numbers.history - first >= most:

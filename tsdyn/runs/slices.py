@@ -32,7 +32,7 @@ def first_slice(weight):
 
 
 class Pace:
-    """Whether a run gets on: an adaptive one whose steps stay so short that it would never end is ended.
+    """Progress of a run: an adaptive run whose steps stay too short to reach its end is ended.
 
     Parameters
     ----------
@@ -44,10 +44,11 @@ class Pace:
         self.t, self.tries, self.before = t, 0, 0.0  # since when, how many; s a try before that
 
     def judge(self, t, tries, end):
-        """Status, and what there is to say: of a run that is at t after so many more tries."""
+        """Status and reason of a run that is at t after `tries` more steps."""
         self.tries += tries
         if self.tries < PACED:
             return SLICE_DONE, ""
+        # s of motion a step
         before, now = self.before, (t - self.t) / self.tries
         self.t, self.tries, self.before = t, 0, now
         if now > 0.0 and (end - t <= HOPELESS * now or now > GETTING_ON * before):
@@ -104,6 +105,7 @@ class Slices:
         """Steps of the next slice, which ends where another method is considered: that mustn't depend on the clock."""
         steps = self.run.numbers.steps
         rows = min(self.most, self.limit - steps)
+        # Another method is considered after a number of steps, not of seconds: results must not depend on the clock
         ask = 0 if self.choose is None else self.choose.ask
         return min(rows, ask - steps) if ask > steps else rows
 
@@ -129,6 +131,7 @@ class Slices:
     def _end_slice(self, status):
         """Take the status of a slice; refuse a run that could not begin."""
         if not self.run.numbers.begun:
+            # A run without a first step is an error, whose cause is named
             singular = status in (Status.SINGULAR, Status.MASS_SINGULAR)
             if status in (Status.SINGULAR, Status.UNHELD):
                 masses = mass_ratio(self.task.prepared.packed, TOO_UNEQUAL)
@@ -149,6 +152,7 @@ class Slices:
 
     def _adapt(self, rows, seconds):
         """The length of the next slice, from the time of this one."""
+        # Aim at SLICE_SECONDS
         if seconds > 2 * SLICE_SECONDS:
             self.most = max(int(rows * SLICE_SECONDS / seconds), 1)
         elif seconds < SLICE_SECONDS / 2 and self.run.numbers.history >= rows:
@@ -157,6 +161,7 @@ class Slices:
     def _look_up(self):
         """Between slices: whether another method takes over, the progress bar, the pace."""
         run, task, (start, end) = self.run, self.task, self.task.span
+        # Another method takes over
         if self.choose is not None and self.status is SLICE_DONE and self.choose.turns(self.memory):
             self.status = Status.STIFF
         try:
@@ -169,10 +174,12 @@ class Slices:
                 _warn_of(error, t)
         if self.status is not SLICE_DONE:
             return
+        # A run that would never end is ended
         if task.max_steps is None and run.numbers.adaptive:
             self.status, self.reason = self.pace.judge(run.clock.t, run.numbers.history, end)
             if self.status is SLICE_DONE and end - t > NOISY * run.clock.h:
                 self._look_for_noise(t)
+        # A checkpoint is due
         if task.archive is not None and self.status is SLICE_DONE:
             with deferred_interrupts():
                 self.recorder.collect()

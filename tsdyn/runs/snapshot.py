@@ -12,8 +12,8 @@ from ..motions.state_program import LENGTH
 from ..validation import EXACT, damaged, demand
 
 LAID_OUT = (  # fields that follow from scene and method, or are filled in before they are read
-    "system", "graph", "kernels", "rub", "anew", "joints", "watched", "loaded", "path", "tableau", "block",
-    "own", "trial", "table",
+    "system", "graph", "kernels", "friction_solver", "reselection", "joints", "watched", "loaded", "path", "tableau",
+    "block", "own", "trial", "table",
 )  # fmt: skip
 OWN = {  # numbers of records, likewise
     "Orders": ("top", "room", "lowest", "highest", "refined", "sweeps"),

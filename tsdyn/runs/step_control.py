@@ -47,6 +47,7 @@ def gets_on(r, t0, t1):
 @kernel
 def stretch(h, longest):
     """How much longer than h the last step of a run may be, so that no tiny one is left."""
+    # Below max_step the last step may be a little longer; at max_step by rounding only
     if h < AT_LONGEST * longest or longest == math.inf:
         return STRETCH * h
     return max(longest - h, ROUNDING_STRETCH * h)
@@ -99,28 +100,32 @@ def _size(context, r):
 
 
 @kernel
-def accept(context, l, r, h):
+def accept(context, linear, r, h):
     """Accept or reject the step h and choose the next one (Gustafsson's PI control). True if accepted."""
     end = r.xd if r.numbers.first_order == 1 else r.y
+    # Error estimate, filtered by (I - g J)^-1 in stiff scenes
     _estimate(r, r.kernels.error, h, end)
-    if l.numbers.g > 0.0:
-        call_soften(l.kernels.soften, context, r.dx, l.numbers.g, r.dy)
+    if linear.numbers.g > 0.0:
+        call_soften(linear.kernels.soften, context, r.dx, linear.numbers.g, r.dy)
     error = _size(context, r)
     if r.kernels.second_error != 0:  # Hairer's combination of two orders; nan stays nan
         _estimate(r, r.kernels.second_error, h, end)
         second = _size(context, r)
         if error != 0.0:
             error *= error / math.hypot(error, SECOND_ESTIMATE * second)
+    # Rejected: h SAFETY error^-power, at least SHRINK h
     power = r.clock.exponent
     if not error <= 1.0:
         factor = SAFETY * error**-power if error < math.inf else SHRINK
         r.clock.h = h * max(factor, SHRINK)
         r.numbers.rejected_last = 1
         return False
+    # Accepted: PI control with the error before; no growth right after a rejection
     error = max(error, LEAST_ERROR)
     factor = SAFETY * error ** (-PI_ERROR * power) * r.clock.error_before ** (PI_BEFORE * power)
     factor = min(max(factor, SHRINK), 1.0 if r.numbers.rejected_last != 0 else GROW)
-    if l.numbers.g > 0.0 and SAME_FROM <= factor <= SAME_TO:
+    # An unchanged step keeps the matrix
+    if linear.numbers.g > 0.0 and SAME_FROM <= factor <= SAME_TO:
         factor = 1.0
     r.clock.error_before = max(error, LEAST_BEFORE)
     r.clock.h = min(h * factor, r.clock.max_step)
@@ -137,18 +142,22 @@ def watch_stiffness(bodies, w, r, h):
     n, at, limit = r.x.size, r.numbers.last_stage, r.clock.stability_limit
     rates, speeds = 0.0, 0.0
     for c in range(n):
+        # Differences of the two last evaluations: |dvdd| / |dvd| estimates |lambda|
         speed, rate = r.memory[at + c] - r.y[c], r.memory[at + n + c] - r.yd[c]
         speeds += speed * speed
         rates += rate * rate
     found = False
+    # At the limit of stability
     if h * h * rates > limit * limit * speeds:
         r.numbers.at_limit += 1
         r.numbers.below_limit = 0
         found = r.numbers.at_limit == STIFF_STEPS
+    # Below it for MILD_STEPS steps: forget
     elif r.numbers.at_limit > 0:
         r.numbers.below_limit += 1
         if r.numbers.below_limit == MILD_STEPS:
             r.numbers.at_limit = 0
+    # Short steps in which nothing moves are stiff, too
     if r.numbers.leave_when_stiff == 1 and h < AT_LONGEST * r.clock.max_step:
         r.numbers.still = r.numbers.still + 1 if _hardly_moves(bodies, w, h) else 0
         if r.numbers.still == STILL_STEPS:
@@ -165,6 +174,7 @@ def _hardly_moves(bodies, w, h):
     far = HARDLY * extent(w) / h
     for b in range(bodies.shape[0]):
         at = bodies[b, 0]
+        # Displacement beside the size of the scene, rotation 2 |pd| h
         for c in range(3):
             if abs(w.qd[at + c]) > far:
                 return False

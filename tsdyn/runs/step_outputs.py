@@ -45,12 +45,14 @@ def store_block(r, log):
 def record_step(context, run, c, r, log, t0, t1):
     """Record what t_eval asks for in (t0, t1], or the step's end where it asks for nothing. Status."""
     w = c.work
+    # Most steps record their end only
     within = r.numbers.dense != 0 or is_wanted_before(r, log, t1)
     if not within:
         record_end(w, r, log, t1)
         return 0
     if log.t_eval.size == 0:
         record(r, log, t1, w.q, w.qd, w.qdd)
+    # Dense output moves the workspace: keep what Newton's methods start from, and fill the block
     keep(c, r.warm)
     head_block(r, t0, t1)
     status = call_fill(r.kernels.fill, context, run)
@@ -58,6 +60,7 @@ def record_step(context, run, c, r, log, t0, t1):
         return status
     store_block(r, log)
     while r.numbers.next_eval < log.t_eval.size and log.t_eval[r.numbers.next_eval] <= t1:
+        # Requested times up to t1
         t = log.t_eval[r.numbers.next_eval]
         r.numbers.next_eval += 1
         if t == t1:
@@ -67,6 +70,7 @@ def record_step(context, run, c, r, log, t0, t1):
         if status != 0:
             return status
         record(r, log, t, w.q, w.qd, w.qdd)
+    # Back to the end of the step
     bring_back(c, r.warm)
     restore_now(w, r)
     return 0

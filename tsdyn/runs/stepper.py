@@ -38,6 +38,7 @@ call_check = caller("p")
 def _add(x, low, dx):
     """x += dx with compensated summation (Kahan); low holds what has been lost."""
     for i in range(x.size):
+        # Kahan: add what was lost before, note what is lost now
         y = dx[i] - low[i]
         s = x[i] + y
         low[i] = (s - x[i]) - y
@@ -48,9 +49,11 @@ def _add(x, low, dx):
 def _enter(context, c, r, log):
     """Begin the run: the first chart, the accelerations there, the first output and the first step's length. Status."""
     w, t = c.work, r.clock.t
+    # Pieces of functions, time, memories of forces
     take_pieces(c.system, r, log)
     set_time(c.system, t)
     remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
+    # First chart and its accelerations
     status = begin_chart(context, c, r, log, AT_START)
     if status == 0:
         status = evaluate(context, w, r, t, r.x, r.y, r.yd, r.xd)
@@ -58,11 +61,13 @@ def _enter(context, c, r, log):
         return status
     store_now(w, r)
     count_turns(r, w.q, w.qd, 0.0)
+    # Dropped rows must hold at the start
     status = -min(call_check(r.kernels.check, context), 0)
     if status != 0:
         return status
     record_end(w, r, log, t)
     r.numbers.begun = 1
+    # A first step, unless one is given
     if r.numbers.adaptive == 1 and r.clock.h == 0.0:
         r.clock.h = min(first_step(context, w, r), r.clock.max_step)
     return 0
@@ -76,6 +81,7 @@ def _cross_stop(context, c, r, log, implicit):
     iteration has left.
     """
     w, status = c.work, 0
+    # f before and after the switch, both at the same state
     if implicit:
         status = evaluate(context, w, r, r.clock.t, r.x, r.y, r.dy, r.dx)
     take_pieces(c.system, r, log)
@@ -96,20 +102,25 @@ def _cross_stop(context, c, r, log, implicit):
 @kernel
 def _propose(c, r, stop, driven, implicit):
     """Where the next step ends: a Status, its end t1, whether it is the last one, whether a stop cuts a fixed one."""
+    # Fixed steps end on their grid
     if r.numbers.adaptive == 0:
         t1, last, cut = fixed_end(r, stop)
         return 0, t1, last, cut
     t0, end = r.clock.t, min(stop, r.clock.t_end)
+    # Nothing else bounds the rotation of driven bodies
     if driven:
         r.clock.h = min(r.clock.h, r.clock.turn_share * longest_step(c.system.bodies, r.now))
+    # Steps have collapsed: the reason is that of the last failure
     t1 = t0 + r.clock.h
     if not gets_on(r, t0, t1):
         failed = r.numbers.failed
         if failed in OFF_CHART and r.numbers.may_pass == 1:
             return PASSAGE, t1, False, False
         return failed if failed in (NOT_FINITE, JAMMED, UNHELD) else STEP_COLLAPSED, t1, False, False
+    # An implicit step ends before a joint comes to rest
     h = until_rest(c, r, r.clock.h) if implicit else r.clock.h
     t1 = t0 + h if gets_on(r, t0, t0 + h) else t1
+    # The last bit before a stop is taken along
     if t1 + stretch(h, r.clock.max_step) >= end:
         t1 = end
     return 0, t1, t1 == r.clock.t_end, False
@@ -144,6 +155,7 @@ def _go_back(r):
 def _attempt(context, run, c, r, t1, implicit):
     """x, y and the accelerations at t1; what the start of the step had is kept. Status."""
     t0 = r.clock.t
+    # The method writes increments, added with compensation; then all constraint levels at t1
     _keep_start(c, r, implicit)
     status = call_step(r.kernels.step, context, run, t0, t1 - t0)
     if status == 0:
@@ -159,9 +171,11 @@ def _attempt(context, run, c, r, t1, implicit):
 @kernel
 def _judge_chart(context, c, r, h, driven):
     """Whether the chart still holds at the end of a step: a Status, and the reason for a new one, 0 for none."""
+    # Contraction and rotation since q0; dropped rows
     reason = call_check(r.kernels.check, context)
     if reason < 0:
         return -reason, reason
+    # Beyond this another branch of the constraints may have been found
     lost = not c.work.control.contraction < CONTRACTION_LOST
     if lost or (driven and too_far(c.system.bodies, r.now, c.work.qd, h)):
         return CHART_LOST, reason
@@ -186,6 +200,7 @@ def _is_accepted(context, run, c, r, t1, h):
 def _halve(c, r, h):
     """Reject a step with a stage that was not solved: the next one is half as long."""
     r.numbers.failed = STAGE_FAILED
+    # As at the start of the step; after a second failure with new derivatives of the force laws
     bring_back(c, r.warm)
     restore_now(c.work, r)
     r.numbers.rejected += 1
@@ -198,11 +213,13 @@ def _halve(c, r, h):
 @kernel
 def _change_chart(context, c, r, log, h, status, driven):
     """Reject a step that left the chart: back to its start, on a new chart if this one has been used. Status."""
+    # q, qd, qdd of the step's start
     restore_now(c.work, r)
     c.chart.state.placement = 0  # the poses are not those that the next chart begins at
     if c.saddle.K.size > 0:  # factors with which stages begin
         bring_back(c, r.warm)
     r.numbers.rejected += 1
+    # The chart is new: the step was too long. A fixed step has no other length
     if r.numbers.in_chart == 0:
         if r.numbers.adaptive == 0:
             near = is_singular_within_a_step(c.tangent) or (status in OFF_CHART and has_hardly_turned(c))
@@ -211,6 +228,7 @@ def _change_chart(context, c, r, log, h, status, driven):
         r.clock.h = QUARTERED * h
         if driven:  # nothing else keeps the next step from being as long
             r.clock.turn_share *= HALVED
+    # Rows may have become dependent
     doubt_selection(c.tangent)
     return begin_chart(context, c, r, log, BY_FAILURE)
 
@@ -221,10 +239,12 @@ def _move_on(c, r, t1, cut, implicit):
     w, t0 = c.work, r.clock.t
     r.numbers.failed = 0
     r.clock.turn_share = min(TURN_GAIN * r.clock.turn_share, 1.0)
+    # Predictions and interpolants use the point before
     if implicit or r.numbers.first_order == 1:
         for j in range(3):
             copy(r.now[j], r.before[j])
         c.linear.numbers.t_before = t0
+    # Turn counts, state, memories of forces
     count_turns(r, w.q, w.qd, t1 - t0)
     store_now(w, r)
     remember(c.system, w.q, w.qd, t1, r.remembered[r.joints.shape[0] :])
@@ -239,6 +259,7 @@ def _finish(context, run, c, r, log, t0, last, reason):
     """After an accepted step from t0: its outputs, and a new chart if there is a reason for one. Status."""
     if reason == 0 and r.numbers.chart_interval > 0 and r.numbers.in_chart >= r.numbers.chart_interval:
         reason = BY_INTERVAL
+    # Outputs of the step belong to its chart, so the change of chart comes last
     status = record_step(context, run, c, r, log, t0, r.clock.t)
     if status == 0 and reason != 0 and not last:
         restore_now(c.work, r)
@@ -256,6 +277,7 @@ def advance(context, run, log, most):
     c, r = load(context), load_run(run)
     status = 0
     adaptive, implicit, driven = r.numbers.adaptive == 1, r.numbers.stage_at > 0, is_rheonomic(c.system)
+    # Begin, or go on after Python was asked at a stop
     if r.numbers.begun == 0 and most != 0:
         status = _enter(context, c, r, log)
     elif r.numbers.waiting == 1:
@@ -264,37 +286,44 @@ def advance(context, run, log, most):
     for _ in range(most):
         if status != 0 or is_full(r, log):
             break
+        # Propose where the step ends
         t0, stop, wanted, before = r.clock.t, next_stop(r, log), r.clock.h, r.clock.error_before
         if t0 >= r.clock.t_end:
             break
         status, t1, last, cut = _propose(c, r, stop, driven, implicit)
         if status != 0:
             break
+        # Attempt it
         h = t1 - t0
         note_try(r, log, t0, h)
         r.numbers.history += 1
         status, reason = _attempt(context, run, c, r, t1, implicit), 0
+        # Rejected: a stage was not solved
         if adaptive and status == STAGE_FAILED:
             _halve(c, r, h)
             status = 0
             continue
+        # Rejected: the step left its chart
         if status == 0:
             status, reason = _judge_chart(context, c, r, h, driven)
         if status != 0:
             status = _change_chart(context, c, r, log, h, status, driven)
             continue
+        # Rejected: the error is too large, or a load changes between the stages
         if adaptive and not _is_accepted(context, run, c, r, t1, h):
             r.numbers.rejected += 1
             if t0 + r.clock.h >= t1:  # rounding would propose the same step for ever
                 r.clock.h = SHRINK * h
             _go_back(r)
             continue
+        # Accepted. A step cut short by a stop doesn't predict the next one
         note_accepted(r, log)
         if adaptive and t1 == stop and h < CUT_SHORT * wanted:
             r.clock.h, r.clock.error_before = max(r.clock.h, wanted), before
         stiff = r.numbers.last_stage > 0 and watch_stiffness(c.system.bodies, c.work, r, h)
         _move_on(c, r, t1, cut, implicit)
         status = _finish(context, run, c, r, log, t0, last, reason)
+        # At a stop the accelerations change
         if status == 0 and t1 == stop:
             if is_sampled(r, log, t1):
                 break

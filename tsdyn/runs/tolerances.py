@@ -11,11 +11,11 @@ SHORTEST, FROM_ZERO = 4e-16, 1e-3
 # it by rounding only.
 STRETCH, AT_LONGEST, ROUNDING_STRETCH = 1e-3, 0.999, 1e-9
 
-# Part of a fixed step: a stop nearer than this to a time of the grid stands for it, rather than leave a step of which
-# only rounding is seen.
+# Part of a fixed step: a stop nearer than this to a time of the grid replaces it, so that no step is left of the size
+# of rounding.
 SLIVER = 1e-6
 
-# Part of the step wanted: a step cut to less at a stop says nothing of the next one.
+# A step that a stop shortens to less than this part of its proposed length isn't used to predict the next one.
 CUT_SHORT = 0.5
 
 # Part of a sampling period: instants that are nearer are the same one, computed in two ways.
@@ -48,9 +48,9 @@ LEAST_ERROR, LEAST_BEFORE = 1e-10, 1e-4
 # Weight of the second estimate in Hairer's combination of two orders (DOP853: Solving ODEs I, II.10).
 SECOND_ESTIMATE = 0.1
 
-# First step (Solving ODEs I, II.4): norms below TOO_SMALL don't tell it, and it is the part TRIAL of the run; its error
-# is to be FIRST_ERROR; x' and x'' below NO_SLOPE count as zero, times the run's length; it is FIRST_GROWTH times the
-# trial at most, and the trial FIRST_PART of the run.
+# First step (Solving ODEs I, II.4). If norms are below TOO_SMALL, the trial step is the part TRIAL of the run, at most
+# FIRST_PART of it. The first step has the error FIRST_ERROR, where x' and x'' times the run's length exceed NO_SLOPE,
+# and at most FIRST_GROWTH times the length of the trial.
 TOO_SMALL, TRIAL, FIRST_ERROR, NO_SLOPE, FIRST_GROWTH, FIRST_PART = 1e-5, 1e-6, 0.01, 1e-15, 100.0, 0.1
 # The first step is at least FIRST_LEAST of the run, and FIRST_SEEN times SHORTEST of the time: from rest, x'' over atol
 # asks for less where rates are 1e15 / s. A step that is too long is rejected.
@@ -64,16 +64,17 @@ HALVED, QUARTERED = 0.5, 0.25
 # the velocity and at it, below which a joint slides: 2.05 at four slip velocities, 4 at rest.
 LANDING, LITTLE, SLIDES = 0.9, 1e-3, 2.05
 
-# Steps at the limit of stability until a motion is called stiff; below it until they are forgotten: Solving ODEs II,
-# IV.2, takes 15 and 6.
+# A motion is stiff after STIFF_STEPS steps at the stability limit; MILD_STEPS steps below it reset the count
+# (Solving ODEs II, IV.2: 15 and 6).
 STIFF_STEPS, MILD_STEPS = 15, 6
-# rad, and part of the scene's size: so many steps in a row in which nothing turns or moves by more are many for what
-# can be seen: the default method tries an implicit one. Rounding and chattering friction don't show as h |lambda|.
+# rad, and part of the scene's size: if no body rotates or moves by more for STILL_STEPS steps in a row, something that
+# doesn't show in the motion limits the step, and the default method tries an implicit one. Rounding and chattering
+# friction don't show as h |lambda|.
 HARDLY, STILL_STEPS = 0.002, 40
 
 # --- charts ----------------------------------------------------------------------------------------------------------
-# |d| of all bodies, the sine of half the turn since q0: a step that turns bodies by less (11 degrees) is no long one,
-# and a chart that it loses is a small one.
+# |d| of all bodies, the sine of half the rotation since q0. A step that rotates bodies by less (11 degrees) is short;
+# if it leaves the chart all the same, the chart is small.
 HARDLY_TURNED = 0.1
 
 # --- rotation limit of driven scenes ---------------------------------------------------------------------------------
@@ -85,15 +86,15 @@ TOO_FAR = 2.5
 TURN_GAIN = 1.05
 
 # --- events ----------------------------------------------------------------------------------------------------------
-# rad that a body turns in a step: less needs half of the samples, more needs the most.
+# rad, rotation of a body in a step: below the first, half the samples suffice; above the second, the most are taken.
 SLOW_TURN, FAST_TURN = 0.1, 2.0
 
-# A value, or a time, that is no more than this beside others is that of the run's start: rounding of some dozen
+# A value or time below this fraction of the others counts as zero at the start of a run: rounding of some dozen
 # operations of an event function.
 START_ZERO = 64.0 * EPS
 
-# Relative change of a state by which the rounding error of an event function is measured, and how much larger than the
-# largest change it is taken for: three changes of random signs are tried.
+# Relative perturbation of a state, with random signs, that measures the rounding error of an event function; safety
+# factor on the largest of three changes.
 SHAKEN, NOISE = 4.0 * EPS, 4.0
 
 # Of the time: how near to a zero Brent's method comes, as near as it can. s: the least distance there, a normal number.
@@ -110,24 +111,24 @@ LONG_STEPS = 1 << 13
 # Numbers that are set to zero at once, so that Ctrl-C is answered: new memory takes up to 1 ns a byte.
 PIECE = 1 << 22
 
-# Steps tried over which the pace of a run is taken; a run with HOPELESS as many to go would take days.
+# Steps over which the progress of a run is measured; a run that needs HOPELESS more would take days.
 PACED, HOPELESS = 1000, 1e10
 
-# Steps to go, at the present length, from which noise is looked for in functions: they take a second or more.
+# Functions are checked for noise if a run needs more steps than this at the present length: a second or more.
 NOISY = 1e6
 
-# A run whose pace, in s a step, has more than doubled since it was taken last gets on.
+# The run counts as progressing if simulated time per step has more than doubled since the last check.
 GETTING_ON = 2.0
 
-# Relative rounding error of (t1 - t0) / step that counts no step more, beside that of t0 and t1.
+# Relative rounding error of (t1 - t0) / step, beside that of t0 and t1: an excess below it makes no further step.
 SAME_COUNT = 1e-12
 
-# Tries of a Taylor step, at most, that are kept in the history of a slice beyond one for each of its steps.
+# Rejected Taylor steps for which the history of a slice has room, beyond one row for each of its steps.
 TRIES = 32
 
 # --- dense output ----------------------------------------------------------------------------------------------------
-# Legs in which a place between two steps is reached from the start of its chart: more, where one of them takes more
-# than FEW factorisations. From nearby there is one of N, and one of S or of the masses.
+# A state inside a step is reached from the base point of its chart in so many legs. More are taken if a leg needs more
+# than FEW factorisations; a short leg needs one of N, and one of S or of the masses.
 LEGS, FEW = (1, 4, 16), 2
 
 # Floats of the workspace of a reader up to which it is kept for the next one (1 MB): a hundred bodies or more.

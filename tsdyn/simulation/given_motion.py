@@ -94,7 +94,7 @@ def follow(scene, times, state, who, remedy):
 
 
 def _demand_consistent(scene, kept, q, t):
-    """Refuse positions that violate the constraints, before velocities are looked for."""
+    """Refuse positions that violate the constraints, before velocities are solved for."""
     from ..configuration.kinetic_metric import Metric
     from ..configuration.start_violations import demand_small
 

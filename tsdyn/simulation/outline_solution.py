@@ -1,4 +1,4 @@
-"""Solutions of files whose scenes have functions, or classes, that are not here: looked at, not run."""
+"""Solutions of files whose scenes have functions, or classes, that are not here: read, not run."""
 
 from __future__ import annotations
 

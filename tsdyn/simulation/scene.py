@@ -16,7 +16,7 @@ from ..constraints.euler_normalization import EulerNormalization
 from ..elements.bodies import IDENTITY, Body, Ground, PointMass
 from ..elements.force import Force
 from ..elements.joint import Joint
-from ..elements.membership import admit, settle
+from ..elements.membership import admit, stop_waiting
 from ..elements.names import named
 from ..elements.primitive import Primitive
 from ..errors import InvalidArgument, InvalidBody, InvalidConstraint
@@ -195,7 +195,7 @@ class Scene(OfFile):
         values |= {"velocity": velocity, "angular_velocity": angular_velocity}
         body = self._admit(Body, name, values)
         self._normalisations[body] = EulerNormalization(body, name=f"EulerNormalization({body.name})")
-        settle(self._normalisations[body])
+        stop_waiting(self._normalisations[body])
         return body
 
     @fitting
@@ -263,7 +263,7 @@ class Scene(OfFile):
             raise item.error(f"{item.name}: it is a part of {item.owner.title}; add that instead.")
         if isinstance(item, Joint):
             item.parts  # noqa: B018  it says what is wrong with them
-        settle(item)
+        stop_waiting(item)
         if type(item) is EulerNormalization:
             return self._normalisations[item.a]
         if item.added and any(item is other for other in members):

@@ -23,7 +23,7 @@ AGAIN = 4
 COST, SERIES_COST = 1.4, 6.5
 STEP_EVALUATIONS = 16  # of a step of SDIRK54, about
 # Safety factor between tolerances and step errors of SDIRK54 where it goes on: fast modes decay, and with them errors.
-STIFF_MARGIN = 50.0
+STIFF_SAFETY = 50.0
 # The loosest tolerance of Radau where there are sharp forces: at 0.005 a step flies over the place where a body breaks
 # loose, whose error is a hundred times that at 0.001.
 LOOSEST = 1e-3

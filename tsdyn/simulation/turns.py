@@ -28,7 +28,7 @@ from .tolerances import (
     SETTLED,
     SHARP_COST,
     STEP_EVALUATIONS,
-    STIFF_MARGIN,
+    STIFF_SAFETY,
     TRIAL,
     TRIED,
 )
@@ -42,7 +42,7 @@ def implicit(method, prepared, form):
     most = LOOSEST if coupled and prepared.sharp else math.inf
     found = (Radau if coupled else SDIRK54)(min(method.rtol, most), min(method.atol, most), max_step=method.max_step)
     if not coupled:
-        found.margin = STIFF_MARGIN
+        found.safety = STIFF_SAFETY
     return frozen(found)
 
 

@@ -8,13 +8,14 @@ that failed, or -1. `kept` holds the diagonal before elimination; its sign is th
 import math
 
 from ..jit.kernels import kernel
-from ..jit.questions import serves
+from ..jit.predicates import serves
 from ..jit.simd import get, let
 
 
 @kernel
 def eliminate(u, size, width, n, kept, limit):
     """Eliminate up to three rows of a panel, n columns from the diagonal on; which of them fails, or -1."""
+    # First pivot
     u00 = u[0]
     if not serves(kept[0], u00, limit):
         return 0
@@ -23,6 +24,7 @@ def eliminate(u, size, width, n, kept, limit):
     if size == 1:
         return -1
     v = u[width:]
+    # Second pivot: u11 - u01^2 / u00
     u01 = u[1]
     f01 = u01 * d0
     u11 = v[1] - f01 * u01
@@ -30,11 +32,13 @@ def eliminate(u, size, width, n, kept, limit):
         return 1
     d1 = 1.0 / u11
     v[1] = d1
+    # Two rows: the rest of the second
     if size == 2:
         for x in range(2, n):
             v[x] -= f01 * u[x]
         return -1
     w = v[width:]
+    # Third pivot, after both rows above it
     u02 = u[2]
     f02 = u02 * d0
     u12 = v[2] - f01 * u02
@@ -44,6 +48,7 @@ def eliminate(u, size, width, n, kept, limit):
     if not serves(kept[2], u22, limit):
         return 2
     w[2] = 1.0 / u22
+    # The rest of the rows, to the right of the pivots
     u, v, w = u[3:], v[3:], w[3:]
     for x in range(n - 3):
         a = u[x]
@@ -59,6 +64,7 @@ def subtract_products(pivots, size, width, left, right, out, stride, rows, n, di
 
     Ten arguments: where the pivots, both factors and the result are, and how many rows and columns they have.
     """
+    # out -= left^T D^-1 right, three rows of it at a time: three pivots times three rows fill the registers
     if size >= 3:
         d0, d1, d2 = pivots[0], pivots[width + 1], pivots[2 * width + 2]
         a, b, c = left, left[width:], left[2 * width :]
@@ -78,6 +84,7 @@ def subtract_products(pivots, size, width, left, right, out, stride, rows, n, di
                 p[x] -= y0 * e + y1 * f + y2 * g
                 q[x] -= z0 * e + z1 * f + z2 * g
             r += 3
+        # The rows that are left over
         while r < rows:
             skip = r if diagonal else 0
             x0, x1, x2 = a[r] * d0, b[r] * d1, c[r] * d2
@@ -112,6 +119,7 @@ def link(values, u, target, stride, kept, limit):
     The other is at values[target], rows `stride` apart; the diagonal before elimination is at values[kept].
     """
     v, w, p, q = u + 6, u + 12, target + stride, target + 2 * stride
+    # Three pivots, as in `eliminate`
     k0, k1, k2 = get(values, kept), get(values, kept + 1), get(values, kept + 2)
     u00, u01, u02 = get(values, u), get(values, u + 1), get(values, u + 2)
     if not serves(k0, u00, limit):
@@ -127,8 +135,11 @@ def link(values, u, target, stride, kept, limit):
     if not serves(k2, u22, limit):
         return 2
     d2 = 1.0 / u22
+    # D^-1 and U of the block
     _store_pivots(values, u, d0, d1, u12, d2)
+    # The 3 x 3 block beside it
     a0, a1, a2, b0, b1, b2, c0, c1, c2 = _rest_of_link(values, u, f01, f02, f12)
+    # Upper triangle of the other block -= (a, b, c)^T D^-1 (a, b, c)
     x, y, z = a0 * d0, b0 * d1, c0 * d2
     _take(values, target, x * a0 + y * b0 + z * c0)
     _take(values, target + 1, x * a1 + y * b1 + z * c1)
@@ -165,6 +176,7 @@ def _take(values, i, x):
 @kernel
 def eliminate_lu(l, u, size, width, n, kept, limit):
     """Eliminate up to three rows of upper and columns of lower; which of them fails, or -1."""
+    # f are multipliers of L, g those of U, both over the pivots
     u00 = u[0]
     if not limit * abs(kept[0]) < abs(u00) < math.inf:
         return 0
@@ -173,6 +185,7 @@ def eliminate_lu(l, u, size, width, n, kept, limit):
     if size == 1:
         return -1
     v, m = u[width:], l[width:]
+    # Second pivot
     u01, l01 = u[1], l[1]
     f01, g01 = l01 * d0, u01 * d0
     u11 = v[1] - f01 * u01
@@ -180,12 +193,14 @@ def eliminate_lu(l, u, size, width, n, kept, limit):
         return 1
     d1 = 1.0 / u11
     v[1] = m[1] = d1
+    # Two rows: the rest of the second
     if size == 2:
         for x in range(2, n):
             v[x] -= f01 * u[x]
             m[x] -= g01 * l[x]
         return -1
     w, o = v[width:], m[width:]
+    # Third pivot
     u02, l02 = u[2], l[2]
     f02, g02 = l02 * d0, u02 * d0
     u12, l12 = v[2] - f01 * u02, m[2] - g01 * l02
@@ -195,6 +210,7 @@ def eliminate_lu(l, u, size, width, n, kept, limit):
     if not limit * abs(kept[2]) < abs(u22) < math.inf:
         return 2
     w[2] = o[2] = 1.0 / u22
+    # The rest of the rows of U and of the columns of L
     u, v, w = u[3:], v[3:], w[3:]
     l, m, o = l[3:], m[3:], o[3:]
     for x in range(n - 3):
@@ -210,6 +226,7 @@ def eliminate_lu(l, u, size, width, n, kept, limit):
 def link_lu(lower, upper, u, target, stride, kept, limit):
     """The same of an unsymmetric matrix; the diagonal before elimination is at upper[kept]."""
     v, w, p, q = u + 6, u + 12, target + stride, target + 2 * stride
+    # Three pivots, as in `eliminate_lu`
     u00, u01, u02, l01, l02 = get(upper, u), get(upper, u + 1), get(upper, u + 2), get(lower, u + 1), get(lower, u + 2)
     if not limit * abs(get(upper, kept)) < abs(u00) < math.inf:
         return 0
@@ -225,10 +242,13 @@ def link_lu(lower, upper, u, target, stride, kept, limit):
     if not limit * abs(get(upper, kept + 2)) < abs(u22) < math.inf:
         return 2
     d2 = 1.0 / u22
+    # D^-1, U and L of the block
     _store_pivots(upper, u, d0, d1, u12, d2)
     _store_pivots(lower, u, d0, d1, l12, d2)
+    # The 3 x 3 blocks beside and below it
     a0, a1, a2, b0, b1, b2, c0, c1, c2 = _rest_of_link(upper, u, f01, f02, f12)
     x0, x1, x2, y0, y1, y2, z0, z1, z2 = _rest_of_link(lower, u, g01, g02, g12)
+    # Upper triangle, then lower triangle, of the other block -= L D^-1 U
     a0, a1, a2 = a0 * d0, a1 * d0, a2 * d0
     b0, b1, b2 = b0 * d1, b1 * d1, b2 * d1
     c0, c1, c2 = c0 * d2, c1 * d2, c2 * d2
@@ -248,6 +268,7 @@ def link_lu(lower, upper, u, target, stride, kept, limit):
 def _rest_of_link(values, u, f01, f02, f12):
     """The columns beside the block at values[u], eliminated: three rows."""
     v, w = u + 6, u + 12
+    # Rows a, b, c, each less its multiples of those before
     a0, a1, a2 = get(values, u + 3), get(values, u + 4), get(values, u + 5)
     b0, b1, b2 = get(values, v + 3) - f01 * a0, get(values, v + 4) - f01 * a1, get(values, v + 5) - f01 * a2
     c0 = get(values, w + 3) - f02 * a0 - f12 * b0

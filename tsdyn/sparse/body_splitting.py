@@ -45,6 +45,7 @@ def cut(pairs, sizes, degrees):
         for body in pair:
             if body >= 0:
                 at_body.setdefault(body, []).append(node)
+    # Rows at one body beyond which its dense block costs more than a tree
     hubs = {body for body, nodes in at_body.items() if sum(sizes[node] for node in nodes) > LARGEST}
     if not hubs:
         return []
@@ -72,6 +73,7 @@ def _walk(pairs, at_body, hubs):
 
 def _tree(hub, nodes, sizes, degrees):
     """The parts of one hub; sizes grows by the welds."""
+    # Leaves hold at most LEAF rows
     leaves, rows = [[]], 0
     for node in nodes:
         if leaves[-1] and rows + sizes[node] > LEAF:
@@ -79,10 +81,12 @@ def _tree(hub, nodes, sizes, degrees):
             rows = 0
         leaves[-1].append(node)
         rows += sizes[node]
+    # Inner levels join FAN parts each, up to one root
     levels = [len(leaves)]
     while levels[-1] > 1:
         levels.append(-(-levels[-1] // FAN))
     parts, below = [], []
+    # Every level carries the same share of the mass
     for count in levels:
         level = [Part(hub, float(len(levels) * count), [] if below else leaves[i], []) for i in range(count)]
         for i, part in enumerate(below):

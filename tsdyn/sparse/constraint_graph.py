@@ -84,7 +84,7 @@ class ConstraintGraph(NamedTuple):
     )  # int64: rows that follow from the others, as chosen at the first start; see independent_rows.py
     frictions: np.ndarray  # (frictions,) of FrictionPlace: those that follow from reactions
     friction_rows: np.ndarray  # int64 (rows of their joints, 2): which row, and on which side its reaction is taken
-    rub: np.ndarray  # int64 (1,): address of what solves for them, as the form needs it
+    friction_solver: np.ndarray  # int64 (1,): address of what solves for them, as the form needs it
     axes: Axes  # rows of bodies with next to no inertia about an axis
 
 

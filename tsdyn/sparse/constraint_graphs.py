@@ -19,7 +19,7 @@ def graph_of(packed, *columns):
 
 
 def set_redundant(packed, rows):
-    """Have the graphs of a scene made anew, with these rows of them redundant, int64 (k,); None where none are.
+    """Discard the graphs of a scene; new ones have these redundant rows, int64 (k,), or None.
 
     Hubs are left whole then: elimination may end with the row of a weld, which can't be left out.
     """
@@ -40,4 +40,4 @@ def with_loops(graph, kinds, *columns):
         for loop in columns:
             if loop != DRIFT or table[DRIFT][i] != 0:
                 table[loop][i] = address(kind.kernels, loop, kind.__name__, InvalidConstraint)
-    return graph._replace(kinds=table, rub=np.zeros(1, np.int64))
+    return graph._replace(kinds=table, friction_solver=np.zeros(1, np.int64))

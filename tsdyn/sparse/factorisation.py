@@ -9,7 +9,7 @@ diagonal block is read. The diagonal before elimination is stored after the pane
 """
 
 from ..jit.kernels import kernel, long_kernel
-from ..jit.questions import or_one
+from ..jit.predicates import or_one
 from ..jit.simd import get, let
 from .block_operations import eliminate, eliminate_lu, link, link_lu, subtract_products
 
@@ -23,6 +23,7 @@ def keep_diagonal(pattern, values):
         head, step, first = heads[j], widths[j] + 1, starts[j]
         for k in range(starts[j + 1] - first):
             kept[first + k] = abs(values[head + k * step])
+    # Axis rows have negative pivots
     for i in range(pattern.negative.size):
         row = pattern.negative[i]
         kept[row] = -or_one(abs(kept[row]))
@@ -53,6 +54,7 @@ def factor_blocks(pattern, values, limit):
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     keep_diagonal(pattern, values)
     for j in range(heads.size):
+        # A link of a chain: 3 rows that update one other block of 3
         first, width = starts[j], widths[j]
         size = starts[j + 1] - first
         if size == 3 and width == 6 and updates[j + 1] - updates[j] == 1:
@@ -61,15 +63,18 @@ def factor_blocks(pattern, values, limit):
             if failed >= 0:
                 return first + failed
             continue
+        # Otherwise: the diagonal block, three pivots at a time
         panel = values[heads[j] :]
         for k in range(0, size, 3):
             u = panel[k * (width + 1) :]
             failed = eliminate(u, size - k, width, width - k, kept[first + k :], limit)
             if failed >= 0:
                 return first + k + failed
+            # Rows of the block below these pivots
             if size - k > 3:
                 out, right = u[3 * (width + 1) :], u[3:]
                 subtract_products(u, 3, width, right, right, out, width, size - k - 3, width - k - 3, True)
+        # Rows of later blocks
         update_later_blocks(pattern, values, panel, j, size, width)
     return -1
 
@@ -78,6 +83,7 @@ def factor_blocks(pattern, values, limit):
 def update_later_blocks(pattern, values, panel, j, size, width):
     """Subtract the products of the eliminated block j, `size` rows of a panel, from later panels."""
     for e in range(pattern.updates[j], pattern.updates[j + 1]):
+        # values[target] -= U_at^T D^-1 U_run for the rows and runs of columns that the record names
         at, rows, run, n, target, stride = record(pattern, e)
         for k in range(0, size, 3):
             u, r = panel[k * (width + 1) :], panel[k * width :]
@@ -87,8 +93,8 @@ def update_later_blocks(pattern, values, panel, j, size, width):
 @kernel
 def record(pattern, e):
     """Which products go where: columns of a panel and how many, twice; place and row length of what they change."""
-    record = pattern.records[6 * e :]
-    return record[0], record[1], record[2], record[3], record[4], record[5]
+    one = pattern.records[6 * e :]
+    return one[0], one[1], one[2], one[3], one[4], one[5]
 
 
 @kernel
@@ -124,6 +130,7 @@ def factor_lu_blocks(pattern, lower, upper, limit):
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     keep_diagonal(pattern, upper)
     for j in range(heads.size):
+        # A link of a chain
         first, width = starts[j], widths[j]
         size = starts[j + 1] - first
         if size == 3 and width == 6 and updates[j + 1] - updates[j] == 1:
@@ -132,6 +139,7 @@ def factor_lu_blocks(pattern, lower, upper, limit):
             if failed >= 0:
                 return first + failed
             continue
+        # The diagonal block, three pivots at a time, in both factors
         below, above = lower[heads[j] :], upper[heads[j] :]
         for k in range(0, size, 3):
             l, u = below[k * (width + 1) :], above[k * (width + 1) :]
@@ -139,12 +147,14 @@ def factor_lu_blocks(pattern, lower, upper, limit):
             if failed >= 0:
                 return first + k + failed
             if size - k > 3:
+                # Rows of the block below these pivots: U -= L D^-1 U, then L likewise
                 left, right, corner = l[3:], u[3:], 3 * (width + 1)
                 out, other = u[corner:], l[corner:]
                 for _ in range(2):
                     subtract_products(u, 3, width, left, right, out, width, size - k - 3, width - k - 3, True)
                     left, right, out = right, left, other
         for e in range(updates[j], updates[j + 1]):
+            # Later blocks: U -= L D^-1 U, then L with the factors exchanged
             at, rows, run, n, target, stride = record(pattern, e)
             left, right, out = below, above, upper[target:]
             for _ in range(2):
@@ -182,11 +192,13 @@ def solve_blocks(pattern, lower, upper, b):
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     columns, segments = pattern.columns, pattern.segments
     for j in range(heads.size):
+        # Forward: D^-1 L^-1 b
         first, width, head = starts[j], widths[j], heads[j]
         size = starts[j + 1] - first
         if width == 6 and size == 3 and columns[j + 1] - columns[j] == 1:
             _forward_link(lower, head, b, first, segments[2 * columns[j]])
             continue
+        # Three unknowns of the block, then what they take from the rows after them
         own, u = b[first:], lower[head:]
         while True:
             _forward(size, width, u, own)
@@ -195,11 +207,13 @@ def solve_blocks(pattern, lower, upper, b):
                 break
             u, own, size = u[3 * (width + 1) :], own[3:], size - 3
     for j in range(heads.size - 1, -1, -1):
+        # Backward: U^-1 b, from the last block on
         first, width, head = starts[j], widths[j], heads[j]
         size = starts[j + 1] - first
         if width == 6 and size == 3 and columns[j + 1] - columns[j] == 1:
             _backward_link(upper, head, b, first, segments[2 * columns[j]])
             continue
+        # Three unknowns at a time, the last ones first
         k = (size - 1) // 3 * 3
         while k >= 0:
             own, u = b[first + k :], upper[head + k * (width + 1) :]
@@ -211,12 +225,14 @@ def solve_blocks(pattern, lower, upper, b):
 @kernel
 def _forward_link(u, h, b, i, o):
     """Three unknowns, at b[i], of a block as `link` eliminates, at u[h]; taken from the three rows at b[o]."""
+    # L^-1 within the block, times D^-1
     x = get(b, i) * get(u, h)
     y = (get(b, i + 1) - x * get(u, h + 1)) * get(u, h + 7)
     z = (get(b, i + 2) - x * get(u, h + 2) - y * get(u, h + 8)) * get(u, h + 14)
     let(b, i, x)
     let(b, i + 1, y)
     let(b, i + 2, z)
+    # What the three unknowns take from the rows after the block
     for c in range(3):
         let(b, o + c, get(b, o + c) - (x * get(u, h + 3 + c) + y * get(u, h + 9 + c) + z * get(u, h + 15 + c)))
 
@@ -224,10 +240,12 @@ def _forward_link(u, h, b, i, o):
 @kernel
 def _backward_link(u, h, b, i, o):
     """The same, backwards."""
+    # Products of the rows beside the block with the three unknowns known already
     e, f, g = get(b, o), get(b, o + 1), get(b, o + 2)
     x = e * get(u, h + 3) + f * get(u, h + 4) + g * get(u, h + 5)
     y = e * get(u, h + 9) + f * get(u, h + 10) + g * get(u, h + 11)
     z = get(b, i + 2) - get(u, h + 14) * (e * get(u, h + 15) + f * get(u, h + 16) + g * get(u, h + 17))
+    # U^-1 within the block
     x += get(u, h + 2) * z
     y = get(b, i + 1) - get(u, h + 7) * (y + get(u, h + 8) * z)
     let(b, i, get(b, i) - get(u, h) * (x + get(u, h + 1) * y))
@@ -251,6 +269,7 @@ def _forward(size, width, u, own):
 @kernel
 def _forward_rest(size, width, u, own, b, here, end, segments):
     """Take up to three unknowns from the rows after them."""
+    # One unknown; segments are runs of consecutive rows in b
     if size == 1:
         x = own[0]
         at = 1
@@ -269,6 +288,7 @@ def _forward_rest(size, width, u, own, b, here, end, segments):
                 out[i] -= x * us[i] + y * vs[i]
             at += n
     else:
+        # Three unknowns, and the rest of the block
         x, y, z = own[0], own[1], own[2]
         v, w = u[width:], u[2 * width :]
         for i in range(3, size):
@@ -301,6 +321,7 @@ def _backward(size, width, u, own, x, y, z):
 def _backward_rest(size, width, u, own, b, here, end, segments):
     """What the rows after them give to up to three unknowns."""
     x, y, z = 0.0, 0.0, 0.0
+    # One unknown; segments are runs of consecutive rows in b
     if size == 1:
         at = 1
         for e in range(here, end):
@@ -318,6 +339,7 @@ def _backward_rest(size, width, u, own, b, here, end, segments):
                 y += vs[i] * source[i]
             at += n
     else:
+        # Three unknowns, and the rest of the block
         v, w = u[width:], u[2 * width :]
         for i in range(3, size):
             x += u[i] * own[i]

@@ -55,6 +55,7 @@ def build(packed, still=None):
     With `still`, a `locked_orientations.Still`, without the rotations of those bodies and the rows that hold them.
     Scenes of a family share all but numbers, unless a body has next to no inertia about an axis.
     """
+    # Axis rows depend on inertias, so a scene that has any is not shared
     shared = packed.derived.shared
     if shared is None or lean_bodies(packed):
         return _Builder(packed, still).graph()
@@ -163,6 +164,7 @@ class _Builder:
     def _products(self):
         products = [(*self._product(i, 0, i, 0), 1) for i in range(len(self.joints))]
         for found in self.at_body:
+            # Pairs of joints at one body, above the diagonal only
             for i, side in found:
                 for j, other in found:
                     if self.firsts[i] < self.firsts[j]:
@@ -174,6 +176,7 @@ class _Builder:
         products, scales = [], []
         for part in self.parts:
             found = self._at_part(part.body, part.nodes)
+            # Rows with rows
             for i, side in found:
                 for j, other in found:
                     if self.firsts[i] <= self.firsts[j]:
@@ -182,6 +185,7 @@ class _Builder:
             for weld, sign in part.welds:
                 count = self.sizes[weld]
                 for i, side in found:
+                    # Rows with the weld's, whose H is +-I
                     node, r = self.inside[i]
                     target, stride, after = self.where(node, weld)
                     to, kind = (target + r, WELD_ROWS) if after else (target + r * stride, ROWS_WELD)
@@ -189,6 +193,7 @@ class _Builder:
                     products.append((left, self.joints[i].constraint.rows, 0, count, to, stride, kind, part.body))
                     scales.append(sign * part.scale)
                 for other, other_sign in part.welds:
+                    # Welds with welds
                     target, stride, after = self.where(weld, other)
                     if not after:
                         products.append((0, count, 0, count, target, stride, WELDS, part.body))
@@ -236,6 +241,7 @@ class _Builder:
                 i = index.get(id(constraint))
                 if i is None:
                     continue
+                # An omitted instance interrupts the run
                 if last is None or last != at - 1:
                     kinds.append(
                         {
@@ -294,7 +300,7 @@ class _Builder:
             dropped=dropped_rows(self.packed, self.still, self.places),
             frictions=frictions,
             friction_rows=friction_rows,
-            rub=np.zeros(1, np.int64),
+            friction_solver=np.zeros(1, np.int64),
             axes=axes,
         )
         return graph, used

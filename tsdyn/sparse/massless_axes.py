@@ -64,12 +64,15 @@ def lean_bodies(packed):
     system = packed.system
     rigid = np.flatnonzero(system.bodies[:, 1] == 7)
     size, axes = np.linalg.eigh(system.inertia[rigid].reshape(-1, 3, 3))
+    # Inertia is small beside the largest one of the body, or beside m l^2
     whole = np.maximum(size[:, 2], system.mass[rigid] * levers(packed)[rigid] ** 2)
     most, found = whole.max(initial=0.0), {}
+    # Bodies far lighter than others matter only where they carry these
     light = np.where(size[:, 0] < THIN * whole, GIVEN * whole, size[:, 0]) < FAINT * most
     carries = np.isin(rigid, _carriers(packed, set(rigid[light].tolist()))) if light.any() else light
     least = np.where(carries, RAISED * most, THIN * whole)
     given = np.where(carries, np.sqrt(whole * most), GIVEN * whole)
+    # Axes below their limit; what is rounding of zero counts as zero
     for i in np.flatnonzero(size[:, 0] < least):
         few = size[i] < least[i]
         true = np.where(size[i, few] > NONE * size[i, 2], size[i, few], 0.0)
@@ -84,6 +87,7 @@ def _carriers(packed, light):
         ends = {number.get(id(constraint.body_of(marker)), -1) for marker in constraint.markers}
         for i in ends & light:
             near[i] |= ends - {i}
+    # Connected sets of light bodies; one with two neighbours outside carries something
     left = set(light)
     while left:
         together, queue = set(), [left.pop()]

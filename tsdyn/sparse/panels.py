@@ -96,6 +96,7 @@ class _Layout:
     def _column(self, g, row):
         """Column of a row in the panel of block g."""
         froms, places = self.maps[g]
+        # The run of consecutive rows that holds this one
         run = bisect_right(froms, row) - 1
         place = places[run] + row - froms[run]
         if place >= (places[run + 1] if run + 1 < len(places) else self.widths[g]):

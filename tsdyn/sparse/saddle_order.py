@@ -76,10 +76,12 @@ class _Sets:
         """The rows that can follow a body, in order."""
         name = self._new(self.at_body.get(body, ()))
         self.home[body] = name
+        # Sets whose anchor was this body
         for other in self.at_anchor.pop(body, ()):
             self.anchors[self._find(other)].discard(body)
             name = self._merge(name, self._find(other))
         found = []
+        # Rows become ready one after the other
         while (i := self._next(self._find(name))) is not None:
             found.append(i)
             name = self._join(i)
@@ -97,7 +99,7 @@ class _Sets:
         return name
 
     def _ends(self, i):
-        """The sets that rows i touch, and the anchors that all of them would have as one."""
+        """The sets that rows i connect, and the anchors of their union."""
         sets = {self._find(self.home[body]) for body in self.pairs[i] if body in self.home}
         anchors = {body for body in self.pairs[i] if body not in self.home}
         return sets, anchors.union(*(self.anchors[name] for name in sets))
@@ -111,7 +113,7 @@ class _Sets:
         return -1 if body in self.home else self.rank[body]
 
     def _join(self, i):
-        """Eliminate rows i: one set of those that they touch."""
+        """Eliminate rows i, and merge the sets that they connect."""
         sets, anchors = self._ends(i)
         name, *others = sets
         for other in others:

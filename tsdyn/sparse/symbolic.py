@@ -85,10 +85,13 @@ def _with_late(order, cliques, early):
 def fill_reducing_order(sizes, cliques):
     """Order of elimination: nodes in one clique only cost no fill and go first; then by minimum degree."""
     graph = _QuotientGraph(sizes, cliques)
+    # Trees vanish entirely here
     graph.peel()
     core = [i for i in range(len(sizes)) if not graph.done[i]]
+    # Large cores: SuperLU's ordering is faster
     if len(core) > OWN:
         return graph.order + _minimum_degree(core, graph.members.values())
+    # Minimum degree; among equals the one that changed longest ago
     ticket = len(core)
     latest = {i: (graph.degree(i), at) for at, i in enumerate(core)}
     heap = [(*key, i) for i, key in latest.items()]
@@ -182,6 +185,7 @@ def _minimum_degree(core, cliques):
         columns += [i for _ in places for i in places]
     n = len(core)
     graph = scipy.sparse.csc_matrix((np.full(len(rows), -1.0), (rows, columns)), (n, n))
+    # Diagonally dominant, so that no pivoting changes the order
     heavy = 1.0 - 2.0 * np.asarray(graph.sum(axis=0)).ravel()
     factors = sparse_lu(
         (graph + scipy.sparse.diags(heavy)).tocsc(),
@@ -226,6 +230,7 @@ def _amalgamate(sizes, order, parent, reach):
     children = {i: [] for i in order}
     for i in order:
         groups[i], rows[i], cost[i] = [i], sizes[i], _cost(sizes[i], reach[i])
+        # A child joins its parent where one dense block is cheaper than two
         for child in children.pop(i):
             both = _cost(rows[i] + rows[child], reach[i])
             if rows[i] + rows[child] <= WIDEST and both <= cost[i] + cost[child]:
@@ -235,6 +240,7 @@ def _amalgamate(sizes, order, parent, reach):
         if parent[i] >= 0:
             children[parent[i]].append(i)
 
+    # A whole small tree as one block, where that is cheaper
     root = {}
     for i in reversed(order):
         root[i] = root[parent[i]] if parent[i] >= 0 else i

@@ -1,9 +1,9 @@
 """Choice of minimal coordinates: joint coordinates in the order of the joints, then displacements and rotations.
 
-What of a candidate is left when those taken before it are held is a diagonal entry of Z P Z^T, P the inverse mass of
-the motions that are still free. Candidates are looked at in batches: those taken in earlier batches are rows of the
-sparse saddle-point matrix, those of the same batch pivots of Cholesky's factor of a small Z P Z^T. So the cost is that
-of a solution a candidate, and of a factorisation a batch.
+The component of a candidate that is independent of those accepted before is a diagonal entry of Z P Z^T, P the inverse
+mass of the motions that are still free. Candidates are examined in batches: those taken in earlier batches are rows of
+the sparse saddle-point matrix, those of the same batch pivots of Cholesky's factor of a small Z P Z^T. So the cost is
+that of a solution a candidate, and of a factorisation a batch.
 """
 
 import numpy as np
@@ -97,7 +97,7 @@ def _left(free, Z, which):
 
 
 def _take_in_turn(motion, Z, taken, which, share, least, k):
-    """Take candidates of which more than a share is left in their turn."""
+    """Accept candidates in order, each whose independent component exceeds a fraction of the best one's."""
     for first in range(0, len(which), BATCH):
         batch = which[first : first + BATCH]
         rows = Z[batch]

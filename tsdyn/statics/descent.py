@@ -47,20 +47,20 @@ class Descent(Moves):
         super().__init__(*start)
         self.steps, self.mu = 0, FIRST_MU
 
-    def tell(self):
-        """Report the steps so far: the fraction is of the digits that are to be gained."""
+    def report_steps(self):
+        """Report progress: digits gained over digits required."""
         left = self.unbalanced
         digits = np.log(left) / np.log(BALANCED) if left > 0.0 else 1.0
         self.report(
             SEARCH * min(max(digits, 0.0), 1.0), f"{self.steps} steps, {left:.1e} of the loads are not balanced"
         )
 
-    def settle(self):
+    def balance(self):
         """Take steps until the loads are balanced to rounding; True if they are."""
         vain = 0
         while self.steps < MOST_STEPS and self.gone < FARTHEST * self.reach and self.turned < MOST_TURNED:
             before = self.unbalanced
-            self.tell()
+            self.report_steps()
             if before <= BALANCED or not self._step():
                 break
             self.steps += 1
@@ -70,7 +70,7 @@ class Descent(Moves):
         return self.unbalanced <= TURNED
 
     def _step(self):
-        """Take a step; False if none is left that the loads do work on."""
+        """Take a step; False if no step is left along which the loads do work."""
         quadratic, load = self.rest.quadratic, self.rest.left
         near = self.unbalanced <= AT_SADDLE
         if near and (self.relative or quadratic.circulatory):
@@ -99,19 +99,19 @@ class Descent(Moves):
         return False
 
     def _least(self, mu):
-        """What stands for K, N m, where there is no stiffness, and where D doesn't suffice."""
+        """Stiffness, N m, that replaces K where there is none, and where D doesn't suffice."""
         stiffness = self.rest.quadratic.local.max(initial=0.0)
         if stiffness == 0.0:
             return SLIDING * np.abs(self.rest.left).max() * max(mu, 1.0)
         return mu * stiffness if mu > STIFF else 0.0
 
     def _is_fit(self, u, mu):
-        """Whether an increment is to be tried: one that is much too long gets shorter, and straighter, by mu."""
+        """Whether an increment is short enough to be tried; a larger mu makes it shorter."""
         slides = self.trust == 1.0 and self.increments.extent(u)[1] <= TOO_FAR * MOST_TURN
         return slides or mu >= 1.0 or self.length(u) <= TOO_FAR * self.trust or not self.rest.quadratic.shift.any()
 
     def _leave(self, factors, step):
-        """Leave what is close to a saddle along a direction of negative stiffness that gains more than a step does."""
+        """Leave a saddle nearby along a direction of negative stiffness, if that gains more than a step."""
         quadratic, load = self.rest.quadratic, self.rest.left
         u = factors.downhill(load, np.random.default_rng(self.steps))
         if u is None:

@@ -84,7 +84,7 @@ def find_equilibrium(packed, handles, remembered, t, q, q0, report):
     descent = Descent(packed, handles, remembered, t, q, report)
     _demand_held(descent.frame)
     for _ in range(MOST_SADDLES):
-        if not descent.settle():
+        if not descent.balance():
             _refuse(descent)
         demand_smooth(descent.motion)
         *findings, way = _stability(descent)

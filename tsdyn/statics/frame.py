@@ -1,4 +1,4 @@
-"""What doesn't change while a configuration at rest is moved: kinds of rows, bodies of each part, sparsity."""
+"""What is constant during a search for an equilibrium: kinds of rows, bodies of each part, sparsity."""
 
 import numpy as np
 
@@ -82,7 +82,7 @@ class Frame:
         return self.saddle, top, (self.blocks.rows, self.blocks.columns), self.blocks.matrix(top).diagonal()
 
     def _rods(self):
-        """Which parts hold two points at a distance; they turn by the difference of shifts."""
+        """Which parts hold two points at a distance: the difference of displacements rotates them."""
         kept = [self.packed.constraints[i] for i in self.parts[: self.constraints]]
         return np.flatnonzero([part.rows == 1 and all(m.code == POINT for m in part.markers) for part in kept])
 

@@ -116,7 +116,7 @@ class Linearisation:
 def linearise(scene, memory, state, inputs, outputs, report):
     """The `Linearisation` of a scene at a consistent (t, q, qd), with the memory of forces and constraints.
 
-    report(fraction, said) is told of what comes next.
+    report(fraction, said) announces the next part.
     """
     report(0.05, "accelerations and reactions are solved for")
     motion = Motion(scene.packed, memory, *state)

@@ -69,7 +69,7 @@ class Motion:
             self._press()
 
     def _press(self):
-        """Take over the normal loads of friction in joints, whose friction vanishes at rest."""
+        """Set the normal loads of joint friction, which vanishes at rest."""
         from ..observables.friction_balance import normal_loads  # imported here: few scenes need it
 
         N, friction = normal_loads(self.packed, self.t, self.q, self.qd, self.Phi_q, self.lam)
@@ -83,7 +83,7 @@ class Motion:
         self.system.reals[self.system.normals] = N
 
     def _redundant(self):
-        """Redundant rows of Phi here: as many as at the start, but which of them is chosen anew."""
+        """Redundant rows of Phi at this state: as many as at the start, reselected."""
         known = graph_of(self.packed, REDUCED).row[redundant_rows(self.packed)]
         if not known.size:
             return known
@@ -162,7 +162,7 @@ class Motion:
 
     @property
     def is_balanced(self):
-        """Whether accelerations are rounding of those that balance each other."""
+        """Whether the accelerations are rounding of contributions that cancel."""
         loads = max(float(np.abs(load / self.root**2).max(initial=0.0)) for load in (self.Q_A, self.Phi_q.T @ self.lam))
         return bool(np.abs(self.qdd).max(initial=0.0) <= ROUNDED * loads)
 

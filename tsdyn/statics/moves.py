@@ -1,4 +1,4 @@
-"""A configuration at rest and how it is moved: by increments that close the constraints, as far as loads do work.
+"""A configuration at rest, and moves to others: increments that satisfy the constraints, along which loads do work.
 
 The work along an increment is that of the trapezoidal rule, so no load needs a potential.
 """
@@ -35,7 +35,7 @@ class Moves:
     q : ndarray (n,)
         Consistent.
     report : callable (fraction, said)
-        Is told how far the search is.
+        Called with the progress of the search.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Moves:
         return self.rest.unbalanced
 
     def nothing(self, reduced):
-        """The stiffness, 1/s^2, that is none: rounding of its terms, and what loads left over seem to have."""
+        """Stiffness, 1/s^2, that counts as zero: rounding of its terms, and apparent stiffness of residual loads."""
         left = self.unbalanced * self.rest.acceleration_scale / self.reach
         return NO_STIFFNESS * reduced.scale + len(reduced.K_hat) * left
 
@@ -93,7 +93,7 @@ class Moves:
         return max(shift / self.longest, turn / MOST_TURN, LEAST_SHIFT)
 
     def advance(self, u, factors):
-        """Move by an increment, or a share of it on which the loads do the work that it promises; whether it moves."""
+        """Move by an increment, or a fraction along which loads do the predicted work; whether it moves."""
         far, factor = self.length(u), 1.0
         turn = self.increments.extent(u)[1]
         factor = min(1.0, self.trust / far)
@@ -108,7 +108,7 @@ class Moves:
         return False
 
     def attempt(self, u, factors):
-        """Move by an increment if the loads do work on the way; whether they do."""
+        """Move by an increment if the loads do work along it; whether they do."""
         old, size = self.rest, self.size(u)
         promised = float(old.left @ u) - 0.5 * old.quadratic.along(u)
         moved = self.increments.moved(old.q, u)
@@ -123,7 +123,7 @@ class Moves:
         return self._move(q, u, size, promised)
 
     def approach_by(self, u):
-        """Move by an increment, or a share of it that leaves less unbalanced; whether one does."""
+        """Move by an increment, or a fraction that reduces the residual; whether one does."""
         factor = min(1.0, 1.0 / self.length(u))
         for i in range(HALVINGS):
             q = self.rest.closed(self.increments.moved(self.rest.q, factor * 0.5**i * u))

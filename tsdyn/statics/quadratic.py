@@ -83,7 +83,7 @@ class Quadratic:
 
     @cached_property
     def strain(self):
-        """Numbers for `Frame.blocks` of what exceeds K, in which increments that strain little are small."""
+        """Numbers for `Frame.blocks` of a norm that exceeds K, in which increments of little strain are small."""
         return self.frame.stiffness(self._structured(self._norms), _diagonal(MASSLESS * self.local))
 
     @cached_property

@@ -68,7 +68,7 @@ class SteadyDescent(Descent):
         """Take Newton steps to the nearest root; True if it is reached."""
         for _ in range(MOST_NEWTON):
             before, rest = self.unbalanced, self.rest
-            self.tell()
+            self.report_steps()
             if before <= BALANCED:
                 break
             u = rest.quadratic.factors(0.0, 0.0).newton(rest.left)
@@ -88,7 +88,7 @@ def find_steady(descent):
         found = descent.approach()
         if not found:  # Newton's steps have gone astray
             descent.rest, descent.memory, descent.angles = start
-            found = descent.settle() and descent.approach()
+            found = descent.balance() and descent.approach()
         if not found:
             if unstable is None:
                 _refuse(descent)
@@ -99,7 +99,7 @@ def find_steady(descent):
         if unstable is None or not findings[0]:
             unstable = findings, descent.rest, descent.memory.copy(), descent.angles.copy()
         descent.kick(way)
-        if not descent.settle():
+        if not descent.balance():
             break
     findings, descent.rest, descent.memory, descent.angles = unstable
     return findings

@@ -1,4 +1,4 @@
-"""What acts at a configuration at rest: loads, constraint rows, and the multipliers that balance most.
+"""Loads, constraint rows and multipliers at a configuration at rest.
 
     [ G    A^T ] [ y   ]     [ Q       ]
     [ A    0   ] [ lam ]  =  [ 0       ]            Q - A^T lam = G y is left over
@@ -67,7 +67,7 @@ class Rest:
         return np.zeros((2, self.q.size))
 
     def _press(self):
-        """Multipliers of the normalisations: nothing is left along p."""
+        """Multipliers of the normalisations: no residual along p."""
         frame, p = self.frame, self.frame.metric.p
         if len(p):
             left = self.Q - self.reactions
@@ -109,17 +109,17 @@ class Rest:
 
     @property
     def unbalanced(self):
-        """The largest acceleration by what is left, m/s^2, over that of the loads by themselves."""
+        """The largest acceleration by the residual loads, m/s^2, over that by the loads alone."""
         return float(self._largest(self.left) / self.acceleration_scale)
 
     @property
     def gains(self):
-        """Accelerations (b, 3), m/s^2, and of turns (b', 3), rad/s^2, by what is left, on bodies without joints."""
+        """Accelerations (b, 3), m/s^2, and of turns (b', 3), rad/s^2, by residual loads, on bodies without joints."""
         return self.frame.increments.accelerations(self.left)
 
     @property
     def fastest(self):
-        """The body that accelerates most by what is left, and how much: for messages."""
+        """The body with the largest residual acceleration, and that acceleration: for messages."""
         shifts, spins = (np.linalg.norm(each, axis=1) for each in self.gains)
         turns = np.zeros(len(shifts))
         turns[self.frame.metric.rigid] = spins
@@ -167,7 +167,7 @@ class Rest:
         return q, size
 
     def _shifted(self, bias):
-        """The increment u with A u = bias that turns least."""
+        """The increment u with A u = bias of least rotation."""
         return self.solve(np.zeros(self.frame.increments.size), bias)[0]
 
     def force_slopes(self, Q_q, Q_qd):
@@ -175,7 +175,7 @@ class Rest:
         return Q_q
 
     def own_slopes(self):
-        """What else is by q of each body, (b, 7, 7)."""
+        """Other derivatives by q of each body, (b, 7, 7)."""
         return np.zeros((len(self.frame.metric.at), 7, 7))
 
     def residuals(self, q):

@@ -12,7 +12,7 @@ from .tolerances import CLEARLY, FEW_NEGATIVE, ROUNDED, SMALL, SOFT
 
 
 def saddle_free(factors, load):
-    """The increment u, by the `Factors` at mu = 0; None where there are too many negative eigenvalues to look at."""
+    """The increment u, by the `Factors` at mu = 0; None where there are too many negative eigenvalues."""
     if load.size <= SMALL:
         return _by_all(factors, load)
     if factors.negative > FEW_NEGATIVE:

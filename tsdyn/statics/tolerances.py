@@ -7,7 +7,7 @@ SINGULAR = 1e-15
 # Refinements of accelerations and multipliers where masses are unequal: the factors lose their ratio, each regains it.
 UNEQUAL_SWEEPS = 3
 
-# Share of the loads' own accelerations below which those that are left are rounding.
+# Residual accelerations over those of the loads alone: below it they are rounding.
 ROUNDED = 1e-13
 
 # Coordinates up to which redundant rows are chosen by QR with pivoting, which costs their cube; of larger scenes by
@@ -15,17 +15,18 @@ ROUNDED = 1e-13
 DENSE, REDUNDANT_SHARE = 400, 1e-6
 
 # --- choice of coordinates ---
-# A coordinate is taken in its turn if what the ones before leave of it is this share of the largest that is left.
+# Accept the next coordinate in order if its component independent of the accepted ones is at least this fraction of the
+# best candidate's.
 IN_TURN = 0.1
-# Share of a coordinate's own variation that the ones before it must leave: squares, as pivots of a Gram matrix are,
-# of which rounding leaves 1e-15.
+# A coordinate is independent if this fraction of its variation is independent of the accepted ones. Squares, being
+# pivots of a Gram matrix with rounding of 1e-15.
 INDEPENDENT = 1e-9
 # Share of a coordinate's variation without constraints that is rounding: squares again, of sums of a few roundings.
 HELD = 1e-13
 # Share of the largest pivot of constraints and coordinates, unit rows, above which the coordinates are independent.
 CLEAR = 1e-6
 
-# Candidates that are looked at together: their dense products cost what a sparse factorisation does.
+# Candidates per batch: their dense products cost as much as a sparse factorisation.
 BATCH = 64
 
 # --- steady motion ---
@@ -48,27 +49,29 @@ ZERO = 1e-12
 # --- smoothness of forces ---
 # Share of the scene's size, rad, and of the speeds by which loads are displaced on both sides of a state.
 PROBE = 1e-7
-# Share of the expected change of the loads by which the two sides may differ; smooth laws leave PROBE over their scale.
+# The differences on both sides may deviate by this fraction of the expected change; those of a smooth law deviate by
+# PROBE over its scale.
 ROUGH = 1e-2
 # Share of the loads' own size that is rounding of their differences.
 ROUNDING = 1e-12
 
 # --- inputs ---
-# Share of the largest generalised force of an input below which its projection onto the motions admitted is rounding.
+# Projection of an input onto the admissible motions over its largest generalised force: below it the projection is
+# rounding.
 NO_EFFECT = 1e-12
 
 # --- equilibria ---
-# Share of the loads' own accelerations that counts as balanced: rounding of sums of a few loads. Steps end there.
+# Residual accelerations over those of the loads alone. BALANCED: rounding of sums of a few loads, where steps end.
 BALANCED = 1e-14
-# The same of what the stiffness leaves out.
+# SETTLED: the part that the stiffness doesn't model.
 SETTLED = 1e-12
-# The same at the end of all steps; also of constraints, relative to 1 + max |q|.
+# TURNED: accepted at the end of all steps; also of constraints, relative to 1 + max |q|.
 TURNED = 1e-9
-# Share of the scene's size, rad: a step that is shorter changes nothing.
+# Share of the scene's size, rad: shorter steps are lost in rounding.
 LEAST_STEP = 1e-15
 LEAST_SHIFT = 1e-300
-# Weight of a shift by the scene's size against a turn by a radian, among what takes up loads: forces are passed on by
-# chains of up to the inverse root of it in links.
+# Weight of a translation by the scene's size against a rotation by one radian in the stiffness of massless bodies:
+# chains of up to its inverse square root in links transmit forces.
 MASSLESS = 1e-8
 # Refinements of what is solved with it, which lose half of the digits at first.
 REFINEMENTS = 2
@@ -77,46 +80,46 @@ REFINEMENTS = 2
 CLEARLY, SOFTENED = 1e-7, 1e-8
 # rad, of a step: angles are counted by the nearest turn, and the trapezoidal rule holds.
 MOST_TURN = 0.5
-# Factors of mu after a step that is taken, and after one that isn't; where it begins, its least; D doesn't suffice
-# above the last.
+# Factors of mu after an accepted and after a rejected step; its first and its least value; above STIFF the diagonal D
+# doesn't suffice.
 SOFTER, STIFFER, FIRST_MU, LEAST_MU, STIFF = 0.25, 5.0, 1e-2, 1e-9, 60.0
-# Factor of a step that does too little work.
+# Factor of a step that reduces the energy too little.
 SHORTER = 0.3
-# Share of the largest stiffness of a body, or of all, below which it has none of its own.
+# Stiffness of a body over its largest entry, or over that of all bodies: below it the body counts as free.
 NOTHING = 1e-12
-# Share of the loads that stands for a stiffness, where there is none: steps are as long as they may be.
+# Where there is no stiffness, this fraction of the loads replaces it: steps then have their greatest length.
 SLIDING = 1e-6
 # Share of the stiffness of a body that a direction without stiffness has.
 SOFTEST = 1e-10
-# Share of the work promised that a step must do; share of what is unbalanced that a short one may leave.
+# A step must do this fraction of the predicted work; a short one may leave this fraction of the residual loads.
 WORTH, GOOD = 0.1, 0.9
-# Steps one after the other that leave more than half of what is nearly nothing: it is rounding.
+# So many successive steps that don't halve a residual near rounding: it is rounding.
 IN_VAIN = 3
-# rad, or shares of the scene's size: the work of shorter steps is rounding, and steps that fail though they are shorter
-# than the second are the last.
+# rad, or shares of the scene's size: the work of steps shorter than SHORT is rounding; if a step shorter than FINAL
+# fails, the search ends.
 SHORT, FINAL = 1e-4, 1e-9
-# A step is this many times longer than may be before mu grows; tries of a step.
+# mu grows if a step exceeds its greatest length by this factor; tries of a step.
 TOO_FAR, MOST_TRIES = 4.0, 20
-# The share of a search that steps take, of what progress reports; stability takes the rest.
+# Fraction of the progress bar for the steps; the check of stability has the rest.
 SEARCH = 0.7
-# Steps at most, and the way in sizes of the scene: what is farther falls.
+# Steps at most; displacement over the size of the scene: a scene that moves farther is falling.
 MOST_STEPS, FARTHEST = 400, 1e5
-# rad, of all steps: what has turned farther is driven round.
+# rad, rotation in all steps: a body that has rotated farther is driven by its loads.
 MOST_TURNED = 60.0
-# Constraints after a step, relative to 1 + max |q|: sums round several times. A sweep that leaves more than the second,
-# a share, stalls.
+# Constraints after a step, relative to 1 + max |q|, several roundings of sums. A sweep that leaves more than the
+# fraction SLOWEST has stalled.
 CLOSED, SLOWEST, MOST_SWEEPS = 1e-15, 0.7, 40
 # ... and above this the step is too long.
 STALLED = 1e-6
-# rad, or shares of the scene's size: ways off a saddle, tried in turn.
+# rad, or shares of the scene's size: displacements away from a saddle, tried in turn.
 KICKS = 0.1, 0.03, 0.01
 # Share of the terms of the stiffness up to which an asymmetry is rounding.
 NEUTRAL_ASYMMETRY = 1e-10
-# Share of the loads' own accelerations up to which a configuration without positive stiffness is close to a saddle;
-# sweeps of inverse iteration to a direction down from there.
+# Residual accelerations over those of the loads alone, up to which a configuration without positive stiffness is near a
+# saddle; sweeps of inverse iteration for a descent direction.
 AT_SADDLE, SWEEPS = 1e-3, 8
-# Increments up to which all eigenvectors are looked at; negative eigenvalues up to which these alone are; shares of the
-# stiffness tried until it is positive.
+# Degrees of freedom up to which all eigenvectors are computed; negative eigenvalues up to which only theirs are;
+# shifts, as fractions of the stiffness, tried until it is positive definite.
 SMALL, FEW_NEGATIVE, SHIFTS = 150, 6, (1e-4, 1e-2, 1.0, 10.0)
 # Share of the stiffness below which a direction without load is neutral.
 SOFT = 1e-5

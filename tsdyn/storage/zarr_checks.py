@@ -1,4 +1,4 @@
-"""Folders of Zarr, looked at before the library is: plain numbers in regular files of the folder, of sizes they hold.
+"""Folders of Zarr, checked before they are read: plain numbers in regular files of the folder, of sizes they hold.
 
 Zarr knows codecs that unpickle, the file system follows links, and a chunk unpacks to what its head says. Codecs that
 tsdyn doesn't write are refused, and so are links.

@@ -14,6 +14,7 @@ NOT_FINITE = int(Status.NOT_FINITE)
 def cross_stop(context, c, r, log):
     """At a stop: poses and accelerations after it, for its output and the next series. Status."""
     w = c.work
+    # Functions switch to their next piece; the state is the same, the accelerations are not
     take_pieces(c.system, r, log)
     status = call_reach(r.kernels.reach, context, r.clock.t, -1.0)
     if status == 0:
@@ -33,6 +34,7 @@ def lower_order(order, rho, tol, h):
 
     rho is the radius of convergence as the coefficients up to that order have it.
     """
+    # At order top - 2 the step would be rho tol^(1 / top)
     top = order.top
     if top > order.lowest and rho * tol ** (1.0 / top) > h:
         order.next = top - 1

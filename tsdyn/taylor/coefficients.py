@@ -39,6 +39,7 @@ TWO_INTEGRALS = np.array([_inverse((k + 1) * (k + 2)) for k in range(MOST_ORDERS
 def begin(graph, system, poses, orders, bodies, Z):
     """Order zero of all bodies, order one of their places, and the forces of order zero but those of a series."""
     for b in range(graph.bodies.shape[0]):
+        # A_0, r_0, r_1 and omega'_0 of the pose; Z begins with gravity and the gyroscopic torque
         at, p, m = b * orders * BODY_ROW, b * POSE, graph.mass[16 * b]
         for c in range(3):
             put(bodies, at + 4 * c, four(poses, p + 4 * c))
@@ -47,6 +48,7 @@ def begin(graph, system, poses, orders, bodies, Z):
         put(Z, 8 * b, lanes(m * system.gravity[0], m * system.gravity[1], m * system.gravity[2]))
         if graph.bodies[b, 1] == 7:
             put(bodies, at + S_OMEGA * orders, four(poses, p + OMEGA))
+            # A_1 = A_0 omega'~_0, and A_2 but for omega'_1
             put(bodies, at + 12, splat(0.0))
             put(bodies, at + 16, splat(0.0))
             put(bodies, at + 20, splat(0.0))
@@ -70,6 +72,7 @@ def spin(graph, b, bodies, at, orders, k):
     torque = splat(0.0)
     if graph.spins[b] != 0:
         o, spins = at + S_OMEGA * orders, at + S_SPIN * orders
+        # -sum_j omega'_j x (J' omega')_{k-j}
         put_momentum(graph, b, bodies, o, spins, k)
         for j in range(k + 1):
             torque = add(torque, cross(four(bodies, spins + 4 * (k - j)), four(bodies, o + 4 * j)))
@@ -88,6 +91,7 @@ def _fetch_next(bodies, at, orders, count, k):
 @kernel
 def turn(bodies, at, k, change):
     """A_k += A_0 change~, the part of (1) that is linear in the last omega'."""
+    # Columns of A_0 change~ are differences of two columns of A_0
     w0, w1, w2, o = splat(first(change)), splat(second(change)), splat(third(change)), at + 12 * k
     a0, a1, a2 = four(bodies, at), four(bodies, at + 4), four(bodies, at + 8)
     put(bodies, o, add(four(bodies, o), sub(times(a1, w2), times(a2, w1))))
@@ -100,6 +104,7 @@ def turn_ahead(bodies, at, orders, k, exact):
     """A_{k+1} of (1) but for omega'_k."""
     x, y, z = splat(0.0), splat(0.0), splat(0.0)
     u, v, w = splat(0.0), splat(0.0), splat(0.0)
+    # sum_{j>0} A_j omega'~_{k-j}
     o = at + S_OMEGA * orders + 4 * (k - 1)
     for c in range(at + 12, at + 12 * (k + 1), 12):
         a0, a1, a2 = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8)
@@ -109,6 +114,7 @@ def turn_ahead(bodies, at, orders, k, exact):
         z, w = fma(a0, w1, z), fma(a1, w0, w)
         o -= 4
     o, f = at + 12 * (k + 1), splat(ONE_INTEGRAL[k, 0])
+    # over k + 1
     x, y, z = sub(x, u), sub(y, v), sub(z, w)
     if exact:
         low = splat(ONE_INTEGRAL[k, 1])
@@ -177,8 +183,8 @@ def expand(graph, system, k, last, ahead, refine, x, f):
     On entry Z has the gyroscopic torques of order k, and A_{k+2} what (1) has without omega'_{k+1}; on exit both are
     of the next order, unless this is the last one. lam_k stays in b until then.
 
-    low_r2 is what r_2 loses to rounding where factors are exact: gravity is rounded to the last place of a larger
-    acceleration, which has the same sign for many steps.
+    low_r2 is the rounding error of r_2 where factors are exact: gravity is rounded to the last place of a larger
+    acceleration, with an error of the same sign in many steps.
 
     The first `refine` orders of lam are refined, `order.sweeps` times each. If more than lam_0, factors 1 / n are exact
     as well: their rounding errors have the same sign in every step, and add up. With `ahead`, a constant, the next
@@ -187,11 +193,14 @@ def expand(graph, system, k, last, ahead, refine, x, f):
     """
     bodies, Z, orders = x.bodies, f.Z, x.order.room
     nb, size = graph.bodies.shape[0], orders * BODY_ROW
+    # F_k and tau'_k without lam_k: reactions by earlier multipliers, then applied forces
     run_loops(graph, system.reals, ADVANCE, k, x, f)
     run_forces(system.reals, x, k, f)
+    # Factors 1 / (k + 1) and 1 / ((k + 1) (k + 2))
     exact = refine > 1
     inverse = g, h, g_low, h_low = inverses(k, exact)
     for b in range(nb):
+        # Eqs. (2), (3) and (1) with lam_k = 0
         at = b * size
         if ahead:
             _fetch_next(bodies, at + size, orders, 12, k + 2)
@@ -200,9 +209,11 @@ def expand(graph, system, k, last, ahead, refine, x, f):
         if graph.bodies[b, 1] == 7:
             put_product(bodies, at + S_OMEGA * orders + 4 * (k + 1), four(Z, 8 * b + 4), g, g_low, exact)
             turn(bodies, at, k + 2, exact_product(four(Z, 8 * b + 4), h, h_low))
+    # Rounding of r_2 begins at zero in every step
     if k == 0:
         x.low_r2[:] = 0.0
         note_loads(f)
+    # Refinement: solve, apply, and solve again for what Phi_{k+2} still lacks
     refined = k < refine
     if refined:
         for sweep in range(x.order.sweeps):
@@ -214,11 +225,13 @@ def expand(graph, system, k, last, ahead, refine, x, f):
                     f.gamma[e] += f.b[e]
             for b in range(nb):
                 change(graph, b, x, k, inverse, exact, Z)
+    # Eq. (4) for lam_k, or for the last correction of it
     _solve(graph, system, k, x, f, refined, exact)
     if refined:
         for e in range(f.b.size):
             f.b[e] += f.gamma[e]
     for b in range(nb):
+        # r_{k+2}, omega'_{k+1}, A_{k+2} with lam_k; then what order k + 1 begins with
         at = b * size
         if ahead:
             _fetch_next(bodies, at + size, orders, 12 * (k + 3), k + 2)
@@ -233,27 +246,31 @@ def expand(graph, system, k, last, ahead, refine, x, f):
 
 @kernel
 def _solve(graph, system, k, x, f, refined, exact):
-    """b = lam_k, or what it lacks to gamma where it is `refined`, and with it Z = -W H^T lam_k.
+    """b = lam_k, or if `refined` its correction of gamma, and Z = -W H^T lam_k.
 
-    With `exact`, low_r2 counts in what lam_0 lacks.
+    With `exact`, the residual of lam_0 includes low_r2.
     """
     orders = x.order.room
+    # (k + 1)(k + 2) Phi_{k+2} of the coefficients so far
     run_loops(graph, system.reals, RESIDUAL, k, x, f)
     if k == 0 and refined and exact:
         for b in range(graph.bodies.shape[0]):
+            # 2 r_2 is an acceleration: H of its rounding error
             put(f.Z, 8 * b, times(four(x.low_r2, 4 * b), splat(2.0)))
             put(f.Z, 8 * b + 4, splat(0.0))
         add_products(graph, f.rows, f.Z, f.b)
+    # S lam_k = that
     solve_series(graph, f, x.bodies, S_OMEGA * orders + 4 * (k + 1), BODY_ROW * orders, k, refined)
 
 
 @kernel
 def change(graph, b, x, k, inverse, exact, Z):
-    """Add what Z makes of a body's r_{k+2}, omega'_{k+1} and A_{k+2}; inverse and exact as of `inverses`."""
+    """Add the effect of accelerations Z to r_{k+2}, omega'_{k+1}, A_{k+2} of a body; inverse, exact: see `inverses`."""
     g, h, g_low, h_low = inverse
     bodies, orders = x.bodies, x.order.room
     at = b * orders * BODY_ROW
     push, o = four(Z, 8 * b), at + S_R * orders + 4 * (k + 2)
+    # r_{k+2} += Z_r / ((k + 1) (k + 2)), at order zero with its rounding error
     if exact and k == 0:
         low = four(x.low_r2, 4 * b)
         put_sum(bodies, o, four(bodies, o), times(push, h), x.low_r2, 4 * b)
@@ -263,9 +280,10 @@ def change(graph, b, x, k, inverse, exact, Z):
     else:
         put(bodies, o, fma(push, h, four(bodies, o)))
     if graph.bodies[b, 1] == 7:
-        change, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
+        # omega'_{k+1} += Z_omega / (k + 1), and A_{k+2} by Eq. (1)
+        twist, o = four(Z, 8 * b + 4), at + S_OMEGA * orders + 4 * (k + 1)
         if exact:
-            put(bodies, o, add(four(bodies, o), exact_product(change, g, g_low)))
+            put(bodies, o, add(four(bodies, o), exact_product(twist, g, g_low)))
         else:
-            put(bodies, o, fma(change, g, four(bodies, o)))
-        turn(bodies, at, k + 2, exact_product(change, h, h_low))
+            put(bodies, o, fma(twist, g, four(bodies, o)))
+        turn(bodies, at, k + 2, exact_product(twist, h, h_low))

@@ -22,11 +22,13 @@ def read_series(context, run, t, rows, blocks, charts, points, out):
     c, r = load_series(context), load_run(run)
     w, x = c.work, c.expansion
     for i in range(t.size):
+        # A block is the whole series of a step
         block = blocks[rows[i]]
         data = block[B_DATA:]
         x.order.top = int(data[0])
         copy(data[1:][: w.q.size], w.q)
         copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
+        # Poses of the start are where Euler parameters are followed from
         recall(c.system, block)
         set_floor(c, w.q)
         place_bodies(c.graph.bodies, w.q, c.tangent.poses)

@@ -45,6 +45,7 @@ def lay_out_forces(packed, orders):
     for row in packed.system.forces:
         reals = int(row.reals)
         for _, group in groupby(members_of(row, packed.loads), _is_driven):  # instances of a kind are run together
+            # Instances that run the same loop in one go
             members = list(group)
             force = members[0].force
             kind = _kind(members)
@@ -57,6 +58,7 @@ def lay_out_forces(packed, orders):
             written.append((total, kind.program))
             total += len(kind.program)
             for i, load in enumerate(members):
+                # A driven force reads the series of its loads from its scratch
                 pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]
                 table += [*pair, (pair[0] == nb) | (pair[1] == nb) << 1]
                 if _is_driven(load):
@@ -77,12 +79,15 @@ def _is_driven(load):
 def _kind(members):
     """The `_Kind` of instances that are alike."""
     load, force = members[0], members[0].force
+    # A traced function: every step is checked
     if hasattr(force.kernels, "program"):
         program = force.kernels.program(len(load.parameters))
         return _Kind(("series", "check", None), True, int(program[ROWS]), program)
+    # Friction in proportion to a normal load: the same
     if load.normal >= 0:
         size = sum(marker.size for marker in force.markers)
         return _Kind(("series", "check", None), True, force.slots + size + FRICTION_ROWS, [])
+    # Other laws: checked everywhere if sharp, or where the margin of analyticity is used up
     signals = [value for each in members for value in each.parameters if isinstance(value, Signal)]
     sharp = force.sharp or not all(signal.entire for signal in signals)
     before, numbers = ("driven_", load.alone[0].stride - 3 * len(force.markers)) if signals else ("", 0)

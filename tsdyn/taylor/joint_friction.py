@@ -43,9 +43,11 @@ def sum_reaction(reals, x, i, k):
     friction, orders = x.frictions[i], x.order.room
     F, T, p, o = splat(0.0), splat(0.0), friction.point, friction.reaction + k
     for j in range(friction.first, friction.first + friction.count):
+        # Force, and torque about the joint's point: sum_l A_l s x f_{k-l}
         source = x.sources[j]
         s, forces, at = source.coordinates, source.forces, source.body * orders * BODY_ROW
         s0, s1, s2 = reals[s], reals[s + 1], reals[s + 2]
+        # Of a point, its arm from the joint's point
         if source.is_point == 1:
             F = add(F, four(x.constraints, forces + 4 * k))
             s0, s1, s2 = s0 - reals[p], s1 - reals[p + 1], s2 - reals[p + 2]
@@ -73,6 +75,7 @@ def _find_slopes(graph, system, w, x, f):
     r, reaction, out = f.friction, stack(6), stack(13)
     for i in range(graph.frictions.shape[0]):
         friction, series = graph.frictions[i], x.frictions[i]
+        # N, N_lam and the reaction of order zero
         body_reaction(graph, f, friction, r.lam, reaction)
         load_slope(system, series.slope, friction, w.q, w.qd, x.order.time, reaction, out)
         for c in range(7):
@@ -83,10 +86,11 @@ def _find_slopes(graph, system, w, x, f):
 
 @kernel
 def _start(graph, system, w, x, f):
-    """Z <- accelerations, r.lam <- lam_0, from Z = W F without friction; False if there are none."""
+    """Z <- accelerations, r.lam <- lam_0, from Z = W F without friction; False if no reactions balance the friction."""
     r = f.friction
     x.low_r2[:] = 0.0
     note_loads(f)
+    # Newton's method for lam_0; if it fails from the last multipliers, from zero
     evaluate_bias(graph, system, f, x.order.time)
     if find_reactions(graph, system, f, w.q, w.qd, x.order.time):
         return True
@@ -98,14 +102,17 @@ def _start(graph, system, w, x, f):
 
 @kernel
 def _correct(graph, system, k, exact, x, f):
-    """Take from the series what Eq. (2) makes of its residuals; f.gamma is lam_k so far."""
+    """Correct the series by Eq. (2) for its residuals; f.gamma is lam_k so far."""
     orders, inverse = x.order.room, inverses(k, exact)
+    # Residuals of Phi_{k+2}
     run_loops(graph, system.reals, RESIDUAL, k, x, f)
+    # less what r_2 has lost to rounding
     if k == 0 and exact:
         for b in range(graph.bodies.shape[0]):
             put(f.Z, 8 * b, add(four(x.low_r2, 4 * b), four(x.low_r2, 4 * b)))
             put(f.Z, 8 * b + 4, splat(0.0))
         add_products(graph, f.rows, f.Z, f.b)
+    # Eq. (2)
     solve_friction_series(graph, f, x.bodies, S_OMEGA * orders + 4 * (k + 1), BODY_ROW * orders, k)
     for e in range(f.b.size):
         f.gamma[e] += f.b[e]
@@ -117,31 +124,38 @@ def _correct(graph, system, k, exact, x, f):
 def expand_with_friction(graph, system, w, k, last, refine, x, f):
     """As `coefficients.expand`; False if no reactions balance the friction at order zero."""
     bodies, Z, orders, r, exact = x.bodies, f.Z, x.order.room, f.friction, refine > 1
+    # Reactions by earlier multipliers, friction as far as it is known, Eq. (1), other forces
     run_loops(graph, system.reals, ADVANCE, k, x, f)
     if k > 0:
         _sum_reactions(system.reals, x, k)
     run_forces(system.reals, x, k, f)
     weigh_bodies(graph, Z)
+    # At order zero all of the friction
     if k == 0 and not _start(graph, system, w, x, f):
         return False
     g, h, g_low, h_low = inverses(k, exact)
     for b in range(graph.bodies.shape[0]):
+        # Coefficients with lam_k = 0, or at order zero with lam_0
         at = b * orders * BODY_ROW
         put_product(bodies, at + S_R * orders + 4 * (k + 2), four(Z, 8 * b), h, h_low, exact)
         if graph.bodies[b, 1] == 7:
             put_product(bodies, at + S_OMEGA * orders + 4 * (k + 1), four(Z, 8 * b + 4), g, g_low, exact)
             turn(bodies, at, k + 2, exact_product(four(Z, 8 * b + 4), h, h_low))
+    # lam_k, refined
     for e in range(f.gamma.size):
         f.gamma[e] = r.lam[e] if k == 0 else 0.0
     for _ in range(1 + (x.order.sweeps if k < refine else 0)):
         _correct(graph, system, k, exact, x, f)
+    # lam_k stays in b for the next order
     copy(f.gamma, f.b)
+    # N~ of order zero serves all orders
     if k == 0:
         copy(f.gamma, r.lam)
         _find_slopes(graph, system, w, x, f)
         if not factorise_loads(graph, f, False):
             return False
     for b in range(graph.bodies.shape[0]):
+        # What order k + 1 begins with
         put(Z, 8 * b, splat(0.0))
         if graph.bodies[b, 1] == 7 and not last:
             put(Z, 8 * b + 4, spin(graph, b, bodies, b * orders * BODY_ROW, orders, k + 1))

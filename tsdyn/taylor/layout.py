@@ -128,6 +128,7 @@ def allocate_expansion(graph, kinds, packed, highest):
     rows, total = [], 0
     for i, kind in enumerate(kinds):
         first, count = graph.kinds[i].table, int(graph.kinds[i].count)
+        # Columns of Phi_x that vary in no instance need no series
         masks = graph.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
         varies = bool((masks & ((1 << GROUND) - 1)).any())
         driven = bool(graph.kinds[i].drift)
@@ -184,6 +185,7 @@ def masks(graph, packed):
         motions, patterns, series = {}, {}, twin(kind.series)
         for i, (constraint, par) in enumerate(members):
             entry = graph.table[row.table + i * INTS :][:INTS]
+            # Directions of bodies that never turn are like those of the ground
             length = [lengths[entry[BODY + (marker.body == "b")]] for marker in kind.markers]
             grounded = tuple(
                 isinstance(constraint.body_of(marker), Ground) or (size == STILL and marker.code != POINT)
@@ -194,6 +196,7 @@ def masks(graph, packed):
                 if grounded not in motions:
                     motions[grounded] = _random_motion(grounded)
                 patterns[key] = _mask(kind, series, key[1], grounded, motions[grounded])
+            # Instances with the same numbers have the same pattern
             mask = patterns[key]
             entry[MASK] = mask | sum(int(size != 7) << (UNTURNED + j) for j, size in enumerate(length))
             constant += len(kind.markers) - (mask & ((1 << GROUND) - 1)).bit_count()
@@ -211,6 +214,7 @@ def _mask(kind, series, par, grounded, motion):
     prescribed = np.random.default_rng(1).normal(size=(len(kind.quantities()), len(motion)))
     scratch = np.concatenate((np.zeros((kind.slots, len(motion))), prescribed))
     varies = np.zeros(len(motion[0]), bool)
+    # A random motion shows which columns have coefficients beyond order zero
     for k, x in enumerate(motion):
         out = np.zeros((kind.rows, len(x)))
         series(x, par, k, scratch, out)

@@ -31,12 +31,13 @@ def size_of_order(bodies, nb, orders, k, far, fast):
 
 @long_kernel
 def radius(bodies, nb, orders, top, far, fast):
-    """The radius of convergence as the last coefficients up to top + 1 have it (Jorba, Zou, 2005); 0 if not finite.
+    """Radius of convergence from the last four coefficients up to top + 1; 0 if they are not finite.
 
-    More than their two: where a motion began at rest every fourth coefficient can vanish.
+    Jorba and Zou (2005) take two; in a motion that starts from rest every fourth coefficient can vanish.
     """
     rho = math.inf
     for k in range(top + 1, max(top - 3, 1), -1):
+        # |c_k|^(-1/k), the least of the last orders
         size = size_of_order(bodies, nb, orders, k, far, fast)
         if not size < math.inf:
             return 0.0
@@ -50,21 +51,25 @@ def order_in_range(bodies, nb, orders, top, far, fast):
     """The highest order up to top whose coefficients neither overflow nor vanish.
 
     They are in proportion to rate^k: 1e450 at order 30 where rates are 1e15 / s, and 1e-450 where they are 1e-15 / s.
-    A maximum can hide a body whose coefficients are no numbers: see `finite_top`.
+    A maximum doesn't show coefficients that are NaN: see `finite_top`.
     """
+    # Nearly always the last coefficients are in range
     k = top + 1
     size = size_of_order(bodies, nb, orders, k, far, fast)
     if FAINT < size < VAST:
         return top
+    # Down to where they don't overflow
     while k > LEAST_ORDER and not size < VAST:
         k -= 1
         size = size_of_order(bodies, nb, orders, k, far, fast)
     held = k - 1
+    # Zero: either exactly, or by underflow of all orders from some on
     while k > 2 and size == 0.0:
         k -= 1
         size = size_of_order(bodies, nb, orders, k, far, fast)
     if size == 0.0 or size > FAINT:  # the zeros are exact
         return held
+    # Down to where they don't underflow
     while k > LEAST_ORDER and not size > FAINT:
         k -= 1
         size = size_of_order(bodies, nb, orders, k, far, fast)
@@ -78,36 +83,41 @@ def weights(c, r):
     rtol, atol = r.clock.rtol, r.clock.atol
     far, fast, speed = splat(0.0), splat(0.0), splat(0.0)
     for b in range(c.graph.bodies.shape[0]):
+        # Largest r, omega' and rd
         at = b * orders * BODY_ROW
         far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
         speed = larger(four(x.bodies, at + S_R * orders + 4), speed)
     far, fast = largest_of_three(far), largest_of_three(fast)
     c.work.control.floor = ROUNDING * (c.work.control.size + far)
+    # Errors are bounded by atol + rtol |value|, those of A by atol + rtol
     tol = atol + rtol
     return tol / (atol + rtol * far), tol / (atol + rtol * fast), 1.0 + max(fast, largest_of_three(speed))
 
 
 @kernel
 def _held(h, rate, k):
-    """A step h whose error is term k, or a shorter one, so that rates are held to the tolerance, too.
+    """Shorten h, whose error is term k, so that the velocity error also meets the tolerance.
 
-    share: of what the error of rates, that of places over h / k, may be; squared, since short steps are many.
+    The velocity error is the position error times k / h. The bound is squared, since short steps are numerous.
     """
+    # Velocity error over its bound: position error times k / h
     share = STIFF_RATES * rate * h / k
     return h * share ** (2.0 / k) if share < 1.0 else h
 
 
 @kernel
 def step_length(c, r):
-    """h = rho tol^(1 / (top + 2)), at most; and the order of the next step, that with the longer step for the work."""
+    """Longest step rho tol^(1 / (top + 2)); sets the order of the next step, by the longer step per unit of work."""
     x, nb, orders = c.expansion, c.graph.bodies.shape[0], c.expansion.order.room
     tol = r.clock.atol + r.clock.rtol
     far, fast, rate = weights(c, r)
+    # Longest step by all orders, then by two orders less
     x.order.top = top = order_in_range(x.bodies, nb, orders, x.order.top, far, fast)
     c.trial.rate = rate
     h = _held(radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2)), rate, top + 2)
     if x.order.highest > x.order.lowest:
         lower = _held(radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top), rate, top)
+        # Higher order if it advances further per unit of work
         change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
         x.order.next = min(max(top + change, x.order.lowest), x.order.highest)
     return h
@@ -117,13 +127,14 @@ def step_length(c, r):
 def longest(c, r, tol, most):
     """The longest step to a tolerance by any order up to `most`, which becomes the step's.
 
-    Next to a singular configuration rounding of lam grows from order to order as if the motion ended there: high orders
-    see no further than to it.
+    Near a singular configuration rounding errors of lam grow from order to order by the ratio of step length to
+    distance: high orders reach no further than the singularity.
     """
     x, nb = c.expansion, c.graph.bodies.shape[0]
     far, fast, _ = weights(c, r)
     h = 0.0
     for k in range(most, min(LEAST_ORDER, most - 1), -1):
+        # rho tol^(1 / (k + 2)) for every order
         longer = radius(x.bodies, nb, x.order.room, k, far, fast) * tol ** (1.0 / (k + 2))
         if longer > h:
             h, x.order.top = longer, k
@@ -134,11 +145,12 @@ def longest(c, r, tol, most):
 def finite_top(c):
     """The highest top up to which the coefficients of all bodies are finite, for steps that have failed.
 
-    Next to where a law is not analytic they overflow, down to the lowest orders, and become NaN (0 c of such a c is no
-    zero). `order_in_range` asks for less: maxima, above LEAST_ORDER.
+    Near a singularity of a force law coefficients overflow, even of low orders, and become NaN. `order_in_range`
+    compares maxima only, above LEAST_ORDER.
     """
     x, orders = c.expansion, c.expansion.order.room
     for k in range(2, x.order.top + 2):
+        # 0 c is not zero where c is infinite or not a number
         rest = splat(0.0)
         for b in range(c.graph.bodies.shape[0]):
             at = b * orders * BODY_ROW

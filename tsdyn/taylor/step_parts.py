@@ -69,11 +69,13 @@ def begin_orders(c, start):
     """Begin the series where `start` is zero; how many orders of lam are refined."""
     x, f = c.expansion, c.tangent
     orders = x.order.room
+    # Series of functions of time are complete before the first order
     if start == 0:
         expand_motions(c.system, x)
         keep_start(c.graph, f.poses, x.start)
         begin(c.graph, c.system, f.poses, orders, x.bodies, f.Z)
     near = is_near_singular(f, f.indicator.start)  # there rounding of lam grows from order to order
+    # An ill-conditioned S: the first orders, refined more than once
     sweeps = refinements(f.indicator.start)
     refine, x.order.sweeps = orders if near or sweeps > 1 else x.order.refined, 1
     if sweeps > 0 and not near:
@@ -86,6 +88,7 @@ def write_qdd(c):
     """Qdd of the series at order zero."""
     x, f, orders = c.expansion, c.tangent, c.expansion.order.room
     for b in range(c.graph.bodies.shape[0]):
+        # (rdd, omega'd) = (2 r_2, omega'_1)
         at = b * orders * BODY_ROW
         put(f.a, 8 * b, times(four(x.bodies, at + S_R * orders + 8), splat(2.0)))
         put(f.a, 8 * b + 4, four(x.bodies, at + S_OMEGA * orders + 4))
@@ -114,10 +117,12 @@ def reach(context, t, h):
     x.order.time = t
     if not set_time(c.system, t):
         return NOT_FINITE
+    # Sums of the series at h, or the poses as they are
     if h >= 0.0:
         sum_series(c.graph, x, h, f.poses, f.p)
     else:
         copy(x.low, x.low_end)
+    # Positions, then velocities, onto the manifold
     status = land(c.graph, c.system, w, f, t)
     if status == 0:
         _land_rates(c, t)
@@ -132,15 +137,17 @@ def reach(context, t, h):
 
 @callback(LAWS)
 def check_laws(context, t, h, atol, rtol):
-    """Compare the series of motions and forces with what they are, at places from t to t + h; sets `Trial.good`."""
+    """Compare the series of motions and forces with their definitions at times from t to t + h; sets `Trial.good`."""
     c = load_series(context)
     limits = stack(LIMITS)
     limits[LENGTH], limits[ATOL], limits[RTOL] = h, atol, rtol
     c.trial.good = 1.0
+    # Prescribed motions
     for j in range(INSTANTS if c.expansion.motions.shape[0] > 0 else 0):
         if _is_motion_off(c, t, h * (j + 1) / INSTANTS, atol, rtol):
             c.trial.good = j / INSTANTS
             return 1
+    # Force laws that may leave their series
     if not _may_differ(c, t, limits):
         return 0
     every = _places_of_users(c, h)
@@ -172,6 +179,7 @@ def _is_motion_off(c, t, tau, atol, rtol):
         row = x.motions[i]
         if row.check != 0:
             call_smooth(row.run, c.system.reals[row.program :], t + tau, 1, value)
+            # The series at tau, and the sum of its absolute terms
             total, terms = 0.0, 0.0
             for k in range(x.order.top + 1, -1, -1):
                 total = total * tau + x.constraints[row.values + k]
@@ -183,7 +191,7 @@ def _is_motion_off(c, t, tau, atol, rtol):
 
 @kernel
 def _set_place(c, t, tau, limits):
-    """Go to t + tau for comparisons with laws."""
+    """Set time and limits for a comparison with laws at t + tau."""
     limits[TAU], limits[TIME] = tau, t + tau
     set_time(c.system, limits[TIME])
 
@@ -204,15 +212,17 @@ def _is_off(c, i, limits):
 def _may_differ(c, t, limits):
     """Set which kinds of forces are to be compared with their laws within the step; whether there are any.
 
-    Sharp ones always are; those with a margin where it is used up; others where they are off at the end of the step.
+    Sharp ones always; those with a margin of analyticity where it is used up; others if they differ at the step's end.
     """
     x, left, found = c.expansion, stack(1), False
     c.trial.left = 1.0
-    # so short a step is held by rates of fast modes, of which coefficients of places show little: STILL is asked for
+    # a step this short is limited by velocities of fast modes, which position coefficients don't show: STILL is
+    # required
     is_short = STIFF_RATES * c.trial.rate * limits[LENGTH] < x.order.top + 2
     for i in range(x.forces.shape[0]):
         kind = x.forces[i]
         kind.near = kind.sharp
+        # sum_{k>0} |a_k| h^k < a_0 leaves a share of a_0: none of what the law divides by vanishes
         if kind.margin != 0:
             left[0] = 1.0
             call_margin(
@@ -222,6 +232,7 @@ def _may_differ(c, t, limits):
             kind.near = 0 if left[0] > (STILL if is_short else 0.0) else 1
             if not left[0] >= c.trial.left:
                 c.trial.left = left[0]
+        # No such bound: compare at the end of the step
         elif kind.check != 0 and kind.sharp == 0:
             _set_place(c, t, limits[LENGTH], limits)
             kind.near = 1 if _is_off(c, i, limits) else 0
@@ -231,7 +242,7 @@ def _may_differ(c, t, limits):
 
 @callback("pdd")
 def accelerate_here(context, t, h):
-    """Qdd where `reach` has come to, between the steps: what it asks for outlives no step."""
+    """Qdd at the state of `reach`, between the steps; nothing of it is kept for the next step."""
     c = load_series(context)
     accelerate_bodies(c.graph, c.system, c.work, c.tangent, t)
     return 0
@@ -251,14 +262,16 @@ def hold_accelerations(c, t):
 def pass_singular(context, t, h):
     """The state at t next to a singular configuration, between the steps: qdd is that of the series. Status.
 
-    Rows that come near to depending on the others there are left to the series, which is right to the tolerance.
+    Nearly dependent rows aren't projected: the series satisfies them to the tolerance.
     """
     c = load_series(context)
     w, x, f, graph = c.work, c.expansion, c.tangent, c.graph
     orders, top = x.order.room, x.order.top
+    # A selection of rows for this configuration only
     save_selection(f)
     sum_series(graph, x, h, f.poses, f.p)
     status = land(graph, c.system, w, f, t)
+    # Rows whose pivots are lost are left out of the projection
     if status == SINGULAR or (status == 0 and singularity_indicator(graph, f.rows) < GONE):
         sum_series(graph, x, h, f.poses, f.p)
         if select_rows(graph, c.system, f, t, GONE) >= 0:
@@ -266,6 +279,7 @@ def pass_singular(context, t, h):
     if status == 0:
         _land_rates(c, t)
         for b in range(graph.bodies.shape[0]):
+            # qdd = sum_k (k + 1) k r_{k+1} h^(k-1), and likewise omega'd
             at, r, omega = b * orders * BODY_ROW, splat(0.0), splat(0.0)
             for k in range(top, 0, -1):
                 r = fma(r, splat(h), times(four(x.bodies, at + S_R * orders + 4 * (k + 1)), splat((k + 1.0) * k)))
@@ -281,7 +295,7 @@ def pass_singular(context, t, h):
 
 @kernel
 def is_singular(c, status):
-    """Whether the state that `reach` has come to, or could not reach, is next to a singular configuration."""
+    """Whether the state of `reach`, or the one that it failed to reach, is near a singular configuration."""
     limit = NEXT_TO_SINGULAR * min(1.0, c.tangent.indicator.largest / UNEQUAL)
     return status == SINGULAR or (status == 0 and singularity_indicator(c.graph, c.tangent.rows) < limit)
 
@@ -291,6 +305,7 @@ def state_within(context, c, kernels, t, h):
     """q, qd, qdd at t, h after the series' origin, which leaves the selection of rows as it is. Status."""
     f = c.tangent
     save_selection(f)
+    # Next to a singular configuration accelerations are those of the series
     status = call_reach(kernels.reach, context, t, h)
     if is_singular(c, status):
         return_to_selection(f)

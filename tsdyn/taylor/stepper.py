@@ -51,13 +51,16 @@ def _open_chart(w, r, log, t, reason):
 
 @long_kernel
 def _stand(context, c, r, log, t):
-    """The poses as they are now are the state at t: the series of order zero gives qdd. Status."""
+    """Take the present poses as the state at t, with qdd from the series of order zero. Status."""
     w, indicator = c.work, c.tangent.indicator
+    # The end of the step is the start of the next
     indicator.start = indicator.end
     indicator.largest = max(indicator.start, indicator.largest)
+    # Forces that count turns, and rounding errors of the state
     remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
     copy(c.expansion.low_end, c.expansion.low)
     status = 0
+    # In a singular configuration qdd is that of the old series
     if c.trial.singular == 0:
         status = call_expand(r.kernels.expand, context, 0, 1)
         if status == 0:
@@ -66,6 +69,7 @@ def _stand(context, c, r, log, t):
         return NOT_FINITE
     if status != 0:
         return status
+    # Accept
     count_turns(r, w.q, w.qd, t - r.clock.t)
     store_now(w, r)
     r.clock.t = t
@@ -77,12 +81,14 @@ def _stand(context, c, r, log, t):
 def _enter(context, c, r, log):
     """Begin the run, with its first output. Status."""
     w, f, t = c.work, c.tangent, r.clock.t
+    # Pieces, rounding floor, compensation
     take_pieces(c.system, r, log)
     set_floor(c, w.q)
     c.expansion.low[:] = 0.0
     w.control.condition = 1.0
     c.trial.singular = c.trial.hops = 0
     c.trial.hopped = t
+    # Project the start and take its accelerations
     status = stand_at(context, c, r, t)
     f.indicator.end = singularity_indicator(c.graph, f.rows) if status == 0 else 0.0
     _open_chart(w, r, log, t, AT_START)
@@ -105,6 +111,7 @@ def _expand(context, c, r):
 def _mind_singular(c, r):
     """Near a singular configuration: the rest of the run has a tighter tolerance."""
     indicator, clock = c.tangent.indicator, r.clock
+    # Once per run: tighter tolerances from here on
     if min(indicator.end, indicator.start) < WARY * indicator.largest:
         if r.numbers.near_steps == 0:
             tol = clock.atol + clock.rtol
@@ -117,7 +124,9 @@ def _mind_singular(c, r):
 @kernel
 def _watch_stiffness(c, r, h):
     """Return True if the motion has just been found stiff: many steps in which nothing rotates or moves far."""
+    # Largest rotation of the step, rad, and displacement over the size of the scene
     far, p, most = extent(c.work) / h, c.tangent.poses, 0.0
+    # A law close to its singularity limits the step, not stiffness
     if not c.trial.left > STILL:
         most = math.inf
     for b in range(c.graph.bodies.shape[0]):
@@ -127,6 +136,7 @@ def _watch_stiffness(c, r, h):
         if most > SMALL:
             r.numbers.at_limit = 0
             return False
+    # Steps in which little moves are counted; with sharp forces many more are needed
     before, enough, tiny, faster = r.numbers.at_limit, SMALL_STEPS, TINY, FASTER
     if c.trial.sharp == 1:
         enough, tiny, faster = SHARP_STEPS, MINUTE, AT_REST
@@ -162,7 +172,9 @@ def _record_within(context, c, r, log, t0, t1):
     """What t_eval asks for in (t0, t1), then back to t1. Status."""
     w = c.work
     while is_wanted_before(r, log, t1):
+        # From the start of the step: Euler parameters are followed from there
         t = log.t_eval[r.numbers.next_eval]
+        # The end of the step again
         go_to_start(c, r)
         status = state_within(context, c, r.kernels, t, t - t0)
         if status != 0:
@@ -196,6 +208,7 @@ def advance_series(context, run, log, most):
 def advance_by_series(context, c, r, log, most):
     """As `advance_series`, for kernels that call it."""
     adaptive, status = r.numbers.adaptive == 1, 0
+    # Begin, or go on after Python was asked at a stop
     if r.numbers.begun == 0 and most != 0:
         status = _enter(context, c, r, log)
     elif r.numbers.waiting == 1:
@@ -204,6 +217,7 @@ def advance_by_series(context, c, r, log, most):
     for _ in range(most):
         if status != 0 or is_full(r, log) or r.numbers.history + TRIES > log.history.shape[0]:
             break
+        # One step: expand, choose a length, reach the end
         t0, stop = r.clock.t, next_stop(r, log)
         if t0 >= r.clock.t_end:
             break
@@ -211,23 +225,27 @@ def advance_by_series(context, c, r, log, most):
         status = make_step(context, c, r, log, stop)
         if status != 0:
             break
+        # Accepted
         t1 = c.trial.t1
         r.numbers.history += 1
         note_accepted(r, log)
         _mind_singular(c, r)
         if adaptive:
             r.clock.h = t1 - t0
+        # Stiffness, unless the step was cut by a bound or a stop
         leave = False
         if t1 != stop and t1 - t0 < AT_LONGEST * r.clock.max_step:
             leave = _watch_stiffness(c, r, t1 - t0)
         elif adaptive and t1 == stop:  # a step that is cut is no sign of stiffness
             _mind_stop(c, r, t1 - t0)
+        # Outputs within the step, before its end becomes the state
         if r.numbers.dense != 0:
             _fill_block(c, r, log, t0, t1)
         if is_wanted_before(r, log, t1):
             status = _record_within(context, c, r, log, t0, t1)
         if status == 0:
             status = _move_on(context, c, r, log, t1)
+        # At a stop the accelerations change
         if status == 0 and t1 == stop and c.trial.singular == 0:
             if is_sampled(r, log, t1):
                 break

@@ -22,7 +22,7 @@ class ForceSeries(Record):
     table: int  # where the entries of the first begin in Expansion.table
     reals: int  # and in System.reals
     check: int  # address of law_check.check; 0 where the law is analytic everywhere
-    margin: int  # address of law_check.margin; 0 where nothing tells how far the law is analytic
+    margin: int  # address of law_check.margin; 0 for a law without a known margin of analyticity
     sharp: int  # whether every step is checked at all places
     near: int  # whether the step tried is, too
     run: int  # address of what runs the program of a traced function; 0 for none
@@ -54,4 +54,4 @@ class MotionSeries(Record):
     run: int  # address of what runs its program
     program: int  # where the program begins in System.reals
     values: int  # where its series begins in Expansion.constraints or, of a load, in Expansion.loads
-    check: int  # whether it is compared with its series: its coefficients at a time may tell little of later times
+    check: int  # whether it is compared with its series: its coefficients may not represent later times

@@ -10,8 +10,8 @@ STEP_COST = 3
 # Range of the coefficients of a step's last order: products of smaller ones lose digits, those of larger ones overflow.
 FAINT, VAST = 1e-280, 1e280
 
-# Landing, over tolerance and rounding of Phi, beyond which the projection corrects no truncation error: the radius of
-# convergence was wrong.
+# |Phi| at the end of a step, over tolerance and rounding: a larger residual is no truncation error, so the radius of
+# convergence was overestimated.
 MISSED = 100.0
 
 # rad of the fastest body in a step where joint angles are counted by forces: two steps a turn would do.
@@ -26,11 +26,11 @@ WIDE = 0.3
 # Factor of a step whose end was not reached.
 HALVED = 0.5
 
-# Error of rates, 1/s, over that of places, up to which only the latter limits steps of sharp forces. Their steps can be
-# very short, and an error of places divided by the step is one of rates.
+# Velocity error over position error, 1/s, up to which only the latter limits the steps of sharp forces. Such steps can
+# be very short, and the velocity error is the position error over the step.
 RATES = 10.0
-# The same wherever the motion is stiff, over 1 + the largest rate: a fast mode that steps make grow shows in rates
-# first. A step's tolerance is a thousandth of the run's.
+# The same for stiff motions, over 1 + the largest rate: a fast mode that the steps amplify appears in velocities first.
+# The tolerance of a step is a thousandth of the run's.
 STIFF_RATES = 1000.0
 
 # Places of a step, equally far apart, at which series of sharp forces are compared with their laws; steps of a run at
@@ -51,42 +51,43 @@ HOP, MOST_HOPS, APART = 16.0, 8, 1e3
 NO_SPEED = 1e-300
 
 # --- stiffness -------------------------------------------------------------------------------------------------------
-# rad, and part of the scene's size: a step that turns and moves everything by less is limited by something that can't
-# be seen. So many of them in a row, and the motion may be stiff (docs/design-decisions.md).
+# rad, and part of the scene's size: after SMALL_STEPS successive steps in which no body rotates or moves by more, the
+# motion may be stiff (docs/design-decisions.md).
 SMALL, SMALL_STEPS = 0.02, 40
-# Share of what a law divides by that a step leaves: where it is less, the law limits the step, not stiffness.
+# Margin of analyticity of the force laws (law_check.py): where it is less, a law limits the step, not stiffness.
 STILL = 0.9
-# A step by less than TINY counts for so many.
+# A step by less than TINY counts as FASTER steps.
 TINY, FASTER = 0.002, 4
 # The same in scenes with sharp forces, which need some ten short steps wherever a velocity reverses; steps by less than
-# MINUTE count for AT_REST there: a reversal at a slip velocity of 1e-9 m/s takes 13, rest no end of them.
+# MINUTE count for AT_REST there: a reversal at a slip velocity of 1e-9 m/s takes 13, and rest any number.
 SHARP_STEPS, MINUTE, AT_REST = 400, 1e-6, 8
 
 # --- singular configurations -----------------------------------------------------------------------------------------
-# Pivot of S, over its diagonal entry, below which accelerations by elimination have lost as many digits, so that those
-# of the series are taken. Below GONE a row is left out of a projection: it would make more of what positions are off by
-# than the series is.
+# Pivot of S over its diagonal entry. Below NEXT_TO_SINGULAR accelerations by elimination have lost eight digits, and
+# those of the series are used. Below GONE a row is omitted from a projection, which would amplify position errors
+# beyond the error of the series.
 NEXT_TO_SINGULAR, GONE = 1e-8, 1e-10
 # Largest pivot of a run below which masses are so unequal that no pivot is large: NEXT_TO_SINGULAR is relative to it.
 UNEQUAL = 1e-4
 
-# Share of a step's end, over that of its start, from which the step has come closer; is too close to go on from; is
-# too close even if it has passed. Measured on rows of parallelograms (tests/simulation/test_singularity_crossing.py).
+# Indicator at the end of a step over that at its start, below which the step approaches a singular configuration; ends
+# too close to continue; ends too close even beyond it. Measured on rows of parallelograms
+# (tests/simulation/test_singularity_crossing.py).
 CLOSER, CLOSE, PASSED = 0.3, 0.1, 0.02
 
-# A step that ends there is shortened by this factor, so many times: to 0.17 of its length.
+# A step that ends there is shortened by AVOID, up to AVOIDING times: to 0.17 of its length.
 AVOID, AVOIDING = 0.7, 5
 
-# Factor of the tolerance from one try to pass to the next; loosest tolerance of a step past from elsewhere, and from
-# close by, where lam has few digits; least order of its series.
+# Factor of the tolerance between tries to cross a singular configuration; loosest tolerance of a crossing that starts
+# far away, and of one that starts close, where lam has few digits; least order of the series.
 LOOSER, FAR_PASSING, PASSING, LEAST_ORDER = 2.0, 1e-13, 1e-10, 5
 
 # Tolerance of a step that starts next to a singular configuration, over that of the run, and the least of it: rounding
 # errors of lam grow there by the ratio of step length to distance.
 TIGHTER, TIGHTEST = 0.01, 1e-16
 
-# Share, over the largest one of the run, below which a run goes on with a part SPARE of its tolerance: what is lost
-# there is made up elsewhere.
+# Indicator over its largest value in the run, below which the tolerance is reduced by the factor SPARE for the rest of
+# the run, to compensate for digits lost there.
 WARY, SPARE = 0.06, 0.1
 
 # --- size ------------------------------------------------------------------------------------------------------------

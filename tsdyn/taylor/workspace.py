@@ -73,7 +73,7 @@ class Trial(Record):
     sharp: int  # whether a force is sharp
     spacing: float  # s, of the places at which laws of users are compared with their series, at most
     rate: float  # 1 + the largest of its start, m/s or rad/s
-    left: float  # share of what laws divide by, or take roots of, that a step can't use up; 1 where they don't
+    left: float  # margin of analyticity of the force laws along the step; 1 where they are analytic everywhere
     hops: int  # in close succession, over places where a law is not analytic
     hopped: float  # time of the last one
     good: float  # share of the step up to which the series of forces are those of their laws

@@ -32,7 +32,7 @@ def check_tolerances(method, case, form, where, order):
         if found[-1] > FACTOR * tol + 10.0 * case.trusted:
             raise CheckFailed(
                 f"{at}: the error is {found[-1]:.2g}, {found[-1] / tol:.0f} times the tolerance; {FACTOR:.0f} times "
-                "are allowed. The error estimate is too small, or the method's margin."
+                "are allowed. The error estimate is too small, or the method's `safety` factor."
             )
     if not (np.diff(found) < 0.0).all():
         pairs = ", ".join(f"{off:.1e} at {tol:g}" for tol, off in zip(tolerances, found, strict=True))

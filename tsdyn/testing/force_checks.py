@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 
 @entry
-def evaluate_force_jacobian(s, q, qd, t, Q_q, Q_qd, anew, kept):
+def evaluate_force_jacobian(s, q, qd, t, Q_q, Q_qd, renew, kept):
     """Q_q, Q_qd (n, n) += the Jacobians of the forces; s is from `with_force_jacobians`."""
     set_time(s, t)
-    force_jacobian(s, q, qd, t, Q_q, Q_qd, anew, kept)
+    force_jacobian(s, q, qd, t, Q_q, Q_qd, renew, kept)
 
 
 def jacobians(packed, q, qd, t):

@@ -21,18 +21,18 @@ class ChartState(Record):
     time: float  # of the last position solve
     factored: int  # 1 if lower and upper hold factors of N
     off: float  # error of these factors at the configuration itself, relative
-    made: int  # 1 if lower and upper hold factors of N at any place of this chart
+    made: int  # 1 if lower and upper hold factors of N at any configuration of this chart
     placement: int  # number of the position solve at the end of the last step; 0 if the chart is of no use
 
 
 class ChartWorkspace(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
 
-    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; chart_validity.touch
-    d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 of the present place; chart_coordinates.displace
+    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; chart_validity.set_base_point
+    d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 at present; chart_coordinates.displace
     x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
     y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
-    rows0: Rows  # H0, Y0, S0: the rows at q0; chart_validity.touch
+    rows0: Rows  # H0, Y0, S0: the rows at q0; chart_validity.set_base_point
     X: np.ndarray  # (m * 16,)  C Y0; chart_matrix.factorise_chart_matrix
     lower: np.ndarray  # factors of N = H C Y0; chart_matrix.factorise_chart_matrix
     upper: np.ndarray

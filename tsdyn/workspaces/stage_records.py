@@ -14,7 +14,7 @@ class StageNumbers(Record):
     chart: int  # counter of charts when P was made, for a form whose P serves one chart only
     every_chart: int  # 1 for one whose P serves every chart
     known: int  # whether there are stiffness and damping
-    left: float  # error norm that a first correction left when last measured, and more with every stage since
+    left: float  # error norm after a first correction as last measured, growing with every stage since
     first: float  # size of that correction
     slow: float  # contraction above which P is rebuilt, if no new one contracts below the usual limit; else 0
     t_before: float  # s, start of the last step; -inf for the first one
@@ -22,8 +22,25 @@ class StageNumbers(Record):
     rates_of: int  # counter of charts when z of the stages was last set; 0 where z and multipliers are unknown
     time: float  # s, of the last stage, and of the one before; -inf where they are unknown
     time_before: float
-    lag: float  # contraction of corrections by factors of N of an older place, as last measured
+    lag: float  # contraction of corrections by factors of N of an older configuration, as last measured
     fresh: int  # 1 if the derivatives of the forces' laws are to be taken by saddle_point.reduce
+
+
+class StageIteration(Record):
+    """Newton's iteration of one stage: its limits, and what its corrections have shown so far."""
+
+    floor: float  # error norm of a correction that is rounding
+    limit: float  # contraction above which the matrix is renewed
+    before: float  # error norm of the correction before, by the same matrix; inf for none
+    theta: float  # contraction: the last one measured, or assumed
+    measured: int  # whether it has been measured
+    first: float  # size of the first correction, and of what it left; inf where that is unknown
+    second: float
+    trusted: int  # whether this stage's first correction leaves what those before it have left
+    renewed: int  # whether the matrix was renewed in this stage
+    poor: int  # matrices that were renewed for poor contraction
+    diverged: int  # iterations that diverged with a new matrix
+    eager: int  # whether the stage begins with a matrix of its own
 
 
 class StageKernels(Record):

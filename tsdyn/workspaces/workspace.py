@@ -12,7 +12,7 @@ from ..sparse.constraint_graph import ConstraintGraph, no_graph
 from .carving import carve
 from .chart_workspace import ChartWorkspace, allocate_chart
 from .saddle_workspace import SaddleWorkspace, allocate_saddle
-from .stage_records import StageKernels, StageNumbers
+from .stage_records import StageIteration, StageKernels, StageNumbers
 
 
 class Control(Record):
@@ -95,7 +95,7 @@ class ImplicitWorkspace(NamedTuple):
     Y: np.ndarray  # (n, n)  U B G1; linearisation.linearise
     Z: np.ndarray  # (n, n)  U B G2; linearisation.linearise
     lam: np.ndarray  # (m,)  multipliers; linearisation.linearise
-    r: np.ndarray  # (n,)  Q_A + S - M qdd; linearisation.linearise
+    r: np.ndarray  # (n,)  Q_A + Q_v - M qdd; linearisation.linearise
     K_body: np.ndarray  # (l, l)  stiffness in body frames, kept over steps and charts; linearisation.linearise
     C_body: np.ndarray  # (l, l)  damping in body frames; linearisation.linearise
     F: np.ndarray  # (l, k)  D in body frames; linearisation.reduce
@@ -113,6 +113,7 @@ class ImplicitWorkspace(NamedTuple):
     before: np.ndarray  # (3, n)  at the one before; the run's own array
     kernels: StageKernels
     numbers: StageNumbers
+    iteration: StageIteration
 
 
 class Parts(NamedTuple):
@@ -189,7 +190,8 @@ def allocate_linear(system, n, m, wanted, kept=0, redundant=0):
         "b": (k,),
     }
     shapes |= {"now": (3, n), "before": (3, n)}
-    return ImplicitWorkspace(**carve(shapes, kernels=StageKernels, numbers=StageNumbers), pivots=np.zeros(k, np.int64))
+    numbers = carve(shapes, kernels=StageKernels, numbers=StageNumbers, iteration=StageIteration)
+    return ImplicitWorkspace(**numbers, pivots=np.zeros(k, np.int64))
 
 
 def basis_free_parts(graph, n, basis, saddle=None, coupled=0):

@@ -41,6 +41,7 @@ def set_pose(poses, at, p):
 @kernel
 def orient(poses, at, e0, e1, e2, e3):
     """The same of p = (e0, e1, e2, e3)."""
+    # A = (e0^2 - e.e) I + 2 e e^T + 2 e0 e~, column by column
     a = e0 * e0 - e1 * e1 - e2 * e2 - e3 * e3
     e, twice = lanes(e1, e2, e3), 2.0 * e0
     put(poses, at, fma(e, splat(2.0 * e1), lanes(a, twice * e3, -twice * e2)))
@@ -55,6 +56,7 @@ def orient(poses, at, e0, e1, e2, e3):
 @kernel
 def add_torque(p, at, Q, i, out, o):
     """out[o : o + 3] += G(p) Q_p / 2, the body torque; p is p[at : at + 4], Q_p is Q[i : i + 4]."""
+    # G(p) Q_p / 2
     e0, e1, e2, e3 = 0.5 * p[at], 0.5 * p[at + 1], 0.5 * p[at + 2], 0.5 * p[at + 3]
     q0, q1, q2, q3 = Q[i], Q[i + 1], Q[i + 2], Q[i + 3]
     out[o] += -e1 * q0 + e0 * q1 + e3 * q2 - e2 * q3
@@ -79,6 +81,7 @@ def place_bodies(bodies, q, poses):
     for b in range(bodies.shape[0]):
         at, i = b * POSE, bodies[b, 0]
         put(poses, at + R, lanes(get(q, i), get(q, i + 1), get(q, i + 2)))
+        # A body that never turns keeps this orientation
         if bodies[b, 1] == 7 or bodies[b, 1] == STILL:
             orient(poses, at, get(q, i + 3), get(q, i + 4), get(q, i + 5), get(q, i + 6))
         if bodies[b, 1] == STILL:
@@ -92,6 +95,7 @@ def move_bodies(bodies, q, qd, poses):
         at, i = b * POSE, bodies[b, 0]
         put(poses, at + RD, lanes(qd[i], qd[i + 1], qd[i + 2]))
         if bodies[b, 1] == 7:
+            # omega' = 2 G(p) pd
             e0, e1, e2, e3 = 2.0 * q[i + 3], 2.0 * q[i + 4], 2.0 * q[i + 5], 2.0 * q[i + 6]
             d0, d1, d2, d3 = qd[i + 3], qd[i + 4], qd[i + 5], qd[i + 6]
             x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3
@@ -131,6 +135,7 @@ def write_accelerations(bodies, poses, accelerations, qdd):
         for c in range(3):
             let(qdd, i + c, get(accelerations, k + c))
         if bodies[b, 1] == 7:
+            # pdd = G^T omega'd / 2 - |omega'|^2 p / 4
             x, y, z = get(accelerations, k + 4), get(accelerations, k + 5), get(accelerations, k + 6)
             _turn(poses, at, 0.5 * x, 0.5 * y, 0.5 * z, qdd, i + 3)
             x, y, z = get(poses, at + OMEGA), get(poses, at + OMEGA + 1), get(poses, at + OMEGA + 2)
@@ -172,12 +177,14 @@ def marker_position(code, poses, at, reals, s, x, i):
 def marker_motion(code, poses, at, reals, s, x, xd, xdd, i):  # nine: the pose, the marker, what it is written to
     """x, xd, and xdd at r'' = omega'' = 0, of a marker with coordinates at reals[s]."""
     if code == PARAMETERS:
+        # Parameters: x = p,  xd = G^T omega' / 2,  xdd = -|omega'|^2 p / 4
         p, w = poses[at + P : at + P + 4], poses[at + OMEGA : at + OMEGA + 3]
         square = -0.25 * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
         for c in range(4):
             x[i + c], xdd[i + c] = p[c], square * p[c]
         _turn(poses, at, 0.5 * w[0], 0.5 * w[1], 0.5 * w[2], xd, i)
         return
+    # Others: b = A s,  bd = w x b,  bdd = w x (w x b), with w = A omega'
     b = turned(poses, at, get(reals, s), get(reals, s + 1), get(reals, s + 2))
     w0, w1, w2 = get(poses, at + OMEGA), get(poses, at + OMEGA + 1), get(poses, at + OMEGA + 2)
     w = turned(poses, at, w0, w1, w2)
@@ -196,12 +203,14 @@ def add_gradient(code, poses, at, reals, s, f, i, H, h):  # nine: the pose, the 
     f = f[i : i + 3], of Parameters 4.
     """
     if code == PARAMETERS:
+        # Parameters: the body torque G(p) f / 2
         e0, e1, e2, e3 = 0.5 * poses[at + P], 0.5 * poses[at + P + 1], 0.5 * poses[at + P + 2], 0.5 * poses[at + P + 3]
         f0, f1, f2, f3 = f[i], f[i + 1], f[i + 2], f[i + 3]
         H[h + 4] += -e1 * f0 + e0 * f1 + e3 * f2 - e2 * f3
         H[h + 5] += -e2 * f0 - e3 * f1 + e0 * f2 + e1 * f3
         H[h + 6] += -e3 * f0 + e2 * f1 - e1 * f2 + e0 * f3
         return
+    # Others: force f of a point, body torque s x A^T f
     f0, f1, f2 = f[i], f[i + 1], f[i + 2]
     if code == POINT:
         let(H, h, get(H, h) + f0)

@@ -8,6 +8,10 @@ Complex steps of the primitive's jacobian and gamma in the marker coordinates x 
 rounding. The chain rule x(q) is quadratic in q, so its second derivative is `rotate_gradient` with another p.
 """
 
+from typing import NamedTuple
+
+import numpy as np
+
 from ...jit.kernels import ANY, complex_stack, complex_stack2, integers, kernel, part, stack, stack2, vector
 from ...maths.euler_parameters import rotate_gradient
 from ..markers import PARAMETERS, chain_rule, rate
@@ -32,6 +36,16 @@ SIGNATURE = "iipppppdpppp"  # count, stride, table, reals, q, qd, qdd, t, lam, K
 SPAN = 14  # coordinates of two bodies
 
 
+class Slopes(NamedTuple):
+    """Derivatives of one instance with respect to its markers."""
+
+    J: np.ndarray  # (ROWS, SIZE)  Phi_x
+    a1: np.ndarray  # (ROWS, SIZE)  Phi_xx xd + Phi_xt
+    a2: np.ndarray  # (ROWS, SIZE)  Phi_xx xdd + gamma_x
+    g_xd: np.ndarray  # (ROWS, SIZE)  gamma_xd
+    H: np.ndarray  # (SIZE, SIZE)  (Phi_x^T lam)_x
+
+
 @kernel
 def _chain_second(code, dimension, at, w, s, f, out):
     """out += f x_qq w, w (n,) being a velocity or an acceleration."""
@@ -54,19 +68,22 @@ def _accelerate_markers(q, qdd, own, real, xdd):
 
 
 @part
-def _derive(x, xd, xdd, par, t, lam, J, a1, a2, g_xd, H):
+def _derive(x, xd, xdd, par, t, lam, slopes):
     """With respect to the markers, by complex steps along x_c and xd_c.
 
-    J = Phi_x, g_xd = gamma_xd, a1 = Phi_xx xd + Phi_xt = gamma_xd / 2, a2 = Phi_xx xdd + gamma_x, H = (Phi_x^T lam)_x.
+    gamma_xd = 2 (Phi_xx xd + Phi_xt), since gamma is quadratic in xd.
     """
+    J, a1, a2, g_xd, H = slopes
     z, zd = complex_stack(SIZE), complex_stack(SIZE)
     zJ, zg = complex_stack2(ROWS, SIZE), complex_stack(ROWS)
+    # Complex copies of x and xd, and Phi_x
     for c in range(SIZE):
         z[c], zd[c] = x[c], xd[c]
         for d in range(SIZE):
             H[c, d] = 0.0
     differentiate(x, par, t, J)
     for c in range(SIZE):
+        # Along x_c: slopes of Phi_x and gamma
         z[c] = complex(x[c], CONSTRAINT_STEP)
         for r in range(ROWS):
             for d in range(SIZE):
@@ -75,12 +92,14 @@ def _derive(x, xd, xdd, par, t, lam, J, a1, a2, g_xd, H):
         kernel_gamma(z, zd, par, t, zg)
         z[c] = x[c]
         for r in range(ROWS):
+            # a2 = Phi_xx xdd + gamma_x,  H = (Phi_x^T lam)_x
             total = zg[r].imag / CONSTRAINT_STEP
             for d in range(SIZE):
                 slope = zJ[r, d].imag / CONSTRAINT_STEP
                 total += slope * xdd[d]
                 H[d, c] += lam[r] * slope
             a2[r, c] = total
+        # Along xd_c: gamma_xd
         zd[c] = complex(xd[c], CONSTRAINT_STEP)
         kernel_gamma(z, zd, par, t, zg)
         zd[c] = xd[c]
@@ -93,31 +112,34 @@ def _derive(x, xd, xdd, par, t, lam, J, a1, a2, g_xd, H):
 def _fill_row(q, qd, own, real, along_x, along_second, out):
     """out (n,) = along_x x_q + along_second x_qq qd, for one row of G1 or G2, at its two bodies."""
     row = stack(SPAN)
-    for c in range(SPAN):
-        row[c] = 0.0
+    for i in range(SPAN):
+        row[i] = 0.0
     for j in range(MARKERS):
+        # First order: along_x x_q. Second order: along_second x_qq qd
         k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
         code, dimension, at = CODES[j], own[DIMENSION + k], own[AT + k]
         chain_rule(code, dimension, at, q, s, along_x[c:], 0, row[7 * k :])
         _chain_second(code, dimension, at, qd, s, along_second[c:], row[7 * k :])
-    for k in range(2):
-        for c in range(own[DIMENSION + k]):
-            out[own[AT + k] + c] = row[7 * k + c]
+    for side in range(2):
+        for i in range(own[DIMENSION + side]):
+            out[own[AT + side] + i] = row[7 * side + i]
 
 
 @part
 def _pull_back(q, own, real, H, XHX):
     """XHX (SPAN, SPAN) = x_q^T H x_q."""
     HX, where, row = stack2(SIZE, SPAN), stack(4), stack(SPAN)
-    for c in range(SPAN):
+    for i in range(SPAN):
         for d in range(SPAN):
-            XHX[c, d] = 0.0
-    for c in range(SIZE):
+            XHX[i, d] = 0.0
+    # HX = H x_q, row by row
+    for i in range(SIZE):
         for d in range(SPAN):
-            HX[c, d] = 0.0
+            HX[i, d] = 0.0
         for j in range(MARKERS):
             k, s = OWNERS[j], real[3 * j : 3 * j + 3]
-            chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, H[c, STARTS[j] :], 0, HX[c, 7 * k :])
+            chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, H[i, STARTS[j] :], 0, HX[i, 7 * k :])
+    # x_q^T HX, column by column
     for d in range(SPAN):
         for j in range(MARKERS):
             k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
@@ -137,11 +159,13 @@ def _add_geometric(own, real, lam, J, XHX):
     for j in range(MARKERS):
         k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
         if own[DIMENSION + k] == 7 and CODES[j] != PARAMETERS:
+            # f = Phi_x^T lam, the force on the marker
             x, y, z = 0.0, 0.0, 0.0
             for r in range(ROWS):
                 x += lam[r] * J[r, c]
                 y += lam[r] * J[r, c + 1]
                 z += lam[r] * J[r, c + 2]
+            # (A(p) s)_p p is quadratic in p: its derivative by p_d is the pull-back of f at p = e_d
             for d in range(4):
                 for b in range(4):
                     where[b] = 1.0 if b == d else 0.0
@@ -158,13 +182,16 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, K, G1, G2):
     x, xd, xdd = stack(SIZE), stack(SIZE), stack(SIZE)
     J, a1, a2, g_xd = stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE)
     H, XHX = stack2(SIZE, SIZE), stack2(SPAN, SPAN)
+    slopes = Slopes(J, a1, a2, g_xd, H)
     for i in range(count):
+        # Markers at q and qd, and their accelerations with qdd
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         own_lam, n = lam[own[ROW] :], own[STRIDE]
         move_markers(q, qd, own, real, x, xd, xdd)
         _accelerate_markers(q, qdd, own, real, xdd)
-        _derive(x, xd, xdd, real[3 * MARKERS :], t, own_lam, J, a1, a2, g_xd, H)
+        _derive(x, xd, xdd, real[3 * MARKERS :], t, own_lam, slopes)
         for r in range(ROWS):
+            # Rows of G1 and G2
             row = (own[ROW] + r) * n
             _fill_row(q, qd, own, real, a1[r], J[r], G1[row:])
             _fill_row(q, qd, own, real, a2[r], g_xd[r], G2[row:])
@@ -172,11 +199,12 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, K, G1, G2):
                 k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
                 at = own[AT + k]
                 _chain_second(CODES[j], own[DIMENSION + k], at, qdd, s, J[r, c:], G2[row + at :])
+        # K += x_q^T H x_q + f x_qq
         _pull_back(q, own, real, H, XHX)
         _add_geometric(own, real, own_lam, J, XHX)
-        for k in range(2):
-            for l in range(2):
-                for c in range(own[DIMENSION + k]):
-                    for d in range(own[DIMENSION + l]):
-                        K[(own[AT + k] + c) * n + own[AT + l] + d] += XHX[7 * k + c, 7 * l + d]
+        for one in range(2):
+            for other in range(2):
+                for e in range(own[DIMENSION + one]):
+                    for d in range(own[DIMENSION + other]):
+                        K[(own[AT + one] + e) * n + own[AT + other] + d] += XHX[7 * one + e, 7 * other + d]
     return 0

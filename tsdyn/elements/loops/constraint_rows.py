@@ -57,11 +57,13 @@ def reduced(count, stride, table, reals, poses, unused, t, out, H):
         own, real = i * INTS, i * stride
         _place_markers(table, own, reals, real, poses, x)
         par = reals[real + 3 * MARKERS :]
+        # Phi and Phi_x of the primitive
         kernel_phi(x, par, t, f)
         differentiate(x, par, t, g)
         row = get(table, own + ROW)
         for r in range(ROWS):
             let(out, row + r, f[r])
+            # H = Phi_x x_(r, pi'), marker by marker
             h = 16 * (row + r)
             for c in range(0, 16, 4):
                 put(H, h + c, splat(0.0))
@@ -79,6 +81,7 @@ def bias(count, stride, table, reals, poses, unused, t, out, H):
     for i in range(count):
         own, real = i * INTS, i * stride
         for j in range(MARKERS):
+            # gamma + Phi_x xdd at (rdd, omega'd) = 0
             at = get(table, own + OWNERS[j]) * POSE
             marker_motion(CODES[j], poses, at, reals, real + 3 * j, x, xd, xdd, STARTS[j])
         row = get(table, own + ROW)

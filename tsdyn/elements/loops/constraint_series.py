@@ -14,11 +14,13 @@ a marker), lam (1 a row), x and Phi_x, and its scratch. A marker with constant c
 Spherical, drops out of (1) beyond order zero and out of (2); a marker on the ground has no force. If all markers of a
 kind are of these sorts, an instance ends with f.
 
-`own`, `real` and `at` are where the table, the numbers and the series of an instance begin.
-
 A prescribed quantity (a length that is a motion) adds the coefficients of Phi_t to (1), by the kernel `series_t`. The
 series of the motions are the last rows of the scratch, written at the start of a step.
 """
+
+from typing import NamedTuple
+
+import numpy as np
 
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, stack2, vector
 from ...jit.simd import add, cross, fetch, fma, four, get, lanes, let, put, splat, times, total
@@ -51,6 +53,19 @@ ADVANCE, RESIDUAL = range(2)
 GROUND, UNTURNED = 16, 32
 
 
+class Instance(NamedTuple):
+    """An instance of a primitive, and the arrays that it is in."""
+
+    orders: int  # that there is room for
+    table: np.ndarray
+    own: int  # where its entry of the table begins
+    reals: np.ndarray
+    real: int  # where its numbers begin
+    bodies: np.ndarray  # series of the bodies
+    values: np.ndarray
+    at: int  # where its own series begin
+
+
 def instance_width(markers, rows, slots, orders, varies, driven=False):
     """Floats of an instance; whether any column of Phi_x of the kind varies, or it has scratch memory."""
     if not (varies or slots or driven):
@@ -76,6 +91,7 @@ def torque(bodies, at, k, forces, first):
     x, y, z = splat(0.0), splat(0.0), splat(0.0)
     u, v, w = splat(0.0), splat(0.0), splat(0.0)
     c, f = at, first + 4 * k
+    # sum_j A_j^T f_{k-j}
     for _ in range((k + 1) // 2):  # two at a time, on accumulators of their own: each waits for its last sum
         g, h = four(forces, f), four(forces, f - 4)
         x, u = fma(four(bodies, c), g, x), fma(four(bodies, c + 12), h, u)
@@ -102,8 +118,9 @@ def _offsets(orders):
 
 
 @part
-def _place(j, k, orders, table, own, reals, real, bodies):
+def _marker_coefficient(j, k, one):
     """Coefficient k of x of a marker."""
+    orders, table, own, reals, real, bodies, _, _ = one
     body, s = get(table, own + OWNERS[j]) * BODY_ROW * orders, real + 3 * j
     x = turned(bodies, body + 12 * k, get(reals, s), get(reals, s + 1), get(reals, s + 2))
     return add(x, four(bodies, body + S_R * orders + 4 * k)) if CODES[j] == POINT else x
@@ -125,16 +142,19 @@ def _fetch_next(mode, k, orders, table, own, bodies, values, at):
 
 
 @part
-def _differentiate(k, orders, table, own, reals, real, bodies, values, at, x, f, g):  # twelve: series are arrays
+def _differentiate(k, one, x, f, g):
     """Store x_k, and (Phi_x)_k where columns of it vary."""
+    orders, table, own, reals, real, _, values, at = one
     wide, (_F, _L, X, J, own_scratch), mask = 4 * orders, _offsets(orders), get(table, own + MASK)
     places, gradients, step = at, at + 4 * MARKERS, 4
     if k > 0:
         places, gradients, step = at + X + 4 * k, at + J + 4 * k, wide
+    # x_k
     for j in range(MARKERS):
-        place = _place(j, k, orders, table, own, reals, real, bodies)
+        place = _marker_coefficient(j, k, one)
         put(values, places + j * step, place)
         put(x, STARTS[j], place)
+    # (Phi_x)_k by the primitive, (Phi_t)_k beside it
     for r in range(ROWS):
         for c in range(SIZE):
             f[r, c] = 0.0
@@ -144,32 +164,37 @@ def _differentiate(k, orders, table, own, reals, real, bodies, values, at, x, f,
         kernel_series_t(x, par, k, scratch, g)
         for r in range(ROWS):
             let(values, at + own_scratch + SLOTS * orders + r, g[r])
+    # Constant columns are stored at order zero only
     for j in range(MARKERS):
         if k == 0 or mask >> j & 1:
             for r in range(ROWS):
-                c, o = STARTS[j], gradients + (r * MARKERS + j) * step
-                put(values, o, lanes(f[r, c], f[r, c + 1], f[r, c + 2]))
+                start, o = STARTS[j], gradients + (r * MARKERS + j) * step
+                put(values, o, lanes(f[r, start], f[r, start + 1], f[r, start + 2]))
 
 
 @part
-def _push(k, orders, table, own, reals, real, bodies, values, at, b, Z):
+def _push(k, one, b, Z):
     """f_{k-1} whole, by lam_{k-1} of b; f_k without lam_k, Eq. (2), and its torque, Eq. (3), onto the bodies' Z."""
+    orders, table, own, reals, real, bodies, values, at = one
     wide, (F, L, _X, J, _scratch), mask = 4 * orders, _offsets(orders), get(table, own + MASK)
     row = get(table, own + ROW)
     for j in range(MARKERS):
         if mask >> (GROUND + j) & 1:
             continue
+        # f_{k-1} with the last term of Eq. (2), which lam_{k-1} gives
         forces, force = at + F + j * wide, splat(0.0)
         done = four(values, forces + 4 * k - 4) if k > 1 else splat(0.0)
         for r in range(ROWS):
             o = at + 4 * (MARKERS + r * MARKERS + j)
             done = fma(four(values, o), splat(-get(b, row + r)), done)
+            # f_k without lam_k: earlier multipliers times the varying part of Phi_x
             if mask >> j & 1:
                 o, multipliers = at + J + (r * MARKERS + j) * wide, at + L + r * orders + k
                 for l in range(1, k + 1):
                     force = fma(four(values, o + 4 * l), splat(-get(values, multipliers - l)), force)
         put(values, forces + 4 * k - 4, done)
         put(values, forces + 4 * k, force)
+        # Torque s x sum_j A_j^T f_{k-j} and force on the body
         body, s = get(table, own + OWNERS[j]), real + 3 * j
         if mask >> (UNTURNED + j) & 1 == 0:
             y = torque(bodies, body * BODY_ROW * orders, k, values, forces)
@@ -180,17 +205,20 @@ def _push(k, orders, table, own, reals, real, bodies, values, at, b, Z):
 
 
 @part
-def _residual(k, orders, table, own, reals, real, bodies, values, at, b, x):
+def _residual(k, one, b, x):
     """b = (k + 1)(k + 2) Phi_{k+2}, Eq. (1)."""
+    orders, table, own, _, _, _, values, at = one
     wide, (_F, _L, X, J, own_scratch), mask = 4 * orders, _offsets(orders), get(table, own + MASK)
+    # x_{k+2} as the bodies have it
     for j in range(MARKERS):
         if mask >> (GROUND + j) & 1 == 0:
-            put(x, STARTS[j], _place(j, k + 2, orders, table, own, reals, real, bodies))
+            put(x, STARTS[j], _marker_coefficient(j, k + 2, one))
     for r in range(ROWS):
         highest, lower = splat(0.0), splat(0.0)
         for j in range(MARKERS):
             if mask >> (GROUND + j) & 1:
                 continue
+            # (k + 2) Phi_{k+2} = (k + 2) (Phi_x)_0 x_{k+2} + sum_l l (Phi_x)_{k+2-l} x_l + (Phi_t)_{k+1}
             highest = fma(four(values, at + 4 * (MARKERS + r * MARKERS + j)), four(x, STARTS[j]), highest)
             if mask >> j & 1:
                 places, gradients = at + X + j * wide, at + J + (r * MARKERS + j) * wide + 4 * (k + 2)
@@ -211,16 +239,19 @@ def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b
     x, f, g = stack(ROOM), stack2(ROWS, SIZE), stack(ROWS)
     for i in range(count):
         own, real, at = i * INTS, i * stride, i * size
+        one = Instance(orders, table, own, reals, real, bodies, values, at)
         if AHEAD and i + 1 < count:
             _fetch_next(mode, k, orders, table, own + INTS, bodies, values, at + size)
         if mode == RESIDUAL:
-            _residual(k, orders, table, own, reals, real, bodies, values, at, b, x)
+            _residual(k, one, b, x)
             continue
+        # Multipliers of the last order are kept where later orders need them
         varies = get(table, own + MASK) & ((1 << GROUND) - 1) != 0
         for r in range(ROWS if k > 0 and varies else 0):
             let(values, at + _offsets(orders)[1] + r * orders + k - 1, get(b, get(table, own + ROW) + r))
+        # Orders zero and one at first, then one more each time
         for now in range(0 if k == 0 else k + 1, k + 2 if varies or DRIVEN else 1):
-            _differentiate(now, orders, table, own, reals, real, bodies, values, at, x, f, g)
+            _differentiate(now, one, x, f, g)
         if k > 0:
-            _push(k, orders, table, own, reals, real, bodies, values, at, b, Z)
+            _push(k, one, b, Z)
     return 0

@@ -64,6 +64,7 @@ def jacobian(count, stride, table, reals, q, qd, t, out):
         differentiate(x, real[3 * MARKERS :], t, f)
         for r in range(ROWS):
             for j in range(MARKERS):
+                # Phi_x x_q at the coordinates of the marker's body
                 k = OWNERS[j]
                 block = own[BLOCK + k] + r * own[STRIDE]
                 s, row = real[3 * j : 3 * j + 3], f[r, STARTS[j] :]
@@ -79,6 +80,7 @@ def bias(count, stride, table, reals, q, qd, t, out):
     f, g = stack2(ROWS, SIZE), stack(ROWS)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        # xdd holds (x_q qd)_q qd
         move_markers(q, qd, own, real, x, xd, xdd)
         acceleration_bias(x, xd, xdd, real[3 * MARKERS :], t, f, g, out[own[ROW] :])
     return 0

@@ -29,6 +29,7 @@ def turn_of_directions(a, b, r):
     size = math.sqrt((a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) * (b[0] * b[0] + b[1] * b[1] + b[2] * b[2]))
     if not size > 0.0:
         return
+    # Half-angle formulas: e0 = cos(phi / 2), e = a x b / (2 |a| |b| e0); no turn beyond 120 degrees
     cosine = (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) / size
     if cosine < -0.5:
         return
@@ -59,7 +60,9 @@ def turn_block(code_row, code_column, r, kept, size, row, column, out):
     turn_matrix(code_row, r, A)
     turn_matrix(code_column, r, B)
     n, m = 4 if code_row == PARAMETERS else 3, 4 if code_column == PARAMETERS else 3
+    # Row i of A kept
     for i in range(n):
+        # times B^T
         for j in range(m):
             g[j] = 0.0
             for k in range(n):

@@ -22,20 +22,20 @@ Of friction in proportion to a normal load, see friction_series.py.
 """
 
 from ...jit.kernels import ANY, data_of, integers, kernel, matrix, part, stack, vector
-from ...jit.questions import some, whole
+from ...jit.predicates import some, whole
 from ...jit.simd import add, cross, fma, four, lanes, put, splat, times
 from ...motions.state_program import LENGTH, ROWS, T, call_order
 from ..markers import PARAMETERS, POINT, TURN
 from .body_poses import POSE, P, turned
 from .constraint_series import BODY_ROW, S_OMEGA, S_R, torque
-from .friction_series import FRICTION_ROWS, rub
+from .friction_series import FRICTION_ROWS, known_friction
 from .template import (
     CODES,
     DRIVEN,
+    FRICTIONAL,
     MARKERS,
     OWNERS,
     ROOM,
-    RUBS,
     SHARP,
     SIZE,
     SLOTS,
@@ -66,7 +66,7 @@ def _turning(bodies, at, orders, k):
 
 
 @kernel
-def place(code, bodies, at, orders, k, s):
+def marker_coefficient(code, bodies, at, orders, k, s):
     """Order k of the x of a Point or Vector; its body's series begins at bodies[at]."""
     f = turned(bodies, at + 12 * k, s[0], s[1], s[2])
     return add(f, four(bodies, at + S_R * orders + 4 * k)) if code == POINT else f
@@ -106,7 +106,7 @@ def scratch_rows(stride, values):
     """Rows of an instance's scratch; the values of its kind."""
     if TRACED:
         return int(values[ROWS])
-    if RUBS:
+    if FRICTIONAL:
         return SLOTS + SIZE + FRICTION_ROWS
     return SLOTS + (stride - 3 * MARKERS if DRIVEN else 0)
 
@@ -132,6 +132,7 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         first = program + i * size
         for j in range(MARKERS):
+            # x_k and xd_k of the markers
             at, s, c = own[OWNERS[j]] * body_size, real[3 * j : 3 * j + 3], STARTS[j]
             if CODES[j] == PARAMETERS:
                 p = first + j * wide
@@ -144,36 +145,41 @@ def series(run, k, orders, count, stride, size, table, reals, bodies, values, po
                 put(x, c, splat(0.0))
                 put(xd, c, _turning(bodies, at, orders, k))
             else:
-                put(x, c, place(CODES[j], bodies, at, orders, k, s))
-                put(xd, c, times(place(CODES[j], bodies, at, orders, k + 1, s), splat(k + 1.0)))
-        for c in range(SIZE):
-            f[c] = 0.0
+                put(x, c, marker_coefficient(CODES[j], bodies, at, orders, k, s))
+                put(xd, c, times(marker_coefficient(CODES[j], bodies, at, orders, k + 1, s), splat(k + 1.0)))
+        for e in range(SIZE):
+            f[e] = 0.0
+        # f_k by the law
         scratch = matrix(data_of(values[first + own_scratch :]), rows, orders)
         if TRACED:
             run_traced(run, values, x, xd, real[3 * MARKERS :], k, rows, orders, values[first + own_scratch :])
         kernel_series(x, xd, real[3 * MARKERS :], k, scratch, f)
-        if RUBS:
+        # In proportion to the normal load: what is known of it
+        if FRICTIONAL:
             kept = values[first + own_scratch + rows * orders + MARKERS :]
-            rub(k, wide, x, real[3 * MARKERS :], kept, scratch, values[first + MARKERS * wide :], f)
+            known_friction(k, wide, x, real[3 * MARKERS :], kept, scratch, values[first + MARKERS * wide :], f)
+        # x and xd are kept for the comparison with the law
         if SHARP:
             kept = first + own_scratch + rows * orders + MARKERS + 2 * SIZE * k
-            for c in range(SIZE):
-                values[kept + c] = x[c]
-                values[kept + SIZE + c] = xd[c]
+            for e in range(SIZE):
+                values[kept + e] = x[e]
+                values[kept + SIZE + e] = xd[e]
         for j in range(MARKERS):
             if own[MASK] >> OWNERS[j] & 1:
                 continue
+            # The last order whose force is not zero bounds the sum of torques
             c, s, z = STARTS[j], real[3 * j : 3 * j + 3], 8 * own[OWNERS[j]]
             at, forces = own[OWNERS[j]] * body_size, first + (MARKERS + j) * wide
             ends = first + own_scratch + rows * orders + j
             wider = CODES[j] == PARAMETERS
             acts = some(f[c]) or some(f[c + 1]) or some(f[c + 2]) or (wider and some(f[c + 3]))
-            if acts or RUBS or k == 0:
-                values[ends] = float(k) if acts or RUBS else -1.0
+            if acts or FRICTIONAL or k == 0:
+                values[ends] = float(k) if acts or FRICTIONAL else -1.0
             put(values, forces + 4 * k, four(f, c) if wider else lanes(f[c], f[c + 1], f[c + 2]))
             last = whole(values[ends])
             if last < 0:
                 continue
+            # Torque of order k, and the force itself, onto the body
             if wider:
                 y = _parameters_torque(values, first + j * wide, forces, k, last)
             else:

@@ -11,7 +11,7 @@ central differences where it is not analytic. `force.callbacks` supplies the nam
 from ...jit.kernels import ANY, complex_stack, integers, part, stack, stack2, vector
 from ..tolerances import FORCE_QUOTIENT, FORCE_STEP
 from .corotated_frames import turn_block, turn_of_bodies, turn_of_directions
-from .marker_jacobians import carry_back, carry_back_derivative, derivatives, state
+from .marker_jacobians import MarkerDerivatives, carry_back, carry_back_derivative, derivatives, state
 from .template import (
     ALONG,
     AT,
@@ -29,7 +29,7 @@ from .template import (
 )
 
 INTS = 4  # of a kind's table for each instance: template.AT and DIMENSION
-JACOBIAN = "iippppdippip"  # count, reals per instance, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept
+JACOBIAN = "iippppdippip"  # count, reals per instance, table, reals, q, qd, t, n, Q_q, Q_qd, renew, kept
 SPAN = 14  # coordinates of two bodies
 FRAME = 7  # floats of an instance's frame: Euler parameters of a body, or a direction
 
@@ -47,6 +47,7 @@ def forces(count, stride, table, reals, q, qd, t, out):
     x, xd, f = stack(SIZE), stack(SIZE), stack(SIZE)
     for i in range(count):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        # f = law(x, xd), pulled back: Q += W^T f
         force_markers(q, qd, own, real, x, xd)
         for c in range(SIZE):
             f[c] = 0.0
@@ -73,6 +74,7 @@ def _complex_slope(z, zd, along, c, par, t, g, slope):
     """slope[:, c] = f_along, by a complex step of along (z or zd), whose imaginary parts are zero."""
     for r in range(SIZE):
         g[r] = 0.0
+    # Im f(x + i h) / h = f' + O(h^2), without cancellation
     here = along[c]
     along[c] = complex(here.real, FORCE_STEP)
     kernel_law(z, zd, par, t, g)
@@ -99,6 +101,7 @@ def _central_slope(x, xd, along, c, par, t, g, slope):
     for r in range(SIZE):
         slope[r, c] = 0.0
     for k in range(-2, 3):
+        # (f(-2h) - 8 f(-h) + 8 f(h) - f(2h)) / 12 h
         weight = (8.0 * k if k * k == 1 else -0.5 * k) / 12.0
         if k != 0:
             for r in range(SIZE):
@@ -122,32 +125,34 @@ def central_differences(x, xd, par, t, fx, fxd):
 def _differentiate_markers(q, qd, own, real, x, xd, W, X, Y):
     """Set x, xd, and W = xd_qd, X = x_q, Y = xd_q (SIZE, SPAN)."""
     for r in range(SIZE):
-        for c in range(SPAN):
-            W[r, c], X[r, c], Y[r, c] = 0.0, 0.0, 0.0
+        for e in range(SPAN):
+            W[r, e], X[r, e], Y[r, e] = 0.0, 0.0, 0.0
     for j in range(MARKERS):
         k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
         state(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:])
-        derivatives(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, c, 7 * k, W, X, Y)
+        derivatives(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, c, 7 * k, MarkerDerivatives(W, X, Y))
 
 
 @part
-def _follow_frame(q, own, x, anew, frame, turn):
-    """With anew keep the force's frame, a body's or the direction between two points; else set its turn since then."""
+def _follow_frame(q, own, x, renew, frame, turn):
+    """With `renew` store the force's frame, a body's or the direction between two points; else set its rotation."""
     if ALONG >= 0:
+        # A law along the line between two points: the frame follows the direction
         d = stack(3)
         for c in range(3):
             d[c] = x[ALONG + c] - x[c]
-        if anew != 0:
+        if renew != 0:
             for c in range(3):
                 frame[4 + c] = d[c]
         else:
             turn_of_directions(frame[4:], d, turn)
         return
     turn[0], turn[1], turn[2], turn[3] = 1.0, 0.0, 0.0, 0.0
+    # A law in the axes of a body
     k = 0 if own[DIMENSION] != 3 else 1  # a law has the axes of a; those of the ground stay where they are
     if own[DIMENSION + k] == 7:
         p = q[own[AT + k] + 3 : own[AT + k] + 7]
-        if anew != 0:
+        if renew != 0:
             for c in range(4):
                 frame[c] = p[c]
         else:
@@ -155,16 +160,17 @@ def _follow_frame(q, own, x, anew, frame, turn):
 
 
 @part
-def _law_derivatives(x, xd, q, own, par, t, anew, kept, fx, fxd):
-    """f_x and f_xd: taken and kept with anew, otherwise those kept, turned to where the force's frame is now."""
+def _law_derivatives(x, xd, q, own, par, t, renew, kept, fx, fxd):
+    """f_x and f_xd: evaluated and stored with `renew`, else the stored ones, rotated with the force's frame."""
     turn, old_x, old_xd = stack(4), kept[:], kept[SIZE * SIZE :]
-    if anew != 0:
+    if renew != 0:
         kernel_derivatives(x, xd, par, t, fx, fxd)
         for k in range(SIZE):
             for c in range(SIZE):
                 old_x[k * SIZE + c], old_xd[k * SIZE + c] = fx[k, c], fxd[k, c]
-    _follow_frame(q, own, x, anew, kept[2 * SIZE * SIZE :], turn)
-    if anew == 0:
+    _follow_frame(q, own, x, renew, kept[2 * SIZE * SIZE :], turn)
+    # T f_x T^T with the rotation T of the frame since the derivatives were taken
+    if renew == 0:
         for j in range(MARKERS):
             for k in range(MARKERS):
                 turn_block(CODES[j], CODES[k], turn, old_x, SIZE, STARTS[j], STARTS[k], fx)
@@ -178,6 +184,7 @@ def _add_products(own, fx, fxd, W, X, Y, n, Q_q, Q_qd):
     for c in range(SPAN):
         if c % 7 >= own[DIMENSION + c // 7]:
             continue
+        # Columns of f_x X + f_xd Y and of f_xd W
         for r in range(SIZE):
             y, yd = 0.0, 0.0
             for k in range(SIZE):
@@ -185,6 +192,7 @@ def _add_products(own, fx, fxd, W, X, Y, n, Q_q, Q_qd):
                 yd += fxd[r, k] * W[k, c]
             h[r], hd[r] = y, yd
         column = own[AT + c // 7] + c % 7
+        # W^T times them
         for r in range(SPAN):
             if r % 7 < own[DIMENSION + r // 7]:
                 y, yd = 0.0, 0.0
@@ -196,12 +204,12 @@ def _add_products(own, fx, fxd, W, X, Y, n, Q_q, Q_qd):
                 Q_qd[place] += yd
 
 
-def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept):
+def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, renew, kept):
     """Q_q, Q_qd (n, n) += the Jacobians of all instances.
 
-    With anew the derivatives of the law are taken and kept, (2 SIZE^2 + FRAME) floats an instance; without, those kept
-    are turned to where the force's frame is now. What follows from geometry is always exact. A callback is given each
-    array by its address, hence twelve arguments.
+    With `renew` the derivatives of the law are evaluated and stored, (2 SIZE^2 + FRAME) floats an instance; otherwise
+    the stored ones are rotated with the force's frame. What follows from geometry is always exact. A callback is given
+    each array by its address, hence twelve arguments.
     """
     kept, table, reals = vector(kept, ANY), integers(table, ANY), vector(reals, ANY)
     q, qd, Q_q, Q_qd = vector(q, ANY), vector(qd, ANY), vector(Q_q, ANY), vector(Q_qd, ANY)
@@ -212,9 +220,11 @@ def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, anew, kept):
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         for r in range(SIZE):
             f[r] = 0.0
+        # W, X, Y; the force f; f_x and f_xd
         _differentiate_markers(q, qd, own, real, x, xd, W, X, Y)
         kernel_law(x, xd, real[3 * MARKERS :], t, f)
-        _law_derivatives(x, xd, q, own, real[3 * MARKERS :], t, anew, kept[i * KEPT :], fx, fxd)
+        _law_derivatives(x, xd, q, own, real[3 * MARKERS :], t, renew, kept[i * KEPT :], fx, fxd)
+        # (W^T f)_q at constant f, then the products
         for j in range(MARKERS):
             k, s = OWNERS[j], real[3 * j : 3 * j + 3]
             carry_back_derivative(CODES[j], own[DIMENSION + k], own[AT + k], s, f[STARTS[j] :], n, Q_q)

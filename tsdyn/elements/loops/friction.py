@@ -35,6 +35,7 @@ def unit_friction(stride, own, real, q, qd, t, out):
         f[c] = 0.0
     for c in range(14):
         out[c] = 0.0
+    # The last of the reals is the normal load: one for this evaluation
     load = real[stride - 1]
     real[stride - 1] = 1.0
     kernel_law(x, xd, real[3 * MARKERS : stride], t, f)
@@ -48,6 +49,7 @@ def unit_friction(stride, own, real, q, qd, t, out):
 @kernel
 def _about_point(A, s, f, out):
     """out (6,) = force and torque about a point s from the centroid, ground frame, of a force and a body torque."""
+    # T = A tau' - s x F
     for i in range(3):
         out[i] = f[i]
         out[3 + i] = A[i, 0] * f[3] + A[i, 1] * f[4] + A[i, 2] * f[5]
@@ -59,6 +61,7 @@ def _about_point(A, s, f, out):
 @kernel
 def _about_centroid(A, s, g, out):
     """out (6,) = the derivative by a force and a body torque, from that by force and torque about the point."""
+    # Transposed: tau' by A^T, F by the moment of T
     for i in range(3):
         out[3 + i] = A[0, i] * g[3] + A[1, i] * g[4] + A[2, i] * g[5]
     out[0] = g[0] - (g[4] * s[2] - g[5] * s[1])
@@ -89,6 +92,7 @@ def normal_load(stride, own, real, q, qd, t, side, derive, f, out):
     x, s, g, z, A = stack(SIZE), stack(3), stack(6), complex_stack(6), stack2(3, 3)
     _stand(own, real, q, qd, side, x, s, A)
     _about_point(A, s, f, g)
+    # Complex steps along the six components of the reaction
     for i in range(6):
         z[i] = g[i]
     par = real[3 * MARKERS : stride]
@@ -115,6 +119,7 @@ def load_slope(stride, own, real, q, qd, t, side, f, out):
     unit, slope, par = stack(6), stack(6), real[3 * MARKERS : stride]
     _stand(own, real, q, qd, side, x, s, A)
     _about_point(A, s, f, out[7:])
+    # Order zero is the load; at constant x coefficient one is its derivative along the reaction
     out[0] = kernel_normal_series(x, out[7:], par, 0, scratch)
     for c in range(SIZE):
         x[c] = 0.0

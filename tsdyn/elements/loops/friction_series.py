@@ -28,6 +28,7 @@ def _complete(k, wide, par, kept, s, forces):
         x[c] = kept[2 * SIZE * k + c]
     for c in range(6):
         f[c] = s[N + REACTION + c, k]
+    # N_k of the whole reaction; f_k lacks g_0 times its change
     load = kernel_normal_series(x, f, par, k, s)
     change = load - s[N, k]
     s[N, k] = load
@@ -37,19 +38,22 @@ def _complete(k, wide, par, kept, s, forces):
 
 
 @part
-def rub(k, wide, x, par, kept, s, forces, f):
+def known_friction(k, wide, x, par, kept, s, forces, f):
     """Replace f, order k of g, by what is known of f_k, Eq. (1), after order k - 1 has been completed."""
     g, N = stack(6), SLOTS + SIZE
+    # The law has given g_k: keep it
     for c in range(SIZE):
         s[SLOTS + c, k] = f[c]
         f[c] = 0.0
     s[N, k] = 0.0
     if k == 0:
         return
+    # Order k - 1 is complete now that its multipliers are known
     _complete(k - 1, wide, par, kept, s, forces)
     for c in range(6):
         g[c] = s[N + REACTION + c, k]
     s[N, k] = kernel_normal_series(x, g, par, k, s)
+    # f_k = sum_j g_j N_{k-j}
     for c in range(SIZE):
         for j in range(k + 1):
             f[c] += s[SLOTS + c, j] * s[N, k - j]
@@ -62,5 +66,6 @@ def load_at(tau, known, x, par, s):
     for c in range(6):
         g[c] = 0.0
         for k in range(known - 1, -1, -1):
+            # Horner's scheme for the reaction
             g[c] = g[c] * tau + s[first + c, k]
     return kernel_normal_load(x, g, par)

@@ -1,6 +1,6 @@
 """Series of forces against their laws, at a place of a Taylor step.
 
-A law may change within less than a series shows: the series of v / sqrt(v^2 + v_0^2) at v >> v_0 knows nothing of the
+A law may change within less than a series shows: the series of v / sqrt(v^2 + v_0^2) at v >> v_0 doesn't contain the
 reversal at v = 0, that of |v| at v > 0 is v, and a pulse is zero to any order long before. The law itself, or the
 program of a traced function, is therefore evaluated at x(tau) and xd(tau), and must be f(tau). What f lacks may be as
 large as
@@ -13,7 +13,7 @@ Where a law is analytic while some rows a of its scratch are positive (`Force.po
     a_0 > sum_{k>0} |a_k| h^k                                                                                  (1)
 
 none of them vanishes within the step, and nothing else is evaluated. Past a zero of d the series of |d| goes on as
--|d|, of which no coefficient tells.
+-|d|, which no coefficient shows.
 """
 
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, vector
@@ -23,15 +23,15 @@ from ...motions.state_program import T
 from ..markers import PARAMETERS, POINT, TURN
 from ..tolerances import LAW_NOISE, LAW_TOLERANCE
 from .constraint_series import BODY_ROW, S_OMEGA
-from .force_series import BODY, INTS, MASK, place, run_traced, scratch_rows
+from .force_series import BODY, INTS, MASK, marker_coefficient, run_traced, scratch_rows
 from .friction_series import load_at
 from .template import (
     CODES,
+    FRICTIONAL,
     MARKERS,
     OWNERS,
     POSITIVE,
     ROOM,
-    RUBS,
     SHARP,
     SIZE,
     STARTS,
@@ -53,6 +53,7 @@ call_check, call_margin = caller(SIGNATURE), caller(MARGIN)
 def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
     """Whether the series of a marker's force, at values[forces], is not the law's f."""
     c, w, tau = STARTS[j], 16 * own[BODY + OWNERS[j]], limits[TAU]
+    # Acceleration per unit of force: 1 / m and s^2 J'^-1, bounded by the trace
     turning = inverse[w + 4] + inverse[w + 9] + inverse[w + 14]
     if CODES[j] == TURN:
         weight = turning
@@ -63,6 +64,7 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
     size = 4 if CODES[j] == PARAMETERS else 3
     off, terms, speed = 0.0, 0.0, 0.0
     total = splat(0.0)
+    # The series at tau, and the largest difference from the law
     for k in range(known - 1, -1, -1):
         total = fma(total, splat(tau), four(values, forces + 4 * k))
     series = stack(4)
@@ -72,9 +74,11 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
         if not gap <= off:  # or not a number
             off = gap
         speed = max(speed, abs(xd[c + i]))
+    # Within tolerance as a velocity over the step
     tol = limits[ATOL] + limits[RTOL] * speed
     if weight * off * limits[LENGTH] <= max(limits[MOST] * tol, LAW_TOLERANCE):
         return False
+    # or within rounding of the terms of the series
     for i in range(size):
         power = 1.0
         for k in range(known):
@@ -88,7 +92,9 @@ def _sums(code, bodies, at, orders, known, tau, s, values, p):
     """The x of a marker at tau, and xd; its body's series begins at bodies[at], p at values[p]."""
     x, xd, h = splat(0.0), splat(0.0), splat(tau)
     if code == TURN:
+        # xd = A omega' of a Turn
         a0, a1, a2, w, o = x, x, x, x, at + S_OMEGA * orders
+        # x and xd together by Horner's scheme
         for k in range(known, -1, -1):
             c = at + 12 * k
             a0, a1, a2 = fma(a0, h, four(bodies, c)), fma(a1, h, four(bodies, c + 4)), fma(a2, h, four(bodies, c + 8))
@@ -96,7 +102,9 @@ def _sums(code, bodies, at, orders, known, tau, s, values, p):
         return x, fma(a0, splat(first(w)), fma(a1, splat(second(w)), times(a2, splat(third(w)))))
     for k in range(known, -1, -1):
         xd = fma(xd, h, x)
-        x = fma(x, h, four(values, p + 4 * k) if code == PARAMETERS else place(code, bodies, at, orders, k, s))
+        x = fma(
+            x, h, four(values, p + 4 * k) if code == PARAMETERS else marker_coefficient(code, bodies, at, orders, k, s)
+        )
     return x, xd
 
 
@@ -123,6 +131,7 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
         for c in range(SIZE):
             x[c], xd[c], f[c] = 0.0, 0.0, 0.0
         if SHARP:
+            # x and xd at tau, of stored series or from those of the bodies
             for k in range(known - 1, -1, -1):
                 at = kept + 2 * SIZE * k
                 for c in range(SIZE):
@@ -130,6 +139,7 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
                     xd[c] = xd[c] * limits[TAU] + values[at + SIZE + c]
         else:
             _sum_markers(own, real, bodies, orders, known, limits[TAU], values[own_values:], x, xd)
+        # The law there: a program at order zero, or a function
         par = real[3 * MARKERS : stride]
         if TRACED:
             own_scratch = values[kept + 2 * SIZE * orders :]
@@ -137,11 +147,12 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
             run_traced(run, values, x, xd, par, 0, rows, 1, own_scratch)
             kernel_series(x, xd, par, 0, matrix(data_of(own_scratch), rows, 1), f)
         else:
-            if RUBS:
+            if FRICTIONAL:
                 scratch = matrix(data_of(values[own_values + 2 * MARKERS * wide :]), rows, orders)
                 par[stride - 3 * MARKERS - 1] = load_at(limits[TAU], known, x, par, scratch)
             kernel_law(x, xd, par, limits[TIME], f)
         for j in range(MARKERS):
+            # Its force against the series, marker by marker
             forces = own_values + (MARKERS + j) * wide
             if own[MASK] >> OWNERS[j] & 1:
                 continue
@@ -153,13 +164,14 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
 def margin(count, stride, size, orders, known, h, values, least):
     """least = the minimum of itself and of the share 1 - sum_{k>0} |a_k| h^k / a_0 of each a; Eq. (1) is share > 0.
 
-    Not a number where a share is none.
+    NaN if a share is NaN.
     """
     h, values, least = vector(h, 1), vector(values, ANY), vector(least, 1)
     rows, left, step = scratch_rows(stride, values), get(least, 0), get(h, 0)
     square = step * step
     rest = 0.0 * step  # not a number where a share isn't: a minimum can lose that
     for i in range(count):
+        # Share 1 - sum_{k>0} |a_k| h^k / a_0, odd and even orders apart
         s = matrix(data_of(values[i * size + 8 * MARKERS * orders :]), rows, orders)
         for a in POSITIVE:
             odd, even, top = 0.0 * step, 0.0 * step, (known - 1) // 2

@@ -7,9 +7,21 @@ W = xd_qd pulls a force f conjugate to the marker back to Q = W^T f. X = x_q equ
     Turn            xd = 2 E(p) pd = -2 E(pd) p,   E = [-e, e~ + e0 I]
 """
 
+from typing import NamedTuple
+
+import numpy as np
+
 from ...jit.kernels import kernel, stack
 from ...maths.euler_parameters import rotate_gradient, rotate_rate
 from ..markers import PARAMETERS, POINT, TURN, chain_rule, position, rate
+
+
+class MarkerDerivatives(NamedTuple):
+    """Derivatives of the markers of an instance by the coordinates of its two bodies."""
+
+    W: np.ndarray  # (size of x, 14)  xd_qd
+    X: np.ndarray  # (size of x, 14)  x_q
+    Y: np.ndarray  # (size of x, 14)  xd_q
 
 
 @kernel
@@ -66,9 +78,11 @@ def _rate(code, p, pd, s, out):
 
 
 @kernel
-def derivatives(code, dimension, at, q, qd, s, row, column, W, X, Y):
-    """W = xd_qd, X = x_q and Y = xd_q of one marker, from [row, column] on; zero on entry."""
+def derivatives(code, dimension, at, q, qd, s, row, column, out):
+    """Set the `MarkerDerivatives` of one marker, from [row, column] on; zero on entry."""
+    W, X, Y = out
     if dimension != 0 and code == POINT:
+        # A point moves with r
         for i in range(3):
             W[row + i, column + i] = 1.0
             X[row + i, column + i] = 1.0
@@ -84,12 +98,14 @@ def derivatives(code, dimension, at, q, qd, s, row, column, W, X, Y):
             W[row + j, c] = 1.0
             X[row + j, c] = 1.0
             continue
+        # A(p) s is quadratic in p: its derivative along e_j is bilinear in p and e_j
         e[j] = 1.0
         _rate(code, p, e, s, f)
         for i in range(3):
             W[row + i, c] = f[i]
             if code != TURN:
                 X[row + i, c] = f[i]
+        # xd likewise, with pd in place of p
         _rate(code, e, pd, s, f)
         for i in range(3):
             Y[row + i, c] = f[i]
@@ -105,6 +121,7 @@ def carry_back_derivative(code, dimension, at, s, f, n, Q_q):
     for i in range(4):
         e[i] = 0.0
     for j in range(4):
+        # W is linear in p: (W^T f)_p along e_j is W^T f at p = e_j
         e[j] = 1.0
         if code == TURN:
             torque_on_parameters(e, f[0], f[1], f[2], g)

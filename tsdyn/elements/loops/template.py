@@ -2,7 +2,7 @@
 
 A loop is a template. `specialised` copies it, and the parts that it calls, for one kind of constraint or force, with
 the names below replaced by the constants and kernels of that kind. Parts are inlined, so arguments cost nothing there;
-a loop is given each array by its address. Both may have up to twelve.
+a loop is given each array by its address, and may have up to twelve.
 """
 
 from ...jit.kernels import part
@@ -20,7 +20,7 @@ DRIVEN = False  # whether the series depend on time
 TRACED = False  # whether a force is given by a program
 SHARP = False  # whether the series of a force are checked against its law
 POSITIVE = ()  # rows of the scratch of `series` that are positive where the law of a force is analytic
-RUBS = False  # whether a force is in proportion to a normal load
+FRICTIONAL = False  # whether a force is in proportion to a normal load
 KEPT = 1  # floats of a force's derivatives kept from step to step
 ALONG = -1  # where in x the direction ends that a force's frame follows, or -1: the frame of a body
 kernel_phi = kernel_value = kernel_jacobian = kernel_gamma = kernel_series = kernel_series_t = None

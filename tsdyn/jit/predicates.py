@@ -1,4 +1,4 @@
-"""What kernels that serve one case and lanes alike ask of numbers; of lanes (lanes.py) one answer serves all.
+"""Predicates of numbers for kernels that serve one case and lanes alike; of lanes (lanes.py) one answer serves all.
 
 serves(k, x, limit)  whether x is a pivot: limit k k < x k < inf; of lanes always, since each is judged later
 some(x)              whether x is not zero, in any lane

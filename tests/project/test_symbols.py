@@ -1,0 +1,71 @@
+"""One symbol, one meaning (docs/notation.md), within every function of the core."""
+
+import ast
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2] / "tsdyn"
+CORE = (
+    "elements/loops", "formulations", "lanes", "maths", "methods", "model", "motions", "rows", "runs", "sparse",
+    "taylor", "workspaces",
+)  # fmt: skip
+FILES = [path for package in CORE for path in sorted((ROOT / package).glob("*.py"))]
+SCOPES = ast.FunctionDef, ast.Lambda, ast.ClassDef, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp
+
+
+def of_function(function):
+    """All nodes of a function but those of scopes within it."""
+    nodes = list(function.body)
+    while nodes:
+        node = nodes.pop()
+        yield node
+        nodes += [child for child in ast.iter_child_nodes(node) if not isinstance(child, SCOPES)]
+
+
+def names_in(target):
+    """The names that an assignment to a target binds."""
+    return {node.id for node in ast.walk(target) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+
+
+def double_names(function):
+    """Names that are the index of a loop and something else besides, or the function's own name."""
+    indices, others = set(), {argument.arg for argument in function.args.args}
+    for node in of_function(function):
+        if isinstance(node, ast.For):
+            ranged = isinstance(node.iter, ast.Call) and getattr(node.iter.func, "id", "") == "range"
+            (indices if ranged else others).update(names_in(node.target))
+        elif isinstance(node, ast.Assign) and not (isinstance(node.value, ast.Constant) and node.value.value == 0):
+            others.update(*map(names_in, node.targets))  # a counter that begins at zero is an index, too
+    return indices & others | {function.name} & (indices | others)
+
+
+def test_the_walk_finds_a_name_of_two_things():
+    (function,) = ast.parse("def f(c):\n    c = load(c)\n    for c in range(3):\n        f = c\n").body
+    assert double_names(function) == {"c", "f"}
+
+
+def test_a_name_is_bound_to_one_thing_in_a_function():
+    found = {}
+    for path in FILES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and (names := double_names(node)):
+                found[f"{path.relative_to(ROOT)}: {node.name}"] = names
+    assert found == {}
+
+
+# templates of callbacks, which are given each array by its address
+BY_ADDRESS = {
+    "elements/loops/constraint_hessians.py: loop", "elements/loops/constraint_series.py: series",
+    "elements/loops/force_series.py: series", "elements/loops/forces.py: jacobian",
+    "elements/loops/law_check.py: check", "profiling/timers.py: _series",
+}  # fmt: skip
+
+
+def test_functions_take_ten_positional_arguments_at_most():
+    found = set()
+    for path in ROOT.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                names = [argument.arg for argument in (*node.args.posonlyargs, *node.args.args)]
+                if len(names) - (names[:1] in (["self"], ["cls"])) > 10:
+                    found.add(f"{path.relative_to(ROOT).as_posix()}: {node.name}")
+    assert found <= BY_ADDRESS

@@ -6,10 +6,12 @@ from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853, Taylor
 from ..jit.compiled import DEBUG
 from ..methods.plug_in import called_for
+from ..model.state_loads import is_of_user
 from ..motions import program, state_program
 from ..motions.signals import Signal
 from ..rows.interface import ELIMINATION
 from ..runs.arguments import adaptive
+from ..runs.path_loads import watch
 from ..runs.stepper import advance
 from ..taylor import step_parts
 from ..taylor.layout import FAR, no_series, pays, room
@@ -49,6 +51,8 @@ def of_scene(scene, method, form, far, rough):
     for kind, moving in _kinds(scene).items():
         yield from of_constraint(kind, moving, series, far, implicit)
     driven = any(_kinds(scene).values())
+    if not series and any(is_of_user(force) for force in scene.forces):
+        yield watch
     if series and (driven or any(_is_checked(force) for force in scene.forces)):
         yield step_parts.check_laws
     for force in scene.forces:

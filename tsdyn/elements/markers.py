@@ -232,8 +232,9 @@ def chain_rule(code, dimension, at, q, s, f, first, out):
         for i in range(dimension):
             out[i] = 0.0
     if code == PARAMETERS:
-        for i in range(4):
-            out[3 + i] += f[i]
+        if dimension == 7:  # a point mass has none
+            for i in range(4):
+                out[3 + i] += f[i]
         return
     if code == POINT:
         for i in range(3):

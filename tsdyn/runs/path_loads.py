@@ -5,10 +5,10 @@ have written are sampled along the quintic Hermite polynomial of the ends of a s
 (motions/changes.py). Eighth differences of the samples, and of each 4th, 16th and 64th of them, must be those of a load
 that a step as long resolves:
 
-    |d| <= DISTINCT (atol + rtol |qd|) / (s dt)     s dt: between the samples of a difference
-           (atol + rtol) |f|                        at most
+    |d| <= max(DISTINCT (atol + rtol |qd|) / (s dt), (atol + rtol) |f|)     s dt: between the samples of a difference
 
-f is the sum of what the loads accelerate all coordinates by. A step with larger ones is rejected, and ends before them.
+f is the sum of what the loads accelerate all coordinates by. A step with larger ones is rejected, and the next one ends
+before them. Steps of less than the distance of samples of functions of time are left alone.
 """
 
 import math
@@ -57,7 +57,7 @@ def _sample(s, r, h, t0, places, d, weights, f):
     """f (places + 1,): the weighted sum of the loads at so many places of the step, equally far apart. The largest."""
     n, k, size = r.now.shape[1], weights.size, 0.0
     x, xd = r.path[7 * k : 8 * k], r.path[8 * k : 9 * k]
-    q, qd, Q = r.path[9 * k : 9 * k + n], r.path[9 * k + n : 9 * k + 2 * n], r.path[9 * k + 2 * n :]
+    Q, q, qd = r.path[9 * k : 9 * k + n], r.path[9 * k + n : 9 * k + 2 * n], r.path[9 * k + 2 * n :]
     for place in range(places + 1):
         share = place / places
         quintic(share, h, k, d, x, xd)

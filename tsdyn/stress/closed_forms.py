@@ -124,6 +124,20 @@ def _pulse():
     return abs(simulate(scene, (0.0, 100.0)).velocity(mass)[-1, 0] - 0.1)
 
 
+def _bump():
+    """The velocity of 1 kg behind a potential of 0.3 J, a thousandth of the way wide, by two methods."""
+
+    def push(t, state):
+        return (168.5 * np.exp(-(((state[0] - 0.5) / 1e-3) ** 2)), 0.0, 0.0)
+
+    scene = Scene(gravity=(0, 0, 0))
+    mass = scene.add_point_mass(1.0, velocity=(1.0, 0, 0))
+    scene.add(forces.PointForce(mass, force=push))
+    right = math.sqrt(1.0 + 2.0 * 168.5 * 1e-3 * math.sqrt(math.pi))
+    found = [simulate(scene, (0.0, 1.0), integrator=method) for method in ("dop853", "taylor")]
+    return max(abs(each.velocity(mass)[-1, 0] - right) for each in found)
+
+
 def _block():
     """The way of a block on a slope of 10 degrees whose friction holds it, in 100 s."""
     turned = Rotation.from_rotvec((0, math.radians(10.0), 0))
@@ -152,6 +166,7 @@ CLOSED_FORMS = (
     ClosedForm("a joint that mimics another with an offset (rad)", _mimic, 1e-12),
     ClosedForm("a motor of a hinge at one and a half turns (rad)", _motor, 1e-12),
     ClosedForm("a pulse of a thousandth of the run (m/s)", _pulse, 1e-6),
+    ClosedForm("past a bump of a thousandth of the way (m/s)", _bump, 1e-6),
     ClosedForm("a block at rest on a slope, 100 s (m)", _block, 1e-6),
     ClosedForm("steps on a bushing of 1e12 N/m, over those of Radau", _stiff, 3.0),
 )

@@ -33,8 +33,8 @@ RATES = 10.0
 # The tolerance of a step is a thousandth of the run's.
 STIFF_RATES = 1000.0
 
-# Places of a step, equally far apart, at which series of sharp forces are compared with their laws; steps of a run at
-# least, since a pulse between two places is missed.
+# Places of a step, equally far apart, at which series of sharp forces are compared with their laws; those of users at
+# more (motions/tolerances.py, SAMPLES). Steps of a run at least, since a pulse between two places is missed.
 PLACES, LEAST_STEPS = 4, 8
 # atol and rtol of that comparison where steps are fixed and have no tolerance: above the errors of series in too long a
 # step, below those of series that have ended.

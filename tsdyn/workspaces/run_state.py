@@ -114,7 +114,7 @@ class Run(NamedTuple):
     joints: np.ndarray  # int64 (angles, 4)  where its two bodies' coordinates begin, and how many they are
     watched: np.ndarray  # int64 (kinds,)  rows of System.forces that are sampled along steps; see path_loads.py
     loaded: np.ndarray  # int64 (bodies,)  that they act on
-    path: np.ndarray  # scratch of it
+    path: np.ndarray  # scratch of path_loads.py
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
     block: np.ndarray  # the present step's: start, h, end, chart; the interpolant's data; what is remembered

@@ -1,10 +1,14 @@
 """Impossible arguments of `simulate` and `evaluate`, and questions to which a solution has no answer."""
 
+import pickle
+import re
+
 import numpy as np
 import pytest
 
 import tsdyn as ts
 from tests.helpers.refusals import INF, NAN, STEP, build, case, refuse, text
+from tests.helpers.tolerances import ROUNDING
 
 C = ts.constraints
 POSITIVE = (0.0, -1.0, NAN, INF, None, "1e-3", "x", [1.0], 1j, 10**400)
@@ -237,3 +241,42 @@ def test_a_tolerance_may_be_an_array_of_no_dimension():
     w = build()
     given, expected = (ts.simulate(w.scene, (0.0, 0.1), rtol=tol, atol=tol) for tol in (np.array(1e-5), 1e-5))
     np.testing.assert_array_equal(given.q, expected.q)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: ts.State(0.0), "State(): missing a required argument: 'q'"),
+        (lambda: ts.State(0.0, [1.0], v=[0.0]), "State() has no argument v"),
+        (lambda: ts.State(0, 1, 2, 3, 4, 5), "State() takes t, q, qd, qdd, multipliers by position, got 6"),
+        (lambda: ts.Solution(), "Solution: make one by ts.simulate(scene, t_span)"),
+        (lambda: ts.Solution(1, 2, 3, {}), "Solution: make one by ts.simulate(scene, t_span)"),
+        (lambda: ts.Ensemble("a"), "Ensemble: make one by ts.ensemble("),
+        (lambda: ts.Body(object(), object()), "Body: make one by scene.add_body(...)"),
+        (lambda: ts.PointMass(*"abcdef"), "PointMass: make one by scene.add_body(...) or scene.add_point_mass(...)"),
+        (lambda: ts.Point(), "Point(): missing a required argument: 'body'"),
+        (lambda: ts.Angle(axle="a"), "Angle() has no argument axle"),
+        (lambda: ts.Displacement(1, 2, 3), "Displacement() takes"),
+        (lambda: ts.CollocationTableau(), "CollocationTableau(): missing a required argument"),
+    ],
+)
+def test_wrong_calls_of_public_classes(call, words):
+    with pytest.raises(ts.InvalidCall, match=re.escape(words)):
+        call()
+
+
+def test_a_state_to_start_from_needs_no_accelerations():
+    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
+    scene.add_point_mass(1.0, name="stone")
+    start = ts.State(1.0, np.array([0.0, 0.0, 5.0]), np.array([1.0, 0.0, 0.0]))
+    found = ts.simulate(scene, (1.0, 2.0), state=start)
+    np.testing.assert_allclose(found.q[-1], (1.0, 0.0, 0.0), atol=ROUNDING)
+    assert pickle.loads(pickle.dumps(found.state)).position("stone").shape == (3,)
+
+
+@pytest.mark.parametrize("part", [slice("a", "b"), slice(0.5, 2), slice(None, None, "a"), slice(None, None, -1), 0])
+def test_parts_of_solutions_that_there_are_not(part):
+    scene = ts.Scene()
+    scene.add_point_mass(1.0)
+    with pytest.raises(ts.InvalidArgument, match="outputs are taken by slices"):
+        ts.simulate(scene, (0.0, 1.0))[part]

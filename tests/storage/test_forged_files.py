@@ -108,6 +108,28 @@ def test_arrays_of_hdf5_that_are_elsewhere(way, saved, tmp_path):
     refuse(lambda: ts.load(path), ts.StorageError, ("last",))
 
 
+READ = """
+import sys
+import tsdyn as ts
+try:
+    ts.load(sys.argv[1])
+except ts.StorageError as error:
+    print(error)
+"""
+
+
+def test_attributes_of_a_type_that_there_is_not(tmp_path):
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w", libver="earliest") as file:  # whose objects have no checksums
+        file.attrs["source"] = "tsdyn"
+    content, text = bytearray(path.read_bytes()), b"source\0\0\x19\x01"
+    assert content.count(text) == 1
+    content[content.find(text) + len(text) - 1] = 2  # neither a sequence nor a text: libhdf5 crashes where it is read
+    path.write_bytes(content)
+    found = subprocess.run([sys.executable, "-c", READ, path], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (found.returncode, found.stdout.partition(": ")[0]) == (0, f"{path} is no saved solution of tsdyn")
+
+
 def test_folders_of_zarr_that_lead_elsewhere(saved, tmp_path):
     whole = saved("zarr").rename(tmp_path / "whole.zarr")
     node, chunk = ("q", "zarr.json"), ("q", "c", "0", "0")

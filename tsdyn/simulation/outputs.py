@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InvalidArgument
 from ..observables.kinematics import Anchor
 from ..other_names import lacking
+from ..validation import shown
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -77,9 +78,10 @@ class Outputs:
 
         Events, statistics and histories remain those of the whole run.
         """
-        if not isinstance(part, slice) or (part.step or 1) < 1:
+        bounds = (part.start, part.stop, part.step) if isinstance(part, slice) else ("",)
+        if not all(each is None or isinstance(each, (int, np.integer)) for each in bounds) or (part.step or 1) < 1:
             raise InvalidArgument(
-                f"outputs are taken by slices, such as solution[100:200] or solution[::10], got {part!r}."
+                f"outputs are taken by slices, such as solution[100:200] or solution[::10], got {shown(part)}."
             )
         if self._stored is None:
             return self._picked(part)

@@ -233,7 +233,8 @@ def outlined_run(path, numbers, arrays, why, kinds):
     found = _solution(path, record, held, scene, kinds[1], known["width"])
     complete(found, known)
     count, rows = found._length(), len(known["rows"])
-    found._held = {f"held_{name}": np.full((count, rows) if name == "multipliers" else count, np.nan) for name in HELD}
+    shapes = {name: (count, rows) if name == "multipliers" else (count,) for name in HELD}
+    found._held = {f"held_{name}": np.broadcast_to(np.nan, shape) for name, shape in shapes.items()}  # takes no memory
     found._content = record, {**held, **found._held, "outline": arrays["outline"]}
     return found
 

@@ -155,7 +155,14 @@ def get(path, group):
 def attributes(path):
     """As formats.py says."""
     with reading(path), _opened(path) as file:
-        return {name: value for name, value in file.attrs.items() if isinstance(value, (str, int, np.integer))}
+        return {name: file.attrs[name] for name in file.attrs if _is_plain(file.attrs.get_id(name))}
+
+
+def _is_plain(attribute):
+    """Whether an attribute is a text or a whole number: of others HDF5 may follow addresses beyond the file."""
+    kind = attribute.get_type()
+    is_text = kind.get_class() == h5py.h5t.STRING and kind.is_variable_str()
+    return attribute.shape == () and (is_text or attribute.dtype.kind in "iu")
 
 
 def shapes(path):

@@ -42,6 +42,18 @@ def test_a_mass_flies_through_the_anchor_of_its_spring(method):
     assert np.ptp(solution.energy) < FAIR
 
 
+def test_a_run_that_comes_to_rest_at_the_anchor_names_the_spring():
+    """A constant pull towards the anchor, and a damper: the mass crosses it ever more often."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    mass = scene.add_point_mass(1.0, (0.3, 0.1, 0))
+    scene.add(F.Spring(mass, scene.ground, actuator=5.0, damping=20.0, stiffness=10.0, free_length=0.0, name="pull"))
+    scene.add(F.Spring(mass, scene.ground, point_b=(3, 1, 0), stiffness=1.0, free_length=math.sqrt(10), name="far"))
+    message = ts.simulate(scene, (0, 5), max_steps=30000).message
+    assert "comes to rest where the law of 'pull' changes at once" in message
+    mass.position = (0.3, 0.0, 0.1)
+    assert "at once" not in ts.simulate(scene, (0, 5), max_steps=3).message
+
+
 @pytest.mark.parametrize("miss", [1e-12, 1e-9, 1e-6, 1e-4, 1e-2])
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 def test_a_mass_passes_close_by_the_anchor(miss, method):

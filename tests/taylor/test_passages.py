@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from examples import stewart_platform
 from tests.helpers.tolerances import FAIR
 from tsdyn.plugins import inverse_root, product, square
 
@@ -123,6 +124,13 @@ def test_a_plug_in_that_says_nothing_is_checked():
     solution = ts.simulate(scene, (0, t))
     assert solution.method.startswith("Taylor")
     assert solution.state.q[0] == pytest.approx(-(v * 0.2 - 2.0 * 0.2**2), abs=FAIR)
+
+
+def test_lengths_that_are_analytic_cost_no_step():
+    """Roots of waves that stay far from zero: a Stewart platform."""
+    solution = ts.simulate(stewart_platform.build(), (0, stewart_platform.END))
+    assert (solution.stats.steps, solution.stats.rejected) == (7, 0)
+    stewart_platform.check(solution, tol=1e-7)
 
 
 def test_a_length_that_changes_at_once_is_followed():

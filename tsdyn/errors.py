@@ -410,7 +410,7 @@ _SENTENCES = {
     ),
     Status.NOT_RUN: ("The case has not been run.", "Go on: resume=True with a store, or run it: ensemble.case(i)."),
     Status.SERIES_ENDED: (
-        "A fixed step by series passes a place where the law of a force or motion is not analytic, such as zero length "
+        "A fixed step by series passes a place where the law of a force is not analytic, such as zero length "
         "of a spring.",
         "Leave out step=, so that steps end before such places, or take 'dop853' or 'nystrom4', which use no series.",
     ),

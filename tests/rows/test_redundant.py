@@ -282,6 +282,15 @@ def test_a_redundant_row_is_found_wherever_a_loop_starts():
         assert np.isnan(first.multipliers[0]).sum() == 1
 
 
+@pytest.mark.parametrize("loops", [5, 20])
+def test_rows_that_serve_are_not_chosen_anew(loops):
+    """Rows fall to a tenth towards the flat place, but none below the weakest one: S loses no digits."""
+    run = ts.simulate(closed_loops.parallelogram(0.6, -6.0, loops=loops), (0.0, 1.0))
+    redundant = np.isnan(run.multipliers)
+    assert redundant[0].sum() == 3 * loops
+    assert (redundant == redundant[0]).all()
+
+
 def test_a_selection_of_redundant_rows_is_restored_whole():
     """After a passing one, of other rows and of another number."""
     selection = SimpleNamespace(weakest=0.125, saved=0.0)

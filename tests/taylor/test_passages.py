@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from examples import stewart_platform
 from tests.helpers.tolerances import FAIR
 from tsdyn.plugins import inverse_root, product, square
 
@@ -40,6 +41,18 @@ def test_a_mass_flies_through_the_anchor_of_its_spring(method):
     expected = np.outer([along(s) for s in t], START / np.linalg.norm(START))
     np.testing.assert_allclose(solution.at(t).q, expected, atol=FAIR)
     assert np.ptp(solution.energy) < FAIR
+
+
+def test_a_run_that_comes_to_rest_at_the_anchor_names_the_spring():
+    """A constant pull towards the anchor, and a damper: the mass crosses it ever more often."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    mass = scene.add_point_mass(1.0, (0.3, 0.1, 0))
+    scene.add(F.Spring(mass, scene.ground, actuator=5.0, damping=20.0, stiffness=10.0, free_length=0.0, name="pull"))
+    scene.add(F.Spring(mass, scene.ground, point_b=(3, 1, 0), stiffness=1.0, free_length=math.sqrt(10), name="far"))
+    message = ts.simulate(scene, (0, 5), max_steps=30000).message
+    assert "comes to rest where the law of 'pull' changes at once" in message
+    mass.position = (0.3, 0.0, 0.1)
+    assert "at once" not in ts.simulate(scene, (0, 5), max_steps=3).message
 
 
 @pytest.mark.parametrize("miss", [1e-12, 1e-9, 1e-6, 1e-4, 1e-2])
@@ -111,6 +124,13 @@ def test_a_plug_in_that_says_nothing_is_checked():
     solution = ts.simulate(scene, (0, t))
     assert solution.method.startswith("Taylor")
     assert solution.state.q[0] == pytest.approx(-(v * 0.2 - 2.0 * 0.2**2), abs=FAIR)
+
+
+def test_lengths_that_are_analytic_cost_no_step():
+    """Roots of waves that stay far from zero: a Stewart platform."""
+    solution = ts.simulate(stewart_platform.build(), (0, stewart_platform.END))
+    assert (solution.stats.steps, solution.stats.rejected) == (7, 0)
+    stewart_platform.check(solution, tol=1e-7)
 
 
 def test_a_length_that_changes_at_once_is_followed():

@@ -50,10 +50,9 @@ def of_scene(scene, method, form, far, rough):
             yield from ELIMINATION["unsymmetric"]
     for kind, moving in _kinds(scene).items():
         yield from of_constraint(kind, moving, series, far, implicit)
-    driven = any(_kinds(scene).values())
     if not series and any(is_of_user(force) for force in scene.forces):
         yield watch
-    if series and (driven or any(_is_checked(force) for force in scene.forces)):
+    if series and any(_is_checked(force) for force in scene.forces):
         yield step_parts.check_laws
     for force in scene.forces:
         signals = [value for value in vars(force).values() if isinstance(value, Signal)]

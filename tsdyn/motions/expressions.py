@@ -68,10 +68,6 @@ OPERATIONS = {
 PLAIN = frozenset(("polynomial", "piecewise", "add", "subtract", "multiply", "sin", "cos"))  # operations
 
 
-def _is_linear(node):
-    return node._operation == "polynomial" and len(node._numbers) <= 2
-
-
 def _operators(operation: str) -> tuple[Operator, Operator]:
     """Return a binary operator of motions, and the same with a number on the left."""
     return lambda self, other: _binary(operation, self, other), lambda self, other: _binary(operation, other, self)
@@ -123,17 +119,6 @@ class Smooth:
     def may_change(self) -> bool:
         """Whether it may change shortly within a piece, as polynomials and sines don't."""
         return not PLAIN.issuperset(node._operation for node in self._order())
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether its series at a time is that of the whole piece: of polynomials, sines, and exp of a linear function.
-
-        Series of other functions, such as 1 / (1 + t^2) and a bump exp(-t^2), say little about later times.
-        """
-        return all(
-            node._operation in PLAIN or (node._operation == "exp" and _is_linear(node._operands[0]))
-            for node in self._order()
-        )
 
     def sides(self, t: ArrayLike) -> Floats:
         """Value and rate at times t (k,), by the pieces that end there and by those that begin: (2, 2, k)."""

@@ -104,11 +104,6 @@ class Motion:
         return found
 
     @property
-    def is_plain(self) -> bool:
-        """As of `Smooth`; of a motion with a series."""
-        return self.series.is_plain
-
-    @property
     def has_series(self) -> bool:
         """Whether there is a Taylor series."""
         return self.series is not None

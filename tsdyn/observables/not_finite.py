@@ -1,4 +1,4 @@
-"""Which forces are not finite, or raise an exception: what a run that ends there can name."""
+"""Which forces are not finite, raise an exception or change at once: what a run that ends there can name."""
 
 from typing import NamedTuple
 
@@ -35,6 +35,24 @@ def not_finite(packed, t, q, qd, slots):
     more = f" and {counted(len(found) - FEW, 'other force')}" if len(found) > FEW else ""
     verb = "is" if len(found) == 1 else "are"
     return NotFinite(f"{', '.join(map(repr, found[:FEW]))}{more} {verb} inf or nan at t = {t:.9g} s.", None)
+
+
+def jumping(packed, t, q, qd, slots, lengths):
+    """Names of the forces that change by as much within the shorter one of two lengths (m or rad) on both sides of q.
+
+    Along qd, or all coordinates at rest. A smooth force changes in proportion to the length.
+    """
+    step = qd / np.abs(qd).max() if qd.any() else np.ones(q.size)
+    places = np.array([q + side * length * step for length in lengths for side in (-1.0, 1.0)])
+    state = np.full(4, t), places, np.tile(qd, (4, 1)), np.tile(np.asarray(slots, float), (4, 1))
+    found = []
+    for load in packed.loads:
+        with np.errstate(all="ignore"):
+            Q = force_loads(packed.system._replace(forces=load.alone), *state)
+        near, far = np.abs(Q[1::2] - Q[::2]).max(axis=1)
+        if near > 0.5 * far and near > 0.5 * np.abs(Q).max():
+            found.append(load.force.name)
+    return found
 
 
 def _struck(packed, Q):

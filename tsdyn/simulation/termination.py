@@ -6,14 +6,14 @@ from ..configuration.rank import weakest_row
 from ..errors import Status
 from ..formulations.dependent_rows import dependent_rows
 from ..observables.evaluate import constraint_arrays
-from ..observables.not_finite import NotFinite, not_finite
+from ..observables.not_finite import NotFinite, jumping, not_finite
 from ..sparse.constraint_graphs import redundant_rows
 from ..sparse.length_metric import MASS_REMEDY, mass_ratio
 from ..sparse.tolerances import TOO_UNEQUAL
 from ..taylor.layout import without_series
 from ..validation import counted
 from .step_limits import step_limit
-from .tolerances import BLOW_UP, MOST_SINGULAR, NEARLY_SINGULAR
+from .tolerances import AT_ONCE, BLOW_UP, MOST_SINGULAR, NEAR_BY, NEARLY_SINGULAR
 
 FEW = 3  # items named in a message
 NO_NUMBERS = Status.NOT_FINITE, Status.STEP_COLLAPSED
@@ -40,6 +40,8 @@ def account(solution, scene, reason, goes_on=""):
         remedy += f" Without a series: {'; '.join(lacking)}."
     if not found and solution.status in NO_NUMBERS:
         found = not_finite_of(solution).said
+    if not found and solution.status in (Status.STEP_COLLAPSED, Status.MAX_STEPS):
+        found = _jump(solution)
     if not found and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
         found = _growth(solution)
     parts = (limit.sentence or solution.status.sentence, reason, where, found, remedy)
@@ -85,6 +87,18 @@ def not_finite_of(solution):
         if found.said:
             return found
     return NotFinite("", None)
+
+
+def _jump(solution):
+    """Name the forces whose law has no direction where the motion has come to rest."""
+    (q, qd, _), t = solution._last, solution._reached
+    names = jumping(solution.packed, t, q, qd, solution._remembered, (AT_ONCE, NEAR_BY))
+    if not names:
+        return ""
+    return (
+        f"The motion comes to rest where the law of {', '.join(map(repr, names[:FEW]))} changes at once: at zero "
+        "length a spring has no direction. Hold the bodies apart there, or let the load change within a short distance."
+    )
 
 
 def _growth(solution):

@@ -47,6 +47,8 @@ NO_STEP = 1e-6
 # Smallest singular value, of the largest, below which a failure is put down to a singular configuration; coordinates up
 # to which singular values are computed for that.
 NEARLY_SINGULAR, MOST_SINGULAR = 0.05, 600
+# m or rad: a force that changes by as much within the second as within the first jumps there.
+NEAR_BY, AT_ONCE = 1e-5, 1e-8
 # Growth of the largest velocity at which a failure is put down to a motion that runs away.
 BLOW_UP = 1e4
 

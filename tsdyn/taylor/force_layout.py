@@ -108,6 +108,6 @@ def _drive(load, first, orders, drives, written):
     numbers = [x for value in load.parameters for x in ([None] * value.width if isinstance(value, Signal) else [value])]
     for j, (number, program) in enumerate(zip(numbers, load.programs, strict=True)):
         if number is None:
-            drives.append([run_program.address, program, first + j * orders, 0])
+            drives.append([run_program.address, program, first + j * orders])
         else:
             written.append((first + j * orders, [float(number)]))

@@ -166,7 +166,7 @@ def _motions(graph, packed, orders, places, constraints):
                 moves = isinstance(given[entry], Motion)
                 if moves:
                     motion = next(motions)
-                    rows.append([run_program.address, motion.program, row, int(not given[entry].is_plain)])
+                    rows.append([run_program.address, motion.program, row])
                 else:
                     constraints[row] = given[entry]
                 entry += 1 if moves else 3

@@ -77,7 +77,7 @@ class SeriesMemory(Memory):
         expansion = allocate_expansion(graph, self.series.kinds, packed, highest)
         tangent, trial = allocate_tangent(graph, n), Trial()
         trial.left = 1.0
-        if expansion.forces["check"].any() or expansion.motions["check"].any():
+        if expansion.forces["check"].any():
             trial.check, trial.sharp = check_laws.address, int(expansion.forces["sharp"].any())
         block = 1 + n + expansion.bodies.size
         run = lay_out(n, 0, 0, prepared.handles.count, system.memory.size, block=block)

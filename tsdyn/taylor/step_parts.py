@@ -8,7 +8,7 @@ import math
 from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..elements.loops.law_check import ATOL, LENGTH, LIMITS, MOST, RTOL, TAU, TIME, call_check, call_margin
-from ..elements.tolerances import LAW_NOISE, OFF, OFF_SELDOM
+from ..elements.tolerances import OFF, OFF_SELDOM
 from ..errors import Status
 from ..formulations.accelerations import accelerate_bodies
 from ..formulations.chart_validity import ROUNDING
@@ -17,7 +17,6 @@ from ..jit.kernels import callback, caller, kernel, stack
 from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import set_time
-from ..motions.program import call_smooth
 from ..rows.interface import (
     accelerations_hold,
     evaluate_bias,
@@ -33,7 +32,7 @@ from ..rows.interface import (
 from .coefficients import begin, expand
 from .prescribed_series import expand_motions
 from .step_end import keep_start, project_rates, sum_series
-from .tolerances import GONE, ILL_ORDERS, INSTANTS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL, UNEQUAL
+from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL, UNEQUAL
 from .workspace import load_series
 
 NOT_FINITE, SINGULAR, UNHELD = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.UNHELD)
@@ -137,17 +136,11 @@ def reach(context, t, h):
 
 @callback(LAWS)
 def check_laws(context, t, h, atol, rtol):
-    """Compare the series of motions and forces with their definitions at times from t to t + h; sets `Trial.good`."""
+    """Compare the series of forces with their laws at times from t to t + h; sets `Trial.good`."""
     c = load_series(context)
     limits = stack(LIMITS)
     limits[LENGTH], limits[ATOL], limits[RTOL] = h, atol, rtol
     c.trial.good = 1.0
-    # Prescribed motions
-    for j in range(INSTANTS if c.expansion.motions.shape[0] > 0 else 0):
-        if _is_motion_off(c, t, h * (j + 1) / INSTANTS, atol, rtol):
-            c.trial.good = j / INSTANTS
-            return 1
-    # Force laws that may leave their series
     if not _may_differ(c, t, limits):
         return 0
     every = _places_of_users(c, h)
@@ -169,24 +162,6 @@ def _places_of_users(c, h):
         if c.expansion.forces[i].users == 1:
             return max(1, math.ceil(h / (PLACES * c.trial.spacing)))
     return 1
-
-
-@kernel
-def _is_motion_off(c, t, tau, atol, rtol):
-    """Whether a prescribed motion is not its series at t + tau."""
-    x, value = c.expansion, stack(1)
-    for i in range(x.motions.shape[0]):
-        row = x.motions[i]
-        if row.check != 0:
-            call_smooth(row.run, c.system.reals[row.program :], t + tau, 1, value)
-            # The series at tau, and the sum of its absolute terms
-            total, terms = 0.0, 0.0
-            for k in range(x.order.top + 1, -1, -1):
-                total = total * tau + x.constraints[row.values + k]
-                terms = terms * tau + abs(x.constraints[row.values + k])
-            if not abs(total - value[0]) <= OFF_SELDOM * (atol + rtol * abs(value[0])) + LAW_NOISE * terms:
-                return True
-    return False
 
 
 @kernel

@@ -54,4 +54,3 @@ class MotionSeries(Record):
     run: int  # address of what runs its program
     program: int  # where the program begins in System.reals
     values: int  # where its series begins in Expansion.constraints or, of a load, in Expansion.loads
-    check: int  # whether it is compared with its series: its coefficients may not represent later times

@@ -39,8 +39,6 @@ PLACES, LEAST_STEPS = 4, 8
 # atol and rtol of that comparison where steps are fixed and have no tolerance: above the errors of series in too long a
 # step, below those of series that have ended.
 COARSE = 1e-3
-# Places of prescribed motions that are no polynomials or waves; they cost less than forces.
-INSTANTS = 16
 
 # HOP: length of a step over a place where a law is not analytic, over the shortest step (runs/tolerances.py, SHORTEST):
 # forces are bounded there, so its error is rounding. Within APART lengths of the one before, such a step is twice as

@@ -121,7 +121,8 @@ def _stamped(function):
         return function, False
     file = folder / f"{cache.name_of(function)}.py"
     try:
-        file.touch()
+        if not file.exists():  # its time stays: older Numbas take it for that of the code
+            file.touch()
     except OSError as error:
         cache.warn_unwritable(error)
         return function, False

@@ -145,6 +145,18 @@ def test_stock_is_asked_for_without_a_warning(tmp_path):
     assert not list(tmp_path.rglob("*.kernel"))
 
 
+def test_a_damaged_file_of_numba_is_told_and_compiled_again(tmp_path):
+    environment = {"TSDYN_JIT": "stock", "TSDYN_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}
+    run(TINY, environment)
+    for suffix in ("nbi", "nbc"):
+        (file,) = tmp_path.rglob(f"*.{suffix}")
+        file.write_bytes(file.read_bytes()[:20])
+        found, errors = run(TINY, environment)
+        assert (found["value"], found["misses"]) == (2.0, 1)
+        assert errors.count("a stored kernel can't be loaded") == 1
+        assert run(TINY, environment)[0]["misses"] == 0
+
+
 def test_an_unknown_way_is_told(tmp_path):
     found, errors = run(TINY, {"TSDYN_JIT": "stok"})
     assert found["value"] == 2.0

@@ -214,7 +214,8 @@ def report(file, error):
 def contents():
     """What is in the folder of kernels: {"folder", "kernels", "stock", "bytes", "damaged", "failures"}.
 
-    kernels: how many of tsdyn's own way; stock: of Numba's as it comes; damaged: [(file, cause)] of files whose checksum is wrong; failures: lines on those that couldn't be loaded before.
+    kernels: how many of tsdyn's own way; stock: of Numba's as it comes; damaged: [(file, cause)] of files whose
+    checksum is wrong; failures: lines on those that couldn't be loaded before.
     """
     path, damaged, failures, sizes = folder(), [], [], []
     for file in sorted(path.glob("*.kernel")) if path else ():

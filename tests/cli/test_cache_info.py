@@ -16,4 +16,4 @@ def test_the_folder_and_the_way_of_compilation_are_shown(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("Kernels are compiled by Numba ")
     assert " kernels, " in lines[1]
-    assert lines[2].startswith("damaged now: ")
+    assert any(line.startswith("damaged now: ") for line in lines[2:4])

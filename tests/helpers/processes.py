@@ -82,7 +82,7 @@ def python(*arguments, folder, code=None, **environment):
 
 
 def edit(file, old, new):
-    """Replace a text in a file, with a later time: Python takes bytecode for that of an equal size and second."""
+    """Replace a text in a file, with a later time: Python tells files of one size by the second that they are of."""
     text, before = file.read_text(), file.stat()
     assert text.count(old) == 1
     file.write_text(text.replace(old, new))

@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import os
 import re
 
 import llvmlite.binding
@@ -144,6 +145,18 @@ def test_stock_is_asked_for_without_a_warning(tmp_path):
     assert not list(tmp_path.rglob("*.kernel"))
 
 
+def test_a_damaged_file_of_numba_is_told_and_compiled_again(tmp_path):
+    environment = {"TSDYN_JIT": "stock", "TSDYN_CACHE_DIR": str(tmp_path), "TSDYN_QUIET": "1"}
+    run(TINY, environment)
+    for suffix in ("nbi", "nbc"):
+        (file,) = tmp_path.rglob(f"*.{suffix}")
+        file.write_bytes(file.read_bytes()[:20])
+        found, errors = run(TINY, environment)
+        assert (found["value"], found["misses"]) == (2.0, 1)
+        assert errors.count("a stored kernel can't be loaded") == 1
+        assert run(TINY, environment)[0]["misses"] == 0
+
+
 def test_an_unknown_way_is_told(tmp_path):
     found, errors = run(TINY, {"TSDYN_JIT": "stok"})
     assert found["value"] == 2.0
@@ -209,6 +222,38 @@ def test_an_edit_of_code_generation_names_other_kernels(package, file):
     path = package / "tsdyn" / "jit" / f"{file}.py"
     path.write_text(path.read_text() + "\nNOTHING = 0\n")
     assert run(code, {}, package)[0]["hash"] != before["hash"]
+
+
+MINE = """
+from numba import types
+from numba.extending import models, register_model
+
+class Mine(types.Type):
+    def __init__(self):
+        super().__init__("Mine")
+
+register_model(Mine)(models.OpaqueModel)
+mine = Mine()
+
+def of_a_class(x):
+    return Mine
+
+def of_a_type(x):
+    return mine
+"""
+
+
+def test_an_edit_beside_a_type_of_a_user_names_other_kernels(tmp_path):
+    """Its model is registered beside it."""
+    file, environment = tmp_path / "user_types.py", {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+    file.write_text(MINE)
+    code = "import json, user_types\nfrom tsdyn.jit.code_hash import deep_hash\n"
+    code += "print(json.dumps({f: deep_hash(getattr(user_types, f)) for f in ('of_a_class', 'of_a_type')}))\n"
+    before, _ = run(code, environment)
+    edit(file, "models.OpaqueModel", "models.PointerModel")
+    after, _ = run(code, environment)
+    assert before["of_a_class"] != after["of_a_class"]
+    assert before["of_a_type"] != after["of_a_type"]
 
 
 INFO = """

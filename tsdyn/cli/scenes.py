@@ -178,6 +178,8 @@ def _cache_info(parsed):
         print("No folder can be written to, so every process compiles its kernels; set TSDYN_CACHE_DIR to one.")
         return 0
     print(f"{found['kernels']} kernels, {found['bytes'] / 1e6:.1f} MB, are in {found['folder']}")
+    if found["stock"]:
+        print(f"{found['stock']} more, compiled by Numba as it comes, are in its folder stock")
     for title, lines in (("damaged now", found["damaged"]), ("couldn't be loaded before", found["failures"])):
         print(f"{title}: {len(lines)}")
         for line in lines:

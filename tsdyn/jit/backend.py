@@ -262,9 +262,9 @@ def tested(own):
 def _test():
     _untested.clear()
     before = {name: files.statistics[name] for name in ("hits", "misses")}
-    address = callback(_probe, _PROBE_TYPE, {"error_model": "numpy"}, False, "probe").address
+    made = callback(_probe, _PROBE_TYPE, {"error_model": "numpy"}, False, "probe")
     files.statistics.update({name: count - files.statistics[name] for name, count in before.items()})
-    found = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(20)
+    found = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(made.address)(20)
     if found != 41:
         raise ImportError(f"the kernel of the self-test gives {found}, not 41")
 
@@ -297,8 +297,16 @@ _untested = [True]
 def entry(function, options, around):
     """What compiles a kernel that Python calls; `around` decorates what compiles it."""
     dispatcher = numba.njit(pipeline_class=Compiler, _nrt=False, **options)(function)
-    dispatcher._cache = KernelCache(function)
-    dispatcher.compile = around(dispatcher.compile)
+    dispatcher._cache = store = KernelCache(function)
+    own = dispatcher.compile
+
+    def compile_for(arguments):
+        try:
+            return own(arguments)
+        finally:
+            store.release()
+
+    dispatcher.compile = around(compile_for)
     return dispatcher
 
 

@@ -171,7 +171,8 @@ def load(name, rebuild):
         try:
             found = rebuild(_opened(name, regular_files.read(file, flags=regular_files.NO_LINKS)))
         except Exception as error:  # whatever a damaged file makes of the loader
-            _report(file, error)
+            if os.path.lexists(file):  # another process may just have deleted it
+                report(file, error)
             continue
         with contextlib.suppress(OSError):
             if time.time() - file.stat().st_mtime > _DAY:
@@ -193,11 +194,11 @@ def _opened(name, content):
     return content[_CHECKSUM:]
 
 
-def _report(file, error):
+def report(file, error):
     """Count a kernel that can't be loaded, note it in its folder, delete it; warn once a process."""
     statistics["damaged"] += 1
     cause = " ".join(f"{type(error).__name__}: {error}".split())
-    with contextlib.suppress(OSError), open(file.parent / FAILURES, "a", encoding="utf-8") as log:
+    with contextlib.suppress(OSError, TypeError), open(folder() / FAILURES, "a", encoding="utf-8") as log:  # no folder
         log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {file.name} {cause[:200]}\n")
     with contextlib.suppress(OSError):
         file.unlink()
@@ -211,23 +212,25 @@ def _report(file, error):
 
 
 def contents():
-    """What is in the folder of kernels: {"folder", "kernels", "bytes", "damaged", "failures"}.
+    """What is in the folder of kernels: {"folder", "kernels", "stock", "bytes", "damaged", "failures"}.
 
-    damaged: [(file, cause)] of files whose checksum is wrong; failures: lines on those that couldn't be loaded before.
+    kernels: how many of tsdyn's own way; stock: of Numba's as it comes; damaged: [(file, cause)] of files whose
+    checksum is wrong; failures: lines on those that couldn't be loaded before.
     """
     path, damaged, failures, sizes = folder(), [], [], []
     for file in sorted(path.glob("*.kernel")) if path else ():
         try:
             content = regular_files.read(file, flags=regular_files.NO_LINKS)
-            sizes.append(len(content))
             _opened(file.name, content)
+            sizes.append(len(content))
         except (OSError, ValueError) as error:
             damaged.append((file.name, f"{type(error).__name__}: {error}"))
     with contextlib.suppress(OSError):
         failures = (path / FAILURES).read_text(encoding="utf-8").splitlines() if path else []
     return {
         "folder": path and str(path),
-        "kernels": len(sizes) - len(damaged),
+        "kernels": len(sizes),
+        "stock": sum(1 for _ in path.glob("stock/*.stored")) if path else 0,
         "bytes": sum(sizes),
         "damaged": damaged,
         "failures": failures,

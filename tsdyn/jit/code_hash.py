@@ -153,11 +153,14 @@ def _add_class(digest, kind, above):
         digest.update(repr([(name, member.value) for name, member in kind.__members__.items()]).encode())
     elif hasattr(kind, "_fields"):
         digest.update(repr(kind._fields).encode())
+    elif issubclass(kind, numba.types.Type):  # its model and lowering are registered beside it, and named nowhere
+        _add_module(digest, sys.modules[kind.__module__])
 
 
 def _add_type(digest, kind):
     """Add a Numba type: its name, and the names of fields, which a tuple's own name leaves out."""
     digest.update(f"{kind}\0".encode())
+    _add_module(digest, sys.modules[type(kind).__module__])
     kind = getattr(kind, "kind", kind)  # a named tuple in memory
     if isinstance(kind, numba.types.BaseNamedTuple):
         digest.update(repr(kind.fields).encode())

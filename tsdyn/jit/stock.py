@@ -9,6 +9,7 @@ import types
 from functools import cached_property
 
 import numba
+from numba import NumbaError
 from numba.extending import intrinsic, overload_attribute
 
 from . import cache
@@ -43,7 +44,7 @@ class Entry:
 
         def compile_for(arguments):
             tell = _counting(self.py_func, arguments)
-            found = own(arguments)
+            found = _loaded(self.py_func, lambda: own(arguments))
             tell(bool(dispatcher.stats.cache_hits.get(arguments)))
             return found
 
@@ -68,7 +69,7 @@ def callback(function, signature, options, allocates):
     """Compile a kernel that others call by address."""
     copy, stored = _stamped(function)
     tell = _counting(function, signature)
-    made = numba.cfunc(signature, cache=stored, **options)(copy)
+    made = _loaded(function, lambda: numba.cfunc(signature, cache=stored, **options)(copy))
     tell(made.cache_hits > 0)
     return made
 
@@ -121,7 +122,8 @@ def _stamped(function):
         return function, False
     file = folder / f"{cache.name_of(function)}.py"
     try:
-        file.touch()
+        if not file.exists():  # its time stays: older Numbas take it for that of the code
+            file.touch()
     except OSError as error:
         cache.warn_unwritable(error)
         return function, False
@@ -130,6 +132,22 @@ def _stamped(function):
     for name in ("__kwdefaults__", "__module__", "__qualname__"):
         setattr(copy, name, getattr(function, name))
     return copy, True
+
+
+def _loaded(function, compile_now):
+    """Return compile_now(); where what Numba has stored of the function can't be loaded, once more without it."""
+    try:
+        return compile_now()
+    except NumbaError:
+        raise
+    except Exception as error:
+        folder = _folder()
+        damaged = list(folder.rglob(f"{cache.name_of(function)}*.nb[ci]")) if folder else []
+        for file in damaged:
+            cache.report(file, error)
+        if not damaged:
+            raise
+        return compile_now()
 
 
 def _marker(folder, function, signature):

@@ -157,7 +157,7 @@ def test_redundant_rows_are_dropped_behind_the_interface():
     for module in FILES:
         if _district(module) not in ("rows", "sparse"):
             names = {getattr(node, "attr", "") for node in ast.walk(tree(module))}
-            assert not names & {"dropped", "anew"}, module
+            assert not names & {"dropped", "reselection"}, module
 
 
 WAY = """

@@ -255,7 +255,7 @@ def _series_callbacks(cls, label, names, functions):
         function = functions[before + "series"]
         sharp = cls.sharp or driven
         own = {**names, "kernel_series": inlined(function), "SLOTS": cls.slots, "SHARP": sharp}
-        own |= {"DRIVEN": driven, "TRACED": traced, "RUBS": "normal_series" in functions}
+        own |= {"DRIVEN": driven, "TRACED": traced, "FRICTIONAL": "normal_series" in functions}
         own |= {"POSITIVE": cls.positive or ()}
         home = getattr(function, "py_func", function)
         copy = specialised(force_series.series, f"{label}.{before}series_loop", home, **own)

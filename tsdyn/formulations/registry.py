@@ -44,8 +44,8 @@ class Formulation:
             graph = (moving_graph if self.keeps_still else graph_of)(packed, *self.kernels.COLUMNS)
         else:  # redundant rows are judged by sparse rows at every level
             graph = graph_of(packed, REDUCED, *((BIAS, DRIFT) if len(redundant_rows(packed)) else ()))
-        if graph.frictions.size and graph.solve_friction[0] == 0:
-            graph.solve_friction[0] = (friction_solve if self.basis_free else friction_basis).solve_friction.address
+        if graph.frictions.size and graph.friction_solver[0] == 0:
+            graph.friction_solver[0] = (friction_solve if self.basis_free else friction_basis).solve_friction.address
         return graph
 
     def sizes(self, n, m, graph):

@@ -73,12 +73,13 @@ def _info(parsed):
     if Path(parsed.scene).suffix.lower() in SOLUTIONS:
         return _solution_info(parsed)
     from ..simulation.method_choice import reason
+    from ..simulation.run_options import RunOptions
     from ..simulation.scene_cache import prepared
 
     # the table of a study is left unread: what it names may not be there
     document = load_document(parsed.scene, parsed.allow_code, False, robot_options(parsed))
     scene, given = document.scene, document.run
-    mobility, why = scene.mobility(), reason(prepared(scene))
+    mobility, why = scene.mobility(), reason(prepared(scene), RunOptions())
     if parsed.json:
         print_json(_facts(scene, mobility, why, given))
         return 0

@@ -44,7 +44,7 @@ class SavedEnsemble(Ensemble):
         self._path, self._record, self._units = path, record, dict(record["parameters"])
         study = SimpleNamespace(
             cases=Cases(columns, {}, record["count"]), keep=_lost if record["keep"] == REDUCED else record["keep"],
-            options=SimpleNamespace(times=arrays["times"]), free=record["free"], given=record["options"], scene=None,
+            times=arrays["times"], free=record["free"], given=record["options"], scene=None,
         )  # fmt: skip
         found = {"t": arrays["reached"], "q": arrays["q"], "qd": arrays["qd"]}
         found |= {f"kept {name}".removesuffix(" kept" if record["is_single"] else ""): a for name, a in kept.items()}

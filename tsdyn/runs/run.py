@@ -6,6 +6,7 @@ the ends of steps; serves any number of runs (`Prepared.engine`), and has
 
     method, form    the form is the one that the driver runs
     kind            of the memory: one of the same kind serves another run
+    layouts         how many memories have been laid out for it
     memory(prepared)            a new `Memory`
     serves(memory)              whether a memory that was made before is that of the scene as it is now
     lay_out(memory)             enter the system, and the numbers and kernels of the method
@@ -16,9 +17,8 @@ the ends of steps; serves any number of runs (`Prepared.engine`), and has
 
 from ..errors import Status
 from ..jit.compiled import clock
-from ..jit.interrupts import CollectionsDeferred
-from .brief import Brief, begin, has_ended_well, limit_of, readings_of
-from .counts import Counts
+from .first_slice import begin, has_ended_well, rows_of
+from .run_end import RecordedEnd
 from .run_log import left_open
 from .sampling import Sampled
 from .segments import Relay
@@ -26,45 +26,42 @@ from .slices import drive
 from .task import Outcome
 from .trajectory import Trajectory
 
-NOT_FINITE, PASSAGE, STIFF = Status.NOT_FINITE, Status.PASSAGE, Status.STIFF
+SUCCESS, NOT_FINITE, PASSAGE, STIFF = Status.SUCCESS, Status.NOT_FINITE, Status.PASSAGE, Status.STIFF
 
 
-def run(task, engine, observe=None, relay=None, past=None, briefly=False, unfinished=None):
-    """Run a `Task` by a kind of engine; the `Outcome`, or a `Brief` where a run of which little is asked allows it.
+def run(task, engine, observe=None, relay=None, past=None, briefly=False):
+    """Run a `Task` by a kind of engine; the `Outcome`.
 
     `observe` is given the memory before the run: one of its own. With a `Relay` the run is a segment of one; where
     there is a way past singular configurations, it ends with Status.PASSAGE next to one. `past(memory)` makes what is
-    advanced in place of the memory.
+    advanced in place of the memory. briefly: whether nothing is asked of the run between its slices.
     """
     prepared = task.prepared
-    if unfinished is not None:
-        memory = unfinished.memory
-        return _end(task, memory, unfinished.begun, unfinished.began, relay)
     engine = prepared.engine(engine, task.method, task.form, task.within)
-    memory = None if observe else prepared.take(engine.kind)
-    if memory is None or not engine.serves(memory):
-        with CollectionsDeferred():
-            memory = engine.memory(prepared)
+    memory = prepared.take(engine) if observe is None else prepared.new_memory(engine)
     memory.enter(engine, task, relay is not None and relay.passes)
+    watch, first, began = None, None, clock()
     if briefly:
+        first = begin(memory, task)
+        if has_ended_well(memory, first):
+            outcome = _ended(task, memory, first.log, began)
+            prepared.give(engine.kind, memory)
+            return outcome
+    readings = _readings(memory, task)
+    if first is None:
+        if observe is not None:
+            observe(memory)
+        if relay is not None:
+            relay.enter(memory)
+        if task.events is not None:
+            watch = (relay or Relay()).watching(task, readings[0])
         began = clock()
-        begun = begin(memory, task.times, task.stops, limit_of(memory.run, task.stops, task.max_steps))
-        return _end(task, memory, begun, began, relay)
-    readings = readings_of(memory, task)
-    if observe is not None:
-        observe(memory)
-    watch = None
-    if relay is not None:
-        relay.enter(memory)
-    if task.events is not None:
-        watch = (relay or Relay()).watching(task, readings[0])
-    began = clock()
     advanced = memory if task.sampling is None else Sampled(memory, task.sampling)
-    driven = drive(advanced if past is None else past(advanced), task, watch)
+    driven = drive(advanced if past is None else past(advanced), task, watch, first)
     if relay is not None and driven[0] in (PASSAGE, STIFF):
         relay.leave(memory)
         relay.interrupted = driven[2].interrupted
-    outcome = _outcome(task, engine, memory, driven, readings, watch, began)
+    outcome = _driven(task, memory, driven, readings, watch, began)
     if watch is not None:
         readings[0].give(watch.reader)
     if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own
@@ -72,32 +69,48 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False, unfini
     return outcome
 
 
-def _end(task, memory, begun, began, relay):
-    """The outcome of a run that has made its first slice."""
-    engine = memory.engine
-    if has_ended_well(memory, begun):
-        outcome = Brief(memory, begun, task, began)
-    else:
-        driven = drive(memory, task, None, begun)
-        if relay is not None and driven[0] in (PASSAGE, STIFF):
-            relay.leave(memory)
-        outcome = _outcome(task, engine, memory, driven, readings_of(memory, task), None, began)
-    if outcome.status is not NOT_FINITE:
-        task.prepared.give(engine.kind, memory)
-    return outcome
+def _ended(task, memory, log, began):
+    """The `Outcome` of a run that has ended well within its first slice."""
+    numbers, steps, charts, trajectory = memory.run.numbers, None, None, None
+    if task.history:
+        steps, charts = log.history[: numbers.history], log.charts[: numbers.chart_rows + 1]
+    if task.dense_output:
+        trajectory = _trajectory(task, memory, log, log.blocks[: numbers.blocks].copy(), _readings(memory, task))
+    return Outcome(SUCCESS, "", rows_of(memory, log), RecordedEnd(memory, steps, charts), trajectory, None, began)
 
 
-def _outcome(task, engine, memory, driven, readings, watch, began):
+def _driven(task, memory, driven, readings, watch, began):
     """The `Outcome` of a run that has been driven."""
     status, reason, recorder = driven
-    run, control = memory.run, memory.work.control
-    charts, last = left_open(run, recorder.charts, control.condition, control.contraction), run.now.copy()
-    trajectory = None
-    if task.dense_output:
-        records = recorder.blocks, charts, recorder.points[: len(charts)].copy()
-        trajectory = Trajectory(readings, records, task.span[0], last, task.angles, task.stops)
+    trajectory = _trajectory(task, memory, recorder, recorder.blocks, readings) if task.dense_output else None
+    end = RecordedEnd(memory, recorder.steps, recorder.chart_history(_charts(memory, recorder)))
     found = None if watch is None else watch.found(task.prepared.n)
-    return Outcome(
-        status, reason, recorder.out, recorder.steps, recorder.chart_history(charts), run.clock.t,
-        last, run.remembered.copy(), Counts.of(memory), trajectory, found, began,
-    )  # fmt: skip
+    return Outcome(status, reason, recorder.out, end, trajectory, found, began)
+
+
+def _charts(memory, log):
+    """The charts (k, 5) of a `RunLog` or a `Recorder`, the last of them as the run has ended in it."""
+    control = memory.work.control
+    return left_open(memory.run, log.charts, control.condition, control.contraction)
+
+
+def _trajectory(task, memory, log, blocks, readings):
+    """The `Trajectory` of a run that has ended; log: as of `_charts`."""
+    charts = _charts(memory, log)
+    records = blocks, charts, log.points[: len(charts)].copy()
+    return Trajectory(readings, records, task.span[0], memory.run.now.copy(), task.angles, task.stops)
+
+
+def _readings(memory, task):
+    """How the steps of a run are read, in this process and in others; None, None where nothing asks for it.
+
+    The same for all runs of an engine, so that a reader serves again.
+    """
+    if not memory.run.numbers.dense:
+        return None, None
+    engine, packed, tol = memory.engine, task.prepared.packed, task.constraint_tol
+    of, found = engine.readings
+    if of is None or of[0] is not packed or of[1] != tol:
+        found = engine.reading(memory, task.prepared, tol)
+        engine.readings = (packed, tol), found
+    return found

@@ -4,14 +4,13 @@ The attribute `driver` of a method is a name in simulate.DRIVERS, or a driver fu
 an `Outcome`.
 """
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import Status
 from ..motions.knots import NO_STOPS
-from .history import ChartLog, StepLog
+from .run_end import RunEnd
 
 
 def between(times, span):
@@ -62,12 +61,7 @@ class Outcome(NamedTuple):
     status: Status
     reason: str  # what there is to say about the status
     rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered; a range where an archive has them
-    steps: StepLog  # or None
-    charts: ChartLog  # or None
-    reached: float  # s
-    last: np.ndarray  # (3, n)  q, qd, qdd there
-    remembered: np.ndarray  # (angles + slots,)  there
-    counts: Mapping  # of `Solution.stats`
+    end: RunEnd  # or a `RecordedEnd`
     trajectory: object  # a `trajectory.Trajectory`, or None
     events: tuple  # times, positions, velocities of each event; or None
     began: float  # by `jit.compiled.clock` when the driver began, prepared

@@ -6,17 +6,26 @@ series fail, the run begins again with DOP853. Where the motion is found stiff, 
 
 from ..errors import Status
 from ..integrators import DOP853, Taylor
+from ..methods.integrator import frozen
 from ..runs.arguments import adaptive
 from .turns import Turns
 
 
-def explicit(prepared, rtol, atol, series):
-    """Return the initial method; series: True if Taylor is admissible."""
-    return adaptive(Taylor if series and not prepared.refusal and prepared.pays else DOP853, rtol, atol)
+def first_method(options, prepared):
+    """Return the method that a run of these `RunOptions` begins with."""
+    method = options.method
+    if method is None:
+        series = options.may_use_series and not prepared.refusal and prepared.pays
+        method = adaptive(Taylor if series else DOP853, options.rtol, options.atol)
+    return method if options.max_step is None else frozen(method.bounded(options.max_step))
 
 
-def reason(prepared):
-    """Return the initial method, and why, in words."""
+def reason(prepared, options):
+    """Say which method a run of these `RunOptions` begins with, and why."""
+    if options.method is not None:
+        return "as asked."
+    if not options.may_use_series:
+        return "DOP853: series serve the tangent form alone, and make their charts themselves."
     if prepared.refusal:
         return f"DOP853. {prepared.refusal}"
     if not prepared.pays:
@@ -24,9 +33,10 @@ def reason(prepared):
     return "Taylor: every constraint and force has a series. Radau takes over where the motion is found stiff."
 
 
-def turns_of(scene, prepared, method, options):
-    """The `Turns` of a run by the initial method; None in a form that no implicit method serves."""
-    return None if options.settings.form.first_order else Turns(scene, prepared, method, options)
+def turns_of(scene, prepared, method, options, span, within):
+    """The `Turns` of a run by the default method; None for another, or in a form that no implicit method serves."""
+    form = options.form
+    return None if options.method or form.first_order else Turns(scene, prepared, method, form, span, within)
 
 
 def instead(task, status):

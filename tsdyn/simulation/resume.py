@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidFile, StorageError
 from ..validation import damaged
+from .prepared_run import Run
+from .run_options import from_names
 from .run_requests import arguments_of
 from .scene import Scene
-from .simulate import run_from
 from .stored_runs import demand_path, demand_same_place
 
 if TYPE_CHECKING:
@@ -74,7 +75,8 @@ def resume(
     with damaged("the checkpoint"):
         given = arguments_of(numbers["arguments"], arrays, scene)
     given |= {"events": events, "progress": progress, "store": path, "checkpoint": numbers["interval"]}
-    return run_from(given, numbers, arrays)
+    options, call = from_names(given)
+    return Run(scene, options).solve(call, (numbers, arrays))
 
 
 def _scene_of(path, numbers, arrays):

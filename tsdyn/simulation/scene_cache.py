@@ -26,7 +26,8 @@ SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocat
 OF_NUMBERS = {"implicit", "spheres", "series", "sampled"}  # what `Prepared` derives from them
 KINDS = 8  # kinds of memory, and shapes of a scene, at most
 LARGEST = 1 << 24  # bytes of a memory that is kept, at most
-SMALL = 1 << 20  # the same where several plans have one each
+SMALL = 1 << 20  # the same where engines that take turns have one each
+FEW_LAYOUTS = 2  # of memories that other engines have used
 
 
 def prepared(scene):
@@ -52,7 +53,7 @@ class Prepared:
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
         self._start = (None, None), None
-        self.plans = {}  # of calls of `simulate`; see plans.py
+        self.runs = ()  # the last ones that `simulate` has prepared
         self.remembers = bool(packed.system.memory.size or handles_of(packed).count)
         every = scene.__dict__.setdefault("_spare", {})
         if len(every) >= KINDS:
@@ -65,7 +66,7 @@ class Prepared:
         other = copy.copy(self)
         for name in OF_NUMBERS & vars(other).keys():
             del vars(other)[name]
-        other.packed, other._start, other._spare, other.plans = packed, ((None, None), None), {}, {}
+        other.packed, other._start, other._spare, other.runs = packed, ((None, None), None), {}, ()
         other.handles = handles_of(packed)
         return other
 
@@ -225,19 +226,33 @@ class Prepared:
         demand_unique(self.packed, start[0], t)
         return hold(self.packed, *start)
 
-    def take(self, kind, mark=None):
-        """Return an idle memory of a kind, for one run; None if there is none. Preferably one with this mark."""
-        try:
-            spare = self._spare[kind]
-            if mark is not None and spare[-1].mark is not mark:
-                for i, memory in enumerate(spare[:-1]):
-                    if memory.mark is mark:
-                        return spare.pop(i)  # another one, if a thread has been quicker
-            return spare.pop()
-        except (KeyError, IndexError):
-            return None
+    def take(self, engine):
+        """An idle memory for one run by an engine, laid out for it where there is such a one; else a new one.
 
-    def has_room(self, memory):
+        Engines that take turns have one each after some runs.
+        """
+        try:
+            spare = self._spare[engine.kind]
+            if spare[-1].engine is not engine:
+                for i, memory in enumerate(spare[:-1]):
+                    if memory.engine is engine:
+                        return spare.pop(i)  # another one, if a thread has been quicker
+            memory = spare.pop()
+        except (KeyError, IndexError):
+            return self.new_memory(engine)
+        if not engine.serves(memory):
+            return self.new_memory(engine)
+        if memory.engine is not engine and engine.layouts > FEW_LAYOUTS and self._has_room(memory):
+            self.give(engine.kind, memory)
+            return self.new_memory(engine)
+        return memory
+
+    @CollectionsDeferred()
+    def new_memory(self, engine):
+        """A memory of its own for a run."""
+        return engine.memory(self)
+
+    def _has_room(self, memory):
         """Whether one more memory like this one is kept."""
         return sum(map(len, [*self._spare.values()])) < KINDS - 1 and memory.nbytes <= SMALL
 

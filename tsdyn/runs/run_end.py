@@ -1,6 +1,8 @@
-"""What a run leaves that ends well within its first slice: copies of its records, read when the solution is asked."""
+"""What a run leaves at its end: the last state, its counts and its histories."""
 
 import ctypes
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,28 +16,37 @@ NUMBERS, COUNTERS = ctypes.sizeof(Clock), ctypes.sizeof(Control)  # bytes before
 NOW = sum(map(ctypes.sizeof, (Clock, Numbers, Kernels))) // 8  # numbers before q
 
 
-class Remains:
-    """Copies of the records of a run, and what they say, as of an `Outcome`.
+class RunEnd(NamedTuple):
+    """The end of a run; n coordinates."""
+
+    reached: float  # s
+    last: np.ndarray  # (3, n)  q, qd, qdd there
+    remembered: np.ndarray  # (angles + slots,)  there
+    counts: Mapping  # of `Solution.stats`
+    steps: StepLog  # or None
+    charts: ChartLog  # or None
+
+
+class RecordedEnd:
+    """The same, read from copies of a memory's records when it is asked for.
 
     Parameters
     ----------
     memory : Memory
         At the end of the run.
-    log : RunLog
-    keeps : bool
-        Whether the histories of steps and charts are kept.
+    steps : StepLog or ndarray (k, 3), or None
+        An array is the memory's, and copied.
+    charts : ChartLog or ndarray (k, 5), or None
+        Likewise; the last row is of the chart that the run has not left.
     """
 
-    __slots__ = ("_charts", "_run", "_steps", "_told", "_work")
+    __slots__ = ("_charts", "_layout", "_run", "_steps", "_work")
 
-    def __init__(self, memory, log, keeps):
-        self._told, self._run, self._work = memory.told, memory.run_state.copy(), memory.state.copy()
-        self._steps = self._charts = None
-        if keeps:
-            run = memory.run.numbers
-            steps = log.history[: run.history]
-            self._steps = steps.copy() if len(steps) < FEW_ROWS else _logged(steps)
-            self._charts = log.charts[: run.chart_rows + 1].copy()
+    def __init__(self, memory, steps, charts):
+        self._layout, self._run, self._work = memory.layout, memory.run_state.copy(), memory.state.copy()
+        if isinstance(steps, np.ndarray):
+            steps, charts = steps.copy() if len(steps) < FEW_ROWS else _logged(steps), charts.copy()
+        self._steps, self._charts = steps, charts
 
     @property
     def reached(self):
@@ -45,14 +56,14 @@ class Remains:
     @property
     def last(self):
         """q, qd, qdd there, (3, n)."""
-        n = self._told.n
+        n = self._layout.n
         return self._run[NOW : NOW + 3 * n].reshape(3, n)
 
     @property
     def remembered(self):
         """Angles of joints there, and what forces remember."""
-        at = NOW + 6 * self._told.n
-        return self._run[at : at + self._told.remembered]
+        at = NOW + 6 * self._layout.n
+        return self._run[at : at + self._layout.remembered]
 
     @property
     def steps(self):
@@ -62,8 +73,8 @@ class Remains:
     @property
     def charts(self):
         """The `ChartLog`, or None."""
-        if self._charts is None:
-            return None
+        if not isinstance(self._charts, np.ndarray):
+            return self._charts
         control, log = Control.from_buffer(self._work), ChartLog()
         log.add(with_end(self._charts, self._numbers(), control.condition, control.contraction), None)
         return log
@@ -72,7 +83,7 @@ class Remains:
     def counts(self):
         """The `Counts`."""
         clock, counters = Clock.from_buffer(self._run), Counters.from_buffer(self._work, COUNTERS)
-        return Counts(self._numbers(), counters, clock.largest_landing, self._told.skipped, self._told.has_forces)
+        return Counts(self._numbers(), counters, clock.largest_landing, self._layout.skipped, self._layout.has_forces)
 
     def _numbers(self):
         return Numbers.from_buffer(self._run, NUMBERS)

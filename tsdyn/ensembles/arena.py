@@ -190,9 +190,9 @@ class Arena:
         choose = method_choice.turns_of(study.scene, self.kept, method, options, span, study.within)
         stops = self.kept.stops(*span, method.step is None) if study.retimes else study.stops
         task = Task(
-            self.kept, method, options.form, span, q, qd, memory, study.times, options.dense_output, study.events,
-            options.constraint_tol, options.max_steps, options.chart_interval or 0, study.report,
-            options.history is not False, choose, stops,
+            self.kept, method, options.form, span, q, qd, memory, study.times, study.within,
+            options.dense_output, study.events, options.constraint_tol, options.max_steps,
+            options.chart_interval or 0, study.report, options.history is not False, choose, stops,
         )  # fmt: skip
         outcome = None if self._slice is None or self.is_immobile else self._slice.run(task)
         if outcome is not None:

@@ -44,7 +44,7 @@ def _of_options(study):
     given = study.given
     if DEBUG:
         return "TSDYN_DEBUG=1 runs kernels as plain Python, which has no lanes"
-    changed = [f"{name}={given[name]!r}" for name in PLAIN if given[name] != OPTIONS[name].default]
+    changed = [f"{name}={given[name]!r}" for name in PLAIN if given[name] != OPTIONS[name]]
     if changed:
         return f"{' and '.join(changed)} can't be served in lanes"
     if study.method.driver != "series":

@@ -206,8 +206,7 @@ class Runner:
         """The `Record` of a run in an arena."""
         study, keep = self.study, self.study.keep
         plain = isinstance(outcome, Finished) or (
-            outcome.status is Status.SUCCESS
-            and not (outcome.reason or outcome.end.counts["steps_near_singular"] or callable(keep))
+            outcome.status is Status.SUCCESS and not (outcome.reason or outcome.end.near_steps or callable(keep))
         )
         if plain and not arena.is_immobile:
             return Record(Status.SUCCESS, PLAIN, record_of(keep, outcome, study.n, task.times))

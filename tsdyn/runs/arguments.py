@@ -64,7 +64,7 @@ def step_count(t0, t1, step):
 
 def demand_steps_seen(method, t0, t1):
     """Refuse steps given to an adaptive method that are no more than the rounding of the times."""
-    if not getattr(method, "embedded_order", 0) or method.step is not None:
+    if (method.max_step is None and method.first_step is None) or not method.embedded_order or method.step is not None:
         return
     for name, value, latest in (
         ("max_step", method.max_step, max(abs(t0), abs(t1))),

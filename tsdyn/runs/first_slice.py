@@ -4,7 +4,6 @@ Its records lie in arrays that the memory keeps, and a run that ends there copie
 see `slices.drive`.
 """
 
-import time
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +15,6 @@ from .recorder import CHART_ROOM, NO_ROWS
 from .run_log import RunLog
 from .tolerances import TRIES
 
-SUCCESS = Status.SUCCESS
-
 
 class FirstSlice(NamedTuple):
     """A run after its first slice."""
@@ -25,7 +22,7 @@ class FirstSlice(NamedTuple):
     log: RunLog
     rows: int  # steps that there was room for
     status: Status  # None where Ctrl-C was pressed meanwhile
-    seconds: float
+    began: float  # by `jit.compiled.clock`
 
 
 class Room(NamedTuple):
@@ -38,8 +35,8 @@ class Room(NamedTuple):
     charts: np.ndarray
 
 
-def begin(memory, task):
-    """Make the first slice of a run that has been entered; the `FirstSlice`."""
+def room_for(memory, task):
+    """The `RunLog` of the first slice of a run, and the steps that there is room for."""
     room, times = memory.room, task.times
     if room is None or room.first != slices.FIRST_SLICE:
         room = memory.room = _room_for(memory)
@@ -48,26 +45,10 @@ def begin(memory, task):
         n, redundant = memory.run.now.shape[1], len(redundant_of(memory.context.tangent))
         blocks = np.zeros((2 * CHART_ROOM, n + redundant)), np.empty((rows, memory.run.block.size))
     out = np.empty((times.size or rows + 1, room.width))
-    log, started = RunLog(times, task.stops, out, room.history, room.charts, *blocks), time.perf_counter()
-    try:
-        status = memory.advance(log, rows)
-    except KeyboardInterrupt:
-        status = None
-    return FirstSlice(log, rows, status, time.perf_counter() - started)
+    return RunLog(times, task.stops, out, room.history, room.charts, *blocks), rows
 
 
 def _room_for(memory):
     most, run = slices.first_slice(memory.weight), memory.run
     history, charts = np.empty((most + 2 * TRIES, 3)), np.empty((2 * CHART_ROOM, 5))
     return Room(slices.FIRST_SLICE, most, 1 + run.now.size + run.remembered.size, history, charts)
-
-
-def has_ended_well(memory, first):
-    """Whether that was all, and there is nothing more to look at."""
-    return first.status is SUCCESS and memory.run.numbers.near_steps == 0
-
-
-def rows_of(memory, log):
-    """The outputs of a run that has ended, in an array of their own."""
-    count, out = memory.run.numbers.rows, log.out
-    return (out if len(out) == count else out[:count]) if log.t_eval.size else out[:count].copy()

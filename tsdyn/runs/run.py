@@ -17,7 +17,7 @@ the ends of steps; serves any number of runs (`Prepared.engine`), and has
 
 from ..errors import Status
 from ..jit.compiled import clock
-from .first_slice import begin, has_ended_well, rows_of
+from .first_slice import FirstSlice, room_for
 from .run_end import RecordedEnd
 from .run_log import left_open
 from .sampling import Sampled
@@ -29,33 +29,50 @@ from .trajectory import Trajectory
 SUCCESS, NOT_FINITE, PASSAGE, STIFF = Status.SUCCESS, Status.NOT_FINITE, Status.PASSAGE, Status.STIFF
 
 
-def run(task, engine, observe=None, relay=None, past=None, briefly=False):
+def begin(task, engine, passes):
+    """Run the first slice of a `Task`: its `Outcome` and None; None, memory and `FirstSlice` if it goes on.
+
+    Nothing is asked of the run between its slices. passes: whether it ends next to a singular configuration.
+    """
+    prepared = task.prepared
+    engine = prepared.engine(engine, task.method, task.form, task.within)
+    memory = prepared.take(engine)
+    memory.enter(engine, task, passes)
+    log, rows = room_for(memory, task)
+    began = clock()
+    try:
+        status = memory.advance(log, rows)
+    except KeyboardInterrupt:
+        status = None
+    if status is not SUCCESS or memory.run.numbers.near_steps:
+        return None, (memory, FirstSlice(log, rows, status, began))
+    outcome = _ended(task, memory, log, began)
+    prepared.give(engine.kind, memory)
+    return outcome, None
+
+
+def run(task, engine, observe=None, relay=None, past=None, begun=None):
     """Run a `Task` by a kind of engine; the `Outcome`.
 
     `observe` is given the memory before the run: one of its own. With a `Relay` the run is a segment of one; where
     there is a way past singular configurations, it ends with Status.PASSAGE next to one. `past(memory)` makes what is
-    advanced in place of the memory. briefly: whether nothing is asked of the run between its slices.
+    advanced in place of the memory. begun: memory and `FirstSlice` of a run that has begun.
     """
     prepared = task.prepared
-    engine = prepared.engine(engine, task.method, task.form, task.within)
-    memory = prepared.take(engine) if observe is None else prepared.new_memory(engine)
-    memory.enter(engine, task, relay is not None and relay.passes)
-    watch, first, began = None, None, clock()
-    if briefly:
-        first = begin(memory, task)
-        if has_ended_well(memory, first):
-            outcome = _ended(task, memory, first.log, began)
-            prepared.give(engine.kind, memory)
-            return outcome
-    readings = _readings(memory, task)
-    if first is None:
+    if begun is None:
+        engine = prepared.engine(engine, task.method, task.form, task.within)
+        memory, first = prepared.take(engine) if observe is None else prepared.new_memory(engine), None
+        memory.enter(engine, task, relay is not None and relay.passes)
         if observe is not None:
             observe(memory)
         if relay is not None:
             relay.enter(memory)
-        if task.events is not None:
-            watch = (relay or Relay()).watching(task, readings[0])
-        began = clock()
+    else:
+        memory, first = begun
+    readings, watch = _readings(memory, task), None
+    if task.events is not None:
+        watch = (relay or Relay()).watching(task, readings[0])
+    began = clock() if first is None else first.began
     advanced = memory if task.sampling is None else Sampled(memory, task.sampling)
     driven = drive(advanced if past is None else past(advanced), task, watch, first)
     if relay is not None and driven[0] in (PASSAGE, STIFF):
@@ -65,18 +82,21 @@ def run(task, engine, observe=None, relay=None, past=None, briefly=False):
     if watch is not None:
         readings[0].give(watch.reader)
     if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own
-        prepared.give(engine.kind, memory)
+        prepared.give(memory.engine.kind, memory)
     return outcome
 
 
 def _ended(task, memory, log, began):
     """The `Outcome` of a run that has ended well within its first slice."""
     numbers, steps, charts, trajectory = memory.run.numbers, None, None, None
+    rows = log.out if len(log.out) == numbers.rows else log.out[: numbers.rows]
+    if not log.t_eval.size:  # there was room for more steps
+        rows = rows.copy()
     if task.history:
         steps, charts = log.history[: numbers.history], log.charts[: numbers.chart_rows + 1]
     if task.dense_output:
         trajectory = _trajectory(task, memory, log, log.blocks[: numbers.blocks].copy(), _readings(memory, task))
-    return Outcome(SUCCESS, "", rows_of(memory, log), RecordedEnd(memory, steps, charts), trajectory, None, began)
+    return Outcome(SUCCESS, "", rows, RecordedEnd(memory, steps, charts), trajectory, None, began)
 
 
 def _driven(task, memory, driven, readings, watch, began):

@@ -26,6 +26,11 @@ class RunEnd(NamedTuple):
     steps: StepLog  # or None
     charts: ChartLog  # or None
 
+    @property
+    def near_steps(self):
+        """Steps near singular configurations."""
+        return self.counts["steps_near_singular"]
+
 
 class RecordedEnd:
     """The same, read from copies of a memory's records when it is asked for.
@@ -40,13 +45,13 @@ class RecordedEnd:
         Likewise; the last row is of the chart that the run has not left.
     """
 
-    __slots__ = ("_charts", "_layout", "_run", "_steps", "_work")
+    __slots__ = ("_charts", "_layout", "_run", "_steps", "_work", "near_steps")
 
     def __init__(self, memory, steps, charts):
         self._layout, self._run, self._work = memory.layout, memory.run_state.copy(), memory.state.copy()
         if isinstance(steps, np.ndarray):
             steps, charts = steps.copy() if len(steps) < FEW_ROWS else _logged(steps), charts.copy()
-        self._steps, self._charts = steps, charts
+        self._steps, self._charts, self.near_steps = steps, charts, memory.run.numbers.near_steps
 
     @property
     def reached(self):

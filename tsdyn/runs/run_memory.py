@@ -57,6 +57,8 @@ class Memory:
         self.run_state, self._run_scratch = divided(run.now.base, run.clock, run.numbers, run.kernels, *tables)
         self._laid_out = [self.run_state, self.state]  # what a run finds as it was laid out,
         self._scratch = [rest] if rest.size else []  # and what it finds zero
+        arrays, records = selection_parts(context.tangent)
+        self._selected = [*arrays, *map(words, records)]
         self._asked, self._start, self._images = None, None, []  # what it is laid out for, and how it is then
 
     def settle(self, context, header=()):
@@ -75,17 +77,13 @@ class Memory:
         It is laid out for an engine and options, and an image of that is copied for further runs of the same.
         """
         asked = (
-            task.constraint_tol,
-            task.dense_output,
-            task.events is None,
-            task.interval,
-            task.choose is None,
-            may_pass,
-        )
-        self._clear_scratch()
+            task.constraint_tol, task.dense_output, task.events is None, task.interval, task.choose is None, may_pass,
+        )  # fmt: skip
+        if self._scratch:
+            self._clear_scratch()
         if self.engine is not engine or self._asked != asked:
             self._lay_out(engine, task, may_pass)
-            self._images = [(array, array.copy()) for array in self._laid_out]
+            self._images = [(array, array.copy()) for array in [*self._laid_out, *self._selected] if array.size]
             self._asked, self._start = asked, (task.q, task.qd)
         else:
             for array, image in self._images:
@@ -95,13 +93,11 @@ class Memory:
         self.context.system.reals[...] = self.reals  # motions, signals and what forces remember are written there
         if task.remembered.size:
             self._remember(task.remembered, task.prepared.handles)
-        reset_selection(self.graph, self.context.tangent)
         self._enter_span(task)
 
     def entered(self):
         """The arrays that `enter` sets."""
-        arrays, records = selection_parts(self.context.tangent)
-        return [*self._scratch, *self._laid_out, self.context.system.reals, *arrays, *map(words, records)]
+        return [*self._scratch, *self._laid_out, self.context.system.reals, *self._selected]
 
     def _clear_scratch(self):
         for array in self._scratch:
@@ -121,6 +117,7 @@ class Memory:
         self.engine, numbers = engine, self.run.numbers
         self.layout = Layout(self.run.now.shape[1], self.run.remembered.size, engine.skipped, bool(self.packed.loads))
         self._enter_start(task)
+        reset_selection(self.graph, self.context.tangent)
         numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
         numbers.may_pass, numbers.chart_interval = may_pass, task.interval
         numbers.leave_when_stiff = task.choose is not None

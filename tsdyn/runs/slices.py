@@ -12,6 +12,7 @@ from contextlib import suppress
 from functools import cached_property
 
 from ..errors import InconsistentState, SingularConfiguration, Status
+from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..observables.not_finite import not_finite
 from ..rows.interface import redundant_of
@@ -128,7 +129,7 @@ class Slices:
         if first.status is None:
             raise KeyboardInterrupt
         self._end_slice(first.status)
-        self._adapt(first.rows, first.seconds)
+        self._adapt(first.rows, clock() - first.began)
 
     def _end_slice(self, status):
         """Take the status of a slice; refuse a run that could not begin."""

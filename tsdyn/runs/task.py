@@ -32,6 +32,7 @@ class Task(NamedTuple):
     qd: np.ndarray  # (n,)
     remembered: np.ndarray  # (angles + slots,) angles of joints at the start, and what forces remember
     times: np.ndarray  # (k,) output times, s; empty for every step
+    within: bool  # whether output between the ends of steps is requested
     dense_output: bool
     events: list  # of `events.Event`, or None
     constraint_tol: float
@@ -39,7 +40,7 @@ class Task(NamedTuple):
     interval: int  # steps between charts that are forced; 0 for none
     report: object  # a function of the fraction done (None at the end), the time, s, and the steps of the segment
     history: bool  # whether the histories of steps and charts are kept
-    choose: object  # says after how many steps, and whether, another method goes on: see simulation/turns.py; or None
+    choose: object  # a function that makes the `Turns` of a run, or the `Turns`; None where no other method goes on
     stops: np.ndarray = NO_STOPS  # times at which a step ends, as of `motions.knots.stops_of`
     sampling: object = None  # a `sampling.Sampling`, or None
     archive: object = None  # a `storage.archive.Archive` that outputs and histories go to, or None
@@ -48,11 +49,6 @@ class Task(NamedTuple):
     def angles(self):
         """Of the joints at the start (angles,)."""
         return self.remembered[: self.prepared.handles.count]
-
-    @property
-    def within(self):
-        """True if output between the ends of steps is requested."""
-        return self.dense_output or self.events is not None or between(self.times, self.span)
 
 
 class Outcome(NamedTuple):

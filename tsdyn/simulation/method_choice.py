@@ -4,6 +4,8 @@ Taylor steps with sharp forces are shorter, and no quicker than those of DOP853 
 series fail, the run begins again with DOP853. Where the motion is found stiff, the implicit method goes on: turns.py.
 """
 
+from functools import partial
+
 from ..errors import Status
 from ..integrators import DOP853, Taylor
 from ..methods.integrator import frozen
@@ -34,9 +36,9 @@ def reason(prepared, options):
 
 
 def turns_of(scene, prepared, method, options, span, within):
-    """The `Turns` of a run by the default method; None for another, or in a form that no implicit method serves."""
+    """What makes the `Turns` of a run by the default method; None for another, and where no implicit one serves."""
     form = options.form
-    return None if options.method or form.first_order else Turns(scene, prepared, method, form, span, within)
+    return None if options.method or form.first_order else partial(Turns, scene, prepared, method, form, span, within)
 
 
 def instead(task, status):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import html
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..ahead.first_run import kernels_of, prepare_first_run
-from ..calls import fitting, fitting_methods
+from ..calls import fitting
 from ..configuration.holonomic import demand_holonomic
 from ..elements.membership import warn_of_waiting
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, Status
 from ..jit.compiled import clock
 from ..observables.state import remembered
 from ..runs.arguments import demand_steps_seen, interval, output_times, state_arrays
@@ -25,7 +25,7 @@ from . import method_choice, stored_runs
 from .local_origin import origin_of, run_near
 from .progress import reporter
 from .rounding_limit import within_rounding
-from .run_options import RunCall, RunOptions, by_name, documented
+from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented
 from .scene import Scene
 from .scene_cache import prepared
 from .segments import run_segments
@@ -36,11 +36,28 @@ if TYPE_CHECKING:
 
     from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
 
+SUCCESS = Status.SUCCESS
 ENGINES = {"steps": StepEngine, "series": SeriesEngine}
+FIXED = {float, int}  # a tuple of them can't be changed
 DRIVERS = {name: partial(run_segments, engine=engine) for name, engine in ENGINES.items()}  # by Integrator.driver
 
 
-@fitting_methods
+class _Last(NamedTuple):
+    """What the task of the last call follows from, beside the options."""
+
+    t_span: tuple
+    t_eval: tuple | None
+    start: tuple  # of the scene
+    engines: dict  # of the scene: replaced where other rows or bodies take part in the equations
+    task: Task
+    is_regular: bool  # whether there is no more to look at, as of `run_task`
+
+
+def _is_fixed(times):
+    """Whether times can't have changed when they are given again."""
+    return times is None or (type(times) is tuple and FIXED.issuperset(map(type, times)))
+
+
 class Run:
     """Runs of a scene with the same options, as `prepare` returns them.
 
@@ -75,21 +92,20 @@ class Run:
 
     def __init__(self, scene: Scene, options: RunOptions) -> None:
         self.scene, self.options = scene, options
-        self._compiled, self._known = set(), None  # with outputs between steps or not; the last start
+        self._compiled, self._last = set(), None  # with outputs between steps or not; the last task
         self._prepare_kernels(options.dense_output or options.events is not None)
         self._prepared = kept = prepared(scene)
         self._start = scene._initial()
         self.method = method = method_choice.first_method(options, kept)
-        self._form, self._drop = options.form, options.redundancy == "drop"
         self._driver = DRIVERS.get(method.driver, method.driver)
-        self._needs_holonomic = not self._form.basis_free or method.implicit
         if method.coupled and kept.rough:
             raise InvalidArgument(
                 f"{type(method).__name__} doesn't solve for reactions that friction depends on "
                 f"({', '.join(kept.rough)}): SDIRK54 does, as do all explicit methods."
             )
 
-    @documented("t_eval", "state", "store", "checkpoint", "progress")
+    @fitting
+    @documented(*OF_CALL)
     def __call__(
         self,
         t_span: Span,
@@ -128,6 +144,7 @@ class Run:
             )
         return self.solve(RunCall(t_span, t_eval, store, checkpoint, progress, state))
 
+    @fitting
     def with_parameters(self, values: Mapping[str, Any]) -> Run:
         """Return a Run of the scene with other values of some parameters, with the same options.
 
@@ -164,10 +181,16 @@ class Run:
         task = self._task(call)
         if is_stored:
             return self._stored(task, call, found, archive)
-        outcome = run_task(task, self.scene, self.options.initial_tol, self._driver)
-        ended, other = clock(), method_choice.instead(task, outcome.status)
-        if other is not None:
-            return self._by(other).solve(call)
+        last = self._last
+        if last is not None and task is last.task and last.is_regular:
+            outcome = self._driver(task)
+        else:
+            outcome = run_task(task, self.scene, self.options.initial_tol)
+        ended = clock()
+        if outcome.status is not SUCCESS:
+            other = method_choice.instead(task, outcome.status)
+            if other is not None:
+                return self._by(other).solve(call)
         return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
     def check(self, call: RunCall) -> None:
@@ -175,15 +198,43 @@ class Run:
         self._task(call)
 
     def _task(self, call):
-        """The `Task` of a call, its start consistent with the constraints."""
-        options, kept, method = self.options, self._prepared, self.method
-        span, state = interval(call.t_span), call.state
+        """The `Task` of a call, its start consistent with the constraints.
+
+        That of the last call serves again if nothing that it follows from can have changed.
+        """
+        state = call.state
+        known, last = self._prepared.packed.derived, self._last
+        is_plain = state is call.progress is call.store is None
+        if (
+            is_plain
+            and last is not None
+            and call.t_span is last.t_span
+            and call.t_eval is last.t_eval
+            and self.scene._start is last.start
+            and known.engines is last.engines
+        ):
+            return last.task
+        start = self.scene._initial() if state is None else state_arrays(state, self._prepared.n)
+        task = self._new_task(call, start)
+        if is_plain and not (task.events or task.sampling) and _is_fixed(call.t_span) and _is_fixed(call.t_eval):
+            is_regular = origin_of(task.prepared.packed, task.q) is None and task.method.step is None
+            is_regular = is_regular and within_rounding(task.method, task.prepared.packed, task.q)[0] is task.method
+            self._last = _Last(call.t_span, call.t_eval, start, known.engines, task, is_regular)
+        return task
+
+    def _new_task(self, call, start):
+        """The same; start: q, qd as given."""
+        options, kept, method, state = self.options, self._prepared, self.method, call.state
+        span = interval(call.t_span)
         times = output_times(call.t_eval, *span)
         demand_steps_seen(method, *span)
         within = options.dense_output or options.events is not None or between(times, span)
         self._prepare_kernels(within)
         stops = kept.stops(*span, method.step is None)
-        memory, q, qd = self._start_of(state, span[0])
+        memory = remembered(state, kept, span[0], start[0])
+        q, qd = kept.start(self.scene, start, span[0], options.initial_tol, memory, options.redundancy == "drop")
+        if not options.form.basis_free or method.implicit:
+            demand_holonomic(kept.packed, q, span[0], options.formulation)
         choose = sampling = None
         if kept.sampled:  # a sampled controller can't be run again: no turns
             sampling = Sampling(kept, state is not None)
@@ -191,28 +242,10 @@ class Run:
             choose = method_choice.turns_of(self.scene, kept, method, options, span, within)
         history = call.store is None if options.history is None else options.history
         return Task(
-            kept, method, self._form, span, q, qd, memory, times, options.dense_output,
+            kept, method, options.form, span, q, qd, memory, times, within, options.dense_output,
             prepared_events(options.events), options.constraint_tol, options.max_steps, options.chart_interval or 0,
             reporter(call.progress), history, choose, stops, sampling,
         )  # fmt: skip
-
-    def _start_of(self, state, t):
-        """What joints and forces remember at a start, and q and qd, projected; the scene's own is looked at once."""
-        scene, kept, options = self.scene, self._prepared, self.options
-        engines, given = kept.packed.derived.engines, scene._initial() if state is None else None
-        if given is not None and self._known is not None:
-            known, of, start = self._known
-            if known is given and of == (t, id(engines)):
-                return start
-        arrays = given or state_arrays(state, kept.n)
-        memory = remembered(state, kept, t, arrays[0])
-        q, qd = kept.start(scene, arrays, t, options.initial_tol, memory, self._drop)
-        if self._needs_holonomic:
-            demand_holonomic(kept.packed, q, t, self._form.name)
-        start = memory, q, qd
-        if given is not None:
-            self._known = given, (t, id(kept.packed.derived.engines)), start
-        return start
 
     def _prepare_kernels(self, within):
         """Have compiled what runs need, at the first one with outputs between steps, or without."""
@@ -238,7 +271,7 @@ class Run:
                 outcome = stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
             return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
         try:
-            outcome = run_task(task._replace(archive=archive), scene, self.options.initial_tol, self._driver)
+            outcome = run_task(task._replace(archive=archive), scene, self.options.initial_tol)
             seconds = clock() - started
             other = method_choice.instead(task, outcome.status)
             if other is not None:
@@ -265,7 +298,7 @@ class Run:
                 f"rtol={method.rtol:g}, atol={method.atol:g} of the run; each step is held to rtol={rtol:.2g}, "
                 f"atol={atol:.2g} (safety factor {method.rtol / rtol:.3g})"
             )
-        names = dict.fromkeys(kernels_of(self.scene, method, self._form, True in self._compiled))
+        names = dict.fromkeys(kernels_of(self.scene, method, self.options.form, True in self._compiled))
         return {
             "method": f"{method!r}, {why}",
             "steps": tolerances,
@@ -288,7 +321,7 @@ class Run:
 
 
 @fitting
-@documented(*(name for name in RunOptions.__dataclass_fields__ if name != "method"))
+@documented(*OF_RUN)
 def prepare(
     scene: Scene,
     *,
@@ -356,11 +389,10 @@ def demand_scene(scene):
         warn_of_waiting(scene, 5)
 
 
-def run_task(task, scene, initial_tol, driver=None):
+def run_task(task, scene, initial_tol):
     """Run the method's driver, relative to a local origin if the scene is far from its own."""
     method, packed = task.method, task.prepared.packed
-    driver = driver or DRIVERS.get(method.driver, method.driver)
-    origin = origin_of(packed, task.q)
+    driver, origin = DRIVERS.get(method.driver, method.driver), origin_of(packed, task.q)
     if origin is not None:
         return run_near(driver, task, scene, origin, initial_tol)
     limited, said = within_rounding(method, packed, task.q)

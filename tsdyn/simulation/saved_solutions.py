@@ -299,7 +299,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
         scene=scene, packed=packed, system=packed.system, handles=handles_of(packed),
         formulation=record["formulation"], span=tuple(record["span"]), status=Status(record["status"]),
         t_events=events[0], q_events=events[1], qd_events=events[2],
-        _method=record["method"], _trajectory=trajectory, _end=run_end, _seconds=record["seconds"],
+        _method=record["method"], _trajectory=trajectory, _end=run_end, _turned="", _seconds=record["seconds"],
         _energy_error=record["energy_error"], _reason=record["reason"], _message=record["message"],
         _provenance=record["provenance"],
     )  # fmt: skip

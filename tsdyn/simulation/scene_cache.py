@@ -184,15 +184,15 @@ class Prepared:
 
         That of a plain method serves again until other rows or bodies take part in the equations.
         """
-        if not is_plain(method):
-            return kind(self, method, form, within)
         known, key = self.packed.derived.engines, (kind, method, form.name, within)
         engine = known.get(key)
         if engine is None:
-            if len(known) >= KINDS:
-                known.clear()
             with CollectionsDeferred():
-                engine = known[key] = kind(self, method, form, within)
+                engine = kind(self, method, form, within)
+            if is_plain(method):
+                if len(known) >= KINDS:
+                    known.clear()
+                known[key] = engine
         return engine
 
     def system(self, implicit):
@@ -233,16 +233,19 @@ class Prepared:
         """
         try:
             spare = self._spare[engine.kind]
-            if spare[-1].engine is not engine:
-                for i, memory in enumerate(spare[:-1]):
-                    if memory.engine is engine:
-                        return spare.pop(i)  # another one, if a thread has been quicker
             memory = spare.pop()
-        except (KeyError, IndexError):
+            if memory.engine is engine:
+                return memory
+            for other in [*spare]:
+                if other.engine is engine:
+                    spare.remove(other)  # ValueError if a thread has been quicker
+                    spare.append(memory)
+                    return other
+        except (KeyError, IndexError, ValueError):
             return self.new_memory(engine)
         if not engine.serves(memory):
             return self.new_memory(engine)
-        if memory.engine is not engine and engine.layouts > FEW_LAYOUTS and self._has_room(memory):
+        if engine.layouts > FEW_LAYOUTS and self._has_room(memory):
             self.give(engine.kind, memory)
             return self.new_memory(engine)
         return memory
@@ -260,9 +263,11 @@ class Prepared:
         """Take back a memory that is no longer in use."""
         if memory.nbytes > LARGEST:
             return
-        if len(self._spare) >= KINDS:
-            self._spare.clear()
-        spare = self._spare.setdefault(kind, [])
+        spare = self._spare.get(kind)
+        if spare is None:
+            if len(self._spare) >= KINDS:
+                self._spare.clear()
+            spare = self._spare.setdefault(kind, [])
         if len(spare) < SPARE:
             spare.append(memory)
 

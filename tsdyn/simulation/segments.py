@@ -15,7 +15,7 @@ from ..errors import Status, TsdynError
 from ..jit.compiled import clock
 from ..runs.counts import NAMES
 from ..runs.history import ChartLog, StepLog
-from ..runs.run import run
+from ..runs.run import begin, run
 from ..runs.run_end import RunEnd
 from ..runs.segments import Relay
 from ..runs.step_engine import StepEngine
@@ -38,10 +38,18 @@ GIVEN_UP = (  # by the implicit method: the explicit one goes on
 
 def run_segments(task, engine, observe=None):
     """Run a `Task` by the engine of its method; return the `Outcome`. An observed run has one segment."""
-    briefly = observe is None and asks_little(task)
-    if observe is not None or not is_relayed(task, engine):
-        return run(task, engine, observe, briefly=briefly)
-    relay = Relay(may_pass(task))
+    passes, begun = observe is None and may_pass(task), None
+    if task.choose is None and engine is SeriesEngine:  # there is nobody to go on
+        passes = False
+    if observe is None and asks_little(task):
+        outcome, begun = begin(task, engine, passes)
+        if outcome is not None:
+            return outcome
+    if observe is not None or (task.choose is None and not passes):
+        return run(task, engine, observe, begun=begun)
+    if task.choose is not None:
+        task = task._replace(choose=task.choose())
+    relay = Relay(passes)
     passed = task.archive.passed if task.archive else []
     try:
         if passed:  # a run that goes on in a later segment
@@ -52,7 +60,7 @@ def run_segments(task, engine, observe=None):
                 segments = _Segments(task, engine, relay, [_recalled(known, task) for known in passed])
             return segments.go_on()
         first = task if task.report is silent else task._replace(report=_until_its_end(task.report))
-        outcome = run(first, engine, relay=relay, briefly=briefly)
+        outcome = run(first, engine, relay=relay, begun=begun)
         ended = outcome.status in (PASSAGE, STIFF) or came_to_rest(task, outcome.status)
         return _Segments(task, engine, relay, [outcome]).go_on() if ended else outcome
     finally:
@@ -63,11 +71,6 @@ def asks_little(task):
     """Whether nothing is asked of a run between the ends of its slices."""
     asked = task.events is not None or task.sampling is not None or task.archive is not None
     return task.report is silent and not asked
-
-
-def is_relayed(task, engine):
-    """Whether a run may have more than one segment."""
-    return task.choose is not None or (engine is StepEngine and may_pass(task))
 
 
 def came_to_rest(task, status):

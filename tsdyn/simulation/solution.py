@@ -98,7 +98,6 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
     t_events: list[Floats] | Any  # None without events
     q_events: list[Floats] | Any
     qd_events: list[Floats] | Any
-    _turned = ""  # the methods of a run that turned
 
     def __init__(self, scene: Scene, task: Any, outcome: Any, seconds: dict[str, float], goes_on: str = "") -> None:
         self.scene, self.packed = scene, task.prepared.packed
@@ -110,11 +109,13 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         self.handles = task.prepared.handles
         self._take(outcome.rows, task.q.size)
         self._seconds, self._energy_error, self._end = seconds, None, outcome.end
-        near = outcome.end.counts["steps_near_singular"]
+        near = outcome.end.near_steps
         if near:
             self._energy_error = energy_error(self, task)
+        redundant = self.packed.derived.redundant
+        self._redundant = 0 if redundant is None else len(redundant)
         self._reason, self._message, self._made = outcome.reason, None, time.time()
-        if near or outcome.status not in SUCCESSES or self.packed.derived.redundant is not None:
+        if outcome.status not in SUCCESSES:
             self._message = account(self, scene, self._reason, goes_on)  # written now, since the scene may change
 
     def __setstate__(self, state):

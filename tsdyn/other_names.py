@@ -41,7 +41,7 @@ CLASSES = {  # of constraints, forces and integrators, in small letters and with
     "simulation": "simulate(scene, t_span)",
     "solve": "simulate(scene, t_span)",
     "solve_ivp": "simulate(scene, t_span)",
-    "run": "simulate(scene, t_span)",
+    "run": "prepare(scene, ...), which returns a ts.Run, or ts.simulate(scene, t_span)",
 }
 METHODS = {  # of a scene
     "add_rigid_body": "scene.add_body(...)",
@@ -75,6 +75,15 @@ ARGUMENTS = {
     "omega": "angular_velocity",
     "mu": "kinetic",
     "friction": "kinetic",
+}
+
+
+OF_RUN = ("integrator", "rtol", "atol", "formulation", "dense_output", "events", "max_step", "max_steps", "history")
+ELSEWHERE = {  # arguments that belong to another call
+    "prepare": dict.fromkeys(
+        ("t_span", "t_eval", "state", "store", "checkpoint", "progress"), "run(t_span, t_eval=...)"
+    ),
+    "Run.__call__": dict.fromkeys(OF_RUN, "ts.prepare(scene, rtol=...)"),
 }
 
 

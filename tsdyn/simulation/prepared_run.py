@@ -298,13 +298,13 @@ class Run:
                 f"rtol={method.rtol:g}, atol={method.atol:g} of the run; each step is held to rtol={rtol:.2g}, "
                 f"atol={atol:.2g} (safety factor {method.rtol / rtol:.3g})"
             )
-        names = dict.fromkeys(kernels_of(self.scene, method, self.options.form, True in self._compiled))
+        kernels = kernels_of(self.scene, method, options.form, True in self._compiled)
         return {
             "method": f"{method!r}, {why}",
             "steps": tolerances,
             "form": f"{options.formulation}; |Phi| to {options.constraint_tol:g} m, starts to {options.initial_tol:g}",
             "options": repr(options),
-            "kernels": f"{len(names)}: {', '.join(names)}",
+            "kernels": f"{len(kernels)}: {_listed(kernels)}",
         }
 
     def __str__(self) -> str:
@@ -318,6 +318,16 @@ class Run:
 
     def __repr__(self) -> str:
         return f"<Run of {self.scene!r} by {self.method!r}, {self.options.formulation}>"
+
+
+def _listed(kernels):
+    """The names of kernels, those of a class of constraints or forces behind it."""
+    groups = {}
+    for kernel in kernels:
+        owner, _, name = getattr(kernel, "py_func", kernel).__qualname__.removesuffix("_loop").rpartition(".")
+        groups.setdefault(owner, []).append(name)
+    own = groups.pop("", [])
+    return ", ".join([*(f"{owner} ({', '.join(names)})" for owner, names in groups.items()), *own])
 
 
 @fitting
@@ -386,7 +396,7 @@ def demand_scene(scene):
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     if scene._waiting:
-        warn_of_waiting(scene, 5)
+        warn_of_waiting(scene, 4)
 
 
 def run_task(task, scene, initial_tol):

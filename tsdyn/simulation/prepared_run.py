@@ -379,7 +379,7 @@ def prepare(
     >>> for k in range(5):
     ...     state = run((0.1 * k, 0.1 * (k + 1)), state=state).state
     >>> print(state.position(bob).round(6) + 0.0)
-    [ 0.372107  0.       -0.9282  ]
+    [ 0.372081  0.       -0.9282  ]
     """
     demand_scene(scene)
     return Run(

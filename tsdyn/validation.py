@@ -95,7 +95,7 @@ def vector3(value, what, error):
 def finite_vector(value, n, what):
     """Return n finite floats as an array (n,), or raise InvalidArgument."""
     array = floats(value)
-    if array.shape != (n,) or not np.isfinite(array).all():
+    if array.shape != (n,) or not (math.isfinite(array.dot(array)) or np.isfinite(array).all()):  # the first is quick
         raise InvalidArgument(f"{what} must be {n} finite numbers, one for each coordinate, got {shown(value)}.")
     return array
 

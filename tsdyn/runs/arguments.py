@@ -80,7 +80,8 @@ def demand_steps_seen(method, t0, t1):
 
 def demand_one_state(value, rule):
     """Refuse a solution or an equilibrium, which has a state and is none."""
-    if np.ndim(getattr(value, "q", 0)) != 1 and hasattr(value, "state"):
+    q = getattr(value, "q", 0)
+    if (q.ndim if type(q) is np.ndarray else np.ndim(q)) != 1 and hasattr(value, "state"):
         raise InvalidArgument(f"{rule}: give the .state of {value!r}.")
 
 

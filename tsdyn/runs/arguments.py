@@ -7,11 +7,10 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..methods.integrator import Integrator, is_own, registered
-from ..validation import checked_once, finite_vector, floats, number, shown, unknown_name
+from ..validation import FEW, checked_once, finite_vector, floats, number, shown, unknown_name
 from .tolerances import EPS, FROM_ZERO, SAME_COUNT, SHORTEST
 
 TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
-FEW = 50  # times that a list serves faster than an array: 0.4 us instead of 2
 NO_TIMES = np.empty(0)
 
 

@@ -6,6 +6,7 @@ import gc
 import inspect
 import math
 import pickle
+import threading
 import warnings
 import weakref
 from concurrent.futures import ThreadPoolExecutor
@@ -104,10 +105,10 @@ def test_options_are_frozen_and_equal_by_value():
 def test_a_run_says_what_it_will_do():
     """The tolerances that steps are held to: those of the run over the safety factor of the method, 30 by default."""
     said = str(ts.prepare(top.build(), integrator=I.RK45(3e-7, 6e-9)))
-    assert "RK45(rtol=3e-07, atol=6e-09), as asked" in said
+    assert "RK45(rtol=3e-07, atol=6e-09): as asked" in said
     assert f"rtol={3e-7 / I.RK45.margin:.2g}, atol={6e-9 / I.RK45.margin:.2g}" in said
     said = str(ts.prepare(top.build(), formulation="tangent", constraint_tol=1e-11))
-    assert "Taylor: every constraint and force has a series" in said
+    assert "Taylor(rtol=1e-08, atol=1e-08): every constraint and force has a series" in said
     assert "|Phi| to 1e-11 m" in said
     assert "advance_series" in said
     said = ts.prepare(top.build(), integrator=I.Nystrom4(2e-3), formulation="null-space")._repr_html_()
@@ -459,6 +460,22 @@ def test_threads_that_call_one_run():
     with ThreadPoolExecutor(12) as pool:
         for (way, start, end), found in zip(jobs, pool.map(lambda job: solve(runs[job[0]], *job), jobs), strict=True):
             same_run(found, expected[way, end, start is None])
+
+
+def test_threads_that_prepare_a_scene_at_once():
+    """What they find is shared: none of their runs belongs to another state of the scene."""
+    expected = ts.simulate(top.build(), SPAN)
+    for _ in range(10):
+        scene, together = top.build(), threading.Barrier(6)
+
+        def work(_, scene=scene, together=together):
+            together.wait()
+            return ts.prepare(scene)
+
+        with ThreadPoolExecutor(6) as pool:
+            runs = list(pool.map(work, range(6)))
+        for run in runs:
+            same_run(run(SPAN), expected)
 
 
 def test_solutions_are_of_their_own():

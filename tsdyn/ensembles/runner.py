@@ -168,7 +168,7 @@ class Runner:
             if ran is not None:
                 return self._record(changes, *ran)
         scene = self._scene(changes)
-        solution = Run(scene, study.options).solve(replace(study.call, progress=study.report))
+        solution = Run(scene, study.options)._solve(replace(study.call, progress=study.report))
         return self._recorded(solution, _Rows(solution))
 
     def _in_arena(self, run):

@@ -22,17 +22,17 @@ def first_method(options, prepared):
     return method if options.max_step is None else frozen(method.bounded(options.max_step))
 
 
-def reason(prepared, options):
-    """Say which method a run of these `RunOptions` begins with, and why."""
+def reason(options, prepared):
+    """Say why a run of these `RunOptions` begins with its first method."""
     if options.method is not None:
         return "as asked."
     if not options.may_use_series:
-        return "DOP853: series serve the tangent form alone, and make their charts themselves."
+        return "series serve the tangent form alone, and make their charts themselves."
     if prepared.refusal:
-        return f"DOP853. {prepared.refusal}"
+        return prepared.refusal
     if not prepared.pays:
-        return "DOP853: a force changes sharply, and without constraints series are no quicker."
-    return "Taylor: every constraint and force has a series. Radau takes over where the motion is found stiff."
+        return "a force changes sharply, and without constraints series are no quicker."
+    return "every constraint and force has a series. Radau takes over where the motion is found stiff."
 
 
 def turns_of(scene, prepared, method, options, span, within):

@@ -142,7 +142,7 @@ class Run:
                 "the scene has changed since it was prepared: prepare it again, by ts.prepare(scene, ...), or leave "
                 "the scene as it is and change numbers by run.with_parameters({...})."
             )
-        return self.solve(RunCall(t_span, t_eval, store, checkpoint, progress, state))
+        return self._solve(RunCall(t_span, t_eval, store, checkpoint, progress, state))
 
     @fitting
     def with_parameters(self, values: Mapping[str, Any]) -> Run:
@@ -169,7 +169,7 @@ class Run:
         """
         return Run(self.scene.with_parameters(values), self.options)
 
-    def solve(self, call: RunCall, found: tuple[Any, Any] = (None, None), archive: Any = None) -> Solution:
+    def _solve(self, call: RunCall, found: tuple[Any, Any] = (None, None), archive: Any = None) -> Solution:
         """Run as of `__call__`, without a look at what has become of the scene.
 
         found: numbers and arrays of a checkpoint to go on from. archive: that of a run which begins again by another
@@ -190,10 +190,10 @@ class Run:
         if outcome.status is not SUCCESS:
             other = method_choice.instead(task, outcome.status)
             if other is not None:
-                return self._by(other).solve(call)
+                return self._by(other)._solve(call)
         return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
-    def check(self, call: RunCall) -> None:
+    def _check(self, call: RunCall) -> None:
         """Raise what a call raises before anything is run."""
         self._task(call)
 
@@ -277,7 +277,7 @@ class Run:
             if other is not None:
                 run = self._by(other)
                 given |= by_name(run.options, call)
-                return run.solve(call, archive=stored_runs.begin_again(archive, given))
+                return run._solve(call, archive=stored_runs.begin_again(archive, given))
             outcome = stored_runs.ended(archive, outcome, seconds)
         finally:
             archive.close()
@@ -290,7 +290,7 @@ class Run:
 
     def _facts(self):
         method, options = self.method, self.options
-        why = method_choice.reason(self._prepared, options)
+        why = method_choice.reason(options, self._prepared)
         tolerances = f"fixed steps of {method.step} s"
         if method.step is None:
             rtol, atol = method.step_tolerances()
@@ -300,7 +300,7 @@ class Run:
             )
         kernels = kernels_of(self.scene, method, options.form, True in self._compiled)
         return {
-            "method": f"{method!r}, {why}",
+            "method": f"{method!r}: {why}",
             "steps": tolerances,
             "form": f"{options.formulation}; |Phi| to {options.constraint_tol:g} m, starts to {options.initial_tol:g}",
             "options": repr(options),

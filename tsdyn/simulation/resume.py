@@ -76,7 +76,7 @@ def resume(
         given = arguments_of(numbers["arguments"], arrays, scene)
     given |= {"events": events, "progress": progress, "store": path, "checkpoint": numbers["interval"]}
     options, call = from_names(given)
-    return Run(scene, options).solve(call, (numbers, arrays))
+    return Run(scene, options)._solve(call, (numbers, arrays))
 
 
 def _scene_of(path, numbers, arrays):

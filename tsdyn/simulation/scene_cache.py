@@ -2,6 +2,7 @@
 
 import copy
 from functools import cached_property
+from threading import RLock
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from ..runs.sampling import instants_of, sampled
 from ..taylor.layout import pays, refusal
 from ..taylor.run_memory import Series
 
+preparing = RLock()  # threads that prepare a scene at once share what they find
 SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocate nothing
 OF_NUMBERS = {"implicit", "spheres", "series", "sampled"}  # what `Prepared` derives from them
 KINDS = 8  # kinds of memory, and shapes of a scene, at most
@@ -38,7 +40,10 @@ def prepared(scene):
         scene.refresh()
     kept = scene._prepared
     if kept is None:
-        kept = scene._prepared = Prepared(scene, scene.packed)
+        with preparing:
+            kept = scene._prepared
+            if kept is None:
+                kept = scene._prepared = Prepared(scene, scene.packed)
     return kept
 
 

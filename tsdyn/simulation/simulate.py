@@ -82,7 +82,7 @@ def simulate(  # many arguments, by name: each is an option of a run
         integrator, rtol, atol, formulation, constraint_tol, initial_tol, redundancy, dense_output, events, max_steps,
         max_step, history, chart_interval,
     )  # fmt: skip
-    return run_of(scene, options).solve(RunCall(t_span, t_eval, store, checkpoint, progress, state))
+    return run_of(scene, options)._solve(RunCall(t_span, t_eval, store, checkpoint, progress, state))
 
 
 def run_of(scene: Scene, options: RunOptions) -> Run:
@@ -98,6 +98,6 @@ def run_of(scene: Scene, options: RunOptions) -> Run:
             return run
     run = Run(scene, options)
     if options.events is None and is_plain(run.method):
-        kept = scene._prepared
+        kept = run._prepared
         kept.runs = (run, *kept.runs[: KEPT - 1])  # and not written to: other threads may be reading
     return run

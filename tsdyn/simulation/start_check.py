@@ -7,4 +7,4 @@ from .run_options import from_names
 def demand_startable(scene, given):
     """Raise what `simulate(scene, **given)` raises before a run."""
     options, call = from_names({"t_span": (0.0, 1.0), **given})
-    Run(scene, options).check(call)
+    Run(scene, options)._check(call)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..simulation.prepared_run import Run
 from ..simulation.resume import resume
-from ..simulation.run_options import from_names
+from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
 from ..simulation.simulate import simulate
 
 SELDOM = 1e9  # s between checkpoints: the first, after a slice, is the only one
@@ -37,10 +37,10 @@ def resumed_is_same(scene, span, solution, **options):
 
 def prepared_twice(scene, span, **options):
     """As `simulate`, by the second run of a prepared one."""
-    options, call = from_names({"t_span": span, **options})
-    prepared = Run(scene, options)
-    prepared.solve(call)
-    return prepared.solve(call)
+    prepared = Run(scene, RunOptions(**{name: value for name, value in options.items() if name in OF_RUN}))
+    of_call = {name: value for name, value in options.items() if name in OF_CALL}
+    prepared(span, **of_call)
+    return prepared(span, **of_call)
 
 
 def same_bits(one, two):

@@ -15,22 +15,47 @@ the ends of steps; serves any number of runs (`Prepared.engine`), and has
     skipped         bodies without gyroscopic torque, bodies that never turn, constant columns of series
 """
 
+from typing import NamedTuple
+
+import numpy as np
+
 from ..errors import Status
 from ..jit.compiled import clock
-from .first_slice import FirstSlice, room_for
+from ..rows.interface import redundant_of
+from . import slices
+from .recorder import CHART_ROOM, NO_ROWS
 from .run_end import RecordedEnd
-from .run_log import left_open
+from .run_log import RunLog, left_open
 from .sampling import Sampled
-from .segments import Relay
-from .slices import drive
+from .segments import SegmentLink
 from .task import Outcome
+from .tolerances import TRIES
 from .trajectory import Trajectory
 
 SUCCESS, NOT_FINITE, PASSAGE, STIFF = Status.SUCCESS, Status.NOT_FINITE, Status.PASSAGE, Status.STIFF
 
 
+class StartedRun(NamedTuple):
+    """A run after its first slice."""
+
+    log: RunLog
+    rows: int  # steps that there was room for
+    status: Status  # None where Ctrl-C was pressed meanwhile
+    began: float  # by `jit.compiled.clock`
+
+
+class SliceArrays(NamedTuple):
+    """Where a memory keeps the records of a first slice."""
+
+    first: int  # slices.FIRST_SLICE
+    most: int  # steps
+    width: int  # of a row of outputs
+    history: np.ndarray
+    charts: np.ndarray
+
+
 def begin(task, engine, passes):
-    """Run the first slice of a `Task`: its `Outcome` and None; None, memory and `FirstSlice` if it goes on.
+    """Run the first slice of a `Task`: its `Outcome` and None; None, memory and `StartedRun` if it goes on.
 
     Nothing is asked of the run between its slices. passes: whether it ends next to a singular configuration.
     """
@@ -38,52 +63,71 @@ def begin(task, engine, passes):
     engine = prepared.engine(engine, task.method, task.form, task.within)
     memory = prepared.take(engine)
     memory.enter(engine, task, passes)
-    log, rows = room_for(memory, task)
+    log, rows = _log_of(memory, task)
     began = clock()
     try:
         status = memory.advance(log, rows)
     except KeyboardInterrupt:
         status = None
     if status is not SUCCESS or memory.run.numbers.near_steps:
-        return None, (memory, FirstSlice(log, rows, status, began))
+        return None, (memory, StartedRun(log, rows, status, began))
     outcome = _ended(task, memory, log, began)
     prepared.give(engine.kind, memory)
     return outcome, None
 
 
-def run(task, engine, observe=None, relay=None, past=None, begun=None):
+def run(task, engine, observe=None, link=None, past=None, begun=None):
     """Run a `Task` by a kind of engine; the `Outcome`.
 
-    `observe` is given the memory before the run: one of its own. With a `Relay` the run is a segment of one; where
+    `observe` is given the memory before the run: one of its own. With a `SegmentLink` the run is a segment; where
     there is a way past singular configurations, it ends with Status.PASSAGE next to one. `past(memory)` makes what is
-    advanced in place of the memory. begun: memory and `FirstSlice` of a run that has begun.
+    advanced in place of the memory. begun: memory and `StartedRun` of a run that has begun.
     """
     prepared = task.prepared
     if begun is None:
         engine = prepared.engine(engine, task.method, task.form, task.within)
         memory, first = prepared.take(engine) if observe is None else prepared.new_memory(engine), None
-        memory.enter(engine, task, relay is not None and relay.passes)
+        memory.enter(engine, task, link is not None and link.passes)
         if observe is not None:
             observe(memory)
-        if relay is not None:
-            relay.enter(memory)
+        if link is not None:
+            link.enter(memory)
     else:
         memory, first = begun
     readings, watch = _readings(memory, task), None
     if task.events is not None:
-        watch = (relay or Relay()).watching(task, readings[0])
+        watch = (link or SegmentLink()).watching(task, readings[0])
     began = clock() if first is None else first.began
     advanced = memory if task.sampling is None else Sampled(memory, task.sampling)
-    driven = drive(advanced if past is None else past(advanced), task, watch, first)
-    if relay is not None and driven[0] in (PASSAGE, STIFF):
-        relay.leave(memory)
-        relay.interrupted = driven[2].interrupted
+    driven = slices.drive(advanced if past is None else past(advanced), task, watch, first)
+    if link is not None and driven[0] in (PASSAGE, STIFF):
+        link.leave(memory)
+        link.interrupted = driven[2].interrupted
     outcome = _driven(task, memory, driven, readings, watch, began)
     if watch is not None:
         readings[0].give(watch.reader)
     if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own
         prepared.give(memory.engine.kind, memory)
     return outcome
+
+
+def _log_of(memory, task):
+    """The `RunLog` of the first slice of a run, and the steps that there is room for."""
+    arrays, times = memory.arrays, task.times
+    if arrays is None or arrays.first != slices.FIRST_SLICE:
+        arrays = memory.arrays = _arrays_of(memory)
+    rows, blocks = min(arrays.most, slices.step_limit(memory.run, task)), (NO_ROWS, NO_ROWS)
+    if task.dense_output:
+        n, redundant = memory.run.now.shape[1], len(redundant_of(memory.context.tangent))
+        blocks = np.zeros((2 * CHART_ROOM, n + redundant)), np.empty((rows, memory.run.block.size))
+    out = np.empty((times.size or rows + 1, arrays.width))
+    return RunLog(times, task.stops, out, arrays.history, arrays.charts, *blocks), rows
+
+
+def _arrays_of(memory):
+    most, run = slices.first_slice(memory.weight), memory.run
+    history, charts = np.empty((most + 2 * TRIES, 3)), np.empty((2 * CHART_ROOM, 5))
+    return SliceArrays(slices.FIRST_SLICE, most, 1 + run.now.size + run.remembered.size, history, charts)
 
 
 def _ended(task, memory, log, began):

@@ -43,7 +43,7 @@ class Memory:
 
     reason = ""  # of the end of a run: told by its status
     engine = None  # that it is laid out for
-    room = None  # of a first slice: a `first_slice.Room`
+    arrays = None  # of a first slice: `run.SliceArrays`
     layout = None  # a `Layout`
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 

@@ -90,7 +90,7 @@ class Slices:
         return Pace(self.task.span[0])
 
     def drive(self, first=None):
-        """Advance until the end, from the `FirstSlice` of a run on."""
+        """Advance until the end, from the `run.StartedRun` of a run on."""
         rows = self._rows() if first is None else first.rows
         while self.status is SLICE_DONE:
             if first is None:
@@ -239,7 +239,7 @@ def _warn_of(error, t):
 
 
 def drive(memory, task, watch, first=None):
-    """Drive a run to its end, from its `FirstSlice` on; Status, what there is to say of it, and the closed `Recorder`.
+    """Drive a run to its end; Status, what there is to say of it, and the closed `Recorder`. first: a `run.StartedRun`.
 
     Where `task.choose` says that another method goes on, the run ends with Status.STIFF.
     """

@@ -17,7 +17,7 @@ from ..runs.counts import NAMES
 from ..runs.history import ChartLog, StepLog
 from ..runs.run import begin, run
 from ..runs.run_end import RunEnd
-from ..runs.segments import Relay
+from ..runs.segments import SegmentLink
 from ..runs.step_engine import StepEngine
 from ..runs.task import Outcome
 from ..runs.trajectory import Pieces
@@ -49,20 +49,20 @@ def run_segments(task, engine, observe=None):
         return run(task, engine, observe, begun=begun)
     if task.choose is not None:
         task = task._replace(choose=task.choose())
-    relay = Relay(passes)
+    link = SegmentLink(passes)
     passed = task.archive.passed if task.archive else []
     try:
         if passed:  # a run that goes on in a later segment
             with damaged("the checkpoint"):
-                relay.share, relay.largest, relay.h = map(float, passed[-1]["relay"])
+                link.share, link.largest, link.h = map(float, passed[-1]["relay"])
                 if passed[-1]["turns"] is not None:
                     task.choose.restore(passed[-1]["turns"])
-                segments = _Segments(task, engine, relay, [_recalled(known, task) for known in passed])
+                segments = _Segments(task, engine, link, [_recalled(known, task) for known in passed])
             return segments.go_on()
         first = task if task.report is silent else task._replace(report=_until_its_end(task.report))
-        outcome = run(first, engine, relay=relay, begun=begun)
+        outcome = run(first, engine, link=link, begun=begun)
         ended = outcome.status in (PASSAGE, STIFF) or came_to_rest(task, outcome.status)
-        return _Segments(task, engine, relay, [outcome]).go_on() if ended else outcome
+        return _Segments(task, engine, link, [outcome]).go_on() if ended else outcome
     finally:
         task.report(None)
 
@@ -107,12 +107,12 @@ class _Segments:
         The whole run's.
     engine : type
         Of its method.
-    relay : Relay
+    link : SegmentLink
     parts : list of Outcome
     """
 
-    def __init__(self, task, engine, relay, parts):
-        self.task, self.engine, self.relay, self.parts, self.turns = task, engine, relay, parts, task.choose
+    def __init__(self, task, engine, link, parts):
+        self.task, self.engine, self.link, self.parts, self.turns = task, engine, link, parts, task.choose
         self.roles, self.raised = [METHOD], ""
         self.passed = [] if task.archive is None else task.archive.passed
         if self.passed:
@@ -125,7 +125,7 @@ class _Segments:
         parts, role = self.parts, self.passed[-1]["next"] if self.passed else self._pass()
         try:
             while role is not None:
-                if self.relay.interrupted:
+                if self.link.interrupted:
                     raise KeyboardInterrupt
                 rest = self._rest()
                 if rest.max_steps == 0:
@@ -150,7 +150,7 @@ class _Segments:
 
         Its per-step outputs begin with the row that the segment before ends with.
         """
-        part, archive, relay = self.parts[-1], self.task.archive, self.relay
+        part, archive, link = self.parts[-1], self.task.archive, self.link
         if gives_up or (self.roles[-1] == IMPLICIT and part.status in GIVEN_UP):
             self.turns, role = None, METHOD
         else:
@@ -163,7 +163,7 @@ class _Segments:
             arrays = {"rows": len(part.rows), "last": end.last.tolist(), "remembered": end.remembered.tolist()}
             turns = None if self.turns is None else self.turns.saved()
             self.passed.append(
-                {**numbers, **arrays, "turns": turns, "relay": [relay.share, relay.largest, float(relay.h)]}
+                {**numbers, **arrays, "turns": turns, "relay": [link.share, link.largest, float(link.h)]}
             )
             archive.skips = self.task.times.size == 0
         return role
@@ -182,21 +182,19 @@ class _Segments:
 
     def _run(self, rest, role):
         """The `Outcome` of the next segment."""
-        task, relay, turned = self.task, self.relay, self.roles[-1] != CROSSING
+        task, link, turned = self.task, self.link, self.roles[-1] != CROSSING
         if role == CROSSING:
-            relay.h = 0.0
-            return run(
-                by_series(rest), SeriesEngine, relay=relay, past=lambda memory: Carrier(memory, task, relay.share)
-            )
+            link.h = 0.0
+            return run(by_series(rest), SeriesEngine, link=link, past=lambda memory: Carrier(memory, task, link.share))
         if self.turns is not None:
             self.turns.begin(role == IMPLICIT, rest.span[0], turned)
         if role == METHOD or not turned:
-            relay.h = 0.0
+            link.h = 0.0
         if role == IMPLICIT:
             demand_holonomic(rest.prepared.packed, rest.q, rest.span[0], rest.form.name)
             method, self.raised = within_rounding(self.turns.implicit, rest.prepared.packed, rest.q)
             rest = rest._replace(method=method)
-        return run(rest._replace(choose=self.turns), StepEngine if role == IMPLICIT else self.engine, relay=relay)
+        return run(rest._replace(choose=self.turns), StepEngine if role == IMPLICIT else self.engine, link=link)
 
     def _rest(self):
         """The remaining task, by the task's method."""

@@ -78,13 +78,7 @@ ARGUMENTS = {
 }
 
 
-OF_RUN = ("integrator", "rtol", "atol", "formulation", "dense_output", "events", "max_step", "max_steps", "history")
-ELSEWHERE = {  # arguments that belong to another call
-    "prepare": dict.fromkeys(
-        ("t_span", "t_eval", "state", "store", "checkpoint", "progress"), "run(t_span, t_eval=...)"
-    ),
-    "Run.__call__": dict.fromkeys(OF_RUN, "ts.prepare(scene, rtol=...)"),
-}
+ELSEWHERE = {}  # of calls by their title: arguments that another call takes, and which; entered where both are known
 
 
 def hint(where, name, known):

@@ -329,10 +329,12 @@ def test_wrong_calls_say_what_is_wrong():
         run(SPAN, rtol=1e-8)
     with pytest.raises(ts.InvalidCall, match=r"did you mean t_eval\?"):
         run(SPAN, t_evl=(0.1,))
-    with pytest.raises(ts.InvalidCall, match=r"given to run\(t_span"):
+    with pytest.raises(ts.InvalidCall, match=r"given to the call, run\(t_span"):
         ts.prepare(top.build(), t_eval=(0.1,))
     with pytest.raises(ts.InvalidArgument, match=r"must be a ts\.Scene"):
         ts.prepare(None)
+    with pytest.raises(ts.InvalidArgument, match="options must be a RunOptions"):
+        ts.Run(top.build(), {"rtol": 1e-9})
     with pytest.raises(ts.InvalidArgument, match="checkpoint needs a store"):
         run(SPAN, checkpoint=1.0)
     with pytest.raises(ts.InvalidArgument, match="solves its stages"):

@@ -14,6 +14,7 @@ from ..elements.membership import warn_of_waiting
 from ..errors import InvalidArgument, Status
 from ..jit.compiled import clock
 from ..observables.state import remembered
+from ..other_names import ELSEWHERE
 from ..runs.arguments import demand_steps_seen, interval, output_times, state_arrays
 from ..runs.events import prepare as prepared_events
 from ..runs.sampling import Sampling
@@ -90,6 +91,7 @@ class Run:
     [  0.   0. -20.]
     """
 
+    @fitting
     def __init__(self, scene: Scene, options: RunOptions) -> None:
         self.scene, self.options = scene, options
         self._compiled, self._last = set(), None  # with outputs between steps or not; the last task
@@ -389,6 +391,10 @@ def prepare(
             max_steps, max_step, history, chart_interval,
         ),
     )  # fmt: skip
+
+
+ELSEWHERE["prepare"] = dict.fromkeys(("t_span", *OF_CALL), "the call, run(t_span, t_eval=...)")
+ELSEWHERE["Run.__call__"] = dict.fromkeys(OF_RUN, "ts.prepare(scene, rtol=...)")
 
 
 def demand_scene(scene):

@@ -187,7 +187,9 @@ class Arena:
                 return None
             self.packed.derived.origin = q, None  # the pen has looked
         options, method, span = study.options, study.method, study.span
-        choose = method_choice.turns_of(study.scene, self.kept, method, options, span, study.within)
+        choose = None
+        if options.method is None:
+            choose = method_choice.turns_of(study.scene, self.kept, method, options.form, span, study.within)
         stops = self.kept.stops(*span, method.step is None) if study.retimes else study.stops
         task = Task(
             self.kept, method, options.form, span, q, qd, memory, study.times, study.within,

@@ -35,10 +35,9 @@ def reason(options, prepared):
     return "every constraint and force has a series. Radau takes over where the motion is found stiff."
 
 
-def turns_of(scene, prepared, method, options, span, within):
-    """What makes the `Turns` of a run by the default method; None for another, and where no implicit one serves."""
-    form = options.form
-    return None if options.method or form.first_order else partial(Turns, scene, prepared, method, form, span, within)
+def turns_of(scene, prepared, method, form, span, within):
+    """What makes the `Turns` of a run by the default method; None in a form that no implicit method serves."""
+    return None if form.first_order else partial(Turns, scene, prepared, method, form, span, within)
 
 
 def instead(task, status):

@@ -93,7 +93,7 @@ class Run:
 
     @fitting
     def __init__(self, scene: Scene, options: RunOptions) -> None:
-        self.scene, self.options = scene, options
+        self.scene, self.options, self._form = scene, options, options.form
         self._compiled, self._last = set(), None  # with outputs between steps or not; the last task
         self._prepare_kernels(options.dense_output or options.events is not None)
         self._prepared = kept = prepared(scene)
@@ -235,16 +235,16 @@ class Run:
         stops = kept.stops(*span, method.step is None)
         memory = remembered(state, kept, span[0], start[0])
         q, qd = kept.start(self.scene, start, span[0], options.initial_tol, memory, options.redundancy == "drop")
-        if not options.form.basis_free or method.implicit:
+        if not self._form.basis_free or method.implicit:
             demand_holonomic(kept.packed, q, span[0], options.formulation)
         choose = sampling = None
         if kept.sampled:  # a sampled controller can't be run again: no turns
             sampling = Sampling(kept, state is not None)
-        else:
-            choose = method_choice.turns_of(self.scene, kept, method, options, span, within)
+        elif options.method is None:
+            choose = method_choice.turns_of(self.scene, kept, method, self._form, span, within)
         history = call.store is None if options.history is None else options.history
         return Task(
-            kept, method, options.form, span, q, qd, memory, times, within, options.dense_output,
+            kept, method, self._form, span, q, qd, memory, times, within, options.dense_output,
             prepared_events(options.events), options.constraint_tol, options.max_steps, options.chart_interval or 0,
             reporter(call.progress), history, choose, stops, sampling,
         )  # fmt: skip
@@ -254,7 +254,7 @@ class Run:
         if within not in self._compiled:
             options = self.options
             default = options.rtol, options.atol, options.may_use_series
-            prepare_first_run(self.scene, options.method, options.form, within, default)
+            prepare_first_run(self.scene, options.method, self._form, within, default)
             self._compiled.add(within)
 
     def _by(self, method):
@@ -300,7 +300,7 @@ class Run:
                 f"rtol={method.rtol:g}, atol={method.atol:g} of the run; each step is held to rtol={rtol:.2g}, "
                 f"atol={atol:.2g} (safety factor {method.rtol / rtol:.3g})"
             )
-        kernels = kernels_of(self.scene, method, options.form, True in self._compiled)
+        kernels = kernels_of(self.scene, method, self._form, True in self._compiled)
         return {
             "method": f"{method!r}: {why}",
             "steps": tolerances,

@@ -242,9 +242,13 @@ def test_a_state_is_told_by_its_numbers():
     run = ts.prepare(top.build())
     state = run(SPAN).state
     first = run((0.3, 0.5), state=state)
-    same_run(run((0.3, 0.5), state=copy.copy(state)), first)
+    span = (0.3, 0.5)
+    for given in (state, state, copy.copy(state), state, state, state):
+        same_run(run(span, state=given), first)
     state.qd[0] += 0.25
-    assert (run((0.3, 0.5), state=state).q[-1] != first.q[-1]).any()
+    found = run(span, state=state)
+    same_run(found, ts.simulate(top.build(), span, state=state))
+    assert (found.q[-1] != first.q[-1]).any()
     state.q[2] += 1.0
     for _ in range(2):
         with pytest.raises(ts.InconsistentState):

@@ -7,6 +7,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from ..ahead.first_run import kernels_of, prepare_first_run
 from ..calls import fitting
 from ..configuration.holonomic import demand_holonomic
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
 
 SUCCESS = Status.SUCCESS
 ENGINES = {"steps": StepEngine, "series": SeriesEngine}
+FLOAT = np.dtype(float)
 FIXED = {float, int}  # a tuple of them can't be changed
 DRIVERS = {name: partial(run_segments, engine=engine) for name, engine in ENGINES.items()}  # by Integrator.driver
 
@@ -48,7 +51,8 @@ class _Last(NamedTuple):
 
     t_span: tuple
     t_eval: tuple | None
-    start: tuple  # of the scene
+    start: tuple  # q, qd: arrays of the scene, or of a state
+    bits: tuple | None  # of the state
     engines: dict  # of the scene: replaced where other rows or bodies take part in the equations
     task: Task
     is_regular: bool  # whether there is no more to look at, as of `run_task`
@@ -57,6 +61,15 @@ class _Last(NamedTuple):
 def _is_fixed(times):
     """Whether times can't have changed when they are given again."""
     return times is None or (type(times) is tuple and FIXED.issuperset(map(type, times)))
+
+
+def _bits_of(state, prepared):
+    """Positions and velocities of a state as bytes; None where a run takes more from it, or they are not plain."""
+    q, qd, memory = (getattr(state, name, None) for name in ("q", "qd", "memory"))
+    plain = type(q) is type(qd) is np.ndarray and q.dtype is qd.dtype is FLOAT and q.ndim == qd.ndim == 1
+    if prepared.remembers or not plain or not (memory is None or np.shape(memory) == (0,)):
+        return None
+    return q.tobytes(), qd.tobytes()
 
 
 class Run:
@@ -94,7 +107,8 @@ class Run:
     @fitting
     def __init__(self, scene: Scene, options: RunOptions) -> None:
         self.scene, self.options, self._form = scene, options, options.form
-        self._compiled, self._last = set(), None  # with outputs between steps or not; the last task
+        self._compiled = set()  # with outputs between steps, or not
+        self._last = self._seen = None  # the last `_Last`, and state
         self._prepare_kernels(options.dense_output or options.events is not None)
         self._prepared = kept = prepared(scene)
         self._start = scene._initial()
@@ -204,24 +218,28 @@ class Run:
 
         That of the last call serves again if nothing that it follows from can have changed.
         """
-        state = call.state
-        known, last = self._prepared.packed.derived, self._last
-        is_plain = state is call.progress is call.store is None
+        state, kept, last = call.state, self._prepared, self._last
+        known, is_plain, bits = kept.packed.derived, call.progress is call.store is None, None
+        if state is not None:  # it is worth a look at its numbers if it is given again
+            bits = _bits_of(state, kept) if state is self._seen else None
+            is_plain = is_plain and bits is not None
+        self._seen = state
         if (
             is_plain
             and last is not None
             and call.t_span is last.t_span
             and call.t_eval is last.t_eval
-            and self.scene._start is last.start
+            and bits == last.bits
+            and (state is not None or self.scene._start is last.start)
             and known.engines is last.engines
         ):
             return last.task
-        start = self.scene._initial() if state is None else state_arrays(state, self._prepared.n)
+        start = self.scene._initial() if state is None else state_arrays(state, kept.n)
         task = self._new_task(call, start)
         if is_plain and not (task.events or task.sampling) and _is_fixed(call.t_span) and _is_fixed(call.t_eval):
             is_regular = origin_of(task.prepared.packed, task.q) is None and task.method.step is None
             is_regular = is_regular and within_rounding(task.method, task.prepared.packed, task.q)[0] is task.method
-            self._last = _Last(call.t_span, call.t_eval, start, known.engines, task, is_regular)
+            self._last = _Last(call.t_span, call.t_eval, start, bits, known.engines, task, is_regular)
         return task
 
     def _new_task(self, call, start):

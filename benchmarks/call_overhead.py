@@ -69,6 +69,12 @@ def edited(scene):
     return call
 
 
+def prepared(scene, **options):
+    """A call of a prepared run, with outputs at both ends."""
+    run = ts.prepare(scene, **(options or TOLERANCES))
+    return lambda: run(SPAN, t_eval=SPAN)
+
+
 def contenders():
     """The calls to be timed, by name."""
     top, pendulum, chain = (SCENES[name].build() for name in ("sliding top", "two-body pendulum", "chain of 4"))
@@ -76,6 +82,8 @@ def contenders():
     adaptive, implicit = ts.integrators.DOP853(**TOLERANCES), ts.integrators.SDIRK54(**TOLERANCES)
     times = np.linspace(*SPAN, 11)
     return {
+        "prepared run of the sliding top": prepared(top),
+        "  Nystrom4, one step ": prepared(top, integrator=step),
         "sliding top, outputs at both ends": lambda: ts.simulate(top, SPAN, t_eval=SPAN, **TOLERANCES),
         "  every step": lambda: ts.simulate(top, SPAN, **TOLERANCES),
         "  at 11 times": lambda: ts.simulate(top, SPAN, t_eval=times, **TOLERANCES),

@@ -55,7 +55,9 @@ from .motions.tables import Table  # noqa: E402
 from .observables.state import State  # noqa: E402
 from .simulation.load import LOADERS as _LOADERS  # noqa: E402
 from .simulation.load import load  # noqa: E402
+from .simulation.prepared_run import Run, prepare  # noqa: E402
 from .simulation.resume import resume  # noqa: E402
+from .simulation.run_options import RunOptions  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402
 from .simulation.simulate import simulate  # noqa: E402
 from .simulation.solution import Solution  # noqa: E402
@@ -103,6 +105,8 @@ __all__ = [
     "PointMass",
     "Primitive",
     "RedundantConstraints",
+    "Run",
+    "RunOptions",
     "RungeKuttaTableau",
     "Scene",
     "SingularConfiguration",
@@ -127,6 +131,7 @@ __all__ = [
     "load",
     "motions",
     "plots",
+    "prepare",
     "profile",
     "resume",
     "shapes",

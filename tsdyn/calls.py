@@ -40,6 +40,8 @@ def unknown_argument(title, name, known):
     said = f"; here it is {here}=." if here else nearest(name, known)
     if {f"{name}_a", f"{name}_b", "a", "b"} <= {*known}:
         said = f"; {title}.at(a, b, {name}=...) takes one for both bodies, in the ground frame."
+    if name in other_names.ELSEWHERE.get(title, ()):
+        said = f"; it is given to {other_names.ELSEWHERE[title][name]}."
     return InvalidCall(f"{title}() has no argument {name}{said} It has {', '.join(known)}.")
 
 

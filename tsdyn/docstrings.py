@@ -35,6 +35,12 @@ def complete_docstring(cls: type, standard: Iterable[str] = (), raises: str = ""
     cls.__doc__ = "\n\n".join([head, *shown])
 
 
+def entries_of(texts: Iterable[str], arguments: Iterable[str]) -> list[str]:
+    """The entries of arguments, in order, in the sections Parameters of some docstrings."""
+    entries = [entry for text in texts for entry in _entries(_split(text)[1]["Parameters"])]
+    return _in_order(entries, list(arguments))
+
+
 @cache  # a base is asked by each of its subclasses, at import
 def _split(text: str) -> tuple[str, dict[str, str]]:
     """Return the text before the first section, and the sections by title."""

@@ -45,7 +45,7 @@ CLASSES = {  # of constraints, forces and integrators, in small letters and with
     "simulation": "simulate(scene, t_span)",
     "solve": "simulate(scene, t_span)",
     "solve_ivp": "simulate(scene, t_span)",
-    "run": "simulate(scene, t_span)",
+    "run": "prepare(scene, ...), which returns a ts.Run, or ts.simulate(scene, t_span)",
 }
 PUBLIC = "Scene", "Solution", "Ensemble", "State"  # their subclasses are called by the same names
 RUNS = "simulate", "run", "solve"  # what a scene has in other programs
@@ -111,6 +111,9 @@ ARGUMENTS = {
     "mu": "kinetic",
     "friction": "kinetic",
 }
+
+
+ELSEWHERE = {}  # of calls by their title: arguments that another call takes, and which; entered where both are known
 
 
 def hint(where, name, known):

@@ -10,6 +10,7 @@ import numpy as np
 from .errors import InvalidArgument, StorageError, UnknownAttribute
 
 EXACT = 2**53  # integers below it are floats
+FEW = 50  # numbers that a list serves faster than an array: 0.4 us instead of 2
 MANY = 30  # names that a message lists
 LONG = 200  # characters of a value that a message shows
 
@@ -105,7 +106,8 @@ def vector3(value, what, error):
 def finite_vector(value, n, what):
     """Return n finite floats as an array (n,), or raise InvalidArgument."""
     array = floats(value)
-    if array.shape != (n,) or not np.isfinite(array).all():
+    finite = all(map(math.isfinite, array.ravel().tolist())) if array.size < FEW else np.isfinite(array).all()
+    if array.shape != (n,) or not finite:
         raise InvalidArgument(f"{what} must be {n} finite numbers, one for each coordinate, got {shown(value)}.")
     return array
 

@@ -8,6 +8,7 @@ import pytest
 import tsdyn as ts
 from examples import four_bar
 from tests.helpers.commands import called
+from tsdyn.simulation.run_options import OF_RUN
 
 FALL = 'version = 1\n[[body]]\nname = "stone"\ntype = "PointMass"\nmass = 1.0\nposition = [0, 0, 5]\n'
 
@@ -215,3 +216,20 @@ def test_robots(folder, capsys):
     assert (code, json.loads(out)["degrees_of_freedom"]) == (0, 6)
     assert called(capsys, "run", "arm.urdf", "--to", "0.1")[0] == 0
     assert "is for URDF files" in called(capsys, "run", "bars.toml", "--free-base")[2]
+
+
+def test_options_of_a_run_have_flags(folder, capsys):
+    """Every number and word of `RunOptions`."""
+    words = ("run", "fall.toml", "--method", "rk45", "--max-step", "0.01", "--max-steps", "7", "--json")
+    found = json.loads(called(capsys, *words)[1])
+    assert (found["status"], found["stats"]["steps"]) == ("max_steps", 7)
+    assert found["reached"] <= 0.07 * (1.0 + 1e-12)
+    for form in ("null-space", "maggi-kane"):
+        assert json.loads(
+            called(capsys, "run", "bars.toml", "--to", "0.01", "--method", "dop853", "--formulation", form, "--json")[1]
+        )["success"]
+    code, _, said = called(capsys, "run", "bars.toml", "--redundancy", "keep")
+    assert (code, "redundancy must be 'drop' or 'refuse'" in said) == (1, True)
+    _, flags, _ = called(capsys, "run", "--help")
+    for name in OF_RUN.keys() - {"integrator", "events", "history", "dense_output"}:
+        assert f"--{name.replace('_', '-')} " in flags

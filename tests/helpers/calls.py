@@ -1,20 +1,8 @@
-"""Calls of `simulate` that are like earlier ones, and what they must return."""
-
-import sys
-from unittest import mock
+"""Runs that must be the same."""
 
 import numpy as np
 
-import tsdyn as ts
-
-MODULE = sys.modules["tsdyn.simulation.simulate"]
 PARTS = ("t", "q", "qd", "qdd", "multipliers")
-
-
-def by_plan(scene, *arguments, **options):
-    """Call `simulate`; fail if the call goes the ordinary way."""
-    with mock.patch.object(MODULE, "run_from", side_effect=AssertionError("the call had no plan")):
-        return ts.simulate(scene, *arguments, **options)
 
 
 def same_run(one, two):

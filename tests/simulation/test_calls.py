@@ -203,7 +203,7 @@ def test_a_start_is_looked_at_once_and_again_when_it_changes(monkeypatch):
     assert len(looked) == 1
     ts.simulate(scene, (0.3, 0.4), state=state)
     run(scene, "default")
-    assert len(looked) == 3
+    assert len(looked) == 2
     with pytest.raises(ts.InconsistentState):
         ts.simulate(scene, SPAN, state=state._replace(q=state.q + 1.0))
     with pytest.raises(ts.InconsistentState):

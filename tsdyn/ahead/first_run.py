@@ -32,13 +32,20 @@ def prepare_first_run(scene, method, form, within, default):
     key = type(method), form.name, within, packed is not None and packed.system.normals.size > 0
     if (key in _known and packed is not None) or DEBUG or not scene.bodies:
         return
-    method = method or _default_method(scene, *default)
-    rough = any("normal_load" in force.kernels for force in scene.forces)
+    compile_ahead(kernels_of(scene, method or _default_method(scene, *default), form, within))
+    _known.add((*key[:3], _is_rough(scene)))
+
+
+def kernels_of(scene, method, form, within):
+    """The kernels that a run of the scene needs, as the keys of a dict; arguments as of `prepare_first_run`."""
+    rough = _is_rough(scene)
     far = isinstance(method, Taylor) and len(scene.bodies) * room(method.orders()[2]) > FAR
-    compile_ahead(
-        dict.fromkeys([*of_scene(scene, method, form, far, rough), *of_method(method, form, within, far, rough)])
-    )
-    _known.add((*key[:3], rough))
+    return dict.fromkeys([*of_scene(scene, method, form, far, rough), *of_method(method, form, within, far, rough)])
+
+
+def _is_rough(scene):
+    """Whether there is joint friction."""
+    return any("normal_load" in force.kernels for force in scene.forces)
 
 
 def of_scene(scene, method, form, far, rough):

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidArgument
-from ..files import run_table
+from ..files import run_table, types
 from ..storage.formats import SUFFIXES as SOLUTIONS
 from .output import print_json, text_cell
 from .scene_file import load_document, robot_options
 
 TABLES = (".csv",)
+METAVARS = {float: "X", int: "N", str: "NAME"}  # what a flag is followed by
 
 
 def add_run_options(parser):
@@ -29,10 +30,19 @@ def add_method(parser):
     """Add how a scene is run: what the arguments of `simulate` are called here."""
     add_end(parser)
     parser.add_argument("--method", metavar="NAME", help="an integrator, such as dop853")
-    parser.add_argument("--rtol", type=float, metavar="TOL", help="relative tolerance")
-    parser.add_argument("--atol", type=float, metavar="TOL", help="absolute tolerance")
-    parser.add_argument("--formulation", metavar="NAME", help="tangent, null-space or maggi-kane")
     parser.add_argument("--every", type=float, metavar="S", help="interval of outputs instead of every step")
+    for name, argument in _flags().items():
+        kind = {types.NUMBER: float, types.WHOLE: int, types.TEXT: str}[argument.kind]
+        said = " or ".join(argument.options) or f"{argument.name}= of ts.simulate"
+        parser.add_argument(f"--{name.replace('_', '-')}", type=kind, metavar=METAVARS[kind], help=said)
+
+
+def _flags():
+    """The options of a run that have a flag: numbers and words, by name."""
+    from ..simulation.simulate import simulate
+
+    known = run_table.arguments(simulate)
+    return {name: one for name, one in known.items() if one.kind in (types.NUMBER, types.WHOLE, types.TEXT)}
 
 
 def add_end(parser):
@@ -111,8 +121,7 @@ def options_of(parsed, given):
     end = end if parsed.to is None else parsed.to
     if parsed.method is not None:
         given["integrator"] = parsed.method
-    given |= {name: getattr(parsed, name) for name in ("rtol", "atol", "formulation")
-              if getattr(parsed, name) is not None}  # fmt: skip
+    given |= {name: getattr(parsed, name) for name in _flags() if getattr(parsed, name) is not None}
     if parsed.every is not None:
         given["t_eval"] = run_table.output_times(start, end, parsed.every)
     elif "t_eval" in given and parsed.to is not None:

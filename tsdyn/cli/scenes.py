@@ -81,13 +81,15 @@ def _info(parsed):
         return _cache_info(parsed)
     if Path(parsed.scene).suffix.lower() in SOLUTIONS:
         return _solution_info(parsed)
-    from ..simulation.method_choice import reason
+    from ..simulation.method_choice import first_method, reason
+    from ..simulation.run_options import RunOptions
     from ..simulation.scene_cache import prepared
 
     # the table of a study is left unread: what it names may not be there
     document = load_document(parsed.scene, parsed.allow_code, False, robot_options(parsed))
     scene, given = document.scene, document.run
-    mobility, why = scene.mobility(), reason(prepared(scene))
+    mobility, chosen = scene.mobility(), (RunOptions(), prepared(scene))
+    why = f"{type(first_method(*chosen)).__name__}: {reason(*chosen)}"
     if parsed.json:
         print_json(_facts(scene, mobility, why, given))
         return 0

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..methods.integrator import frozen
 from ..model.derived import Derived
 from ..model.handles import handles_of
 from ..model.lengths import is_small
@@ -17,7 +16,7 @@ from ..model.packed import System
 from ..parameters.edit import KEPT
 from ..runs.task import Task
 from ..simulation import method_choice
-from ..simulation.simulate import run_task
+from ..simulation.prepared_run import run_task
 from ..sparse.graph_builder import weights
 from ..sparse.length_metric import are_unequal
 from ..sparse.massless_axes import lean_bodies
@@ -187,28 +186,20 @@ class Arena:
             if self.packed.derived.redundant is not None:
                 return None
             self.packed.derived.origin = q, None  # the pen has looked
-        options, settings, method = study.options, study.options.settings, study.method
+        options, method, span = study.options, study.method, study.span
         choose = None
-        if study.given["integrator"] is None:
-            choose = method_choice.turns_of(study.scene, self.kept, method, options)
-        stops = self.kept.stops(*options.span, method.step is None) if study.retimes else study.stops
+        if options.method is None:
+            choose = method_choice.turns_of(study.scene, self.kept, method, options.form, span, study.within)
+        stops = self.kept.stops(*span, method.step is None) if study.retimes else study.stops
         task = Task(
-            self.kept, method, settings.form, options.span, q, qd, memory, options.times, settings.dense_output,
-            options.events, settings.constraint_tol, settings.max_steps, settings.chart_interval or 0, study.report,
-            options.history, choose, stops,
+            self.kept, method, options.form, span, q, qd, memory, study.times, study.within,
+            options.dense_output, study.events, options.constraint_tol, options.max_steps,
+            options.chart_interval or 0, study.report, options.history is not False, choose, stops,
         )  # fmt: skip
         outcome = None if self._slice is None or self.is_immobile else self._slice.run(task)
         if outcome is not None:
             return task, outcome
         if is_resized:
             return None
-        outcome = run_task(task, self.scene, settings.initial_tol)
+        outcome = run_task(task, self.scene, options.initial_tol)
         return None if method_choice.instead(task, outcome.status) is not None else (task, outcome)
-
-
-def method_of(kept, options, default):
-    """The method of a run, as `simulate` chooses it."""
-    method, settings = options.method, options.settings
-    if method is None:
-        method = method_choice.explicit(kept, *default)
-    return method if settings.max_step is None else frozen(method.bounded(settings.max_step))

@@ -46,7 +46,7 @@ class Batch:
     @staticmethod
     def serves(arena):
         """Whether Python has nothing to do between the cases of an arena."""
-        packed, pen, state = arena.packed, arena.pen, arena.study.given["state"]
+        packed, pen, state = arena.packed, arena.pen, arena.study.call.state
         if DEBUG or pen is None or arena.kept.n >= LONG_STEPS:
             return False
         selects = pen.moves or pen.written & OF_ROWS or pen.geometry is not None  # redundant rows, in each case
@@ -63,7 +63,7 @@ class Batch:
         if pen.moves:
             q = pen.starts[:, 0]
             fits = fits & are_near(packed, q) if pen.geometry is None else fits.copy()
-            fits[fits] = are_aligned(packed, q[fits], study.options.span[0])
+            fits[fits] = are_aligned(packed, q[fits], study.span[0])
         count = len(status)
         self._at, *self._chunk = resident(CaseArrays(
             pen.numbers, pen.starts, fits.astype(np.int64), arrays["t"], arrays["q"].reshape(count, -1),
@@ -75,8 +75,6 @@ class Batch:
         if self._long * FEW_LONG > self._cases > TRIED:  # longer ones hardly notice Python
             return k
         memory = self._take()
-        if memory is None:
-            return k
         reached = run_cases(*memory.where, self._plan, self._at, k, end)
         numbers = self._numbers
         self._cases += reached - k + numbers.ran
@@ -86,12 +84,10 @@ class Batch:
         return reached
 
     def _take(self):
-        """The memory of runs, laid out for this batch; None where there is none that serves."""
+        """The memory of runs, laid out for this batch."""
         kept, task = self._arena.kept, self._task
         engine, places = kept.engine(SeriesEngine, task.method, task.form, task.within), self._arena.pen.places()
-        memory = kept.take(engine.kind)
-        if memory is None or not engine.serves(memory):
-            return None
+        memory = kept.take(engine)
         if memory is not self._memory or places is not self._places:
             self._lay_out(memory, engine, places)
         self._kind = engine.kind

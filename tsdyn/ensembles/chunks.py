@@ -73,7 +73,7 @@ def _enter(arrays, k, found):
 
 def empty(study, cases):
     """Arrays by name for so many cases, all NaN."""
-    shape = (study.options.times.size, study.n) if study.keep == TIMES else (study.n,)
+    shape = (study.times.size, study.n) if study.keep == TIMES else (study.n,)
     return {"t": np.full(cases, np.nan), "q": np.full((cases, *shape), np.nan), "qd": np.full((cases, *shape), np.nan)}
 
 

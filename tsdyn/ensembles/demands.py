@@ -20,18 +20,18 @@ def demand_whole(study):
     TsdynError
         A subclass; names the argument.
     """
-    given, cases = study.given, study.cases
+    state, cases = study.call.state, study.cases
     if callable(study.keep):
         demand_arguments(study.keep, "keep", ("solution",))
     if cases.names is None:
         demand_arguments(cases.function, "the function of cases", ("case",))
-    for event in study.options.events or ():
+    for event in study.events or ():
         demand_arguments(event.function, event.name, ("t", "state"))
-    if given["state"] is not None:
-        _demand_state(study, given["state"])
-    form = study.options.settings.form
+    if state is not None:
+        _demand_state(study, state)
+    form = study.options.form
     if study.method.driver == "series" and form.name != "tangent":
-        SeriesEngine(study.kept, study.method, form, study.options.within)  # says which methods serve the form
+        SeriesEngine(study.kept, study.method, form, study.within)  # says which methods serve the form
     if cases.names is not None:
         table = (*cases.columns.values(), *cases.fixed.values())
         is_of_numbers = all(np.asarray(values).dtype.kind == "f" for values in table)

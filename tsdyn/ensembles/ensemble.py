@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,8 +9,8 @@ import numpy as np
 from ..calls import fitting, unknown_argument
 from ..elements.names import named
 from ..errors import InvalidArgument
+from ..simulation.run_options import OPTIONS, from_names
 from ..simulation.scene import Scene
-from ..simulation.simulate import simulate
 from ..validation import sequence, whole
 from .cases import cases_of
 from .chunks import Collected
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 
     from ..hints import CaseTable, Keep, Place, Progress, Span
 
-OWN = ("scene", "t_span", "store", "checkpoint", "progress")  # arguments of `simulate` that are no options here
+OWN = [name for name in OPTIONS if name not in ("store", "checkpoint", "progress")]  # options of `simulate`
 NAMED = ("keep", "cases", "assemble", "executor", "threads", "lanes", "store", "resume", "progress")
 
 
@@ -126,9 +125,12 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     threads = whole(threads, "threads")
     if threads is not None and executor is not None:
         raise InvalidArgument("threads and executor: the cases run on the one or the other; leave one of them out.")
-    given = given_of(t_span, options)
+    for name in options:
+        if name not in OWN:
+            raise unknown_argument("ensemble", name, [*NAMED, *OWN])
+    asked, call = from_names({"t_span": t_span, **options})
     study = Study(
-        scene, cases_of(scene, parameters, cases), given, keep, free_of(scene, assemble, given["state"]), lanes
+        scene, cases_of(scene, parameters, cases), asked, call, keep, free_of(scene, assemble, call.state), lanes
     )
     demand_whole(study)
     if callable(progress):
@@ -184,15 +186,3 @@ def demand_lanes(lanes):
     if isinstance(lanes, bool) or not isinstance(lanes, (int, np.integer)) or lanes not in LANES:
         raise InvalidArgument(f"lanes must be one of {', '.join(map(str, LANES))}, got {lanes!r}.")
     return int(lanes)
-
-
-def given_of(t_span, options):
-    """The arguments of `simulate` by name, the options among them checked by name."""
-    defaults = {
-        name: p.default for name, p in inspect.signature(simulate).parameters.items() if name not in ("scene", "t_span")
-    }
-    known = [name for name in defaults if name not in OWN]
-    for name in options:
-        if name not in known:
-            raise unknown_argument("ensemble", name, [*NAMED, *known])
-    return {**defaults, **options, "scene": None, "t_span": t_span}

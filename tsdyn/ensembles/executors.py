@@ -48,8 +48,8 @@ def _runners_of(digest):
 
 
 def _study(payload, cases):
-    scene, given, keep, free, lanes = pickle.loads(payload)
-    return Study(scene, cases, given, keep, free, lanes)
+    scene, *given = pickle.loads(payload)
+    return Study(scene, cases, *given)
 
 
 def run_executor(study, sink, executor, report):
@@ -113,8 +113,7 @@ class _Sender:
             self.sent = study
         else:
             self.dump = _pickler(is_dask)
-            given = {**study.given, "scene": None}
-            payload = self.dump((study.scene, given, study.keep, study.free, study.lanes))
+            payload = self.dump((study.scene, study.options, study.call, study.keep, study.free, study.lanes))
             self.sent = hashlib.sha256(payload).hexdigest(), payload
 
     def run(self, report):

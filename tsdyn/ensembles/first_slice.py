@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import Status
-from ..jit.interrupts import CollectionsDeferred
 from ..runs.recorder import CHART_ROOM, NO_ROWS
+from ..runs.run_end import RunEnd
 from ..runs.run_log import RunLog
 from ..runs.slices import FIRST_SLICE, FIRST_WORK
 from ..runs.tolerances import TRIES
@@ -20,8 +20,7 @@ SUCCESS = Status.SUCCESS
 class Finished(NamedTuple):
     """Of an `Outcome` what an ensemble keeps."""
 
-    reached: float
-    last: np.ndarray  # (2, n): q, qd
+    end: RunEnd  # its `last` (2, n): q, qd
     rows: np.ndarray  # outputs; valid until the next run
 
 
@@ -34,7 +33,7 @@ class FirstSlice:
     """
 
     def __init__(self, study):
-        n, times = study.n, study.options.times
+        n, times = study.n, study.times
         self.rows = min(max(FIRST_WORK // n, 1), FIRST_SLICE)
         width = 1 + 3 * n + study.kept.handles.count + study.family.packed.system.memory.size
         self.out = np.empty((times.size or self.rows + 1, width))
@@ -46,7 +45,7 @@ class FirstSlice:
     def serves(study):
         """Return True if nothing is asked of the runs of a study that needs more."""
         options = study.options
-        plain = options.events is None and not options.settings.dense_output and options.settings.max_steps is None
+        plain = options.events is None and not options.dense_output and options.max_steps is None
         return plain and study.method.driver == "series" and not len(study.stops) and not callable(study.keep)
 
     def run(self, task):
@@ -55,17 +54,14 @@ class FirstSlice:
         if self._long * MOSTLY > self._tried > TRIED or origin_of(kept.packed, task.q) is not None:
             return None
         engine = kept.engine(SeriesEngine, task.method, task.form, task.within)
-        memory = kept.take(engine.kind)
-        if memory is None or not engine.serves(memory):
-            with CollectionsDeferred():
-                memory = engine.memory(kept)
+        memory = kept.take(engine)
         memory.enter(engine, task, False)
         status, run = memory.advance(self.log, self.rows), memory.run
         self._tried += 1
         self._long += status is Status.SLICE_DONE
         found = None
         if status is SUCCESS and not run.numbers.near_steps:
-            found = Finished(run.clock.t, run.now[:2].copy(), self.out[: run.numbers.rows])
+            found = Finished(RunEnd(run.clock.t, run.now[:2].copy(), *[None] * 4), self.out[: run.numbers.rows])
         if status is not Status.NOT_FINITE:  # NaN may be left
             kept.give(engine.kind, memory)
         return found

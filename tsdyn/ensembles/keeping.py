@@ -21,12 +21,13 @@ def demand_keep(keep, times):
 
 def record_of(keep, outcome, n, times):
     """Arrays of a run by name: t, q, qd."""
+    end = outcome.end
     if keep != TIMES:
-        return {"t": outcome.reached, "q": outcome.last[0], "qd": outcome.last[1]}
+        return {"t": end.reached, "q": end.last[0], "qd": end.last[1]}
     q = np.full((2, times.size, n), np.nan)
     rows = outcome.rows
     q[:, : len(rows)] = rows[:, 1 : 1 + 2 * n].reshape(-1, 2, n).swapaxes(0, 1)
-    return {"t": outcome.reached, "q": q[0], "qd": q[1]}
+    return {"t": end.reached, "q": q[0], "qd": q[1]}
 
 
 def reduced(keep, solution):

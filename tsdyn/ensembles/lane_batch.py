@@ -42,8 +42,6 @@ class LaneBatch(Batch):
     def _pass(self, end):
         """Run in lanes what can be run in them."""
         memory = self._take()
-        if memory is None:
-            return
         self._passed, known = True, self._status[:end] != NOT_RUN
         if self._of is not memory:
             self._lay_out_lanes(memory)

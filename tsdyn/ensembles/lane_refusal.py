@@ -7,6 +7,7 @@ from ..jit.compiled import DEBUG, load
 from ..lanes.kinds import constraint_loops, force_loops
 from ..motions.signals import Signal
 from ..runs.tolerances import LONG_STEPS
+from ..simulation.run_options import OPTIONS
 from ..sparse.constraint_graphs import redundant_rows
 from ..taylor.layout import SHOWN, is_far
 from .arena import Arena
@@ -14,7 +15,7 @@ from .first_slice import FirstSlice
 from .lane_loop import lane_runner
 
 INSTEAD = "Leave lanes out: one case at a time serves every scene and method."
-PLAIN = {"formulation": "tangent", "chart_interval": None, "redundancy": "drop"}  # what lanes have of these options
+PLAIN = ("formulation", "chart_interval", "redundancy")  # of which lanes have the default
 
 
 def prepare_lanes(study):
@@ -43,7 +44,7 @@ def _of_options(study):
     given = study.given
     if DEBUG:
         return "TSDYN_DEBUG=1 runs kernels as plain Python, which has no lanes"
-    changed = [f"{name}={given[name]!r}" for name, plain in PLAIN.items() if given[name] != plain]
+    changed = [f"{name}={given[name]!r}" for name in PLAIN if given[name] != OPTIONS[name]]
     if changed:
         return f"{' and '.join(changed)} can't be served in lanes"
     if study.method.driver != "series":
@@ -96,7 +97,7 @@ def _of_scene(arena):
     if found:
         more = [f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else []
         return "; ".join(found[:SHOWN] + more)
-    moved = arena.pen.moves and (study.given["state"] is not None or not arena.kept.handles.begin_at_zero)
+    moved = arena.pen.moves and (study.call.state is not None or not arena.kept.handles.begin_at_zero)
     if moved or packed.system.memory.size or (arena.pen.moves and (graph.bodies[:, 1] == 4).any()):
         return "starts differ in a scene whose joint angles count from a given value, or with locked orientations"
     return ""

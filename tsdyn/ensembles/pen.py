@@ -71,7 +71,7 @@ class Pen:
         self.geometry, at = None, 0
         if self.constraints:
             self._follow_levers()
-            tol = arena.study.options.settings.constraint_tol
+            tol = arena.study.options.constraint_tol
             self.geometry = GeometryColumns(arena.study.family, self.constraints, self._weights, tol)
             self._parts.append(self.geometry)
         for part in self._parts:

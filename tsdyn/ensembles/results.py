@@ -130,7 +130,7 @@ class Ensemble:
     @property
     def times(self) -> Floats:
         """The times of t_eval (k,), s; empty if none were given."""
-        return self._study.options.times
+        return self._study.times
 
     def reductions(self) -> dict[str, Floats]:
         """What a function `keep` made of each solution, (cases, ...) by name; an array without a name as "kept"."""
@@ -238,8 +238,7 @@ class Ensemble:
         from ..simulation.simulate import simulate
 
         study, i = self._study, self._number_of(i)
-        given = {name: value for name, value in study.given.items() if name != "scene"}
-        return simulate(study.scene.with_parameters(self._values(i)), **given)
+        return simulate(study.scene.with_parameters(self._values(i)), **study.given)
 
     def _values(self, i):
         """Values of a case by name, with those of its start."""

@@ -1,5 +1,6 @@
 """Cases, run one after the other."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,11 +8,15 @@ import numpy as np
 from ..ahead.first_run import prepare_first_run
 from ..errors import Status, TsdynError
 from ..model.state_loads import is_of_user
-from ..simulation.options import checked
-from ..simulation.simulate import run_from
+from ..runs.arguments import interval, output_times
+from ..runs.events import prepare
+from ..runs.task import between
+from ..simulation.method_choice import first_method
+from ..simulation.prepared_run import Run
+from ..simulation.run_options import by_name
 from ..simulation.solution import Solution
 from ..simulation.variants import family_of, of_numbers, packed_anew, start_names
-from .arena import Arena, method_of
+from .arena import Arena
 from .cases import started
 from .first_slice import Finished
 from .keeping import demand_keep, record_of, reduced
@@ -36,8 +41,8 @@ class Study:
     ----------
     scene : Scene
     cases : Cases or CalledCases
-    given : dict
-        The arguments of `simulate` by name; scene and progress among them are not used.
+    options : RunOptions
+    call : RunCall
     keep : str or callable
     free : sequence of str, optional
         Names of the bodies by which each start is made consistent; None takes starts as they are.
@@ -50,21 +55,24 @@ class Study:
         As `simulate` does for its options.
     """
 
-    def __init__(self, scene, cases, given, keep, free=None, lanes=1):
-        self.scene, self.cases, self.keep, self.given = scene, cases, keep, {**given, "progress": None}
+    def __init__(self, scene, cases, options, call, keep, free=None, lanes=1):
+        self.scene, self.cases, self.keep, self.options, self.call = scene, cases, keep, options, call
         self.free, self.lanes = free, lanes
-        self.options = options = checked(self.given)
-        demand_keep(keep, options.times)
+        self.span = interval(call.t_span)
+        self.times, self.events = output_times(call.t_eval, *self.span), prepare(options.events)
+        self.within = options.dense_output or self.events is not None or between(self.times, self.span)
+        demand_keep(keep, self.times)
         self.family, self.changes = family_of(scene)
-        self.kept, settings, default = scene._prepared, options.settings, (given["rtol"], given["atol"], options.series)
-        prepare_first_run(scene, options.method, settings.form, options.within, default)
-        self.method, self.n = method_of(self.kept, options, default), self.kept.n
-        self.stops = self.kept.stops(*options.span, self.method.step is None)
+        default = options.rtol, options.atol, options.may_use_series
+        prepare_first_run(scene, options.method, options.form, self.within, default)
+        self.kept = scene._prepared
+        self.method, self.n = first_method(options, self.kept), self.kept.n
+        self.stops = self.kept.stops(*self.span, self.method.step is None)
         self.names = None if cases.names is None else {*self.changes, *cases.names}
         if self.names is not None and free is not None:
             self.names |= start_names(self.kept.packed)
         self.retimes = self._retimes()
-        self.has_arena = settings.drop and serves(self.family, self.kept, self.names)
+        self.has_arena = options.redundancy == "drop" and serves(self.family, self.kept, self.names)
         self.halt, self.idle = np.zeros(1, np.int64), []  # runners of the threads of an executor
 
     def _retimes(self):
@@ -84,7 +92,12 @@ class Study:
 
     def __reduce__(self):
         """What is analysed is analysed again in another process."""
-        return Study, (self.scene, self.cases, self.given, self.keep, self.free, self.lanes)
+        return Study, (self.scene, self.cases, self.options, self.call, self.keep, self.free, self.lanes)
+
+    @property
+    def given(self):
+        """The arguments of `simulate` by name, but for the scene."""
+        return by_name(self.options, self.call)
 
     def twin(self, cases):
         """The same for some of the cases."""
@@ -94,7 +107,7 @@ class Study:
 
     def values(self, i):
         """Values of case i by name, with those of a consistent start."""
-        return started(self.scene, self.cases.values(i), self.options.span[0], self.free)
+        return started(self.scene, self.cases.values(i), self.span[0], self.free)
 
     def report(self, fraction, *more):
         """Of a run: end it if the ensemble has been stopped."""
@@ -155,7 +168,7 @@ class Runner:
             if ran is not None:
                 return self._record(changes, *ran)
         scene = self._scene(changes)
-        solution = run_from({**study.given, "scene": scene, "progress": study.report})
+        solution = Run(scene, study.options)._solve(replace(study.call, progress=study.report))
         return self._recorded(solution, _Rows(solution))
 
     def _in_arena(self, run):
@@ -193,8 +206,7 @@ class Runner:
         """The `Record` of a run in an arena."""
         study, keep = self.study, self.study.keep
         plain = isinstance(outcome, Finished) or (
-            outcome.status is Status.SUCCESS
-            and not (outcome.reason or outcome.counts["steps_near_singular"] or callable(keep))
+            outcome.status is Status.SUCCESS and not (outcome.reason or outcome.end.near_steps or callable(keep))
         )
         if plain and not arena.is_immobile:
             return Record(Status.SUCCESS, PLAIN, record_of(keep, outcome, study.n, task.times))
@@ -207,7 +219,7 @@ class Runner:
         study = self.study
         if solution.status is Status.INTERRUPTED:
             raise KeyboardInterrupt
-        arrays = record_of(study.keep, outcome, study.n, study.options.times)
+        arrays = record_of(study.keep, outcome, study.n, study.times)
         status, message = solution.status, solution.message
         if callable(study.keep):
             arrays |= reduced(study.keep, solution)
@@ -225,7 +237,7 @@ class _Rows:
     """Of a solution what `record_of` reads of an outcome."""
 
     def __init__(self, solution: Any) -> None:
-        self.reached, self.last, self.solution = solution._reached, solution._last, solution
+        self.end, self.solution = solution._end, solution
 
     @property
     def rows(self):

@@ -10,12 +10,12 @@ import numpy as np
 
 from ..errors import InvalidArgument, InvalidFile, Status, StorageError
 from ..files import scene_text
-from ..simulation.options import demand_arguments_of_file
+from ..simulation.run_options import OPTIONS, demand_arguments_of_file
 from ..simulation.scene import Scene
 from ..simulation.stored_runs import hash_of
 from ..validation import damaged, demand, demand_record
 from .cases import Cases, started
-from .ensemble import OWN, given_of
+from .ensemble import OWN
 from .keeping import FINAL, TIMES
 from .results import Ensemble
 from .saving import FORMAT, REDUCED
@@ -48,8 +48,7 @@ class SavedEnsemble(Ensemble):
         self._path, self._record, self._units = path, record, dict(record["parameters"])
         study = SimpleNamespace(
             cases=Cases(columns, {}, record["count"]), keep=_lost if record["keep"] == REDUCED else record["keep"],
-            options=SimpleNamespace(times=arrays["times"].astype(float)), free=record["free"], given=_options(record),
-            scene=None,
+            times=arrays["times"].astype(float), free=record["free"], given=_options(record), scene=None,
         )  # fmt: skip
         found = {name: arrays[name].astype(float) for name in ("q", "qd")} | {"t": arrays["reached"].astype(float)}
         found |= {f"kept {name}".removesuffix(" kept" if record["is_single"] else ""): a for name, a in kept.items()}
@@ -113,8 +112,8 @@ class SavedEnsemble(Ensemble):
 
 def _options(record):
     """The arguments of the cases, checked; none that is no option of an ensemble, such as where a run is stored."""
-    options = {name: value for name, value in record["options"].items() if name not in OWN}
-    given = given_of(record["options"].get("t_span"), options)
+    options = record["options"]
+    given = {**OPTIONS, "t_span": options.get("t_span"), **{name: options[name] for name in OWN if name in options}}
     if not record["lacking"]:
         demand_arguments_of_file(given)
     demand(given["state"] is given["events"] is None, "functions and states")

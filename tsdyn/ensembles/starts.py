@@ -34,8 +34,8 @@ class Starts:
     def start(self, start):
         """The memory of forces and a consistent start; None if the start needs a scene of its own."""
         arena, kept, packed = self._arena, self._arena.kept, self._arena.kept.packed
-        given, options = arena.study.given, arena.study.options
-        t, tol, state = options.span[0], options.settings.initial_tol, given["state"]
+        study = arena.study
+        t, tol, state = study.span[0], study.options.initial_tol, study.call.state
         q, qd = start if state is None else state_arrays(state, kept.n)
         known, found = self._known
         if known is q and not arena.written & OF_ROWS:

@@ -122,7 +122,7 @@ class StoredResults:
         parameters = self.study.cases.part(slice(chunk.first, chunk.first + 1)).table
         self._table = table_of(self.study, parameters, kept)
         attributes = {"source": f"tsdyn {__version__}", DIGEST: digest_of(self.study)}
-        attributes |= {"cases": self.study.cases.count, "times": json.dumps(self.study.options.times.tolist())}
+        attributes |= {"cases": self.study.cases.count, "times": json.dumps(self.study.times.tolist())}
         make = self._format.Store
         with writing(self.path, GO_ON):
             if self.first:
@@ -222,7 +222,7 @@ def table_of(study, parameters, kept):
     names = [f"{body.name}.{x}" for body in bodies for x in ("x", "y", "z", "e0", "e1", "e2", "e3")[: body.dimension]]
     labels, grid = {"coordinate": names}, ()
     if study.keep == TIMES:
-        labels["time"], grid = [repr(t) for t in study.options.times.tolist()], ("time",)
+        labels["time"], grid = [repr(t) for t in study.times.tolist()], ("time",)
     columns = [Column(CASE, (), {"long_name": "case", "units": "1"})]
     columns += [
         Column("status", (), _said("number of the Status", "1")),
@@ -284,7 +284,7 @@ def digest_of(study):
     digest.update(
         repr((sorted(plain.items()), sources_of(functions), study.keep if not callable(study.keep) else "")).encode()
     )
-    digest.update(study.options.times.tobytes() + (f"{study.lanes} lanes".encode() if study.lanes > 1 else b""))
+    digest.update(study.times.tobytes() + (f"{study.lanes} lanes".encode() if study.lanes > 1 else b""))
     digest.update(b"" if study.free is None else repr(study.free).encode())
     state = given["state"]
     digest.update(b"" if state is None else np.asarray(state.q).tobytes() + np.asarray(state.qd).tobytes())

@@ -12,16 +12,16 @@ from .expressions import Misread
 from .reading import known_keys
 from .values import decode_number
 
-ELSEWHERE = ("t_span", "integrator", "events", "store", "checkpoint", "progress", "state")  # and functions
+DATA = (types.NUMBER, types.WHOLE, types.FLAG, types.TEXT, types.ARRAY)  # kinds of arguments that are data
 OWN = ("start", "end", "method", "every")
 END = 10.0  # s
 MOST = 10_000_000  # outputs
 
 
 def arguments(simulate):
-    """The arguments that a table may have besides its own keys."""
+    """The arguments that a table may have besides its own keys: all that are data, but for those of a store."""
     known = types.arguments_of(simulate)
-    return {name: argument for name, argument in known.items() if name not in ELSEWHERE}
+    return {name: argument for name, argument in known.items() if argument.kind in DATA and name != "checkpoint"}
 
 
 def options(table, simulate, mistakes, names):

@@ -114,9 +114,10 @@ class RememberingState(State):
 
 def remembered(state, prepared, t, q):
     """Return the memory with which a run from a state (or None) begins: joint angles, then memory of forces."""
-    if state is None and not prepared.remembers:
+    memory = getattr(state, "memory", None)
+    if not prepared.remembers and (memory is None or np.shape(memory) == (0,)):
         return NOTHING
-    slots, memory = prepared.packed.system.memory.size, getattr(state, "memory", None)
+    slots = prepared.packed.system.memory.size
     if memory is None and state is not None and slots:
         raise InvalidArgument(
             "parts of the scene count turns or hold a load, and this state doesn't say how many: give solution.state, "

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calls import fitting
+from ..calls import fitting, unknown_argument
 from ..errors import InvalidArgument, Status
-from ..formulations.registry import formulation
 from ..jit.cache import statistics
 from ..jit.kernels import DEBUG
 from ..observables.state import remembered
-from ..runs.arguments import interval, method_of, state_arrays
+from ..runs.arguments import interval, state_arrays
 from ..simulation import method_choice
+from ..simulation.prepared_run import DRIVERS
+from ..simulation.run_options import OPTIONS, from_names
 from ..simulation.scene import Scene
 from ..simulation.scene_cache import prepared
-from ..simulation.simulate import DRIVERS, simulate
+from ..simulation.simulate import simulate
 from ..simulation.turns import implicit
 from .advice import advise
 from .instrumentation import Stopwatch, Timekeeper
@@ -74,8 +75,11 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
         raise InvalidArgument("profile times compiled kernels, and with TSDYN_DEBUG=1 there are none.")
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
-    if "progress" in options:
-        raise InvalidArgument("profile makes many runs and has no progress; leave progress out.")
+    for name in options:
+        if name == "progress":
+            raise InvalidArgument("profile makes many runs and has no progress; leave progress out.")
+        if name not in OPTIONS:
+            raise unknown_argument("profile", name, ["scene", "t_span", "advice", *OPTIONS])
     if not isinstance(advice, (bool, np.bool_)):
         raise InvalidArgument(f"advice must be True or False, got {advice!r}.")
     before = dict(statistics)
@@ -86,7 +90,8 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     start, end = interval(t_span)[0], solution.reached
     if not end > start:
         solution.raise_if_failed()
-    method = _method(scene, solution, options)
+    wanted, call = from_names({"t_span": t_span, **options})
+    method = _method(scene, solution, wanted)
     plain = {name: value for name, value in options.items() if name not in (*OUTPUTS, "integrator", "rtol", "atol")}
     plain["t_eval"] = (start, end)
 
@@ -106,7 +111,7 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     outside += _outputs(asked, least, chosen, solution)
     if "chosen" in least:
         outside.append(Phase("choice of the method", "steps by the other one", 1, max(least["asked"] - chosen, 0.0)))
-    once = _once(scene, method, options, start)
+    once = _once(scene.copy(), method, wanted, call.state, start)
     result = Profile(
         scene, solution, method, (start, end), least["asked"], least["driver"], (*found, *outside), once, loaded,
         orders(entries) if series else (),
@@ -133,20 +138,12 @@ def _without(options):
     return {name: value for name, value in options.items() if name not in ("rtol", "atol")}
 
 
-def _first(scene, options):
-    """Return the initial default method."""
-    series = options.get("formulation", "tangent") == "tangent" and options.get("chart_interval") is None
-    return method_choice.explicit(prepared(scene), options.get("rtol"), options.get("atol"), series)
-
-
 def _method(scene, solution, options):
     """Return the method of a solution, of most of its time if it has turned."""
-    if options.get("integrator") is not None:
-        return method_of(options["integrator"], options.get("rtol"), options.get("atol"))
-    method = _first(scene, options)
-    if solution.method.startswith(repr(method)):
+    method = method_choice.first_method(options, prepared(scene))
+    if options.method is not None or solution.method.startswith(repr(method)):
         return method
-    return implicit(method, prepared(scene), formulation(options.get("formulation", "tangent")))
+    return implicit(method, prepared(scene), options.form)
 
 
 def _observed(method, observer):
@@ -189,10 +186,9 @@ def _outputs(asked, least, chosen, solution):
     return [Phase("outputs", OUTPUTS[name], calls[name], value * share) for name, value in more.items()]
 
 
-def _once(scene, method, options, start):
-    """Return seconds of work that only the first call of a scene does."""
+def _once(scene, method, options, state, start):
+    """Return seconds of work that only the first call of a scene does; of a scene that hasn't been packed."""
     seconds, clock = {}, time.perf_counter
-    scene.touch()
     began = clock()
     scene.packed  # noqa: B018
     seconds["packing"] = clock() - began
@@ -200,16 +196,13 @@ def _once(scene, method, options, start):
     if method.driver == "series":
         kept.series  # noqa: B018
     else:
-        form = formulation(options.get("formulation", "tangent")).serving(method)
+        form = options.form.serving(method)
         form.graph(kept.packed)
         kept.system(method.implicit)
     seconds["order of elimination"] = clock() - began
-    state = options.get("state")
     given = scene.start if state is None else state_arrays(state, kept.n)
     began = clock()
     memory = remembered(state, kept, start, given[0])
-    kept.start(
-        scene, given, start, options.get("initial_tol", 1e-9), memory, options.get("redundancy", "drop") == "drop"
-    )
+    kept.start(scene, given, start, options.initial_tol, memory, options.redundancy == "drop")
     seconds["check of the start"] = clock() - began
     return seconds

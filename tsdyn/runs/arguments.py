@@ -7,11 +7,10 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..methods.integrator import Integrator, is_own, registered
-from ..validation import checked_once, finite_vector, floats, number, shown, unknown_name
+from ..validation import FEW, checked_once, finite_vector, floats, number, shown, unknown_name
 from .tolerances import EPS, FROM_ZERO, SAME_COUNT, SHORTEST
 
 TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
-FEW = 50  # times that a list serves faster than an array: 0.4 us instead of 2
 NO_TIMES = np.empty(0)
 
 
@@ -64,7 +63,7 @@ def step_count(t0, t1, step):
 
 def demand_steps_seen(method, t0, t1):
     """Refuse steps given to an adaptive method that are no more than the rounding of the times."""
-    if not getattr(method, "embedded_order", 0) or method.step is not None:
+    if (method.max_step is None and method.first_step is None) or not method.embedded_order or method.step is not None:
         return
     for name, value, latest in (
         ("max_step", method.max_step, max(abs(t0), abs(t1))),
@@ -80,7 +79,8 @@ def demand_steps_seen(method, t0, t1):
 
 def demand_one_state(value, rule):
     """Refuse a solution or an equilibrium, which has a state and is none."""
-    if np.ndim(getattr(value, "q", 0)) != 1 and hasattr(value, "state"):
+    q = getattr(value, "q", 0)
+    if (q.ndim if type(q) is np.ndarray else np.ndim(q)) != 1 and hasattr(value, "state"):
         raise InvalidArgument(f"{rule}: give the .state of {value!r}.")
 
 

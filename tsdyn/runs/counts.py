@@ -3,9 +3,6 @@
 from collections.abc import Mapping
 from operator import attrgetter
 
-from ..workspaces.run_state import Numbers
-from ..workspaces.workspace import Counters
-
 _READ = {
     "steps": attrgetter("numbers.steps"),
     "rejected": attrgetter("numbers.rejected"),
@@ -52,14 +49,6 @@ class Counts(Mapping):
     def __init__(self, numbers, counters, largest_landing, skipped, has_forces):
         self.numbers, self.counters, self.largest_landing = numbers, counters, largest_landing
         self.skipped, self.has_forces = skipped, has_forces
-
-    @classmethod
-    def of(cls, memory):
-        """Those of a run that has ended there."""
-        run, told = memory.run, memory.told
-        numbers = Numbers.from_buffer_copy(run.numbers)
-        counters = Counters.from_buffer_copy(memory.work.counters)
-        return cls(numbers, counters, run.clock.largest_landing, told.skipped, told.has_forces)
 
     def __getitem__(self, name):
         return _READ[name](self)

@@ -1,7 +1,6 @@
 """Run workspace of a driver, allocated once and reused by successive runs."""
 
 import math
-from operator import is_
 from typing import NamedTuple
 
 from ..errors import Status
@@ -19,8 +18,8 @@ UNLIMITED = 2**62  # steps wanted of an adaptive run
 STATUSES = {int(status): status for status in Status}
 
 
-class Told(NamedTuple):
-    """What the records of a run don't say."""
+class Layout(NamedTuple):
+    """What the records of a run don't say, of a memory as it is laid out."""
 
     n: int
     remembered: int  # angles and slots
@@ -44,8 +43,8 @@ class Memory:
 
     reason = ""  # of the end of a run, beyond its status
     engine = None  # that it is laid out for
-    room = None  # of a first slice: a `brief.Room`
-    mark = None  # of the plan that has entered it last
+    arrays = None  # of a first slice: `run.SliceArrays`
+    layout = None  # a `Layout`
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 
     def __init__(self, prepared, graph, context, run):
@@ -58,8 +57,9 @@ class Memory:
         self.run_state, self._run_scratch = divided(run.now.base, run.clock, run.numbers, run.kernels, *tables)
         self._laid_out = [self.run_state, self.state]  # what a run finds as it was laid out,
         self._scratch = [rest] if rest.size else []  # and what it finds zero
-        self._images, self._start = [], ()
-        self._entered, self._whole = (None, None), []
+        arrays, records = selection_parts(context.tangent)
+        self._selected = [*arrays, *map(words, records)]
+        self._asked, self._start, self._images = None, None, []  # what it is laid out for, and how it is then
 
     def bind(self, context, header=()):
         """Let the kernels find this context, behind the integers of a header."""
@@ -72,56 +72,32 @@ class Memory:
         return self._context, self._run
 
     def enter(self, engine, task, may_pass):
-        """As if it were new, for an engine and a task: what a run before has left behind is gone."""
-        self.mark = None
-        self._clear_scratch()
-        start = task.q, task.qd, task.constraint_tol
-        # A new engine lays out the memory; otherwise its image is restored
-        if self.engine is not engine:
-            self._lay_out(engine, task)
-            self._images, self._start = [(array, array.copy()) for array in self._laid_out], start
+        """As if it were new, for an engine and a task: what a run before has left behind is gone.
+
+        It is laid out for an engine and options, and an image of that is copied for further runs of the same.
+        """
+        asked = (
+            task.constraint_tol, task.dense_output, task.events is None, task.interval, task.choose is None, may_pass,
+        )  # fmt: skip
+        if self._scratch:
+            self._clear_scratch()
+        if self.engine is not engine or self._asked != asked:
+            self._lay_out(engine, task, may_pass)
+            self._images = [(array, array.copy()) for array in [*self._laid_out, *self._selected] if array.size]
+            self._asked, self._start = asked, (task.q, task.qd)
         else:
             for array, image in self._images:
                 array[...] = image
-            if not all(map(is_, start, self._start)):
-                self._enter_start(*start[:2])
-                self._hold(task)
+            if task.q is not self._start[0] or task.qd is not self._start[1]:
+                self._enter_start(task)
         self.context.system.reals[...] = self.reals  # motions, signals and what forces remember are written there
         if task.remembered.size:
             self._remember(task.remembered, task.prepared.handles)
-        reset_selection(self.graph, self.context.tangent)
-        self._set_out(task, may_pass)
-
-    def enter_again(self, plan, engine, stretch, start):
-        """As `enter`, for a run of a `simulation.plan.Plan`: what the plan has entered before is copied from an image.
-
-        stretch, start: as of the plan; the same objects as long as they are the same.
-        """
-        if self.mark is not plan.mark or self.engine is not engine:
-            self.enter(engine, plan.task_of(stretch, start, plan.task.choose), plan.may_pass)
-            self._whole = [(array, array.copy()) for array in self._set() if array.size]
-            self.mark, self._entered = plan.mark, (stretch, start)
-            return
-        if self._scratch:
-            self._clear_scratch()
-        for array, image in self._whole:
-            array[...] = image
-        of_stretch, of_start = self._entered
-        if stretch is not of_stretch:
-            self._enter_span(stretch.span, stretch.steps)
-        if start is not of_start:
-            self._enter_start(start.q, start.qd)
-            if start.remembered.size:
-                self._remember(start.remembered, plan.kept.handles)
+        self._enter_span(task)
 
     def entered(self):
-        """The arrays that `enter` sets, laid out."""
-        return [*self._scratch, *self._set()]
-
-    def _set(self):
-        """The same, but for those that it clears."""
-        arrays, records = selection_parts(self.context.tangent)
-        return [*self._laid_out, self.context.system.reals, *arrays, *map(words, records)]
+        """The arrays that `enter` sets."""
+        return [*self._scratch, *self._laid_out, self.context.system.reals, *self._selected]
 
     def _clear_scratch(self):
         for array in self._scratch:
@@ -130,17 +106,21 @@ class Memory:
             else:
                 _clear(array)
 
-    def _lay_out(self, engine, task):
+    def _lay_out(self, engine, task, may_pass):
         """Enter what engine and task say, and load the driver where this process has not called it yet."""
         self.engine = None
         for array in self._laid_out:
             array.fill(0)
         self._enter_method(engine.method)
         engine.lay_out(self)
-        self.engine = engine
-        self.told = Told(self.run.now.shape[1], self.run.remembered.size, engine.skipped, bool(self.packed.loads))
-        self._enter_start(task.q, task.qd)
-        self._hold(task)
+        engine.layouts += 1
+        self.engine, numbers = engine, self.run.numbers
+        self.layout = Layout(self.run.now.shape[1], self.run.remembered.size, engine.skipped, bool(self.packed.loads))
+        self._enter_start(task)
+        reset_selection(self.graph, self.context.tangent)
+        numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
+        numbers.may_pass, numbers.chart_interval = may_pass, task.interval
+        numbers.leave_when_stiff = task.choose is not None
         self.load()
 
     def _enter_method(self, method):
@@ -154,15 +134,12 @@ class Memory:
         else:
             clock.h = method.step
 
-    def _enter_start(self, q, qd):
-        """Positions and velocities."""
+    def _enter_start(self, task):
+        """Positions and velocities, and how closely the constraints are held."""
         work, run = self.work, self.run
-        work.q[...], work.qd[...] = q, qd
-        run.now[0], run.now[1] = q, qd
-
-    def _hold(self, task):
-        """How closely the constraints are held."""
-        hold(self.work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
+        work.q[...], work.qd[...] = task.q, task.qd
+        run.now[0], run.now[1] = task.q, task.qd
+        hold(work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
 
     def _remember(self, remembered, handles):
         """Angles of joints, and what forces remember."""
@@ -171,21 +148,13 @@ class Memory:
         if own.memory.size:
             own.reals[own.memory] = remembered[len(run.joints) :]
 
-    def _set_out(self, task, may_pass):
-        """The interval, and what the run is to do."""
-        step, numbers = task.method.step, self.run.numbers
-        self._enter_span(task.span, 0 if step is None else step_count(*task.span, step))
-        numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
-        numbers.may_pass, numbers.chart_interval = may_pass, task.interval
-        numbers.leave_when_stiff = task.choose is not None
-
-    def _enter_span(self, span, steps):
-        """The interval, s, and how many fixed steps it takes; 0 of an adaptive method."""
-        clock = self.run.clock
-        clock.t = clock.t_origin = span[0]
-        clock.t_end = span[1]
-        if steps:
-            self.run.numbers.steps_wanted = steps
+    def _enter_span(self, task):
+        """The interval, s, and how many fixed steps it takes."""
+        clock, step = self.run.clock, task.method.step
+        clock.t = clock.t_origin = task.span[0]
+        clock.t_end = task.span[1]
+        if step is not None:
+            self.run.numbers.steps_wanted = step_count(*task.span, step)
 
     def saved(self):
         """What is to be saved of it beside its arrays: nothing."""

@@ -3,7 +3,7 @@
 from .event_search import Watch
 
 
-class Relay:
+class SegmentLink:
     """Handed from part to part of a run: its events, and how near to a singular configuration it has come.
 
     Parameters

@@ -12,6 +12,7 @@ from contextlib import suppress
 from functools import cached_property
 
 from ..errors import InconsistentState, SingularConfiguration, Status
+from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..observables.not_finite import not_finite
 from ..rows.interface import redundant_of
@@ -29,6 +30,11 @@ FIRST_SLICE, FIRST_WORK = 1024, 1 << 15  # steps; coordinates stepped on, unless
 def first_slice(weight):
     """How many steps of this `weight` there are in a first slice."""
     return min(max(FIRST_WORK // weight, 1), FIRST_SLICE)
+
+
+def step_limit(run, task):
+    """How many steps a run may make."""
+    return run.numbers.steps_wanted + len(task.stops) if task.max_steps is None else task.max_steps
 
 
 class Pace:
@@ -75,8 +81,7 @@ class Slices:
     def __init__(self, memory, task, watch, recorder):
         self.memory, self.task, self.watch, self.recorder = memory, task, watch, recorder
         self.run, self.choose = memory.run, task.choose
-        wanted = self.run.numbers.steps_wanted
-        self.limit = wanted + len(task.stops) if task.max_steps is None else task.max_steps
+        self.limit = step_limit(self.run, task)
         self.most = first_slice(memory.weight)
         self.status, self.reason = SLICE_DONE, ""
 
@@ -85,16 +90,16 @@ class Slices:
         """The `Pace` of the run."""
         return Pace(self.task.span[0])
 
-    def drive(self, begun=None):
-        """Advance until the end, from the `Begun` of a run on."""
-        rows = self._rows() if begun is None else begun.rows
+    def drive(self, first=None):
+        """Advance until the end, from the `run.StartedRun` of a run on."""
+        rows = self._rows() if first is None else first.rows
         while self.status is SLICE_DONE:
-            if begun is None:
+            if first is None:
                 self.recorder.begin_slice(rows)
                 self._adapt(rows, self._advance(rows))
             else:
-                self._go_on(begun)
-                begun = None
+                self._go_on(first)
+                first = None
             self._look_up()
             if self.status is SLICE_DONE:
                 rows = self._rows()
@@ -120,13 +125,13 @@ class Slices:
         self._end_slice(status)
         return seconds
 
-    def _go_on(self, begun):
+    def _go_on(self, first):
         """From the end of a first slice."""
-        self.recorder.adopt(begun.log)
-        if begun.status is None:
+        self.recorder.adopt(first.log)
+        if first.status is None:
             raise KeyboardInterrupt
-        self._end_slice(begun.status)
-        self._adapt(begun.rows, begun.seconds)
+        self._end_slice(first.status)
+        self._adapt(first.rows, clock() - first.began)
 
     def _end_slice(self, status):
         """Take the status of a slice; refuse a run that could not begin."""
@@ -240,8 +245,8 @@ def _warn_of(error, t):
         )
 
 
-def drive(memory, task, watch, begun=None):
-    """Drive a run to its end, from its `Begun` on; Status, what there is to say of it, and the closed `Recorder`.
+def drive(memory, task, watch, first=None):
+    """Drive a run to its end; Status, what there is to say of it, and the closed `Recorder`. first: a `run.StartedRun`.
 
     Where `task.choose` says that another method goes on, the run ends with Status.STIFF.
     """
@@ -251,7 +256,7 @@ def drive(memory, task, watch, begun=None):
         slices.restore(*task.archive.resumed)
         task.archive.resumed = None
     try:
-        slices.drive(begun)
+        slices.drive(first)
     except OSError as error:
         if task.archive is None:
             raise

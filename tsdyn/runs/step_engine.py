@@ -20,6 +20,8 @@ NOTHING = np.empty((2, 0), np.int64)
 class StepEngine:
     """A run by a method with a step kernel, in a formulation."""
 
+    layouts, readings = 0, (None, (None, None))
+
     def __init__(self, prepared, method, form, within):
         self.method, self.form, self.within = method, (form := form.serving(method)), within
         n, m, packed = prepared.n, prepared.m, prepared.packed

@@ -4,14 +4,13 @@ The attribute `driver` of a method is a name in simulate.DRIVERS, or a driver fu
 an `Outcome`.
 """
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import Status
 from ..motions.knots import NO_STOPS
-from .history import ChartLog, StepLog
+from .run_end import RunEnd
 
 
 def between(times, span):
@@ -33,6 +32,7 @@ class Task(NamedTuple):
     qd: np.ndarray  # (n,)
     remembered: np.ndarray  # (angles + slots,) angles of joints at the start, and what forces remember
     times: np.ndarray  # (k,) output times, s; empty for every step
+    within: bool  # whether output between the ends of steps is requested
     dense_output: bool
     events: list  # of `events.Event`, or None
     constraint_tol: float
@@ -40,7 +40,7 @@ class Task(NamedTuple):
     interval: int  # steps between charts that are forced; 0 for none
     report: object  # a function of the fraction done (None at the end), the time, s, and the steps of the segment
     history: bool  # whether the histories of steps and charts are kept
-    choose: object  # says after how many steps, and whether, another method goes on: see simulation/turns.py; or None
+    choose: object  # a function that makes the `Turns` of a run, or the `Turns`; None where no other method goes on
     stops: np.ndarray = NO_STOPS  # times at which a step ends, as of `motions.knots.stops_of`
     sampling: object = None  # a `sampling.Sampling`, or None
     archive: object = None  # a `storage.archive.Archive` that outputs and histories go to, or None
@@ -50,11 +50,6 @@ class Task(NamedTuple):
         """Of the joints at the start (angles,)."""
         return self.remembered[: self.prepared.handles.count]
 
-    @property
-    def within(self):
-        """True if output between the ends of steps is requested."""
-        return self.dense_output or self.events is not None or between(self.times, self.span)
-
 
 class Outcome(NamedTuple):
     """How a run went: arrays of its own, shared with no other run."""
@@ -62,12 +57,7 @@ class Outcome(NamedTuple):
     status: Status
     reason: str  # what there is to say about the status
     rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered; a range where an archive has them
-    steps: StepLog  # or None
-    charts: ChartLog  # or None
-    reached: float  # s
-    last: np.ndarray  # (3, n)  q, qd, qdd there
-    remembered: np.ndarray  # (angles + slots,)  there
-    counts: Mapping  # of `Solution.stats`
+    end: RunEnd  # or a `RecordedEnd`
     trajectory: object  # a `trajectory.Trajectory`, or None
     events: tuple  # times, positions, velocities of each event; or None
     began: float  # by `jit.compiled.clock` when the driver began, prepared

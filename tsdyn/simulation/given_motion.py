@@ -12,6 +12,7 @@ from ..errors import InvalidArgument, Status
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
 from ..runs.counts import NAMES
+from ..runs.run_end import RunEnd
 from ..runs.task import Outcome
 from ..validation import counted
 from .scene_cache import prepared
@@ -37,10 +38,8 @@ class GivenMotion(Solution):
         counts = dict.fromkeys(NAMES, 0) | {
             name: getattr(followed, name) for name in ("steps", "rejected", "factorizations", "newton_iterations")
         }
-        outcome = Outcome(
-            followed.status, "", followed.rows, None, None, followed.reached, followed.last, followed.remembered,
-            counts, None, None, 0.0,
-        )  # fmt: skip
+        end = RunEnd(followed.reached, followed.last, followed.remembered, counts, None, None)
+        outcome = Outcome(followed.status, "", followed.rows, end, None, None, 0.0)
         super().__init__(scene, task, outcome, {"prepare": 0.0, "run": followed.seconds})
         self._method, self._message = type(self)._method, message or _account(self, scene, wanted)
 

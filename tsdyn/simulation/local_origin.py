@@ -17,6 +17,7 @@ from ..model.derived import Derived
 from ..model.lengths import size_of
 from ..model.packed import classes
 from ..runs.events import Instant
+from ..runs.run_end import RunEnd
 from .scene_cache import Prepared
 from .tolerances import FAR_ORIGIN
 
@@ -114,7 +115,8 @@ def run_near(driver, task, scene, origin, tol):
         task.archive.shift = shift
     watched = task.events and [each._replace(function=_away(each.function, packed, shift)) for each in task.events]
     outcome = driver(task._replace(prepared=local, q=q, qd=qd, events=watched))
-    rows, last, events = outcome.rows, outcome.last.copy(), outcome.events
+    rows, end, events = outcome.rows, outcome.end, outcome.events
+    last = end.last.copy()
     if task.archive is None:
         rows = rows.copy()
         rows[:, 1 : 1 + shift.size] += shift
@@ -123,7 +125,8 @@ def run_near(driver, task, scene, origin, tol):
         times, positions, *rest = events
         events = times, [each + shift for each in positions], *rest
     trajectory = outcome.trajectory and _Moved(outcome.trajectory, shift)
-    return outcome._replace(rows=rows, last=last, events=events, trajectory=trajectory)
+    end = RunEnd(end.reached, last, end.remembered, end.counts, end.steps, end.charts)
+    return outcome._replace(rows=rows, end=end, events=events, trajectory=trajectory)
 
 
 def _local(prepared, scene, origin):

@@ -4,29 +4,40 @@ Taylor steps with sharp forces are shorter, and no quicker than those of DOP853 
 series fail, the run begins again with DOP853. Where the motion is found stiff, the implicit method goes on: turns.py.
 """
 
+from functools import partial
+
 from ..errors import Status
 from ..integrators import DOP853, Taylor
+from ..methods.integrator import frozen
 from ..runs.arguments import adaptive
 from .turns import Turns
 
 
-def explicit(prepared, rtol, atol, series):
-    """Return the initial method; series: True if Taylor is admissible."""
-    return adaptive(Taylor if series and not prepared.refusal and prepared.pays else DOP853, rtol, atol)
+def first_method(options, prepared):
+    """Return the method that a run of these `RunOptions` begins with."""
+    method = options.method
+    if method is None:
+        series = options.may_use_series and not prepared.refusal and prepared.pays
+        method = adaptive(Taylor if series else DOP853, options.rtol, options.atol)
+    return method if options.max_step is None else frozen(method.bounded(options.max_step))
 
 
-def reason(prepared):
-    """Return the initial method, and why, in words."""
+def reason(options, prepared):
+    """Say why a run of these `RunOptions` begins with its first method."""
+    if options.method is not None:
+        return "as asked."
+    if not options.may_use_series:
+        return "series serve the tangent form alone, and make their charts themselves."
     if prepared.refusal:
-        return f"DOP853. {prepared.refusal}"
+        return prepared.refusal
     if not prepared.pays:
-        return "DOP853: a force changes sharply, and without constraints series are no quicker."
-    return "Taylor: every constraint and force has a series. Radau takes over where the motion is found stiff."
+        return "a force changes sharply, and without constraints series are no quicker."
+    return "every constraint and force has a series. Radau takes over where the motion is found stiff."
 
 
-def turns_of(scene, prepared, method, options):
-    """The `Turns` of a run by the initial method; None in a form that no implicit method serves."""
-    return None if options.settings.form.first_order else Turns(scene, prepared, method, options)
+def turns_of(scene, prepared, method, form, span, within):
+    """What makes the `Turns` of a run by the default method; None in a form that no implicit method serves."""
+    return None if form.first_order else partial(Turns, scene, prepared, method, form, span, within)
 
 
 def instead(task, status):

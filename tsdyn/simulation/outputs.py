@@ -16,15 +16,6 @@ if TYPE_CHECKING:
     from ..hints import Floats
 
 _COLUMNS = {"t": "time", "q": "q", "qd": "qd", "qdd": "qdd", "anchor": "remembered", "_remembers": "remembered"}
-_REMAINS = {  # of a run that leaves its `brief.Remains`: made when it is asked for
-    "_reached": lambda of, angles: of.reached,
-    "_last": lambda of, angles: of.last,
-    "_angles": lambda of, angles: of.remembered[:angles],
-    "_remembered": lambda of, angles: of.remembered[angles:],
-    "_step_log": lambda of, angles: of.steps,
-    "_chart_log": lambda of, angles: of.charts,
-    "_counts": lambda of, angles: of.counts,
-}
 
 
 class Outputs:
@@ -35,6 +26,15 @@ class Outputs:
     qd: Floats
     qdd: Floats
     handles: Any
+    _end: Any  # a `RunEnd`, or a `RecordedEnd`
+
+    _reached = property(lambda self: self._end.reached)
+    _last = property(lambda self: self._end.last)
+    _angles = property(lambda self: self._end.remembered[: self.handles.count])
+    _remembered = property(lambda self: self._end.remembered[self.handles.count :])
+    _step_log = property(lambda self: self._end.steps)
+    _chart_log = property(lambda self: self._end.charts)
+    _counts = property(lambda self: self._end.counts)
 
     def _take(self, rows, n):
         """Take the rows (k, 1 + 3 n + angles + slots) of a run, or its `StoredOutputs`."""
@@ -58,8 +58,6 @@ class Outputs:
             self._unpack(*rows)
         if name in _COLUMNS and name in self.__dict__:  # made now, or by another thread
             return self.__dict__[name]
-        if name in _REMAINS and "_remains" in self.__dict__:
-            return self.__dict__.setdefault(name, _REMAINS[name](self._remains, self.handles.count))
         if stored is None or name not in _COLUMNS:
             raise lacking(self, name)
         found = stored.read(_COLUMNS[name], self._slice)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidFile, StorageError
 from ..validation import clipped, damaged
-from .options import demand_arguments_of_file
 from .outlines import Lacking
+from .prepared_run import Run
+from .run_options import demand_arguments_of_file, from_names
 from .run_requests import arguments_of
 from .scene import Scene
 from .scene_cache import prepared
-from .simulate import run_from
 from .stored_runs import demand_path, demand_same_place, demand_same_scene
 
 if TYPE_CHECKING:
@@ -85,7 +85,8 @@ def _resumed(path, numbers, arrays, scene, events=None, progress=None):
         given = arguments_of(numbers["arguments"], arrays, scene)
         demand_arguments_of_file({**given, "store": path})
     given |= {"events": events, "progress": progress, "store": path, "checkpoint": numbers["interval"]}
-    return run_from(given, numbers, arrays)
+    options, call = from_names(given)
+    return Run(scene, options)._solve(call, (numbers, arrays))
 
 
 def _scene_of(path, numbers, arrays):

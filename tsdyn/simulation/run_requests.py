@@ -67,9 +67,9 @@ def request_of(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def arguments_of(numbers: dict[str, Any], arrays: dict[str, Any], scene: Scene) -> dict[str, Any]:
-    """The arguments of a run of a scene, by name; raises KeyError, TypeError or ValueError where they are none."""
+    """The arguments of `simulate` for a scene, by name; KeyError, TypeError or ValueError where they are none."""
     method = numbers["method"]
-    given = {**numbers["options"], "scene": scene, "state": None}
+    given = {**numbers["options"], "state": None}
     given["integrator"] = method if method is None or isinstance(method, str) else method_of(method)
     found = {name: arrays.get(f"state.{name}") for name in STATE}
     if found["q"] is not None:

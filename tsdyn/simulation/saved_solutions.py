@@ -11,7 +11,8 @@ import numpy as np
 from ..errors import InvalidArgument, InvalidFile, Status
 from ..model.handles import handles_of
 from ..observables.diagnostics import ConstraintError
-from ..runs import counts
+from ..runs.counts import NAMES
+from ..runs.run_end import RunEnd
 from ..validation import damaged, demand, demand_numbers, demand_record
 from .outlines import Lacking, complete, outline_of, row_labels, scene_of, width_of
 from .stored_runs import demand_path, demand_same_scene, hash_of, provenance_of
@@ -259,7 +260,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
     n = int(packed.system.bodies[:, 1].sum())
     arrays = {name: array if name in ("scene", "outline") else array.astype(float) for name, array in arrays.items()}
     demand(arrays["last"].shape == (3, n) and arrays["angles"].size + arrays["memory"].size == width, "its last state")
-    demand_numbers(record["counts"], counts.NAMES)
+    demand_numbers(record["counts"], NAMES)
     demand_numbers(record["seconds"], ("prepare", "run"))
     start, end = record["span"]
     demand_numbers({"start": start, "end": end, "error": record["energy_error"]}, ("start", "end", "error"), ("error",))
@@ -273,13 +274,15 @@ def _solution(path, record, arrays, scene, kind, width=None):
     if record.get("trajectory") is not None:
         dense = {name.removeprefix("dense_"): array for name, array in arrays.items() if name.startswith("dense_")}
         trajectory = trajectory_of(record["trajectory"], dense, scene, packed)
+    run_end = RunEnd(
+        record["reached"], arrays["last"], np.concatenate((arrays["angles"], arrays["memory"])), record["counts"],
+        StoredLog.of(outputs, "steps"), StoredLog.of(outputs, "charts"),
+    )  # fmt: skip
     vars(found).update(
         scene=scene, packed=packed, system=packed.system, handles=handles_of(packed),
         formulation=record["formulation"], span=tuple(record["span"]), status=Status(record["status"]),
         t_events=events[0], q_events=events[1], qd_events=events[2],
-        _method=record["method"], _trajectory=trajectory, _reached=record["reached"], _last=arrays["last"],
-        _angles=arrays["angles"], _remembered=arrays["memory"], _counts=record["counts"], _seconds=record["seconds"],
-        _step_log=StoredLog.of(outputs, "steps"), _chart_log=StoredLog.of(outputs, "charts"),
+        _method=record["method"], _trajectory=trajectory, _end=run_end, _turned="", _seconds=record["seconds"],
         _energy_error=record["energy_error"], _reason=record["reason"], _message=record["message"],
         _provenance=record["provenance"],
     )  # fmt: skip

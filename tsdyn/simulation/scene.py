@@ -34,6 +34,7 @@ from .editing import copy as _copy
 from .editing import remove as _remove
 from .inverse_dynamics import inverse_dynamics as _inverse_dynamics
 from .kinematics import kinematics as _kinematics
+from .scene_cache import preparing
 from .scene_imported import OfFile
 from .scene_saving import save as _save
 from .scene_table import summary, table
@@ -333,9 +334,14 @@ class Scene(OfFile):
 
     def _initial(self):
         """The same, until the scene changes the same arrays, not to be written to."""
-        if self._start is None:
-            self._start = tuple(np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
-        return self._start
+        start = self._start
+        if start is None:
+            with preparing:
+                start = self._start
+                if start is None:
+                    q, qd = (np.concatenate([getattr(body, x) for body in self._bodies]) for x in ("q", "qd"))
+                    self._start = start = q, qd
+        return start
 
     def body(self, name: str) -> Body | Any:
         """Return the body of this name."""

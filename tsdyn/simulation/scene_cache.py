@@ -2,6 +2,7 @@
 
 import copy
 from functools import cached_property
+from threading import RLock
 
 import numpy as np
 
@@ -22,11 +23,13 @@ from ..runs.sampling import instants_of, sampled
 from ..taylor.layout import pays, refusal
 from ..taylor.run_memory import Series
 
+preparing = RLock()  # threads that prepare a scene at once share what they find
 SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocate nothing
 OF_NUMBERS = {"implicit", "spheres", "series", "sampled"}  # what `Prepared` derives from them
 KINDS = 8  # kinds of memory, and shapes of a scene, at most
 LARGEST = 1 << 24  # bytes of a memory that is kept, at most
-SMALL = 1 << 20  # the same where several plans have one each
+SMALL = 1 << 20  # the same where engines that take turns have one each
+FEW_LAYOUTS = 2  # of memories that other engines have used
 
 
 def prepared(scene):
@@ -37,7 +40,10 @@ def prepared(scene):
         scene.refresh()
     kept = scene._prepared
     if kept is None:
-        kept = scene._prepared = Prepared(scene, scene.packed)
+        with preparing:
+            kept = scene._prepared
+            if kept is None:
+                kept = scene._prepared = Prepared(scene, scene.packed)
     return kept
 
 
@@ -52,7 +58,7 @@ class Prepared:
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
         self._start = (None, None), None
-        self.plans = {}  # of calls of `simulate`; see plans.py
+        self.runs = ()  # the last ones that `simulate` has prepared
         self.remembers = bool(packed.system.memory.size or handles_of(packed).count)
         every = scene.__dict__.setdefault("_spare", {})
         if len(every) >= KINDS:
@@ -65,7 +71,7 @@ class Prepared:
         other = copy.copy(self)
         for name in OF_NUMBERS & vars(other).keys():
             del vars(other)[name]
-        other.packed, other._start, other._spare, other.plans = packed, ((None, None), None), {}, {}
+        other.packed, other._start, other._spare, other.runs = packed, ((None, None), None), {}, ()
         other.handles = handles_of(packed)
         return other
 
@@ -188,15 +194,15 @@ class Prepared:
 
         That of a plain method serves again until other rows or bodies take part in the equations.
         """
-        if not is_plain(method):
-            return kind(self, method, form, within)
         known, key = self.packed.derived.engines, (kind, method, form.name, within)
         engine = known.get(key)
         if engine is None:
-            if len(known) >= KINDS:
-                known.clear()
             with CollectionsDeferred():
-                engine = known[key] = kind(self, method, form, within)
+                engine = kind(self, method, form, within)
+            if is_plain(method):
+                if len(known) >= KINDS:
+                    known.clear()
+                known[key] = engine
         return engine
 
     def system(self, implicit):
@@ -230,19 +236,36 @@ class Prepared:
         demand_unique(self.packed, start[0], t)
         return hold(self.packed, *start)
 
-    def take(self, kind, mark=None):
-        """Return an idle memory of a kind, for one run; None if there is none. Preferably one with this mark."""
-        try:
-            spare = self._spare[kind]
-            if mark is not None and spare[-1].mark is not mark:
-                for i, memory in enumerate(spare[:-1]):
-                    if memory.mark is mark:
-                        return spare.pop(i)  # another one, if a thread has been quicker
-            return spare.pop()
-        except (KeyError, IndexError):
-            return None
+    def take(self, engine):
+        """An idle memory for one run by an engine, laid out for it where there is such a one; else a new one.
 
-    def has_room(self, memory):
+        Engines that take turns have one each after some runs.
+        """
+        try:
+            spare = self._spare[engine.kind]
+            memory = spare.pop()
+            if memory.engine is engine:
+                return memory
+            for other in [*spare]:
+                if other.engine is engine:
+                    spare.remove(other)  # ValueError if a thread has been quicker
+                    spare.append(memory)
+                    return other
+        except (KeyError, IndexError, ValueError):
+            return self.new_memory(engine)
+        if not engine.serves(memory):
+            return self.new_memory(engine)
+        if engine.layouts > FEW_LAYOUTS and self._has_room(memory):
+            self.give(engine.kind, memory)
+            return self.new_memory(engine)
+        return memory
+
+    @CollectionsDeferred()
+    def new_memory(self, engine):
+        """A memory of its own for a run."""
+        return engine.memory(self)
+
+    def _has_room(self, memory):
         """Whether one more memory like this one is kept."""
         return sum(map(len, [*self._spare.values()])) < KINDS - 1 and memory.nbytes <= SMALL
 
@@ -250,9 +273,11 @@ class Prepared:
         """Take back a memory that is no longer in use."""
         if memory.nbytes > LARGEST:
             return
-        if len(self._spare) >= KINDS:
-            self._spare.clear()
-        spare = self._spare.setdefault(kind, [])
+        spare = self._spare.get(kind)
+        if spare is None:
+            if len(self._spare) >= KINDS:
+                self._spare.clear()
+            spare = self._spare.setdefault(kind, [])
         if len(spare) < SPARE:
             spare.append(memory)
 

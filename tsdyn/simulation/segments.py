@@ -13,10 +13,11 @@ import numpy as np
 from ..configuration.holonomic import demand_holonomic
 from ..errors import Status, TsdynError
 from ..jit.compiled import clock
-from ..runs import counts
+from ..runs.counts import NAMES
 from ..runs.history import ChartLog, StepLog
-from ..runs.run import run
-from ..runs.segments import Relay
+from ..runs.run import begin, run
+from ..runs.run_end import RunEnd
+from ..runs.segments import SegmentLink
 from ..runs.step_engine import StepEngine
 from ..runs.task import Outcome
 from ..runs.trajectory import Pieces
@@ -35,28 +36,33 @@ GIVEN_UP = (  # by the implicit method: the explicit one goes on
 )  # fmt: skip
 
 
-def run_segments(task, engine, observe=None, unfinished=None):
-    """Run a `Task` by the engine of its method, or what a plan has left `Unfinished` of it; return the `Outcome`.
-
-    An observed run has one segment.
-    """
-    briefly = observe is None and asks_little(task)
-    if observe is not None or not is_relayed(task, engine):
-        return run(task, engine, observe, briefly=briefly, unfinished=unfinished)
-    relay = Relay(may_pass(task))
+def run_segments(task, engine, observe=None):
+    """Run a `Task` by the engine of its method; return the `Outcome`. An observed run has one segment."""
+    passes, begun = observe is None and may_pass(task), None
+    if task.choose is None and engine is SeriesEngine:  # there is nobody to go on
+        passes = False
+    if observe is None and asks_little(task):
+        outcome, begun = begin(task, engine, passes)
+        if outcome is not None:
+            return outcome
+    if observe is not None or (task.choose is None and not passes):
+        return run(task, engine, observe, begun=begun)
+    if task.choose is not None:
+        task = task._replace(choose=task.choose())
+    link = SegmentLink(passes)
     passed = task.archive.passed if task.archive else []
     try:
         if passed:  # a run that goes on in a later segment
             with damaged("the checkpoint"):
-                relay.share, relay.largest, relay.h = map(float, passed[-1]["relay"])
+                link.share, link.largest, link.h = map(float, passed[-1]["relay"])
                 if passed[-1]["turns"] is not None:
                     task.choose.restore(passed[-1]["turns"])
-                segments = _Segments(task, engine, relay, [_recalled(known, task) for known in passed])
+                segments = _Segments(task, engine, link, [_recalled(known, task) for known in passed])
             return segments.go_on()
         first = task if task.report is silent else task._replace(report=_until_its_end(task.report))
-        outcome = run(first, engine, relay=relay, briefly=briefly, unfinished=unfinished)
+        outcome = run(first, engine, link=link, begun=begun)
         ended = outcome.status in (PASSAGE, STIFF) or came_to_rest(task, outcome.status)
-        return _Segments(task, engine, relay, [outcome]).go_on() if ended else outcome
+        return _Segments(task, engine, link, [outcome]).go_on() if ended else outcome
     finally:
         task.report(None)
 
@@ -65,11 +71,6 @@ def asks_little(task):
     """Whether nothing is asked of a run between the ends of its slices."""
     asked = task.events is not None or task.sampling is not None or task.archive is not None
     return task.report is silent and not asked
-
-
-def is_relayed(task, engine):
-    """Whether a run may have more than one segment."""
-    return task.choose is not None or (engine is StepEngine and may_pass(task))
 
 
 def came_to_rest(task, status):
@@ -92,11 +93,9 @@ def _recalled(known, task):
     last, remembered = np.array(known["last"], float), np.array(known["remembered"], float)
     demand(last.shape == (3, task.q.size) and remembered.shape == task.remembered.shape, "the end of a segment")
     demand(known["next"] in (METHOD, IMPLICIT, CROSSING) and is_count(known["rows"]), "the parts of the run")
-    demand_numbers(known["counts"], counts.NAMES)
-    return Outcome(
-        Status(known["status"]), "", range(known["rows"]), None, None, float(known["reached"]), last, remembered,
-        known["counts"], None, None, clock(),
-    )  # fmt: skip
+    demand_numbers(known["counts"], NAMES)
+    end = RunEnd(float(known["reached"]), last, remembered, known["counts"], None, None)
+    return Outcome(Status(known["status"]), "", range(known["rows"]), end, None, None, clock())
 
 
 class _Segments:
@@ -108,12 +107,12 @@ class _Segments:
         The whole run's.
     engine : type
         Of its method.
-    relay : Relay
+    link : SegmentLink
     parts : list of Outcome
     """
 
-    def __init__(self, task, engine, relay, parts):
-        self.task, self.engine, self.relay, self.parts, self.turns = task, engine, relay, parts, task.choose
+    def __init__(self, task, engine, link, parts):
+        self.task, self.engine, self.link, self.parts, self.turns = task, engine, link, parts, task.choose
         self.roles, self.raised = [METHOD], ""
         self.passed = [] if task.archive is None else task.archive.passed
         if self.passed:
@@ -126,7 +125,7 @@ class _Segments:
         parts, role = self.parts, self.passed[-1]["next"] if self.passed else self._pass()
         try:
             while role is not None:
-                if self.relay.interrupted:
+                if self.link.interrupted:
                     raise KeyboardInterrupt
                 rest = self._rest()
                 if rest.max_steps == 0:
@@ -151,7 +150,7 @@ class _Segments:
 
         Its per-step outputs begin with the row that the segment before ends with.
         """
-        part, archive, relay = self.parts[-1], self.task.archive, self.relay
+        part, archive, link = self.parts[-1], self.task.archive, self.link
         if gives_up or (self.roles[-1] == IMPLICIT and part.status in GIVEN_UP):
             self.turns, role = None, METHOD
         else:
@@ -159,11 +158,12 @@ class _Segments:
         if archive is not None and role is not None:
             if gives_up:
                 self.passed.pop()
-            numbers = {"status": part.status, "reached": part.reached, "counts": dict(part.counts), "next": role}
-            arrays = {"rows": len(part.rows), "last": part.last.tolist(), "remembered": part.remembered.tolist()}
+            end = part.end
+            numbers = {"status": part.status, "reached": end.reached, "counts": dict(end.counts), "next": role}
+            arrays = {"rows": len(part.rows), "last": end.last.tolist(), "remembered": end.remembered.tolist()}
             turns = None if self.turns is None else self.turns.saved()
             self.passed.append(
-                {**numbers, **arrays, "turns": turns, "relay": [relay.share, relay.largest, float(relay.h)]}
+                {**numbers, **arrays, "turns": turns, "relay": [link.share, link.largest, float(link.h)]}
             )
             archive.skips = self.task.times.size == 0
         return role
@@ -172,7 +172,7 @@ class _Segments:
         role, parts = self.roles[-1], self.parts
         if status is PASSAGE:
             t0, t1 = self.task.span
-            if len(parts) > PASSES and parts[-1].reached - parts[-1 - PASSES].reached < GOT_ON * (t1 - t0):
+            if len(parts) > PASSES and parts[-1].end.reached - parts[-1 - PASSES].end.reached < GOT_ON * (t1 - t0):
                 parts[-1] = parts[-1]._replace(status=Status.STEP_COLLAPSED)
                 return None
             return CROSSING if role != CROSSING else self.roles[-2]
@@ -182,26 +182,24 @@ class _Segments:
 
     def _run(self, rest, role):
         """The `Outcome` of the next segment."""
-        task, relay, turned = self.task, self.relay, self.roles[-1] != CROSSING
+        task, link, turned = self.task, self.link, self.roles[-1] != CROSSING
         if role == CROSSING:
-            relay.h = 0.0
-            return run(
-                by_series(rest), SeriesEngine, relay=relay, past=lambda memory: Carrier(memory, task, relay.share)
-            )
+            link.h = 0.0
+            return run(by_series(rest), SeriesEngine, link=link, past=lambda memory: Carrier(memory, task, link.share))
         if self.turns is not None:
             self.turns.begin(role == IMPLICIT, rest.span[0], turned)
         if role == METHOD or not turned:
-            relay.h = 0.0
+            link.h = 0.0
         if role == IMPLICIT:
             demand_holonomic(rest.prepared.packed, rest.q, rest.span[0], rest.form.name)
             method, self.raised = within_rounding(self.turns.implicit, rest.prepared.packed, rest.q)
             rest = rest._replace(method=method)
-        return run(rest._replace(choose=self.turns), StepEngine if role == IMPLICIT else self.engine, relay=relay)
+        return run(rest._replace(choose=self.turns), StepEngine if role == IMPLICIT else self.engine, link=link)
 
     def _rest(self):
         """The remaining task, by the task's method."""
-        task, parts, last = self.task, self.parts, self.parts[-1]
-        times, left, done = task.times, task.max_steps, sum(part.counts["steps"] for part in parts)
+        task, parts, last = self.task, self.parts, self.parts[-1].end
+        times, left, done = task.times, task.max_steps, sum(part.end.counts["steps"] for part in parts)
         if times.size:
             times = times[sum(len(part.rows) for part in parts) :]
             times = times if times.size else np.array([np.inf])  # an empty array would ask for every step
@@ -221,12 +219,14 @@ class _Segments:
         task, parts, last = self.task, self.parts, self.parts[-1]
         logs = task.history and not task.archive
         said = last.reason, self._turned(), crossings(self._who(CROSSING)), self.raised
+        ends = [part.end for part in parts]
+        steps = StepLog([end.steps for end in ends]) if logs else None
+        charts = ChartLog([end.charts for end in ends]) if logs else None
+        counts = _summed([end.counts for end in ends])
         return last._replace(
             reason=" ".join(part for part in said if part),
             rows=self._rows(),
-            steps=StepLog([part.steps for part in parts]) if logs else None,
-            charts=ChartLog([part.charts for part in parts]) if logs else None,
-            counts=_summed([part.counts for part in parts]),
+            end=RunEnd(last.end.reached, last.end.last, last.end.remembered, counts, steps, charts),
             trajectory=Pieces([part.trajectory for part in parts]) if task.dense_output else None,
             began=parts[0].began,
             method=self._methods(),
@@ -246,7 +246,7 @@ class _Segments:
 
     def _turned(self):
         """Say how often the implicit method took over, and when first."""
-        found = [before.reached for before, _ in self._who(IMPLICIT)]
+        found = [before.end.reached for before, _ in self._who(IMPLICIT)]
         if not found:
             return ""
         name, times = type(self.task.choose.implicit).__name__, "" if len(found) == 1 else f" {len(found)} times, first"
@@ -257,9 +257,9 @@ class _Segments:
         implicit = self._who(IMPLICIT)
         if not implicit:
             return ""
-        within = sum(part.reached - before.reached for before, part in implicit)
+        within = sum(part.end.reached - before.end.reached for before, part in implicit)
         first = self.task.method, self.task.choose.implicit
-        most = 2.0 * within > self.parts[-1].reached - self.task.span[0]
+        most = 2.0 * within > self.parts[-1].end.reached - self.task.span[0]
         return " and ".join(repr(method) for method in (first[::-1] if most else first))
 
 

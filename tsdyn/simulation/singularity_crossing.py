@@ -24,7 +24,7 @@ def by_series(task):
 
 def crossings(found):
     """Say how often the Taylor series took over, and when first; each with the segment before."""
-    passed = [before.reached for before, series in found if series.status in (Status.PASSAGE, Status.SUCCESS)]
+    passed = [before.end.reached for before, series in found if series.status in (Status.PASSAGE, Status.SUCCESS)]
     if not passed:
         return ""
     times = "once" if len(passed) == 1 else f"{len(passed)} times, the first"

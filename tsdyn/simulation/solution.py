@@ -19,7 +19,6 @@ from ..observables.exerted import acted, exerted, member
 from ..observables.friction_reactions import with_normal_loads
 from ..observables.kinematics import Anchor, Kinematics
 from ..observables.state import RememberingState
-from ..runs.brief import Brief
 from ..validation import counted, floats
 from .balances import Balances
 from .conservation import energy_error
@@ -112,19 +111,14 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)
         self.handles = task.prepared.handles
         self._take(outcome.rows, task.q.size)
-        self._seconds, self._energy_error, near = seconds, None, 0
-        if isinstance(outcome, Brief):
-            self._remains = outcome.remains
-        else:
-            angles = self.handles.count
-            self._reached, self._last = outcome.reached, outcome.last
-            self._angles, self._remembered = outcome.remembered[:angles], outcome.remembered[angles:]
-            self._step_log, self._chart_log = outcome.steps, outcome.charts
-            self._counts, near = outcome.counts, outcome.counts["steps_near_singular"]
+        self._seconds, self._energy_error, self._end = seconds, None, outcome.end
+        near = outcome.end.near_steps
         if near:
             self._energy_error = energy_error(self, task)
+        redundant = self.packed.derived.redundant
+        self._redundant = 0 if redundant is None else len(redundant)
         self._reason, self._message, self._made = outcome.reason, None, time.time()
-        if near or outcome.status not in SUCCESSES or self.packed.derived.redundant is not None:
+        if outcome.status not in SUCCESSES:
             self._message = account(self, scene, self._reason, goes_on)  # written now, since the scene may change
 
     def __setstate__(self, state):

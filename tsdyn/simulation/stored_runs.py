@@ -17,6 +17,7 @@ from ..jit.cache import machine
 from ..jit.code_hash import platform_hash
 from ..model.packed import user_functions
 from ..runs import counts
+from ..runs.run_end import RunEnd
 from ..runs.task import Outcome
 from ..validation import clipped, damaged, demand, demand_numbers, demand_record, is_count, number
 from .run_requests import request_of
@@ -24,16 +25,16 @@ from .run_requests import request_of
 SETTINGS = ("rtol", "atol", "step", "max_step")  # of a method, as its provenance tells them
 
 
-def demand_storable(given):
-    """Raise InvalidArgument or StorageError unless a store can be made as the arguments of a run ask for."""
-    path, interval = given["store"], given["checkpoint"]
+def demand_storable(call, options):
+    """Raise InvalidArgument or StorageError unless a store can be made as a `RunCall` with `RunOptions` asks for."""
+    path, interval = call.store, call.checkpoint
     if path is None:
         raise InvalidArgument("checkpoint needs a store, which it goes on with: simulate(..., store='run.h5').")
     from ..storage.formats import demand_free, format_of
 
     demand_path(path, "store")
     format_of(path)
-    if given["dense_output"]:
+    if options.dense_output:
         raise InvalidArgument("a store keeps outputs, no interpolants: give t_eval in place of dense_output.")
     if interval is not None and not 0.0 <= number(interval) < np.inf:
         raise InvalidArgument(f"checkpoint must be a time in s, 0 or more, got {interval!r}.")
@@ -101,7 +102,9 @@ def ended(archive, outcome, seconds, task):
     except OSError as error:
         outcome = outcome._replace(status=Status.STORE_FAILED, reason=f"{error.strerror or error}.")
     rows, steps, charts = _stored(archive)
-    return outcome._replace(rows=rows, steps=steps, charts=charts)
+    end = outcome.end
+    end = RunEnd(end.reached, end.last, end.remembered, end.counts, steps, charts)
+    return outcome._replace(rows=rows, end=end)
 
 
 def call_to_go_on(archive):
@@ -125,14 +128,15 @@ def _stored(archive):
 
 def _ending(outcome, seconds, provenance):
     """The numbers and arrays of a checkpoint at the end of a run."""
-    numbers = {"ended": True, "t": outcome.reached, "status": outcome.status, "reason": outcome.reason}
+    end = outcome.end
+    numbers = {"ended": True, "t": end.reached, "status": outcome.status, "reason": outcome.reason}
     numbers["method"] = outcome.method
-    arrays = {"last": outcome.last, "remembered": outcome.remembered}
+    arrays = {"last": end.last, "remembered": end.remembered}
     if outcome.events is not None:
         numbers["watched"] = len(outcome.events[0])
         for name, found in zip(("t", "q", "qd"), outcome.events, strict=True):
             arrays |= {f"event {i}.{name}": array for i, array in enumerate(found)}
-    return numbers | {"statistics": dict(outcome.counts), "seconds": seconds, "provenance": provenance}, arrays
+    return numbers | {"statistics": dict(end.counts), "seconds": seconds, "provenance": provenance}, arrays
 
 
 def ended_outcome(numbers, arrays, archive, n, memory):
@@ -151,10 +155,9 @@ def ended_outcome(numbers, arrays, archive, n, memory):
     demand(last.shape == (3, n) and remembered.shape == (memory,), "the end of the run")
     demand_numbers(numbers["statistics"], counts.NAMES)
     demand_record(numbers, {"reason": str, "method": str, "seconds": (int, float)})
-    return Outcome(
-        Status(numbers["status"]), numbers["reason"], *_stored(archive), float(numbers["t"]), last, remembered,
-        numbers["statistics"], None, events, 0.0, numbers["method"],
-    )  # fmt: skip
+    rows, steps, charts = _stored(archive)
+    end = RunEnd(float(numbers["t"]), last, remembered, numbers["statistics"], steps, charts)
+    return Outcome(Status(numbers["status"]), numbers["reason"], rows, end, None, events, 0.0, numbers["method"])
 
 
 def provenance_of(scene, method, said, formulation, span, made):

@@ -62,7 +62,7 @@ def _kept(stats):
 
 def _locked(solution):
     """Report that redundant rows leave no degree of freedom."""
-    redundant = len(redundant_rows(solution.packed))
+    redundant = solution._redundant
     still = redundant and not solution.system.rheonomic[0]
     if not (still and solution._last.shape[1] == len(solution.system.segments) - redundant):
         return ""

@@ -56,8 +56,10 @@ class Turns:
         Of the scene.
     method : Integrator
         The explicit method.
-    options : Options
-        Of the run.
+    form : Formulation
+    span : (float, float), s
+    within : bool
+        Whether output between the ends of steps is requested.
 
     Attributes
     ----------
@@ -73,14 +75,15 @@ class Turns:
     began = lasted = 0.0  # s: of the segment, and length of the one before
     lost = most_lost = 0.0  # work, by the implicit method, since it was last even; the most so far
 
-    def __init__(self, scene, prepared, method, options):
-        self.scene, self.prepared, self.method, self.options = scene, prepared, method, options
-        self.window = options.span[0], 0.0  # where the steps that are judged begin: time, work
+    def __init__(self, scene, prepared, method, form, span, within):
+        self.scene, self.prepared, self.method = scene, prepared, method
+        self.form, self.end, self.within = form, span[1], within
+        self.window = span[0], 0.0  # where the steps that are judged begin: time, work
 
     @cached_property
     def implicit(self):
         """The implicit method."""
-        return implicit(self.method, self.prepared, self.options.settings.form)
+        return implicit(self.method, self.prepared, self.form)
 
     @cached_property
     def _cost(self):
@@ -102,7 +105,7 @@ class Turns:
         """A segment begins at t: after a turn, or after a singular configuration."""
         self.window, self.ask = (t, 0.0), self._first if to_implicit else FIRST_WINDOW
         if to_implicit:
-            prepare_first_run(self.scene, self.implicit, self.options.settings.form, self.options.within, None)
+            prepare_first_run(self.scene, self.implicit, self.form, self.within, None)
         elif not self.tried:
             self.ask = FIRST_WINDOW if self.prepared.slips else (AGAIN - 1) * self.taken
         if turned:
@@ -139,14 +142,14 @@ class Turns:
 
     def _pays(self, rate, t):
         """Whether what is left at this rate is worth a turn."""
-        return rate * (self.options.span[1] - t) > self._cost * TRIAL * STEP_EVALUATIONS
+        return rate * (self.end - t) > self._cost * TRIAL * STEP_EVALUATIONS
 
     def _back(self, memory, steps, rate):
         """Whether the explicit method is to go on: it would take less work for the rest, or is to be tried.
 
         A trial may cost as much as was lost before: steps at the limit of stability keep fast modes alive.
         """
-        left, rough = self.options.span[1] - memory.run.clock.t, self.prepared.rough
+        left, rough = self.end - memory.run.clock.t, self.prepared.rough
         jacobians = memory.work.counters.jacobians
         if steps <= self._first:
             self.jacobians = jacobians

@@ -6,7 +6,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from ..simulation.prepared_run import Run
 from ..simulation.resume import resume
+from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
 from ..simulation.simulate import simulate
 
 SELDOM = 1e9  # s between checkpoints: the first, after a slice, is the only one
@@ -31,6 +33,14 @@ def resumed_is_same(scene, span, solution, **options):
         path = f"{folder}/run.h5"
         simulate(scene, span, progress=_Stop(path), store=path, checkpoint=SELDOM, **options)
         return same_bits(solution, resume(path, scene=scene))
+
+
+def prepared_twice(scene, span, **options):
+    """As `simulate`, by the second run of a prepared one."""
+    prepared = Run(scene, RunOptions(**{name: value for name, value in options.items() if name in OF_RUN}))
+    of_call = {name: value for name, value in options.items() if name in OF_CALL}
+    prepared(span, **of_call)
+    return prepared(span, **of_call)
 
 
 def same_bits(one, two):

@@ -75,7 +75,7 @@ def judge(case, others):
     return str(solution.status), solution.message
 
 
-def run(case, **more):
-    """Run a case, with other options in place of its own where they are given."""
+def run(case, by=simulate, **more):
+    """Run a case by a function like `simulate`, with other options in place of its own where they are given."""
     options = {"dense_output": True, "max_steps": MOST_STEPS} | case.options | more
-    return simulate(case.scene, case.span, **options)
+    return by(case.scene, case.span, **options)

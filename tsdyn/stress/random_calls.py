@@ -25,7 +25,9 @@ from ..motions.prescribed import Motion
 from ..motions.tables import Table
 from ..profiling.profile import profile
 from ..simulation.load import load
+from ..simulation.prepared_run import prepare
 from ..simulation.resume import resume
+from ..simulation.run_options import RunOptions
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
@@ -62,7 +64,8 @@ def targets(w):
                     found.append((f"{name}.of", thing.of))
     found += [("Scene", Scene), ("Table", Table), ("Motion", Motion), ("Integrator", Integrator)]
     found += [(name, thing) for name, thing in sorted(vars(shapes).items()) if callable(thing) and name[0] != "_"]
-    found += [(call.__name__, call) for call in (load, resume, ensemble, compare, profile)]
+    found += [(call.__name__, call) for call in (load, resume, ensemble, compare, profile, prepare, RunOptions)]
+    found += [("run", prepare(w.scene)), ("run.with_parameters", prepare(w.scene).with_parameters)]
     for owner, label in ((w.scene, "scene"), (w.solution, "solution")):
         for name, _ in inspect.getmembers(type(owner), inspect.isfunction):
             if not name.startswith("_") and name not in (*INNER, *WRITE):

@@ -12,6 +12,8 @@ from .step_parts import accelerate_here, expand_far_series, expand_series, pass_
 class SeriesEngine:
     """A run by Taylor series, in the tangent form."""
 
+    layouts, readings = 0, (None, (None, None))
+
     def __init__(self, prepared, method, form, within):
         if form.name != "tangent":
             raise InvalidArgument(

@@ -1,0 +1,438 @@
+"""`prepare`: what every run of a scene with the same options has in common, worked out once."""
+
+from __future__ import annotations
+
+import html
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..ahead.first_run import kernels_of, prepare_first_run
+from ..calls import fitting
+from ..configuration.holonomic import demand_holonomic
+from ..elements.membership import warn_of_waiting
+from ..errors import InvalidArgument, Status
+from ..jit.compiled import clock
+from ..observables.state import remembered
+from ..other_names import ELSEWHERE
+from ..runs.arguments import demand_steps_seen, interval, output_times, state_arrays
+from ..runs.events import prepare as prepared_events
+from ..runs.sampling import Sampling
+from ..runs.step_engine import StepEngine
+from ..runs.task import Task, between
+from ..taylor.series_engine import SeriesEngine
+from ..validation import damaged
+from . import method_choice, stored_runs
+from .local_origin import origin_of, run_near
+from .progress import reporter
+from .rounding_limit import within_rounding
+from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented
+from .scene import Scene
+from .scene_cache import prepared
+from .segments import run_segments
+from .solution import Solution
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
+
+SUCCESS = Status.SUCCESS
+ENGINES = {"steps": StepEngine, "series": SeriesEngine}
+FLOAT = np.dtype(float)
+FIXED = {float, int}  # a tuple of them can't be changed
+DRIVERS = {name: partial(run_segments, engine=engine) for name, engine in ENGINES.items()}  # by Integrator.driver
+
+
+class _Last(NamedTuple):
+    """What the task of the last call follows from, beside the options."""
+
+    t_span: tuple
+    t_eval: tuple | None
+    start: tuple  # q, qd: arrays of the scene, or of a state
+    bits: tuple | None  # of the state
+    engines: dict  # of the scene: replaced where other rows or bodies take part in the equations
+    task: Task
+    is_regular: bool  # whether there is no more to look at, as of `run_task`
+
+
+def _is_fixed(times):
+    """Whether times can't have changed when they are given again."""
+    return times is None or (type(times) is tuple and FIXED.issuperset(map(type, times)))
+
+
+def _bits_of(state, prepared):
+    """Positions and velocities of a state as bytes; None where a run takes more from it, or they are not plain."""
+    q, qd, memory = (getattr(state, name, None) for name in ("q", "qd", "memory"))
+    plain = type(q) is type(qd) is np.ndarray and q.dtype is qd.dtype is FLOAT and q.ndim == qd.ndim == 1
+    if prepared.remembers or not plain or not (memory is None or np.shape(memory) == (0,)):
+        return None
+    return q.tobytes(), qd.tobytes()
+
+
+class Run:
+    """Runs of a scene with the same options, as `prepare` returns them.
+
+    Parameters
+    ----------
+    scene : Scene
+    options : RunOptions
+
+    Attributes
+    ----------
+    scene : Scene
+    options : RunOptions
+    method : Integrator
+        The method that a run begins with.
+
+    Notes
+    -----
+    A Run may be called by several threads at once: each call has a workspace of its own, and the compiled driver
+    releases the GIL. It belongs to the scene as it was prepared. After an edit of the scene a call raises
+    InvalidArgument; prepare the scene again, or change numbers by `with_parameters`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> stone = scene.add_point_mass(mass=1.0, name="stone")
+    >>> run = ts.prepare(scene, rtol=1e-10)
+    >>> solution = run((0, 1))
+    >>> print(run((solution.reached, 2.0), state=solution.state).position(stone)[-1])
+    [  0.   0. -20.]
+    """
+
+    @fitting
+    def __init__(self, scene: Scene, options: RunOptions) -> None:
+        self.scene, self.options, self._form = scene, options, options.form
+        self._compiled = set()  # with outputs between steps, or not
+        self._last = self._seen = None  # the last `_Last`, and state
+        self._prepare_kernels(options.dense_output or options.events is not None)
+        self._prepared = kept = prepared(scene)
+        self._start = scene._initial()
+        self.method = method = method_choice.first_method(options, kept)
+        self._driver = DRIVERS.get(method.driver, method.driver)
+        if method.coupled and kept.rough:
+            raise InvalidArgument(
+                f"{type(method).__name__} doesn't solve for reactions that friction depends on "
+                f"({', '.join(kept.rough)}): SDIRK54 does, as do all explicit methods."
+            )
+
+    @fitting
+    @documented(*OF_CALL)
+    def __call__(
+        self,
+        t_span: Span,
+        *,
+        t_eval: ArrayLike | None = None,
+        state: State | None = None,
+        store: Place | None = None,
+        checkpoint: float | None = None,
+        progress: Progress | None = None,
+    ) -> Solution:
+        """Run over an interval of time.
+
+        Parameters
+        ----------
+        t_span : (float, float), s
+            Start and end, start < end.
+        {options}
+
+        Returns
+        -------
+        Solution
+            With the bits of `simulate`.
+
+        Raises
+        ------
+        TsdynError
+            As of `simulate`; InvalidArgument also if the scene has changed since it was prepared.
+        """
+        scene = self.scene
+        if scene._users:
+            scene.refresh()
+        if scene._prepared is not self._prepared or scene._start is not self._start:
+            raise InvalidArgument(
+                "the scene has changed since it was prepared: prepare it again, by ts.prepare(scene, ...), or leave "
+                "the scene as it is and change numbers by run.with_parameters({...})."
+            )
+        return self._solve(RunCall(t_span, t_eval, store, checkpoint, progress, state))
+
+    @fitting
+    def with_parameters(self, values: Mapping[str, Any]) -> Run:
+        """Return a Run of the scene with other values of some parameters, with the same options.
+
+        Parameters
+        ----------
+        values : mapping
+            Values by name, as of `Scene.with_parameters`.
+
+        Raises
+        ------
+        TsdynError
+            As of `Scene.with_parameters`.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene(gravity=(0, 0, -10))
+        >>> stone = scene.add_point_mass(mass=1.0, name="stone")
+        >>> run = ts.prepare(scene).with_parameters({"stone.velocity": (1, 0, 0)})
+        >>> print(run((0, 1)).position(stone)[-1])
+        [ 1.  0. -5.]
+        """
+        return Run(self.scene.with_parameters(values), self.options)
+
+    def _solve(self, call: RunCall, found: tuple[Any, Any] = (None, None), archive: Any = None) -> Solution:
+        """Run as of `__call__`, without a look at what has become of the scene.
+
+        found: numbers and arrays of a checkpoint to go on from. archive: that of a run which begins again by another
+        method.
+        """
+        started, is_stored = clock(), call.store is not None or call.checkpoint is not None
+        if is_stored and archive is None and found[0] is None:
+            stored_runs.demand_storable(call, self.options)
+        task = self._task(call)
+        if is_stored:
+            return self._stored(task, call, found, archive)
+        last = self._last
+        if last is not None and task is last.task and last.is_regular:
+            outcome = self._driver(task)
+        else:
+            outcome = run_task(task, self.scene, self.options.initial_tol)
+        ended = clock()
+        if outcome.status is not SUCCESS:
+            other = method_choice.instead(task, outcome.status)
+            if other is not None:
+                return self._by(other)._solve(call)
+        return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
+
+    def _check(self, call: RunCall) -> None:
+        """Raise what a call raises before anything is run."""
+        self._task(call)
+
+    def _task(self, call):
+        """The `Task` of a call, its start consistent with the constraints.
+
+        That of the last call serves again if nothing that it follows from can have changed.
+        """
+        state, kept, last = call.state, self._prepared, self._last
+        known, is_plain, bits = kept.packed.derived, call.progress is call.store is None, None
+        if state is not None:  # it is worth a look at its numbers if it is given again
+            bits = _bits_of(state, kept) if state is self._seen else None
+            is_plain = is_plain and bits is not None
+        self._seen = state
+        if (
+            is_plain
+            and last is not None
+            and call.t_span is last.t_span
+            and call.t_eval is last.t_eval
+            and bits == last.bits
+            and (state is not None or self.scene._start is last.start)
+            and known.engines is last.engines
+        ):
+            return last.task
+        start = self.scene._initial() if state is None else state_arrays(state, kept.n)
+        task = self._new_task(call, start)
+        if is_plain and not (task.events or task.sampling) and _is_fixed(call.t_span) and _is_fixed(call.t_eval):
+            is_regular = origin_of(task.prepared.packed, task.q) is None and task.method.step is None
+            is_regular = is_regular and within_rounding(task.method, task.prepared.packed, task.q)[0] is task.method
+            self._last = _Last(call.t_span, call.t_eval, start, bits, known.engines, task, is_regular)
+        return task
+
+    def _new_task(self, call, start):
+        """The same; start: q, qd as given."""
+        options, kept, method, state = self.options, self._prepared, self.method, call.state
+        span = interval(call.t_span)
+        times = output_times(call.t_eval, *span)
+        demand_steps_seen(method, *span)
+        within = options.dense_output or options.events is not None or between(times, span)
+        self._prepare_kernels(within)
+        stops = kept.stops(*span, method.step is None)
+        memory = remembered(state, kept, span[0], start[0])
+        q, qd = kept.start(self.scene, start, span[0], options.initial_tol, memory, options.redundancy == "drop")
+        if not self._form.basis_free or method.implicit:
+            demand_holonomic(kept.packed, q, span[0], options.formulation)
+        choose = sampling = None
+        if kept.sampled:  # a sampled controller can't be run again: no turns
+            sampling = Sampling(kept, state is not None)
+        elif options.method is None:
+            choose = method_choice.turns_of(self.scene, kept, method, self._form, span, within)
+        history = call.store is None if options.history is None else options.history
+        return Task(
+            kept, method, self._form, span, q, qd, memory, times, within, options.dense_output,
+            prepared_events(options.events), options.constraint_tol, options.max_steps, options.chart_interval or 0,
+            reporter(call.progress), history, choose, stops, sampling,
+        )  # fmt: skip
+
+    def _prepare_kernels(self, within):
+        """Have compiled what runs need, at the first one with outputs between steps, or without."""
+        if within not in self._compiled:
+            options = self.options
+            default = options.rtol, options.atol, options.may_use_series
+            prepare_first_run(self.scene, options.method, self._form, within, default)
+            self._compiled.add(within)
+
+    def _by(self, method):
+        """The same by another method."""
+        return Run(self.scene, replace(self.options, integrator=method, rtol=None, atol=None))
+
+    def _stored(self, task, call, found, archive):
+        """Run a task whose outputs go to a store, from its start or from what was found in a checkpoint."""
+        scene, (numbers, arrays), kept = self.scene, found, task.prepared
+        given = {"scene": scene, **by_name(self.options, call)}
+        archive = archive or stored_runs.archive_of(given, kept, task.history, numbers, arrays)
+        started = clock()
+        if numbers is not None and numbers.get("ended"):
+            with damaged("the checkpoint"):
+                slots = kept.handles.count + kept.packed.system.memory.size
+                outcome = stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
+            return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
+        try:
+            outcome = run_task(task._replace(archive=archive), scene, self.options.initial_tol)
+            seconds = clock() - started
+            other = method_choice.instead(task, outcome.status)
+            if other is not None:
+                run = self._by(other)
+                given |= by_name(run.options, call)
+                return run._solve(call, archive=stored_runs.begin_again(archive, given))
+            outcome = stored_runs.ended(archive, outcome, seconds, task)
+        finally:
+            archive.close()
+        timed = {"prepare": outcome.began - started, "run": seconds}
+        return Solution(scene, task, outcome, timed, stored_runs.call_to_go_on(archive))
+
+    def __reduce__(self):
+        """A Run that is pickled is prepared anew where it is read."""
+        return Run, (self.scene, self.options)
+
+    def _facts(self):
+        method, options = self.method, self.options
+        why = method_choice.reason(options, self._prepared)
+        tolerances = f"fixed steps of {method.step} s"
+        if method.step is None:
+            rtol, atol = method.step_tolerances()
+            tolerances = (
+                f"rtol={method.rtol:g}, atol={method.atol:g} of the run; each step is held to rtol={rtol:.2g}, "
+                f"atol={atol:.2g} (safety factor {method.rtol / rtol:.3g})"
+            )
+        kernels = kernels_of(self.scene, method, self._form, True in self._compiled)
+        return {
+            "method": f"{method!r}: {why}",
+            "steps": tolerances,
+            "form": f"{options.formulation}; |Phi| to {options.constraint_tol:g} m, starts to {options.initial_tol:g}",
+            "options": repr(options),
+            "kernels": f"{len(kernels)}: {_listed(kernels)}",
+        }
+
+    def __str__(self) -> str:
+        lines = [f"  {name:9}{fact}" for name, fact in self._facts().items()]
+        return "\n".join([f"Run of {self.scene!r}", *lines])
+
+    def _repr_html_(self) -> str:
+        """Return the text as a table, for notebooks."""
+        rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in self._facts().items())
+        return f"<table><caption>Run of {html.escape(repr(self.scene))}</caption>{rows}</table>"
+
+    def __repr__(self) -> str:
+        return f"<Run of {self.scene!r} by {self.method!r}, {self.options.formulation}>"
+
+
+def _listed(kernels):
+    """The names of kernels, those of a class of constraints or forces behind it."""
+    groups = {}
+    for kernel in kernels:
+        owner, _, name = getattr(kernel, "py_func", kernel).__qualname__.removesuffix("_loop").rpartition(".")
+        groups.setdefault(owner, []).append(name)
+    own = groups.pop("", [])
+    return ", ".join([*(f"{owner} ({', '.join(names)})" for owner, names in groups.items()), *own])
+
+
+@fitting
+@documented(*OF_RUN)
+def prepare(
+    scene: Scene,
+    *,
+    integrator: Method | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    formulation: Formulation = "tangent",
+    constraint_tol: float = 1e-12,
+    initial_tol: float = 1e-9,
+    redundancy: Redundancy = "drop",
+    dense_output: bool = False,
+    events: Event | Sequence[Event] | None = None,
+    max_steps: int | None = None,
+    max_step: float | None = None,
+    history: bool | None = None,
+    chart_interval: int | None = None,
+) -> Run:
+    """Prepare runs of a scene: method, kernels and workspace are chosen once, for any number of calls.
+
+    Parameters
+    ----------
+    scene : Scene
+    {options}
+
+    Returns
+    -------
+    Run
+        `run(t_span, t_eval=..., state=...)` returns the `Solution` of `simulate` with these options. `print(run)` says
+        what it will do.
+
+    Raises
+    ------
+    TsdynError
+        A subclass: InvalidArgument if an option is inadmissible or the method doesn't serve the scene.
+
+    Examples
+    --------
+    A pendulum, restarted from where it is every tenth of a second:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> run, state = ts.prepare(scene, rtol=1e-9), None
+    >>> for k in range(5):
+    ...     state = run((0.1 * k, 0.1 * (k + 1)), state=state).state
+    >>> print(state.position(bob).round(6) + 0.0)
+    [ 0.372081  0.       -0.9282  ]
+    """
+    demand_scene(scene)
+    return Run(
+        scene,
+        RunOptions(
+            integrator, rtol, atol, formulation, constraint_tol, initial_tol, redundancy, dense_output, events,
+            max_steps, max_step, history, chart_interval,
+        ),
+    )  # fmt: skip
+
+
+ELSEWHERE["prepare"] = dict.fromkeys(("t_span", *OF_CALL), "the call, run(t_span, t_eval=...)")
+ELSEWHERE["Run.__call__"] = dict.fromkeys(OF_RUN, "ts.prepare(scene, rtol=...)")
+
+
+def demand_scene(scene):
+    """Raise InvalidArgument unless it is a scene; warn of parts that were never added to it."""
+    if not isinstance(scene, Scene):
+        raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    if scene._waiting:
+        warn_of_waiting(scene, 4)
+
+
+def run_task(task, scene, initial_tol):
+    """Run the method's driver, relative to a local origin if the scene is far from its own."""
+    method, packed = task.method, task.prepared.packed
+    driver, origin = DRIVERS.get(method.driver, method.driver), origin_of(packed, task.q)
+    if origin is not None:
+        return run_near(driver, task, scene, origin, initial_tol)
+    limited, said = within_rounding(method, packed, task.q)
+    outcome = driver(task if limited is method else task._replace(method=limited))
+    if method.step is not None:
+        said = task.prepared.unresolved(*task.span, method.step)
+    if said:
+        outcome = outcome._replace(reason=" ".join(part for part in (outcome.reason, said) if part))
+    return outcome

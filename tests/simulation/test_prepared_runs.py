@@ -106,7 +106,7 @@ def test_a_run_says_what_it_will_do():
     """The tolerances that steps are held to: those of the run over the safety factor of the method, 30 by default."""
     said = str(ts.prepare(top.build(), integrator=I.RK45(3e-7, 6e-9)))
     assert "RK45(rtol=3e-07, atol=6e-09): as asked" in said
-    assert f"rtol={3e-7 / I.RK45.margin:.2g}, atol={6e-9 / I.RK45.margin:.2g}" in said
+    assert f"rtol={3e-7 / I.RK45.safety:.2g}, atol={6e-9 / I.RK45.safety:.2g}" in said
     said = str(ts.prepare(top.build(), formulation="tangent", constraint_tol=1e-11))
     assert "Taylor(rtol=1e-08, atol=1e-08): every constraint and force has a series" in said
     assert "|Phi| to 1e-11 m" in said

@@ -59,6 +59,7 @@ class Prepared:
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
         self._start = (None, None), None
         self.runs = ()  # the last ones that `simulate` has prepared
+        self._changes = None, []  # span, and what `_changes_of` has found of motions in it
         self.remembers = bool(packed.system.memory.size or handles_of(packed).count)
         every = scene.__dict__.setdefault("_spare", {})
         if len(every) >= KINDS:
@@ -72,6 +73,7 @@ class Prepared:
         for name in OF_NUMBERS & vars(other).keys():
             del vars(other)[name]
         other.packed, other._start, other._spare, other.runs = packed, ((None, None), None), {}, ()
+        other._changes = None, []
         other.handles = handles_of(packed)
         return other
 
@@ -156,11 +158,24 @@ class Prepared:
             motion.check(t0, t1)
         found = NO_CHANGES
         if adaptive and any(self._changing):
-            t = sample_times(t0, t1)
-            found = changes(t, [values for _, values in self._sampled(t, self._changing)])
+            found = np.unique(np.concatenate([each for _, each in self._changes_of(t0, t1)]), axis=0)
         if not (self._has_stops or found.size):
             return NO_STOPS
         return stops_of(self.motions, instants_of(self.packed, t0, t1), found, t0, t1)
+
+    def _changes_of(self, t0, t1):
+        """What functions are, and intervals (k, 2), s, in which each changes shortly.
+
+        Those of motions are kept, of one span; those of loads depend on numbers that cases of an ensemble change.
+        """
+        (span, known), t, (motions, kinds) = self._changes, sample_times(t0, t1), self._changing
+        if span != (t0, t1):
+            known = self._changes_in(t, (motions, []))
+            self._changes = (t0, t1), known
+        return known + self._changes_in(t, ([], kinds))
+
+    def _changes_in(self, t, functions):
+        return [(what, changes(t, [values])) for what, values in self._sampled(t, functions)]
 
     def _sampled(self, t, functions):
         """What functions are, and values (k,) at times t (k,)."""
@@ -172,9 +187,8 @@ class Prepared:
     def unresolved(self, t0, t1, h):
         """Say what changes within less than steps of a fixed length h; "" for nothing."""
         if any(self._changing):
-            t = sample_times(t0, t1)
-            for what, values in self._sampled(t, self._changing):
-                for begin, end in changes(t, [values]):
+            for what, found in self._changes_of(t0, t1):
+                for begin, end in found:
                     if end - begin < h:
                         return (
                             f"{what}: the function changes within {end - begin:.2g} s at t = {end:.6g} s, which steps "

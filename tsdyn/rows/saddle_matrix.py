@@ -49,13 +49,13 @@ def _write_axes(s):
         # c e beside the block of the body, and - c^2 e e^T of the raised inertia taken back: J' + c^2 e e^T
         axis[0], axis[1], axis[2] = one.x, one.y, one.z
         for r in range(3):
-            let(s.upper, one.base + one.step * r, axis[r])
-            let(s.lower, one.base + one.step * r, axis[r])
+            let(s.upper, one.first + one.step * r, axis[r])
+            let(s.lower, one.first + one.step * r, axis[r])
             for c in range(3):
                 more(s.upper, one.target + one.stride * r + c, axis[r] * axis[c])
                 more(s.lower, one.target + one.stride * r + c, axis[r] * axis[c])
-        let(s.upper, one.diagonal, 1.0)
-        let(s.lower, one.diagonal, 1.0)
+        let(s.upper, one.own, 1.0)
+        let(s.lower, one.own, 1.0)
 
 
 @kernel

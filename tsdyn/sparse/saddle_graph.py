@@ -62,9 +62,9 @@ class LeanAxis(Record):
 
     target: int  # where the block begins in the factors, and the length of a row there
     stride: int
-    base: int  # where the row begins, and its stride
+    first: int  # where the row begins, and its stride
     step: int
-    diagonal: int  # where its diagonal entry is
+    own: int  # where its diagonal entry is
     x: float  # c e, body frame
     y: float
     z: float

@@ -351,3 +351,5 @@ def test_the_safety_factor_divides_the_tolerances_of_steps():
     assert Careful(rtol=1e-6, atol=1e-8).step_tolerances() == expected
     assert Margin(rtol=1e-6, atol=1e-8).step_tolerances() == expected
     assert ts.integrators.RK45(rtol=1e-6, atol=1e-8).step_tolerances() != expected
+    with pytest.raises(ts.InvalidArgument, match="Careless: safety"):
+        type("Careless", (ts.integrators.RK45,), {"order": 0, "safety": 0.0})

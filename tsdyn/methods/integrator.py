@@ -84,6 +84,7 @@ class Integrator:
             cls.__init__ = fitting(cls.__init__)
         if "margin" in vars(cls):  # another name of `safety`
             cls.safety = cls.margin
+        positive(cls.safety, f"{cls.__name__}: safety")
         complete_docstring(cls)
         if cls.order:
             _registry[cls.__name__.lower().replace("_", "")] = cls

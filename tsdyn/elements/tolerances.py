@@ -31,9 +31,10 @@ FORCE_STEP = 1e-40
 FORCE_QUOTIENT = 7e-4
 
 # Series of forces against their laws (loops/law_check.py). OFF: what sharp ones may be off by, as a velocity over the
-# tolerance of a step; OFF_SELDOM: the same of laws that are analytic but at few places: flights past the anchor of a
-# spring are off by twice the tolerance at most at 200, as at 20, and by forty times at 1000. LAW_TOLERANCE: the least velocity, m/s or rad/s,
-# below which terms that cancel within a law count. LAW_NOISE: rounding of a law, relative to the terms of its series.
+# tolerance of a step. OFF_SELDOM: the same of laws that are analytic but at few places; flights past the anchor of a
+# spring are off by twice the tolerance at most at 200, as at 20, and by forty times at 1000. LAW_TOLERANCE: the least
+# velocity, m/s or rad/s, below which terms that cancel within a law count. LAW_NOISE: rounding of a law, relative to
+# the terms of its series.
 OFF, OFF_SELDOM, LAW_TOLERANCE, LAW_NOISE = 1000.0, 200.0, 1e-12, 1e-13
 
 # Part of a normal load, relative to the whole: below it a part is rounding of the reactions, in a mechanism in a plane

@@ -13,8 +13,8 @@ import numpy as np
 import tsdyn as ts
 from benchmarks.scenes import SCENES
 from examples import driven_pivot
-from tsdyn.runs.step_memory import StepMemory
-from tsdyn.taylor.run_memory import SeriesMemory
+from tsdyn.runs.step_engine import StepMemory
+from tsdyn.taylor.series_engine import SeriesMemory
 
 SPAN, CALLS, ROUNDS = (0.0, 1e-4), 30, 15
 TOLERANCES = {"rtol": 1e-8, "atol": 1e-8}

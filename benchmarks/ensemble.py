@@ -16,7 +16,7 @@ import numpy as np
 import tsdyn as ts
 from benchmarks.call_overhead import Clocked
 from benchmarks.scenes import SCENES
-from tsdyn.ensembles import batch
+from tsdyn.ensembles import case_loop
 
 SPANS = {"sliding top": (1e-4, 1.0, 10.0), "two-body pendulum": (1e-4, 0.5, 5.0), "chain of 4": (1e-4, 0.2, 1.0)}
 CASES, ROUNDS, LOOPED = 1500, 5, 30  # cases of the longest span: a tenth
@@ -37,15 +37,15 @@ def seconds(call, count):
 
 def overhead(scene, span, count):
     """Seconds that a case takes outside the compiled loop: of an ensemble of six times as many less those of one."""
-    plain = batch.run_cases
-    batch.run_cases = clock = Clocked(plain, time.process_time)
+    plain = case_loop.run_cases
+    case_loop.run_cases = clock = Clocked(plain, time.process_time)
     outside = []
     for many in (count, 6 * count):
         values, clock.seconds = table(scene, many), 0.0
         began = time.process_time()
         ts.ensemble(scene, values, span, threads=1)
         outside.append(time.process_time() - began - clock.seconds)
-    batch.run_cases = plain
+    case_loop.run_cases = plain
     return (outside[1] - outside[0]) / (5 * count)
 
 

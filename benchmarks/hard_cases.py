@@ -15,7 +15,7 @@ import time
 import numpy as np
 
 import tsdyn as ts
-from tsdyn.comparison.exudyn_scene import MANY, OUTPUTS, ExudynScene
+from tsdyn.benchmarking.exudyn_scene import MANY, OUTPUTS, ExudynScene
 from tsdyn.stress.gallery.cases import CASES
 
 DENSE = 600  # rows that a dense solver takes in a reasonable time

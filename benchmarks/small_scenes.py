@@ -13,8 +13,8 @@ from benchmarks.measure import measure
 from benchmarks.ours import Ours
 from benchmarks.peers.heyoka import Heyoka
 from benchmarks.scenes import SCENES
-from tsdyn.runs.step_memory import StepMemory
-from tsdyn.taylor.run_memory import SeriesMemory
+from tsdyn.runs.step_engine import StepMemory
+from tsdyn.taylor.series_engine import SeriesMemory
 
 ERRORS, ROUNDS = (1e-6, 1e-8, 1e-10, 1e-12, 1e-14), 15
 SPANS, CALLS = {"sliding top": 1.0, "two-body pendulum": 0.2, "chain of 4": 0.1, "chain of 16": 0.05}, 200  # s: 0.5 ms

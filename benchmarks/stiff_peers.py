@@ -87,7 +87,7 @@ def _places(solution):
 
 def run_exudyn(case, divisions, solver="GeneralizedAlpha"):
     """All coordinates, with multipliers."""
-    from tsdyn.comparison.exudyn_scene import ExudynScene
+    from tsdyn.benchmarking.exudyn_scene import ExudynScene
 
     step = case.end / OUTPUTS / divisions
     found = ExudynScene(case.build()).run(case.end, step, OUTPUTS, solver=solver)

@@ -9,9 +9,8 @@ import numpy as np
 
 from tsdyn.drawing import BLUE, GREEN, VERMILION
 from tsdyn.elements.bodies import rotation_matrix
-from tsdyn.viewer.frames import resample
-from tsdyn.viewer.run_data import run_data
-from tsdyn.viewer.sizes import attached
+from tsdyn.viewer.run_data import resample, run_data
+from tsdyn.viewer.symbols import attached
 
 FRAMES = 200
 SIDES, BANDS, TURNS = 20, 10, 6  # of cylinders and balls; of coils

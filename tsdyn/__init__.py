@@ -12,10 +12,10 @@ if not (_here / "constraints").is_dir():  # a checkout: they stand beside this f
 from . import constraints, forces, integrators, motions, shapes  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
 from .elements.bodies import Body, PointMass  # noqa: E402
+from .elements.element import Angle, Displacement  # noqa: E402
 from .elements.force import Force  # noqa: E402
+from .elements.friction import JointFriction  # noqa: E402
 from .elements.joint import Joint  # noqa: E402
-from .elements.joint_coordinates import Angle, Displacement  # noqa: E402
-from .elements.joint_friction import JointFriction  # noqa: E402
 from .elements.markers import Parameters, Point, Turn, Vector  # noqa: E402
 from .elements.primitive import Primitive  # noqa: E402
 from .errors import (  # noqa: E402
@@ -143,7 +143,7 @@ __all__ = [
 if TYPE_CHECKING:
     from . import plots, testing
     from .benchmarking.benchmark import benchmark
-    from .comparison.compare import compare
+    from .benchmarking.compare import compare
     from .ensembles.ensemble import ensemble
     from .ensembles.results import Ensemble
     from .profiling.profile import profile
@@ -154,7 +154,7 @@ else:
     _LATER = {
         "Ensemble": ".ensembles.results",
         "benchmark": ".benchmarking.benchmark",
-        "compare": ".comparison.compare",
+        "compare": ".benchmarking.compare",
         "ensemble": ".ensembles.ensemble",
         "plots": ".plots",
         "profile": ".profiling.profile",

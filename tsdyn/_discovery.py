@@ -3,8 +3,8 @@
 import pkgutil
 from importlib import import_module
 
+from .calls import hint
 from .errors import UnknownAttribute
-from .other_names import hint
 
 
 def export_all(package, path, namespace, *bases):

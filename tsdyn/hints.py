@@ -10,8 +10,9 @@ from typing import Any, Literal, Protocol, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .benchmarking.reference_solution import Reference
-from .benchmarking.report import Benchmark
+from .analyses.equilibrium import Equilibrium
+from .analyses.linearise import Linearisation
+from .benchmarking.benchmark import Benchmark, Reference
 from .configuration.assemble import AssemblyReport
 from .configuration.mobility import Mobility, RedundantRow
 from .elements.bodies import Attribute, Body, Ground, PointMass
@@ -28,17 +29,13 @@ from .motions.prescribed import Motion
 from .motions.tables import Table
 from .observables.diagnostics import ConstraintError
 from .observables.evaluate import Evaluation
-from .observables.kinematics import Kinematics
-from .observables.state import RememberingState, State
-from .parameters.listing import ParameterList
+from .observables.state import Kinematics, RememberingState, State
 from .profiling.phases import Phase
 from .profiling.report import Profile
-from .simulation.inverse_result import InverseDynamics
-from .simulation.kinematics import KinematicAnalysis
+from .simulation.given_motion import InverseDynamics, KinematicAnalysis
+from .simulation.parameters import ParameterList
 from .simulation.scene import Scene
 from .simulation.solution import Charts, Solution, Steps
-from .statics.equilibrium import Equilibrium
-from .statics.linearise import Linearisation
 
 
 class Rotation(Protocol):

@@ -15,8 +15,7 @@ from .drawing import BLUE, GREY, VERMILION, new_figure, save
 from .errors import InvalidArgument
 from .figures.axes import ZERO, largest
 from .figures.ensembles import final_map, quantile_bands
-from .figures.errors import constraint_error
-from .figures.history import charts, energy, reaction, steps
+from .figures.histories import charts, constraint_error, energy, reaction, steps
 from .figures.modes import mode_shapes
 from .figures.phase import phase_portrait, poincare_section
 

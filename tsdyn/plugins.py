@@ -5,47 +5,54 @@ integrators/ import from here, too. docs/plug-ins.md shows how.
 """
 
 from .calls import Placing, fitting
-from .elements.applied_load import Given, GivenByState, GivenInBody, given_series
 from .elements.bodies import Ground, PointMass, ground_point, rotation_matrix
-from .elements.element import in_frame
+from .elements.element import Angle, Displacement, angles, displacements, in_frame
 from .elements.force import Force, load, vector_load
-from .elements.framed_joint import FramedJoint, beside, carried, turned_about
-from .elements.friction_laws import (
+from .elements.friction import (
+    AXIS,
+    BEARING_ROWS,
     BodyFriction,
+    JointFriction,
     act,
     act_series,
     along_and_across,
+    bearing_series,
     coefficient,
+    coefficient_series,
     direction_series,
+    magnitude,
     optional,
     slip,
     slip_of,
     slip_series,
 )
-from .elements.joint import Joint, across
-from .elements.joint_coordinates import Angle, Displacement, angles, displacements
-from .elements.joint_friction import AXIS, JointFriction
-from .elements.joint_load import JointLoad
-from .elements.markers import Parameters, Point, Turn, Vector
-from .elements.normal_series import BEARING_ROWS, bearing_series, coefficient_series, magnitude
-from .elements.primitive import Primitive
-from .elements.tolerances import PARALLEL
-from .elements.user_functions import (
+from .elements.joint import FramedJoint, Joint, across, beside, carried, turned_about
+from .elements.loads import (
     STATE,
     ByState,
+    Given,
+    GivenByState,
+    GivenInBody,
+    JointLoad,
     arguments_of,
     fill_state,
     fill_state_series,
+    given_series,
     load_at,
     state_load,
 )
+from .elements.markers import Parameters, Point, Turn, Vector
+from .elements.primitive import Primitive
+from .elements.tolerances import PARALLEL
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
 from .jit.predicates import some
 from .maths import vectors
-from .maths.angles import angle_about, angle_near, angle_series
 from .maths.recurrences import (
     angle,
+    angle_about,
+    angle_near,
+    angle_series,
     cross,
     dot,
     exponential,
@@ -68,6 +75,7 @@ from .methods.explicit import (
     embedded_error,
     error_kernel,
     second_embedded_error,
+    step_kernel,
     vector,
 )
 from .methods.integrator import (
@@ -80,12 +88,10 @@ from .methods.integrator import (
 )
 from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
 from .methods.interpolants import linear_second
-from .methods.plug_in import step_kernel
 from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
 from .motions.expressions import Smooth
-from .motions.keywords import numbers_of
 from .motions.prescribed import Motion
-from .motions.signals import Signal
+from .motions.signals import Signal, numbers_of
 from .motions.tables import is_data
 from .validation import finite, floats, not_negative, number, positive, shown, vector3, whole
 

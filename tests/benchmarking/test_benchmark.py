@@ -9,8 +9,8 @@ import pytest
 import tsdyn as ts
 from tests.helpers.reference import load
 from tests.helpers.tolerances import FINE, HELD, NEAR
-from tsdyn.benchmarking import reference_solution as agreement
-from tsdyn.benchmarking import report as benchmark_report
+from tsdyn.benchmarking import benchmark as agreement
+from tsdyn.benchmarking import benchmark as benchmark_report
 from tsdyn.testing.integrator_scenes import sliding_top, two_body_pendulum
 
 I = ts.integrators

@@ -6,7 +6,7 @@ import numpy as np
 
 import tsdyn as ts
 from tsdyn.cli import ensemble
-from tsdyn.cli.case_table import table_of
+from tsdyn.cli.ensemble import table_of
 
 
 def test_names_that_begin_as_formulas(tmp_path):

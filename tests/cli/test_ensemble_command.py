@@ -9,7 +9,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.commands import called
-from tsdyn.cli.output import plain
+from tsdyn.cli.parser import plain
 
 STUDY = """\
 version = 1

@@ -5,11 +5,10 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.rods_on_a_spring import two_rods_on_a_spring as chain
-from tsdyn.ensembles import batch, first_slice, runner
+from tsdyn.ensembles import case_loop, runner
 from tsdyn.ensembles.tolerances import TRIED
-from tsdyn.runs.recorder import CHART_ROOM
-from tsdyn.taylor.run_memory import SeriesMemory
-from tsdyn.taylor.series_engine import SeriesEngine
+from tsdyn.runs.run_log import CHART_ROOM
+from tsdyn.taylor.series_engine import SeriesEngine, SeriesMemory
 
 RNG = np.random.default_rng(11)
 SPAN = (0.0, 0.05)
@@ -172,8 +171,8 @@ def test_a_thin_body_that_gains_inertia():
 
 def test_long_cases_are_run_once(by_python, monkeypatch):
     """A case that doesn't end within the steps of the loop is run by Python; where most are, all of them."""
-    monkeypatch.setattr(first_slice, "FIRST_SLICE", 40)
-    monkeypatch.setattr(batch, "TRIED", 2)
+    monkeypatch.setattr(case_loop, "FIRST_SLICE", 40)
+    monkeypatch.setattr(case_loop, "TRIED", 2)
     scene, table = chain(), {"rod 0.angular_velocity": np.zeros((CASES, 3)), "rod 0.mass": uniform()}
     found = ts.ensemble(scene, table, SPAN, threads=1, max_step=np.diff(SPAN)[0] / 50)
     assert len(by_python) == CASES
@@ -215,5 +214,5 @@ def test_longer_runs_share_a_memory_and_are_not_begun_twice(monkeypatch):
     assert len(begun) <= CASES + TRIED + 2
     for i in (0, TRIED, CASES - 1):
         solution = ts.simulate(scene.with_parameters({"rod 0.mass": table["rod 0.mass"][i]}), (0.0, 3.0), **options)
-        assert solution.stats.steps > first_slice.FIRST_SLICE
+        assert solution.stats.steps > case_loop.FIRST_SLICE
         assert found.q[i].tobytes() == solution.state.q.tobytes()

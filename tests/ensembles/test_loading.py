@@ -12,11 +12,11 @@ import tsdyn as ts
 scene = ts.Scene()
 ball = scene.add_point_mass(mass=1.0)
 ts.simulate(scene, (0, 0.1))
-others = "tsdyn.parameters", "tsdyn.ensembles", "tsdyn.lanes", "tsdyn.jit.lane"
+others = "tsdyn.simulation.parameters", "tsdyn.ensembles", "tsdyn.taylor.lane", "tsdyn.jit.lane"
 print([name for name in sys.modules if name.startswith(others)])
 ts.ensemble
 ts.ensemble(scene, {"body1.mass": [1.0, 2.0]}, (0, 0.1))
-assert not any(name.startswith(("tsdyn.lanes", "tsdyn.jit.lane")) for name in sys.modules)
+assert not any(name.startswith(("tsdyn.taylor.lane", "tsdyn.jit.lane")) for name in sys.modules)
 print("tsdyn.ensembles.ensemble" in sys.modules, "dask" in sys.modules, "pandas" in sys.modules)
 """
 

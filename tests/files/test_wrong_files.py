@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tsdyn.files.starting_file import TEXT
+from tsdyn.files.scene_text import TEXT
 
 ROOT = Path(__file__).parents[2]
 

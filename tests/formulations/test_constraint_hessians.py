@@ -10,13 +10,12 @@ from tests.helpers import built_in
 from tests.helpers.reduced_ode import difference, evaluate_curvature
 from tests.helpers.scenes import rotation, unit
 from tests.helpers.tolerances import EPS
-from tsdyn.elements.joint_load import JointLoad
-from tsdyn.elements.loops.corotated_frames import turn_block, turn_of_bodies, turn_of_directions
+from tsdyn.elements.loads import JointLoad
+from tsdyn.elements.loops.forces import turn_block, turn_of_bodies, turn_of_directions
 from tsdyn.elements.markers import PARAMETERS, POINT
 from tsdyn.errors import TsdynError
 from tsdyn.jit.kernels import entry, twin
-from tsdyn.model.packed import with_curvatures
-from tsdyn.model.packed_forces import with_force_jacobians
+from tsdyn.model.packed import with_curvatures, with_force_jacobians
 from tsdyn.observables.evaluate import constraint_arrays
 from tsdyn.testing.force_checks import evaluate_force_jacobian
 

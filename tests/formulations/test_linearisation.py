@@ -11,7 +11,7 @@ from tests.helpers.reduced_ode import Tangent, difference
 from tests.helpers.reference import load
 from tests.helpers.scenes import BETWEEN, PRIMITIVES, build, random_chain, random_pair, unit
 from tests.helpers.tolerances import EPS, HELD, LOOSE
-from tsdyn.elements.joint_load import JointLoad
+from tsdyn.elements.loads import JointLoad
 
 C, F = ts.constraints, ts.forces
 SPACING = 1e-3  # of differences of f

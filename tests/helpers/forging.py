@@ -21,7 +21,7 @@ import zarr
 
 import tsdyn as ts
 from tsdyn.jit import cache
-from tsdyn.runs import slices
+from tsdyn.runs import driver
 from tsdyn.storage import checkpoint, saved_file
 
 MEMORY = 3 << 30  # bytes beyond what is in use at the start: libraries reserve without use
@@ -84,7 +84,7 @@ def make(kind, folder):
         found = ts.ensemble(scene(), {"arm.mass": [1.0, 2.0, 3.0]}, (0, 0.1), **store)
         return path if store else found.save(path)
     stop = stopped_soon() if kind == "checkpoint" else None
-    slices.FIRST_SLICE = 4
+    driver.FIRST_SLICE = 4
     end = 60.0 if stop else 0.5
     ts.simulate(scene(), (0, end), integrator="taylor", store=path, checkpoint=0.0, progress=stop)
     return path

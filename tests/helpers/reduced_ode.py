@@ -7,10 +7,9 @@ from tsdyn.jit.kernels import caller, entry, resident
 from tsdyn.methods.diagonally_implicit import call_linearise
 from tsdyn.methods.explicit import call_accelerate, call_place
 from tsdyn.model.equations import constraint_curvature, set_time
-from tsdyn.model.packed import with_curvatures
-from tsdyn.model.packed_forces import with_force_jacobians
+from tsdyn.model.packed import with_curvatures, with_force_jacobians
 from tsdyn.observables.evaluate import mass_matrix
-from tsdyn.workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
+from tsdyn.workspaces import Context, allocate, allocate_linear, basis_free_parts
 
 WEIGHTS = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}  # central differences of sixth order
 

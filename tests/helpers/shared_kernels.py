@@ -13,7 +13,7 @@ from tsdyn.formulations.registry import FORMULATIONS
 from tsdyn.jit.compiled import is_declared
 from tsdyn.motions.program import run_program
 from tsdyn.observables.reactions import solve_multipliers
-from tsdyn.rows.reselection import reselect_rows
+from tsdyn.rows.row_selection import reselect_rows
 
 
 def shared_kernels():

@@ -4,15 +4,15 @@ import numpy as np
 
 import tsdyn as ts
 from tests.helpers.reduced_ode import soften, solve, with_derivatives
-from tsdyn.formulations.body_stiffness import add_constraints, add_forces
 from tsdyn.formulations.registry import formulation
+from tsdyn.formulations.saddle_point import add_constraints, add_forces
 from tsdyn.jit.kernels import caller, entry, resident
 from tsdyn.methods.diagonally_implicit import call_linearise, call_reduce
 from tsdyn.methods.explicit import call_accelerate, call_place
 from tsdyn.model.equations import applied_forces, evaluate_constraints, set_time
-from tsdyn.sparse.saddle_graph import BLOCK, saddle_of
-from tsdyn.workspaces.workspace import Context, allocate, allocate_linear, basis_free_parts
-from tsdyn.workspaces.workspace import load as load_context
+from tsdyn.rows.saddle_matrix import BLOCK, saddle_of
+from tsdyn.workspaces import Context, allocate, allocate_linear, basis_free_parts
+from tsdyn.workspaces import load as load_context
 
 _call_chart, call_check = caller("pdpppp"), caller("p")
 NAMES = "place", "accelerate", "start_chart", "check", "linearise", "reduce", "factorise", "solve", "soften"

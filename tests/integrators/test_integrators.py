@@ -8,10 +8,9 @@ from tests.helpers.built_in import INTEGRATORS
 from tsdyn.jit.kernels import ANY
 from tsdyn.maths.dense_linalg import copy
 from tsdyn.methods import integrator
-from tsdyn.methods.explicit import call_accelerate, call_place, callback, vector
+from tsdyn.methods.explicit import call_accelerate, call_place, callback, step_kernel, vector
 from tsdyn.methods.interpolants import HERMITE, VALUE, Interpolant
-from tsdyn.methods.plug_in import step_kernel
-from tsdyn.testing import adaptive_checks, integrator_runs, integrator_scenes
+from tsdyn.testing import integrator_checks, integrator_scenes
 
 I = ts.integrators
 CLASSICAL = I.Nystrom4.first_order
@@ -184,7 +183,7 @@ def test_rejected_steps_that_leave_a_trace():
 
     case = next(iter(integrator_scenes.cases(Remembering)))
     with pytest.raises(ts.testing.CheckFailed, match=r"rejected steps leave a trace|and not at once"):
-        adaptive_checks.check_rejections(Remembering, case, "tangent", "here")
+        integrator_checks.check_rejections(Remembering, case, "tangent", "here")
     fails(Remembering, "sliding top, formulation 'tangent'")
 
 
@@ -195,8 +194,8 @@ def test_limits_that_are_not_kept(monkeypatch):
         order = 5
 
     case = next(iter(integrator_scenes.cases(Hasty)))
-    adaptive_checks.check_bounds(Hasty, case, "tangent", "here")
-    plain = adaptive_checks.run_case
+    integrator_checks.check_bounds(Hasty, case, "tangent", "here")
+    plain = integrator_checks.run_case
 
     def without(name):
         def run(case, method, form, **options):
@@ -207,21 +206,21 @@ def test_limits_that_are_not_kept(monkeypatch):
         return run
 
     for name, words in (("max_step", "longer than the max_step"), ("first_step", "not the first_step")):
-        monkeypatch.setattr(adaptive_checks, "run_case", without(name))
+        monkeypatch.setattr(integrator_checks, "run_case", without(name))
         with pytest.raises(ts.testing.CheckFailed, match=words):
-            adaptive_checks.check_bounds(Hasty, case, "tangent", "here")
+            integrator_checks.check_bounds(Hasty, case, "tangent", "here")
 
 
 def test_constraint_errors_are_seen():
     scene = integrator_scenes.two_body_pendulum()
     solution = ts.simulate(scene, (0.0, 0.1), integrator=I.Nystrom4(0.01))
-    integrator_runs.demand_levels(solution, "here")
+    integrator_checks.demand_levels(solution, "here")
     for name, level in (("q", "position"), ("qd", "velocity"), ("qdd", "acceleration")):
         values = getattr(solution, name).copy()
         values[3, 1] += 1e-10
         state = ts.State(solution.t, **{n: getattr(solution, n) for n in ("q", "qd", "qdd")}, multipliers=None)
         with pytest.raises(ts.testing.CheckFailed, match=f"the {level} constraint error"):
-            integrator_runs.demand_levels(solution, "here", state._replace(**{name: values}))
+            integrator_checks.demand_levels(solution, "here", state._replace(**{name: values}))
 
 
 def test_a_method_that_is_never_the_same(one_scene):

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 
 import tsdyn as ts
-from tsdyn.jit import waiting
+from tsdyn.jit import interrupts
 
 
 class Terminal:
@@ -26,7 +26,7 @@ def test_one_line_counts_on_a_terminal(monkeypatch):
     monkeypatch.setattr(sys, "stderr", Terminal())
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.delenv("TSDYN_QUIET", raising=False)
-    with waiting.Waiting(2) as line:
+    with interrupts.Waiting(2) as line:
         for name in (
             "tsdyn.configuration.start_kernels land_start",
             "tsdyn.constraints.distance Distance.phi_loop",
@@ -42,7 +42,7 @@ def test_one_line_counts_on_a_terminal(monkeypatch):
 
 def test_quiet(monkeypatch, capsys):
     monkeypatch.setenv("TSDYN_QUIET", "1")
-    with waiting.Waiting(1) as line:
+    with interrupts.Waiting(1) as line:
         line.begin("tsdyn.configuration.start_kernels land_start")
         line.end("tsdyn.configuration.start_kernels land_start")
     assert capsys.readouterr() == ("", "")

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import diags_array
 
-from tsdyn.maths import sparse_lu as module
+from tsdyn.maths import matrix_rank as module
 
 
 def test_large_matrices(monkeypatch):

@@ -5,7 +5,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.tolerances import COARSE, EPS, HELD, LOOSE
-from tsdyn.methods.stage_prediction import begin_prediction, predict, prediction_memory
+from tsdyn.methods.diagonally_implicit import begin_prediction, predict, prediction_memory
 from tsdyn.methods.tableau import ImplicitTableau
 
 I = ts.integrators

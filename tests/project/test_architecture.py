@@ -16,12 +16,10 @@ PLACES = {"tsdyn": ROOT / "tsdyn", "tsdyn.constraints": ROOT / "constraints", "t
 # lowest first: a module imports from its own package and those (or modules that lie flat in tsdyn/) before it
 ORDER = [
     "errors",
-    "regular_files",
     "_version",
     "validation",
-    "other_names",
-    "_discovery",
     "calls",
+    "_discovery",
     "docstrings",
     "drawing",
     "jit",
@@ -30,7 +28,6 @@ ORDER = [
     "motions",
     "elements",
     "model",
-    "sparse",
     "rows",
     "workspaces",
     "methods",
@@ -43,20 +40,16 @@ ORDER = [
     "viewer",
     "runs",
     "taylor",
-    "lanes",
     "configuration",
-    "statics",
-    "inverse",
+    "analyses",
     "figures",
     "ahead",
     "storage",
     "files",
     "importing",
-    "parameters",
     "simulation",
     "ensembles",
     "benchmarking",
-    "comparison",
     "profiling",
     "plots",
     "testing",
@@ -68,7 +61,7 @@ ORDER = [
 ]
 FLAT = 14  # modules at most that lie flat in tsdyn/
 LONGEST = 700  # lines of a file, without examples
-ELIMINATION = ("elimination", "factorisation", "block_operations")  # of tsdyn.sparse, for tsdyn.rows alone
+GRAPHS = {"interface", "constraint_graph", "graph_builder", "massless_axes", "saddle_matrix", "symbolic", "tolerances"}
 
 
 def _modules():
@@ -146,16 +139,17 @@ def test_no_modules_import_each_other_in_a_circle():
 
 
 def test_constraint_rows_have_one_interface():
+    """Other packages read rows by `interface` alone; graphs and their orders are data that anybody may read."""
+    open_to_all = {f"tsdyn.rows.{name}" for name in GRAPHS}
     for module, targets in edges().items():
-        if _district(module) in ("rows", "sparse"):
-            continue
-        below = {target for target in targets if _district(target) == "rows"} - {"tsdyn.rows.interface"}
-        assert not below | set(targets) & {f"tsdyn.sparse.{name}" for name in ELIMINATION}, module
+        if _district(module) != "rows":
+            below = {target for target in targets if _district(target) == "rows"}
+            assert below <= open_to_all, module
 
 
 def test_redundant_rows_are_dropped_behind_the_interface():
     for module in FILES:
-        if _district(module) not in ("rows", "sparse"):
+        if _district(module) not in ("rows",):
             names = {getattr(node, "attr", "") for node in ast.walk(tree(module))}
             assert not names & {"dropped", "reselection"}, module
 
@@ -208,8 +202,8 @@ def test_packages_say_what_they_are_for(package):
 
 # arguments of kernels that have one order everywhere, and the packages whose kernels keep to it
 ARGUMENTS = ("context", "graph", "system", "w", "f", "l", "linear", "q", "qd", "qdd", "t", "out")
-NAMED_THRESHOLDS = ("rows", "sparse", "formulations", "workspaces")  # no bare numbers in kernels
-ORDERED = ("rows", "sparse", "formulations", "workspaces", "constraints", "forces", "taylor", "configuration", "maths")
+NAMED_THRESHOLDS = ("rows", "formulations", "workspaces")  # no bare numbers in kernels
+ORDERED = ("rows", "formulations", "workspaces", "constraints", "forces", "taylor", "configuration", "maths")
 
 
 def test_arguments_of_kernels_have_one_order():

@@ -7,7 +7,7 @@ import re
 import pytest
 
 import tsdyn as ts
-from tsdyn.other_names import ARGUMENTS, ATTRIBUTES, CLASSES
+from tsdyn.calls import ARGUMENTS, ATTRIBUTES, CLASSES
 
 MODULES = ("constraints", "forces", "integrators")
 

@@ -5,10 +5,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2] / "tsdyn"
 CORE = (
-    "elements/loops", "formulations", "lanes", "maths", "methods", "model", "motions", "rows", "runs", "sparse",
-    "taylor", "workspaces",
+    "elements/loops", "formulations", "maths", "methods", "model", "motions", "rows", "runs", "taylor",
 )  # fmt: skip
-FILES = [path for package in CORE for path in sorted((ROOT / package).glob("*.py"))]
+FILES = [ROOT / "workspaces.py", *(path for package in CORE for path in sorted((ROOT / package).glob("*.py")))]
 SCOPES = ast.FunctionDef, ast.Lambda, ast.ClassDef, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp
 
 

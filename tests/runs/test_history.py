@@ -6,7 +6,7 @@ import pytest
 import tsdyn as ts
 from tests.helpers.closed_forms import point_pendulum
 from tests.helpers.tolerances import NEAR
-from tsdyn.runs.history import ChartLog, StepLog
+from tsdyn.runs.run_log import ChartLog, StepLog
 
 I = ts.integrators
 METHODS = [None, I.Taylor(), I.DOP853(1e-9, 1e-9), I.RK45(1e-6, 1e-6), I.Nystrom4(1e-2)]

@@ -7,7 +7,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.tolerances import FAIR, FINE, LOOSE
-from tsdyn.model.state_loads import watched_loads
+from tsdyn.model.equations import watched_loads
 
 F, C = ts.forces, ts.constraints
 TOLERANCES = {"rtol": 1e-8, "atol": 1e-10}

@@ -9,7 +9,7 @@ import pytest
 import tsdyn as ts
 from examples import door, driven_pivot, top
 from tests.helpers.calls import same_run
-from tsdyn.runs.reader import Reader
+from tsdyn.runs.dense_output import Reader
 
 I = ts.integrators
 SPAN = (0.0, 0.5)

@@ -7,9 +7,8 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.tolerances import FAIR, FINE, LOOSE, ROUGH
-from tsdyn.model.state_loads import depends_on_time
-from tsdyn.motions.changes import changes, sample_times
-from tsdyn.motions.knots import stops_of
+from tsdyn.model.equations import depends_on_time
+from tsdyn.motions.knots import changes, sample_times, stops_of
 
 C, F, I, M = ts.constraints, ts.forces, ts.integrators, ts.motions
 SPAN, AREA, BUMP = (0, 100), 0.1, 0.05 * math.sqrt(math.pi)  # N s: the impulses of box and bump

@@ -6,7 +6,7 @@ from scipy.interpolate import CubicSpline, PPoly
 
 import tsdyn as ts
 from tests.helpers.tolerances import ALGEBRA, CLOSE, FAIR, HELD, NEAR, ROUNDING
-from tsdyn.files.run_table import output_times
+from tsdyn.files.run_tables import output_times
 
 I, C = ts.integrators, ts.constraints
 END = 2.0  # units of time

@@ -77,7 +77,7 @@ def test_files_that_are_no_meshes_are_refused(name, data, words, tmp_path):
 
 
 def test_polygons_make_a_bounded_number_of_triangles(tmp_path, monkeypatch):
-    monkeypatch.setattr("tsdyn.shapes.mesh_files.MOST", 100)
+    monkeypatch.setattr("tsdyn.shapes.MOST", 100)
     (tmp_path / "part.obj").write_text("v 0 0 0\n" + f"f{' 1' * 40}\n" * 3)
     with pytest.raises(ts.InvalidFile, match="more than 100"):
         S.Mesh(tmp_path / "part.obj")
@@ -95,7 +95,7 @@ def test_meshes_are_regular_files_of_bounded_size(tmp_path, monkeypatch):
     }.items():
         with pytest.raises(ts.StorageError, match=words):
             S.Mesh(tmp_path / f"{name}.stl")
-    monkeypatch.setattr("tsdyn.shapes.mesh_files.LARGEST", 100)
+    monkeypatch.setattr("tsdyn.shapes.LARGEST", 100)
     (tmp_path / "part.stl").write_bytes(binary_stl(CORNERS))
     with pytest.raises(ts.StorageError, match=r"too large: .* may have 100 at most"):
         S.Mesh(tmp_path / "part.stl")

@@ -12,8 +12,8 @@ import tsdyn as ts
 from examples import driven_pivot, top
 from tests.helpers.scenes import build as build_scene
 from tests.helpers.scenes import random_chain
-from tsdyn.configuration.start_workspace import StartWorkspace
-from tsdyn.runs import recorder
+from tsdyn.configuration.initial_conditions import StartWorkspace
+from tsdyn.runs import run_log
 from tsdyn.runs.run_memory import Memory
 from tsdyn.runs.step_engine import StepEngine
 from tsdyn.simulation import scene_cache as prepare
@@ -259,6 +259,6 @@ def test_a_large_memory_is_not_kept(monkeypatch):
 
 def test_room_for_charts_is_made_as_they_come(monkeypatch):
     expected = {way: run(top.build(), way) for way in ("charts", "dense", "default")}
-    monkeypatch.setattr(recorder, "CHART_ROOM", 4)
+    monkeypatch.setattr(run_log, "CHART_ROOM", 4)
     for way, each in expected.items():
         same(run(top.build(), way), each)

@@ -16,7 +16,7 @@ from benchmarks import mechanisms
 from examples import geared_pair, top
 from tests.helpers.methods import one_of_each
 from tsdyn.model import packed
-from tsdyn.runs import interrupted, reader, run_memory, slices
+from tsdyn.runs import dense_output, driver, run_memory
 from tsdyn.storage import archive as archives
 
 OUTPUTS = ("t", "q", "qd", "qdd")
@@ -39,9 +39,9 @@ def interrupt(monkeypatch):
         call()
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(interrupted, "interruptible", interruptible)
-    monkeypatch.setattr(slices, "FIRST_SLICE", 1)
-    for module in (run_memory, reader):
+    monkeypatch.setattr(run_memory, "interruptible", interruptible)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 1)
+    for module in (run_memory, dense_output):
         monkeypatch.setattr(module, "LONG_STEPS", 0)
     return lambda n: left.__setitem__(0, n)
 

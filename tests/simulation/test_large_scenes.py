@@ -16,8 +16,8 @@ from tsdyn.configuration import kinetic_metric as kinetic
 from tsdyn.errors import RedundantConstraints, Status
 from tsdyn.observables.diagnostics import constraint_rows
 from tsdyn.observables.evaluate import constraint_arrays
+from tsdyn.rows import graph_builder as hubs
 from tsdyn.simulation.scene_cache import prepared
-from tsdyn.sparse import body_splitting as hubs
 from tsdyn.taylor import layout as expansion_pack
 
 C = ts.constraints

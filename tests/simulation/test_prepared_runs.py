@@ -19,11 +19,11 @@ from benchmarks.stiff import jointed
 from examples import door, driven_pivot, four_bar, top
 from tests.helpers.calls import same_run
 from tsdyn.methods import integrator as methods
-from tsdyn.runs import slices
+from tsdyn.runs import driver as slices
 from tsdyn.runs.run_memory import Memory
-from tsdyn.runs.step_memory import StepMemory
+from tsdyn.runs.step_engine import StepMemory
 from tsdyn.simulation.run_options import CHECKS, OF_CALL, OF_RUN, OPTIONS, RunCall
-from tsdyn.taylor.run_memory import SeriesMemory
+from tsdyn.taylor.series_engine import SeriesMemory
 
 I = ts.integrators
 SPAN = (0.0, 0.3)

@@ -135,7 +135,7 @@ print("done")
 
 @pytest.mark.slow
 def test_charts_have_room_when_a_run_of_many_fails(monkeypatch):
-    monkeypatch.setattr("tsdyn.runs.recorder.CHART_ROOM", 8)
+    monkeypatch.setattr("tsdyn.runs.run_log.CHART_ROOM", 8)
     scene = ts.Scene()
     mass = scene.add_point_mass(1.0)
 

@@ -8,8 +8,8 @@ import pytest
 import tsdyn as ts
 from benchmarks.stiff import jointed
 from tests.helpers.tolerances import CLOSE, NEAR
-from tsdyn.runs import slices
-from tsdyn.simulation import segments, turns
+from tsdyn.runs import driver
+from tsdyn.simulation import segments
 
 pytestmark = pytest.mark.slow  # kernels of implicit methods
 OPTIONS = {"rtol": 1e-7, "atol": 1e-7}
@@ -24,8 +24,8 @@ def level(t, state):
 def impatient():
     """The explicit method is tried after a few steps already, so that runs turn more than once."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(turns, "PATIENCE", 1)
-        patched.setattr(turns.Turns, "patience", 1)
+        patched.setattr(segments, "PATIENCE", 1)
+        patched.setattr(segments.Turns, "patience", 1)
         yield
 
 
@@ -85,7 +85,7 @@ def test_what_the_solution_says(turned, tmp_path):
 
 
 def test_turns_do_not_depend_on_slices(turned, monkeypatch):
-    monkeypatch.setattr(slices, "FIRST_SLICE", 3)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 3)
     np.testing.assert_array_equal(ts.simulate(jointed(), (0.0, END), **OPTIONS).q, turned.q)
 
 
@@ -98,7 +98,7 @@ def test_steps_in_all_segments_count(turned):
 
 @pytest.mark.parametrize("share", [0.1, 0.3, 0.6])
 def test_an_interrupted_run_has_what_it_had(share, turned, monkeypatch):
-    monkeypatch.setattr(slices, "FIRST_SLICE", 3)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 3)
     seen = []
 
     def stop(fraction):
@@ -121,7 +121,7 @@ def test_the_explicit_method_goes_on_where_the_implicit_one_cannot(monkeypatch, 
             raise KeyboardInterrupt
 
     monkeypatch.setattr(segments, "demand_holonomic", refuse)
-    monkeypatch.setattr(slices, "FIRST_SLICE", 3)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 3)
     solution = ts.simulate(jointed(), (0.0, 0.05), **OPTIONS).raise_if_failed()
     assert solution.method == "Taylor(rtol=1e-07, atol=1e-07)"
     assert solution.t.size == solution.stats.steps + 1
@@ -176,10 +176,12 @@ def test_far_from_the_origin_runs_turn_as_there():
 
 def test_an_interruption_as_a_segment_ends_is_heeded(turned, monkeypatch):
     """Ctrl-C in the report with which a segment ends: the next one doesn't begin."""
-    monkeypatch.setattr(slices, "FIRST_SLICE", 3)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 3)
     calls, ended = [], []
-    own = turns.Turns.turns
-    monkeypatch.setattr(turns.Turns, "turns", lambda self, memory: own(self, memory) and not ended.append(len(calls)))
+    own = segments.Turns.turns
+    monkeypatch.setattr(
+        segments.Turns, "turns", lambda self, memory: own(self, memory) and not ended.append(len(calls))
+    )
     ts.simulate(jointed(), (0.0, END), progress=calls.append, **OPTIONS)
     assert len(ended) == 5
     at, seen = ended[2], []

@@ -16,7 +16,7 @@ import tsdyn as ts
 from tests.helpers import forging
 from tests.helpers.processes import ROOT
 from tests.helpers.refusals import refuse
-from tsdyn.runs import slices
+from tsdyn.runs import driver
 from tsdyn.storage import checkpoint, saved_file
 
 SECRET = 1234.5
@@ -272,7 +272,7 @@ def test_outputs_that_are_not_finite_are_not_drawn(stopped):
 @pytest.fixture
 def stopped(tmp_path, monkeypatch):
     """The store of a run by series that was stopped, with redundant rows and a sharp force."""
-    monkeypatch.setattr(slices, "FIRST_SLICE", 4)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
     path = tmp_path / "run.h5"
     scene, options = forging.scene(), {"integrator": "taylor", "store": path, "checkpoint": 0.0}
     ts.simulate(scene, (0.0, 60.0), progress=forging.stopped_soon(), **options)

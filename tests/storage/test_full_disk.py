@@ -11,7 +11,7 @@ import pytest
 import tsdyn as ts
 from examples import top
 from tests.helpers.refusals import refuse
-from tsdyn.runs import slices
+from tsdyn.runs import driver
 
 FORMATS = ("h5", "zarr")
 NAMESPACE = ["unshare", "--user", "--map-root-user", "--mount"]  # in which mount is allowed
@@ -103,7 +103,7 @@ def test_a_file_that_may_grow_no_more(suffix, limit, tmp_path):
 
 def test_a_disk_without_room(tmp_path, monkeypatch):
     path, free = tmp_path / "run.h5", iter([1 << 30] * 3)
-    monkeypatch.setattr(slices, "FIRST_SLICE", 4)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=next(free, 1 << 20)))
     solution = ts.simulate(top.build(), (0.0, 3.0), integrator="dop853", store=path, checkpoint=0.0)
     assert solution.status == ts.Status.STORE_FAILED

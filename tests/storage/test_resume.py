@@ -9,8 +9,8 @@ import tsdyn as ts
 from benchmarks.stiff import jointed
 from examples import driven_pivot, four_bar, geared_pair, top
 from tests.helpers.refusals import refuse
-from tsdyn.runs import slices
-from tsdyn.simulation import turns
+from tsdyn.runs import driver
+from tsdyn.simulation import segments
 from tsdyn.storage import checkpoint
 
 I = ts.integrators
@@ -32,7 +32,7 @@ class Stop:
 @pytest.fixture
 def short_slices(monkeypatch):
     """Slices of a few steps, so that a short run has many."""
-    monkeypatch.setattr(slices, "FIRST_SLICE", 4)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
 
 
 def same(one, other):
@@ -170,8 +170,8 @@ def test_singular_configurations(method, count, tmp_path):
 @pytest.mark.parametrize("count", [2, 5, 8, 11, 13, 15])
 def test_runs_that_turn_to_an_implicit_method(count, tmp_path, monkeypatch):
     """Stopped in segments of either method, of which there are five or more."""
-    monkeypatch.setattr(turns, "PATIENCE", 1)
-    monkeypatch.setattr(turns.Turns, "patience", 1)
+    monkeypatch.setattr(segments, "PATIENCE", 1)
+    monkeypatch.setattr(segments.Turns, "patience", 1)
     path, options = tmp_path / "run.h5", {"rtol": 1e-7, "atol": 1e-7, "history": True}
     whole = ts.simulate(jointed(), (0.0, 2.0), **options)
     assert "Radau took over 3 times" in whole.message

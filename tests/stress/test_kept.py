@@ -5,7 +5,7 @@ import pytest
 
 from tsdyn.errors import Status
 from tsdyn.stress import comparisons
-from tsdyn.stress.judgement import judge_case, run
+from tsdyn.stress.judgement import judge_case, run_case
 from tsdyn.stress.random_scenes import generate
 
 KEPT = {
@@ -42,7 +42,7 @@ def made(seed):
 def test_joint_friction_starts_from_the_same_loads_with_output_times():
     """Loads of friction at output times are not where the next step starts from."""
     case = made(2000326)
-    one, two = run(case), run(case, t_eval=np.linspace(*case.span, 7))
+    one, two = run_case(case), run_case(case, t_eval=np.linspace(*case.span, 7))
     np.testing.assert_array_equal(one.steps.h, two.steps.h)
     np.testing.assert_array_equal(one.q[-1], two.q[-1])
 
@@ -50,7 +50,7 @@ def test_joint_friction_starts_from_the_same_loads_with_output_times():
 def test_a_step_that_rounding_repeats_ends_the_run():
     """The end of the shortest step is rounded to where the rejected step before it had ended."""
     case = made(2001057)
-    solution = run(case)
+    solution = run_case(case)
     assert solution.status == Status.STEP_COLLAPSED
     assert solution.stats.rejected < 1000
     assert "diverges" in solution.message
@@ -58,7 +58,7 @@ def test_a_step_that_rounding_repeats_ends_the_run():
 
 def test_light_links_between_heavy_bodies_keep_their_accelerations_on_the_constraints():
     """Masses from 3e-5 kg to 2e3 kg: a last place of the multipliers accelerated the lightest by 1.5e-8 m/s^2."""
-    assert run(made(4004998)).constraint_error.acceleration.max() < 1e-12
+    assert run_case(made(4004998)).constraint_error.acceleration.max() < 1e-12
 
 
 @pytest.mark.slow_for("*")

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from tests.helpers.drawn_numbers import DrawnNumbers
 from tsdyn.stress.judgement import comparison, judge_case, judge_scene
-from tsdyn.stress.random_parts import Draw
-from tsdyn.stress.random_scenes import KINDS, drawn, generate
+from tsdyn.stress.random_scenes import KINDS, Draw, drawn, generate
 
 
 def test_every_kind_is_drawn():

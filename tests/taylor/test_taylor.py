@@ -9,8 +9,8 @@ import tsdyn as ts
 from tests.helpers.closed_loops import bricard
 from tests.helpers.reference import demand_on_the_manifold, error, load
 from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, NEAR, ROUNDING, TIGHT
-from tsdyn.runs import slices
-from tsdyn.simulation import turns
+from tsdyn.runs import driver
+from tsdyn.simulation import segments
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 TOLERANCES = (1e-4, 1e-8, 1e-12)
@@ -284,10 +284,12 @@ def test_velocities_of_fast_modes_are_held_too():
 def test_an_implicit_method_is_considered_again_at_times_of_the_motion_alone(slices_of, monkeypatch):
     """Not for what little seems to be left, which may change. Slices end where the clock wants it."""
     asked = []
-    monkeypatch.setattr(slices, "FIRST_SLICE", slices_of)
-    monkeypatch.setattr(turns, "TRIAL", 1e9)
-    own = turns.Turns._to_implicit
-    monkeypatch.setattr(turns.Turns, "_to_implicit", lambda self, *given: asked.append(given[1]) or own(self, *given))
+    monkeypatch.setattr(driver, "FIRST_SLICE", slices_of)
+    monkeypatch.setattr(segments, "TRIAL", 1e9)
+    own = segments.Turns._to_implicit
+    monkeypatch.setattr(
+        segments.Turns, "_to_implicit", lambda self, *given: asked.append(given[1]) or own(self, *given)
+    )
     ts.simulate(mounted(1e6), (0.0, 1.0), rtol=1e-6, atol=1e-6, max_steps=3000)
     assert len(asked) == 5
     assert [later / before for before, later in pairwise(asked)] == [4.0, 4.0, 4.0, 4.0]

@@ -21,7 +21,7 @@ from tests.helpers.tolerances import ALGEBRA, FINE, HELD, ROUNDING, TIGHT
 from tsdyn.elements.bodies import transform_g
 from tsdyn.elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from tsdyn.taylor.layout import room
-from tsdyn.workspaces.run_state import B_DATA, B_H
+from tsdyn.workspaces import B_DATA, B_H
 
 C, F = ts.constraints, ts.forces
 ORDER = 16

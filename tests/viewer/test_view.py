@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 import tsdyn as ts
 from examples import door, four_bar
 from tests.helpers.pages import Tags, array, decoded, place
-from tsdyn.viewer.contacts import HOLDS_BACK, PUSHES
-from tsdyn.viewer.run_data import FRAMES
+from tsdyn.viewer.run_data import FRAMES, HOLDS_BACK, PUSHES
 
 C, S = ts.constraints, ts.shapes
 ROOT = Path(__file__).parents[2]
@@ -67,7 +66,7 @@ def test_a_page_has_the_poses_of_the_run(run, page):
 
 def test_between_outputs_the_motion_is_a_quintic(run):
     """Without dense output, and close to it."""
-    from tsdyn.viewer.frames import resample
+    from tsdyn.viewer.run_data import resample
 
     plain = ts.simulate(run.scene, (0.0, 2.0))
     assert plain.t.size < 200

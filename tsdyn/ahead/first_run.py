@@ -1,13 +1,13 @@
 """Which kernels a run needs, so that a first one can have them compiled at the same time."""
 
 from ..configuration import start_kernels
-from ..formulations import friction_basis, friction_solve, null_space
+from ..formulations import accelerations, null_space
 from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853, Taylor
 from ..jit.compiled import DEBUG
-from ..methods.plug_in import called_for
-from ..model.state_loads import is_of_user
-from ..motions import program, state_program
+from ..methods.explicit import called_for
+from ..model.equations import is_of_user
+from ..motions import program, tracing
 from ..motions.signals import Signal
 from ..rows.interface import ELIMINATION
 from ..runs.arguments import adaptive
@@ -65,7 +65,7 @@ def of_scene(scene, method, form, far, rough):
         signals = [value for value in vars(force).values() if isinstance(value, Signal)]
         yield from of_force(force.kernels, series, implicit, form, "driven_" * bool(signals))
         if series and hasattr(force.kernels, "program"):
-            yield state_program.run_order
+            yield tracing.run_order
         if signals and (series or any(signal.motions for signal in signals)):
             yield program.run_program
 
@@ -86,7 +86,7 @@ def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"],
     names += [driven + "series", driven + "check", driven + "margin", "load_slope"] * series
     found = [kernels[name] for name in names if name in kernels]
     if "normal_load" in kernels and not series:
-        found.append((friction_solve if form.basis_free else friction_basis).solve_friction)
+        found.append((accelerations if form.basis_free else null_space).solve_friction)
     return found
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from ..jit import cache, compilers, stock
 from ..jit.code_hash import is_ours
 from ..jit.compiled import DEBUG, is_loaded, is_stored, load
-from ..jit.waiting import Waiting
+from ..jit.interrupts import Waiting
 from .worker import find
 
 MOST = 16  # processes: each takes some 300 MB

@@ -1,5 +1,4 @@
-"""`ts.benchmark`: run time against error of methods on a user's scene; the tables of Haug (2018).
+"""`ts.benchmark` and `ts.compare`: run time against error of methods and of other engines; the tables of Haug (2018).
 
-Imports simulation and below. Begin with benchmark.py; reference_solution.py makes the reference solution for
-the errors.
+Imports simulation and below. Begin with benchmark.py, which makes the reference solution of a scene, too.
 """

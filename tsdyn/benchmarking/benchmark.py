@@ -1,29 +1,342 @@
-"""`benchmark`: work-precision of integration methods on a user's scene."""
+"""`benchmark`: work-precision of integration methods on a user's scene, against a reference solution."""
 
 from __future__ import annotations
 
 import contextlib
+import datetime
+import html
+import math
+import platform
 import signal
 import threading
 from functools import partial
-from typing import TYPE_CHECKING
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..calls import fitting
+from ..drawing import BLUE, GREEN, GREY, VERMILION, Drawn, new_figure
 from ..errors import InvalidArgument, Status
 from ..formulations.registry import formulation as find_formulation
+from ..integrators import DOP853, RK45, SDIRK54
 from ..methods.integrator import Integrator, registered
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
 from ..validation import floats, positive, unknown_name, whole
-from .reference_solution import Reference, agreed, errors
-from .report import Benchmark, Row
+from .tolerances import ENOUGH, REFERENCE_TOLERANCES, ROOM
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..hints import ArrayLike, Formulation, Methods, Span
+    from ..hints import ArrayLike, Formulation, Methods, Solution, Span
+
+
+# Reference solution of a scene: two unrelated methods, refined until they agree as far as they can.
+
+PAIRS = ((DOP853, RK45), (DOP853, SDIRK54), (SDIRK54, RK45))  # the next one where a method doesn't get through
+
+
+class Reference(NamedTuple):
+    """Where the bodies are at given times; k times, b bodies."""
+
+    t: np.ndarray  # (k,), s
+    r: np.ndarray  # (k, b, 3), m
+    A: np.ndarray  # (k, b, 3, 3); the identity for a point mass
+    trusted: float  # what r (m) and A are taken to be right to
+    source: str
+
+    @property
+    def digits(self) -> float:
+        """Decimals of r (m) and A that are trusted."""
+        return -math.log10(self.trusted) if self.trusted > 0.0 else 16.0
+
+
+def poses(solution):
+    """Positions (k, b, 3) and rotation matrices (k, b, 3, 3) of a solution's bodies."""
+    bodies, k = solution.scene.bodies, solution.t.size
+    r = np.stack([solution.position(body) for body in bodies], axis=1)
+    A = [np.broadcast_to(np.eye(3), (k, 3, 3)) if body.dimension == 3 else solution.rotation(body) for body in bodies]
+    return r, np.stack(A, axis=1)
+
+
+def errors(solution, reference):
+    """Largest differences in r (m) and in A from a reference, over all bodies and outputs."""
+    return tuple(
+        float(np.abs(found - given).max(initial=0.0))
+        for found, given in zip(poses(solution), (reference.r, reference.A), strict=True)
+    )
+
+
+def agreed(scene, t_span, times, max_steps):
+    """Make a `Reference`.
+
+    Raises
+    ------
+    InvalidArgument
+        If no two methods reach the end within max_steps.
+    KeyboardInterrupt
+        If one of the runs is interrupted.
+    """
+    best, said = None, []
+    for pair in PAIRS:
+        for tol in REFERENCE_TOLERANCES:
+            runs = [_run(scene, t_span, times, kind, tol, max_steps) for kind in pair]
+            failed = [run for run in runs if not run.success]
+            if failed:
+                said += [f"{run.method}: {run.message}" for run in failed]
+                break
+            r, A = poses(runs[0])
+            gap = max(errors(runs[1], Reference(times, r, A, 0.0, "")))
+            if best is None or gap < best[0]:
+                best = gap, Reference(times, r, A, 0.0, f"{runs[0].method}, from which {runs[1].method} differs by")
+            if gap < ENOUGH:
+                break
+        if best is not None:
+            break
+    if best is None:
+        raise InvalidArgument(
+            f"no reference could be made for this scene within {max_steps} steps; shorten t_span, raise max_steps, or "
+            f"give a reference. {said[-1]}"
+        )
+    gap, reference = best
+    size = 1.0 + np.abs(reference.r).max(initial=0.0)
+    trusted = max(ROOM * gap, 10.0 * np.finfo(float).eps * size)
+    return reference._replace(trusted=trusted, source=f"{reference.source} {gap:.1e} at most")
+
+
+def _run(scene, t_span, times, kind, tol, max_steps):
+    run = simulate(scene, t_span, integrator=kind(tol, tol), t_eval=times, max_steps=max_steps)
+    if run.status == Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    return run
+
+
+# The work-precision figure of `benchmark`: one panel a scene, one line a method.
+
+COLOURS = (BLUE, VERMILION, GREEN, "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS = "osD^vPX"
+
+
+def figure(benchmarks):
+    """Draw benchmarks side by side."""
+    with new_figure(1.0 + 4.0 * len(benchmarks), 4.4) as drawn:
+        panels = drawn.subplots(1, len(benchmarks), sharey=True, squeeze=False)[0]
+        names = list(dict.fromkeys(row.method for benchmark in benchmarks.values() for row in benchmark.rows))
+        for ax, (title, benchmark) in zip(panels, benchmarks.items(), strict=True):
+            _panel(ax, benchmark, names)
+            ax.set_title(title, loc="left", fontsize=11)
+        panels[0].set_ylabel("run time (s)")
+        handles = {name: line for ax in panels for line, name in zip(*ax.get_legend_handles_labels(), strict=True)}
+        if handles:
+            drawn.legend(
+                handles.values(),
+                handles.keys(),
+                loc="outside lower center",
+                ncols=len(handles),
+                frameon=False,
+                fontsize=9,
+            )
+    return drawn
+
+
+def _panel(ax, benchmark, names):
+    """One line a method, and the errors that the reference can't tell apart in grey."""
+    ax.set(xscale="log", yscale="log", xlabel="largest error in position (m) and rotation matrix")
+    ax.grid(True, which="major", color="#dddddd", linewidth=0.6)
+    ax.spines[["top", "right"]].set_visible(False)
+    for i, name in enumerate(names):
+        points = sorted((row.error, row.seconds) for row in benchmark.rows if row.method == name and not row.message)
+        if points:
+            look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i % len(MARKERS)]}
+            ax.plot(*zip(*points, strict=True), label=name, markersize=4, linewidth=1.3, **look)
+    if benchmark.reference is not None and ax.lines:
+        trusted = benchmark.reference.trusted
+        ax.axvline(trusted, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)))
+        ax.annotate(
+            f"reference: {benchmark.reference_digits:.0f} digits", (trusted, 0.98), (3, 0), color=GREY, fontsize=8,
+            xycoords=ax.get_xaxis_transform(), textcoords="offset points", rotation=90, va="top",
+        )  # fmt: skip
+    ax.invert_xaxis()  # better to the right
+
+
+# The result of `benchmark`: rows, their table, and the figure.
+
+COUNTS = (
+    "steps",
+    "rejected",
+    "evaluations",
+    "placements",
+    "jacobians",
+    "iteration_matrices",
+    "factorizations",
+    "charts",
+)
+HEADS = ("steps", "rejected", "evaluations", "placements", "Jacobians", "iter.mat.", "factor.", "charts")
+
+
+class Row(NamedTuple):
+    """One method at one tolerance, or of one step; nan and zeros where it didn't run to the end."""
+
+    method: str
+    setting: str  # "tolerance" or "step"
+    value: float  # the tolerance, or the step in s
+    error_r: float  # m, largest over all bodies and outputs
+    error_A: float  # entries of the rotation matrix
+    trusted: bool  # whether the error is above what the reference is trusted to
+    seconds: float  # median over the repeats, of the run without its preparation
+    steps: int
+    rejected: int
+    evaluations: int
+    placements: int
+    jacobians: int
+    iteration_matrices: int
+    factorizations: int
+    charts: int
+    status: str
+    message: str  # empty for a run that reached its end
+
+    @property
+    def error(self) -> float:
+        """The larger of the two."""
+        return max(self.error_r, self.error_A)
+
+    @classmethod
+    def of(
+        cls,
+        method: str,
+        setting: str,
+        value: float,
+        solution: Solution | None,
+        off: tuple[float, float],
+        floor: float,
+        message: str,
+    ) -> Row:
+        """The row of a run that has not been timed."""
+        stats = None if solution is None else solution.stats
+        counts = {name: getattr(stats, name, 0) for name in COUNTS}
+        status = "refused" if solution is None else str(solution.status)
+        return cls(
+            method, setting, value, *off, bool(max(off) > floor), np.nan, **counts, status=status, message=message
+        )
+
+
+class Benchmark(Drawn):
+    """Run time against error of methods on one scene.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+    reference : agreement.Reference, or None if it was interrupted before there was one
+    reference_digits : float
+        Decimals of positions (m) and rotation matrices that the reference is trusted to.
+    interrupted : bool
+        Whether Ctrl-C ended it; rows not reached are missing, those not timed have nan seconds.
+    machine : str
+        Processor, versions and date.
+    """
+
+    def __init__(
+        self,
+        rows: tuple[Row, ...],
+        reference: Reference | None,
+        span: tuple[float, float],
+        formulation: str,
+        repeats: int,
+        interrupted: bool,
+    ) -> None:
+        self.rows, self.reference, self.span, self.formulation = rows, reference, span, formulation
+        self.repeats, self.interrupted, self.machine = repeats, interrupted, machine()
+
+    @property
+    def reference_digits(self) -> float:
+        """Decimals that the reference is trusted to; 0 without one."""
+        return 0.0 if self.reference is None else self.reference.digits
+
+    def table(self) -> str:
+        """The rows as text, with where the errors come from and the machine."""
+        if self.reference is None:
+            return "Benchmark, interrupted before there was a reference."
+        head = [
+            f"Run time against error, {self.span[0]:g} to {self.span[1]:g} s, formulation {self.formulation!r}.",
+            f"Errors are the largest over all bodies and {self.reference.t.size} outputs; run times are medians of "
+            f"{self.repeats} interleaved runs, without compilation and preparation.",
+            f"Reference: {self.reference.source}; {self.reference_digits:.1f} digits are trusted.",
+            *(["* below what the reference is trusted to."] if self._marked() else []),
+            *(["Interrupted: what there was so far."] if self.interrupted else []),
+            self.machine,
+            "",
+        ]
+        cells = [_HEAD, *(_cells(row) for row in self.rows)]
+        widths = [max(len(line[i]) for line in cells) for i in range(len(_HEAD))]
+        lines = [
+            "  ".join(
+                cell.ljust(w) if i in _LEFT else cell.rjust(w)
+                for i, (cell, w) in enumerate(zip(line, widths, strict=True))
+            )
+            for line in cells
+        ]
+        return "\n".join([*head, *(line.rstrip() for line in lines), *self._messages()])
+
+    def _marked(self):
+        return any(not row.trusted and not row.message for row in self.rows)
+
+    def _messages(self):
+        return [f"{row.method}, {row.setting} {row.value:g}: {row.message}" for row in self.rows if row.message]
+
+    __str__ = table
+
+    def __repr__(self) -> str:
+        return f"<Benchmark: {len(self.rows)} runs, reference trusted to {self.reference_digits:.1f} digits>"
+
+    def _repr_html_(self) -> str:
+        """The table in a notebook."""
+        lines = [f"<th>{html.escape(cell)}</th>" for cell in _HEAD]
+        rows = [
+            "".join(lines),
+            *("".join(f"<td>{html.escape(cell)}</td>" for cell in _cells(row)) for row in self.rows),
+        ]
+        notes = "<br>".join(html.escape(text) for text in (*self._messages(), self.machine))
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        return (
+            f"<table><caption>Run time against error; {self.reference_digits:.1f} digits of the reference are trusted"
+            f"</caption>{body}</table><p>{notes}</p>"
+        )
+
+    def figure(self) -> Any:
+        """Draw it; return the matplotlib Figure."""
+        return figure({"": self})
+
+
+_HEAD = ("method", "tol or step", "error r (m)", "error A", "", "time (ms)", *HEADS, "status")
+_LEFT = (0, 4, len(_HEAD) - 1)
+
+
+def _cells(row):
+    setting = f"{row.value:.0e}" if row.setting == "tolerance" else f"{row.value:g} s"
+    off = [f"{value:.1e}" if np.isfinite(value) else "-" for value in (row.error_r, row.error_A)]
+    mark = "" if row.trusted or row.message else "*"
+    seconds = f"{1e3 * row.seconds:.3g}" if np.isfinite(row.seconds) else "-"
+    return (row.method, setting, *off, mark, seconds, *(str(getattr(row, name)) for name in COUNTS), row.status)
+
+
+def machine() -> str:
+    """Processor, versions and date in one line."""
+    from .._version import __version__
+
+    name = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        models = [
+            line.partition(":")[2].strip() for line in cpuinfo.read_text().splitlines() if line.startswith("model name")
+        ]
+        name = models[0] if models else name
+    versions = f"Python {platform.python_version()}, NumPy {np.__version__}, Numba {version('numba')}"
+    return f"{name}, {platform.system()}; tsdyn {__version__}, {versions}; {datetime.date.today()}."
+
+
+# `benchmark`: work-precision of integration methods on a user's scene.
 
 
 @fitting

@@ -1,14 +1,53 @@
-"""The command `tsdyn`, also `python -m tsdyn`: scene files and their runs, studies, measurements, hard cases."""
+"""The command `tsdyn`, also `python -m tsdyn`: scene files, runs, studies, measurements, completion."""
 
 import inspect
 import os
 import sys
 
-from ..errors import TsdynError
-from . import completion, ensemble, measure, run, scenes, view
-from .output import print_json
-from .parser import Parser
+from ..errors import MissingDependency, TsdynError
+from . import ensemble, measure, run, scenes
+from . import run as view
+from .parser import Parser, print_json
 from .stress import _stress, add_options
+
+# The command `tsdyn completion`: a script with which a shell completes the words of `tsdyn`.
+
+SHELLS = ("bash", "zsh", "tcsh")
+FILES = ("SCENE", "FILE", "PATH", "FROM", "TO", "CSV")  # metavars of paths
+
+
+def add_completion_options(parser):
+    """Add the options of `tsdyn completion`."""
+    parser.add_argument("shell", choices=SHELLS, help="for which the script is")
+
+
+def _completion(parsed):
+    """Print a script with which a shell completes commands, options and paths.
+
+    bash: tsdyn completion bash > ~/.local/share/bash-completion/completions/tsdyn
+    zsh:  tsdyn completion zsh > a folder of $fpath, as _tsdyn
+    """
+    try:
+        import shtab
+    except ImportError as error:
+        raise MissingDependency("tsdyn completion needs shtab: pip install 'tsdyn[completion]'.") from error
+    for each in _all(parsed.parser):
+        for action in each._actions:
+            if action.metavar in FILES:
+                action.complete = shtab.FILE
+    print(shtab.complete(parsed.parser, parsed.shell))
+    return 0
+
+
+def _all(parser):
+    """A parser and those of its commands."""
+    yield parser
+    for action in parser._actions:
+        for child in dict.fromkeys((action.choices or {}).values()) if hasattr(action.choices, "values") else ():
+            yield from _all(child)
+
+
+# The command `tsdyn`, also `python -m tsdyn`: scene files and their runs, studies, measurements, hard cases.
 
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
@@ -57,7 +96,7 @@ def parser_of_all():
     kernels.add_argument("--all", action="store_true", help="of every method, formulation and result, too")
     run.add_json(kernels)
     add_options(_command(commands, _stress))
-    completion.add_completion_options(_command(commands, completion._completion))
+    add_completion_options(_command(commands, _completion))
     return parser
 
 

@@ -4,8 +4,8 @@ import sys
 import time
 
 from ..errors import InvalidArgument
-from ..files.run_table import END
-from .output import print_json
+from ..files.run_tables import END
+from .parser import print_json
 from .run import add_end, add_json, add_method, add_plot, add_scene, options_of, plotted
 
 TOLERANCES = "1e-4,1e-6,1e-8,1e-10"

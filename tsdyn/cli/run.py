@@ -1,4 +1,4 @@
-"""The command `tsdyn run`: a run of a scene file, its summary, results in files."""
+"""The commands `tsdyn run` and `tsdyn view`: a run of a scene file, its summary, results in files, its animation."""
 
 import csv
 import sys
@@ -8,10 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InvalidArgument
-from ..files import run_table, types
+from ..files import run_tables, types
 from ..storage.formats import SUFFIXES as SOLUTIONS
-from .output import print_json, text_cell
-from .scene_file import load_document, robot_options
+from ..viewer.view import page_path
+from .parser import print_json, text_cell
+from .scene_file import load_document, load_run, robot_options
+
+# The command `tsdyn run`: a run of a scene file, its summary, results in files.
 
 TABLES = (".csv",)
 METAVARS = {float: "X", int: "N", str: "NAME"}  # what a flag is followed by
@@ -41,7 +44,7 @@ def _flags():
     """The options of a run that have a flag: numbers and words, by name."""
     from ..simulation.simulate import simulate
 
-    known = run_table.arguments(simulate)
+    known = run_tables.arguments(simulate)
     return {name: one for name, one in known.items() if one.kind in (types.NUMBER, types.WHOLE, types.TEXT)}
 
 
@@ -117,13 +120,13 @@ def _run(parsed):
 def options_of(parsed, given):
     """The span, and the other arguments of `simulate`."""
     given = dict(given)
-    start, end = given.pop("t_span", (0.0, run_table.END))
+    start, end = given.pop("t_span", (0.0, run_tables.END))
     end = end if parsed.to is None else parsed.to
     if parsed.method is not None:
         given["integrator"] = parsed.method
     given |= {name: getattr(parsed, name) for name in _flags() if getattr(parsed, name) is not None}
     if parsed.every is not None:
-        given["t_eval"] = run_table.output_times(start, end, parsed.every)
+        given["t_eval"] = run_tables.output_times(start, end, parsed.every)
     elif "t_eval" in given and parsed.to is not None:
         kept = np.asarray(given["t_eval"])
         given["t_eval"] = kept[kept <= end]
@@ -244,3 +247,51 @@ def _lines(solution):
     if found["energy"]:
         lines.append(f"  energy    {found['energy']['start']:.6g} J, range {found['energy']['range']:.1e} J")
     return lines
+
+
+# The command `tsdyn view`: the animation of a scene's run, or of a saved solution.
+
+
+def add_view_options(parser):
+    """Add the options of `tsdyn view` to its parser."""
+    add_scene(parser)
+    add_method(parser)
+    parser.add_argument("--output", metavar="PATH", help="where to write the page (default: the browser opens it)")
+    add_force(parser)
+    add_json(parser)
+
+
+def _view(parsed):
+    """Show the run of a scene, or a saved solution, as an animation in the web browser.
+
+    A scene is run first, as `tsdyn run` does; a solution (.h5, .nc, .zarr) is shown as it is. The exit code is 0 only
+    if the run reached its end.
+    """
+    if parsed.output is not None:
+        demand_new(page_path(parsed.output), parsed.force)
+    solution = _solution(parsed)
+    path = solution.view(parsed.output)
+    if parsed.json:
+        print_json({"success": solution.success, "message": solution.message, "written": path})
+    else:
+        print(f"Animation: {path}")
+    if not solution.success:
+        print(f"tsdyn: {solution.message}", file=sys.stderr)
+    return 0 if solution.success else 1
+
+
+def _solution(parsed):
+    if Path(parsed.scene).suffix.lower() in SOLUTIONS:
+        from ..simulation.load import load
+
+        found = load(parsed.scene)
+        if not hasattr(found, "view"):
+            raise InvalidArgument(
+                f"{parsed.scene} is an ensemble; show a case: ts.load({parsed.scene!r}).case(0).view()"
+            )
+        return found
+    from ..simulation.simulate import simulate
+
+    scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
+    span, options = options_of(parsed, given)
+    return simulate(scene, span, **options, dense_output=True)

@@ -5,7 +5,7 @@ import textwrap
 from pathlib import Path
 
 from ..errors import InvalidArgument, TsdynError
-from .output import print_json
+from .parser import print_json
 from .run import SOLUTIONS, add_force, add_json, add_scene, demand_format, demand_new, write
 from .scene_file import load_document, load_run, load_scene, robot_options
 
@@ -46,7 +46,7 @@ def _check(parsed):
     All mistakes of the file are listed with line and column; then the start is compared with the constraints. The exit
     code is 0 only if a run could begin.
     """
-    from ..simulation.start_check import demand_startable
+    from ..simulation.simulate import demand_startable
 
     found = {"file": parsed.scene, "ok": True, "mistakes": [], "message": "It can start."}
     try:
@@ -81,7 +81,7 @@ def _info(parsed):
         return _cache_info(parsed)
     if Path(parsed.scene).suffix.lower() in SOLUTIONS:
         return _solution_info(parsed)
-    from ..simulation.method_choice import first_method, reason
+    from ..simulation.prepared_run import first_method, reason
     from ..simulation.run_options import RunOptions
     from ..simulation.scene_cache import prepared
 
@@ -191,7 +191,7 @@ def _cache_info(parsed):
 
 def _new(parsed):
     """Write a scene file to start from, with comments: a pendulum with a spring and a run."""
-    from ..files.starting_file import TEXT
+    from ..files.scene_text import TEXT
 
     path = Path(parsed.path)
     if path.suffix.lower() not in SCENES:
@@ -230,7 +230,7 @@ def _convert(parsed):
         written = (write_ensemble if isinstance(found, Ensemble) else write)(found, parsed.target)
     elif source in SCENES and target in SCENES:
         from ..simulation.load import text_of
-        from ..simulation.scene_saving import write_text
+        from ..simulation.scene import write_text
 
         load_document(parsed.scene, parsed.allow_code, robot=robot_options(parsed))  # refuses mistakes
         written = write_text(parsed.target, text_of(parsed.scene))

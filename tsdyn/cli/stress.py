@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import InvalidArgument
-from .output import print_json
+from .parser import print_json
 from .run import add_json, add_plot, demand_folder, plotted
 
 BESIDE = {"scenes": 200, "calls": 400}  # random ones beside the gallery
@@ -158,7 +158,7 @@ def _write(path, text, marks):
 
 def _draw(found, path):
     from ..drawing import save
-    from ..stress.figure import figure
+    from ..stress.report import figure
 
     drawable = [figures for figures in found if "growth" in figures]
     if not drawable:

@@ -6,7 +6,7 @@ Phi_q together and silently give wrong results if one isn't the derivative of th
 
 import numpy as np
 
-from ..elements.loops.marker_jacobians import state
+from ..elements.loops.template import state
 from ..errors import InvalidConstraint
 from ..jit.code_hash import is_ours
 from ..jit.kernels import twin

@@ -6,19 +6,29 @@ import numpy as np
 
 from ..errors import InvalidArgument, RedundantConstraints, SingularConfiguration, Status
 from ..formulations.locked_orientations import keep_turning, release_loose_bodies, still
-from ..maths.row_rank import dependent
+from ..jit.kernels import resident
+from ..maths.matrix_rank import dependent
+from ..model.packed import is_small
 from ..observables.evaluate import constraint_arrays
-from ..rows.interface import redundant_of, set_selection
-from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-from ..sparse.constraint_graphs import graph_of, set_redundant
-from ..sparse.length_metric import coordinate_scales
-from ..sparse.massless_axes import axis_of
-from .mobility import mobility_at
-from .rank import check_rank
+from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, by_lengths, coordinate_scales
+from ..rows.graph_builder import graph_of, set_redundant
+from ..rows.interface import (
+    allocate_tangent,
+    redundant_of,
+    reset_selection,
+    selection_parts,
+    set_selection,
+    with_reselection,
+)
+from ..rows.massless_axes import axis_of
+from ..workspaces import parts, words
+from .mobility import check_rank, mobility_at
+from .motor_starts import demand_finite, demand_small, refuse_masses, refuse_vanished
 from .start_kernels import (
     DOUBTFUL,
     HOLDS,
     NONE,
+    StartParts,
     evaluate_start,
     failing_row,
     go_near_by,
@@ -26,10 +36,9 @@ from .start_kernels import (
     select_redundant,
     take_start,
 )
-from .start_violations import demand_finite, demand_small, refuse_masses, refuse_vanished
-from .start_workspace import give, taken
 from .tolerances import (
     DENSE_ENTRIES,
+    KEPT_FLOATS,
     LEAST_NEIGHBOURHOOD,
     LEAST_SIZE,
     LISTED_ENTRIES,
@@ -40,6 +49,73 @@ from .tolerances import (
     SHORTENING,
     SHORTEST_LEG,
 )
+
+# The workspace in which a start is checked; one that is idle serves the next start of the scene.
+
+
+class StartWorkspace:
+    """System, scratch memory and address of what the kernels of a start use; one start at a time.
+
+    Parameters
+    ----------
+    packed : Packed
+    graph : ConstraintGraph
+    n : int
+        Coordinates.
+    """
+
+    def __init__(self, packed, graph, n):
+        self.graph = graph
+        own = packed.system._replace(reals=packed.system.reals.copy())
+        whole = parts(own, graph, n)
+        if packed.derived.redundant is not None:
+            whole = whole._replace(tangent=allocate_tangent(graph, n, redundant=True))
+        self.reals, self.tangent, self.work, self.rates = own.reals, whole.tangent, whole.work, np.zeros(len(graph.row))
+        measured = whole._replace(graph=by_lengths(packed, graph))
+        if packed.derived.redundant is not None:  # rows are selected anew in the same metric
+            measured = measured._replace(tangent=with_reselection(measured.graph, whole.tangent))
+        self.unequal = are_unequal(packed.system)
+        self.address, *self._keep = resident(StartParts(whole, measured, np.array([self.unequal], np.int64)))
+        rigid = graph.bodies[graph.bodies[:, 1] == 7, 0]
+        self.at, self.first_parameters = rigid[:, None] + np.arange(3, 7), rigid + 3  # Euler parameters
+
+    def enter(self, reals, size, q, tol):
+        """As if it were new, for the numbers and size of a system and a start that is checked to a tolerance."""
+        tangent, control = self.tangent, self.work.control
+        for array in (self.work.q.base, tangent.b, tangent.gamma, tangent.Z, tangent.a):
+            array.fill(0.0)
+        tangent.landing.clear()
+        reset_selection(self.graph, tangent)
+        self.reals[...] = reals
+        control.u_tol, control.size = tol, size
+        far = np.abs(q)
+        if is_small(size):
+            far[self.at] *= size
+        control.floor = ROUNDING * (size + far.max())
+
+    def entered(self):
+        """The arrays that `enter` sets but for reals."""
+        tangent = self.tangent
+        arrays, records = selection_parts(tangent)
+        arrays += [self.work.q.base, tangent.b, tangent.gamma, tangent.Z, tangent.a]
+        return [*arrays, *map(words, (tangent.landing, *records))]
+
+
+def taken(packed, graph, n):
+    """Return a `StartWorkspace` of a packed scene: an idle one of this graph, or a new one."""
+    try:
+        found = packed.derived.start_workspaces.pop()
+    except IndexError:
+        found = None
+    return found if found is not None and found.graph is graph else StartWorkspace(packed, graph, n)
+
+
+def give(packed, workspace):
+    """Take back a workspace that is no longer in use, unless it is large."""
+    small = workspace.tangent.rows.S.size + workspace.tangent.rows.H.size < KEPT_FLOATS
+    if small and packed.derived.redundant is None and not packed.derived.start_workspaces:
+        packed.derived.start_workspaces.append(workspace)
+
 
 NO_CHOICE = (
     "Phi_q has dependent rows, and no independent selection of its rows was found: a row may be zero here. Start from "

@@ -9,12 +9,11 @@ Euler parameters stay normalised, so A has no normalisation rows.
 import numpy as np
 
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
-from ..maths.row_rank import row_lengths
-from ..maths.sparse_lu import sparse_lu
+from ..maths.matrix_rank import row_lengths, sparse_lu
 from ..maths.tolerances import RANK_TOL
-from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
+from ..model.equations import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
-from ..sparse.length_metric import arms
+from ..rows.constraint_graph import arms
 from .tolerances import (
     DENSE,
     IMMOBILE,
@@ -35,7 +34,7 @@ _G = transform_g(np.eye(4)).reshape(4, 12)  # G is linear in p
 class Metric:
     """Constraints of a packed scene at time t as rows (m', x), dense or, of more than DENSE coordinates, sparse.
 
-    held (n,) marks coordinates that are fixed. With `lengths`, the metric is that of sparse/length_metric.py: rank is
+    held (n,) marks coordinates that are fixed. With `lengths`, the metric is that of rows/constraint_graph.py: rank is
     geometry. The kinetic one `is_bounded` where masses or moments of inertia are raised, so that it stays a metric: it
     says which of many configurations is near, and no physical number. Those come of `kinetic_rows`.
     """

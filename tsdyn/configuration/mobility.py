@@ -1,4 +1,4 @@
-"""`scene.mobility`: degrees of freedom, rank, redundant rows, and whether the configuration is singular."""
+"""`scene.mobility`: degrees of freedom, rank, redundant rows by name, and whether the configuration is singular."""
 
 from __future__ import annotations
 
@@ -10,18 +10,154 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..calls import fitting
-from ..errors import InvalidArgument
+from ..constraints.euler_normalization import EulerNormalization
+from ..errors import InvalidArgument, RedundantConstraints
 from ..jit.interrupts import CollectionsDeferred
-from ..maths.row_rank import rank_of
+from ..maths.matrix_rank import farthest_first, rank_of, singular_values, unit_rows
+from ..maths.tolerances import RANK_TOL
+from ..rows.constraint_graph import coordinate_scales
 from ..validation import counted, finite_vector, number
 from .continuation import close
 from .kinetic_metric import Metric, unit_tangent
-from .row_dependence import divide, partners, put_aside
-from .start_violations import demand_finite, demand_small
-from .tolerances import ASIDE, CONSISTENT, NEIGHBOUR_MET
+from .motor_starts import demand_finite, demand_small, refuse_vanished
+from .tolerances import ASIDE, CONSISTENT, FIRM, NEIGHBOUR_MET, TAKES_PART
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Attachment, Scene
+
+
+# Linear dependence of constraint rows, joint by joint in the order in which the joints were added.
+
+
+def divide(A, groups):
+    """Return kept and redundant rows of A (rows, x), by groups: redundant rows depend on rows before them.
+
+    groups is a list of index arrays. Within a group, pivoted QR chooses the rows to keep.
+    """
+    from scipy.linalg import qr  # imported here: it would double the time of `import tsdyn`
+
+    unit, rank = unit_rows(A), rank_of(A)
+    basis, kept, redundant = np.zeros((0, A.shape[1])), [], []
+    for rows in groups:
+        left = unit[rows]
+        for _ in range(2):
+            left = left - (left @ basis.T) @ basis
+        Q, R, order = qr(left.T, mode="economic", pivoting=True)
+        size = np.abs(np.diagonal(R))
+        count = int((size > RANK_TOL * np.sqrt(max(len(unit), 1))).sum())
+        basis = np.vstack((basis, Q.T[:count]))
+        kept += sorted(rows[order[:count]].tolist())
+        redundant += sorted(rows[order[count:]].tolist())
+    if len(kept) != rank:  # the rank is ambiguous: choose among all rows at once
+        order, _ = farthest_first(unit)
+        kept, redundant = sorted(order[:rank].tolist()), sorted(order[rank:].tolist())
+    return kept, redundant
+
+
+def partners(A, kept, redundant):
+    """Return, for each redundant row, the kept rows of which it is a combination."""
+    unit = unit_rows(A)
+    if not (kept and redundant):
+        return [[] for _ in redundant]
+    weights = np.linalg.lstsq(unit[kept].T, unit[redundant].T, rcond=None)[0]
+    return [[row for row, weight in zip(kept, column, strict=True) if abs(weight) > TAKES_PART] for column in weights.T]
+
+
+def put_aside(A, owners):
+    """Remove rows of a sparse A that are certainly independent; return the remaining rows.
+
+    owners (x,) is the body of each column. If the rows of a body are independent in its columns alone, they are
+    independent of all other rows, and the body is removed with them, as the links of an open chain are from its end.
+    """
+    from scipy.sparse import csr_array
+
+    A = csr_array(A)
+    of_row = [np.unique(owners[A.indices[A.indptr[i] : A.indptr[i + 1]]]) for i in range(A.shape[0])]
+    rows_of = [set() for _ in range(int(owners.max(initial=-1)) + 1)]
+    for row, bodies in enumerate(of_row):
+        for body in bodies:
+            rows_of[body].add(row)
+    columns = [np.flatnonzero(owners == body) for body in range(len(rows_of))] if len(rows_of) < 2 else _columns(owners)
+    left, queue = set(range(A.shape[0])), list(range(len(rows_of)))
+    while queue:
+        body = queue.pop()
+        rows = sorted(rows_of[body])
+        if not 0 < len(rows) <= len(columns[body]):
+            continue
+        block = unit_rows(A[rows].toarray())[:, columns[body]]
+        size = singular_values(block)
+        if size[-1] <= FIRM * size[0]:
+            continue
+        near = {int(other) for row in rows for other in of_row[row]} - {body}
+        for row in rows:
+            for other in of_row[row]:
+                rows_of[other].discard(row)
+        left -= set(rows)
+        queue += sorted(near)
+    return np.array(sorted(left), int)
+
+
+def _columns(owners):
+    order = np.argsort(owners, kind="stable")
+    cuts = np.searchsorted(owners[order], np.arange(1, owners.max() + 1))
+    return np.split(order, cuts)
+
+
+# Redundant rows of Phi_q: detection, and their names.
+
+
+def check_rank(scene, Phi_q):
+    """Refuse dependent rows of Phi_q, by name."""
+    Phi_q = Phi_q * coordinate_scales(scene.packed)
+    m = Phi_q.shape[0]
+    if m == 0:
+        return
+    lengths = np.linalg.norm(Phi_q, axis=1)
+    if not lengths.all():
+        refuse_vanished(scene.row_names()[int(np.argmin(lengths))])
+    rank = rank_of(Phi_q)
+    if rank == m:
+        return
+    names, order = scene.row_names(), _pivots(scene, unit_rows(Phi_q))
+    kept, dropped = order[:rank].tolist(), sorted(order[rank:].tolist())
+    stories = [
+        f"  {names[row]} depends on " + (", ".join(names[i] for i in sorted(others)[:8]) or "nothing else")
+        for row, others in zip(dropped, partners(Phi_q, kept, dropped), strict=True)
+    ]
+    raise RedundantConstraints(
+        f"{m - rank} of the {m} constraint rows are redundant, Phi_q has rank {rank}:\n"
+        + "\n".join(stories)
+        + "\nRemove the redundant rows, or use a joint with fewer rows. If the rows are independent elsewhere, this is "
+        "a singular configuration: start from another one."
+    )
+
+
+def weakest_row(scene, Phi_q, redundant=0):
+    """Return the name of the row of Phi_q nearest to dependence, and the smallest singular value over the largest.
+
+    `redundant` rows, those nearest to dependence, are skipped.
+    """
+    if not (Phi_q.size and np.isfinite(Phi_q).all()):
+        return "", 1.0
+    scaled = unit_rows(Phi_q * coordinate_scales(scene.packed))
+    size = singular_values(scaled)
+    last = len(scaled) - 1 - redundant  # there are fewer values where rows are more than coordinates
+    return scene.row_names()[_pivots(scene, scaled)[last]], size[last] / size[0]
+
+
+def _pivots(scene, rows):
+    """Return the rows ordered by pivoted QR, normalisations first.
+
+    Normalisations belong to the bodies, so dependence on them is attributed to the user's constraints.
+    """
+    own = np.array([type(c) is EulerNormalization for c in scene.constraints for _ in range(c.rows)])
+    rest, first = np.flatnonzero(~own), np.flatnonzero(own)
+    basis = unit_rows(rows[first])  # of different bodies
+    left = rows[rest] - (rows[rest] @ basis.T) @ basis
+    return np.concatenate((first, rest[farthest_first(left)[0]])).astype(int)
+
+
+# `scene.mobility`: degrees of freedom, rank, redundant rows, and whether the configuration is singular.
 
 TRIES = 3
 MOST_ROWS = 3000  # of closed loops, which take a dense factorisation

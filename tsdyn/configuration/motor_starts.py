@@ -1,9 +1,4 @@
-"""Motors at the start: how far their joints stand from the angle prescribed, and the way there.
-
-The row of a motor is periodic and admits the angle half a turn away, so `assemble` takes a joint that stands far from
-its motor there first. In a tree, one part is turned rigidly; in a loop the motor is driven in small steps, each
-followed by an assembly, so that the mechanism stays on its branch.
-"""
+"""Checks of a start against constraints and motors: violated rows, mirrored branches, angles of motors."""
 
 import math
 
@@ -11,14 +6,127 @@ import numpy as np
 
 from ..constraints.rotation_motor import RotationMotor
 from ..constraints.thread import Thread
-from ..elements.joint_coordinates import AngleGeometry
+from ..elements.bodies import IDENTITY, rotation_matrix
+from ..elements.element import AngleGeometry
 from ..errors import InconsistentState, SingularConfiguration
-from ..model import joint_motion
+from ..maths.vectors import cross
+from ..model import handles as joint_motion
 from ..model.handles import counts, handles_of
 from ..motions.elementary import Polynomial
 from ..motions.prescribed import Motion
-from .rigid_shift import RigidShift
+from ..rows.constraint_graph import MASS_REMEDY, mass_ratio
 from .tolerances import DRIVE_TURN, ELSEWHERE
+
+# Rigid displacement of one part of a scene relative to the other, across the only joint between them.
+#
+# A point x moves to c + R (x - c) + d, with R a rotation about the axis of the joint through c and d a translation
+# along its direction. Velocities v - v_F and omega - omega_F relative to the fixed body F are rotated by R.
+
+
+class RigidShift:
+    """Moves the bodies on one side of a joint; their velocities relative to the other side are preserved.
+
+    Parameters
+    ----------
+    joint : joint
+    stays, goes : Body or ground
+        Its two bodies.
+    bodies : list of Body
+        The moving bodies: `goes`, and all bodies beyond it.
+    """
+
+    def __init__(self, joint, stays, goes, bodies):
+        self.joint, self.stays, self.goes, self.bodies = joint, stays, goes, bodies
+
+    @classmethod
+    def of(cls, scene, joint):
+        """Return the shift across a joint; None if the joint is in a loop."""
+        for stays, goes in ((joint.a, joint.b), (joint.b, joint.a)):
+            found = _beyond(scene, stays, goes)
+            if not any(body is stays or body is scene.ground for body in found):
+                return cls(joint, stays, goes, found)
+        return None
+
+    def gain(self, goals):
+        """Set the rates of the goals' coordinates."""
+        for goal in goals:
+            axis, centre, sense = self._line(goal)
+            gain = sense * (goal.new_rate - goal.rate) * axis
+            for body in self.bodies:
+                if not goal.turns:
+                    body.velocity = body.velocity + gain
+                    continue
+                body.velocity = body.velocity + np.cross(gain, body.position - centre)
+                if body.dimension == 7:
+                    body.angular_velocity = body.angular_velocity + rotation_matrix(body.orientation).T @ gain
+
+    def move(self, goals, share):
+        """Move by a share of the goals' increments."""
+        for goal in goals:
+            axis, centre, sense = self._line(goal)
+            way = sense * share * (goal.new_value - goal.value)
+            turn, travel = (way, 0.0 * axis) if goal.turns else (0.0, way * axis)
+            half = np.append(np.cos(0.5 * turn), np.sin(0.5 * turn) * axis)
+            R = rotation_matrix(half)
+            r, v, omega = _motion(self.stays)
+            for body in self.bodies:
+                x, xd, w = _motion(body)
+                place = centre + R @ (x - centre) + travel
+                body.velocity = v + np.cross(omega, place - r) + R @ (xd - v - np.cross(omega, x - r))
+                body.position = place
+                if body.dimension == 7:
+                    body.orientation = _product(half, body.orientation)
+                    body.angular_velocity = rotation_matrix(body.orientation).T @ (omega + R @ (w - omega))
+
+    def _line(self, goal):
+        """Return the axis of a goal's coordinate (ground frame), a point on it, and the sign for the moving side."""
+        geometry, point = goal.geometry, "point_a" if self.goes is self.joint.a else "point_b"
+        direction = cross(geometry.f, geometry.g) if goal.turns else geometry.e
+        axis = rotation_matrix(_orientation(geometry.own)) @ direction
+        s = getattr(self.joint, point, np.zeros(3))
+        centre = self.goes.position + rotation_matrix(_orientation(self.goes)) @ s
+        return axis, centre, 1.0 if self.goes is geometry.other else -1.0
+
+
+def _beyond(scene, stays, goes):
+    """Return the bodies on one side when the links between two are cut; in a loop, the other is among them."""
+    links = {}
+    for constraint in scene.constraints:
+        a, b = constraint.a, constraint.b
+        if b is not None and {a, b} != {stays, goes}:
+            links.setdefault(a, []).append(b)
+            links.setdefault(b, []).append(a)
+    found, waiting = {goes}, [goes]
+    while waiting:
+        for body in links.get(waiting.pop(), ()):
+            if body not in found:
+                found.add(body)
+                waiting.append(body)
+    return list(found)
+
+
+def _orientation(body):
+    return IDENTITY if body.dimension == 3 else body.orientation
+
+
+def _motion(body):
+    """Position, velocity and angular velocity of a body at the start, ground frame."""
+    if body.dimension == 0:
+        return np.zeros((3, 3))
+    omega = rotation_matrix(body.orientation) @ body.angular_velocity if body.dimension == 7 else np.zeros(3)
+    return body.position, body.velocity, omega
+
+
+def _product(p, o):
+    """The Euler parameters of A(p) A(o)."""
+    return np.append(p[0] * o[0] - p[1:] @ o[1:], p[0] * o[1:] + o[0] * p[1:] + np.cross(p[1:], o[1:]))
+
+
+# Motors at the start: how far their joints stand from the angle prescribed, and the way there.
+#
+# The row of a motor is periodic and admits the angle half a turn away, so `assemble` takes a joint that stands far from
+# its motor there first. In a tree, one part is turned rigidly; in a loop the motor is driven in small steps, each
+# followed by an assembly, so that the mechanism stays on its branch.
 
 
 class Way:
@@ -148,3 +256,110 @@ def demand_turns(packed, q, t):
         said = elsewhere(packed, t, q)
         if said:
             raise InconsistentState("\n".join(said))
+
+
+# Mirrored branches of joints: rows that align directions also admit opposed ones; such a start is refused.
+
+
+def demand_aligned(packed, q, t):
+    """Refuse positions q (n,) at t that meet the rows with directions opposed or turns away, by the joint's name."""
+    opposed, titles = _opposed(packed, q, t)
+    opposed = np.flatnonzero(opposed)
+    if opposed.size:
+        names = list(dict.fromkeys(titles[i] for i in opposed))
+        more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+        raise InconsistentState(
+            f"{', '.join(names[:8])}{more}: directions that the joint keeps parallel point opposite ways here. Its "
+            "rows hold so, too, but it is the mirrored joint. Give one of the axes (or references) the other sign, or "
+            "turn a body half a turn." + "".join(f"\n{each}" for each in elsewhere(packed, t, q))
+        )
+    demand_turns(packed, q, t)
+
+
+def are_aligned(packed, q, t):
+    """Which of many positions (k, n) at t `demand_aligned` lets pass."""
+    return ~_opposed(packed, q, t)[0].any(axis=-1)
+
+
+def _opposed(packed, q, t):
+    """Which pairs of directions are opposed at positions q (..., n), and their titles."""
+    if packed.derived.aligned is None:
+        packed.derived.aligned = _pairs(packed)
+    titles, places, directions, moving = packed.derived.aligned
+    if not titles:
+        return np.zeros((*q.shape[:-1], 0), bool), titles
+    if moving:
+        directions = directions.copy()
+        for i, direction in moving:
+            directions[0, i] = direction(t)
+    p = np.concatenate((q, np.broadcast_to(IDENTITY, (*q.shape[:-1], 4))), axis=-1)[..., places]
+    turned = np.einsum("...skij,skj->...ski", rotation_matrix(p), directions)
+    return ~((turned[..., 0, :, :] * turned[..., 1, :, :]).sum(axis=-1) > 0.0), titles
+
+
+def _pairs(packed):
+    """Titles; where the Euler parameters of both bodies are in (q, 1, 0, 0, 0), (2, k, 4); directions (2, k, 3).
+
+    Then the places of first directions that are functions of time, with them.
+    """
+    starts = {id(body): int(at) + 3 for body, (at, _) in zip(packed.bodies, packed.system.bodies, strict=True)}
+    ground = int(packed.system.bodies[:, 1].sum())
+    titles, places, directions, moving = [], [], [], []
+    for member in packed.members:
+        for pair in getattr(member.constraint, "opposed", ()):
+            titles.append(member.constraint.title)
+            places.append([starts.get(id(body), ground) for body, _ in pair])
+            (_, first), (_, second) = pair
+            if callable(first):
+                moving.append((len(directions), first))
+                first = np.zeros(3)  # of another time each time
+            directions.append([first, second])
+    places = np.array(places, np.int64).reshape(-1, 2).T[..., None] + np.arange(4)
+    return titles, places, np.array(directions).reshape(-1, 2, 3).swapaxes(0, 1), moving
+
+
+# Checks of initial conditions against the constraints; messages name the violated rows.
+
+
+def demand_finite(scene, *arrays):
+    """Refuse rows that are not finite, by name."""
+    for array in arrays:
+        bad = np.flatnonzero(~np.isfinite(array if array.ndim == 1 else array.sum(axis=1)))
+        if bad.size:
+            raise InconsistentState(
+                f"{scene.row_names()[bad[0]]}: its constraint or a derivative of it is not finite at the start. Look "
+                "at its parameters, its motion, or its kernels."
+            )
+
+
+def demand_small(scene, residual, tol, level, formula, start):
+    """Refuse residuals (m,) above tol, by name; start is (t, q) or (t, q, qd)."""
+    bad = np.flatnonzero(~(np.abs(residual) <= tol))
+    if bad.size == 0:
+        return
+    names = scene.row_names()
+    worst = sorted(bad, key=lambda i: -abs(residual[i]))
+    lines = [f"  {names[i]}: {formula} = {residual[i]:.6g}" for i in worst[:8]]
+    if bad.size > 8:
+        lines.append(f"  ... and {bad.size - 8} more rows")
+    said = elsewhere(scene.packed, *start)
+    raise InconsistentState(
+        f"the initial {level} breaks {bad.size} constraint row{'s' if bad.size > 1 else ''} (allowed: {tol:.2g}):\n"
+        + "\n".join(lines + said)
+        + f"\nCorrect the bodies' {'poses' if level == 'position' else 'velocities'}, or call scene.assemble() to move "
+        "them to the nearest consistent ones."
+    )
+
+
+def refuse_vanished(row):
+    """Refuse a row of Phi_q, by its name, that is zero."""
+    raise SingularConfiguration(
+        f"the row of {row} in Phi_q is zero in this configuration: the constraint is singular here. Start from another "
+        "configuration, or use a constraint that is regular here."
+    )
+
+
+def refuse_masses(scene, graph, row):
+    """Refuse masses so unequal that S is singular to rounding at a row of the graph."""
+    where = scene.row_names()[graph.row[row]] if graph.row[row] >= 0 else "a body with many joints"
+    raise SingularConfiguration(f"{mass_ratio(scene.packed)}, found at {where}. {MASS_REMEDY}")

@@ -15,16 +15,14 @@ import numpy as np
 from ..constraints.angle_driver import AngleDriver
 from ..constraints.dot2 import Dot2
 from ..constraints.thread import Thread
-from ..elements.joint_coordinates import Angle, AngleGeometry
-from ..elements.membership import stop_waiting
+from ..elements.element import Angle, AngleGeometry, stop_waiting
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
-from ..model import joint_motion
+from ..model import handles as joint_motion
 from ..model.handles import counts, handles_of
 from ..motions.elementary import Polynomial
 from ..validation import floats, number, sequence
 from .assemble import assembled_nearby
-from .motor_starts import approach, prescribed
-from .rigid_shift import RigidShift
+from .motor_starts import RigidShift, approach, prescribed
 from .tolerances import DRIVE_LEAST, DRIVE_SHARE, DRIVE_TURN, ELSEWHERE, LEAST_DIVISOR
 
 if TYPE_CHECKING:

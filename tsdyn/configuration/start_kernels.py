@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.loops.body_poses import move_bodies, place_bodies, write_positions, write_velocities
+from ..elements.loops.constraint_rows import move_bodies, place_bodies, write_positions, write_velocities
 from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.kernels import callback, entry, integers, kernel, loader, vector
 from ..maths.dense_linalg import copy, is_finite, largest
 from ..model.equations import set_time
-from ..model.lengths import SMALL
+from ..model.packed import SMALL
 from ..rows.interface import (
     DYNAMICS,
     METRIC,
@@ -26,7 +26,7 @@ from ..rows.interface import (
     select_rows,
     singularity_indicator,
 )
-from ..workspaces.workspace import Parts, no_parts
+from ..workspaces import Parts, no_parts
 from .tolerances import DOUBTFUL_SHARE, IMMOBILE, LEAST_SIZE, ROUNDING
 
 # In place of a row that depends on others: there is none; rounding may hide one.

@@ -1,29 +1,239 @@
-"""Base of constraints and forces: two bodies, a name, markers, and attributes that are validated when set."""
+"""Base of constraints and forces: two bodies, a name, markers, joint coordinates, membership in a scene."""
 
 from __future__ import annotations
 
+import contextlib
+import warnings
+from contextvars import ContextVar
+from dataclasses import dataclass
 from functools import wraps
 from inspect import CO_VARKEYWORDS, signature, unwrap
 from types import MethodType
-from typing import TYPE_CHECKING, Any, Never, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Never, Self
 
 import numpy as np
 
-from ..calls import Placing, complete_signature, fitting
+from ..calls import Placing, complete_signature, fitting, fitting_constructor
 from ..docstrings import complete_docstring
 from ..errors import InvalidConstraint
-from ..jit.kernels import NumbaError, kernel
+from ..jit.kernels import NumbaError, kernel, twin
+from ..maths import vectors
+from ..maths.vectors import IDENTITY, unit
 from ..validation import demand_known, floats, label, number
-from .bodies import Ground, PointMass, rotation_matrix
+from .bodies import Ground, PointMass, named, new_name, rotation_matrix
 from .markers import PARAMETERS, POINT, TURN, Marker, entries
-from .membership import note
-from .names import named, new_name
+from .tolerances import OPPOSED, PARALLEL_FOUND
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..hints import AnyBody, ArrayLike, BodyLike, Floats, Function, Scene, TsdynError
-    from .joint_coordinates import Angle, Displacement
+
+
+# Bookkeeping of the constraints and forces made for a scene: which were added, and under which names.
+
+SHOWN = 5
+
+_may_be_idle = ContextVar("whether forces that are made may be zero", default=False)
+
+
+@contextlib.contextmanager
+def idle_forces(admitted):
+    """A block in which a force may be made whose numbers are all zero: a file says what it says."""
+    token = _may_be_idle.set(admitted)
+    try:
+        yield
+    finally:
+        _may_be_idle.reset(token)
+
+
+def note(item):
+    """A constraint or force has been made: it waits to be added to its scene, or to become a part of a joint."""
+    if "a" in vars(item):  # its __init__ has called that of its base
+        if not _may_be_idle.get():
+            item.demand_effect()
+        item.scene._waiting[id(item)] = item
+
+
+def stop_waiting(item):
+    """It waits no longer."""
+    item.scene._waiting.pop(id(item), None)
+
+
+def warn_of_waiting(scene, stacklevel):
+    """Warn, once, of what was made for a scene and never added."""
+    if not scene._waiting:
+        return
+    titles = [item.title for item in scene._waiting.values()]
+    scene._waiting.clear()
+    more = f" and {len(titles) - SHOWN} more" if len(titles) > SHOWN else ""
+    warnings.warn(
+        f"made for this scene and never added: {', '.join(titles[:SHOWN])}{more}. What scene.add(...) isn't given has "
+        "no effect.",
+        stacklevel=stacklevel + 1,
+    )
+
+
+def admit(scene, item):
+    """Give an item that is added a name of its own, or refuse the one that its user gave it and another has."""
+    taken = scene._titles
+    if taken is None:
+        taken = scene._titles = {other.name for other in (*scene._added, *scene._forces)}
+    if item.name in taken and item.named:
+        raise item.error(f"the scene has a constraint or force named {item.name!r} already; choose another name.")
+    name, count = item.name, 1
+    while name in taken:
+        name, count = f"{item.name} #{count + 1}", count + 1
+    taken.add(name)
+    if name != item.name:
+        item.name = name
+
+
+# Joint coordinates: angles and displacements between two bodies, declared by the class of a joint.
+#
+#     v     = A_own^T A_other h         the direction h of the other body, seen from the own body
+#     theta = atan2(g.v, f.v)           (1)  f, g: directions of the own body at right angles; modulo 2 pi
+#     s     = e.(x_other - x_own)       (2)  e: a direction of the own body
+#
+# The own body is the body of the axis. f, g and the axis are right-handed; if the axis belongs to b, g is reversed, so
+# that theta is the angle of b relative to a about the axis (right-hand rule) in either case.
+
+cross, dot, to_body, to_ground = map(twin, (vectors.cross, vectors.dot, vectors.to_body, vectors.to_ground))
+
+
+@fitting_constructor
+@dataclass(frozen=True)
+class Angle:
+    """Declare an angle of b against a about an axis (right hand), by names of attributes of the joint.
+
+    Parameters
+    ----------
+    axis : str
+        The axis: "axis_a", or a name that ends with _b where it belongs to b.
+    other : str
+        The axis of the other body that the joint keeps along it; read only where `direction` is left out.
+    reference : str, optional
+        The direction of the axis' own body at which the angle is zero. Left out: the angle is zero as built, that is
+        as the bodies stood when the joint was made.
+    direction : str, optional
+        The direction of the other body whose angle it is. Left out: the one that was at the angle zero as built.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.constraints.Revolute.joint_coordinates
+    (Angle(axis='axis_a', other='axis_b', reference='', direction=''),)
+    """
+
+    axis: str = "axis_a"
+    other: str = "axis_b"
+    reference: str = ""
+    direction: str = ""
+
+    def of(self, item: Any) -> AngleGeometry:
+        """The `AngleGeometry` of an item."""
+        own, other, A, B = _bodies(item, self.axis)
+        axis = unit(getattr(item, self.axis))
+        h = unit(getattr(item, self.direction)) if self.direction else None
+        if self.reference:
+            f = _across(axis, tuple(getattr(item, self.reference)))
+        else:
+            f = _across(axis, to_body(A, to_ground(B, h)) if h else None)
+        if h is None:
+            kept = unit(getattr(item, self.other))
+            h = to_body(B, _swung(to_ground(A, axis), to_ground(B, kept), to_ground(A, f)))
+        g = cross(axis, f)
+        return AngleGeometry(own, other, f, g if own is item.a else tuple(-x for x in g), h)
+
+
+@fitting_constructor
+@dataclass(frozen=True)
+class Displacement:
+    """Declare the displacement of the other body's point from the own body's point along a direction of the own body.
+
+    Parameters
+    ----------
+    axis : str
+        The direction, an attribute of the joint; its name ends with the letter of its body.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ts.constraints.Translational.joint_coordinates
+    (Displacement(axis='axis_a'),)
+    """
+
+    axis: str = "axis_a"
+
+    def of(self, item: Any) -> DisplacementGeometry:
+        """The `DisplacementGeometry` of an item."""
+        own, other, _, _ = _bodies(item, self.axis)
+        points = [tuple(item.point_a.tolist()), tuple(item.point_b.tolist())]
+        if own is item.b:
+            points.reverse()
+        return DisplacementGeometry(own, other, unit(getattr(item, self.axis)), *points)
+
+
+class AngleGeometry(NamedTuple):
+    """Where an angle is measured, Eq. (1): unit vectors in the body frames.
+
+    A torque T of the joint along the angle is T on `other` about f x g, the opposite on `own`.
+    """
+
+    own: object  # the body that the axis belongs to
+    other: object
+    f: tuple  # of the own body, where the angle is zero
+    g: tuple  # of the own body, where it is pi / 2
+    h: tuple  # of the other body
+
+
+class DisplacementGeometry(NamedTuple):
+    """Where a displacement is measured, Eq. (2), in the body frames."""
+
+    own: object  # the body that the direction belongs to
+    other: object
+    e: tuple
+    s_own: tuple
+    s_other: tuple
+
+
+def angles(item):
+    """The `AngleGeometry` of each angle that a constraint or force declares, in order."""
+    return [declared.of(item) for declared in item.joint_coordinates if isinstance(declared, Angle)]
+
+
+def displacements(item):
+    """The `DisplacementGeometry` of each displacement that a constraint or force declares, in order."""
+    return [declared.of(item) for declared in item.joint_coordinates if isinstance(declared, Displacement)]
+
+
+def _bodies(item, axis):
+    """The body that an axis belongs to, the other one, and the Euler parameters of both as built."""
+    one, other = (IDENTITY if p is None else tuple(p.tolist()) for p in item.built)
+    return (item.b, item.a, other, one) if axis.endswith("_b") else (item.a, item.b, one, other)
+
+
+def _across(axis, direction=None):
+    """The direction made perpendicular to an axis, of unit length; any, where it is left out or along the axis."""
+    if direction is not None:
+        along = dot(axis, direction)
+        f = tuple(d - along * u for d, u in zip(direction, axis, strict=True))
+        if dot(f, f) > PARALLEL_FOUND**2 * dot(direction, direction):
+            return unit(f)
+    least = min(range(3), key=lambda i: abs(axis[i]))
+    return unit(cross(tuple(float(i == least) for i in range(3)), axis))
+
+
+def _swung(u, v, d):
+    """The direction d turned by the least that takes the unit vector u to v; as it is where they are opposed."""
+    n, cosine = cross(u, v), dot(u, v)
+    if cosine <= -1.0 + OPPOSED:
+        return d
+    side, along = cross(n, d), dot(n, d) / (1.0 + cosine)
+    return tuple(cosine * x + y + along * z for x, y, z in zip(d, side, n, strict=True))
+
+
+# Base of constraints and forces: two bodies, a name, markers, and attributes that are validated when set.
 
 # Part of a vector's largest component: below it a component is what a rotation into a body frame leaves of zero. Series
 # would lose it from positions, but not from torques, with the same sign in every step.
@@ -81,7 +291,7 @@ class Attachment:
     error: type[TsdynError] = InvalidConstraint
     lacks = ""  # what a base class is the base of, and has none of itself
     particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
-    joint_coordinates: tuple[Angle | Displacement, ...] = ()  # Angle and Displacement, see joint_coordinates.py
+    joint_coordinates: tuple[Angle | Displacement, ...] = ()  # Angle and Displacement, see element.py
     permanent: tuple[str, ...] = ()  # arguments that can't be set later
     angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
     drives = ""  # of a motor: the coordinate that it prescribes, and its attribute: "angle" or "displacement"

@@ -8,7 +8,7 @@ A force works on marker coordinates x and their rates xd (ground frame) and neve
     remember(x, xd, par, t)        optional, with memory = 1: what par[-1] is after each accepted step
     series(x, xd, par, k, s, out)  optional; out[len(x)]  coefficient k of the law's Taylor series, see recurrences.py
     driven_series                  optional; the same with the series of par in the rows of s from `slots` on
-    normal_load(x, f, par)         optional, of friction: what par[-1] is, from a reaction f, see joint_friction.py
+    normal_load(x, f, par)         optional, of friction: what par[-1] is, from a reaction f, see friction.py
     normal_series(x, f, par, k, s) optional, of friction: coefficient k of that; series is for par[-1] = 1 then
 
 x is the concatenation of the force's markers, par the floats that `parameters()` returns, functions of time among them

@@ -20,7 +20,7 @@ import numpy as np
 from ..calls import fitting_constructor
 from ..errors import InvalidBody, InvalidConstraint
 from ..jit.kernels import kernel, stack
-from ..maths.euler_parameters import rotate, rotate_gradient, rotate_rate
+from ..maths.vectors import rotate, rotate_gradient, rotate_rate
 from ..validation import vector3
 from .tolerances import FARTHEST
 

@@ -1,30 +1,59 @@
-"""The arrays that the runs of one thread have in common: each case writes its numbers into them.
-
-Everything that numbers don't change is made once: constraint graphs, memory of runs, addresses. A case whose numbers
-change more (an axis without inertia, a scene of micrometres) isn't run here; it is run as a scene of its own, with the
-same bits.
-"""
+"""The arrays that the runs of one thread have in common: each case writes its numbers into them; which can share them."""
 
 from types import SimpleNamespace
 
 import numpy as np
 
-from ..model.derived import Derived
+from ..elements.bodies import PointMass
+from ..jit.code_hash import is_ours
 from ..model.handles import handles_of
-from ..model.lengths import is_small
-from ..model.packed import System
-from ..parameters.edit import KEPT
+from ..model.packed import Derived, System, classes, is_small
+from ..motions.signals import Signal
+from ..rows.constraint_graph import are_unequal
+from ..rows.graph_builder import weights
+from ..rows.massless_axes import lean_bodies
 from ..runs.task import Task
-from ..simulation import method_choice
+from ..simulation import prepared_run
+from ..simulation.parameters import KEPT
 from ..simulation.prepared_run import run_task
-from ..sparse.graph_builder import weights
-from ..sparse.length_metric import are_unequal
-from ..sparse.massless_axes import lean_bodies
-from .batch import Batch
-from .first_slice import Finished, FirstSlice
-from .pen import pen_of
-from .sharing import have_same_zeros
-from .starts import OF_ROWS, Starts
+from .case_loop import OF_ROWS, Batch, Finished, FirstSlice, Starts
+from .case_numbers import pen_of
+
+# Which cases can share arrays: those whose numbers change nothing that is found from them beforehand.
+
+
+def serves(family, kept, names):
+    """Return True if cases with other values of these parameters, all where names is None, can share arrays."""
+    packed = family.packed
+    driven = {kind for kind, row in zip(classes(packed), packed.system.kinds, strict=True) if row.phi_t}
+    if kept.sampled:
+        return False
+    fields = family.fields.values() if names is None else map(family.field, names)
+    for owner in {id(field.owner): field.owner for field in fields}.values():
+        if owner is family.template or isinstance(owner, PointMass):
+            continue
+        load = family.load_of(owner)
+        if load is not None and any(isinstance(value, Signal) for value in load.parameters):
+            return False  # numbers beside a function of time are written into the memory of the series
+        kinds = {type(part) for part in getattr(owner, "parts", ())}
+        if load is None and (kinds & driven or not all(is_ours(kind.__module__) for kind in (type(owner), *kinds))):
+            return False
+    return True
+
+
+def have_same_zeros(parameters, base):
+    """Whether numbers of constraints are zero where others are: masks of columns depend on these."""
+    if parameters is base:
+        return True
+    changed = [(new, old) for new, old in zip(parameters, base, strict=True) if new is not old]
+    return all((x == 0.0) == (y == 0.0) for new, old in changed for x, y in zip(new, old, strict=True))
+
+
+# The arrays that the runs of one thread have in common: each case writes its numbers into them.
+#
+# Everything that numbers don't change is made once: constraint graphs, memory of runs, addresses. A case whose numbers
+# change more (an axis without inertia, a scene of micrometres) isn't run here; it is run as a scene of its own, with
+# the same bits.
 
 
 class Arena:
@@ -154,7 +183,7 @@ class Arena:
         ran = self._run(start, scene, size is not None)
         if self._batch is None and ran is not None and Batch.serves(self):
             if self.study.lanes > 1 and self._slice is not None:
-                from .lane_batch import LaneBatch
+                from .lanes import LaneBatch
 
                 self._batch = LaneBatch(self, ran[0], self._slice, self.study.lanes)
             elif isinstance(ran[1], Finished):
@@ -189,7 +218,7 @@ class Arena:
         options, method, span = study.options, study.method, study.span
         choose = None
         if options.method is None:
-            choose = method_choice.turns_of(study.scene, self.kept, method, options.form, span, study.within)
+            choose = prepared_run.turns_of(study.scene, self.kept, method, options.form, span, study.within)
         stops = self.kept.stops(*span, method.step is None) if study.retimes else study.stops
         task = Task(
             self.kept, method, options.form, span, q, qd, memory, study.times, study.within,
@@ -202,4 +231,4 @@ class Arena:
         if is_resized:
             return None
         outcome = run_task(task, self.scene, options.initial_tol)
-        return None if method_choice.instead(task, outcome.status) is not None else (task, outcome)
+        return None if prepared_run.instead(task, outcome.status) is not None else (task, outcome)

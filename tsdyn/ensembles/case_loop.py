@@ -1,17 +1,165 @@
-"""The compiled loop over cases: each is written into the arrays of an arena and run by series, without Python."""
+"""The compiled loop over cases: each is written into shared arrays and run by series, without Python."""
 
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 
+from ..configuration.initial_conditions import RedundantStarts, RegularStarts, consistent
+from ..configuration.motor_starts import are_aligned, demand_aligned
 from ..configuration.start_kernels import LANDED
 from ..errors import Status
-from ..jit.kernels import Record, caller, data_of, entry, integers, kernel, loader, vector
+from ..formulations.locked_orientations import hold, still
+from ..jit.kernels import DEBUG, Record, caller, data_of, entry, integers, kernel, loader, resident, vector
 from ..maths.dense_linalg import copy
-from ..runs.run_log import RunLog, no_log
+from ..model.packed import Derived
+from ..observables.reactions import demand_unique
+from ..observables.state import remembered
+from ..runs.arguments import state_arrays
+from ..runs.driver import FIRST_SLICE, FIRST_WORK
+from ..runs.run_log import CHART_ROOM, NO_ROWS, RunEnd, RunLog, no_log
+from ..runs.tolerances import LONG_STEPS, TRIES
+from ..simulation.local_origin import are_near, origin_of
+from ..simulation.parameters import KEPT
+from ..taylor.layout import load_series
+from ..taylor.series_engine import SeriesEngine
 from ..taylor.stepper import advance_by_series
-from ..taylor.workspace import load_series
-from ..workspaces.run_state import load_run
+from ..workspaces import load_run, words
+from .case_numbers import Place
+from .cases import TIMES
+from .tolerances import FEW_LONG, MOSTLY, TRIED
+
+# Runs by series that end within the driver's first slice, without the bookkeeping that longer ones need.
+
+COMPLETE = Status.SUCCESS
+
+
+class Finished(NamedTuple):
+    """Of an `Outcome` what an ensemble keeps."""
+
+    end: RunEnd  # its `last` (2, n): q, qd
+    rows: np.ndarray  # outputs; valid until the next run
+
+
+class FirstSlice:
+    """Runs a `Task` in the memory of an arena, if it ends within one slice.
+
+    Parameters
+    ----------
+    study : Study
+    """
+
+    def __init__(self, study):
+        n, times = study.n, study.times
+        self.rows = min(max(FIRST_WORK // n, 1), FIRST_SLICE)
+        width = 1 + 3 * n + study.kept.handles.count + study.family.packed.system.memory.size
+        self.out = np.empty((times.size or self.rows + 1, width))
+        history, charts = np.empty((self.rows + 2 * TRIES, 3)), np.empty((self.rows + CHART_ROOM, 5))  # one a step
+        self._long = self._tried = 0
+        self.log = RunLog(times, study.stops, self.out, history, charts, NO_ROWS, NO_ROWS)
+
+    @staticmethod
+    def serves(study):
+        """Return True if nothing is asked of the runs of a study that needs more."""
+        options = study.options
+        plain = options.events is None and not options.dense_output and options.max_steps is None
+        return plain and study.method.driver == "series" and not len(study.stops) and not callable(study.keep)
+
+    def run(self, task):
+        """The `Finished` run; None if it hasn't ended well within the slice, or most haven't: it begins again then."""
+        kept = task.prepared
+        if self._long * MOSTLY > self._tried > TRIED or origin_of(kept.packed, task.q) is not None:
+            return None
+        engine = kept.engine(SeriesEngine, task.method, task.form, task.within)
+        memory = kept.take(engine)
+        memory.enter(engine, task, False)
+        status, run = memory.advance(self.log, self.rows), memory.run
+        self._tried += 1
+        self._long += status is Status.SLICE_DONE
+        found = None
+        if status is COMPLETE and not run.numbers.near_steps:
+            found = Finished(RunEnd(run.clock.t, run.now[:2].copy(), *[None] * 4), self.out[: run.numbers.rows])
+        if status is not Status.NOT_FINITE:  # NaN may be left
+            kept.give(engine.kind, memory)
+        return found
+
+
+# Consistent starts of the cases of an arena, checked as those of runs alone are.
+
+OF_ROWS = {"mass", "inertia"}  # what the independence of rows depends on, beside where things are
+
+
+class Starts:
+    """Checks and projects the starts of an arena, one after the other.
+
+    Attributes
+    ----------
+    others : list
+        The scene with other redundant rows, if there are any: unknown, and none.
+    has_other_rows : bool
+        Whether other rows were redundant at the last start than at the first.
+    """
+
+    def __init__(self, arena):
+        self._arena, self.others, self.has_other_rows = arena, [], False
+        self._known, self._regular, self._redundant = (None, None), None, None
+
+    def start(self, start):
+        """The memory of forces and a consistent start; None if the start needs a scene of its own."""
+        arena, kept, packed = self._arena, self._arena.kept, self._arena.kept.packed
+        study = arena.study
+        t, tol, state = study.span[0], study.options.initial_tol, study.call.state
+        q, qd = start if state is None else state_arrays(state, kept.n)
+        known, found = self._known
+        if known is q and not arena.written & OF_ROWS:
+            return found
+        memory = remembered(state, kept, t, q)
+        if packed.system.memory.size:
+            packed.system.reals[packed.system.memory] = memory[kept.handles.count :]
+        started = self._started(q, qd, t, tol)
+        if started is None or arena.is_spoilt:
+            return None
+        if known is not q:
+            demand_aligned(packed, started[0], t)
+        demand_unique(packed, started[0], t)
+        found = memory, hold(packed, *started)
+        self._known = q, found
+        return found
+
+    def kernel(self):
+        """As of `RegularStarts`, once a start has been checked."""
+        return self._regular.kernel()
+
+    def _started(self, q, qd, t, tol):
+        """A start as `consistent` returns it; None if it needs a scene of its own."""
+        arena, derived = self._arena, self._arena.packed.derived
+        if self._regular is None:
+            self._regular = RegularStarts(arena.scene, q, qd, t, tol)
+        if derived.redundant is None and self._regular.are_plain(q, qd):
+            return q, qd
+        if arena.kept.packed.coordinates is not arena.base.coordinates:
+            return None
+        if derived.redundant is None:
+            return consistent(arena.scene, arena.packed.system, q, qd, t, tol, True)
+        if self._redundant is None:
+            self.others = [self._with_redundant(rows) for rows in (None, np.zeros(0, np.int64))]
+            self._redundant = RedundantStarts([*self.others, arena.scene], q, qd, t, tol)
+        started = self._redundant.landed(q, qd)
+        self.has_other_rows = started is None
+        return started
+
+    def _with_redundant(self, rows):
+        """The scene with the same arrays, and other redundant rows."""
+        arena = self._arena
+        derived = Derived(redundant=rows, shared=arena.study.family.shared)
+        for name in KEPT:
+            setattr(derived, name, getattr(arena.packed.derived, name))
+        own = SimpleNamespace(**vars(arena.scene))
+        own.packed = arena.packed._replace(derived=derived)
+        return own
+
+
+# The compiled loop over cases: each is written into the arrays of an arena and run by series, without Python.
 
 SUCCESS = int(Status.SUCCESS)
 call_take = caller("pppppidd")
@@ -144,3 +292,117 @@ def run_cases(context, run, where, chunk_at, first, end):
             return k
         _keep(plan, chunk, k, r)
     return end
+
+
+# The cases of a chunk that the compiled loop runs: what it needs of an arena, laid out once.
+
+NOT_FINITE, SLICE_DONE = int(Status.NOT_FINITE), int(Status.SLICE_DONE)
+
+
+class Batch:
+    """Runs stretches of cases in the memory of an arena.
+
+    Parameters
+    ----------
+    arena : Arena
+    task : Task
+        Of a case that has ended within the driver's first slice, its start regular.
+    first_slice : FirstSlice
+    """
+
+    def __init__(self, arena, task, first_slice):
+        self._arena, self._task, self._slice = arena, task, first_slice
+        self._numbers = LoopNumbers(most=first_slice.rows, moves=arena.pen.moves, grid=arena.study.keep == TIMES)
+        self._long, self._cases, self._memory, self._places, self._chunk = 0, 0, None, None, None
+        self._start = None
+        if arena.pen.moves or arena.pen.written & OF_ROWS or arena.pen.geometry is not None:
+            numbers, (arguments, self._start) = self._numbers, arena.starts.kernel()
+            (
+                numbers.take_start, numbers.start_context, numbers.start_rates, numbers.start_at, numbers.start_count,
+                numbers.start_t, numbers.start_tol,
+            ) = arguments  # fmt: skip
+            numbers.may_land = not still(arena.packed).bodies.size
+
+    @staticmethod
+    def serves(arena):
+        """Whether Python has nothing to do between the cases of an arena."""
+        packed, pen, state = arena.packed, arena.pen, arena.study.call.state
+        if DEBUG or pen is None or arena.kept.n >= LONG_STEPS:
+            return False
+        selects = pen.moves or pen.written & OF_ROWS or pen.geometry is not None  # redundant rows, in each case
+        if packed.derived.redundant is not None and selects:
+            return False
+        moved = still(packed).bodies.size or packed.system.memory.size or not arena.kept.handles.begin_at_zero
+        return not (pen.moves and (moved or state is not None))
+
+    def enter(self, chunk):
+        """Take the chunk that the arena's pen has laid out, and arrays for its results."""
+        arrays, status = chunk.arrays, chunk.status
+        pen, study = self._arena.pen, self._arena.study
+        fits, packed = pen.fits, self._arena.packed
+        if pen.moves:
+            q = pen.starts[:, 0]
+            fits = fits & are_near(packed, q) if pen.geometry is None else fits.copy()
+            fits[fits] = are_aligned(packed, q[fits], study.span[0])
+        count = len(status)
+        self._at, *self._chunk = resident(CaseArrays(
+            pen.numbers, pen.starts, fits.astype(np.int64), arrays["t"], arrays["q"].reshape(count, -1),
+            arrays["qd"].reshape(count, -1), status, study.halt,
+        ))  # fmt: skip
+
+    def run(self, k, end):
+        """Run cases of the chunk from k on; the first that was not."""
+        if self._long * FEW_LONG > self._cases > TRIED:  # longer ones hardly notice Python
+            return k
+        memory = self._take()
+        reached = run_cases(*memory.where, self._plan, self._at, k, end)
+        numbers = self._numbers
+        self._cases += reached - k + numbers.ran
+        self._long += numbers.ran and numbers.status == SLICE_DONE
+        if not (numbers.ran and numbers.status == NOT_FINITE):  # NaN may be left
+            self._give(memory)
+        return reached
+
+    def _take(self):
+        """The memory of runs, laid out for this batch."""
+        kept, task = self._arena.kept, self._task
+        engine, places = kept.engine(SeriesEngine, task.method, task.form, task.within), self._arena.pen.places()
+        memory = kept.take(engine)
+        if memory is not self._memory or places is not self._places:
+            self._lay_out(memory, engine, places)
+        self._kind = engine.kind
+        return memory
+
+    def _give(self, memory):
+        """Let others use the memory."""
+        self._arena.kept.give(self._kind, memory)
+
+    def _lay_out(self, memory, engine, places):
+        memory.enter(engine, self._task, False)
+        self._memory, self._places = memory, places
+        arrays = [*memory.entered(), *([] if self._start is None else self._start.entered())]
+        arrays = [array for array in arrays if array.size]
+        self._images = [(array, array.copy() if array.any() else None) for array in arrays]
+        images = [[a.ctypes.data, 0 if b is None else b.ctypes.data, a.nbytes // 8] for a, b in self._images]
+        targets = [[place.to.ctypes.data, place.column, place.to.size] for place in (*places, *self._own(memory))]
+        start = np.zeros((2, self._arena.study.n))
+        self._plan, *self._kept = resident(Plan(self._numbers, _words(images), _words(targets), start, self._slice.log))
+
+    def _own(self, memory):
+        """Places of numbers that follow from points of constraints, in the memory of runs and of starts."""
+        pen = self._arena.pen
+        if pen.geometry is None:
+            return []
+        at, found, control = pen.geometry.column, pen.places_in(self._start.reals), memory.work.control
+        found += [Place(_number(each, "size"), at) for each in (control, self._start.work.control)]
+        return [*found, Place(_number(control, "u_tol"), at + 1)]
+
+
+def _number(record, name):
+    """A number of a record as an array."""
+    at = getattr(type(record), name).offset // 8
+    return words(record).view(float)[at : at + 1]
+
+
+def _words(rows):
+    return np.array(rows, np.int64).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""The table of cases: for each parameter a value of its own in each case, or one for all."""
+"""The table of cases, what is kept of each, and mistakes that concern all of them, found before the first run."""
 
 from __future__ import annotations
 
@@ -7,12 +7,83 @@ from collections.abc import Mapping, Set
 
 import numpy as np
 
-from ..elements.bodies import Body
-from ..errors import InvalidArgument
-from ..parameters.fields import fields_of, unknown_field
-from ..simulation.variants import start_of
-from ..validation import counted, shown, whole
-from .user_functions import called
+from ..elements.bodies import Body, PointMass
+from ..errors import InvalidArgument, TsdynError
+from ..runs.arguments import state_arrays
+from ..simulation.parameters import fields_of, unknown_field
+from ..simulation.variants import start_names, start_of
+from ..taylor.series_engine import SeriesEngine
+from ..validation import counted, floats, shown, whole
+
+# Functions of a user that an ensemble calls: whether they take what they are given, and what they raise.
+
+
+def demand_arguments(function, what, names):
+    """Raise InvalidArgument unless a function can be called with so many arguments by position."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # of a builtin
+        return
+    try:
+        signature.bind(*names)
+    except TypeError as error:
+        name = getattr(function, "__name__", type(function).__name__)
+        raise InvalidArgument(
+            f"{what} is called with ({', '.join(names)}), and {name}{signature} can't be: {error}. Others than "
+            f"{'this argument' if len(names) == 1 else 'these arguments'} need defaults."
+        ) from None
+
+
+def called(function, what, argument):
+    """What a function gives; raises InvalidArgument, with what the function raises as the cause."""
+    try:
+        return function(argument)
+    except TsdynError:
+        raise
+    except Exception as error:
+        raise InvalidArgument(f"{what} raised {type(error).__name__}: {str(error).rstrip('.')}.") from error
+
+
+# What is kept of each run: its last state, the states at t_eval, or what a user's function makes of the solution.
+
+FINAL, TIMES = "final", "t_eval"
+
+
+def demand_keep(keep, times):
+    """Raise InvalidArgument unless `keep` is one of the ways, and there are times for it."""
+    if not (callable(keep) or (isinstance(keep, str) and keep in (FINAL, TIMES))):
+        raise InvalidArgument(f"keep must be 'final', 't_eval' or a function of the Solution, got {keep!r}.")
+    if keep == TIMES and not times.size:
+        raise InvalidArgument("keep='t_eval' keeps the states at the times of t_eval=; give them.")
+
+
+def record_of(keep, outcome, n, times):
+    """Arrays of a run by name: t, q, qd."""
+    end = outcome.end
+    if keep != TIMES:
+        return {"t": end.reached, "q": end.last[0], "qd": end.last[1]}
+    q = np.full((2, times.size, n), np.nan)
+    rows = outcome.rows
+    q[:, : len(rows)] = rows[:, 1 : 1 + 2 * n].reshape(-1, 2, n).swapaxes(0, 1)
+    return {"t": end.reached, "q": q[0], "qd": q[1]}
+
+
+def reduced(keep, solution):
+    """What a user's function makes of a solution: arrays by name; "" stands for one without a name."""
+    found = called(keep, "keep", solution)
+    found = dict(found) if isinstance(found, Mapping) else {"": found}
+    arrays = {}
+    for name, value in found.items():
+        array = np.asarray(value, float) if isinstance(value, (bool, np.bool_)) else floats(value)
+        if array.dtype != float or array.size == 0:
+            raise InvalidArgument(
+                f"keep must return numbers, arrays of numbers or a mapping of them, got {shown(value)}."
+            )
+        arrays[f"kept {name}".rstrip()] = array
+    return arrays
+
+
+# The table of cases: for each parameter a value of its own in each case, or one for all.
 
 MATRIX = 2  # dimensions of an inertia
 NO_NUMBERS = "USbcmM"  # kinds of arrays: text, truth values, complex, times
@@ -187,3 +258,75 @@ def _array(given):
         found = np.empty(len(given), object)
         found[:] = list(given)
         return found
+
+
+# What is wrong with every case of an ensemble, told before the first one runs.
+
+
+def demand_whole(study):
+    """Check what all cases of a study have in common: functions, state, method, table.
+
+    Raises
+    ------
+    TsdynError
+        A subclass; names the argument.
+    """
+    state, cases = study.call.state, study.cases
+    if callable(study.keep):
+        demand_arguments(study.keep, "keep", ("solution",))
+    if cases.names is None:
+        demand_arguments(cases.function, "the function of cases", ("case",))
+    for event in study.events or ():
+        demand_arguments(event.function, event.name, ("t", "state"))
+    if state is not None:
+        _demand_state(study, state)
+    form = study.options.form
+    if study.method.driver == "series" and form.name != "tangent":
+        SeriesEngine(study.kept, study.method, form, study.within)  # says which methods serve the form
+    if cases.names is not None:
+        table = (*cases.columns.values(), *cases.fixed.values())
+        is_of_numbers = all(np.asarray(values).dtype.kind == "f" for values in table)
+        if study.method.driver == "series" and study.kept.refusal and is_of_numbers:
+            raise InvalidArgument(study.kept.refusal)
+        _demand_shapes(study)
+        _demand_fixed(study)
+
+
+def _demand_state(study, state):
+    state_arrays(state, study.n)
+    both = sorted(start_names(study.kept.packed) & {*(study.cases.names or ())})
+    if both:
+        raise InvalidArgument(
+            f"{', '.join(both)} and state: every case starts from the state, whatever the table says; leave one of "
+            "them out."
+        )
+
+
+def _demand_shapes(study):
+    """Raise InvalidArgument where the values of a column have a shape that their attribute doesn't take."""
+    for name, column in study.cases.columns.items():
+        field = study.family.fields[name]
+        shape, value = column.shape[1:], np.asarray(field.value) if field.is_numeric else None
+        if column.dtype.kind != "f" or value is None or shape == value.shape:
+            continue
+        if field.attribute == "inertia" and isinstance(field.owner, Body) and shape == (3,):
+            continue
+        try:
+            study.scene.with_parameters({name: np.resize(value, shape)})
+        except TsdynError:
+            raise InvalidArgument(
+                f"{name}: the values of the cases have the shape {shape}, and must have {value.shape}, that of the "
+                "scene's own."
+            ) from None
+
+
+def _demand_fixed(study):
+    """Raise what an attribute does where a value for all cases is inadmissible.
+
+    Whether it fits may depend on others of its owner that differ from case to case, unless that is a body.
+    """
+    fields, cases = study.family.fields, study.cases
+    varied = {id(fields[name].owner) for name in cases.columns if not isinstance(fields[name].owner, PointMass)}
+    fixed = {name: value for name, value in cases.fixed.items() if id(fields[name].owner) not in varied}
+    if fixed:
+        study.scene.with_parameters(fixed)

@@ -2,31 +2,66 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..calls import fitting, unknown_argument
-from ..elements.names import named
+from ..elements.bodies import named
 from ..errors import InvalidArgument
+from ..simulation.progress import bar_class
 from ..simulation.run_options import OPTIONS, from_names
 from ..simulation.scene import Scene
 from ..validation import sequence, whole
-from .cases import cases_of
-from .chunks import Collected
-from .demands import demand_whole
-from .executors import run_executor
-from .progress import CaseProgress
+from .cases import cases_of, demand_arguments, demand_whole
+from .executors import Collected, run_executor, run_threads
 from .results import Ensemble
 from .runner import Study
-from .threads import run_threads
 from .tolerances import LANES
-from .user_functions import demand_arguments
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..hints import CaseTable, Keep, Place, Progress, Span
+
+
+# Progress of an ensemble: a bar with rate and remaining time, or a user's function.
+
+
+class CaseProgress:
+    """What is told of cases that are finished.
+
+    Parameters
+    ----------
+    progress : bool or callable
+        As of `simulate`.
+    count : int
+        Cases in all.
+    done : int
+        Cases that were finished before.
+    """
+
+    def __init__(self, progress, count, done=0):
+        self.count, self.done, self._bar, self._tell = count, done, None, None
+        if callable(progress):
+            self._tell = progress
+        elif progress not in (None, False):
+            self._bar = bar_class(progress)(total=count, initial=done, unit=" cases", file=sys.stderr)
+
+    def __call__(self, cases):
+        """So many more cases are finished."""
+        self.done += cases
+        if self._bar is not None:
+            self._bar.update(cases)
+        if self._tell is not None and cases:
+            self._tell(self.done / self.count)
+
+    def close(self):
+        """It has ended."""
+        if self._bar is not None:
+            self._bar.close()
+
 
 OWN = [name for name in OPTIONS if name not in ("store", "checkpoint", "progress")]  # options of `simulate`
 NAMED = ("keep", "cases", "assemble", "executor", "threads", "lanes", "store", "resume", "progress")

@@ -1,17 +1,265 @@
-"""Cases sent in chunks to an executor: processes, or workers of Dask on this machine and others."""
+"""Cases in chunks: shared out to threads, or sent to an executor of processes or of machines."""
 
 import contextlib
 import hashlib
+import os
 import pickle
+import threading
 import time
 import warnings
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, ThreadPoolExecutor, wait
+from typing import NamedTuple
 
-from ..errors import InvalidArgument, MissingDependency
-from .chunks import run_chunk
-from .runner import Runner, Study
-from .threads import Queue
-from .tolerances import AHEAD, LOOK, RETRIES, SENT_SECONDS, STUDIES
+import numpy as np
+
+from ..errors import InvalidArgument, MissingDependency, Status
+from .cases import TIMES
+from .runner import PLAIN, Runner, Study
+from .tolerances import AHEAD, ALONE_SECONDS, CHUNK_SECONDS, GROWTH, LOOK, MOST_CASES, RETRIES, SENT_SECONDS, STUDIES
+
+# Chunks of cases: what threads and processes are given, and what they give back.
+
+NOT_RUN = int(Status.NOT_RUN)
+ALWAYS = ("t", "q", "qd")  # of the same shape in every case
+
+
+OTHER_SHAPE = "keep must return arrays of the same shape for every case, it gave one of shape {}, and {} before."
+
+
+class Chunk(NamedTuple):
+    """Results of cases without a gap."""
+
+    first: int
+    status: np.ndarray  # int64 (k,)
+    messages: dict  # case -> message, of those that are not the sentence of their status
+    arrays: dict  # name -> (k, ...)
+
+    @property
+    def count(self):
+        """Number of cases."""
+        return len(self.status)
+
+
+def run_chunk(runner, first, count, offset=0):
+    """Run cases from `first` on; the `Chunk`, and whether Ctrl-C has ended it early.
+
+    offset: the number of the first case of the study among all.
+    """
+    study, messages = runner.study, {}
+    status, arrays = np.full(count, NOT_RUN), empty(study, count)
+    interrupted, k = False, 0
+    try:
+        room = runner.room(first, status, arrays, messages)
+        while (k := runner.run_many(room, k)) < count:
+            if study.stopped:
+                raise KeyboardInterrupt
+            record = runner.run(room, k)
+            said = _enter(arrays, k, record.arrays)
+            message = said or record.message
+            if message is not PLAIN:
+                messages[k] = message
+            status[k] = record.status if said is None else Status.CASE_FAILED
+            k += 1
+    except KeyboardInterrupt:
+        interrupted = True
+    done = int(np.argmax(status == NOT_RUN)) if (status == NOT_RUN).any() else count
+    parts = {name: array[:done] for name, array in arrays.items()}
+    said = {offset + first + k: message for k, message in messages.items()}
+    return Chunk(offset + first, status[:done], said, parts), interrupted
+
+
+def _enter(arrays, k, found):
+    """Write arrays of a case; what is wrong with them, or None."""
+    for name, value in found.items():
+        if name in ALWAYS:
+            arrays[name][k] = value
+            continue
+        if name not in arrays:
+            arrays[name] = np.full((len(arrays["t"]), *np.shape(value)), np.nan)
+        if np.shape(value) != arrays[name].shape[1:]:
+            return OTHER_SHAPE.format(np.shape(value), arrays[name].shape[1:])
+        arrays[name][k] = value
+    return None
+
+
+def empty(study, cases):
+    """Arrays by name for so many cases, all NaN."""
+    shape = (study.times.size, study.n) if study.keep == TIMES else (study.n,)
+    return {"t": np.full(cases, np.nan), "q": np.full((cases, *shape), np.nan), "qd": np.full((cases, *shape), np.nan)}
+
+
+def fitted(chunk, shapes):
+    """A chunk whose arrays have these shapes, by name: its cases have failed where they have others."""
+    wrong = {
+        name: array.shape[1:]
+        for name, array in chunk.arrays.items()
+        if array.shape[1:] != shapes.get(name, array.shape[1:])
+    }
+    if not wrong:
+        return chunk
+    status, messages = chunk.status.copy(), dict(chunk.messages)
+    name = next(iter(wrong))
+    for k in np.flatnonzero(np.isin(status, (int(Status.SUCCESS), int(Status.EVENT)))).tolist():
+        status[k], messages[chunk.first + k] = Status.CASE_FAILED, OTHER_SHAPE.format(wrong[name], shapes[name])
+    return chunk._replace(
+        status=status, messages=messages, arrays={k: v for k, v in chunk.arrays.items() if k not in wrong}
+    )
+
+
+class Collected:
+    """Results of all cases in memory.
+
+    Parameters
+    ----------
+    study : Study
+    """
+
+    first, is_full, reason = 0, False, ""  # case to begin with; whether to wait; why cases are missing
+
+    def __init__(self, study):
+        count = study.cases.count
+        self.status, self.messages, self.arrays = np.full(count, int(Status.NOT_RUN)), {}, empty(study, count)
+
+    def add(self, chunk):
+        """Take over the results of a chunk; cases that are known already stay as they are."""
+        chunk = fitted(chunk, {name: array.shape[1:] for name, array in self.arrays.items()})
+        rows = slice(chunk.first, chunk.first + chunk.count)
+        fresh = self.status[rows] == Status.NOT_RUN
+        self.status[rows][fresh] = chunk.status[fresh]
+        self.messages |= {i: message for i, message in chunk.messages.items() if fresh[i - chunk.first]}
+        for name, values in chunk.arrays.items():
+            if name not in self.arrays:
+                self.arrays[name] = np.full((len(self.status), *values.shape[1:]), np.nan)
+            self.arrays[name][rows][fresh] = values[fresh]
+
+    def close(self):
+        """Do nothing: all is in memory."""
+
+
+# Cases shared out to threads of this process.
+
+
+class Queue:
+    """Cases that wait, handed out in chunks that take about so many seconds, multiples of `least` cases."""
+
+    def __init__(self, first, end, seconds=CHUNK_SECONDS, least=1):
+        self.next, self.end, self.seconds, self.least, self._lock = first, end, seconds, least, threading.Lock()
+        self.size = least
+
+    def take(self):
+        """(first, count) of a chunk; None at the end."""
+        with self._lock:
+            first, count = self.next, min(self.size, self.end - self.next)
+            self.next += count
+        return (first, count) if count > 0 else None
+
+    def timed(self, count, seconds):
+        """Adapt the size of the next chunks to the time that one has taken."""
+        wanted = count * self.seconds / max(seconds, 1e-9)
+        wanted = min(int(wanted), GROWTH * count, MOST_CASES)
+        self.size = max(wanted // self.least, 1) * self.least
+
+
+def processors():
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def run_threads(study, sink, threads, report):
+    """Run the cases of a study on threads, which give their chunks to the sink; the number of threads.
+
+    None: this thread alone where all cases together are short, else as many as there are processors. `report(cases)` is
+    told of progress. Ctrl-C ends it: whether it did.
+    """
+    queue = Queue(sink.first, study.cases.count, least=study.lanes)
+    runner, began = Runner(study), time.perf_counter()
+    while threads is None:  # the first case makes what all have in common
+        pair = queue.take()
+        if pair is None:
+            return 1, False
+        if _run(runner, pair, queue, sink, report):
+            return 1, True
+        if time.perf_counter() - began > ALONE_SECONDS:
+            threads = processors()
+    if threads == 1:
+        return 1, _run_here(runner, queue, sink, report)
+    return threads, _Pool(study, queue, sink, threads).run(report)
+
+
+def _run(runner, pair, queue, sink, report):
+    """Run a chunk; whether Ctrl-C has ended it."""
+    began = time.perf_counter()
+    chunk, interrupted = run_chunk(runner, *pair)
+    queue.timed(pair[1], time.perf_counter() - began)
+    sink.add(chunk)
+    report(chunk.count)
+    return interrupted
+
+
+def _run_here(runner, queue, sink, report):
+    try:
+        while (pair := queue.take()) is not None:
+            if _run(runner, pair, queue, sink, report):
+                return True
+    except KeyboardInterrupt:  # between two cases
+        return True
+    return False
+
+
+class _Pool:
+    """Threads with a runner each; the thread that asks waits for them, so that Ctrl-C reaches it."""
+
+    def __init__(self, study, queue, sink, count):
+        self.study, self.queue, self.sink = study, queue, sink
+        self.lock, self.news, self.finished, self.errors = threading.Lock(), threading.Event(), 0, []
+        self.threads = [threading.Thread(target=self._work, daemon=True) for _ in range(count)]
+
+    def _work(self):
+        try:
+            runner = Runner(self.study)
+            while self._may_go_on() and (pair := self.queue.take()) is not None:
+                began = time.perf_counter()
+                chunk, _ = run_chunk(runner, *pair)
+                self.queue.timed(pair[1], time.perf_counter() - began)
+                with self.lock:
+                    self.sink.add(chunk)
+                    self.finished += chunk.count
+        except BaseException as error:  # raised again by the thread that waits
+            self.errors.append(error)
+            self.study.stopped = True
+
+    def _may_go_on(self):
+        """Wait while results wait for others to be written."""
+        while self.sink.is_full and not self.study.stopped:
+            time.sleep(LOOK)
+        return not self.study.stopped
+
+    def run(self, report):
+        """Run all; whether Ctrl-C has ended it."""
+        interrupted = False
+        for thread in self.threads:
+            thread.start()
+        try:
+            self._wait(report)
+        except KeyboardInterrupt:
+            interrupted = self.study.stopped = True
+            for thread in self.threads:
+                thread.join()
+        if self.errors:
+            raise self.errors[0]
+        return interrupted
+
+    def _wait(self, report):
+        told = 0
+        for thread in self.threads:
+            while thread.is_alive():
+                thread.join(LOOK)
+                report(self.finished - told)
+                told = self.finished
+        report(self.finished - told)
+
+
+# Cases sent in chunks to an executor: processes, or workers of Dask on this machine and others.
 
 CLOSED = "executor: it takes no work: {}. Give one that is open, such as within `with ProcessPoolExecutor() as pool:`."
 

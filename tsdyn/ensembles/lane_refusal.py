@@ -4,15 +4,15 @@ import contextlib
 
 from ..errors import InvalidArgument, TsdynError
 from ..jit.compiled import DEBUG, load
-from ..lanes.kinds import constraint_loops, force_loops
 from ..motions.signals import Signal
+from ..rows.graph_builder import redundant_rows
 from ..runs.tolerances import LONG_STEPS
 from ..simulation.run_options import OPTIONS
-from ..sparse.constraint_graphs import redundant_rows
+from ..taylor.lane_memory import constraint_loops, force_loops
 from ..taylor.layout import SHOWN, is_far
 from .arena import Arena
-from .first_slice import FirstSlice
-from .lane_loop import lane_runner
+from .case_loop import FirstSlice
+from .lanes import lane_runner
 
 INSTEAD = "Leave lanes out: one case at a time serves every scene and method."
 PLAIN = ("formulation", "chart_interval", "redundancy")  # of which lanes have the default

@@ -7,20 +7,17 @@ import numpy as np
 
 from ..ahead.first_run import prepare_first_run
 from ..errors import Status, TsdynError
-from ..model.state_loads import is_of_user
+from ..model.equations import is_of_user
 from ..runs.arguments import interval, output_times
 from ..runs.events import prepare
 from ..runs.task import between
-from ..simulation.method_choice import first_method
-from ..simulation.prepared_run import Run
+from ..simulation.prepared_run import Run, first_method
 from ..simulation.run_options import by_name
 from ..simulation.solution import Solution
 from ..simulation.variants import family_of, of_numbers, packed_anew, start_names
-from .arena import Arena
-from .cases import started
-from .first_slice import Finished
-from .keeping import demand_keep, record_of, reduced
-from .sharing import serves
+from .arena import Arena, serves
+from .case_loop import Finished
+from .cases import demand_keep, record_of, reduced, started
 from .tolerances import ARENAS
 
 PLAIN = Status.SUCCESS.sentence

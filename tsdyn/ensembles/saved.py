@@ -14,11 +14,9 @@ from ..simulation.run_options import OPTIONS, demand_arguments_of_file
 from ..simulation.scene import Scene
 from ..simulation.stored_runs import hash_of
 from ..validation import damaged, demand, demand_record
-from .cases import Cases, started
+from .cases import FINAL, TIMES, Cases, started
 from .ensemble import OWN
-from .keeping import FINAL, TIMES
-from .results import Ensemble
-from .saving import FORMAT, REDUCED
+from .results import FORMAT, REDUCED, Ensemble
 
 RECORD = {  # of every file, with the types of it
     "count": int, "keep": str, "is_single": bool, "kept": list, "parameters": list, "coordinates": list,

@@ -13,16 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import regular_files
+from .. import validation
 from .._version import __version__
 from ..errors import Status, StorageError
-from ..regular_files import NO_LINKS
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
-from ..storage.formats import Column, Table, demand_shapes, format_of
-from ..storage.write_errors import demand_writable, writing
-from ..validation import damaged
-from .chunks import empty, fitted
-from .keeping import TIMES
+from ..storage.formats import Column, Table, demand_shapes, demand_writable, format_of, writing
+from ..validation import NO_LINKS, damaged
+from .cases import TIMES
+from .executors import empty, fitted
 from .tolerances import FLUSH, WAITING
 
 GO_ON = "Free space there, and go on: resume=True.", "Mend that, and go on: resume=True."
@@ -177,7 +175,7 @@ class StoredResults:
         if not self._said.exists():
             return {}
         with damaged(self._said):
-            pairs = [json.loads(line) for line in regular_files.read(self._said, flags=NO_LINKS).splitlines()]
+            pairs = [json.loads(line) for line in validation.read(self._said, flags=NO_LINKS).splitlines()]
             if not all(type(i) is int and isinstance(said, str) for i, said in pairs):
                 raise ValueError("a line is no number of a case and its message")
             return dict(pairs)

@@ -9,7 +9,7 @@ import numpy as np
 from ..drawing import GREY, VERMILION
 from ..elements.bodies import rotation_matrix
 from ..errors import InvalidArgument
-from ..viewer.sizes import attached, joint_points
+from ..viewer.symbols import attached, joint_points
 from .axes import axes_of, figure_of
 
 if TYPE_CHECKING:

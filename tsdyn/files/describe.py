@@ -6,7 +6,7 @@ from ..elements.bodies import IDENTITY, Body
 from ..errors import InvalidArgument
 from ..jit.code_hash import is_ours
 from . import types
-from .values import Unwritable, encode
+from .types import Unwritable, encode
 
 VERSION = 1
 BUILT = {"built_a": 0, "built_b": 1}  # orientations of a and b at which an angle is zero

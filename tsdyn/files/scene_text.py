@@ -1,4 +1,4 @@
-"""A scene as TOML text, and the text as a scene."""
+"""A scene as TOML text, and the text as a scene; the file that `tsdyn new` writes."""
 
 import re
 import tomllib
@@ -8,12 +8,14 @@ import numpy as np
 
 from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidFile
-from . import run_table, study_tables, toml_text
+from . import run_tables, toml_text
 from .build import build
 from .describe import describe, outline
-from .mistakes import Mistakes
-from .places import Places
-from .values import encode
+from .reading import Mistakes
+from .toml_text import Places
+from .types import encode
+
+# A scene as TOML text, and the text as a scene.
 
 KEEP = "A class of your own must keep each argument of its __init__ as an attribute of the same name."
 LARGEST = 1 << 26  # bytes of a file that is read: what Python makes of it takes some thirty times as many
@@ -75,14 +77,14 @@ def read_all(text, name, make, simulate, allow_code=False, study=None):
     """
     document, mistakes = parsed(text, name)
     scene, names = build(document, make, mistakes, allow_code)
-    given = run_table.options(document["run"], simulate, mistakes, names) if "run" in document else {}
+    given = run_tables.options(document["run"], simulate, mistakes, names) if "run" in document else {}
     cases = {}
     if "ensemble" in document and study is not False:
         table = document["ensemble"]
         if isinstance(table, dict):
             table = table | {key: value for key, value in (study or {}).items() if value is not None}
-        cases = study_tables.ensemble(table, scene, mistakes, names)
-    output = study_tables.output(document.get("output", {}), mistakes)
+        cases = run_tables.ensemble(table, scene, mistakes, names)
+    output = run_tables.output(document.get("output", {}), mistakes)
     mistakes.demand_none()
     return Document(scene, given, cases, output)
 
@@ -142,3 +144,78 @@ def _demand_same(scene, twin):
     if changed or list(one) != list(other):
         which = ", ".join(changed[:5]) or "the names"
         raise InvalidArgument(f"the scene can't be written: {which} would not come back to the bit. {KEEP}")
+
+
+# The scene file that `tsdyn new` writes.
+
+TEXT = """\
+# A scene of tsdyn. SI units and radians; Euler parameters scalar first.
+# Run it:    tsdyn run scene.toml
+# Check it:  tsdyn check scene.toml        What is in it:  tsdyn info scene.toml
+version = 1
+title = "pendulum with a spring"
+gravity = [0.0, 0.0, -9.81]
+
+# Numbers with names. A number anywhere below may be an expression of them, in quotes.
+[parameters]
+length = 1.0
+mass = 2.0
+
+# A rigid body; type = "PointMass" is a particle, without inertia and orientation.
+[[body]]
+name = "arm"
+mass = "mass"
+inertia = [0.01, "mass * length**2 / 12", "mass * length**2 / 12"] # about the centroid, body frame
+position = ["length / 2", 0, 0]                                    # of the centroid, ground frame
+# orientation = [1, 0, 0, 0]
+# velocity = [0, 0, 0]
+# angular_velocity = [0, 0, 0]                                     # body frame
+
+# A joint. `at` gives its point and axis in the ground frame; without it point_a, axis_b, ... are in the body frames.
+[[constraint]]
+type = "Revolute"
+name = "hinge"
+a = "ground"
+b = "arm"
+at = { point = [0, 0, 0], axis = [0, 1, 0] }
+
+# A motor would prescribe the angle, as an expression of the time t:
+# [[constraint]]
+# type = "RotationMotor"
+# a = "ground"
+# b = "arm"
+# at = { axis = [0, 1, 0] }
+# angle = "0.5 * sin(2 * t)"
+
+[[force]]
+type = "Spring"
+name = "spring"
+a = "arm"
+b = "ground"
+point_a = ["length / 2", 0, 0]
+point_b = ["length", 0, 0.5]
+stiffness = 20.0
+damping = 0.1
+
+# assemble = true moves bodies that don't quite fit to the nearest places where they do.
+[start]
+assemble = false
+
+[run]
+end = 10.0
+every = 0.01 # outputs; without it one a step
+# method = "dop853"
+# rtol = 1e-9
+
+# Results of `tsdyn run` and `tsdyn ensemble`, below the working folder.
+# [output]
+# files = ["arm.h5", "arm.csv"]
+# plot = "arm.png"
+
+# Many runs, by `tsdyn ensemble`: what differs from case to case. `tsdyn info --parameters` lists them.
+# [ensemble]
+# cases = 100
+# [ensemble.parameters]
+# "arm.mass" = { normal = [2.0, 0.05] }
+# "spring.stiffness" = { uniform = [15, 25] }
+"""

@@ -4,7 +4,7 @@ import inspect
 import json
 
 from ..motions.tables import MAKERS
-from . import run_table, study_tables, types
+from . import run_tables, types
 from .build import KEYS
 from .describe import BUILT, VERSION
 
@@ -44,7 +44,7 @@ BY_KIND = {
     types.FLAG: {"type": "boolean"},
     types.TEXT: {"type": "string"},
     types.ARRAY: {"$ref": "#/$defs/array"},
-    types.MOTION: {"$ref": "#/$defs/motion"},
+    types.MOTION_TYPE: {"$ref": "#/$defs/motion"},
     types.VECTOR: {"$ref": "#/$defs/vector motion"},
     types.REFERENCE: {"description": "the name of a constraint", "type": "string"},
     types.NAMES: {"type": "array", "items": {"type": "string"}},
@@ -55,7 +55,7 @@ BY_KIND = {
 def schema(scene, simulate):
     """The JSON Schema, with all built-in classes; by the class of scenes and `simulate`."""
     bodies = [_body(name, getattr(scene, method)) for name, method in types.BODY_TYPES.items()]
-    run = {name: _property(argument) for name, argument in run_table.arguments(simulate).items()}
+    run = {name: _property(argument) for name, argument in run_tables.arguments(simulate).items()}
     own = {"start": NUMBER, "end": NUMBER, "every": NUMBER, "method": {"type": ["string", "object"]}}
     properties = {
         "version": {"const": VERSION},
@@ -87,11 +87,11 @@ def _closed(properties):
 
 def _ensemble():
     pair = {"type": "array", "items": {"$ref": "#/$defs/array"}, "minItems": 2}
-    spread = {kind: {**pair, "maxItems": most} for kind, most in study_tables.SPREADS.items()}
+    spread = {kind: {**pair, "maxItems": most} for kind, most in run_tables.SPREADS.items()}
     value = {"anyOf": [{"$ref": "#/$defs/array"}, {**_closed(spread), "minProperties": 1, "maxProperties": 1}]}
-    whole = {key: {"type": "integer", "minimum": least} for key, least in study_tables.LEAST.items()}
+    whole = {key: {"type": "integer", "minimum": least} for key, least in run_tables.LEAST.items()}
     names = {"type": "array", "items": {"type": "string"}}
-    others = {"grid": {"type": "boolean"}, "keep": {"enum": list(study_tables.KEEPS)}}
+    others = {"grid": {"type": "boolean"}, "keep": {"enum": list(run_tables.KEEPS)}}
     others |= {"assemble": {"anyOf": [{"type": "boolean"}, names]}}
     parameters = {"type": "object", "additionalProperties": value, "minProperties": 1}
     return {**_closed({"parameters": parameters, **whole, **others}), "required": ["parameters"]}

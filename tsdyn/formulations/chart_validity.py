@@ -10,7 +10,7 @@ neither on units nor on the scaling of constraint rows or lever arms:
 
 import math
 
-from ..elements.loops.body_poses import POSE, P, R, place_bodies
+from ..elements.loops.constraint_rows import POSE, P, R, place_bodies
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy
 from ..rows.interface import (

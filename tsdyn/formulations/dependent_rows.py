@@ -2,15 +2,14 @@
 
 import numpy as np
 
-from ..elements.loops.body_poses import place_bodies
+from ..elements.loops.constraint_rows import place_bodies
 from ..jit.kernels import entry, resident
-from ..model.derived import Derived
 from ..model.equations import set_time
+from ..model.packed import Derived
+from ..rows.constraint_graph import REDUCED, by_lengths
+from ..rows.graph_builder import graph_of
 from ..rows.interface import allocate_tangent, redundant_of, select_rows
-from ..sparse.constraint_graph import REDUCED
-from ..sparse.constraint_graphs import graph_of
-from ..sparse.length_metric import by_lengths
-from ..workspaces.workspace import load_parts, parts
+from ..workspaces import load_parts, parts
 
 
 @entry("pvdd")
@@ -26,7 +25,7 @@ def _choose(context, q, t, share):
 def dependent_rows(packed, q, t, share):
     """Rows of Phi that are left less than a share of their diagonal entries of H W H^T by elimination, int64 (k,).
 
-    None where no choice among them is independent. Normalisations are not included. See independent_rows.py: of many
+    None where no choice among them is independent. Normalisations are not included. See row_selection.py: of many
     rows the choice is made within blocks, and may have one too many or too few.
     """
     own, known = packed, packed.derived

@@ -1,18 +1,571 @@
-"""The tangent form for implicit methods: accelerations of a stage, and rates of another configuration, in a chart.
+"""The tangent form for implicit methods: Newton's method for one stage, or for all of a collocation method."""
 
-Newton's method for its stages is that of stage_equations.py; the matrices are those of saddle_point.py.
-"""
+import math
 
+from ..elements.loops.constraint_rows import write_positions, write_velocities
 from ..errors import Status
-from ..jit.kernels import callback, vector
-from ..jit.simd import add, cross, fma, lanes, put, splat, times, total
+from ..jit.kernels import ANY, callback, complex_vector, data_of, kernel, vector
+from ..jit.simd import add, cross, fma, four, lanes, put, splat, times, total
+from ..maths.dense_linalg import copy, largest
 from ..maths.vectors import spin
-from ..workspaces.workspace import load
-from .chart_coordinates import turn_accelerations
+from ..methods.collocation import parts_of
+from ..methods.explicit import NORM
+from ..model.equations import is_rheonomic, set_time
+from ..rows.interface import (
+    DYNAMICS,
+    apply_multipliers,
+    clear_redundant,
+    evaluate_bias,
+    evaluate_drift,
+    evaluate_rows,
+    factorise_complex_saddle,
+    factorise_saddle,
+    factorise_selected_rows,
+    multiply_rates,
+    multiply_rows,
+    solve_complex_saddle,
+    solve_product,
+    solve_rows,
+    solve_saddle,
+    take_reactions,
+    weigh,
+    weigh_bodies,
+    write_saddle_rows,
+)
+from ..workspaces import load
+from .accelerations import body_forces
+from .chart_coordinates import displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
 from .chart_validity import measure_turns
-from .saddle_point import factorise, linearise, reduce, soften, solve
-from .stage_equations import correct, distance, residual
-from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, write_state
+from .projection import largest_residual, velocity_floor
+from .saddle_point import add_blocks, degrees, factorise, linearise, reduce, soften, solve, take_solution, turned_back
+from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, weighted_square, write_state
+from .tolerances import (
+    FARTHEST_AHEAD,
+    LAG,
+    LEAST_LAG,
+    LEFT,
+    REACTION_SWEEPS,
+    REACTIONS_LEFT,
+    ROUNDING_AT_MOST,
+    SLOW,
+    STALLED,
+    SWEEPS,
+)
+
+# Right-hand side of a Newton correction of a stage: the normal part of accelerations, and the unbalanced loads.
+
+
+@kernel
+def add_to(x, out):
+    """Add x to out."""
+    for i in range(x.size):
+        out[i] += x[i]
+
+
+@kernel
+def solve_normal(c):
+    """f.b <- N^-1 f.b, by factors that may be of an older configuration, such as q0."""
+    l = c.chart
+    lower, upper = (l.lower, l.upper) if l.state.made == 1 else (l.rows0.S, l.rows0.S)
+    solve_product(c.graph, lower, upper, c.tangent.b)
+
+
+@kernel
+def find_normal_part(c):
+    """s.r = n for the accelerations s.a; f.b are its multipliers, n = -Y0 f.b."""
+    f, s = c.tangent, c.saddle
+    # N^-1 (H a + gamma)
+    if f.b.size > 0:
+        multiply_rows(c.graph, f.rows, s.a, f.b)
+        add_to(f.gamma, f.b)
+        solve_normal(c)
+    spread_normal(c, f.b)
+
+
+@kernel
+def spread_normal(c, b):
+    """s.r = -Y0 b."""
+    s = c.saddle
+    for i in range(s.r.size):
+        s.r[i] = 0.0
+    apply_multipliers(c.graph, c.chart.rows0, b, s.r)
+
+
+@kernel
+def find_imbalance(c):
+    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows. False if S is singular."""
+    f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
+    # M (a + C n)
+    to_bodies(graph, l, s.r, f.Z)
+    add_to(s.a, f.Z)
+    for b in range(graph.bodies.shape[0]):
+        weigh(graph.mass, b, f.Z, 8 * b, f.Z, 8 * b)
+    # e = F - M (a + C n) - H^T lam
+    for i in range(s.e.size):
+        s.e[i] = s.loads[i] - f.Z[i]
+    take_reactions(graph, f.rows, s.multipliers, s.e)
+    if f.b.size > 0 and not _correct_multipliers(c):
+        return False
+    # In the order of elimination
+    for i in range(s.x.size):
+        s.x[i] = 0.0
+    for b in range(graph.bodies.shape[0]):
+        at, o = s.graph.body_at[b], 8 * b
+        for i in range(degrees(graph, b)):
+            s.x[at + i] = s.e[o + i + i // 3]
+    return True
+
+
+@kernel
+def _correct_multipliers(c):
+    """Correct lam by S^-1 H W e until H W e, e = F - M (a + C n) - H^T lam, is small; s.e = e. False if S is singular.
+
+    The saddle-point matrix was formed with an older H, so the residual normal to the constraints is eliminated with the
+    present one. S may be older, too, as long as corrections contract: at first it is that of the step's start.
+    """
+    w, f, s, graph, least, before, renewed = c.work, c.tangent, c.saddle, c.graph, 0.0, math.inf, False
+    lean = graph.axes.rows.shape[0] > 0  # S is of another metric than W
+    for sweep in range(REACTION_SWEEPS):
+        # H W e, the part of the imbalance that multipliers can balance
+        copy(s.e, f.Z)
+        put(f.Z, 8 * graph.bodies.shape[0], splat(0.0))  # the ground
+        put(f.Z, 8 * graph.bodies.shape[0] + 4, splat(0.0))
+        weigh_bodies(graph, f.Z)
+        multiply_rows(graph, f.rows, f.Z, f.b)
+        worst = largest_residual(graph, w, f)
+        if sweep == 0:
+            least = REACTIONS_LEFT * worst
+        if worst <= least:
+            return True
+        # Where W is that of raised inertias, N of the chart takes the place of S
+        if lean:
+            solve_normal(c)
+        else:
+            # S of an older configuration contracts no more
+            if worst > SLOW * before and not renewed:
+                w.counters.factorizations += 1
+                if factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0:
+                    return False
+                renewed = True
+            solve_rows(graph, f.rows, f.b)
+            clear_redundant(f, f.b)  # which others may have been when S was made
+        # lam <- lam + dlam,  e <- e - H^T dlam
+        add_to(f.b, s.multipliers)
+        take_reactions(graph, f.rows, f.b, s.e)
+        before = worst
+    return True
+
+
+# Newton's method for a stage of an implicit method in the tangent form, its multipliers unknowns as well.
+#
+#     Phi(q) = 0                         q  at x - Y0 u
+#     H C (xd - Y0 z) + Phi_t = 0        qd at xd - Y0 z
+#     H a + gamma = 0                    a = (rdd, omega'd), the accelerations k of chart coordinates
+#     M a + H^T lam = F
+#
+# x and xd are those of k. `residual` solves the first two for u and z, to well below the tolerance of the stage, and
+# evaluates the others. `correct` takes n = -Y0 N^-1 (H a + gamma) for the normal part of the correction of k; the
+# tangent part e follows with the multipliers from the saddle-point matrix (saddle_point.py):
+#
+#     [ M - g C_b - g^2 K_b    H^T ] [ C e  ]     [ F - M (a + C n) - H^T lam ]
+#     [ H                      0   ] [ dlam ]  =  [ 0                         ]
+#
+# Before, lam is corrected by S^-1 H W times the right-hand side, at the present H. The factors of N and S are those of
+# an older configuration as long as corrections contract: at first of the step's start.
+
+OK, NOT_FINITE, SINGULAR = int(Status.SUCCESS), int(Status.NOT_FINITE), int(Status.SINGULAR)
+CHART_LOST, NEWTON_FAILED = int(Status.CHART_LOST), int(Status.NEWTON_FAILED)
+
+
+@callback("pddppp")
+def residual(context, t, g, x, y, k):
+    """Place the stage at chart coordinates x and rates y; rows, loads and the accelerations of bodies there. Status."""
+    c = load(context)
+    system, w, f, l, s, graph = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph
+    numbers, n = c.linear.numbers, l.x.size - 8
+    l.state.time = t
+    w.counters.evaluations += 1
+    if not set_time(system, t):
+        return NOT_FINITE
+    # Iterates u, z and lam go on from the stage before
+    _begin(numbers, s, w.counters.charts, t)
+    clear_redundant(f, s.multipliers)  # which no iteration corrects: extrapolation would amplify those of dropped rows
+    copy(vector(x, n), l.x)
+    copy(vector(y, n), l.y)
+    # x - Y0 u and xd - Y0 z
+    apply_multipliers(graph, l.rows0, w.u, l.x)
+    apply_multipliers(graph, l.rows0, s.z, l.y)
+    status = _solve_positions(c, t, g)
+    if status == OK:
+        status = _solve_rates(c, t)
+    if status != OK:
+        return status
+    if system.forces.shape[0] > 0:
+        write_positions(graph.bodies, f.poses, w.q)
+        write_velocities(graph.bodies, f.poses, w.qd)
+    if f.b.size > 0:
+        evaluate_bias(graph, system, f, t)
+    # F at the stage, and a of k
+    body_forces(graph, system, w, f, t)
+    copy(f.Z, s.loads)
+    turn_accelerations(graph, l, f.poses, vector(k, n), s.a)
+    return OK if largest(s.loads) < math.inf else NOT_FINITE
+
+
+@kernel
+def _begin(numbers, s, charts, t):
+    """In a new stage, multipliers along the line through the last two; z and lag in a new chart."""
+    if numbers.rates_of == 0:  # at the start, and where a stage has failed
+        numbers.time = numbers.time_before = -math.inf
+        for e in range(s.multipliers.size):
+            s.multipliers[e] = s.before[e] = 0.0
+    # Normal velocities belong to a chart
+    if numbers.rates_of != charts:
+        numbers.rates_of, numbers.lag = charts, LAG
+        for e in range(s.z.size):
+            s.z[e] = 0.0
+    if t == numbers.time:
+        return
+    # Multipliers along the line through the last two stages
+    span, ratio = numbers.time - numbers.time_before, 0.0
+    if 0.0 < abs(span) < math.inf:
+        ratio = min(max((t - numbers.time) / span, -FARTHEST_AHEAD), FARTHEST_AHEAD)
+    for e in range(s.multipliers.size):
+        last = s.multipliers[e]
+        s.multipliers[e] += ratio * (last - s.before[e])
+        s.before[e] = last
+    numbers.time_before, numbers.time = numbers.time, t
+
+
+@kernel
+def _renew_normal(c):
+    """Factors of N at the present configuration; False if it is singular."""
+    c.linear.numbers.lag = LEAST_LAG
+    return factorise_normal(c.graph, c.work, c.tangent, c.chart)
+
+
+@kernel
+def _take_off(c, x):
+    """f.b <- N^-1 f.b and x -= Y0 f.b; s.r is the change of x."""
+    solve_normal(c)
+    spread_normal(c, c.tangent.b)
+    for i in range(x.size):
+        x[i] += c.saddle.r[i]
+
+
+@kernel
+def _rate_size(c, x):
+    """The error norm of a change x of rates in chart coordinates."""
+    numbers, n = c.linear.numbers, c.work.q.size
+    square = weighted_square(c.graph, c.chart, x, c.work.qd, c.linear.now[1], 0, numbers.rtol, numbers.atol)
+    return math.sqrt(square / (2 * n))
+
+
+@kernel
+def _solve_positions(c, t, g):
+    """Newton's method for u: poses and H. Status.
+
+    Stops when the position error over g is a velocity well below the tolerance of the stage.
+    """
+    system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
+    floor, before, renewed = w.control.floor, math.inf, False
+    for _ in range(SWEEPS):
+        if not displace(graph, l, f.poses):
+            return CHART_LOST
+        if f.b.size == 0:
+            return OK
+        evaluate_rows(graph, system, f, f.rows, t)
+        worst = largest_residual(graph, w, f)
+        if not worst < math.inf:
+            return NOT_FINITE
+        # Rounding, or a residual near it that falls no more
+        if worst <= floor or (worst > SLOW * before and worst <= ROUNDING_AT_MOST * floor):
+            return OK
+        if before < math.inf:
+            # Contraction by factors of an older configuration
+            numbers.lag = max(worst / before, LEAST_LAG)
+            if numbers.lag > SLOW and renewed:
+                return NEWTON_FAILED
+            # Factors at the present H, once
+            if not renewed:  # one correction was not enough
+                if not _renew_normal(c):
+                    return SINGULAR
+                renewed = True
+        # x <- x - Y0 N^-1 Phi,  u <- u + N^-1 Phi
+        _take_off(c, l.x)
+        add_to(f.b, w.u)
+        w.counters.newton += 1
+        # The expected error over g is a velocity below what the stage notices
+        if numbers.lag * _rate_size(c, s.r) <= g * LEFT:
+            return OK if displace(graph, l, f.poses) else CHART_LOST
+        before = worst
+    return NEWTON_FAILED
+
+
+@kernel
+def _solve_rates(c, t):
+    """rd and omega' of the poses from the rates l.y, tangent to well below the tolerance of the stage. Status."""
+    system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
+    rheonomic, floor, before, renewed = is_rheonomic(system), 0.0, math.inf, False
+    if rheonomic:
+        evaluate_drift(graph, system, f, t, l.drift)
+    for sweep in range(SWEEPS):
+        turn_rates(graph, l, l.y, f.poses)
+        if f.b.size == 0:
+            return OK
+        # H (rd, omega') + Phi_t, and the size of its rounding
+        if sweep == 0:
+            floor = velocity_floor(graph, w, f)
+        multiply_rates(graph, f.rows, f.poses, f.b)
+        if rheonomic:
+            add_to(l.drift, f.b)
+        worst = largest_residual(graph, w, f)
+        if not worst < math.inf:
+            return NOT_FINITE
+        if worst <= floor or (worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
+            return OK
+        # Factors at the present H, once
+        if worst > SLOW * before:
+            if renewed:
+                return NEWTON_FAILED
+            if not _renew_normal(c):
+                return SINGULAR
+            renewed = True
+        # xd <- xd - Y0 N^-1 (H (rd, omega') + Phi_t),  z likewise
+        _take_off(c, l.y)
+        add_to(f.b, s.z)
+        if numbers.lag * _rate_size(c, s.r) <= LEFT:
+            turn_rates(graph, l, l.y, f.poses)
+            return OK
+        before = worst
+    return NEWTON_FAILED
+
+
+@callback("pdp", "d")
+def correct(context, g, k):
+    """Correct k (8 b,) and the multipliers; the size of the change of positions and velocities in the error norm."""
+    c = load(context)
+    w, f, l, s, graph, numbers = c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
+    k, n = vector(k, l.x.size - 8), w.q.size
+    # k += n, the normal part
+    turn_accelerations(graph, l, f.poses, k, s.a)
+    _correct_normal_part(c, g, k)
+    # [e, dlam] of the saddle-point matrix
+    if not find_imbalance(c):
+        return math.inf
+    solve_saddle(s)
+    take_solution(graph, s)
+    # k += e in chart coordinates
+    for b in range(graph.bodies.shape[0]):
+        at, o = s.graph.body_at[b], 8 * b
+        put(s.r, o, lanes(s.x[at], s.x[at + 1], s.x[at + 2]))
+        put(k, o, add(four(k, o), four(s.r, o)))
+        if graph.bodies[b, 1] == 7:
+            put(s.r, o + 4, turned_back(l, b, s, at + 3))
+            put(k, o + 4, add(four(k, o + 4), four(s.r, o + 4)))
+    # Positions move by g^2 e, velocities change by g e
+    square = weighted_square(graph, l, s.r, w.q, c.linear.now[0], 0, numbers.rtol, numbers.atol)
+    return g * math.sqrt(square * g * g / (2 * n) + _rate_size(c, s.r) ** 2)
+
+
+@kernel
+def _correct_normal_part(c, g, k):
+    """k += n; s.r = n. A change n moves x and xd by g^2 n and g n, which u and z take off again."""
+    w, f, s = c.work, c.tangent, c.saddle
+    find_normal_part(c)
+    for i in range(k.size):
+        k[i] += s.r[i]
+    for e in range(f.b.size):
+        w.u[e] -= g * g * f.b[e]
+        s.z[e] -= g * f.b[e]
+
+
+@callback(NORM, "d")
+def distance(context, ex, ey, old, rtol, atol):
+    """As `error_norm`, of changes that are tangent to the constraints already."""
+    c = load(context)
+    w, l, graph, n = c.work, c.chart, c.graph, c.work.q.size
+    old = vector(old, 3 * n)
+    total = weighted_square(graph, l, vector(ex, l.x.size - 8), w.q, old, 0, rtol, atol)
+    total += weighted_square(graph, l, vector(ey, l.x.size - 8), w.qd, old, n, rtol, atol)
+    return math.sqrt(total / (2 * n))
+
+
+# Newton's method for all stages of a collocation method at once, in the tangent form.
+#
+# The equations of each stage are those of implicit_tangent.py. A correction e_i of the accelerations of stage i changes
+# the velocities of all stages j by h a_ji e_i, and their positions by h^2 (A^2)_ji e_i. With one K and C for all of
+# them the eigenvectors of A uncouple the stages (methods/collocation.py): for each eigenvalue there is one matrix
+#
+#     [ M - g C_b - g^2 K_b    H^T ]
+#     [ H                      0   ],        g = h times the eigenvalue, real for one of them, complex for the others
+#
+# Of each stage, u, z and lam are kept in `SaddleWorkspace.stages`. In the memory of a step the accelerations k_i of
+# stage i = 0, 1, ... are at (2 i + 5) n, as those of any Runge-Kutta method with an explicit first stage.
+
+KERNELS = "take_stage", "balance_stage", "factorise_stages", "solve_stages"
+
+
+@callback("pi")
+def take_stage(context, i):
+    """Go on with u, z and lam of stage i."""
+    c = load(context)
+    s, m = c.saddle, c.saddle.z.size
+    copy(s.stages[i, :m], c.work.u)
+    copy(s.stages[i, m : 2 * m], s.z)
+    copy(s.stages[i, 2 * m :], s.multipliers)
+    return OK
+
+
+@callback("pip")
+def balance_stage(context, i, k):
+    """After `residual` at stage i, its accelerations being k: the right-hand side of Newton's equations. Status."""
+    c = load(context)
+    f, l, s, graph, m = c.tangent, c.chart, c.saddle, c.graph, c.saddle.z.size
+    # a = (rdd, omega'd) of k, its normal part n = -Y0 N^-1 (H a + gamma)
+    turn_accelerations(graph, l, f.poses, vector(k, l.x.size - 8), s.a)
+    find_normal_part(c)
+    copy(f.b, s.normal[i])
+    # F - M (a + C n) - H^T lam
+    if not find_imbalance(c):
+        return SINGULAR
+    copy(s.x, s.right[i])
+    # What the correction of this stage needs once all stages are solved
+    copy(l.d, s.turns[i])
+    copy(c.work.u, s.stages[i, :m])
+    copy(s.z, s.stages[i, m : 2 * m])
+    copy(s.multipliers, s.stages[i, 2 * m :])
+    return OK
+
+
+@callback("pdpi")
+def factorise_stages(context, h, tableau, i):
+    """Factors of the matrix of pair i of eigenvalues at the present H, K and C, then of the real one. Status.
+
+    Called for i = 0, 1, ...: between the calls Ctrl-C is answered.
+    """
+    c, tableau = load(context), vector(tableau, ANY)
+    f, s, graph, shifts = c.tangent, c.saddle, c.graph, tableau[parts_of(tableau).shifts :]
+    # M, H and H^T are common to all eigenvalues
+    if i == 0:
+        c.work.counters.iteration_matrices += 1
+        write_saddle_rows(graph, f, s)
+        add_blocks(graph, s, s.upper, s.lower, 0.0, True)
+    # The real eigenvalue comes last, since its factors take the place of the common part
+    if i == s.complex_upper.shape[0]:
+        add_blocks(graph, s, s.upper, s.lower, h * shifts[0], False)
+        if f.b.size > 0 and not factorise_normal(graph, c.work, f, c.chart):
+            return SINGULAR
+        return OK if factorise_saddle(s) else SINGULAR
+    # A complex eigenvalue: the common part, then - g C_b - g^2 K_b
+    size = s.graph.pattern.shape[1]
+    lower, upper = complex_vector(data_of(s.complex_lower[i]), size), complex_vector(data_of(s.complex_upper[i]), size)
+    for e in range(size):
+        lower[e], upper[e] = s.lower[e], s.upper[e]
+    add_blocks(graph, s, upper, lower, complex(h * shifts[1 + 2 * i], h * shifts[2 + 2 * i]), False)
+    return OK if factorise_complex_saddle(s, i) else SINGULAR
+
+
+@callback("pdpp", "d")
+def solve_stages(context, h, tableau, memory):
+    """Correct k, u, z and lam of all stages; the size of the change in the error norm, of all stages.
+
+    s.e is then the change of the last stage's positions.
+    """
+    c, tableau, memory = load(context), vector(tableau, ANY), vector(memory, ANY)
+    p = parts_of(tableau)
+    s, n, m, stages = c.saddle, c.chart.x.size - 8, c.saddle.z.size, c.saddle.stages.shape[0]
+    # [e_i, dlam_i] of all stages
+    _solve(s, tableau, p)
+    for i in range(stages):
+        # k_i += e_i + n_i
+        k = memory[(2 * i + 5) * n :][:n]
+        _take_correction(c, i, k)
+        spread_normal(c, s.normal[i])
+        for j in range(n):
+            k[j] += s.r[j]
+        for j in range(stages):  # what the normal parts of accelerations have moved is taken off again
+            a, square = h * tableau[p.a + stages * i + j], h * h * tableau[p.square + stages * i + j]
+            for e in range(m):
+                s.stages[i, e] -= square * s.normal[j, e]
+                s.stages[i, m + e] -= a * s.normal[j, e]
+    return _size(c, h, tableau, p)
+
+
+@kernel
+def _combine(weights, rows, out):
+    """out = sum_i weights_i rows_i."""
+    for e in range(out.size):
+        out[e] = 0.0
+    for i in range(rows.shape[0]):
+        for e in range(out.size):
+            out[e] += weights[i] * rows[i, e]
+
+
+@kernel
+def _solve(s, tableau, p):
+    """s.right <- the solutions of Newton's equations for the right-hand sides s.right."""
+    stages = s.right.shape[0]
+    # Coefficients of the real eigenvector
+    _combine(tableau[p.there :], s.right, s.x)
+    solve_saddle(s)
+    copy(s.x, s.solved[0])
+    for pair in range(s.complex_upper.shape[0]):
+        # Those of one eigenvector of each conjugate pair
+        x, row = complex_vector(data_of(s.complex_x), s.x.size), 1 + 2 * pair
+        real, imaginary = s.solved[row], s.solved[row + 1]
+        _combine(tableau[p.there + stages * row :], s.right, real)
+        _combine(tableau[p.there + stages * (row + 1) :], s.right, imaginary)
+        for e in range(x.size):
+            x[e] = complex(real[e], imaginary[e])
+        solve_complex_saddle(s, pair)
+        for e in range(x.size):
+            real[e], imaginary[e] = x[e].real, x[e].imag
+    # Back to the stages
+    for i in range(stages):
+        _combine(tableau[p.back + stages * i :], s.solved, s.right[i])
+
+
+@kernel
+def _take_correction(c, i, k):
+    """Add the correction s.right[i] to k and lam of stage i; s.changes[i] is that of k."""
+    s, graph, l, m = c.saddle, c.graph, c.chart, c.saddle.z.size
+    copy(s.right[i], s.x)
+    copy(s.turns[i], l.d)
+    # lam_i += dlam_i
+    for e in range(m):
+        if s.graph.row_at[e] >= 0:
+            s.stages[i, 2 * m + e] += s.x[s.graph.row_at[e]]
+    # k_i += (rhodd, C^-1 times the rotation)
+    for b in range(graph.bodies.shape[0]):
+        at, o = s.graph.body_at[b], 8 * b
+        put(s.changes[i], o, lanes(s.x[at], s.x[at + 1], s.x[at + 2]))
+        put(k, o, add(four(k, o), four(s.changes[i], o)))
+        if graph.bodies[b, 1] == 7:
+            put(s.changes[i], o + 4, turned_back(l, b, s, at + 3))
+            put(k, o + 4, add(four(k, o + 4), four(s.changes[i], o + 4)))
+
+
+@kernel
+def _size(c, h, tableau, p):
+    """The error norm of what s.changes changes of positions and velocities, root mean square of the stages."""
+    w, s, graph, l, numbers, total = c.work, c.saddle, c.graph, c.chart, c.linear.numbers, 0.0
+    stages, now = s.stages.shape[0], c.linear.now
+    # Stage i moves by h^2 sum_j (A^2)_ij e_j, its velocities change by h sum_j a_ij e_j
+    for i in range(stages):
+        _combine(tableau[p.square + stages * i :], s.changes, s.e)
+        _combine(tableau[p.a + stages * i :], s.changes, s.r)
+        for e in range(s.e.size):
+            s.e[e] *= h * h
+            s.r[e] *= h
+        total += weighted_square(graph, l, s.e, w.q, now[0], 0, numbers.rtol, numbers.atol)
+        total += weighted_square(graph, l, s.r, w.qd, now[1], 0, numbers.rtol, numbers.atol)
+    return math.sqrt(total / (2 * w.q.size * stages))
+
+
+# The tangent form for implicit methods: accelerations of a stage, and rates of another configuration, in a chart.
+#
+# Newton's method for its stages is that of implicit_tangent.py; the matrices are those of saddle_point.py.
 
 __all__ = [  # parts of the form
     "COLUMNS",
@@ -30,7 +583,6 @@ __all__ = [  # parts of the form
     "solve",
     "start_chart",
 ]
-OK = int(Status.SUCCESS)
 
 
 @callback("p")

@@ -8,18 +8,25 @@ constraint_hessians.py), Eq. 4 gives (multipliers drop out because Phi_q D = 0)
     K* = (M qdd - Q_v - Q_A)_q + (Phi_q^T lam)_q - M Z + C* Y,  Z = U B G2
 
 One evaluation serves many steps and charts: K* and C* without Q_A,q and Q_A,qd are stored in body frames, the
-derivatives of the force laws in corotated frames (corotated_frames.py). At the current configuration, `reduce` and
+derivatives of the force laws in corotated frames (forces.py). At the current configuration, `reduce` and
 `factorise` form P = A - g C_hat + g^2 K_hat, the iteration matrix of a stage with g = h a_ii.
 """
 
 from ..jit.kernels import callback, kernel, stack, stack2, vector
-from ..maths.dense_linalg import lu, lu_solve, transposed_times
-from ..maths.euler_parameters import matrix_a, matrix_g
+from ..maths.dense_linalg import (
+    add_product,
+    add_transposed_product,
+    clear_matrix,
+    lu,
+    lu_solve,
+    multiply,
+    transposed_times,
+)
+from ..maths.vectors import matrix_a, matrix_g
 from ..model.equations import applied_forces, constraint_curvature, force_jacobian
-from ..workspaces.workspace import load
-from .dense_products import add_product, add_transposed_product, clear_matrix, multiply
-from .newton_iterations import NOT_FINITE, OK, SINGULAR
+from ..workspaces import load
 from .null_space import find_accelerations
+from .null_space_chart import NOT_FINITE, OK, SINGULAR
 from .tolerances import HUGE
 
 

@@ -13,9 +13,8 @@ import numpy as np
 from ..elements.markers import PARAMETERS, VECTOR
 from ..model.packed import classes
 from ..motions.prescribed import Motion
+from ..rows.graph_builder import build, graph_of, redundant_rows, with_loops
 from ..rows.interface import MOST_ROWS
-from ..sparse.constraint_graphs import graph_of, redundant_rows, with_loops
-from ..sparse.graph_builder import build
 from .tolerances import HOLDING, UNIT_ROUNDING
 
 

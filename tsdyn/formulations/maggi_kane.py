@@ -11,10 +11,9 @@ from ..jit.kernels import callback, vector
 from ..maths.dense_linalg import copy
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import set_time
-from ..workspaces.workspace import load
-from .newton_iterations import NOT_FINITE, OK
+from ..workspaces import load
 from .null_space import check_validity, frictional_acceleration, project, reduced_mass, velocities, weighted_square
-from .null_space_chart import new_chart, tangent_map
+from .null_space_chart import NOT_FINITE, OK, new_chart, tangent_map
 
 
 @callback(PLACE)

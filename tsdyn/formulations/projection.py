@@ -6,7 +6,7 @@ positions and velocities. It also serves the accelerations, unless positions hav
 
 import math
 
-from ..elements.loops.body_poses import OMEGA, POSE, RD, P, R, set_pose
+from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R, set_pose
 from ..errors import Status
 from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import add, four, put

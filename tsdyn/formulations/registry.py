@@ -3,20 +3,11 @@
 from dataclasses import dataclass, replace
 from types import ModuleType
 
+from ..rows.constraint_graph import BIAS, DRIFT, REDUCED
+from ..rows.graph_builder import graph_of, redundant_rows
 from ..rows.interface import redundancy
-from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED
-from ..sparse.constraint_graphs import graph_of, redundant_rows
 from ..validation import unknown_name
-from . import (
-    coupled_stages,
-    friction_basis,
-    friction_solve,
-    implicit_tangent,
-    linearisation,
-    maggi_kane,
-    null_space,
-    tangent,
-)
+from . import accelerations, implicit_tangent, linearisation, maggi_kane, null_space, tangent
 from .locked_orientations import moving_graph
 
 
@@ -45,7 +36,7 @@ class Formulation:
         else:  # redundant rows are judged by sparse rows at every level
             graph = graph_of(packed, REDUCED, *((BIAS, DRIFT) if len(redundant_rows(packed)) else ()))
         if graph.frictions.size and graph.friction_solver[0] == 0:
-            graph.friction_solver[0] = (friction_solve if self.basis_free else friction_basis).solve_friction.address
+            graph.friction_solver[0] = (accelerations if self.basis_free else null_space).solve_friction.address
         return graph
 
     def sizes(self, n, m, graph):
@@ -71,7 +62,7 @@ class Formulation:
         """The kernels that implicit methods need, by their names in `StageKernels`; coupled: all stages at once."""
         module = self.kernels if self.basis_free else linearisation
         if coupled:
-            own = {name: getattr(coupled_stages, name) for name in coupled_stages.KERNELS}
+            own = {name: getattr(implicit_tangent, name) for name in implicit_tangent.KERNELS}
             shared = ("linearise", "reduce", "soften", "recall", "residual", "distance")
             return own | {name: getattr(module, name) for name in shared} | {"error_norm": self.kernels.error_norm}
         names = ("linearise", "reduce", "factorise", "solve", "soften", "recall")

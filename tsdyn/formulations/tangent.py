@@ -1,24 +1,14 @@
-"""The tangent form: the tangent-space ODE without a basis of the tangent space, equivalent to Eq. 26, in O(N).
-
-    (rho, eta)      = x - Y0 u,         u from Phi = 0                           Eqs. 19-22, see chart_workspace.py
-    (rhod, etad)    = xd - Y0 z,        N z = H C xd + Phi_t                      Eq. 23
-    (rdd, omega'd)  = W (F - H^T lam),  (H W H^T) lam = H W F + gamma             Eqs. 3, 4
-    xdd             = (rhodd, etadd)
-
-H = [Phi_r, Phi_pi'] at q, Y0 = W0 H0^T at q0, N = H C Y0, F the applied and velocity forces. xdd keeps its component
-in the normal space, so x follows the curvature of the manifold; u and z are then of the size of the truncation error of
-a step, and Newton's method converges in one or two sweeps. The position solve removes the normal component again.
-Runge-Kutta steps are linear, so V^T x is the v of the null-space form.
-"""
+"""The tangent form: the tangent-space ODE without a basis of the tangent space, equivalent to Eq. 26, in O(N)."""
 
 import math
 
-from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
+from ..elements.loops.constraint_rows import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..errors import Status
 from ..jit.kernels import callback, kernel, long_kernel, vector
 from ..maths.dense_linalg import copy, is_finite
-from ..methods.explicit import ACCELERATE, PLACE
+from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import is_rheonomic, set_time
+from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..rows.interface import (
     DYNAMICS,
     apply_multipliers,
@@ -29,16 +19,14 @@ from ..rows.interface import (
     is_axis,
     multiply_rates,
     multiply_rows,
+    project,
     redundant_rows_hold,
     refinements,
     solve_product,
     solve_rows,
 )
-from ..sparse.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-from ..workspaces.workspace import (
-    load,
-)
-from .accelerations import refine_accelerations, solve_accelerations
+from ..workspaces import load
+from .accelerations import call_friction, refine_accelerations, solve_accelerations
 from .chart_coordinates import (
     displace,
     factorise_normal,
@@ -46,9 +34,7 @@ from .chart_coordinates import (
     write_back,
 )
 from .chart_validity import every_level_holds, reason_to_leave, set_base_point
-from .friction_loads import call_friction
 from .projection import largest_residual, velocity_floor
-from .tangent_error import error_norm
 from .tolerances import (
     CONTRACTION_LOST,
     CURVATURE,
@@ -59,6 +45,78 @@ from .tolerances import (
     STALLED,
     SWEEPS,
 )
+
+# Error norm of the tangent form: errors of chart coordinates without their normal part, in terms of q and qd.
+
+
+@kernel
+def _tangent_part(graph, f, l, e):
+    """f.Z = P0 e."""
+    copy(e, f.Z)
+    for i in range(e.size, f.Z.size):
+        f.Z[i] = 0.0
+    if f.b.size > 0:
+        project(graph, l.rows0, f.Z, f.b)
+
+
+@kernel
+def weighted_square(graph, l, Z, values, old, at, rtol, atol):
+    """(dq_i / (atol + rtol |value|))^2 summed, dq the change of coordinates (n,) that Z makes at q0.
+
+    Eight arguments: the graph, the chart, the change Z, values at both ends of the step, and tolerances.
+    """
+    total = 0.0
+    for b in range(graph.bodies.shape[0]):
+        i, o = graph.bodies[b, 0], 8 * b
+        # dr
+        for c in range(3):
+            x = Z[o + c] / (atol + rtol * max(abs(values[i + c]), abs(old[at + i + c])))
+            total += x * x
+        if graph.bodies[b, 1] == 7:
+            # dp = G(p0)^T eta / 2
+            i += 3
+            e0, e1, e2, e3 = l.base[o + 4], l.base[o + 5], l.base[o + 6], l.base[o + 7]
+            x, y, z = 0.5 * Z[o + 4], 0.5 * Z[o + 5], 0.5 * Z[o + 6]
+            for c in range(4):
+                if c == 0:
+                    part = -e1 * x - e2 * y - e3 * z
+                elif c == 1:
+                    part = e0 * x - e3 * y + e2 * z
+                elif c == 2:
+                    part = e3 * x + e0 * y - e1 * z
+                else:
+                    part = -e2 * x + e1 * y + e0 * z
+                part /= atol + rtol * max(abs(values[i + c]), abs(old[at + i + c]))
+                total += part * part
+    return total
+
+
+@callback(NORM, "d")
+def error_norm(context, ex, ey, old, rtol, atol):
+    """Root mean square of the errors P0 ex of q and P0 ey of qd, over atol + rtol times the larger end of the step."""
+    c = load(context)
+    w, f, l, graph = c.work, c.tangent, c.chart, c.graph
+    n, k = w.q.size, l.x.size - 8
+    old = vector(old, 3 * n)
+    # The normal component of the error is removed by the position solve
+    _tangent_part(graph, f, l, vector(ex, k))
+    total = weighted_square(graph, l, f.Z, w.q, old, 0, rtol, atol)
+    _tangent_part(graph, f, l, vector(ey, k))
+    total += weighted_square(graph, l, f.Z, w.qd, old, n, rtol, atol)
+    return math.sqrt(total / (2 * n))
+
+
+# The tangent form: the tangent-space ODE without a basis of the tangent space, equivalent to Eq. 26, in O(N).
+#
+#     (rho, eta)      = x - Y0 u,         u from Phi = 0                           Eqs. 19-22, see workspaces.py
+#     (rhod, etad)    = xd - Y0 z,        N z = H C xd + Phi_t                      Eq. 23
+#     (rdd, omega'd)  = W (F - H^T lam),  (H W H^T) lam = H W F + gamma             Eqs. 3, 4
+#     xdd             = (rhodd, etadd)
+#
+# H = [Phi_r, Phi_pi'] at q, Y0 = W0 H0^T at q0, N = H C Y0, F the applied and velocity forces. xdd keeps its component
+# in the normal space, so x follows the curvature of the manifold; u and z are then of the size of the truncation error
+# of a step, and Newton's method converges in one or two sweeps. The position solve removes the normal component again.
+# Runge-Kutta steps are linear, so V^T x is the v of the null-space form.
 
 __all__ = ["error_norm"]  # which is a part of the form, too
 OK, SINGULAR, MASS_SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR), int(Status.MASS_SINGULAR)

@@ -1,5 +1,7 @@
 """A scene of a description: bodies at their centroids in the axes of their links, joints, springs and couplings."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -7,6 +9,7 @@ from ..constraints.cylindrical import Cylindrical
 from ..constraints.dot1 import Dot1
 from ..constraints.dot2 import Dot2
 from ..constraints.fixed import Fixed
+from ..constraints.gear import Gear
 from ..constraints.parallel import Parallel
 from ..constraints.planar import Planar
 from ..constraints.revolute import Revolute
@@ -14,13 +17,152 @@ from ..constraints.screw import Screw
 from ..constraints.spherical import Spherical
 from ..constraints.translational import Translational
 from ..constraints.universal import Universal
+from ..elements.bodies import rotation_matrix
 from ..elements.joint import across
+from ..errors import InvalidConstraint
+from ..forces.bushing import Bushing
 from ..forces.spring import Spring
-from .couplings import couple
-from .description import GROUND
-from .joint_forces import add_joint_forces, unused
+from ..forces.torsional_spring import TorsionalSpring
+from ..forces.viscous_friction import ViscousFriction
+from .description import GROUND, fresh
 from .report import FrameOn
-from .tolerances import TRIANGLE
+from .tolerances import ORTHOGONAL, PARALLEL, TRIANGLE
+
+# Joints that mimic others: gear pairs, where the wheels are hinged to a common carrier on parallel axes.
+
+WHAT = "joint that mimics another one"
+
+
+def couple(scene, description, bodies, report):
+    """Add what can be a gear pair; list the rest."""
+    joints = {joint.name: joint for joint in description.joints if not joint.loop}
+    for coupling in description.couplings:
+        one, other = joints.get(coupling.driver), joints.get(coupling.follower)
+        reason = _reason(one, other, coupling)
+        if not reason:
+            parallel = float(np.sign(one.axis @ other.axis))
+            try:
+                gear = Gear.at(
+                    bodies[one.b], bodies[other.b], point_a=one.point, point_b=other.point, axis_a=one.axis,
+                    ratio=coupling.ratio * parallel, name=coupling.name,
+                )  # fmt: skip
+                gear.offset += coupling.offset * parallel
+                scene.add(gear)
+            except InvalidConstraint as error:
+                reason = str(error)
+        if reason:
+            report.leave(WHAT, coupling.name, f"(ratio {coupling.ratio:g}, offset {coupling.offset:g}: {reason})")
+
+
+def _reason(one, other, coupling):
+    """Why two joints can't be a gear pair; empty if they can."""
+    if one is None or other is None:
+        return "one of them is held"
+    if one.kind != "revolute" or other.kind != "revolute":
+        return "a gear pair needs two hinges"
+    if one.a != other.a:
+        return "a gear pair needs hinges on one body"
+    if np.linalg.norm(np.cross(one.axis, other.axis)) > PARALLEL:
+        return "a gear pair needs parallel axes"
+    if not coupling.ratio:
+        return "a gear pair needs a ratio"
+    return ""
+
+
+# Springs, dampers and constant loads of joints.
+#
+# A hinge has a TorsionalSpring; a slide a Bushing of equal stiffness in all directions, of which the joint leaves one;
+# a ball viscous friction in rotation.
+
+SUFFIX = " spring"  # of names
+
+
+def unused(scene, name):
+    """The name, or with a number behind it where the scene has it already."""
+    return fresh(name, scene._titles or ())
+
+
+def add_joint_forces(scene, joint, bodies, report):
+    """Add what acts along a joint; what has no counterpart is listed."""
+    if joint.slides:
+        _slides(scene, joint, bodies[joint.a], bodies[joint.b], report)
+    _add(scene, joint, bodies, report, SUFFIX)
+    for servo in joint.servos:
+        _add(scene, replace(joint, **servo._asdict()), bodies, report, "")
+
+
+def _add(scene, joint, bodies, report, suffix):
+    """Add spring, damper and constant load, named after the joint."""
+    a, b, name = bodies[joint.a], bodies[joint.b], unused(scene, joint.name + suffix)
+    if not (joint.stiffness or joint.damping or joint.load):
+        return
+    if min(joint.stiffness, joint.damping) < 0.0:
+        report.leave("negative stiffness or damping", joint.name, f"{joint.stiffness:g}, {joint.damping:g}")
+        return
+    if joint.kind in ("revolute", "planar"):
+        _hinge(scene, joint, a, b, name)
+    elif joint.kind == "prismatic":
+        _slide(scene, joint, a, b, name, report)
+    elif joint.kind in ("spherical", "free"):
+        if joint.stiffness:
+            report.leave(f"stiffness of a {joint.kind} joint", joint.name, f"{joint.stiffness:g}")
+        if joint.damping:
+            places = {} if joint.point is None else {"point_a": joint.point}
+            linear = {"damping": joint.damping} if joint.kind == "free" else {}
+            scene.add(ViscousFriction.at(b, a, torsional_damping=joint.damping, **linear, **places, name=name))
+    else:
+        report.leave(f"stiffness and damping of a {joint.kind} joint", joint.name)
+
+
+def _hinge(scene, joint, a, b, name):
+    scene.add(
+        TorsionalSpring.at(
+            a, b, axis=joint.axis, stiffness=joint.stiffness, damping=joint.damping, free_angle=joint.free,
+            actuator=joint.load, name=name,
+        )
+    )  # fmt: skip
+
+
+def _slide(scene, joint, a, b, name, report):
+    """A constant load is a shift of the spring; without stiffness it is listed."""
+    free = joint.free
+    if joint.load and joint.stiffness:
+        free += joint.load / joint.stiffness
+    elif joint.load:
+        report.leave("constant force along a joint", joint.name, f"{joint.load:g} N")
+    if not (joint.stiffness or joint.damping):
+        return
+    point_a = joint.point + free * joint.axis
+    scene.add(
+        Bushing.at(
+            a, b, point_a=point_a, point_b=joint.point, stiffness=joint.stiffness, damping=joint.damping,
+            name=name,
+        )
+    )  # fmt: skip
+
+
+def _slides(scene, joint, a, b, report):
+    """Springs of several slides along axes of body a; others are listed."""
+    stiffness, damping, shift = np.zeros(3), np.zeros(3), np.zeros(3)
+    A = rotation_matrix(np.asarray(a.orientation))
+    for slide in joint.slides:
+        if not (slide.stiffness or slide.damping or slide.load):
+            continue
+        along = np.abs(A.T @ slide.axis)
+        i = int(along.argmax())
+        if abs(along[i] - 1.0) > ORTHOGONAL or slide.load or min(slide.stiffness, slide.damping) < 0.0:
+            report.leave("spring or load of a slide in a plane", slide.name)
+            continue
+        stiffness[i], damping[i] = slide.stiffness, slide.damping
+        shift += slide.free * slide.axis
+    if stiffness.any() or damping.any():
+        scene.add(
+            Bushing.at(
+                a, b, point_a=joint.point + shift, point_b=joint.point, stiffness=stiffness, damping=damping,
+                name=unused(scene, f"{joint.name} springs"),
+            )
+        )  # fmt: skip
+
 
 ONE_AXIS = {"revolute": Revolute, "prismatic": Translational, "planar": Planar, "cylindrical": Cylindrical}
 

@@ -1,8 +1,4 @@
-"""MJCF: what MuJoCo's own compiler makes of it, at qpos0.
-
-So defaults, included files, units of angles, Euler sequences, inertia from geoms and all other options of the compiler
-mean what they mean in MuJoCo. A body with several joints becomes as many links, of which the last one has the mass.
-"""
+"""MJCF: what MuJoCo's own compiler makes of it, at qpos0; joints, loops, actuators and tendons."""
 
 import warnings
 from contextlib import contextmanager
@@ -10,12 +6,323 @@ from contextlib import contextmanager
 import numpy as np
 
 from ..errors import MissingDependency
-from . import mjcf_forces, mjcf_joints, mjcf_loops, mjcf_rest, mjcf_shapes
-from .description import GROUND, Description, Link
-from .frames import of_body, of_quaternion, posed
-from .mjcf_files import Sources
-from .mjcf_unread import leave_unread
-from .names import fresh
+from . import drawn_shapes
+from .description import (
+    GROUND,
+    Coupling,
+    Description,
+    JointItem,
+    Link,
+    Servo,
+    SpringItem,
+    fresh,
+    of_body,
+    of_quaternion,
+    posed,
+    shifted,
+)
+from .mjcf_files import Sources, leave_unread
+
+# Actuators and tendons of MJCF: servos with the control that MuJoCo starts with, and springs between two sites.
+#
+# force = gain u + b0 + b1 l + b2 ld,  l = gear q,  torque = gear force     u: 0, or the nearest control in its range
+
+PLAIN = ("mjGAIN_FIXED", "mjGAIN_AFFINE")
+BIAS = ("mjBIAS_NONE", "mjBIAS_AFFINE")
+
+
+def add_forces(mujoco, model, data, found, names, report):
+    """Add actuators of joints and springs of tendons; others are listed."""
+    joints = {joint.name: joint for joint in found.joints}
+    off, bits = model.opt.disableflags, mujoco.mjtDisableBit
+    for i in range(_actuators(model)):
+        if not off & bits.mjDSBL_ACTUATION:
+            _add_actuator(mujoco, model, i, joints, names, report)
+    for i in range(model.ntendon):
+        _add_tendon(mujoco, model, data, i, found, names, report)
+
+
+def _actuators(model):
+    return int(getattr(model, "nactuator", model.nu))
+
+
+def _add_actuator(mujoco, model, i, joints, names, report):
+    name = names.of("actuator", i)
+    on = _joint_of(mujoco, model, i, joints, names)
+    gain, bias = int(model.actuator_gaintype[i]), int(model.actuator_biastype[i])
+    known = gain in _codes(mujoco.mjtGain, PLAIN) and bias in _codes(mujoco.mjtBias, BIAS)
+    if on is None or not known or int(model.actuator_dyntype[i]) == int(mujoco.mjtDyn.mjDYN_MUSCLE):
+        report.leave("actuator", name)
+        return
+    u, gear = _control(mujoco, model, i), float(model.actuator_gear[i, 0])
+    joint, q0 = on
+    b = np.array(model.actuator_biasprm[i, :3]) * (bias != int(mujoco.mjtBias.mjBIAS_NONE))
+    g = np.array(model.actuator_gainprm[i, :3]) * (1.0, *(2 * [gain != int(mujoco.mjtGain.mjGAIN_FIXED)]))
+    constant, stiffness, damping = (
+        gear * (b[0] + g[0] * u),
+        -gear * gear * (b[1] + g[1] * u),
+        -gear * gear * (b[2] + g[2] * u),
+    )
+    if model.actuator_forcelimited[i]:
+        low, high = model.actuator_forcerange[i]
+        report.leave("limit of force", name, f"[{low:g}, {high:g}]")
+    if not (constant or stiffness or damping):
+        report.leave(
+            "motor", name, f"(of {joint.name}, gear {gear:g}: no torque without control; see ts.forces.JointTorque)"
+        )
+        return
+    load = constant - stiffness * q0  # stiffness counts from q = 0, not from the start
+    free = 0.0
+    if stiffness > 0.0:
+        free, load = load / stiffness, 0.0
+    joint.servos.append(
+        Servo(
+            f"{name} actuator" if name in joints else name, float(stiffness), float(damping), float(free), float(load)
+        )
+    )
+    report.note(f"actuator {name}: with the control {u:g}, as a spring and damper of {joint.name}")
+
+
+def _codes(kinds, names):
+    return [int(getattr(kinds, name)) for name in names]
+
+
+def _joint_of(mujoco, model, i, joints, names):
+    """The hinge or slide of an actuator, and its coordinate at the start; None if it acts on something else."""
+    if int(model.actuator_trntype[i]) not in _codes(mujoco.mjtTrn, ("mjTRN_JOINT", "mjTRN_JOINTINPARENT")):
+        return None
+    j = int(model.actuator_trnid[i, 0])
+    joint = joints[names.of("joint", j)]
+    return (joint, float(model.qpos0[model.jnt_qposadr[j]])) if joint.kind in ("revolute", "prismatic") else None
+
+
+def _control(mujoco, model, i):
+    """The control nearest to zero."""
+    at = int(getattr(model, "actuator_ctrladr", np.arange(model.nu))[i])
+    free = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
+    if free or at < 0 or not model.actuator_ctrllimited[i]:
+        return 0.0
+    low, high = model.actuator_ctrlrange[i]
+    return float(min(max(0.0, low), high))
+
+
+def _add_tendon(mujoco, model, data, i, found, names, report):
+    """A spring, where a tendon has two sites and one free length."""
+    name, first, count = names.of("tendon", i), int(model.tendon_adr[i]), int(model.tendon_num[i])
+    stiffness, damping = float(model.tendon_stiffness[i]), float(model.tendon_damping[i])
+    low, high = model.tendon_lengthspring[i]
+    sites = all(int(kind) == int(mujoco.mjtWrap.mjWRAP_SITE) for kind in model.wrap_type[first : first + count])
+    straight = sites and count == 2 and low == high
+    if straight and (stiffness or damping):
+        ends = [int(s) for s in model.wrap_objid[first : first + 2]]
+        bodies = [names.body(int(model.site_bodyid[s])) for s in ends]
+        if bodies[0] != bodies[1]:
+            points = [_place(model, data, s) for s in ends]
+            found.springs.append(SpringItem(name, *bodies, *points, stiffness, damping, float(low)))
+    elif stiffness or damping:
+        report.leave("spring of a tendon", name)
+    if model.tendon_limited[i]:
+        report.leave("limits of a tendon", name)
+    if model.tendon_frictionloss[i]:
+        report.leave("friction of a tendon", name)
+    if getattr(model, "tendon_armature", np.zeros(i + 1))[i]:
+        report.leave("armature of a tendon", name)
+    if not (stiffness or damping):
+        report.leave("tendon", name)
+
+
+def _place(model, data, site):
+    """A site in the ground frame."""
+    return of_body(data, int(model.site_bodyid[site])).point(model.site_pos[site])
+
+
+# Joints of MJCF: of a body with several, all but the last one carry a link without mass.
+
+KINDS = {"mjJNT_FREE": "free", "mjJNT_BALL": "spherical", "mjJNT_SLIDE": "prismatic", "mjJNT_HINGE": "revolute"}
+
+
+def add_joints(mujoco, model, data, found, names, report):
+    """Add the joints of all bodies; a body without one is fixed to its parent."""
+    kinds = {int(getattr(mujoco.mjtJoint, name)): kind for name, kind in KINDS.items()}
+    for i in range(1, model.nbody):
+        name, last = names.body(i), names.body(int(model.body_parentid[i]))
+        count, first = int(model.body_jntnum[i]), int(model.body_jntadr[i])
+        if model.body_mocapid[i] >= 0:
+            report.leave("body that is moved by hand (mocap), held", name)
+        if not count:
+            found.joints.append(JointItem(f"{name} weld", "fixed", last, name))
+        for j in range(first, first + count):
+            follower = name if j == first + count - 1 else fresh(f"{name}/{names.of('joint', j)}", found.links)
+            if follower != name:
+                found.links[follower] = Link(follower, found.links[name].frame)
+            joint = JointItem(
+                names.of("joint", j), kinds[int(model.jnt_type[j])], last, follower, data.xanchor[j].copy(),
+                data.xaxis[j].copy(),
+            )  # fmt: skip
+            _spring_and_damper(mujoco, model, j, joint, report)
+            _leave_limits(model, j, joint, report)
+            found.joints.append(joint)
+            last = follower
+    order = {joint.b: k for k, joint in enumerate(found.joints)}  # links of a body in the order of its joints
+    found.links = dict(sorted(found.links.items(), key=lambda item: order[item[0]]))
+
+
+def _spring_and_damper(mujoco, model, j, joint, report):
+    off, bits = model.opt.disableflags, mujoco.mjtDisableBit
+    dof, at = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
+    if not off & bits.mjDSBL_SPRING:
+        joint.stiffness = float(model.jnt_stiffness[j])
+        if joint.kind in ("revolute", "prismatic"):
+            joint.free = float(model.qpos_spring[at] - model.qpos0[at])
+    if not off & bits.mjDSBL_DAMPER:
+        joint.damping = float(model.dof_damping[dof])
+    for name, index in (("jnt_stiffnesspoly", j), ("dof_dampingpoly", dof)):
+        if np.any(getattr(model, name, np.zeros((index + 1, 1)))[index]):
+            report.leave("nonlinear stiffness or damping", joint.name)
+
+
+def _leave_limits(model, j, joint, report):
+    """List limits, friction and armature."""
+    dof = int(model.jnt_dofadr[j])
+    if model.jnt_limited[j]:
+        low, high = model.jnt_range[j]
+        report.leave("limits of a joint", joint.name, f"[{low:g}, {high:g}]")
+    if friction := float(model.dof_frictionloss[dof]):
+        report.leave("friction of a joint", joint.name, f"{friction:g}")
+    if armature := float(model.dof_armature[dof]):
+        report.leave("armature of a joint", joint.name, f"{armature:g}")
+
+
+# Equality constraints of MJCF: connect, weld and joint, held exactly.
+#
+# connect    x_1 + A_1 s_1 = x_2 + A_2 s_2
+# weld       x_1 + A_1 s_1 = x_2 + A_2 s_2,  A_1 R = A_2
+# joint      q_1 - q_1(0) = a1 (q_2 - q_2(0))
+
+
+def add_loops(mujoco, model, data, found, names, report):
+    """Add the constraints that are active."""
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_EQUALITY:
+        return
+    for i in range(model.neq):
+        name, kind = names.of("equality", i), int(model.eq_type[i])
+        if not model.eq_active0[i]:
+            report.leave("equality that is not active", name)
+        elif kind in (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)):
+            _add_loop(mujoco, model, data, i, found, names, report)
+        elif kind == int(mujoco.mjtEq.mjEQ_JOINT):
+            _add_coupling(model, i, found, names, report)
+        else:
+            report.leave("equality of tendons or flexible bodies", name)
+
+
+def _add_loop(mujoco, model, data, i, found, names, report):
+    name, kind = names.of("equality", i), int(model.eq_type[i])
+    pair = [int(model.eq_obj1id[i]), max(int(model.eq_obj2id[i]), 0)]
+    if int(model.eq_objtype[i]) == int(mujoco.mjtObj.mjOBJ_SITE):
+        bodies = [int(model.site_bodyid[s]) for s in pair]
+        frames = [
+            of_body(data, body) @ posed(model.site_pos[s], model.site_quat[s])
+            for body, s in zip(bodies, pair, strict=True)
+        ]
+    else:
+        bodies, numbers = pair, model.eq_data[i]
+        one, other = (of_body(data, body) for body in bodies)
+        if kind == int(mujoco.mjtEq.mjEQ_WELD):
+            frames = [one @ posed(numbers[3:6], numbers[6:10]), other @ shifted(numbers[0:3])]
+        else:
+            frames = [frame @ shifted(numbers[k : k + 3]) for k, frame in ((0, one), (3, other))]
+    weld = kind == int(mujoco.mjtEq.mjEQ_WELD)
+    if weld and not model.eq_data[i, 10]:
+        weld = False
+        report.note(f"{name}: a weld without torque holds a point")
+    links = [names.body(body) for body in bodies]
+    found.joints.append(
+        JointItem(
+            name, "fixed" if weld else "spherical", *links, loop=True, frame_a=frames[0], frame_b=frames[1]
+        )
+    )  # fmt: skip
+    report.note("equality constraints are held exactly: their solref and solimp are those of a soft one")
+
+
+def _add_coupling(model, i, found, names, report):
+    """Proportional joints; one that is held becomes fixed."""
+    name, follower = names.of("equality", i), names.of("joint", int(model.eq_obj1id[i]))
+    a = np.array(model.eq_data[i, :5])
+    if int(model.eq_obj2id[i]) < 0 and not a[0]:
+        for joint in found.joints:
+            if joint.name == follower:
+                joint.kind = "fixed"
+        report.note(f"{name}: the joint {follower} is held")
+    elif int(model.eq_obj2id[i]) < 0 or a[0] or a[2:].any():
+        report.leave("polynomial of joints", name, f"({follower})")
+    else:
+        driver = names.of("joint", int(model.eq_obj2id[i]))
+        found.couplings.append(Coupling(name, driver, follower, float(a[1])))
+
+
+# What a model of MuJoCo has and a scene lacks, listed.
+
+OBJECTS = {  # of the model before it is compiled: what they are, and the names of those without one
+    "keys": ("keyframe", "key"),
+    "tuples": ("tuple of the user's", "tuple"),
+    "numerics": ("number of the user's", "numeric"),
+    "texts": ("text of the user's", "text"),
+    "sensors": ("sensor", "sensor"),
+    "cameras": ("camera", "camera"),
+    "lights": ("light", "light"),
+    "pairs": ("contact pair", "pair"),
+    "excludes": ("pair of bodies without contact", "exclude"),
+    "skins": ("skin", "skin"),
+    "textures": ("texture", "texture"),
+}
+ROOMS = ("memory", "nstack", "njmax", "nconmax", "nuser_body", "nuser_jnt", "nuser_geom", "nuser_site", "nuser_cam",
+         "nuser_tendon", "nuser_actuator", "nuser_sensor")  # fmt: skip
+LEFT = {"nflex": ("flexible body", "flex"), "nplugin": ("plugin", "plugin")}
+
+
+def strip(mujoco, spec, report):
+    """List objects without counterpart; leave no pictures, and no room for data of the user's, to be compiled."""
+    for name, (what, kind) in OBJECTS.items():
+        for i, one in enumerate(getattr(spec, name)):
+            report.leave(what, one.name or f"{kind}{i}")
+    for texture in spec.textures:
+        texture.file, texture.content_type, texture.cubefiles = "", "", 6 * [""]
+        texture.builtin, texture.gridsize = int(mujoco.mjtBuiltin.mjBUILTIN_FLAT), [1, 1]
+        texture.width = texture.height = 1
+    for camera in spec.cameras:
+        camera.resolution = [1, 1]
+    for skin in list(spec.skins):
+        spec.delete(skin)
+    for name in ROOMS:
+        setattr(spec, name, -1)
+    spec.nkey = spec.nuserdata = 0
+    for name in ("bodies", "joints", "geoms", "sites", "cameras", "tendons", "actuators", "sensors"):
+        for one in getattr(spec, name):
+            if len(one.userdata):
+                one.userdata = []
+
+
+def leave_rest(model, names, report):
+    """List objects, and options of the physics, that have no counterpart."""
+    for count, (what, kind) in LEFT.items():
+        for i in range(int(getattr(model, count, 0))):
+            report.leave(what, names.of(kind, i))
+    for i in np.flatnonzero(model.body_gravcomp):
+        report.leave("compensation of gravity", names.body(int(i)), f"{model.body_gravcomp[i]:g}")
+    for name in ("density", "viscosity"):
+        if value := float(getattr(model.opt, name)):
+            report.leave("drag of a fluid", name, f"{value:g}")
+    for name in ("actuator_damping", "actuator_armature"):
+        for i in np.flatnonzero(np.asarray(getattr(model, name, ()))):
+            report.leave(name.replace("actuator_", "") + " of an actuator", names.of("actuator", int(i)))
+
+
+# MJCF: what MuJoCo's own compiler makes of it, at qpos0.
+#
+# So defaults, included files, units of angles, Euler sequences, inertia from geoms and all other options of the
+# compiler mean what they mean in MuJoCo. A body with several joints becomes as many links, of which the last one has
+# the mass.
 
 
 def describe(root, path, report, outside):
@@ -34,14 +341,14 @@ def describe(root, path, report, outside):
     found = Description(root.get("model") or "mujoco", gravity=_gravity(mujoco, model))
     for i in range(1, model.nbody):
         found.links[names.body(i)] = _link(model, data, i, names)
-    mjcf_joints.add_joints(mujoco, model, data, found, names, report)
+    add_joints(mujoco, model, data, found, names, report)
     for i in range(model.nsite):
         at = posed(model.site_pos[i], model.site_quat[i])
         found.frames[names.of("site", i)] = names.body(int(model.site_bodyid[i])), at
-    mjcf_forces.add_forces(mujoco, model, data, found, names, report)
-    mjcf_loops.add_loops(mujoco, model, data, found, names, report)
-    mjcf_shapes.add_shapes(mujoco, model, found, names, report)
-    mjcf_rest.leave_rest(model, names, report)
+    add_forces(mujoco, model, data, found, names, report)
+    add_loops(mujoco, model, data, found, names, report)
+    drawn_shapes.add_geoms(mujoco, model, found, names, report)
+    leave_rest(model, names, report)
     leave_unread(sources, report)
     return found
 
@@ -98,8 +405,8 @@ def _compiled(mujoco, root, sources, report):
     """The model of a file, without what a scene has no counterpart for; missing meshes don't matter."""
     try:
         spec = mujoco.MjSpec.from_file(str(sources.path))
-        mjcf_rest.strip(mujoco, spec, report)
-        mjcf_shapes.drop_missing_meshes(mujoco, spec, sources, root, report)
+        strip(mujoco, spec, report)
+        drawn_shapes.drop_missing_meshes(mujoco, spec, sources, root, report)
         spec.compiler.fusestatic = spec.compiler.discardvisual = False
         return spec.compile()
     except (ValueError, TypeError, OSError, mujoco.FatalError, mujoco.UnexpectedError) as error:

@@ -11,10 +11,8 @@ from ..errors import InvalidArgument, TsdynError
 from ..observables.diagnostics import constraint_error
 from . import mjcf, sdf, urdf
 from .building import build
-from .massless import complete
-from .merging import merge
+from .reduction import complete, gather, merge
 from .report import ImportReport
-from .slides import gather
 from .tolerances import HUGE, NO_MASS, OPEN
 from .xml_file import OutsideFiles, read
 

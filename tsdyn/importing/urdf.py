@@ -6,9 +6,8 @@ https://wiki.ros.org/urdf/XML.
 
 import numpy as np
 
-from .description import GROUND, Coupling, Description, JointItem, Link
-from .frames import HERE, shifted, turned
-from .urdf_shapes import add_shapes, colours, placed
+from .description import GROUND, HERE, Coupling, Description, JointItem, Link, shifted, turned
+from .drawn_shapes import add_visuals, colours, placed
 
 KINDS = {
     "revolute": "revolute",
@@ -63,7 +62,7 @@ def _add_link(found, nodes, node, outside, report, materials):
     inertial = node.one("inertial")
     if inertial is not None:
         link.mass, link.centroid, link.inertia = mass_of(inertial, name)
-    add_shapes(link, node, outside, report, materials)
+    add_visuals(link, node, outside, report, materials)
 
 
 def mass_of(node, name):

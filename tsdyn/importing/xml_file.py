@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import regular_files
+from .. import validation
 from ..errors import InvalidFile, MissingDependency
-from ..files.mistakes import Mistakes
+from ..files.reading import Mistakes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,7 +50,7 @@ def read(path: Any) -> tuple[Node, Mistakes]:
     mistakes = Mistakes(str(path), Lines)
     options = {"resolve_entities": False, "no_network": True, "load_dtd": False, "huge_tree": False}
     elements = etree.iterparse(
-        BytesIO(regular_files.read(path, LARGEST)), ("start",), remove_comments=True, remove_pis=True, **options
+        BytesIO(validation.read(path, LARGEST)), ("start",), remove_comments=True, remove_pis=True, **options
     )
     try:
         count = 0

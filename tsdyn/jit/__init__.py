@@ -6,5 +6,5 @@ Begin with kernels.py: `kernel` (a function that other kernels call), `entry` (c
 by address). They are compiled by backend.py, the only file that uses what isn't public of Numba, or by stock.py, which
 uses Numba as it comes; compilers.py chooses. cache.py stores kernels under a hash of all code that they depend on
 (code_hash.py); resident.py lays out workspaces that kernels find by one address, records of named numbers included;
-waiting.py counts kernels on stderr.
+interrupts.py counts kernels on stderr.
 """

@@ -1,4 +1,4 @@
-"""Arrays of kernels: on the stack, and over memory that somebody else owns."""
+"""Arrays of kernels: on the stack, aligned to cache lines, over memory that somebody else owns, spread as arguments."""
 
 import platform
 
@@ -8,6 +8,20 @@ from numba import RequireLiteralValue, types
 from numba.extending import intrinsic
 
 from .compiled import DEBUG
+
+# Arrays aligned to cache lines, so that no vector of four floats straddles two lines.
+
+LINE = 64  # bytes
+
+
+def zeros(count):
+    """So many floats, zero."""
+    room = np.zeros(count + LINE // 8)
+    first = -room.ctypes.data % LINE // 8
+    return room[first : first + count]
+
+
+# Arrays of kernels: on the stack, and over memory that somebody else owns.
 
 ANY = 1 << 40  # the length of arrays whose length a kernel doesn't need
 _i64, _f64 = ir.IntType(64), ir.DoubleType()
@@ -171,3 +185,29 @@ if DEBUG:
     def data_of(array):
         """The array itself."""
         return array
+
+
+# Numbers of an array as arguments of a call: function(t, *spread(numbers, COUNT)) in a kernel.
+
+
+@intrinsic(prefer_literal=True)
+def spread(typing, numbers, count):
+    """The first `count` numbers, a constant, as a tuple."""
+    length, number = count.literal_value, numbers.dtype
+
+    def generate(context, builder, signature, arguments):
+        data = context.make_array(numbers)(context, builder, value=arguments[0]).data
+        kind = context.get_value_type(number)
+        places = [builder.gep(data, [ir.IntType(64)(i)], source_etype=kind) for i in range(length)]
+        if not length:
+            return context.get_dummy_value()
+        return joined(builder, [builder.load(place, typ=kind) for place in places])
+
+    return types.UniTuple(number, length)(numbers, count), generate
+
+
+if DEBUG:
+
+    def spread(numbers, count):
+        """The first `count` numbers, a constant."""
+        return tuple(numbers[:count])

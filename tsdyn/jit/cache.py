@@ -25,7 +25,7 @@ from pathlib import Path
 import llvmlite.binding as llvm
 import numba
 
-from .. import regular_files
+from .. import validation
 from ..errors import CompilerWarning
 from .code_hash import deep_hash, platform_hash
 
@@ -169,7 +169,7 @@ def load(name, rebuild):
         if not os.path.lexists(file):
             continue
         try:
-            found = rebuild(_opened(name, regular_files.read(file, flags=regular_files.NO_LINKS)))
+            found = rebuild(_opened(name, validation.read(file, flags=validation.NO_LINKS)))
         except Exception as error:  # whatever a damaged file makes of the loader
             if os.path.lexists(file):  # another process may just have deleted it
                 report(file, error)
@@ -220,7 +220,7 @@ def contents():
     path, damaged, failures, sizes = folder(), [], [], []
     for file in sorted(path.glob("*.kernel")) if path else ():
         try:
-            content = regular_files.read(file, flags=regular_files.NO_LINKS)
+            content = validation.read(file, flags=validation.NO_LINKS)
             _opened(file.name, content)
             sizes.append(len(content))
         except (OSError, ValueError) as error:

@@ -15,8 +15,23 @@ from numba.extending import typeof_impl
 
 from . import stock
 from .cache import statistics
+from .code_hash import deep_hash
 from .compilers import attempt, callback_frames, current
 from .interrupts import prompt_interrupts
+
+# Users' functions, compiled once a process: equal source and constants share one compiled function.
+#
+# Compiled code is never freed, so compiled functions are kept and reused.
+
+_made = {}
+
+
+def compiled_once(kind, function, make):
+    """What `make()` makes of a user's function, for use as `kind`; the same one for the same code and constants."""
+    key = kind, deep_hash(function)
+    found = _made.get(key)
+    return _made.setdefault(key, make()) if found is None else found
+
 
 OPTIONS = {"error_model": "numpy"}  # of every kernel
 DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")

@@ -1,10 +1,12 @@
-"""Dense factorisations for small matrices, without LAPACK and without allocation."""
+"""Dense products and factorisations for small matrices, without LAPACK and without allocation."""
 
 import math
 
 from ..jit.kernels import kernel
 from ..jit.simd import first, fma, four, fourth, larger, second, splat, third, total
 from .tolerances import CONVERGED, ORTHOGONAL
+
+# Dense factorisations for small matrices, without LAPACK and without allocation.
 
 
 @kernel
@@ -263,3 +265,43 @@ def largest(values):
     for i in range(fours, values.size):
         worst, rest = max(worst, abs(values[i])), rest + 0.0 * values[i]
     return worst if rest == 0.0 else math.inf
+
+
+# Products of dense matrices, over the nonzero entries of the first factor.
+
+
+@kernel
+def clear_matrix(out):
+    """out = 0."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = 0.0
+
+
+@kernel
+def add_product(scale, A, B, out):
+    """out += scale A B."""
+    for i in range(A.shape[0]):
+        for c in range(A.shape[1]):
+            f = scale * A[i, c]
+            if f != 0.0:
+                for j in range(B.shape[1]):
+                    out[i, j] += f * B[c, j]
+
+
+@kernel
+def add_transposed_product(scale, A, B, out):
+    """out += scale A^T B."""
+    for c in range(A.shape[0]):
+        for i in range(A.shape[1]):
+            f = scale * A[c, i]
+            if f != 0.0:
+                for j in range(B.shape[1]):
+                    out[i, j] += f * B[c, j]
+
+
+@kernel
+def multiply(A, B, out):
+    """out = A B."""
+    clear_matrix(out)
+    add_product(1.0, A, B, out)

@@ -1,28 +1,29 @@
-"""Recurrences of Taylor coefficients: the building blocks of `series` kernels of constraints and forces.
-
-A series is a row of coefficients, a[k] that of t^k. Each function returns coefficient k of its result from the rows of
-its arguments up to k and the row of the result up to k - 1. Fill rows of the scratch array in order:
-
-    s[2, k] = product(s[0], s[1], k)
-    s[3, k] = root(s[2], s[3], k)
-
-    product          c = a b                 c_k = sum_j a_j b_{k-j}
-    square           c = a a                 the same in half the operations
-    dot, cross       of three rows each; scaled: of three rows and one
-    rotation         A(p) by columns, nine rows; rotated, rotated_back: A v and A^T v
-    quotient         q = a / b               b_0 q_k = a_k - sum_{j>0} b_j q_{k-j}                         (1)
-    root             r = sqrt(a)             2 r_0 r_k = a_k - sum_{0<j<k} r_j r_{k-j}                     (2)
-    power            u = a^n                 k a_0 u_k = sum_{j>0} (n j - (k - j)) a_j u_{k-j}             (3)
-    exponential      e = exp(a)              k e_k = sum_j j a_j e_{k-j}                                   (4)
-    sine_cosine      s, c of a               k s_k = sum_j j a_j c_{k-j},  k c_k = -sum_j j a_j s_{k-j}    (5)
-    angle            theta of (x, y)         theta' (x^2 + y^2) = x y' - y x'                              (6)
-
-(1)-(6) are the product rule applied to q b = a, r r = a, a u' = n a' u, e' = a' e, s' = a' c, c' = -a' s and (6).
-"""
+"""Recurrences of Taylor coefficients, of which `series` kernels are made; the polar angle as an analytic function."""
 
 import numpy as np
 
 from ..jit.kernels import kernel
+
+# Recurrences of Taylor coefficients: the building blocks of `series` kernels of constraints and forces.
+#
+# A series is a row of coefficients, a[k] that of t^k. Each function returns coefficient k of its result from the rows
+# of its arguments up to k and the row of the result up to k - 1. Fill rows of the scratch array in order:
+#
+#     s[2, k] = product(s[0], s[1], k)
+#     s[3, k] = root(s[2], s[3], k)
+#
+#     product          c = a b                 c_k = sum_j a_j b_{k-j}
+#     square           c = a a                 the same in half the operations
+#     dot, cross       of three rows each; scaled: of three rows and one
+#     rotation         A(p) by columns, nine rows; rotated, rotated_back: A v and A^T v
+#     quotient         q = a / b               b_0 q_k = a_k - sum_{j>0} b_j q_{k-j}                         (1)
+#     root             r = sqrt(a)             2 r_0 r_k = a_k - sum_{0<j<k} r_j r_{k-j}                     (2)
+#     power            u = a^n                 k a_0 u_k = sum_{j>0} (n j - (k - j)) a_j u_{k-j}             (3)
+#     exponential      e = exp(a)              k e_k = sum_j j a_j e_{k-j}                                   (4)
+#     sine_cosine      s, c of a               k s_k = sum_j j a_j c_{k-j},  k c_k = -sum_j j a_j s_{k-j}    (5)
+#     angle            theta of (x, y)         theta' (x^2 + y^2) = x y' - y x'                              (6)
+#
+# (1)-(6) are the product rule applied to q b = a, r r = a, a u' = n a' u, e' = a' e, s' = a' c, c' = -a' s and (6).
 
 
 @kernel
@@ -208,3 +209,47 @@ def angle(y, x, square, theta, k):
     for j in range(1, k):
         total -= j * theta[j] * square[k - j]
     return total / (k * square[0])
+
+
+# The polar angle of (x, y) as an analytic function: also for complex numbers, truncated Taylor series and arrays.
+
+TURN_ROUND = 2.0 * np.pi
+
+
+@kernel
+def polar_angle(y, x):
+    """The angle atan2(y, x) in (-pi, pi], exact to first order in an imaginary part and to second order of a series.
+
+    The point is rotated back by its real angle; the remainder atan(s / c) with s = 0 is s / c to second order.
+    """
+    real = np.arctan2(y.real, x.real)
+    cosine, sine = np.cos(real), np.sin(real)
+    return real + (y * cosine - x * sine) / (x * cosine + y * sine)
+
+
+@kernel
+def angle_near(y, x, near):
+    """The angle of (x, y) on the turn that lies nearest to a real angle."""
+    principal = polar_angle(y, x)
+    return principal + TURN_ROUND * np.floor((near - principal.real) / TURN_ROUND + 0.5)
+
+
+@kernel
+def angle_about(x, near):
+    """The angle from f = x[3:6] to g = x[6:9] about u = x[:3], perpendicular to f, on the turn nearest to `near`."""
+    w0, w1, w2 = x[1] * x[5] - x[2] * x[4], x[2] * x[3] - x[0] * x[5], x[0] * x[4] - x[1] * x[3]  # u x f
+    y = x[6] * w0 + x[7] * w1 + x[8] * w2
+    return angle_near(y, x[6] * x[3] + x[7] * x[4] + x[8] * x[5], near)
+
+
+@kernel
+def angle_series(near, k, s):
+    """Coefficient k of `angle_about`, in row 18 of s; u, f, g are in rows 0 to 8; 9 to 11 and 15 to 17 are its own."""
+    s[9, k], s[10, k], s[11, k] = cross(s, 0, 3, k)
+    s[15, k] = dot(s, 6, 9, k)
+    s[16, k] = dot(s, 6, 3, k)
+    s[17, k] = square(s[15], k) + square(s[16], k)
+    if k == 0:
+        s[18, 0] = angle_near(s[15, 0], s[16, 0], near)
+    else:
+        s[18, k] = angle(s[15], s[16], s[17], s[18], k)

@@ -2,7 +2,7 @@
 
     vd_i = vd + h sum_j a_ij k_j,    v_i = v + h sum_j a_ij vd_j,    k_i = f(t + c_i h, v_i, vd_i)
 
-The iteration is that of formulations/coupled_stages.py. Its matrices are kept over iterations, steps and charts. They
+The iteration is that of formulations/implicit_tangent.py. Its matrices are kept over iterations, steps and charts. They
 are formed again where the step has changed by more than SAME_STEP, or contraction is poor: from the same stiffness and
 damping; in the next step, or at once where iterations diverge, from those of the present configuration; then from new
 derivatives of the forces' laws.
@@ -19,8 +19,7 @@ import math
 from ..errors import Status
 from ..jit.kernels import callback, caller, kernel
 from ..maths.dense_linalg import copy
-from ..workspaces.run_state import load_run
-from ..workspaces.workspace import load
+from ..workspaces import load, load_run
 from .collocation import parts_of
 from .diagonally_implicit import call_linearise, call_reduce, call_residual
 from .explicit import STEP, call_norm, combine

@@ -1,18 +1,19 @@
-"""The step kernels of explicit tableau methods, and how step kernels and error estimates are called.
-
-A formulation supplies two kernels, called by address:
-
-    place(context, t, x)                set positions: evaluate all that depends on t and x alone
-    accelerate(context, t, y, yd, xd)   set velocities; return yd and, for a first-order system, xd
-
-A step kernel, step(context, run, t, h), makes a step h from t. It reads x, y and their derivatives xd, yd at the start
-of the step from the `Run`, and writes the increments dx, dy there, which the driver adds by compensated summation. The
-memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then (x', y') of each stage.
-"""
+"""The step kernels of explicit tableau methods and of plug-ins, and how step kernels and error estimates are called."""
 
 from ..jit.kernels import ANY, callback, caller, kernel, vector
 from ..maths.dense_linalg import copy
-from ..workspaces.run_state import load_run
+from ..workspaces import load_run
+
+# The step kernels of explicit tableau methods, and how step kernels and error estimates are called.
+#
+# A formulation supplies two kernels, called by address:
+#
+#     place(context, t, x)                set positions: evaluate all that depends on t and x alone
+#     accelerate(context, t, y, yd, xd)   set velocities; return yd and, for a first-order system, xd
+#
+# A step kernel, step(context, run, t, h), makes a step h from t. It reads x, y and their derivatives xd, yd at the
+# start of the step from the `Run`, and writes the increments dx, dy there, which the driver adds by compensated
+# summation. The memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then (x', y') of each stage.
 
 PLACE, ACCELERATE, STEP = "pdp", "pdppp", "ppdd"
 ERROR, NORM = "diipppppp", "ppppdd"
@@ -183,3 +184,37 @@ def second_embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):  # nine: a
     y, yd, ex, ey = vector(y, nx), vector(yd, ny), vector(ex, nx), vector(ey, ny)
     _error(1, h, y, yd, vector(tableau, ANY), vector(memory, ANY), ex, ey)
     return 0
+
+
+# Step kernels of plug-ins, written to the documented interface: docs/plug-ins.md.
+#
+# A plug-in's step kernel has its arrays as arguments, not the `Run`. `plug_in_step` is what the driver
+# calls in its place.
+
+PLUG_IN_STEP = "piiddiipppppppp"
+_call = caller(PLUG_IN_STEP)
+
+
+def step_kernel(function):
+    """Decorate a step kernel: f(context, place, accelerate, t, h, nx, ny, x, y, yd, xd, tableau, memory, dx, dy).
+
+    It writes the increments dx, dy and returns 0, or the status that `call_place` or `call_accelerate` gave. Arrays
+    come as addresses, integers: `vector(x, nx)` is the array of nx floats there, without a copy. x, xd and dx have nx
+    floats, y, yd and dy have ny; lengths are not checked.
+    """
+    return callback(PLUG_IN_STEP)(function)
+
+
+@callback(STEP)
+def plug_in_step(context, run, t, h):
+    """One step by the kernel of a plug-in. Status."""
+    r = load_run(run)
+    return _call(
+        r.kernels.plug_in, context, r.kernels.place, r.kernels.accelerate, t, h, r.x.size, r.y.size,
+        r.x, r.y, r.yd, r.xd, r.tableau, r.memory, r.dx, r.dy,
+    )  # fmt: skip
+
+
+def called_for(step):
+    """The step kernel that the driver calls for a method's, and the one of a plug-in behind it, or None."""
+    return (plug_in_step, step) if step.signature == PLUG_IN_STEP else (step, None)

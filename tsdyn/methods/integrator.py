@@ -11,8 +11,7 @@ from ..calls import fitting
 from ..docstrings import complete_docstring
 from ..jit.code_hash import is_ours
 from ..validation import checked_once, positive
-from .collocation import CollocationTableau
-from .collocation_output import interpolant_of, second_derivative
+from .collocation import CollocationTableau, interpolant_of, second_derivative
 from .collocation_step import collocation_step
 from .collocation_step import memory_of as collocation_memory
 from .diagonally_implicit import implicit_step, memory_of

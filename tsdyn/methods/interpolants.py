@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ..jit.kernels import Callback, callback, caller, kernel, vector
 from ..maths.dense_linalg import copy
-from ..workspaces.run_state import B_DATA, B_H, B_START, load_run
+from ..workspaces import B_DATA, B_H, B_START, load_run
 from .explicit import combine, stage
 
 FILL, VALUE = "pp", "ddiiippp"

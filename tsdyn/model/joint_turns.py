@@ -1,6 +1,6 @@
 """Turn counts of joints: the angle of each joint is tracked from one accepted step to the next.
 
-    v = A_own^T A_other h,  theta = atan2(g.v, f.v) + 2 pi turns                    see joint_coordinates.py
+    v = A_own^T A_other h,  theta = atan2(g.v, f.v) + 2 pi turns                    see element.py
     thetad = (E Fd - F Ed) / (E^2 + F^2),  E = f.v,  F = g.v,  vd = w x v           (1)
              w = A_own^T A_other omega_other' - omega_own'
     theta(t + h) ~ theta(t) + h (thetad(t) + thetad(t + h)) / 2                     (2)

@@ -1,22 +1,347 @@
 """The packed system: the arrays that kernels read, in a named tuple whose type is the same for every scene."""
 
 import os
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from ..elements.element import address, checked_parameters
 from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE
+from ..elements.loops.forces import FORCE_INTS, kept_size
 from ..elements.loops.template import AT, DIMENSION
-from ..errors import InvalidConstraint
+from ..elements.markers import POINT
+from ..errors import InvalidConstraint, InvalidForce
 from ..jit.interrupts import CollectionsDeferred
-from ..jit.kernels import records, row_of
+from ..jit.kernels import Record, records, row_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
-from .derived import Derived
-from .lengths import size_of
-from .packed_forces import find_forces, pack_forces
-from .tables import ConstraintKind, ForceKind, MotionPlace, SignalPlace
+from ..motions.tracing import Untraceable
+
+# Rows of the tables of a packed system, each a record: what runs over the instances of a kind, and where they are.
+#
+# Addresses are those of kernels of this process; zero stands for none.
+
+
+class ConstraintKind(Record):
+    """All instances of one class of primitive."""
+
+    phi: int  # addresses of the loops of coordinate_rows.py
+    jacobian: int
+    gamma: int
+    phi_t: int
+    remember: int
+    curvature: int  # address of constraint_hessians.loop; implicit methods load it
+    count: int  # instances
+    stride: int  # reals of each
+    table: int  # where the entries of the first begin in System.table
+    reals: int  # and in System.reals
+
+
+class ForceKind(Record):
+    """All instances of one kind of force; user functions have kinds of their own."""
+
+    force: int  # addresses of the loops of forces.py
+    jacobian: int  # implicit methods load it
+    remember: int
+    count: int
+    stride: int
+    table: int
+    reals: int
+    kept: int  # where its derivatives begin among those that implicit methods keep
+
+
+class MotionPlace(Record):
+    """A prescribed motion: a program of `ts.motions`, or three functions of a user's."""
+
+    value: int  # address of f, or of what runs a program
+    rate: int  # address of fd; zero for a program
+    acceleration: int  # address of fdd; zero for a program
+    place: int  # where value, rate and acceleration at t are in System.reals
+    program: int  # where the program begins there
+
+
+class SignalPlace(Record):
+    """A load that is a function of time."""
+
+    address: int  # of the function, or of what runs a program
+    place: int  # where its values at t are in System.reals
+    width: int  # how many they are
+    program: int  # where the program begins there; -1 for a function
+
+
+# What has been worked out from a packed scene, once, for whoever asks next.
+
+
+@dataclass(slots=True)
+class Derived:
+    """Of one `Packed`: each entry is None, or empty, until the function named beside it has been called."""
+
+    redundant: object = None  # int64 (k,): redundant rows of the constraint graph; constraint_graphs.set_redundant
+    turning: set = field(default_factory=set)  # bodies that count as turning; locked_orientations.keep_turning
+    handles: object = None  # handles.handles_of
+    body_indices: dict = None  # packed.index_of
+    members: dict = None  # packed.member_of
+    short_rows: object = None  # a `System`: sparse_jacobian.with_short_rows
+    graph: tuple = None  # constraint_graph.graph_of, and by the loops asked for:
+    graphs: dict = field(default_factory=dict)
+    locked: object = None  # a `Still`: locked_orientations.still
+    moving_graph: tuple = None  # locked_orientations.moving_graph, and by the loops asked for:
+    moving_networks: dict = field(default_factory=dict)
+    saddle: tuple = None  # a graph, a system, and their `SaddleGraph`: saddle_graph.saddle_of
+    examined: object = None  # a `Packed` without redundant rows so far: dependent_rows.dependent_rows
+    start_workspaces: list = field(default_factory=list)  # idle: start_workspace.taken
+    aligned: tuple = None  # mirrored_branches.demand_aligned
+    holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
+    loads: dict = None  # reactions.loads_of
+    row_parts: list = field(default_factory=list)  # idle: observables.row_parts.taken
+    places_within: list = None  # of each primitive among those of its class: reactions.only
+    coordinate_starts: dict = None  # diagnostics.starts
+    engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine
+    levers: object = None  # (bodies,), m: rounding_limit.within_rounding, and the start last found near the origin:
+    near: object = None
+    grounded: tuple = None  # local_origin.origin_of, and for the start last seen:
+    origin: tuple = (None, None)
+    local: tuple = None  # the scene from an origin of its own: local_origin
+    family: object = None  # a parameters.family.Family: variants.family_of
+    shared: dict = None  # of a family: what numbers don't change, by the functions that find it; None for one scene
+
+    @property
+    def is_of_start(self):
+        """Whether some of it holds where runs have started: redundant rows, bodies that turn, a local origin."""
+        return self.redundant is not None or bool(self.turning) or self.local is not None
+
+    def forget_graphs(self):
+        """The constraint graph is another."""
+        self.graph = None
+        self.graphs.clear()
+        self.forget_locked()
+
+    def forget_locked(self):
+        """Other bodies turn."""
+        self.locked = self.moving_graph = None
+        self.moving_networks.clear()
+        self.engines = {}  # and not cleared: a run in another thread may be about to add one
+
+    def __reduce__(self):
+        """In another process: what doesn't depend on where things are in memory."""
+        return _of, (self.redundant, self.turning, self.handles)
+
+
+def _of(redundant, turning, handles):
+    return Derived(redundant, turning, handles)
+
+
+# Lengths of a scene: in a small one positions are held to rounding of these, not of the pure numbers beside them.
+
+SMALL = 1e-3  # m: a scene without longer lengths; rounding of one is 1e-12 of it
+
+
+def is_small(size):
+    """Return True for the size of a scene in which pure numbers, such as the coordinates of axes, are no lengths."""
+    return 0.0 < size < SMALL
+
+
+def has_lengths(primitive):
+    """Return True if the rows of a primitive are lengths, or depend on them; False if they are pure numbers."""
+    return any(marker.code == POINT for marker in primitive.markers)
+
+
+def size_of(primitives, coordinates):
+    """Size of a scene: the largest number among the coordinates of markers; of a small one, the largest length, m."""
+    return size_of_reaches([reaches_of(*pair) for pair in zip(primitives, coordinates, strict=True)])
+
+
+def reaches_of(primitive, places):
+    """The largest numbers among the coordinates of points, and of all markers, of a primitive."""
+    sizes = [(marker.code, float(np.abs(s).max())) for marker, s in zip(primitive.markers, places, strict=True)]
+    return max((size for code, size in sizes if code == POINT), default=0.0), max((s for _, s in sizes), default=0.0)
+
+
+def size_of_reaches(reaches):
+    """The same as `size_of`, from those of each primitive."""
+    length = max((each[0] for each in reaches), default=0.0)
+    return length if is_small(length) else max((each[1] for each in reaches), default=0.0)
+
+
+# Forces packed for the kernels: one row a kind; indices and parameters of each instance in shared arrays.
+
+
+class Load(NamedTuple):
+    """One force as it was when it was packed."""
+
+    force: object
+    parameters: tuple  # floats and Signals
+    coordinates: tuple  # where its markers are, (3,) each
+    alone: np.ndarray  # (1,) of tables.ForceKind: a System.forces that has this instance alone
+    slot: int  # of System.memory; -1 for none
+    normal: int  # of System.normals; -1 for none
+    programs: tuple  # for each number of par: where in System.reals the program of its series begins; -1 for none
+
+
+def pack_forces(forces, where, table, reals):
+    """Append the instances to `table` and `reals`; return rows of System.forces, .signals, .memory, .normals, Loads.
+
+    Raises
+    ------
+    InvalidForce
+        If a plug-in's parameters are no finite numbers or Signals, or Numba can't compile its kernels.
+    """
+    groups = {}
+    for force in forces:
+        groups.setdefault(id(force.kernels), []).append(force)  # user functions have kernels of their own
+    rows, signals, memory, normals, loads = [], [], [], [], {}
+    programs, expanded = [], {}
+    for members in groups.values():
+        kernels = members[0].kernels
+        force_address = _force_address(members[0], "force")
+        remember = _force_address(members[0], "remember") if "remember" in kernels else 0
+        first, stride = (len(table), len(reals)), None
+        for force in members:
+            begin = len(table), len(reals)
+            parameters = checked_parameters(force, Signal, "loads")
+            table += _force_places(force, where)
+            reals += np.concatenate(force.coordinates).tolist()
+            for value in parameters:
+                if not isinstance(value, Signal):
+                    reals.append(float(value))
+                    continue
+                for i, motion in enumerate(value.motions):
+                    signals.append([value.address, len(reals) + i, 1, -1])
+                    programs.append((signals[-1], motion))
+                if not value.motions:
+                    signals.append([value.address, len(reals), value.width, -1])
+                reals += [np.nan] * value.width  # until the time is set
+            if force.memory:
+                memory.append(len(reals))
+                reals.append(0.0)
+            if "normal_load" in kernels:
+                normals.append(len(reals))
+                reals.append(0.0)
+            size = len(reals) - begin[1]
+            if stride not in (None, size):
+                raise InvalidForce(
+                    f"{force.name}: parameters() must return as many values as for every other {type(force).__name__}."
+                )
+            stride = size
+            alone = records(ForceKind, [[force_address, 0, remember, 1, stride, *begin, 0]])
+            slot = len(memory) - 1 if force.memory else -1
+            normal = len(normals) - 1 if "normal_load" in kernels else -1
+            loads[id(force)] = Load(force, parameters, force.coordinates, alone, slot, normal, ())
+            expanded[id(force)] = [motion for value in parameters for motion in _series(value)]
+        rows.append([force_address, 0, remember, len(members), stride, *first, 0])
+    begins = {id(None): -1}
+    for motion in (*(motion for _, motion in programs), *(motion for each in expanded.values() for motion in each)):
+        if id(motion) not in begins:  # one program for all that are given the same
+            begins[id(motion)] = len(reals)
+            reals += motion.program()
+    for signal, motion in programs:
+        signal[-1] = begins[id(motion)]
+    for force, motions in expanded.items():
+        loads[force] = loads[force]._replace(programs=tuple(begins[id(motion)] for motion in motions))
+    rows, signals = records(ForceKind, rows), records(SignalPlace, signals)
+    return rows, signals, memory, normals, tuple(loads[id(force)] for force in forces)
+
+
+def _series(value):
+    """A parameter's numbers as motions; None for what is constant, or has no series."""
+    if not isinstance(value, Signal):
+        return (None,)
+    try:
+        return value.smooth
+    except Untraceable:
+        return (None,) * value.width
+
+
+def with_force_jacobians(packed):
+    """The system of a packed scene with the forces' Jacobian loops, which are loaded now; and the floats they keep."""
+    rows, total = packed.system.forces.copy(), 0
+    for row in rows:
+        force = members_of(row, packed.loads)[0].force
+        row.jacobian, row.kept = _force_address(force, "jacobian"), total
+        total += row.count * kept_size(force.markers)
+    return packed.system._replace(forces=rows), int(total)
+
+
+def find_forces(system, loads):
+    """Write this process's addresses into the rows of an unpickled system; the loads with theirs."""
+    signals, rows = iter(system.signals), {}
+    for row in system.forces:
+        members = members_of(row, loads)
+        row.force, row.jacobian = _force_address(members[0].force, "force"), 0
+        row.remember = _force_address(members[0].force, "remember") if row.remember else 0
+        for load in members:
+            alone = load.alone.copy()
+            for name in ("force", "jacobian", "remember"):
+                alone[name] = row[name]
+            rows[id(load)] = load._replace(alone=alone)
+            for value in load.parameters:
+                for _ in range(max(len(value.motions), 1) if isinstance(value, Signal) else 0):
+                    next(signals).address = value.address
+    return tuple(rows[id(load)] for load in loads)
+
+
+def members_of(row, loads):
+    """The loads that a row of System.forces runs."""
+    return [load for load in loads if (load.alone[0].force, load.alone[0].stride) == (row.force, row.stride)]
+
+
+def _force_address(force, name):
+    return address(force.kernels, name, force.name, InvalidForce)
+
+
+def _force_places(force, where):
+    """The table entry of one instance; the ground has dimension 0 and no place."""
+    entry = np.zeros(FORCE_INTS, np.int64)
+    for i, body in enumerate((force.a, force.b)):
+        entry[AT + i], entry[DIMENSION + i] = where.get(id(body), (0, 0))
+    return entry.tolist()
+
+
+# Joint friction in the constraint graph: the joint whose reaction enters, and the bodies on which friction acts.
+
+
+class FrictionPlace(Record):
+    """A joint friction among the bodies and rows of a constraint graph."""
+
+    body_a: int
+    body_b: int
+    on: int  # the side, 0 for a and 1 for b, on which the reaction is taken
+    first: int  # where its rows begin in ConstraintGraph.friction_rows
+    count: int  # and how many they are
+    kind: int  # row of System.forces
+    index: int  # and its instance there
+    unit: int  # addresses of friction.unit_friction and friction.normal_load
+    normal: int
+
+
+def frictions_of(packed, bodies, rows_of, sides):
+    """Rows of ConstraintGraph.frictions, in the order of System.normals, and of ConstraintGraph.friction_rows.
+
+    bodies gives the place of a body by its id, rows_of those of a primitive's rows, sides (m, 2) their bodies.
+    """
+    found = sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
+    members = {id(member.constraint): member for member in packed.members} if found else {}
+    frictions, rows = [], []
+    for load in found:
+        force, first = load.force, len(rows)
+        on = 0 if force.on is force.a else 1
+        for part in packed.constraints[members[id(force.joint)].parts]:
+            rows += [(e, int(sides[e, 1] == bodies[id(force.on)])) for e in rows_of(part)]
+        kind, index = _place(packed.system.forces, load.alone[0])
+        loops = (address(force.kernels, name, force.name, InvalidForce) for name in ("unit_friction", "normal_load"))
+        pair = (bodies.get(id(body), len(bodies)) for body in (force.a, force.b))
+        frictions.append([*pair, on, first, len(rows) - first, kind, index, *loops])
+    return records(FrictionPlace, frictions), np.array(rows, np.int64).reshape(-1, 2)
+
+
+def _place(kinds, row):
+    """Return the row of System.forces that runs a load, and the index of the load in it."""
+    for i, kind in enumerate(kinds):
+        index = (row.table - kind.table) // FORCE_INTS
+        if kind.stride == row.stride and 0 <= index < kind.count:
+            return i, int(index)
+    raise AssertionError("a load has a row")
 
 
 class System(NamedTuple):

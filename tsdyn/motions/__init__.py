@@ -4,9 +4,9 @@ Imports jit and maths.
 
 Begin with expressions.py: smooth motions and their arithmetic; elementary.py has `Sine`, `Polynomial` and the like.
 prescribed.py makes a `Motion` of whatever a driver is given, plain Python functions included, signals.py a load of
-time; those of time and state are in elements/user_functions.py. tables.py and piecewise.py are data and splines,
-knots.py and changes.py say where steps end, program.py is what kernels evaluate. tracing.py makes graphs of users'
-functions, state_program.py runs those of time and state.
+time; those of time and state are in elements/loads.py. tables.py has data and splines, knots.py says
+where steps end, program.py is what kernels evaluate. tracing.py makes graphs of users' functions, and runs those of
+time and state.
 """
 
 from .elementary import Constant, Exponential, Piecewise, Polynomial, Ramp, Sine, time

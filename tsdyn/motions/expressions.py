@@ -18,8 +18,7 @@ import numpy as np
 
 from ..calls import fitting
 from ..errors import InvalidArgument
-from ..maths.power_series import Truncated
-from ..maths.two_jets import Jet
+from ..maths.power_series import Jet, Truncated
 from ..validation import number
 from . import program as code
 

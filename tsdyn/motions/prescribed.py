@@ -10,14 +10,14 @@ import numpy as np
 
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidConstraint
-from ..jit.compiled_once import compiled_once
+from ..jit.compiled import compiled_once
 from ..jit.kernels import Callback, NumbaError, caller, entry, kernel, specialised
 from ..validation import number, shown
 from .elementary import Constant, Piecewise, time
 from .expressions import FUNCTIONS, Smooth
-from .keywords import demand_time_alone
 from .knots import demand_covered, demand_followed
 from .program import run_program
+from .signals import demand_time_alone
 from .tables import Table, is_data
 from .tolerances import QUOTIENT_ERROR, QUOTIENT_NOISE, QUOTIENT_STEPS, SAME_VALUE, TIMES
 from .tracing import Untraceable, of_time, retold

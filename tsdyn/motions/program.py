@@ -10,7 +10,7 @@ import numpy as np
 
 from ..jit.kernels import ANY, callback, caller, data_of, kernel, matrix, vector
 from ..maths.recurrences import exponential, power, product, quotient, sine_cosine, square
-from .piecewise import HEAD as PIECES_HEAD
+from .tables import HEAD as PIECES_HEAD
 
 POLYNOMIAL, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, SINE, EXP, LOG, TANH, ARCTAN, PIECEWISE = range(12)
 HEAD, STEP, WIDTH = 6, 4, 36  # numbers before the instructions, numbers of an instruction, coefficients of a row

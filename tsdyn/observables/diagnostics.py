@@ -13,7 +13,7 @@ import numpy as np
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
 from ..elements.markers import PARAMETERS, POINT, TURN
 from ..jit.kernels import twin
-from ..maths.two_jets import Jet
+from ..maths.power_series import Jet
 from ..motions.prescribed import Motion
 
 if TYPE_CHECKING:

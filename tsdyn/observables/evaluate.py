@@ -1,4 +1,4 @@
-"""`scene.evaluate(q, qd, t)`: the paper's quantities at one state, in plain NumPy."""
+"""`scene.evaluate(q, qd, t)`: the paper's quantities at one state, coupled friction included, in plain NumPy."""
 
 from __future__ import annotations
 
@@ -7,22 +7,101 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..calls import fitting
-from ..elements.bodies import transform_g
+from ..elements.bodies import rotation_matrix, transform_g
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
 from ..jit.interrupts import CollectionsDeferred
-from ..maths.row_rank import dependent, farthest_first
-from ..maths.sparse_lu import sparse_lu
+from ..jit.kernels import twin
+from ..maths.matrix_rank import dependent, farthest_first, sparse_lu
 from ..maths.tolerances import RANK_TOL
-from ..model.equations import evaluate_constraints
-from ..model.sparse_jacobian import WIDTH, as_csr, with_short_rows
-from ..sparse.length_metric import coordinate_scales
+from ..model.equations import WIDTH, as_csr, evaluate_constraints, with_short_rows
+from ..rows.constraint_graph import coordinate_scales
 from ..validation import finite_vector, number
-from .generalised_forces import applied_loads, velocity_forces
-from .tolerances import INDEPENDENT, LARGE, LEAST_DIVISOR, LOST, LOST_DENSE, REDUNDANT_SHARES
+from .diagnostics import starts_of
+from .generalised_forces import applied_loads, force_loads, velocity_forces
+from .power import marker_states
+from .tolerances import BALANCED, COMPLEX_STEP, INDEPENDENT, LARGE, LEAST_DIVISOR, LOST, LOST_DENSE, REDUNDANT_SHARES
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Floats, Matrix, Scene
+
+
+# Coupled friction and reactions at one state, in plain NumPy, for `scene.evaluate`.
+
+SWEEPS = 50
+JAMMED = (
+    "no reactions are consistent with the friction of the joints: with large coefficients of friction the mechanism "
+    "may jam here."
+)
+
+
+def balance(packed, t, q, qd, Phi_q, solve):
+    """Return friction forces (n,) and the solution of the equations of motion; solve(load) is affine in the load.
+
+    Newton's method for the normal loads N = N(lam_0 + sum_i lam_i N_i).
+    """
+    system, n = packed.system, q.size
+    found = sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
+    units = [_unit(system, load, t, q, qd) for load in found]
+    first = solve(np.zeros(n))
+    parts = np.array([solve(unit) - first for unit in units])
+    reactions = [_reaction(packed, load, q, qd, Phi_q) for load in found]
+    N = np.zeros(len(found))
+    for _ in range(SWEEPS):
+        lam = np.nan_to_num((first + N @ parts)[n:])
+        values, changes = zip(*(reaction(lam) for reaction in reactions), strict=True)
+        J = np.eye(N.size) - np.array(changes) @ np.nan_to_num(parts[:, n:]).T
+        try:
+            step = np.linalg.solve(J, np.array(values) - N)
+        except np.linalg.LinAlgError as error:
+            raise SingularConfiguration(JAMMED) from error
+        N = N + step
+        if not np.abs(step).max() > BALANCED * np.abs(N).max():
+            return N @ np.array(units), first + N @ parts
+    raise SingularConfiguration(JAMMED)
+
+
+def normal_loads(packed, t, q, qd, Phi_q, lam):
+    """Return the normal loads (frictions,) by multipliers (m,), and the friction forces of unit ones (frictions, n)."""
+    found = sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
+    loads = np.array([_reaction(packed, load, q, qd, Phi_q)(lam)[0] for load in found])
+    return loads, np.array([_unit(packed.system, load, t, q, qd) for load in found])
+
+
+def _unit(system, load, t, q, qd):
+    """Return the generalised forces g (n,) of one friction for unit normal load."""
+    memory = np.zeros((1, system.memory.size + system.normals.size))
+    memory[0, system.memory.size + load.normal] = 1.0
+    return force_loads(system._replace(forces=load.alone), np.array([t]), q[None], qd[None], memory)[0]
+
+
+def _reaction(packed, load, q, qd, Phi_q):
+    """Return a normal load as a function of multipliers (m,), with its derivative (m,)."""
+    force, member = load.force, next(m for m in packed.members if m.constraint is load.force.joint)
+    rows = Phi_q[member.rows]
+    rows = rows if isinstance(rows, np.ndarray) else rows.toarray()
+    at, (jets, _) = starts_of(packed)[force.on], marker_states(packed, load, q[None], qd[None])
+    x = [float(np.squeeze(jet.x)) for jet in jets]
+    s = np.array(x[:3] if force.on is force.a else x[6:9]) - q[at : at + 3]
+    wrench = np.zeros((6, rows.shape[0]))  # for unit multipliers: force, and torque about the point
+    wrench[:3] = -rows[:, at : at + 3].T
+    if force.on.dimension == 7:
+        p = q[at + 3 : at + 7]
+        wrench[3:] = -0.5 * rotation_matrix(p) @ transform_g(p) @ rows[:, at + 3 : at + 7].T
+    wrench[3:] -= np.cross(s, wrench[:3], axisb=0, axisc=0)
+    normal, par = twin(type(force).normal_load), [*load.parameters, 1.0]
+
+    def find(lam):
+        f = wrench @ lam[member.rows]
+        values = [normal(x, f + COMPLEX_STEP * 1j * e, par) for e in np.eye(6)]
+        change = np.zeros(lam.size)
+        change[member.rows] = np.imag(values) / COMPLEX_STEP @ wrench
+        return np.real(values[0]), change
+
+    return find
+
+
+# `scene.evaluate(q, qd, t)`: the paper's quantities at one state, in plain NumPy.
 
 NOT_UNIQUE = (
     "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
@@ -126,7 +205,6 @@ def _with_friction(packed, t, q, qd, Phi_q, solve):
     """Return friction forces of joints (n,), and solve(friction) with them."""
     if not packed.system.normals.size:
         return 0.0, solve(0.0)
-    from .friction_balance import balance  # imported here: few scenes need it
 
     return balance(packed, float(t), q, qd, Phi_q, solve)
 

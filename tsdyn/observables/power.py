@@ -12,7 +12,7 @@ import numpy as np
 
 from ..elements.markers import TURN
 from ..jit.kernels import twin
-from ..maths.two_jets import Jet
+from ..maths.power_series import Jet
 from ..motions.signals import Signal
 from .diagnostics import constraint_rows, marker_jets, starts_of
 from .generalised_forces import force_loads

@@ -1,25 +1,154 @@
-"""Multipliers and constraint reactions, from positions, velocities and accelerations."""
+"""Multipliers and constraint reactions from positions, velocities and accelerations; their uniqueness."""
+
+from __future__ import annotations
 
 import math
 from collections import Counter
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..calls import fitting_methods
 from ..elements.bodies import rotation_matrix, transform_g
-from ..elements.loops.body_poses import take_loads
+from ..elements.loops.constraint_rows import place_bodies, take_loads
 from ..elements.loops.coordinate_rows import INTS
 from ..elements.markers import POINT
-from ..jit.kernels import entry
+from ..errors import InvalidBody, InvalidConstraint, RedundantConstraints
+from ..formulations.accelerations import find_reactions, normal_load
+from ..jit.kernels import entry, kernel, long_kernel, resident, stack
 from ..maths.dense_linalg import copy
-from ..model.equations import constraint_jacobian, set_time
-from ..model.packed import classes, index_of
-from ..model.sparse_jacobian import WIDTH, with_short_rows
-from ..rows.interface import balance_loads, mark_redundant
-from ..workspaces.workspace import load_parts
-from .factorised_rows import factorise_at
-from .friction_reactions import with_normal_loads
+from ..model.equations import WIDTH, constraint_jacobian, set_time, with_short_rows
+from ..model.handles import handles_of
+from ..model.packed import classes, index_of, member_of
+from ..rows.constraint_graph import REDUCED
+from ..rows.graph_builder import graph_of
+from ..rows.interface import (
+    METRIC,
+    Rows,
+    balance_loads,
+    count_self_stresses,
+    evaluate_every_row,
+    evaluate_rows,
+    factorise_rows,
+    mark_redundant,
+    redundancy,
+    self_stress,
+    weigh_bodies,
+)
+from ..workspaces import arrays_of, load_parts, parts
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
-from .row_parts import give, taken
+from .tolerances import KEPT_FLOATS, LEAST_DIVISOR, NO_STRESS
+
+if TYPE_CHECKING:
+    from ..hints import BodyLike, Floats, Handles, ItemLike
+
+
+# The workspace in which rows are evaluated and factorised after a run; one that is idle serves the next call.
+
+
+class RowParts:
+    """`Parts` of a packed scene with short rows, and their address; one evaluation at a time.
+
+    Parameters
+    ----------
+    system : System
+    graph : ConstraintGraph
+    n : int
+        Coordinates.
+    """
+
+    def __init__(self, system, graph, n):
+        self.source, self.graph = system, graph
+        self.system = system._replace(reals=system.reals.copy())
+        whole = parts(self.system, graph, n)
+        self._images = [(array, array.copy()) for array in arrays_of((whole.work, whole.tangent)) if array.size]
+        self.address, *self._keep = resident(whole)
+
+    @property
+    def size(self):
+        """Floats of it."""
+        return sum(array.size for array, _ in self._images)
+
+    def enter(self):
+        """As if it were new."""
+        for array, image in self._images:
+            array[...] = image
+        self.system.reals[...] = self.source.reals
+
+
+def taken(packed, n):
+    """Return a `RowParts` of a packed scene, as if it were new."""
+    system, graph = with_short_rows(packed), graph_of(packed, REDUCED)
+    try:
+        found = packed.derived.row_parts.pop()
+    except IndexError:
+        found = None
+    if found is None or found.graph is not graph or found.source is not system:
+        return RowParts(system, graph, n)
+    found.enter()
+    return found
+
+
+def give(packed, found):
+    """Take back one that is no longer in use, unless it is large, or has room to select rows anew."""
+    if not packed.derived.row_parts and redundancy(found.graph) == 0 and found.size < KEPT_FLOATS:
+        packed.derived.row_parts.append(found)
+
+
+# Constraint rows at given positions, factorised.
+
+
+@kernel
+def factorise_at(graph, s, f, t, q):
+    """H, Y and the factors of S at t, q. Return True if S is nonsingular."""
+    set_time(s, t)
+    place_bodies(graph.bodies, q, f.poses)
+    evaluate_rows(graph, s, f, f.rows, t)
+    return factorise_rows(graph, s, f, f.rows, t, METRIC)
+
+
+# Normal loads of joint friction, from positions, velocities and accelerations.
+
+
+@entry
+def _solve(context, t, q, qd, r, out):
+    """out (k, frictions): normal loads with Phi_q^T lam - sum_i g_i N_i = r (k, n); NaN if there are none.
+
+    H W (H^T lam - sum_i g_i N_i(lam)) = H W r: the acceleration equation for the residual forces.
+    """
+    c = load_parts(context)
+    graph, s, f = c.graph, c.system, c.tangent
+    for k in range(t.size):
+        found = factorise_at(graph, s, f, t[k], q[k])
+        take_loads(graph.bodies, q[k], r[k], f.Z)
+        weigh_bodies(graph, f.Z)
+        for e in range(f.gamma.size):
+            f.gamma[e] = 0.0
+        found = found and find_reactions(graph, s, f, q[k], qd[k], t[k])
+        for i in range(out.shape[1]):
+            out[k, i] = f.friction.load[7 * i] if found else np.nan
+
+
+def with_normal_loads(packed, t, q, qd, qdd, memory):
+    """Return the memory of forces (k, slots), then normal loads of joint friction if there is any."""
+    system = packed.system
+    if not system.normals.size:
+        return memory
+    memory = np.zeros((t.size, system.memory.size)) if memory is None else memory
+    if memory.shape[1] > system.memory.size:
+        return memory
+    r = applied_loads(system, t, q, qd, memory)
+    r += velocity_forces(system, q, qd)
+    r -= inertial_forces(system, q, qdd)
+    own = system._replace(reals=system.reals.copy())
+    context, *_keep = resident(parts(own, graph_of(packed, REDUCED), q.shape[1]))
+    loads = np.zeros((t.size, system.normals.size))
+    _solve(context, t, q, qd, r, loads)
+    return np.hstack((memory, loads))
+
+
+# Multipliers and constraint reactions, from positions, velocities and accelerations.
 
 MATRIX = np.zeros((0, 0))  # its type
 
@@ -169,3 +298,168 @@ def constraint_loads(s, t, q, lam, first, halves, rows, out):
                 continue
             for c in range(out.shape[1]):
                 out[k, c] -= rows[first + i, halves[i] + c] * lam[k, i]
+
+
+# Uniqueness of reactions among redundant constraints: reactions to which no self-stress contributes.
+#
+# A redundant row gives a self-stress z, H^T z = 0. Any multiple of z may be added to the multipliers without effect on
+# the motion. The reaction of a constraint is unique if no self-stress loads a body through it.
+
+
+@long_kernel
+def find_rows(graph, s, f, q, t, whole):
+    """H at q without redundant rows and, in `whole`, with them, and the factors of S; False if S is singular."""
+    regular = factorise_at(graph, s, f, t, q)
+    evaluate_every_row(graph, s, f, Rows(whole, f.rows.Y, f.rows.S), t)
+    return regular
+
+
+@entry
+def free_loads(context, t, q, rows, sides, whole, out):
+    """out (k,): the largest load on a body by these rows in a unit self-stress, relative to their size."""
+    c = load_parts(context)
+    graph, s, f = c.graph, c.system, c.tangent
+    for k in range(t.size):
+        out[k] = 0.0 if find_rows(graph, s, f, q[k], t[k], whole) else math.inf
+        for d in range(count_self_stresses(f)):
+            largest, size = self_stress(graph, f, whole, d), 0.0
+            for c in range(8):
+                load = 0.0
+                for i in range(rows.size):
+                    h = whole[16 * rows[i] + 8 * sides[i] + c]
+                    size = max(size, abs(h))
+                    load += f.b[rows[i]] * h
+                f.Z[c] = load
+            for c in range(8):
+                out[k] = max(out[k], abs(f.Z[c]) / max(largest * size, LEAST_DIVISOR))
+
+
+def unique(solution, rows, body):
+    """Determine whether the reaction of these rows, a slice, on a body is unique: bool (k,)."""
+    graph = graph_of(solution.packed, REDUCED)
+    if not redundancy(graph):
+        return np.ones(solution.t.size, bool)
+    wanted = np.flatnonzero((graph.row >= rows.start) & (graph.row < rows.stop))
+    sides = np.where(graph.sides[wanted, 0] == index_of(solution.packed, body), 0, 1)
+    system = solution.system._replace(reals=solution.system.reals.copy())
+    context, *_keep = resident(parts(system, graph, solution.q.shape[1]))
+    out = np.zeros(solution.t.size)
+    free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(graph.row)), out)
+    return out < NO_STRESS
+
+
+# Refusal of joint friction that depends on a reaction which redundant constraints leave undetermined.
+
+
+@entry
+def _free_loads(context, t, q, whole, out):
+    """out (frictions,): the largest normal load in a unit self-stress."""
+    c = load_parts(context)
+    graph, s, f = c.graph, c.system, c.tangent
+    reaction, none, found = stack(6), stack(7), stack(7)
+    find_rows(graph, s, f, q, t, whole)
+    for d in range(count_self_stresses(f)):
+        largest = self_stress(graph, f, whole, d)
+        for i in range(out.size):
+            friction = graph.frictions[i]
+            for c in range(6):
+                reaction[c] = 0.0
+            normal_load(s, friction, q, q, t, 0, reaction, none)
+            for j in range(friction.first, friction.first + friction.count):
+                e, side = graph.friction_rows[j]
+                at = 16 * e + 8 * side
+                for c in range(3):
+                    reaction[c] -= whole[at + c] * f.b[e] / largest
+                    reaction[3 + c] -= whole[at + 4 + c] * f.b[e] / largest
+            normal_load(s, friction, q, q, t, 0, reaction, found)
+            out[i] = max(out[i], abs(found[0] - none[0]))
+
+
+def demand_unique(packed, q, t):
+    """Raise RedundantConstraints if a friction depends on a reaction that isn't unique at q."""
+    graph = graph_of(packed, REDUCED)
+    if not (redundancy(graph) and len(graph.frictions)):
+        return
+    system = packed.system._replace(reals=packed.system.reals.copy())
+    context, *_keep = resident(parts(system, graph, q.size))
+    free = np.zeros(len(graph.frictions))
+    _free_loads(context, t, q, np.zeros(16 * len(graph.row)), free)
+    wrong = [load.force for load in packed.loads if load.normal >= 0 and free[load.normal] > NO_STRESS]
+    if wrong:
+        names = ", ".join(force.name for force in wrong)
+        joints = ", ".join(force.joint.name for force in wrong)
+        raise RedundantConstraints(
+            f"{names}: the normal load depends on a reaction of {joints} that is not unique, since constraint rows are "
+            "redundant (statically indeterminate).\nUse joints with fewer rows, so that the reaction is unique "
+            "(scene.mobility() names the rows), or remove the part of the friction that depends on it."
+        )
+
+
+# Forces and torques that the constraints and forces of a scene exert, of solutions, states and equilibria alike.
+
+
+def member(packed, constraint):
+    """The `Member` of a constraint of the scene."""
+    found = member_of(packed, constraint)
+    if found is None:
+        raise InvalidConstraint(f"{constraint!r} is not a constraint or force of this solution's scene.")
+    return found
+
+
+def acted(packed, item, on):
+    """The body on which the load of an item is asked for: a handle, a name, or None for the item's own choice."""
+    if on is None:
+        return item.on
+    handles = handles_of(packed)
+    on = handles.body(on) if isinstance(on, str) else handles.own(on)
+    if on is item.a or on is item.b:
+        if on.dimension:
+            return on
+        raise InvalidBody(f"{item.name}: the load on the ground is the opposite of the load on {item.on.name!r}.")
+    if getattr(on, "dimension", 0):
+        on = handles.body(on)  # refuses one of another scene
+    raise InvalidBody(f"{item.name}: on must be one of its bodies, got {on!r}.")
+
+
+def exerted(motion, item, on):
+    """Force and torque (k, 3) of an item along a motion, on a body of it.
+
+    A motion has packed, system, t (k,), q and qd (k, n), multipliers (k, m) and _memory (k, slots).
+    """
+    item = handles_of(motion.packed).item(item)
+    load = loads_of(motion.packed).get(id(item))
+    if load is not None:
+        return force_reaction(motion, load, acted(motion.packed, item, on))
+    return reaction(motion, member(motion.packed, item), acted(motion.packed, item, on))
+
+
+@fitting_methods
+class Exerting:
+    """Mixed into states that know their scene: `packed`, t, q, qd, qdd, multipliers and the `memory` of forces."""
+
+    __slots__ = ()
+    packed: Any
+    memory: Any
+    t: Any
+    q: Floats
+    qd: Floats
+    qdd: Floats
+    multipliers: Floats
+
+    @property
+    def handles(self) -> Handles:
+        """The bodies and joints of the scene."""
+        return handles_of(self.packed)
+
+    def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
+        """Force (N) and torque (N m) that a constraint, a joint as a whole, or a force exerts: (3,) each.
+
+        As `Solution.reaction` has them: on a, or b if a is the ground; in the ground frame, the torque about the item's
+        first point on that body. A state at k times gives (k, 3).
+        """
+        packed, levels = self.packed, (self.q, self.qd, self.qdd, self.multipliers)
+        t, (q, qd, qdd, lam) = np.atleast_1d(self.t), map(np.atleast_2d, levels)
+        memory = with_normal_loads(packed, t, q, qd, qdd, np.atleast_2d(self.memory))
+        motion = SimpleNamespace(packed=packed, system=packed.system, t=t, q=q, qd=qd, multipliers=lam, _memory=memory)
+        force, torque = exerted(motion, item, on)
+        return (force, torque) if np.ndim(self.t) else (force[0], torque[0])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..benchmarking.reference_solution import poses
+from ..benchmarking.benchmark import poses
 from ..errors import Status, TsdynError
 from ..integrators import SDIRK54, Taylor
 from ..simulation.scene_cache import prepared

@@ -15,19 +15,18 @@ from ..jit.cache import statistics
 from ..jit.kernels import DEBUG
 from ..observables.state import remembered
 from ..runs.arguments import interval, state_arrays
-from ..simulation import method_choice
+from ..simulation import prepared_run
 from ..simulation.prepared_run import DRIVERS
 from ..simulation.run_options import OPTIONS, from_names
 from ..simulation.scene import Scene
 from ..simulation.scene_cache import prepared
+from ..simulation.segments import implicit
 from ..simulation.simulate import simulate
-from ..simulation.turns import implicit
 from .advice import advise
-from .instrumentation import Stopwatch, Timekeeper
-from .micro_benchmarks import prices
+from .instrumentation import Stopwatch, Timekeeper, prices
 from .phases import Phase, of_series, of_steps, orders
 from .report import Profile
-from .timer_cost import own_cost
+from .timers import own_cost
 from .tolerances import FEWEST, LONG, MOST, RESOLUTION, SAMPLE
 
 if TYPE_CHECKING:
@@ -140,7 +139,7 @@ def _without(options):
 
 def _method(scene, solution, options):
     """Return the method of a solution, of most of its time if it has turned."""
-    method = method_choice.first_method(options, prepared(scene))
+    method = prepared_run.first_method(options, prepared(scene))
     if options.method is not None or solution.method.startswith(repr(method)):
         return method
     return implicit(method, prepared(scene), options.form)

@@ -1,10 +1,4 @@
-"""Timers: callbacks that wrap callbacks, so that profiling needs no change of a kernel.
-
-A profiled run replaces each called address by the address of a timer. The timer reads the clock, calls the original and
-reads the clock again; time between two readings is attributed to the phase that was running, so the phases add up to
-the whole run. A timer finds its record through a word stored in front of its argument: the context, or the table of a
-kind of constraint or force.
-"""
+"""Timers: callbacks that wrap callbacks, so that profiling needs no change of a kernel; what a timer costs."""
 
 import ctypes
 import sys
@@ -29,6 +23,7 @@ from ..jit.kernels import (
     integers,
     kernel,
     specialised,
+    vector,
 )
 from ..methods.collocation_step import call_balance, call_factorise, call_solve
 from ..methods.diagonally_implicit import call_correct, call_reduce, call_residual, call_soften
@@ -40,6 +35,13 @@ from ..methods.explicit import call_accelerate, call_norm, call_place, call_step
 from ..runs.dense_output import call_chart, call_complete
 from ..runs.stepper import call_check
 from ..taylor.step_parts import call_expand, call_reach
+
+# Timers: callbacks that wrap callbacks, so that profiling needs no change of a kernel.
+#
+# A profiled run replaces each called address by the address of a timer. The timer reads the clock, calls the original
+# and reads the clock again; time between two readings is attributed to the phase that was running, so the phases add up
+# to the whole run. A timer finds its record through a word stored in front of its argument: the context, or the table
+# of a kind of constraint or force.
 
 # roles: the driver, and the kernels called by address; ROWS is any loop over constraints or forces
 DRIVER, PLACE, ACCELERATE, COMPLETE, CHECK, CHART, STEP, NORM = range(8)
@@ -344,3 +346,46 @@ def stop(notes):
     """Stop the clock of the driver."""
     now = _now(notes)
     notes[SLOTS + 1] += now - notes[LAST]
+
+
+# The cost of a timer, by calls of a little callback with and without one.
+
+
+@entry
+def _call_often(address, context, count):
+    for _ in range(count):
+        call_check(address, context)
+
+
+LITTLE = 20  # numbers
+
+
+def _do_little(context):
+    """Work of a typical callback: it hides part of the cost of a reading."""
+    x = vector(context, LITTLE)
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for i in range(0, LITTLE, 4):
+        a += x[i] * x[i + 1]
+        b += x[i + 1] * x[i + 2]
+        c += x[i + 2] * x[i + 3]
+        d += x[i + 3] * x[i]
+    x[0] = a + b + c + d
+    return 0
+
+
+_little = Callback(_do_little, "p")
+
+
+def own_cost(count=10000, rounds=15):
+    """Return the seconds of a timer, half of them in the timed phase: least time with it, less least time without."""
+    notes, context = new_notes(0), np.zeros(1 + LITTLE)
+    notes[TARGETS + CHECK] = _little.address
+    context[:1].view(np.int64)[0] = notes.ctypes.data
+    least = [np.inf, np.inf]
+    for _ in range(1 + rounds):  # the first loads
+        start(notes)
+        for i, address in enumerate((_little.address, TIMERS[CHECK].address)):
+            began = time.perf_counter()
+            _call_often(address, context.ctypes.data + 8, count)
+            least[i] = min(least[i], (time.perf_counter() - began) / count)
+    return max(least[1] - least[0], 0.0)

@@ -1,9 +1,18 @@
-"""Row evaluation at the current poses: Phi, H, gamma or Phi_t, zero at redundant rows."""
+"""Row evaluation: Phi, H, gamma or Phi_t, zero at redundant rows; multipliers of one order of a series."""
 
 from ..elements.loops.constraint_rows import call_body_loop
 from ..jit.kernels import kernel, long_kernel
-from .axis_rows import clear_axes
 from .redundant_rows import clear_redundant, keep_every_row, keep_redundant, leave_redundant_rows, restore_selection
+from .schur_complement import (
+    add_axis_multipliers,
+    apply_columns,
+    clear_axes,
+    find_correction,
+    gather_axes,
+    solve_product,
+)
+
+# Row evaluation at the current poses: Phi, H, gamma or Phi_t, zero at redundant rows.
 
 
 @kernel
@@ -98,3 +107,45 @@ def evaluate_drift(graph, system, f, t, out):
         kind = graph.kinds[i]
         _run_loop(graph, system.reals, f, t, kind, kind.drift, out, f.rows.H)
     keep_redundant(f, out, f.redundant.drift)
+
+
+# Multipliers of one order of a Taylor series, by the factors of S at order zero.
+
+
+@kernel
+def solve_series(graph, f, omega, at, stride, k, correction):
+    """lam of order k from f.b, the residuals of Phi_{k+2}.
+
+    S lam = f.b,    f.Z = -Y^T lam
+
+    Order k + 1 of omega' of body i is at omega[at + stride * i]. With `correction` f.b becomes what f.gamma, a first
+    solution, lacks.
+    """
+    _complete(graph, f, omega, at, stride, k, correction)
+    find_correction(graph, f.rows, f.b, f.Z)
+
+
+@kernel
+def solve_friction_series(graph, f, omega, at, stride, k):
+    """The same with joint friction, as a correction of f.gamma.
+
+    N~ lam = f.b,    f.Z = -X^T lam,    N~ = H X^T as of accelerations.py
+    """
+    r = f.friction
+    _complete(graph, f, omega, at, stride, k, True)
+    # N~ lam = residual,  Z = -X^T lam
+    solve_product(graph, r.lower, r.upper, f.b)
+    for i in range(f.Z.size):
+        f.Z[i] = 0.0
+    apply_columns(graph, r.X, f.b, f.Z)
+
+
+@kernel
+def _complete(graph, f, omega, at, stride, k, correction):
+    """The residuals f.b of all rows, from those of the primitives."""
+    # Welds: zero. Axis rows: (k + 1) c e . omega'_{k+1}, and lam_e of a first solution
+    clear_welds(graph, f.b)
+    gather_axes(graph, omega, at, stride, k + 1.0, f.b)
+    if correction:
+        add_axis_multipliers(graph, f.gamma, f.b)
+    clear_redundant(f, f.b)

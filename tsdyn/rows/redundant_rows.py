@@ -6,7 +6,7 @@ multiplier is zero and every sparsity pattern is unchanged.
 
 import math
 
-from ..elements.loops.body_poses import POSE, R
+from ..elements.loops.constraint_rows import POSE, R
 from ..jit.kernels import kernel
 from ..jit.simd import four, put, splat
 from .tolerances import HELD

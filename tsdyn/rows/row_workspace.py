@@ -60,7 +60,7 @@ class Selection(Record):
 
 
 class Indicator(Record):
-    """The singularity indicator, see singularity.py."""
+    """The singularity indicator, see row_selection.py."""
 
     start: float  # of a step
     end: float
@@ -70,7 +70,7 @@ class Indicator(Record):
 class TangentWorkspace(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
 
-    poses: np.ndarray  # ((b + 1) * 28,)  see body_poses.py; projection, tangent
+    poses: np.ndarray  # ((b + 1) * 28,)  see constraint_rows.py; projection, tangent
     rows: Rows  # at the poses; interface.evaluate_rows, factorise_rows
     b: np.ndarray  # (m,)  right-hand sides and solutions
     gamma: np.ndarray  # (m,)  acceleration bias in terms of omega'; constraint_rows.bias

@@ -1,23 +1,100 @@
-"""The Schur complement S = H W H^T (Delassus operator) of the constraint rows H = [Phi_r, Phi_pi']: factors, solves.
+"""The Schur complement S = H W H^T (Delassus operator) of H = [Phi_r, Phi_pi'], and the chart matrix N."""
 
-Body quantities are rows of eight floats, (linear, 0, angular in the body frame, 0); the last row is the ground's.
-"""
-
-from ..elements.loops.body_poses import POSE, RD
-from ..jit.kernels import kernel
-from ..jit.simd import add, fma, four, get, let, put, splat, times, total
-from ..sparse.constraint_graph import (
-    ROWS,
-    ROWS_WELD,
-    W_MASS,
-    W_ROTATION,
-    WEIGHTS,
-    WELD_ROWS,
-)
-from ..sparse.elimination import factor, solve
-from .axis_rows import gather_axes, leave_axes_out, multiply_axes, weigh_axes
+from ..elements.loops.constraint_rows import POSE, RD
+from ..jit.kernels import kernel, long_kernel, stack
+from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, times, total
+from .constraint_graph import ROWS, ROWS_WELD, W_MASS, W_ROTATION, WEIGHTS, WELD_ROWS, WELDS
+from .elimination import factor, factor_lu, solve, solve_lu
+from .massless_axes import AXIS_H, AXIS_OWN, AXIS_Y
 from .redundant_rows import set_redundant_diagonal
-from .tolerances import ZERO_PIVOT
+from .tolerances import COMPENSATED, ZERO_PIVOT
+
+# Products of axis rows (massless_axes.py): contributions to S, to matrices of its pattern and right-hand sides.
+#
+# An axis row is zero in H, since a projection onto the constraint manifold ignores it; in Y = W H^T it is present.
+
+
+@kernel
+def weigh_axes(graph, Y):
+    """Set the axis rows of Y = W H^T."""
+    axes = graph.axes
+    for i in range(axes.rows.shape[0]):
+        put(Y, 16 * axes.rows[i].row + 4, four(axes.values[i], AXIS_Y))
+
+
+@kernel
+def multiply_axes(graph, H, Y, values):
+    """Add the products of axis rows with all rows to the blocks of S."""
+    axes = graph.axes
+    for i in range(axes.products.shape[0]):
+        # c e . (J'^-1 H^T) of a row at the body; of a weld, a component of it
+        product, scale = axes.products[i], axes.scales[i]
+        side, y = product.side, 16 * axes.rows[product.axis].row + 4
+        x = get(Y, y - 1 - side) if side < 0 else total(times(four(H, side + 4), four(Y, y)))
+        let(values, product.target, scale * x)
+    # Diagonal: -j / J
+    for i in range(axes.rows.shape[0]):
+        let(values, graph.diagonal[axes.rows[i].row], axes.values[i, AXIS_OWN])
+
+
+@kernel
+def multiply_axes_both(graph, H, X, lower, upper):
+    """Add the products of axis rows to H X^T, in the form of `factor_lu`; no body is split."""
+    multiply_axes(graph, H, X, upper)
+    axes = graph.axes
+    for i in range(axes.products.shape[0]):
+        # The lower factor takes c e . X
+        product = axes.products[i]
+        h = four(axes.values[product.axis], AXIS_H)
+        let(lower, product.target, total(times(h, four(X, product.side + 4))))
+    for i in range(axes.rows.shape[0]):
+        let(lower, graph.diagonal[axes.rows[i].row], axes.values[i, AXIS_OWN])
+
+
+@kernel
+def leave_axes_out(graph, values):
+    """Replace axis rows by minus one on the diagonal: S for the given inertias, with zero multipliers of axis rows."""
+    axes = graph.axes
+    for i in range(axes.rows.shape[0]):
+        let(values, graph.diagonal[axes.rows[i].row], -1.0)
+
+
+@kernel
+def gather_axes(graph, values, at, stride, scale, out):
+    """out = scale c e . z of the axis rows, z at values[at + stride * b] being of body b."""
+    axes = graph.axes
+    for i in range(axes.rows.shape[0]):
+        # c e . omega'd
+        e, b = axes.rows[i].row, axes.rows[i].body
+        out[e] = scale * total(times(four(axes.values[i], AXIS_H), four(values, at + stride * b)))
+
+
+@kernel
+def add_axis_multipliers(graph, lam, out):
+    """out += lam of the axis rows: the second term of c e . omega'd + lam_e."""
+    axes = graph.axes
+    for i in range(axes.rows.shape[0]):
+        e = axes.rows[i].row
+        out[e] += lam[e]
+
+
+@kernel
+def clear_axes(graph, out):
+    """out = 0 of the axis rows."""
+    axes = graph.axes
+    for i in range(axes.rows.shape[0]):
+        out[axes.rows[i].row] = 0.0
+
+
+@kernel
+def is_axis(graph, rows, e):
+    """Return True if the row that failed in the factorisation of S, or -1, is an axis row."""
+    return e >= 0 and rows.S[graph.pattern.shape[1] + e] < 0.0
+
+
+# The Schur complement S = H W H^T (Delassus operator) of the constraint rows H = [Phi_r, Phi_pi']: factors, solves.
+#
+# Body quantities are rows of eight floats, (linear, 0, angular in the body frame, 0); the last row is the ground's.
 
 # What S is made for. DYNAMICS: W is the inverse of the mass matrix, by way of axis rows where a body has next to no
 # inertia about an axis. METRIC: W is that of the raised inertias, without axis rows: a metric for projections.
@@ -286,3 +363,160 @@ def balance_loads(graph, rows, F, lam):
     _gather(graph, rows.Y, F, lam)
     solve(graph.pattern, rows.S, lam)
     _scatter(graph, rows.H, lam, F)
+
+
+# The chart matrix N = H C Y0, the derivative of Phi with respect to -u, and other matrices H X^T.
+#
+#     omega'  = C etad,       C = d0 I - d~ + d d^T / d0        X^T = C Y0
+#
+# At the parts of a split body N has the products with the welds, whose rows are W0 at q0 and C W0 at q.
+
+
+@kernel
+def _multiply_both(graph, H, X, lower, upper):
+    """Set H X^T in the blocks of the pattern as `factor_lu` expects: upper triangle, lower triangle transposed."""
+    products = graph.products
+    # Blocks that no product reaches are fill
+    for i in range(graph.pattern.shape[1]):
+        let(upper, i, 0.0)
+        let(lower, i, 0.0)
+    for i in range(products.shape[0]):
+        product = products[i]
+        left, right, rows, columns = product.left, product.right, product.rows, product.columns
+        target, stride = product.target, product.stride
+        # A primitive with itself shares both bodies
+        if product.same != 0:
+            for r in range(rows):
+                more(upper, target + r, inner_both(H, left + 16 * r, X, right + 16 * r))
+                for c in range(r + 1, columns):
+                    more(upper, target + c, inner_both(H, left + 16 * r, X, right + 16 * c))
+                    more(lower, target + c, inner_both(H, right + 16 * c, X, left + 16 * r))
+                target += stride
+        else:
+            # Two primitives at one common body
+            for r in range(rows):
+                for c in range(columns):
+                    more(upper, target + c, inner(H, left + 16 * r, X, right + 16 * c))
+                    more(lower, target + c, inner(H, right + 16 * c, X, left + 16 * r))
+                target += stride
+
+
+@kernel
+def rotate_rate(l, b, rate):
+    """Return C rate of body b, rate in four lanes."""
+    x, y, z, w = get(l.d, 4 * b), get(l.d, 4 * b + 1), get(l.d, 4 * b + 2), get(l.d, 4 * b + 3)
+    # C = d0 I - d~ + d d^T / d0, with d0 - 1 = w
+    d = lanes(x, y, z)
+    along = total(times(d, rate)) / (1.0 + w)
+    return add(rate, sub(fma(d, splat(along), times(rate, splat(w))), cross(d, rate)))
+
+
+@long_kernel
+def factorise_chart_matrix(graph, f, l):
+    """Set the LU factors of N = H C Y0 at the present H; return True if N is nonsingular."""
+    Y0 = l.rows0.Y
+    for e in range(graph.sides.shape[0]):
+        for k in range(2):
+            # X^T = C Y0, body by body
+            at = 16 * e + 8 * k
+            put(l.X, at, four(Y0, at))
+            put(l.X, at + 4, rotate_rate(l, graph.sides[e, k], four(Y0, at + 4)))
+    _multiply_both(graph, f.rows.H, l.X, l.lower, l.upper)
+    if graph.parts.shape[0] > 0:
+        _multiply_chart_parts(graph, f.rows.H, l)
+    # Dropped and axis rows: one, or minus one, on the diagonal
+    for values in (l.lower, l.upper):
+        set_redundant_diagonal(graph, f, values)
+        leave_axes_out(graph, values)
+    return factor_lu(graph.pattern, l.lower, l.upper, ZERO_PIVOT) < 0
+
+
+@kernel
+def factorise_product(graph, f, X, lower, upper):
+    """Set the LU factors of H X^T at the present H, with axis rows; return True if the matrix is nonsingular."""
+    _multiply_both(graph, f.rows.H, X, lower, upper)
+    multiply_axes_both(graph, f.rows.H, X, lower, upper)
+    set_redundant_diagonal(graph, f, lower)
+    set_redundant_diagonal(graph, f, upper)
+    return factor_lu(graph.pattern, lower, upper, ZERO_PIVOT) < 0
+
+
+@kernel
+def solve_product(graph, lower, upper, b):
+    """b <- (H X^T)^-1 b, by the factors of `factorise_chart_matrix` or `factorise_product`; those of S serve twice."""
+    solve_lu(graph.pattern, lower, upper, b)
+
+
+@kernel
+def pivot_loss(graph, l):
+    """Return max |1 - n / s|, with n and s the products of the pivots of a primitive's rows in N and in S0.
+
+    Single pivots of a spherical joint depend on the axes of the ground frame; their product does not.
+    """
+    worst, axes = 0.0, graph.axes.rows
+    # Primitives, then welds, then axes
+    for i in range(graph.products.shape[0]):
+        if graph.products[i].same == 0:
+            break  # those of a primitive with itself come first
+        worst = max(worst, _loss(graph, l, graph.products[i].left // 16, graph.products[i].rows))
+    for i in range(0, graph.welds.shape[0], 3):  # three displacements, three rotations
+        worst = max(worst, _loss(graph, l, graph.welds[i, 0], 3))
+    for i in range(axes.shape[0]):
+        worst = max(worst, _loss(graph, l, axes[i].row, 1))
+    return worst
+
+
+@kernel
+def _loss(graph, l, e, rows):
+    """|1 - n / s| of successive rows."""
+    share = 1.0
+    for r in range(e, e + rows):
+        share *= get(l.rows0.S, graph.diagonal[r]) / get(l.upper, graph.diagonal[r])  # reciprocals of s and n
+    return abs(1.0 - share) * (COMPENSATED if rows > 1 else 1.0)
+
+
+@kernel
+def _multiply_chart_parts(graph, H, l):
+    """Add the products at the parts of split bodies."""
+    t, lower, upper = stack(12), l.lower, l.upper  # t: C W0 of a body
+    for i in range(graph.parts.shape[0]):
+        # A part of a hub has 1 / scale of its mass and inertia, so W is `scale` times as large
+        part, scale = graph.parts[i], graph.scales[i]
+        left, rows, right, columns = part.left, part.rows, part.right, part.columns
+        target, stride, kind, b = part.target, part.stride, part.kind, part.body
+        light, w = graph.inverse[WEIGHTS * b + W_MASS], WEIGHTS * b + W_ROTATION
+        # C W0 of the rotations of a weld
+        if kind != ROWS and graph.bodies[b, 1] == 7:
+            for c in range(3):
+                put(t, 4 * c, rotate_rate(l, b, four(graph.inverse, w + 4 * c)))
+        for r in range(rows):
+            for c in range(columns):
+                at, h = target + r * stride + c, left + 16 * r
+                # Two sets of rows at the part
+                if kind == ROWS:
+                    other = right + 16 * c
+                    if left != right or c >= r:
+                        more(upper, at, scale * inner(H, h, l.X, other))
+                    if left != right or c > r:
+                        more(lower, at, scale * inner(H, other, l.X, h))
+                # Two welds: +-W0 on the translations, +-C W0 on the rotations
+                elif kind == WELDS:
+                    if r < 3 and r == c:
+                        more(upper, at, scale * light)
+                        more(lower, at, scale * light)
+                    elif r >= 3 and c >= 3:
+                        more(upper, at, scale * t[4 * (c - 3) + r - 3])
+                        more(lower, at, scale * t[4 * (r - 3) + c - 3])
+                else:
+                    # Rows and a weld: H C W0 in one factor, W0 H^T C^T in the other
+                    turned = light * H[h + c]
+                    if c >= 3:
+                        o = 4 * (c - 3)
+                        turned = H[h + 4] * t[o] + H[h + 5] * t[o + 1] + H[h + 6] * t[o + 2]
+                    placed = l.X[h + c + c // 3]
+                    if kind == ROWS_WELD:
+                        more(upper, at, scale * turned)
+                        more(lower, at, scale * placed)
+                    else:
+                        more(upper, target + c * stride + r, scale * placed)
+                        more(lower, target + c * stride + r, scale * turned)

@@ -1,19 +1,62 @@
-"""Dense output of step methods: v and vd are interpolated in the chart, then positions and velocities are solved for.
+"""Outputs of a run between its steps: the records of accepted states, dense output, readers of it."""
 
-The driver uses it at the times of t_eval, in its own workspace. `Solution.at` and events use it through `read` and a
-workspace of their own (reader.py), where the chart of a step is rebuilt: q0, the time and the selection of rows
-determine it.
-"""
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from ..errors import Status
-from ..jit.kernels import caller, entry, kernel, long_kernel
+from ..jit.kernels import caller, entry, kernel, long_kernel, resident
 from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import call_accelerate, call_place
-from ..methods.interpolants import call_value
+from ..methods.interpolants import call_fill, call_value
+from ..model.joint_turns import angle_after
 from ..rows.interface import take_noted_selection
-from ..workspaces.run_state import B_CHART, B_DATA, B_H, B_START, load_run
-from ..workspaces.workspace import load
-from .tolerances import FEW, LEGS
+from ..workspaces import B_CHART, B_DATA, B_END, B_H, B_START, STORED, arrays_of, load, load_run
+from .run_memory import call
+from .tolerances import FEW, KEPT_FLOATS, LEGS, LONG_STEPS
+
+# Outputs of a driver: the records of accepted states.
+
+
+@long_kernel
+def record(r, log, t, q, qd, qdd):
+    """Record one output, at the last accepted state or inside the step."""
+    n, i = q.size, r.numbers.rows
+    # t, q, qd, qdd, angles of joints and memories of forces
+    row = log.out[i]
+    row[0] = t
+    for j in range(n):
+        row[1 + j], row[1 + n + j], row[1 + 2 * n + j] = q[j], qd[j], qdd[j]
+    for j in range(r.remembered.size):
+        row[1 + 3 * n + j] = r.remembered[j]
+    # Within a step angles are extrapolated from its start
+    if t != r.clock.t:
+        for j in range(r.joints.shape[0]):
+            row[1 + 3 * n + j] = angle_after(r, j, q, qd, t - r.clock.t)
+    r.numbers.rows = i + 1
+
+
+@long_kernel
+def store_now(w, r):
+    """q, qd, qdd as those of the last accepted point."""
+    copy(w.q, r.now[0])
+    copy(w.qd, r.now[1])
+    copy(w.qdd, r.now[2])
+
+
+@long_kernel
+def restore_now(w, r):
+    """Put them back."""
+    copy(r.now[0], w.q)
+    copy(r.now[1], w.qd)
+    copy(r.now[2], w.qdd)
+
+
+# Dense output of step methods: v and vd are interpolated in the chart, then positions and velocities are solved for.
+#
+# The driver uses it at the times of t_eval, in its own workspace. `Solution.at` and events use it through `read` and a
+# workspace of their own (dense_output.py), where the chart of a step is rebuilt: q0, the time and the selection of rows
+# determine it.
 
 NOT_FINITE = int(Status.NOT_FINITE)
 
@@ -199,3 +242,239 @@ def _go_to(context, c, r, t, began, block):
         if status == 0 and most <= FEW:
             break
     return _evaluate_there(context, w, r, t, block) if status == 0 else status
+
+
+# What a step gives besides its end: the interpolation block, and the states that t_eval asks for.
+
+
+@kernel
+def is_wanted_before(r, log, t1):
+    """Whether t_eval asks for a time before t1."""
+    i = r.numbers.next_eval
+    return i < log.t_eval.size and log.t_eval[i] < t1
+
+
+@kernel
+def record_end(w, r, log, t):
+    """Record the state at the end of a step where every step is asked for, or t by t_eval."""
+    if log.t_eval.size == 0:
+        record(r, log, t, w.q, w.qd, w.qdd)
+    elif r.numbers.next_eval < log.t_eval.size and log.t_eval[r.numbers.next_eval] == t:
+        record(r, log, t, w.q, w.qd, w.qdd)
+        r.numbers.next_eval += 1
+
+
+@kernel
+def head_block(r, t0, t1):
+    """What every block of a step begins and ends with: the step, its chart, and what is remembered."""
+    block = r.block
+    block[B_START], block[B_H], block[B_END], block[B_CHART] = t0, t1 - t0, t1, r.numbers.chart_rows
+    copy(r.remembered, block[block.size - r.remembered.size :])
+
+
+@kernel
+def store_block(r, log):
+    """Keep the block of a step, where blocks are kept."""
+    if r.numbers.dense == STORED:
+        copy(r.block, log.blocks[r.numbers.blocks])
+        r.numbers.blocks += 1
+
+
+@kernel
+def record_step(context, run, c, r, log, t0, t1):
+    """Record what t_eval asks for in (t0, t1], or the step's end where it asks for nothing. Status."""
+    w = c.work
+    # Most steps record their end only
+    within = r.numbers.dense != 0 or is_wanted_before(r, log, t1)
+    if not within:
+        record_end(w, r, log, t1)
+        return 0
+    if log.t_eval.size == 0:
+        record(r, log, t1, w.q, w.qd, w.qdd)
+    # Dense output moves the workspace: keep what Newton's methods start from, and fill the block
+    keep(c, r.warm)
+    head_block(r, t0, t1)
+    status = call_fill(r.kernels.fill, context, run)
+    if status != 0:
+        return status
+    store_block(r, log)
+    while r.numbers.next_eval < log.t_eval.size and log.t_eval[r.numbers.next_eval] <= t1:
+        # Requested times up to t1
+        t = log.t_eval[r.numbers.next_eval]
+        r.numbers.next_eval += 1
+        if t == t1:
+            record(r, log, t, r.now[0], r.now[1], r.now[2])
+            continue
+        status = between(context, w, r, t, r.block)
+        if status != 0:
+            return status
+        record(r, log, t, w.q, w.qd, w.qdd)
+    # Back to the end of the step
+    bring_back(c, r.warm)
+    restore_now(w, r)
+    return 0
+
+
+# Readers of dense output: states between the steps of a run, in a workspace of the reader's own.
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """How the steps of runs are read: what a `Reader` is made of, in the process of the run."""
+
+    read: object  # the kernel; arguments as of dense_output.read
+    workspace: object  # a function without arguments: (context, run), the reader's own
+    system: object  # the `System` as it was run
+    shift: int  # from a step to the block that ends with the angles at its start
+    degree: int  # power of two, of a polynomial that can be expected to follow a function of the states in a step
+    idle: list = field(default_factory=list)  # a `Reader` that is not in use
+
+    def reader(self):
+        """A `Reader`, as if it were new."""
+        try:
+            found = self.idle.pop()
+        except IndexError:
+            return Reader(self)
+        found.enter(self.system)
+        return found
+
+    def give(self, reader):
+        """Take back one that is no longer in use, unless it is large."""
+        if reader.is_small and not self.idle:
+            self.idle.append(reader)
+
+
+class Reader:
+    """Reads states between steps; one thread at a time."""
+
+    def __init__(self, reading):
+        context, run = reading.workspace()
+        self._read, self.degree, self.n = reading.read, reading.degree, run.now.shape[1]
+        (self._context, *kept), (self._run, *more) = resident(context), resident(run)
+        self._kept, self._kernels, self._reals = (kept, more), run.kernels, context.system.reals
+        own = [part for name, part in context._asdict().items() if name not in ("system", "graph")]
+        arrays = [array for array in arrays_of((*own, run)) if array.size]
+        self.is_small = sum(array.size for array in arrays) < KEPT_FLOATS
+        self._images = [(array, array.copy()) for array in arrays] if self.is_small else []
+
+    def enter(self, system):
+        """As if it were new, for the numbers of a system."""
+        for array, image in self._images:
+            array[...] = image
+        self._reals[...] = system.reals
+
+    def __call__(self, t, rows, blocks, charts, points):
+        """States (k, 3, n) at times t (k,), in the steps blocks[rows]; and the Status."""
+        out = np.zeros((t.size, 3, self.n))
+        arguments = self._context, self._run, t, rows, blocks, charts, points, out
+        long = self.n >= LONG_STEPS
+        return out, Status(call(self._read, arguments, (self._kernels,)) if long else self._read(*arguments))
+
+
+# What a run with dense output leaves to its solution: the blocks of its steps, read at any time.
+
+
+class Pieces:
+    """The trajectories of a run's parts, one after the other, as one `Trajectory`."""
+
+    def __init__(self, parts):
+        self.parts, self.start, self.end = parts, parts[0].start, parts[-1].end
+
+    @property
+    def edges(self):
+        """The steps' ends (k,), s."""
+        return np.unique(np.concatenate([part.edges for part in self.parts]))
+
+    def __call__(self, t):
+        """As of a `Trajectory`."""
+        states, memory, status = self._gathered(t, lambda part, times: part(times))
+        return states, memory, max(status)
+
+    def anchors(self, t):
+        """As of a `Trajectory`."""
+        return self._gathered(t, lambda part, times: part.anchors(times))
+
+    def _gathered(self, t, ask):
+        """What the parts say of times t, in their order; where it is no array, a list."""
+        piece = np.searchsorted([part.end for part in self.parts[:-1]], t)
+        order, found = [], []
+        for i, part in enumerate(self.parts):
+            at = np.flatnonzero(piece == i)
+            if at.size or (not found and i == len(self.parts) - 1):
+                order.append(at)
+                found.append(ask(part, t[at]))
+        back = np.argsort(np.concatenate(order), kind="stable")
+        columns = zip(*found, strict=True)
+        return [np.concatenate(column)[back] if isinstance(column[0], np.ndarray) else column for column in columns]
+
+
+class Trajectory:
+    """What a run with dense_output leaves to its solution.
+
+    Parameters
+    ----------
+    readings : tuple
+        The `Reading` of this process; a function and its arguments, which make it in another one.
+    records : tuple of ndarray
+        Blocks (steps, ...), charts (charts, 5), and q0 of each chart (charts, n).
+    start : float, s
+    first : ndarray (3, n)
+        q, qd, qdd there, for a run that has made no step.
+    angles : ndarray (count,)
+        Of the joints, there.
+    stops : ndarray (stops, 3)
+        Of the `Task`: at one where a function is asked the step counts that begins there, as for outputs.
+    """
+
+    def __init__(self, readings, records, start, first, angles, stops):
+        self._reading, self.again = readings
+        self.blocks, self.charts, self.points = records
+        self.start, self.first, self.angles = start, first, angles
+        self.asked = stops[stops[:, 1] != 0.0, 0]
+
+    def __getstate__(self):
+        return {**self.__dict__, "_reading": None}
+
+    @property
+    def reading(self):
+        """The `Reading`; made anew in another process than the run's."""
+        if self._reading is None:
+            make, *arguments = self.again
+            self._reading = make(*arguments)
+        return self._reading
+
+    @property
+    def end(self):
+        """The time reached."""
+        return float(self.blocks[-1, B_END]) if len(self.blocks) else self.start
+
+    @property
+    def edges(self):
+        """The steps' ends (k,), s."""
+        return self.blocks[:, B_END] if len(self.blocks) else np.array([self.start])
+
+    def __call__(self, t):
+        """States (k, 3, n) at times t (k,) between start and end, what forces remember (k, slots), and the Status."""
+        slots = self.reading.system.memory.size
+        if not len(self.blocks):
+            return np.repeat(self.first[None], t.size, axis=0), np.zeros((t.size, slots)), Status.SUCCESS
+        rows = np.searchsorted(self.blocks[:, B_END], t)
+        if self.asked.size:
+            rows = np.minimum(rows + np.isin(t, self.asked), len(self.blocks) - 1)
+        order = np.argsort(rows, kind="stable")  # so that a chart is made once
+        out = np.empty((t.size, *self.first.shape))
+        reader = self.reading.reader()
+        out[order], status = reader(t[order], rows[order], self.blocks, self.charts, self.points)
+        self.reading.give(reader)
+        return out, self.blocks[rows, self.blocks.shape[1] - slots :], status
+
+    def anchors(self, t):
+        """The starts (k,) of the steps that times t (k,) lie in, and the angles (k, count) of joints there."""
+        if not len(self.blocks):
+            return np.full(t.size, self.start), np.repeat(self.angles[None], t.size, axis=0)
+        rows = np.searchsorted(self.blocks[:, B_END], t)
+        end = self.blocks.shape[1] - self.reading.system.memory.size
+        kept = self.blocks[:, end - self.angles.size : end]
+        if self.reading.shift:
+            kept = np.concatenate((self.angles[None], kept[:-1]))
+        return self.blocks[rows, B_START], kept[rows]

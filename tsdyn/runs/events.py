@@ -1,15 +1,22 @@
-"""Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp."""
+"""Events: users' functions of time and state, and their zeros inside every step, on states of the manifold."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InvalidArgument
+from ..errors import InvalidArgument, Status
+from ..maths.root_isolation import LARGEST, Search, TooFast
+from ..maths.tolerances import MOST_SCALED
+from ..model.handles import handles_of
 from ..observables import reactions
-from ..observables.exerted import Exerting
-from ..observables.kinematics import Anchor, Kinematics
-from ..validation import number
+from ..observables.reactions import Exerting
+from ..observables.state import Anchor, Kinematics
+from ..validation import demand, demand_numbers, is_count, number
+from ..workspaces import B_END, STORED
+from .tolerances import EPS, FAST_TURN, LEAST_TIME, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
+
+# Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp.
 
 
 class Event(NamedTuple):
@@ -107,3 +114,373 @@ class Instant(Exerting, Kinematics):
 
     def __getitem__(self, i):
         return tuple(self)[i]
+
+
+# States inside the last step of a run, for event location.
+
+ROOM = 64  # states that are kept
+
+
+class Inside:
+    """States within the step that a run has just made."""
+
+    def __init__(self, reader, run, log, t0, before):
+        self.t0, self.t1, self.degree = t0, float(run.clock.t), 0
+        self._reader, self._log, self._block = reader, log, run.block[None]
+        self._known = {t0: before, self.t1: run.now.copy()}
+
+    def states(self, times):
+        """States (3, n) at times (k,), None where there is none."""
+        times, known = times.tolist(), self._known
+        # States that are known already are not read again
+        missing = [t for t in times if t not in known]
+        if missing:
+            found = dict(zip(missing, self._read(np.array(missing)), strict=True))
+            if len(known) > ROOM:
+                return [found[t] if t in found else known[t] for t in times]
+            known.update(found)
+        return [known[t] for t in times]
+
+    def _read(self, times):
+        rows = np.zeros(times.size, int)
+        states, status = self._reader(times, rows, self._block, self._log.charts, self._log.points)
+        if status == Status.SUCCESS:
+            return states
+        return [self._read(times[i : i + 1])[0] for i in range(times.size)] if times.size > 1 else [None]
+
+    def at(self, t):
+        """The state (3, n) at t."""
+        (state,) = self.states(np.array([t]))
+        if state is None:
+            raise Failed(f"there is no state at t = {t:.9g} s to evaluate events at.", t)
+        return state
+
+
+# Event location: zeros of users' functions inside every step, on states of the manifold.
+#
+# The driver is called one step at a time and is unaware of events, so events change no step. Functions are sampled on
+# the dense output of the step, as finely as each requires (root_isolation.py), and Brent's method locates the zeros. A
+# sign change is an event. A zero value is an event, too: exact at a sampled time, or within rounding where the function
+# touches zero without a sign change. A touch counts once, in either direction.
+
+
+class Occurrence(NamedTuple):
+    """An event found."""
+
+    t: float
+    index: int
+    state: np.ndarray  # (3, n)
+
+
+class Track:
+    """What is known of one function up to the last step's end."""
+
+    def __init__(self, value):
+        self.value = self.end = value  # at that time, and at the end of the present step
+        self.sign = 0.0  # the last it had; 0 for none yet
+        self.significant = None  # time and value at which it had that sign
+        self.zero = None  # time of the last zero, if it has had no sign since
+        self.passed = self.pending = False  # that zero is a start within rounding; may become an event on being left
+        self.noise = 0.0  # rounding error of the values, once measured
+        self.degree = 0  # that the last step needed
+
+
+class Watch:
+    """The events of one run: what is known of the functions, and what has been found.
+
+    Attributes
+    ----------
+    t : float, s
+        The time up to which events have been searched.
+    """
+
+    def __init__(self, events, packed, reader, start):
+        self.events, self.packed = events, packed
+        self.start = self.t = start
+        self.state = self.memory = None  # at t, and what is remembered of it: joints' angles, and what forces do
+        self.angles = handles_of(packed).count
+        self.beside = None  # the start of the present step, for `Instant`
+        self.tracks = None
+        self.list = [[] for _ in events]
+        rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
+        self._p = rigid[:, None] + np.arange(3, 7)
+        self._signs = np.random.default_rng(0).choice([-1.0, 1.0], (3, 3, packed.system.bodies[:, 1].sum()))
+        self.read_by(reader)
+
+    def read_by(self, reader):
+        """Take a reader of the steps that are watched from now on."""
+        none, self.reader = np.empty(0), reader
+        reader(none, none.astype(int), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0)))  # loads the kernel
+
+    def found(self, n):
+        """Times, positions and velocities of each event."""
+        times = [np.array([each.t for each in found]) for found in self.list]
+        states = [np.array([each.state for each in found]).reshape(-1, 3, n) for found in self.list]
+        return times, *([np.ascontiguousarray(state[:, i]) for state in states] for i in (0, 1))
+
+    def advance(self, memory, log, most):
+        """As `Memory.advance`; the Status, and what there is to say of it."""
+        run = memory.run
+        # The first call begins the run and takes the values at its start
+        if not run.numbers.begun:
+            status = memory.advance(log, -1)
+            if not run.numbers.begun:
+                return status, ""
+            self.state, self.memory = run.now.copy(), run.remembered.copy()
+            self._note_start()
+            if self.tracks is None:
+                try:
+                    self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
+                except Failed as failure:
+                    raise InvalidArgument(f"events: {failure}") from failure.__cause__
+        stiff = run.numbers.stiff
+        # One step at a time, searched before the next one
+        for _ in range(most):
+            done = run.numbers.steps
+            status = memory.advance(log, 1)
+            if run.numbers.steps > done:
+                try:
+                    last = self._search_step(run, log)
+                except Failed as failure:
+                    return Status.EVENT_FAILED, str(failure)
+                if last is not None:
+                    return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
+            full = run.numbers.chart_rows + 2 >= len(log.charts)
+            if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
+                return status, ""
+        return status, ""
+
+    def saved(self):
+        """What is known and found between two steps: numbers, and arrays by name."""
+        found = [each for mine in self.list for each in mine]
+        numbers = {"t": self.t, "tracks": [vars(track) for track in self.tracks], "found": [each[:2] for each in found]}
+        states = np.array([each.state for each in found]).reshape(-1, *self.state.shape)
+        return numbers, {"watch.state": self.state, "watch.memory": self.memory, "watch.found": states}
+
+    def restore(self, numbers, arrays):
+        """As it was when it was saved."""
+        self.t, self.state, self.memory = numbers["t"], arrays["watch.state"], arrays["watch.memory"]
+        demand(self.state.shape == (3, self._signs.shape[2]) and len(self.memory) >= self.angles, "the state of events")
+        self.tracks = [Track(0.0) for _ in self.events]
+        for track, known in zip(self.tracks, numbers["tracks"], strict=True):
+            if known["significant"] is not None:
+                t, value = map(float, known["significant"])
+                known = known | {"significant": (t, value)}
+            demand_numbers(known | {"significant": None}, vars(track), ("significant", "zero"))
+            vars(track).update(known)
+        self.list = [[] for _ in self.events]
+        for (t, index), state in zip(numbers["found"], arrays["watch.found"], strict=True):
+            demand(is_count(index), "the number of an event")
+            self.list[index].append(Occurrence(float(t), index, state))
+
+    def go_back(self, run, log):
+        """Let the run end where events were searched last."""
+        if self.state is not None and run.clock.t > self.t:
+            run.remembered[:] = self.memory
+            self._end(run, log, self.t, self.state, self.t)
+
+    def _note_start(self):
+        self.beside = self.t, self.state, self.memory[: self.angles]
+
+    def _instant(self, t, state):
+        return Instant(self.packed, self.memory[self.angles :], self.beside, t, state)
+
+    def _value(self, i, t, state):
+        return self.events[i].value(t, self._instant(t, state))
+
+    def _search_step(self, run, log):
+        """Look at the step just made; the `Occurrence` that ends the run, or None."""
+        self._note_start()
+        before, self.memory = self.memory, run.remembered.copy()
+        try:
+            return self._locate(run, log, Inside(self.reader, run, log, self.t, self.state))
+        except KeyboardInterrupt:
+            self.memory = before
+            raise
+
+    def _locate(self, run, log, step):
+        found, failure, end = [], None, step.t1
+        step.degree = self._degree(step)
+        for i in range(len(self.events)):
+            # Times that bracket the zeros of event i
+            points, failed = self._points(i, step, end)
+            if failed is not None:
+                failure, end = failed, min(end, failed.t)
+            try:
+                # Events among them
+                mine = self._walk(i, step, points)
+            except Failed as failed:
+                mine, failure, end = [], failed, min(end, failed.t)
+            found += mine
+            # The run ends with the event that reaches its limit
+            last = self.events[i].limit - len(self.list[i])
+            if len(mine) >= last:
+                end = min(end, mine[int(last) - 1].t)
+        # Events in order of time, up to the one that ends the run or the first failure
+        for each in sorted(found, key=lambda each: each.t):
+            if failure is not None and each.t >= failure.t:
+                break
+            self.list[each.index].append(each)
+            if len(self.list[each.index]) >= self.events[each.index].limit:
+                run.remembered[: self.angles] = self._instant(each.t, each.state).angles
+                self._end(run, log, each.t, each.state, step.t0)
+                self.t, self.state = each.t, each.state
+                return each
+        self.t, self.state = step.t1, step.at(step.t1)
+        if failure is not None:
+            raise failure
+        return None
+
+    def _points(self, i, step, end):
+        """Times up to `end`, and values of event i, between which its sign changes once at most; what `Failed`."""
+        track, good, failure = self.tracks[i], [step.t0], None
+
+        def sample(times):
+            values = np.full(times.size, np.nan)
+            for k, (t, state) in enumerate(zip(times.tolist(), step.states(times), strict=True)):
+                if state is not None:
+                    values[k] = self._value(i, t, state)
+                    good.append(t)
+            return values
+
+        # A function that fails at some time is searched up to the last time before
+        while end > step.t0:
+            search = Search(sample, lambda t: self._shaken(i, step, t), track.noise)
+            try:
+                degree = max(step.degree, track.degree // 2)
+                track.degree, track.end = search.run(step.t0, track.value, end, degree)
+                track.noise = search.noise
+                return search.points, failure
+            except Failed as failed:
+                failure, end = failed, max(t for t in good if t < failed.t)
+            except TooFast:
+                return [(step.t0, track.value)], Failed(
+                    f"{self.events[i].name} changes too fast to be followed: {search.spent} values between "
+                    f"t = {step.t0:.9g} and {end:.9g} s were not enough. Give a max_step, or a smoother function.",
+                    step.t0,
+                )
+        return [(step.t0, track.value)], failure
+
+    def _degree(self, step):
+        """The degree that the interpolant and the fastest turn of a body ask for."""
+        squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
+        turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
+        return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
+
+    def _walk(self, i, step, points):
+        """The occurrences of event i among these points."""
+        track, direction, found = self.tracks[i], self.events[i].direction, []
+        (before, value), *rest = points
+        # A value near zero at the start of the run is a zero there, within rounding
+        if track.sign == 0.0 and track.zero is None:  # the run's first step
+            if 0.0 < abs(track.value) <= START_ZERO * max(abs(value) for _, value in points):
+                track.zero, track.passed, track.pending = before, value != 0.0, value == 0.0
+            else:
+                rest = points
+        for t, value in rest:
+            sign = float(value > 0.0) - float(value < 0.0)
+            # A zero: an event at once, or when it is left, if the direction counts
+            if value == 0.0:
+                if track.zero is None or track.passed:
+                    late = track.sign == 0.0 and t > self.start  # the start's own zero, within rounding
+                    track.passed, track.pending = False, late or (direction != 0.0 and direction * track.sign >= 0.0)
+                    if not track.pending:
+                        found.append(self._zero(i, step, t, before))
+                track.zero = t
+            # A sign: leaves a zero, or changes
+            elif abs(value) > track.noise:
+                if track.zero is not None:
+                    if track.pending and direction * sign >= 0.0:
+                        found.append(self._leave(i, step, track.zero, (t, value)))
+                    track.zero, track.passed, track.pending = None, False, False
+                elif sign == -track.sign and direction * sign >= 0.0:
+                    found += self._root(i, step, t, value)
+                track.sign, track.significant = sign, (t, value)
+            before = t
+        track.value = track.end
+        return found
+
+    def _shaken(self, i, step, t):
+        """By how much the value of event i at t changes with rounding errors of the state."""
+        try:
+            # Rounding of the state, in three random directions
+            state, value = step.at(t), self._at(i, step, t)
+            size = SHAKEN * np.abs(state).max(axis=1, keepdims=True)
+            shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
+        except Failed:
+            return 0.0
+        return NOISE * max(abs(each - value) for each in shaken)
+
+    def _zero(self, i, step, t, other):
+        """The `Occurrence` at a zero, or at the end next to another time of the zeros around it."""
+        if t != other and self._at(i, step, t) == 0.0:
+            # Bisection for the end of an interval of zeros
+            while t != (middle := 0.5 * (t + other)) != other:
+                if self._at(i, step, middle) == 0.0:
+                    t = middle
+                else:
+                    other = middle
+        return Occurrence(t, i, step.at(t))
+
+    def _leave(self, i, step, t, last):
+        """The `Occurrence` where event i leaves a zero: that at t, or one that is so within rounding."""
+        value = self._at(i, step, t)
+        if value != 0.0 and (value < 0.0) != (last[1] < 0.0):
+            t = self._between(i, step, (t, value), last)
+            return Occurrence(t, i, step.at(t))
+        return self._zero(i, step, t, last[0])
+
+    def _root(self, i, step, t1, b):
+        """The change of sign up to t1, where event i has the value b; none if it is that of the run's start."""
+        track = self.tracks[i]
+        # From the last value with a sign, or from the step's start
+        t0, a = max(track.significant, (step.t0, track.value))
+        if a == 0.0 or (a < 0.0) == (b < 0.0):
+            return [Occurrence(t0, i, step.at(t0))]
+        root = self._between(i, step, (t0, a), (t1, b))
+        return [] if self._is_start(i, step, root, a) else [Occurrence(root, i, step.at(root))]
+
+    def _is_start(self, i, step, t, before):
+        """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before."""
+        if t - self.start <= START_ZERO * max(abs(self.start), step.t1 - step.t0):
+            return True
+        return step.t0 == self.start and abs(before) <= self._shaken(i, step, step.t0)
+
+    def _between(self, i, step, first, last):
+        """Where event i changes its sign between two times with values."""
+        from scipy.optimize import brentq  # takes a while to import
+
+        # Values of order one, by a power of two
+        known, (t0, a), (t1, b) = dict((first, last)), first, last
+        unit = math.ldexp(1.0, min(-math.frexp(max(abs(a), abs(b)))[1], MOST_SCALED))
+
+        def value(t):  # of size one: Brent's method multiplies three of them
+            return unit * (known[t] if t in known else self._at(i, step, t))
+
+        # Brent's method, as near as numbers of this size allow
+        least = max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
+        root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
+        shift = least + ROOT * abs(root)
+        # a run that continues from a terminal event must not find it again
+        ends, side = self.events[i].limit < math.inf, math.copysign(1.0, b)
+        while ends and root + shift < t1 and side * value(root) <= 0.0:
+            root, shift = root + shift, 2.0 * shift
+        return root
+
+    def _at(self, i, step, t):
+        return self._value(i, t, step.at(t))
+
+    @staticmethod
+    def _end(run, log, t, state, start):
+        """Let the run end at t, within the step that began at `start`."""
+        run.now[:] = state
+        run.clock.t = t
+        if log.t_eval.size > 0:
+            while run.numbers.rows > 0 and log.out[run.numbers.rows - 1, 0] > t:
+                run.numbers.rows -= 1
+        elif t > start:
+            log.out[run.numbers.rows - 1] = [t, *state.ravel(), *run.remembered]
+        else:
+            run.numbers.rows -= 1
+        if run.numbers.dense == STORED:
+            log.blocks[run.numbers.blocks - 1, B_END] = t

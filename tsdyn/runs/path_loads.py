@@ -2,7 +2,7 @@
 
 A method sees the loads at its stages, and flies over a bump, a notch or a wall between them. So the loads that users
 have written are sampled along the quintic Hermite polynomial of the ends of a step, as densely as functions of time are
-(motions/changes.py). Eighth differences of the samples, and of each 4th, 16th and 64th of them, must be those of a load
+(motions/knots.py). Eighth differences of the samples, and of each 4th, 16th and 64th of them, must be those of a load
 that a step as long resolves:
 
     |d| <= max(DISTINCT (atol + rtol |qd|) / (s dt), (atol + rtol) |f|)     s dt: between the samples of a difference
@@ -18,8 +18,7 @@ from ..jit.kernels import callback, caller, kernel, stack
 from ..methods.interpolants import quintic
 from ..model.equations import set_time
 from ..motions.tolerances import SAMPLES
-from ..workspaces.run_state import load_run
-from ..workspaces.workspace import load
+from ..workspaces import load, load_run
 from .tolerances import DISTINCT, IMPLICIT_PLACES, NOISE_OF_LOADS, PLACES
 
 WATCH = "ppdd"
@@ -113,8 +112,8 @@ def watch(context, run, t1, h):
     set_time(c.system, t1)
     stride = 1
     while ORDER * stride <= places:
-        i = _first_large(f, places, stride, max(DISTINCT * tol * places / (stride * h), noise))
-        if i >= 0:
-            return (i + (ORDER - 1) * stride if i > 0 else stride) / places
+        first = _first_large(f, places, stride, max(DISTINCT * tol * places / (stride * h), noise))
+        if first >= 0:
+            return (first + (ORDER - 1) * stride if first > 0 else stride) / places
         stride *= 4
     return 1.0

@@ -1,34 +1,258 @@
-"""The step driver: steps, outputs, charts. One kernel serves every scene, method and formulation by address.
+"""The step driver: steps, stops, charts. One kernel serves every scene, method and formulation by address."""
 
-A step is proposed (where it ends), attempted (x and y at its end, from the method), and rejected or accepted.
-"""
+import math
 
 from ..errors import Status
+from ..formulations.accelerations import body_of, unit_friction
+from ..formulations.chart_coordinates import turned_most
 from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL
 from ..formulations.tolerances import CONTRACTION_LOST
-from ..jit.kernels import caller, entry, kernel, long_kernel
+from ..jit.kernels import caller, entry, kernel, long_kernel, stack
 from ..maths.dense_linalg import copy
 from ..methods.explicit import call_step
-from ..model.equations import is_rheonomic, remember, set_time
+from ..model.equations import hold_pieces, is_rheonomic, remember, set_time
 from ..model.joint_turns import count_turns
-from ..rows.interface import doubt_selection, is_singular_within_a_step
-from ..workspaces.run_state import AGAIN, load_run
-from ..workspaces.workspace import load
-from .breakpoints import amend, fixed_end, is_sampled, next_stop, take_pieces
-from .chart_changes import begin_chart, has_hardly_turned
-from .coming_to_rest import until_rest
-from .dense_output import bring_back, call_complete, evaluate, keep
-from .outputs import restore_now, store_now
+from ..motions.tolerances import TOGETHER
+from ..rows.interface import (
+    doubt_selection,
+    is_next_to_singular,
+    is_singular_within_a_step,
+    note_indicator,
+    note_selection,
+)
+from ..workspaces import AGAIN, load, load_run
+from .dense_output import (
+    bring_back,
+    call_chart,
+    call_complete,
+    evaluate,
+    keep,
+    record,
+    record_end,
+    record_step,
+    restore_now,
+    store_now,
+)
 from .path_loads import call_watch
-from .rotation_limit import longest_step, too_far
-from .run_log import is_full, no_log, note_accepted, note_try
+from .run_log import close_chart, is_full, no_log, note_accepted, note_try, open_chart
 from .step_control import accept, first_step, gets_on, stretch, watch_stiffness
-from .step_outputs import record_end, record_step
-from .tolerances import CUT_SHORT, HALVED, QUARTERED, SHRINK, TURN_GAIN
+from .tolerances import (
+    CUT_SHORT,
+    HALVED,
+    HARDLY_TURNED,
+    LANDING,
+    LITTLE,
+    MOST_TURN,
+    QUARTERED,
+    SHRINK,
+    SLIDES,
+    SLIVER,
+    TOO_FAR,
+    TURN_GAIN,
+)
+
+# Rotation limit of a step in driven scenes.
+#
+# A prescribed coordinate is exact for any step length, so an error estimate never limits the step; and after a full
+# turn a body is back in its orientation, so a chart doesn't either.
+
+
+@kernel
+def longest_step(bodies, now):
+    """The step in which nothing turns by more than MOST_TURN; now (3, n) is q, qd, qdd."""
+    longest = math.inf
+    for b in range(bodies.shape[0]):
+        if bodies[b, 1] == 7:
+            # |pd| and |pdd| of the Euler parameters
+            speed, gain = 0.0, 0.0
+            for c in range(bodies[b, 0] + 3, bodies[b, 0] + 7):
+                speed += now[1, c] * now[1, c]
+                gain += now[2, c] * now[2, c]
+            gain = 2.0 * math.sqrt(max(gain - speed * speed, 0.0))  # pdd is pd.pd along p, alpha / 2 across
+            speed = 2.0 * math.sqrt(speed)
+            # MOST_TURN = speed h + gain h^2 / 2, solved for h without cancellation
+            fast = speed + math.sqrt(speed * speed + 2.0 * gain * MOST_TURN)
+            if fast > 0.0:
+                longest = min(longest, 2.0 * MOST_TURN / fast)
+    return longest
+
+
+@kernel
+def too_far(bodies, now, qd, h):
+    """Whether a body has turned by more than TOO_FAR, from its speeds at both ends."""
+    for b in range(bodies.shape[0]):
+        if bodies[b, 1] == 7:
+            # Mean speed of both ends times h
+            one, other = 0.0, 0.0
+            for c in range(bodies[b, 0] + 3, bodies[b, 0] + 7):
+                one += now[1, c] * now[1, c]
+                other += qd[c] * qd[c]
+            if (math.sqrt(one) + math.sqrt(other)) * h > TOO_FAR:
+                return True
+    return False
+
+
+# Stops: times at which a step must end, such as knots of motions and loads and sampling times.
+#
+# A step that would pass a stop is shortened to end there. At the stop all piecewise functions switch to their next
+# piece, and accelerations are re-evaluated for the output and for the next step. After a shortened step of fixed
+# length, the next step ends on the original time grid. A short change of a function is a stop for steps that begin
+# before it alone.
+
+
+@kernel
+def next_stop(r, log):
+    """The next time at which a step has to end, but for the end of the run; inf where there is none."""
+    i = r.numbers.next_stop
+    # Stops behind, and changes of functions that begin before t
+    while i < log.stops.shape[0] and (log.stops[i, 0] <= r.clock.t or log.stops[i, 2] < r.clock.t):
+        i += 1
+    r.numbers.next_stop = i
+    return log.stops[i, 0] if i < log.stops.shape[0] else math.inf
+
+
+@kernel
+def fixed_end(r, stop):
+    """The end of the next step of fixed length, whether it is the run's last, and whether a stop cuts it.
+
+    t_k = t_origin + k h, but for steps that end at stops; a stop within SLIVER h, or rounding, of t_k stands for it.
+    """
+    # End k of the grid, counted without steps that stops have cut
+    done, h = r.numbers.steps + 1 - r.numbers.cuts, r.clock.h
+    last = done == r.numbers.steps_wanted
+    t1 = r.clock.t_end if last else r.clock.t_origin + done * h
+    # A stop within a sliver of the grid point replaces it
+    near = max(SLIVER * h, TOGETHER * abs(t1))
+    if stop < t1 - near or (last and stop < t1):
+        return stop, False, True
+    return stop if stop < t1 + near and not last else t1, last, False
+
+
+@kernel
+def take_pieces(system, r, log):
+    """Let piecewise motions and loads stay with their pieces up to the next stop."""
+    # The piece is the one half way to the next stop
+    end = min(next_stop(r, log), r.clock.t_end)
+    hold_pieces(system, 0.5 * (r.clock.t + end))
+
+
+@kernel
+def is_sampled(r, log, t1):
+    """Whether Python is asked at this stop, before the run goes on."""
+    i = r.numbers.next_stop
+    if i < log.stops.shape[0] and log.stops[i, 0] == t1 and log.stops[i, 1] != 0.0:
+        r.numbers.waiting = 1
+        return True
+    return False
+
+
+@kernel
+def amend(r, log, q, qd, qdd):
+    """The output at a stop, if there is one, with the accelerations after it."""
+    i = r.numbers.rows - 1
+    if i >= 0 and log.out[i, 0] == r.clock.t:
+        r.numbers.rows = i
+        record(r, log, r.clock.t, q, qd, qdd)
+
+
+# New charts along a run, and what is recorded of the old ones.
+
+PASSAGE = int(Status.PASSAGE)
+
+
+@long_kernel
+def begin_chart(context, c, r, log, reason):
+    """New chart at the present q, qd, qdd; closes the record of the old one. PASSAGE near a singular configuration."""
+    w = c.work
+    # Record of the chart before
+    if reason != AT_START:
+        close_chart(r, log, w.control.condition, w.control.contraction)
+    open_chart(r, log, r.clock.t, reason)
+    # Chart coordinates begin at zero: nothing is left to compensate
+    for j in range(r.x.size):
+        r.x_low[j] = 0.0
+    for j in range(r.y.size):
+        r.y_low[j] = 0.0
+    # Dense output rebuilds a chart from q0 and the selection of rows
+    kept = log.points.shape[0] > 0
+    if kept:
+        copy(w.q, log.points[r.numbers.chart_rows])
+    status = call_chart(r.kernels.start_chart, context, r.clock.t, r.x, r.y, r.yd, r.xd)
+    if kept:
+        note_selection(c.tangent, log.points[r.numbers.chart_rows, w.q.size :])
+    # Distance to a singular configuration
+    if r.numbers.first_order == 0:
+        note_indicator(c.graph, c.tangent, c.chart.rows0)
+        if r.numbers.may_pass == 1 and status == 0 and reason != AT_START and is_next_to_singular(c.tangent):
+            return PASSAGE
+    return status
+
+
+@kernel
+def has_hardly_turned(c):
+    """Whether bodies have rotated on the present chart, by a small angle."""
+    return 0.0 < turned_most(c.chart) < HARDLY_TURNED
+
+
+# Where friction brings a joint to rest: there its force changes at once, and an implicit step is to end just before.
+#
+# With Q the generalised forces of a friction for unit normal load, -Q . qd = mu |v|. From velocity and deceleration,
+#
+#     t_rest = |v| / -d|v|/dt
+#
+# Each step to LANDING of it leaves a tenth of the velocity, until friction at rest is resolved.
+
+
+@kernel
+def _friction_power(c, friction, r, scale, ahead):
+    """-Q . qd of a friction at scale qd + ahead qdd."""
+    graph, qd, Q, power = c.graph, c.work.qd, stack(14), 0.0
+    # Power of friction for unit normal load at scaled velocities
+    for i in range(qd.size):
+        qd[i] = scale * r.now[1, i] + ahead * r.now[2, i]
+    unit_friction(c.system, friction, r.now[0], qd, r.clock.t, Q)
+    for k in range(2):
+        # -Q.qd, body by body
+        b = body_of(friction, k)
+        if b < graph.bodies.shape[0]:
+            at = graph.bodies[b, 0]
+            for j in range(graph.bodies[b, 1]):
+                power -= Q[7 * k + j] * qd[at + j]
+    return power
+
+
+@kernel
+def until_rest(c, r, h):
+    """The step h, or less of it: to just before the first joint comes to rest. Counts those at rest in r.numbers.still.
+
+    c.work.qd is that of r.now after it.
+    """
+    if c.graph.frictions.shape[0] == 0:
+        return h
+    r.numbers.still = 0
+    for i in range(c.graph.frictions.shape[0]):
+        friction = c.graph.frictions[i]
+        # mu |v| now
+        now = _friction_power(c, friction, r, 1.0, 0.0)
+        # At rest, friction grows faster than in proportion to velocity
+        if not _friction_power(c, friction, r, 2.0, 0.0) < SLIDES * now:
+            r.numbers.still += 1
+        elif now < math.inf:
+            # Deceleration by a small part of the step: rest is at h now / slowing parts from here
+            slowing = now - _friction_power(c, friction, r, 1.0, LITTLE * h)
+            if slowing > LITTLE * now:
+                h = min(h, LANDING * LITTLE * h * now / slowing)
+    copy(r.now[1], c.work.qd)
+    return h
+
+
+# The step driver: steps, outputs, charts. One kernel serves every scene, method and formulation by address.
+#
+# A step is proposed (where it ends), attempted (x and y at its end, from the method), and rejected or accepted.
 
 STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAILED)
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
-JAMMED, PASSAGE, UNHELD = int(Status.JAMMED), int(Status.PASSAGE), int(Status.UNHELD)
+JAMMED, UNHELD = int(Status.JAMMED), int(Status.UNHELD)
 OFF_CHART = CHART_LOST, int(Status.NEWTON_FAILED), int(Status.SINGULAR)  # what a chart that reaches nowhere ends in
 
 call_check = caller("p")

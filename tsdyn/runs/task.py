@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import Status
 from ..motions.knots import NO_STOPS
-from .run_end import RunEnd
+from .run_log import RunEnd
 
 
 def between(times, span):

@@ -1,8 +1,8 @@
-"""`Scene`, `simulate` and `Solution`: the user's interface.
+"""`Scene`, `prepare`, `simulate` and `Solution`: the user's interface.
 
 Imports ahead and below.
 
-Begin with simulate.py, whose arguments options.py checks. scene_cache.py holds data shared by the runs of a scene,
-method_choice.py chooses the default method, turns.py when another method goes on, singularity_crossing.py takes step
-methods across singular configurations; segments.py runs what they say. termination.py reports the end of a run.
+Begin with run_options.py (the options of a run) and prepared_run.py (a `Run`: the options made concrete for a scene);
+simulate.py is prepare and run. scene_cache.py holds data shared by the runs of a scene, segments.py changes methods on
+the way and crosses singular configurations, termination.py reports the end of a run.
 """

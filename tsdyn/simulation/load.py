@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import regular_files
+from .. import validation
 from ..calls import fitting
 from ..errors import InvalidArgument, StorageError
 from .resume import ended_run
@@ -149,6 +149,6 @@ def text_of(path: Place) -> str:
     from ..files.scene_text import LARGEST
 
     try:
-        return regular_files.read(path, LARGEST).decode("utf-8-sig").replace("\r\n", "\n")
+        return validation.read(path, LARGEST).decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise StorageError(f"{path} is no text in UTF-8: {error}.") from error

@@ -1,25 +1,27 @@
-"""Scenes far from the origin: runs use a local origin among the bodies; results are in the scene's coordinates.
+"""Scenes far from the origin: runs use a local origin among the bodies; the smallest attainable tolerances."""
 
-Constraints and forces depend on differences of positions, and a position of 1e6 m has no digits below 1e-10 m. If the
-jointed bodies and their ground points lie close together but far from the origin, positions are taken relative to a
-local origin. Its coordinates are multiples of a power of two, so the shift is exact.
-"""
-
+import copy
 from types import SimpleNamespace
 
 import numpy as np
 
 from ..elements.bodies import Ground
+from ..elements.loads import Kernels
 from ..elements.markers import POINT
-from ..elements.user_functions import Kernels
+from ..formulations.tolerances import ROUNDING
 from ..jit.code_hash import is_ours
-from ..model.derived import Derived
-from ..model.lengths import size_of
-from ..model.packed import classes
+from ..model.packed import Derived, classes, size_of
+from ..rows.massless_axes import levers
 from ..runs.events import Instant
-from ..runs.run_end import RunEnd
+from ..runs.run_log import RunEnd
 from .scene_cache import Prepared
-from .tolerances import FAR_ORIGIN
+from .tolerances import FAR_LEVER, FAR_ORIGIN
+
+# Scenes far from the origin: runs use a local origin among the bodies; results are in the scene's coordinates.
+#
+# Constraints and forces depend on differences of positions, and a position of 1e6 m has no digits below 1e-10 m. If the
+# jointed bodies and their ground points lie close together but far from the origin, positions are taken relative to a
+# local origin. Its coordinates are multiples of a power of two, so the shift is exact.
 
 
 def origin_of(packed, q):
@@ -196,3 +198,40 @@ class _Moved:
         states, memory, status = self.trajectory(t)
         states[:, 0] += self.shift
         return states, memory, status
+
+
+# The smallest attainable tolerances: cancellation in positions far from the origin bounds the error estimate.
+
+NOISE = 4.0 * ROUNDING  # direction error of a placement: rounding of a position over the lever
+
+
+def within_rounding(method, packed, q):
+    """Return the method with attainable tolerances, and a sentence if they were raised.
+
+    The Taylor method accounts for the rounding of its projection itself.
+    """
+    if method.step is not None or method.driver != "steps":
+        return method, ""
+    if packed.derived.near is q:
+        return method, ""
+    if packed.derived.levers is None:
+        packed.derived.levers = levers(packed)
+    arms = packed.derived.levers
+    if np.abs(q).max() < FAR_LEVER * arms.min(where=arms > 0.0, initial=np.inf):
+        packed.derived.near = q
+        return method, ""
+    far = np.abs(q[packed.system.bodies[:, :1] + np.arange(3)]).max(axis=1)
+    ratios = np.where(arms > 0.0, far / np.where(arms > 0.0, arms, 1.0), 0.0)
+    worst = int(np.argmax(ratios))
+    noise = NOISE * ratios[worst]
+    if ratios[worst] < FAR_LEVER or min(method.step_tolerances()) >= noise:
+        return method, ""
+    other = copy.copy(method)
+    for i, name in enumerate(("rtol", "atol")):
+        while other.step_tolerances()[i] < noise:
+            setattr(other, name, 2.0 * getattr(other, name))
+    body = packed.bodies[worst].name
+    return other, (
+        f"The tolerances were raised to rtol={other.rtol:.1e} and atol={other.atol:.1e}: {body} is "
+        f"{far[worst]:.3g} m from the origin, where on a lever of {arms[worst]:.3g} m no more digits are left."
+    )

@@ -1,4 +1,4 @@
-"""`prepare`: what every run of a scene with the same options has in common, worked out once."""
+"""`prepare`: what all runs of a scene with the same options share, worked out once; the choice of the method."""
 
 from __future__ import annotations
 
@@ -10,34 +10,82 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..ahead.first_run import kernels_of, prepare_first_run
-from ..calls import fitting
+from ..calls import ELSEWHERE, fitting
 from ..configuration.holonomic import demand_holonomic
-from ..elements.membership import warn_of_waiting
+from ..elements.element import warn_of_waiting
 from ..errors import InvalidArgument, Status
+from ..integrators import DOP853, Taylor
 from ..jit.compiled import clock
+from ..methods.integrator import frozen
 from ..observables.state import remembered
-from ..other_names import ELSEWHERE
-from ..runs.arguments import demand_steps_seen, interval, output_times, state_arrays
+from ..runs.arguments import adaptive, demand_steps_seen, interval, output_times, state_arrays
+from ..runs.driver import Sampling
 from ..runs.events import prepare as prepared_events
-from ..runs.sampling import Sampling
 from ..runs.step_engine import StepEngine
 from ..runs.task import Task, between
 from ..taylor.series_engine import SeriesEngine
 from ..validation import damaged
-from . import method_choice, stored_runs
-from .local_origin import origin_of, run_near
+from . import stored_runs
+from .local_origin import origin_of, run_near, within_rounding
 from .progress import reporter
-from .rounding_limit import within_rounding
 from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented
 from .scene import Scene
 from .scene_cache import prepared
-from .segments import run_segments
+from .segments import Turns, run_segments
 from .solution import Solution
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
+
+
+# Choice of the default method: Taylor; DOP853 where a part of the scene has no series; implicit where it is stiff.
+#
+# Taylor steps with sharp forces are shorter, and no quicker than those of DOP853 in scenes without constraints. Where
+# series fail, the run begins again with DOP853. Where the motion is found stiff, the implicit method goes on:
+# segments.py.
+
+
+def first_method(options, prepared):
+    """Return the method that a run of these `RunOptions` begins with."""
+    method = options.method
+    if method is None:
+        series = options.may_use_series and not prepared.refusal and prepared.pays
+        method = adaptive(Taylor if series else DOP853, options.rtol, options.atol)
+    return method if options.max_step is None else frozen(method.bounded(options.max_step))
+
+
+def reason(options, prepared):
+    """Say why a run of these `RunOptions` begins with its first method."""
+    if options.method is not None:
+        return "as asked."
+    if not options.may_use_series:
+        return "series serve the tangent form alone, and make their charts themselves."
+    if prepared.refusal:
+        return prepared.refusal
+    if not prepared.pays:
+        return "a force changes sharply, and without constraints series are no quicker."
+    return "every constraint and force has a series. Radau takes over where the motion is found stiff."
+
+
+def turns_of(scene, prepared, method, form, span, within):
+    """What makes the `Turns` of a run by the default method; None in a form that no implicit method serves."""
+    return None if form.first_order else partial(Turns, scene, prepared, method, form, span, within)
+
+
+def instead(task, status):
+    """Return the method that begins a run of the default method again; None if its `status` stands.
+
+    A law that is not analytic somewhere, as |v| at rest, may end series where stages go on.
+    """
+    failed = status in (Status.STEP_COLLAPSED, Status.NOT_FINITE)
+    if failed and task.choose is not None and isinstance(task.method, Taylor) and task.prepared.sharp:
+        return DOP853(task.method.rtol, task.method.atol, max_step=task.method.max_step)
+    return None
+
+
+# `prepare`: what every run of a scene with the same options has in common, worked out once.
 
 SUCCESS = Status.SUCCESS
 ENGINES = {"steps": StepEngine, "series": SeriesEngine}
@@ -112,7 +160,7 @@ class Run:
         self._prepare_kernels(options.dense_output or options.events is not None)
         self._prepared = kept = prepared(scene)
         self._start = scene._initial()
-        self.method = method = method_choice.first_method(options, kept)
+        self.method = method = first_method(options, kept)
         self._driver = DRIVERS.get(method.driver, method.driver)
         if method.coupled and kept.rough:
             raise InvalidArgument(
@@ -204,7 +252,7 @@ class Run:
             outcome = run_task(task, self.scene, self.options.initial_tol)
         ended = clock()
         if outcome.status is not SUCCESS:
-            other = method_choice.instead(task, outcome.status)
+            other = instead(task, outcome.status)
             if other is not None:
                 return self._by(other)._solve(call)
         return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
@@ -259,7 +307,7 @@ class Run:
         if kept.sampled:  # a sampled controller can't be run again: no turns
             sampling = Sampling(kept, state is not None)
         elif options.method is None:
-            choose = method_choice.turns_of(self.scene, kept, method, self._form, span, within)
+            choose = turns_of(self.scene, kept, method, self._form, span, within)
         history = call.store is None if options.history is None else options.history
         return Task(
             kept, method, self._form, span, q, qd, memory, times, within, options.dense_output,
@@ -293,7 +341,7 @@ class Run:
         try:
             outcome = run_task(task._replace(archive=archive), scene, self.options.initial_tol)
             seconds = clock() - started
-            other = method_choice.instead(task, outcome.status)
+            other = instead(task, outcome.status)
             if other is not None:
                 run = self._by(other)
                 given |= by_name(run.options, call)
@@ -310,7 +358,7 @@ class Run:
 
     def _facts(self):
         method, options = self.method, self.options
-        why = method_choice.reason(options, self._prepared)
+        why = reason(options, self._prepared)
         tolerances = f"fixed steps of {method.step} s"
         if method.step is None:
             rtol, atol = method.step_tolerances()

@@ -11,10 +11,9 @@ from ..validation import clipped, damaged
 from .outlines import Lacking
 from .prepared_run import Run
 from .run_options import demand_arguments_of_file, from_names
-from .run_requests import arguments_of
 from .scene import Scene
 from .scene_cache import prepared
-from .stored_runs import demand_path, demand_same_place, demand_same_scene
+from .stored_runs import arguments_of, demand_path, demand_same_place, demand_same_scene
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,52 +1,180 @@
-"""The scene: bodies, constraints and forces, validated as they are added."""
+"""The scene: bodies, constraints and forces, validated as they are added; its table, its files."""
 
 from __future__ import annotations
 
+import html
+import os
 from collections import Counter
+from contextlib import suppress
 from itertools import count
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Never
 
 import numpy as np
 
-from ..calls import fitting, fitting_methods
+from ..calls import fitting, fitting_methods, lacking
 from ..configuration.assemble import assemble as _assemble
 from ..configuration.mobility import mobility as _mobility
 from ..configuration.set_joint_coordinates import set_joint
 from ..constraints.euler_normalization import EulerNormalization
-from ..elements.bodies import IDENTITY, Body, Ground, PointMass
+from ..elements.bodies import IDENTITY, Body, Ground, PointMass, named
+from ..elements.element import admit, stop_waiting
 from ..elements.force import Force
 from ..elements.joint import Joint
-from ..elements.membership import admit, stop_waiting
-from ..elements.names import named
 from ..elements.primitive import Primitive
-from ..errors import InvalidArgument, InvalidBody, InvalidConstraint
+from ..errors import InvalidArgument, InvalidBody, InvalidConstraint, StorageError
 from ..jit.code_hash import deep_hash
-from ..model.compilable import demand_compilable
+from ..model.equations import demand_compilable
 from ..model.handles import handles_of
 from ..model.packed import pack, user_functions
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..observables.evaluate import evaluate as _evaluate
-from ..other_names import lacking
-from ..validation import demand_known, label, vector3
-from .editing import WHAT, demand_present, found
-from .editing import copy as _copy
-from .editing import remove as _remove
-from .inverse_dynamics import inverse_dynamics as _inverse_dynamics
-from .kinematics import kinematics as _kinematics
+from ..validation import counted, demand_known, label, vector3
+from .analyses import equilibrium as _equilibrium
+from .analyses import linearise as _linearise
+from .given_motion import inverse_dynamics as _inverse_dynamics
+from .given_motion import kinematics as _kinematics
 from .scene_cache import preparing
-from .scene_imported import OfFile
-from .scene_saving import save as _save
-from .scene_table import summary, table
-from .statics import equilibrium as _equilibrium
-from .statics import linearise as _linearise
-from .variants import HANDLES, make_handles
+from .variants import HANDLES, WHAT, demand_present, found, make_handles
+from .variants import copy as _copy
 from .variants import parameters as _parameters
 from .variants import place as _place
+from .variants import remove as _remove
 from .variants import with_parameters as _with_parameters
 
 if TYPE_CHECKING:
-    from ..hints import AnyBody, ArrayLike, Floats, Item, Orientation, Packed, System
+    from ..hints import AnyBody, ArrayLike, Floats, ImportReport, Item, Orientation, Packed, Place, System
+
+
+# A scene in a line, and as a table for notebooks.
+
+PARTICLE = 3  # coordinates of a point mass
+SHOWN = 25  # rows at most of bodies, of constraints and of forces
+HEAD = "<tr><th>name</th><th>kind</th><th></th></tr>"
+
+
+def table(scene: Scene) -> str:
+    """Bodies with their masses, constraints and forces with the bodies that they join."""
+    bodies = [(body.name, type(body).__name__, f"{body.mass:g} kg") for body in scene.bodies]
+    constraints = [one for one in scene.constraints if not getattr(one, "normalises", False)]
+    rows = [*_rows(bodies), *_rows(map(_item, constraints)), *_rows(map(_item, scene.forces))]
+    caption = html.escape(summary(scene).strip("<>"))
+    return f"<table><caption>{caption}</caption>{HEAD}{''.join(rows)}</table>"
+
+
+def summary(scene: Scene) -> str:
+    """What `repr` says of a scene."""
+    rows = sum(constraint.rows for constraint in scene.constraints)
+    n = sum(body.dimension for body in scene.bodies)
+    points = sum(body.dimension == PARTICLE for body in scene.bodies)
+    parts = [(len(scene.bodies) - points, "rigid body", "rigid bodies"), (points, "point mass", "point masses")]
+    bodies = ", ".join(counted(*part) for part in parts if part[0]) or "no bodies"
+    forces = f", {counted(len(scene.forces), 'force')}" if scene.forces else ""
+    return f"<Scene of {bodies}: {counted(n, 'coordinate')}, {counted(rows, 'constraint row')}{forces}>"
+
+
+def _item(item):
+    names = [body.name for body in (item.a, item.b) if body is not None]
+    return item.name, item._kind(), ", ".join(names)
+
+
+def _rows(lines):
+    lines = list(lines)
+    for line in lines[:SHOWN]:
+        yield f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in line)}</tr>"
+    if len(lines) > SHOWN:
+        yield f"<tr><td>and {len(lines) - SHOWN} more</td><td></td><td></td></tr>"
+
+
+# `Scene.imported` and `Scene.shapes`: what a file of another program leaves behind.
+
+
+class OfFile:
+    """Mixed into `Scene`.
+
+    Attributes
+    ----------
+    imported : ImportReport or None
+        What was left out of an imported file, and where its frames are.
+    shapes : dict
+        Name of a body, or "ground" -> list of shapes that `solution.view` draws for it; from an imported file.
+    """
+
+    imported: ImportReport | None = None
+
+    @property
+    def shapes(self) -> dict[str, list[Any]]:
+        """Name of a body, or "ground" -> list of shapes, in the frame of the body; files of meshes are read now."""
+        return {
+            name: [shape.make().moved(-centroid) for shape in shapes]
+            for name, (shapes, centroid) in vars(self).get("_drawn", {}).items()
+        }
+
+
+# `Scene.save`.
+
+
+@fitting
+def save(scene: Scene, path: Place) -> Path:
+    """Write the scene to a TOML file, from which `ts.load` returns it to the bit.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        Ends in .toml. A file that is there is replaced.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InvalidArgument
+        If the scene has what a file can't hold: functions, named each, or a class of your own that keeps its arguments
+        under other names.
+    StorageError
+        If the file can't be written.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import tsdyn as ts
+    >>> stone = (scene := ts.Scene(gravity=(0, 0, -10))).add_point_mass(mass=0.5, position=(0, 0, 2), name="stone")
+    >>> print(scene.save(mkdtemp() + "/stone.toml").read_text().strip())
+    version = 1
+    gravity = [0.0, 0.0, -10.0]
+    <BLANKLINE>
+    [[body]]
+    name = "stone"
+    type = "PointMass"
+    mass = 0.5
+    position = [0.0, 0.0, 2.0]
+    """
+    from ..files import scene_text
+
+    if not isinstance(path, (str, os.PathLike)) or Path(path).suffix.lower() != ".toml":
+        raise InvalidArgument(f"a scene is saved to a path that ends in .toml, got {path!r}.")
+    return write_text(path, scene_text.write(scene, type(scene)))
+
+
+def write_text(path: Place, text: str) -> Path:
+    """Write a text file whole or not at all; raises StorageError."""
+    path = Path(path)
+    partial = path.with_name(f"{path.name}-partial-{os.getpid()}")
+    try:
+        partial.unlink(missing_ok=True)  # a link, perhaps
+        with open(partial, "x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        os.replace(partial, path)
+    except (OSError, UnicodeError) as error:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+        raise StorageError(f"{path} can't be written: {getattr(error, 'strerror', None) or error}.") from error
+    return path
+
+
+# The scene: bodies, constraints and forces, validated as they are added.
 
 
 @fitting_methods
@@ -93,7 +221,7 @@ class Scene(OfFile):
     def __init__(self, gravity: ArrayLike = (0.0, 0.0, -9.81)) -> None:
         self.ground = Ground(self)
         self._bodies, self._added, self._forces, self._normalisations = [], [], [], {}
-        self._waiting, self._titles = {}, None  # see membership.py
+        self._waiting, self._titles = {}, None  # see element.py
         self._users = None  # of compiled functions; what holds them, see `user_functions`
         self._names = None  # of ground and bodies; None if a body may have been renamed
         self._twins = None  # handle of the scene that this one is a copy of -> handle here
@@ -382,7 +510,7 @@ class Scene(OfFile):
     set = set_joint
     remove = _remove
     copy = _copy
-    save = _save
+    save = save
     __copy__ = _copy
 
     def _repr_html_(self) -> str:

@@ -7,21 +7,19 @@ from threading import RLock
 import numpy as np
 
 from ..configuration.initial_conditions import consistent
-from ..configuration.mirrored_branches import demand_aligned
+from ..configuration.motor_starts import demand_aligned
 from ..errors import StorageError
 from ..formulations.locked_orientations import hold, still
 from ..jit.interrupts import CollectionsDeferred
 from ..methods.integrator import is_plain
+from ..model.equations import depends_on_time, sampled_loads, user_kinds, watched_loads
 from ..model.handles import handles_of
-from ..model.packed import with_curvatures
-from ..model.packed_forces import with_force_jacobians
-from ..model.state_loads import depends_on_time, sampled_loads, user_kinds, watched_loads
-from ..motions.changes import NO_CHANGES, changes, is_noise, sample_times, within_step
-from ..motions.knots import NO_STOPS, stops_of
-from ..observables.friction_unique import demand_unique
-from ..runs.sampling import instants_of, sampled
+from ..model.packed import with_curvatures, with_force_jacobians
+from ..motions.knots import NO_CHANGES, NO_STOPS, changes, is_noise, sample_times, stops_of, within_step
+from ..observables.reactions import demand_unique
+from ..runs.driver import instants_of, sampled
 from ..taylor.layout import pays, refusal
-from ..taylor.run_memory import Series
+from ..taylor.series_engine import Series
 
 preparing = RLock()  # threads that prepare a scene at once share what they find
 SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocate nothing
@@ -204,7 +202,7 @@ class Prepared:
         return next((what for what, values in found if is_noise(values)), "")
 
     def engine(self, kind, method, form, within):
-        """The engine of a method, as `frozen` returns it, in a form; see runs/run.py.
+        """The engine of a method, as `frozen` returns it, in a form; see runs/driver.py.
 
         That of a plain method serves again until other rows or bodies take part in the equations.
         """

@@ -1,4 +1,4 @@
-"""`simulate`: prepare a run, or take the last one of the same options, and run it."""
+"""`simulate`: prepare a run, or take the last one of the same options, and run it; whether a run could begin."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 from ..calls import fitting
 from ..methods.integrator import is_plain
 from .prepared_run import Run, demand_scene
-from .run_options import RunCall, RunOptions, documented
+from .run_options import RunCall, RunOptions, documented, from_names
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Scene, Solution, Span, State
+
+
+# `simulate`: prepare a run, or take the last one of the same options, and run it.
 
 KEPT = 8  # runs of a scene
 
@@ -101,3 +104,12 @@ def run_of(scene: Scene, options: RunOptions) -> Run:
         kept = run._prepared
         kept.runs = (run, *kept.runs[: KEPT - 1])  # and not written to: other threads may be reading
     return run
+
+
+# Whether a run could begin: all that `simulate` refuses before it runs anything.
+
+
+def demand_startable(scene, given):
+    """Raise what `simulate(scene, **given)` raises before a run."""
+    options, call = from_names({"t_span": (0.0, 1.0), **given})
+    Run(scene, options)._check(call)

@@ -1,4 +1,4 @@
-"""The result of a run: trajectory, termination, statistics and derived quantities."""
+"""The result of a run: trajectory, termination, statistics, balances, figures and animation."""
 
 from __future__ import annotations
 
@@ -14,21 +14,301 @@ from ..calls import fitting, fitting_methods
 from ..errors import InvalidArgument, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
-from ..observables import diagnostics, reactions, uniqueness
-from ..observables.exerted import acted, exerted, member
-from ..observables.friction_reactions import with_normal_loads
-from ..observables.kinematics import Anchor, Kinematics
-from ..observables.state import RememberingState
+from ..observables import diagnostics, power, reactions
+from ..observables.power import driving_power, force_powers, power_of
+from ..observables.reactions import acted, exerted, member, multipliers, with_normal_loads
+from ..observables.state import Anchor, Kinematics, RememberingState
 from ..validation import counted, floats
-from .balances import Balances
-from .conservation import energy_error
-from .outputs import Outputs
 from .records import Records
-from .showing import Showing
+from .stored_runs import Outputs
 from .termination import account, cause_of
+from .tolerances import AGREE, DEEPEST, NO_POWER
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
     from ..hints import ArrayLike, BodyLike, Bools, ConstraintError, Floats, Integers, ItemLike, Scene
+
+
+# What shows a run: an animation, and figures.
+
+
+@fitting_methods
+class Showing:
+    """Mixed into `Solution`; what draws is loaded when it is asked for."""
+
+    def view(
+        self,
+        path: str | Path | None = None,
+        *,
+        shapes: Mapping[Any, Any] | None = None,
+        trails: Sequence[Any] | None = None,
+    ) -> Any:
+        """Show the run as an interactive 3-D animation: one HTML page, which works offline.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            The file to write, of suffix .html if it has none. By default a notebook shows the page inline; elsewhere it
+            is written to a temporary file, which the web browser opens.
+        shapes : dict, optional
+            Body, ground or name -> what to draw for it: one of `ts.shapes` (`Box`, `Sphere`, `Cylinder`, `Mesh`, or a
+            shape with mass) or a list of them, in the frame of the body. Other bodies are drawn as the uniform solid
+            with their inertia, and rods to their joints.
+        trails : sequence, optional
+            Whose ways are shown: bodies, for their centroids, or pairs (body, point), point (3,) in the body frame, m.
+            By default the centroids of up to eight bodies.
+
+        Returns
+        -------
+        Path, or View in a notebook
+
+        Raises
+        ------
+        InvalidArgument
+            If there are no outputs, a shape or trail is none, or the file can't be written.
+        InvalidBody
+            If a key of shapes, or what should leave a trail, is not a body of this solution's scene.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> from tempfile import TemporaryDirectory
+        >>> import tsdyn as ts
+        >>> bob = (scene := ts.Scene()).add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+        >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+        >>> solution = ts.simulate(scene, (0, 2))
+        >>> with TemporaryDirectory() as folder:
+        ...     page = solution.view(Path(folder) / "pendulum", shapes={"bob": ts.shapes.Sphere(0.1, colour="red")})
+        ...     print(page.name)
+        pendulum.html
+        """
+        from ..viewer.view import show
+
+        return show(self, path, shapes, trails)
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """Draw constraint errors, energies, steps and charts over time.
+
+        `ts.plots` has these and other figures by themselves.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            A file to write the figure to, in the format of its suffix.
+
+        Returns
+        -------
+        ndarray (2, 2) of matplotlib Axes
+
+        Raises
+        ------
+        MissingDependency
+            If matplotlib is not installed.
+        InvalidArgument
+            If the file can't be written.
+
+        Examples
+        --------
+        >>> import matplotlib
+        >>> import tsdyn as ts
+        >>> matplotlib.use("agg")
+        >>> stone = (scene := ts.Scene()).add_point_mass(mass=1.0)
+        >>> axes = ts.simulate(scene, (0, 1)).plot()
+        >>> axes[0, 1].get_ylabel()
+        'energy (J)'
+        """
+        from ..figures.histories import overview
+
+        return overview(self, path)
+
+
+# Energy error of an undriven and undamped run near singular configurations.
+
+MOST_OUTPUTS = 200  # examined
+
+
+def energy_error(solution, task):
+    """Return the largest change of energy since the start over the largest kinetic energy; None if it isn't conserved.
+
+    Outputs and the last state are compared.
+    """
+    system, packed = solution.system, solution.packed
+    if system.rheonomic[0] or system.normals.size:
+        return None
+    some, slots = solution[:: max(solution._length() // MOST_OUTPUTS, 1)], system.memory.size
+    t = np.concatenate(([task.span[0]], some.t, [solution.reached]))
+    q, qd = (
+        np.vstack((first, rows, last))
+        for first, rows, last in zip((task.q, task.qd), (some.q, some.qd), solution._last[:2], strict=True)
+    )
+    memory = np.vstack((task.remembered[-slots:] if slots else np.zeros(0), some._remembers, solution._remembered))
+    forces = power.force_powers(SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=packed))
+    kinetic = diagnostics.kinetic_energy(system, q, qd)
+    largest = kinetic.max()
+    if not (
+        largest > 0.0 and max(np.abs(forces.applied).max(), np.abs(forces.dissipation).max()) <= NO_POWER * largest
+    ):
+        return None
+    energy = kinetic + diagnostics.potential_energy(system, q) + forces.potential
+    return float(np.abs(energy - energy[0]).max() / largest)
+
+
+# Mechanical work along a trajectory: Gauss quadrature of power on the dense output of every step.
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
+AT_ONCE = 2000  # pieces of the interval, evaluated in one call
+
+
+def work(solution, trajectory, item=None):
+    """Work (k,), J, since the start: of applied and driving forces, less dissipation.
+
+    item restricts it to one constraint or force, as in `power.power_of`.
+    """
+    edges = np.unique(np.concatenate([[trajectory.start], trajectory.edges, solution.t]))
+    pieces = np.zeros(0)
+    for first in range(0, edges.size - 1, AT_ONCE):
+        some = edges[first : first + AT_ONCE + 1]
+        pieces = np.append(pieces, _integrals(solution, trajectory, item, some[:-1], some[1:], 0))
+    return np.append(0.0, np.cumsum(pieces))[np.searchsorted(edges, solution.t)]
+
+
+def _integrals(solution, trajectory, item, a, b, depth, known=None):
+    """Return the work from each a to its b, by bisection until halves agree: steps of series are long.
+
+    known: what `_quadrature` gives for them, if it has been asked already.
+    """
+    done, size = known or _quadrature(solution, trajectory, item, a, b)
+    if depth == DEEPEST or not a.size:
+        return done
+    middle = 0.5 * (a + b)
+    halves = [(ends, _quadrature(solution, trajectory, item, *ends)) for ends in ((a, middle), (middle, b))]
+    found = sum(part for _, (part, _) in halves)
+    off = np.flatnonzero(np.abs(found - done) > AGREE * size)
+    found[off] = sum(
+        _integrals(solution, trajectory, item, first[off], last[off], depth + 1, (part[off], size[off]))
+        for (first, last), (part, size) in halves
+    )
+    return found
+
+
+def _quadrature(solution, trajectory, item, a, b):
+    """Integrals (k,) of the power and of its size, five nodes each."""
+    if not a.size:
+        return np.zeros(0), np.zeros(0)
+    middle, half = 0.5 * (b + a), 0.5 * (b - a)
+    t = (middle[:, None] + half[:, None] * NODES).ravel()
+    power = _power(solution, trajectory, item, t).reshape(-1, NODES.size)
+    return half * (power @ WEIGHTS), half * (np.abs(power) @ WEIGHTS)
+
+
+def _power(solution, trajectory, item, t):
+    states, memory, status = trajectory(t)
+    q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
+    system = solution.system
+    memory = with_normal_loads(solution.packed, t, q, qd, qdd, memory)
+    at = SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=solution.packed, system=system)
+    if system.rheonomic[0]:
+        at.multipliers = multipliers(solution.packed, t, q, qd, qdd, memory)
+    if item is not None:
+        power = power_of(at, item)
+    else:
+        powers = force_powers(at)
+        power = powers.applied + driving_power(at) - powers.dissipation
+    return power if status == 0 else np.full(t.size, np.nan)
+
+
+# Balances of a run: energies, powers and momenta, mixed into `Solution`.
+
+
+@fitting_methods
+class Balances:
+    """Mixed into what has `system`, `packed`, `handles` and outputs t (k,), q and qd (k, n)."""
+
+    @cached_property
+    def kinetic_energy(self) -> Floats:
+        """Kinetic energy (k,), J."""
+        return diagnostics.kinetic_energy(self.system, self.q, self.qd)
+
+    @cached_property
+    def potential_energy(self) -> Floats:
+        """Potential energy (k,), J, of gravity (zero at the origin) and of springs; applied loads have none."""
+        return diagnostics.potential_energy(self.system, self.q) + self._force_powers.potential
+
+    @property
+    def energy(self) -> Floats:
+        """Kinetic and potential energy together (k,), J."""
+        return self.kinetic_energy + self.potential_energy
+
+    @cached_property
+    def _force_powers(self):
+        return power.force_powers(self)
+
+    @cached_property
+    def power(self) -> Floats:
+        """Power (k,), W, of applied forces, actuators and driven constraints: dE/dt = power - dissipation."""
+        return self._force_powers.applied + power.driving_power(self)
+
+    @property
+    def dissipation(self) -> Floats:
+        """Power (k,), W, dissipated by dampers and friction; not negative."""
+        return self._force_powers.dissipation
+
+    @cached_property
+    def work(self) -> Floats:
+        """Work (k,), J, since the start: of applied and driving forces, less dissipation.
+
+        energy - work is constant up to the integration error. The work is integrated over the dense output.
+
+        Raises
+        ------
+        InvalidArgument
+            If the run kept no dense output.
+        """
+        return self._integrated(None)
+
+    def power_of(self, item: ItemLike) -> Floats:
+        """Power (k,), W, supplied by one constraint or force (or its name): its share of dE/dt.
+
+        Of a motor or a driver: the power of its force or torque along the prescribed motion. Of a force: the power of
+        its loads and actuators, less dissipation; stored energy of a spring doesn't count. Of other constraints: zero.
+        """
+        return power.power_of(self, self._part(item))
+
+    def work_of(self, item: ItemLike) -> Floats:
+        """Work (k,), J, since the start, of one constraint or force: the integral of `power_of`.
+
+        Raises
+        ------
+        InvalidArgument
+            If the run kept no dense output.
+        """
+        return self._integrated(self._part(item))
+
+    def _part(self, item):
+        """The `Load` of a force, or the `Member` of a constraint."""
+        item = self.handles.item(item)
+        load = reactions.loads_of(self.packed).get(id(item))
+        return member(self.packed, item) if load is None else load
+
+    def _integrated(self, part):
+        if self._trajectory is None:
+            raise InvalidArgument("work is integrated over dense output: simulate(..., dense_output=True) keeps it.")
+        return work(self, self._trajectory, part)
+
+    @cached_property
+    def linear_momentum(self) -> Floats:
+        """Linear momentum (k, 3), kg m/s, ground frame."""
+        return diagnostics.linear_momentum(self.system, self.q, self.qd)
+
+    @cached_property
+    def angular_momentum(self) -> Floats:
+        """Angular momentum about the ground's origin (k, 3), kg m^2/s, ground frame."""
+        return diagnostics.angular_momentum(self.system, self.q, self.qd)
+
+
+# The result of a run: trajectory, termination, statistics and derived quantities.
 
 SUCCESSES = Status.SUCCESS, Status.EVENT
 
@@ -299,7 +579,7 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
         body = acted(self.packed, item, on)
         if id(item) in reactions.loads_of(self.packed):
             return np.ones(self.t.size, bool)
-        return uniqueness.unique(self, member(self.packed, item).rows, body)
+        return reactions.unique(self, member(self.packed, item).rows, body)
 
     def rows(self, constraint: ItemLike) -> slice:
         """Return the columns of `multipliers` of a constraint, as a slice."""

@@ -1,26 +1,242 @@
-"""Runs with a store: its archive, what a checkpoint holds beside the state, how a run ends in it."""
+"""Runs with a store: the request, outputs in memory or in the store, contents of a checkpoint, the end of a run."""
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import inspect
+import json
 import os
 import platform
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from .._version import __version__
+from ..calls import lacking
 from ..errors import InvalidArgument, Status, StorageError
 from ..jit.cache import machine
-from ..jit.code_hash import platform_hash
+from ..jit.code_hash import is_ours, platform_hash
+from ..methods.integrator import is_own, registered
 from ..model.packed import user_functions
-from ..runs import counts
-from ..runs.run_end import RunEnd
+from ..observables.state import Anchor, RememberingState, State, remembered
+from ..runs import run_log
+from ..runs.arguments import state_arrays
+from ..runs.run_log import RunEnd
 from ..runs.task import Outcome
-from ..validation import clipped, damaged, demand, demand_numbers, demand_record, is_count, number
-from .run_requests import request_of
+from ..validation import clipped, damaged, demand, demand_numbers, demand_record, is_count, number, shown
+from .outlines import outline_of
+from .scene_cache import prepared
+
+if TYPE_CHECKING:
+    from ..hints import Floats, Scene
+
+
+# What `simulate` was asked, as numbers and arrays: what a checkpoint begins with. Functions and code are left out.
+
+PASSED_AGAIN = ("events", "progress")  # arguments that are functions
+OWN = ("scene", "store", "checkpoint", "state", "integrator", *PASSED_AGAIN)  # arguments that are kept apart
+STATE = "q", "qd", "qdd", "multipliers", "memory", "angles"
+
+
+def request_of(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Numbers (for JSON) and arrays of the arguments of a run, and its scene where a file can hold that.
+
+    Raises
+    ------
+    InvalidArgument
+        If the method is one of the user's own.
+    """
+    from ..files import scene_text  # takes a while to import
+
+    scene, method, state = given["scene"], given["integrator"], given["state"]
+    rest = {name: np.asarray(value).tolist() if value is not None else None
+            for name, value in given.items() if name not in OWN}  # fmt: skip
+    numbers = {"options": json.loads(json.dumps(rest)), "method": method, "lacks": ""}
+    arrays = {}
+    if method is not None and not isinstance(method, str):
+        try:
+            numbers["method"] = method_record(method() if isinstance(method, type) else method)
+        except TypeError as error:
+            raise InvalidArgument(
+                f"a run by a method of your own can't go on from a file, which keeps no code: {error}."
+            ) from None
+    if state is not None:
+        q, qd = state_arrays(state, scene._initial()[0].size)
+        found = {"q": q, "qd": qd} | {name: getattr(state, name, None) for name in STATE[2:5]}
+        found["angles"] = state.angles if getattr(state, "anchor", None) is not None else None
+        arrays |= {f"state.{name}": np.asarray(array, float) for name, array in found.items() if array is not None}
+        numbers["t"] = float(getattr(state, "t", given["t_span"][0]))
+    foreign = {type(item) for item in (*scene._added, *scene.forces) if not is_ours(type(item).__module__)}
+    numbers["lacks"] = ", ".join(sorted(f"{kind.__module__}.{kind.__qualname__}" for kind in foreign))
+    if not foreign:
+        try:
+            arrays["scene"] = np.frombuffer(scene_text.write(scene, type(scene)).encode(), np.uint8)
+        except InvalidArgument as error:
+            numbers["lacks"] = str(error)
+    if "scene" not in arrays:
+        found, text = outline_of(scene, prepared(scene).packed)
+        numbers, arrays = numbers | found, arrays | text
+    return numbers, arrays
+
+
+def arguments_of(numbers: dict[str, Any], arrays: dict[str, Any], scene: Scene) -> dict[str, Any]:
+    """The arguments of `simulate` for a scene, by name; KeyError, TypeError or ValueError where they are none."""
+    method = numbers["method"]
+    given = {**numbers["options"], "state": None}
+    given["integrator"] = method if method is None or isinstance(method, str) else method_of(method)
+    found = {name: arrays.get(f"state.{name}") for name in STATE}
+    if found["q"] is not None:
+        nothing = np.empty(0)
+        q, qd, qdd, lam = (nothing if found[name] is None else found[name] for name in STATE[:4])
+        parts = numbers["t"], q, qd, qdd, lam
+        anchor, kept = None if found["angles"] is None else Anchor(found["angles"]), prepared(scene)
+        bare = found["memory"] is None and anchor is None
+        state = State(*parts) if bare else RememberingState.of(kept.handles, found["memory"], anchor, *parts)
+        given["state"], start = state, state_arrays(state, kept.n)
+        remembered(state, kept, float(numbers["t"]), start[0])
+    return given
+
+
+def method_record(method: Any) -> list[Any]:
+    """The class and the settings of a method; raises TypeError for one that numbers don't tell."""
+    if not isinstance(method, tuple(registered().values())) or not is_own(type(method)) or "driver" in vars(method):
+        raise TypeError(f"{type(method).__module__}.{type(method).__qualname__}")
+    return own_record(method)
+
+
+def own_record(method: Any) -> list[Any]:
+    """As `method_record`, of any registered class."""
+    settings = {name: value.item() if isinstance(value, np.generic) else value for name, value in vars(method).items()}
+    if not all(value is None or isinstance(value, (bool, int, float, str)) for value in settings.values()):
+        raise TypeError(f"the settings of {method!r} are not numbers")
+    return [type(method).__name__.lower().replace("_", ""), settings]
+
+
+def method_of(record: list[Any]) -> Any:
+    """The method of a record: made by its class, which checks its settings.
+
+    Raises
+    ------
+    KeyError
+        If it is a plug-in that isn't known here.
+    ValueError
+        If the class makes another method of the settings.
+    """
+    name, settings = record
+    kind = registered()[name]
+    if not is_own(kind):  # what the arguments of its constructor are, its author alone knows
+        method = kind.__new__(kind)
+        vars(method).update(settings)
+        return method
+    known = {name: settings[name] for name in inspect.signature(kind).parameters if name in settings}
+    if "fixed" in settings:
+        known["order"] = settings["fixed"]
+    method = kind(**known)
+    for name, value in settings.items():
+        if name not in vars(method) and type(getattr(kind, name)) is type(value) is float:
+            setattr(method, name, value)
+    if vars(method) != settings:
+        raise ValueError(f"{kind.__name__} has no such settings")
+    return method
+
+
+# The outputs of a run as arrays: in memory, or in a store from which they are read when they are asked for.
+
+_COLUMNS = {"t": "time", "q": "q", "qd": "qd", "qdd": "qdd", "anchor": "remembered", "_remembers": "remembered"}
+
+
+class Outputs:
+    """Mixed into `Solution`: t (k,), q, qd, qdd (k, n), the turns of joint angles, what forces remember (k, slots)."""
+
+    t: Floats
+    q: Floats
+    qd: Floats
+    qdd: Floats
+    handles: Any
+    _end: Any  # a `RunEnd`, or a `RecordedEnd`
+
+    _reached = property(lambda self: self._end.reached)
+    _last = property(lambda self: self._end.last)
+    _angles = property(lambda self: self._end.remembered[: self.handles.count])
+    _remembered = property(lambda self: self._end.remembered[self.handles.count :])
+    _step_log = property(lambda self: self._end.steps)
+    _chart_log = property(lambda self: self._end.charts)
+    _counts = property(lambda self: self._end.counts)
+
+    def _take(self, rows, n):
+        """Take the rows (k, 1 + 3 n + angles + slots) of a run, or its `StoredOutputs`."""
+        in_memory, self._slice = isinstance(rows, np.ndarray), slice(None)
+        self._stored, self._rows = None if in_memory else rows, (rows, n) if in_memory else None
+
+    def _unpack(self, rows, n):
+        """Make arrays of the rows of a run, when the first of them is asked for."""
+        self.q, self.qd, self.qdd = rows[:, 1 : 1 + 3 * n].reshape(-1, 3, n).swapaxes(0, 1).copy()
+        self._set_remembered(rows[:, 1 + 3 * n :].copy())
+        self.t = rows[:, 0].copy()
+        self._rows = None
+
+    def _set_remembered(self, rest):
+        angles = self.handles.count
+        self.anchor, self._remembers = Anchor(rest[:, :angles]), rest[:, angles:]
+
+    def __getattr__(self, name: str) -> Any:
+        rows, stored = self.__dict__.get("_rows"), self.__dict__.get("_stored")
+        if name in _COLUMNS and rows is not None:
+            self._unpack(*rows)
+        if name in _COLUMNS and name in self.__dict__:  # made now, or by another thread
+            return self.__dict__[name]
+        if stored is None or name not in _COLUMNS:
+            raise lacking(self, name)
+        found = stored.read(_COLUMNS[name], self._slice)
+        if _COLUMNS[name] != "remembered":
+            setattr(self, name, found)
+        else:
+            self._set_remembered(np.empty((self._length(), 0)) if found is None else found)
+        return self.__dict__[name]
+
+    def _length(self):
+        """How many outputs there are; of a store without a look at them."""
+        return self.t.size if self._stored is None else len(range(self._stored.count)[self._slice])
+
+    def __getitem__(self, part: slice) -> Self:
+        """Return a solution of some of the outputs, `solution[a:b]`; of a stored run nothing else is read.
+
+        Events, statistics and histories remain those of the whole run.
+        """
+        bounds = (part.start, part.stop, part.step) if isinstance(part, slice) else ("",)
+        if not all(each is None or isinstance(each, (int, np.integer)) for each in bounds) or (part.step or 1) < 1:
+            raise InvalidArgument(
+                f"outputs are taken by slices, such as solution[100:200] or solution[::10], got {shown(part)}."
+            )
+        if self._stored is None:
+            return self._picked(part)
+        other, found = self._bare(), range(self._stored.count)[self._slice][part]
+        other._slice = slice(found.start, max(found.stop, found.start), found.step)
+        return other
+
+    def _picked(self, part):
+        """A solution of some outputs of a run in memory; part is a slice or indices."""
+        self._length()
+        other = self._bare()
+        for name in ("t", "q", "qd", "qdd", "_remembers"):
+            setattr(other, name, getattr(self, name)[part])
+        other.anchor = Anchor(self.anchor.angles[part])
+        return other
+
+    def _bare(self):
+        """A copy without what has been read, or derived from it."""
+        other = copy.copy(self)
+        for name in [name for name in vars(other) if name in _COLUMNS or hasattr(type(self), name)]:
+            del vars(other)[name]
+        return other
+
+    __iter__ = None  # by the old protocol __getitem__ would make one
+
+
+# Runs with a store: its archive, what a checkpoint holds beside the state, how a run ends in it.
 
 SETTINGS = ("rtol", "atol", "step", "max_step")  # of a method, as its provenance tells them
 
@@ -50,8 +266,7 @@ def demand_path(path, name):
 def archive_of(given, kept, history, numbers, arrays):
     """The `Archive` of a run, made or, with the numbers and arrays of a checkpoint, gone on with."""
     from ..storage.archive import Archive, tables_of
-    from ..storage.formats import demand_shapes, format_of
-    from ..storage.write_errors import writing
+    from ..storage.formats import demand_shapes, format_of, writing
 
     facts = _facts(given, kept)
     if numbers is not None:
@@ -76,7 +291,7 @@ def archive_of(given, kept, history, numbers, arrays):
 
 def begin_again(archive, given):
     """Let another method begin at the start; the archive."""
-    from ..storage.write_errors import writing
+    from ..storage.formats import writing
 
     with writing(archive.path):
         archive.begin_again(_asked(given))
@@ -120,7 +335,7 @@ def call_to_go_on(archive):
 
 def _stored(archive):
     """Outputs, steps and charts of an archive."""
-    from ..storage.stored_outputs import StoredLog, StoredOutputs
+    from ..storage.archive import StoredLog, StoredOutputs
 
     outputs = StoredOutputs(archive.path, archive.columns)
     return outputs, StoredLog.of(outputs, "steps"), StoredLog.of(outputs, "charts")
@@ -153,7 +368,7 @@ def ended_outcome(numbers, arrays, archive, n, memory):
         shapes = [[each.shape for each in found] for found in zip(*events, strict=True)]
         demand(all(found == [(found[0][0],), *[(found[0][0], n)] * 2] for found in shapes), "the events")
     demand(last.shape == (3, n) and remembered.shape == (memory,), "the end of the run")
-    demand_numbers(numbers["statistics"], counts.NAMES)
+    demand_numbers(numbers["statistics"], run_log.NAMES)
     demand_record(numbers, {"reason": str, "method": str, "seconds": (int, float)})
     rows, steps, charts = _stored(archive)
     end = RunEnd(float(numbers["t"]), last, remembered, numbers["statistics"], steps, charts)

@@ -2,7 +2,7 @@
 
 Imports observables and below. Loaded by runs with a store alone.
 
-Begin with archive.py, which a run writes to. hdf5.py and zarr_folder.py are the formats, by suffix in formats.py;
-zarr_checks.py checks a folder before it is read; checkpoint.py writes and reads checkpoints; stored_outputs.py
-reads outputs back, as a `Solution` asks for them. saved_file.py writes and reads a file of a whole solution.
+Begin with archive.py, which a run writes to, and by which a `Solution` reads outputs back. hdf5.py and zarr_folder.py
+are the formats, by suffix in formats.py; checkpoint.py writes and reads checkpoints, saved_file.py files of whole
+solutions.
 """

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import regular_files
+from .. import validation
 from ..errors import StorageError
 from ..validation import demand_record, nearest, reason
 from .formats import NUMBERS, SUFFIXES
@@ -108,7 +108,7 @@ def remove(store):
 
 
 def _read(path):
-    content = regular_files.read(path)
+    content = validation.read(path)
     head, checksum = content[: len(FORMAT)], content[len(FORMAT) :][: SEAL - 1]
     if head != FORMAT:
         raise StorageError(f"{path} is no checkpoint of this format, {FORMAT.decode().strip()!r}.")

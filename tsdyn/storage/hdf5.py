@@ -13,10 +13,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .. import regular_files
+from .. import validation
 from ..errors import StorageError
-from .formats import CHUNK, LONGEST, NUMBERS, ROOM, demand_rows, reading
-from .write_errors import code_of
+from .formats import CHUNK, LONGEST, NUMBERS, ROOM, code_of, demand_rows, reading
 
 BUFFER = CHUNK
 COPIED = 1 << 16  # rows at a time
@@ -177,7 +176,7 @@ def shapes(path):
 
 def demand_plain(path, size=0):
     """As formats.py says; every function that reads asks for it, for it takes a millisecond."""
-    regular_files.demand(path)
+    validation.demand_regular(path)
     if (found := os.path.getsize(path)) < size:  # HDF5 would wait for the missing part for ever
         raise StorageError(f"{path} is damaged: it has {found} bytes of {size} that were written.")
     with reading(path), _opened(path):
@@ -213,7 +212,7 @@ def _opened(path):
 
     Of a damaged file that nobody writes, HDF5 would wait for the missing part for ever.
     """
-    regular_files.demand(path)
+    validation.demand_regular(path)
     written = ({"libver": "latest", "swmr": True, "locking": False},) if _is_being_written(path) else ()
     for options in (*written, {"locking": False}, {}):
         try:

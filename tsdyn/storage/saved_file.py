@@ -16,8 +16,7 @@ import numpy as np
 from ..errors import InvalidArgument, StorageError
 from ..validation import clipped, damaged
 from .checkpoint import LONGEST
-from .formats import SUFFIXES, format_of
-from .write_errors import demand_folder, unwritable, writing
+from .formats import SUFFIXES, demand_folder, format_of, unwritable, writing
 
 FORMAT, VERSION = "tsdyn solution", 1
 STORE = "store"  # what `simulate(store=...)` writes, which names no format

@@ -14,8 +14,7 @@ from ..integrators import DOP853, Nystrom4, Taylor
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
 from .gallery.cases import Case
-from .interruption import resumed_is_same, same_bits
-from .laws import energy_left, findings
+from .laws import energy_left, findings, resumed_is_same, same_bits
 from .tolerances import EPS
 
 TOLERANCE = 1e-15, 1e-12  # of Taylor, and of the other method

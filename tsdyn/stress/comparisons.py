@@ -12,8 +12,16 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..integrators import Nystrom4
-from .interruption import prepared_twice, resumed_is_same, same_bits
-from .laws import Finding, energy_left, is_near_singular, momentum_left, off_steps
+from .laws import (
+    Finding,
+    energy_left,
+    is_near_singular,
+    momentum_left,
+    off_steps,
+    prepared_twice,
+    resumed_is_same,
+    same_bits,
+)
 from .tolerances import EPS, FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, SHORTER, TIGHTER
 
 FEW = 20  # bodies

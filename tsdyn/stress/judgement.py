@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import TsdynError
 from ..simulation.simulate import simulate
-from . import comparisons, passages
+from . import comparisons, random_scenes
 from .laws import findings
 from .random_scenes import generate
 
@@ -35,7 +35,7 @@ class Outcome(NamedTuple):
 def judge_scene(seed, least=None, most=None):
     """Return the `Outcome` of the scene of a seed; one in PASSAGES passes places where a law is not analytic."""
     if least is None and seed % PASSAGES == PASSAGES - 1:
-        return judge_case(passages.draw(seed), (comparisons.another_method,), seed)
+        return judge_case(random_scenes.draw(seed), (comparisons.another_method,), seed)
     return judge_case(generate(seed, least, most), comparison(np.random.default_rng((seed, 1))), seed)
 
 
@@ -62,20 +62,20 @@ def judge(case, others):
     """Return the word for a case, and what was said; raises what the run raises."""
     if case.assembled:
         case.scene.assemble()
-    solution = run(case)
+    solution = run_case(case)
     if not solution.success and not solution.message.strip():
         return f"{FAULT} no message", str(solution.status)
     found = findings(solution)
     if solution.success:
-        found += comparisons.energy(case, solution, run) + comparisons.momenta(case, solution, run)
-        found += [one for other in others for one in other(case, solution, run)]
+        found += comparisons.energy(case, solution, run_case) + comparisons.momenta(case, solution, run_case)
+        found += [one for other in others for one in other(case, solution, run_case)]
     broken = [one for one in found if one.broken]
     if broken:
         return f"{FAULT} {broken[0].law}", "; ".join(map(str, broken[:3]))
     return str(solution.status), solution.message
 
 
-def run(case, by=simulate, **more):
+def run_case(case, by=simulate, **more):
     """Run a case by a function like `simulate`, with other options in place of its own where they are given."""
     options = {"dense_output": True, "max_steps": MOST_STEPS} | case.options | more
     return by(case.scene, case.span, **options)

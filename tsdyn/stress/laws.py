@@ -1,10 +1,9 @@
-"""Laws that hold of every run, whatever its scene: no reference solution is needed.
-
-Each law takes a `Solution` and yields what it found as `Finding`s: a size, and the limit that it must not exceed. LAWS
-lists those of a single run; comparisons.py compares runs.
-"""
+"""Laws that hold of every run, whatever its scene: no reference solution is needed."""
 
 from copy import copy
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -12,11 +11,13 @@ from scipy.spatial import cKDTree
 
 from ..elements.bodies import rotation_matrix
 from ..elements.markers import POINT
-from ..model.sparse_jacobian import WIDTH, places, with_short_rows
+from ..model.equations import WIDTH, places, with_short_rows
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
-from .finding import Finding, some
-from .motor_law import motors
+from ..simulation.prepared_run import Run
+from ..simulation.resume import resume
+from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
+from ..simulation.simulate import simulate
 from .tolerances import (
     BALANCE,
     BODIES,
@@ -35,6 +36,93 @@ from .tolerances import (
     SMALL_SCENE,
     TIME,
 )
+
+# What a law of a run has found.
+
+
+class Finding(NamedTuple):
+    """What a law found."""
+
+    law: str
+    size: float
+    limit: float
+    where: str = ""
+
+    @property
+    def broken(self):
+        """True if the size exceeds the limit, or is no number."""
+        return not self.size <= self.limit
+
+    def __str__(self):
+        where = f" ({self.where})" if self.where else ""
+        return f"{self.law}: {self.size:.2e}, at most {self.limit:.2e}{where}"
+
+
+def some(count, most):
+    """Return indices of the first, the last, and some between, `most` at most."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
+
+
+# A run that is stopped at its first checkpoint and goes on from there.
+
+SELDOM = 1e9  # s between checkpoints: the first, after a slice, is the only one
+
+
+class _Stop:
+    """Ctrl-C as soon as there is a checkpoint: after the first slice, or a later one where the first ends a segment."""
+
+    def __init__(self, path):
+        self.checkpoint = Path(f"{path}.checkpoint")
+
+    def __call__(self, fraction):
+        if self.checkpoint.exists():
+            raise KeyboardInterrupt
+
+
+def resumed_is_same(scene, span, solution, **options):
+    """Whether such a run has the bits of `solution`, which was never stopped; None without h5py."""
+    if find_spec("h5py") is None:
+        return None
+    with TemporaryDirectory() as folder:
+        path = f"{folder}/run.h5"
+        simulate(scene, span, progress=_Stop(path), store=path, checkpoint=SELDOM, **options)
+        return same_bits(solution, resume(path, scene=scene))
+
+
+def prepared_twice(scene, span, **options):
+    """As `simulate`, by the second run of a prepared one."""
+    prepared = Run(scene, RunOptions(**{name: value for name, value in options.items() if name in OF_RUN}))
+    of_call = {name: value for name, value in options.items() if name in OF_CALL}
+    prepared(span, **of_call)
+    return prepared(span, **of_call)
+
+
+def same_bits(one, two):
+    """Whether two solutions have the same outputs to the bit."""
+    pairs = [(getattr(one, name), getattr(two, name)) for name in ("t", "q", "qd", "qdd")]
+    return all(np.array_equal(*pair) for pair in pairs)
+
+
+# The law of motors: joints follow the motions that are prescribed, which rows of sines know modulo turns alone.
+
+
+def motors(solution):
+    """The angle of a motor, and of the joint that it drives, is the one prescribed, turns included."""
+    handles, at = solution.handles, some(solution.t.size, OUTPUTS)
+    driven = [(one.motor.item, one.joint.item, one.place - one.joint.first) for one in handles.driven]
+    driven += [(row.item, row.item, 0) for row in handles.rows]
+    for motor, item, i in driven if solution.success else ():
+        if motor.drives == "angle":
+            angle = solution.angle(item)[at].reshape(len(at), -1)[:, i]
+            wanted = np.array([motor.angle.value(t)[0] for t in solution.t[at]])
+            size = float((np.abs(angle - wanted) / (1.0 + np.abs(wanted))).max())
+            yield Finding("angles of motors", size, ROW_SHARE, item.title)
+
+
+# Laws that hold of every run, whatever its scene: no reference solution is needed.
+#
+# Each law takes a `Solution` and yields what it found as `Finding`s: a size, and the limit that it must not exceed.
+# LAWS lists those of a single run; comparisons.py compares runs.
 
 LEVELS = ("position", "velocity", "acceleration")
 

@@ -2,8 +2,8 @@
 
 Imports runs and below.
 
-Begin with coefficients.py (the recurrences), then step_parts.py (the parts of a step as callbacks), stepper.py (the
-compiled driver) and step_trials.py (what is tried for one step). step_length.py has the radius of
-convergence and the choice of the order, layout.py the memory and which parts of a scene have no series;
-series_engine.py is what runs/run.py drives.
+Begin with coefficients.py (the recurrences), then step_parts.py (the parts of a step as callbacks) and stepper.py (the
+trials of a step, and the compiled driver). step_length.py has the radius of convergence and the choice of the order,
+layout.py the memory and the parts of a scene without series; series_engine.py is driven by runs/driver.py.
+lane_stepper.py makes a step of several cases at once.
 """

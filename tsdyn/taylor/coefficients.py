@@ -1,25 +1,38 @@
-"""Taylor coefficients of the motion of all bodies, order by order, from the state at order zero.
-
-    (k+1) A_{k+1}           = sum_j A_j omega'~_{k-j}                                            (1)
-    (k+1)(k+2) m r_{k+2}    = F_k - [Phi_r^T lam]_k                                              (2)
-    (k+1) J' omega'_{k+1}   = tau'_k - sum_j omega'_j x (J' omega')_{k-j} - [Phi_pi'^T lam]_k    (3)
-    Phi_{k+2}               = 0                                                                  (4)
-
-(4) is linear in lam_k: S lam_k = (k+1)(k+2) Phi_{k+2}, the right-hand side evaluated by (1)-(3) with lam_k = 0. The
-Schur complement S = H W H^T is that of order zero for every k, so it is factorised once a step.
-"""
+"""Taylor coefficients of the motion of all bodies, order by order, from the state at order zero."""
 
 from fractions import Fraction
 
 import numpy as np
 
-from ..elements.loops.body_poses import OMEGA, POSE, RD, R
+from ..elements.loops.constraint_rows import OMEGA, POSE, RD, R
 from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R, S_SPIN, call_series
 from ..jit.kernels import kernel
 from ..jit.simd import add, cross, fetch, first, fma, four, get, lanes, put, second, splat, sub, third, times
 from ..maths.dense_linalg import copy
 from ..rows.interface import add_products, note_loads, solve_series, weigh
-from .compensation import put_sum
+
+# Sums with their rounding errors.
+
+
+@kernel
+def put_sum(out, at, high, change, low, i):
+    """out[at : at + 4] = high + change, rounded; low[i : i + 4] is the rounding error (two-sum)."""
+    # Knuth's two-sum: low is the rounding error of the sum, exactly
+    rounded = add(high, change)
+    taken = sub(rounded, high)
+    put(out, at, rounded)
+    put(low, i, add(sub(high, sub(rounded, taken)), sub(change, taken)))
+
+
+# Taylor coefficients of the motion of all bodies, order by order, from the state at order zero.
+#
+#     (k+1) A_{k+1}           = sum_j A_j omega'~_{k-j}                                            (1)
+#     (k+1)(k+2) m r_{k+2}    = F_k - [Phi_r^T lam]_k                                              (2)
+#     (k+1) J' omega'_{k+1}   = tau'_k - sum_j omega'_j x (J' omega')_{k-j} - [Phi_pi'^T lam]_k    (3)
+#     Phi_{k+2}               = 0                                                                  (4)
+#
+# (4) is linear in lam_k: S lam_k = (k+1)(k+2) Phi_{k+2}, the right-hand side evaluated by (1)-(3) with lam_k = 0. The
+# Schur complement S = H W H^T is that of order zero for every k, so it is factorised once a step.
 
 MOST_ORDERS = 64
 

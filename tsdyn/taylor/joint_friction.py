@@ -7,15 +7,20 @@ linear in lam_k:
     N~ lam_k    = (k+1)(k+2) Phi_{k+2} at lam_k = 0,     N~ = S - H W sum_i g_i,0 N_i,lam              (2)
 
 N_i,lam is that of order zero, so N~ is factorised once a step, as S is without friction. At order zero N_i is not
-linear: Newton's method gives lam_0 (friction_solve.py), and (2) what it lacks to rounding.
+linear: Newton's method gives lam_0 (accelerations.py), and (2) what it lacks to rounding.
 """
 
-from ..elements.loops.body_poses import turned, write_accelerations
+from ..elements.loops.constraint_rows import turned, write_accelerations
 from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R
 from ..errors import Status
-from ..formulations.accelerations import refine_accelerations
-from ..formulations.friction_loads import load_slope
-from ..formulations.friction_solve import accelerate_with_friction, body_reaction, factorise_loads, find_reactions
+from ..formulations.accelerations import (
+    accelerate_with_friction,
+    body_reaction,
+    factorise_loads,
+    find_reactions,
+    load_slope,
+    refine_accelerations,
+)
 from ..jit.kernels import callback, kernel, stack
 from ..jit.simd import add, cross, first, four, put, second, splat, third
 from ..maths.dense_linalg import copy
@@ -31,8 +36,8 @@ from .coefficients import (
     turn,
     turn_ahead,
 )
+from .layout import load_series
 from .step_parts import begin_orders, write_qdd
-from .workspace import load_series
 
 JAMMED = int(Status.JAMMED)
 

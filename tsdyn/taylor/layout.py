@@ -1,27 +1,347 @@
-"""Memory layout of a Taylor run, and the parts of a scene that have no series."""
+"""The Taylor workspace: its memory layout, that of forces and friction; parts of a scene without series."""
+
+from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 
 from ..elements.bodies import Ground
 from ..elements.element import address
-from ..elements.loops.body_poses import STILL
-from ..elements.loops.constraint_rows import BODY, INTS, MASK
-from ..elements.loops.constraint_series import BODY_ROW, GROUND, UNTURNED, instance_width, scratch_at
+from ..elements.loops import force_series
+from ..elements.loops.constraint_rows import BODY, INTS, MASK, STILL
+from ..elements.loops.constraint_series import BODY_ROW, GROUND, UNTURNED, force_at, instance_width, scratch_at
+from ..elements.loops.friction import FRICTION_ROWS, REACTION
 from ..elements.markers import POINT
-from ..errors import InvalidConstraint
+from ..errors import InvalidConstraint, InvalidForce
 from ..formulations.locked_orientations import instances
-from ..jit.aligned_arrays import zeros
-from ..jit.kernels import records, twin
+from ..jit.arrays import zeros
+from ..jit.kernels import Record, loader, records, twin
+from ..model.equations import changes_with_state
+from ..model.packed import System, members_of
 from ..motions.prescribed import Motion
 from ..motions.program import run_program
 from ..motions.signals import Signal
 from ..motions.tables import is_data
-from ..motions.tracing import Untraceable
-from .force_layout import lay_out_forces
-from .friction_layout import kept_multipliers, lay_out_frictions
-from .tables import ConstraintSeries, MotionSeries
+from ..motions.tracing import ROWS, Untraceable, run_order
+from ..rows.constraint_graph import ConstraintGraph
+from ..rows.interface import TangentWorkspace
+from ..workspaces import Work, plain_context
 from .tolerances import FAR
-from .workspace import LOW, Expansion, Orders
+
+# Rows of the tables of an `Expansion`, each a record; addresses are those of kernels of this process.
+
+
+class ConstraintSeries(Record):
+    """All instances of one class of primitive."""
+
+    loop: int  # address of constraint_series.loop
+    values: int  # where the series of the first begin in Expansion.constraints
+    width: int  # floats of each
+
+
+class ForceSeries(Record):
+    """All instances of one kind of force."""
+
+    loop: int  # address of force_series.loop
+    values: int  # where the series of the first begin in Expansion.loads
+    width: int  # floats of each
+    count: int
+    stride: int  # reals of each
+    table: int  # where the entries of the first begin in Expansion.table
+    reals: int  # and in System.reals
+    check: int  # address of law_check.check; 0 where the law is analytic everywhere
+    margin: int  # address of law_check.margin; 0 for a law without a known margin of analyticity
+    sharp: int  # whether every step is checked at all places
+    near: int  # whether the step tried is, too
+    run: int  # address of what runs the program of a traced function; 0 for none
+    users: int  # whether the law is a user's, and may change within any part of a step
+
+
+class FrictionSeries(Record):
+    """A friction of a joint, in the order of ConstraintGraph.frictions."""
+
+    slope: int  # address of friction.load_slope
+    reaction: int  # where the series of its reaction begins in Expansion.loads: force and torque, one after the other
+    point: int  # where the body-frame coordinates of the joint's point begin in System.reals
+    first: int  # of its rows of Expansion.sources
+    count: int
+
+
+class ReactionSource(Record):
+    """A marker of a joint, whose force is a part of the reaction that a friction depends on."""
+
+    forces: int  # where the series of the force begins in Expansion.constraints
+    coordinates: int  # where its body-frame coordinates begin in System.reals
+    is_point: int  # 1 for a Point, 0 for a Vector
+    body: int
+
+
+class MotionSeries(Record):
+    """A prescribed motion, or a number of a load."""
+
+    run: int  # address of what runs its program
+    program: int  # where the program begins in System.reals
+    values: int  # where its series begins in Expansion.constraints or, of a load, in Expansion.loads
+
+
+# The Taylor workspace: the series of one step and everything else that the kernels use.
+
+# floats of a body in Expansion.low, and where those of its parts begin
+LOW, L_R, L_RD, L_OMEGA, L_P = 16, 0, 4, 8, 12
+
+
+class Orders(Record):
+    """Orders of the series: those of omega' are one less than those of r and A; and the time that they are about."""
+
+    top: int  # of omega', in this step
+    room: int  # for so many, from zero on
+    next: int  # top of the next step
+    lowest: int  # bounds of top
+    highest: int
+    refined: int  # how many orders of lam, from zero on, are refined
+    sweeps: int  # how often they are
+    time: float  # about which the series are, s
+
+
+class Expansion(NamedTuple):
+    """The series of a step; orders is what fits, from zero to two above the order of the method."""
+
+    order: Orders
+    bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
+    low: np.ndarray  # (b, 16)  what r, rd, omega' and p lack to rounding at the start of the step; step_end.py
+    low_end: np.ndarray  # (b, 16)  the same at the end of the step tried
+    start: np.ndarray  # (b, 4)  p at the start of the step
+    low_r2: np.ndarray  # (b, 4)  what r_2 lacks to rounding; coefficients.py
+    constraints: np.ndarray  # each kind's instances; constraint_series.series
+    places: np.ndarray  # (kinds,) of tables.ConstraintSeries
+    forces: np.ndarray  # (kinds,) of tables.ForceSeries
+    table: np.ndarray  # int64: the bodies of each force
+    loads: np.ndarray  # each kind of force's instances
+    motions: np.ndarray  # (motions,) of tables.MotionSeries
+    drives: np.ndarray  # (numbers of loads,) of tables.MotionSeries
+    frictions: np.ndarray  # (frictions,) of tables.FrictionSeries
+    sources: np.ndarray  # of tables.ReactionSource
+    kept: np.ndarray  # (m,)  multipliers of the step's start, in scenes with joint friction; joint_friction.py
+
+
+class Trial(Record):
+    """The step that is tried."""
+
+    h: float
+    limit: float  # of h, but by the series
+    tol: float  # that the step is held to
+    own_h: float  # by the tolerance of the run: to go back to when no longer one passes a singular configuration
+    own_tol: float
+    own_top: int
+    highest: int  # order that has been expanded
+    share: float  # singularity indicator at the end of the try before; inf for none
+    looser: int  # whether longer steps at looser tolerances are tried
+    serves: int  # whether the own step is a good one
+    failed: int  # Status of the try before
+    shorter: int  # times that it was shortened, not to end near a singular configuration
+    t1: float  # its end
+    last: int  # whether that is the run's
+    cut: int  # whether a stop cuts a fixed step
+    singular: int  # whether it ends in a singular configuration
+    check: int  # address of step_parts.check_laws; 0 where all laws are analytic everywhere
+    sharp: int  # whether a force is sharp
+    spacing: float  # s, of the places at which laws of users are compared with their series, at most
+    rate: float  # 1 + the largest of its start, m/s or rad/s
+    left: float  # margin of analyticity of the force laws along the step; 1 where they are analytic everywhere
+    hops: int  # in close succession, over places where a law is not analytic
+    hopped: float  # time of the last one
+    good: float  # share of the step up to which the series of forces are those of their laws
+
+
+class SeriesContext(NamedTuple):
+    """All that the driver's kernels use."""
+
+    system: System
+    work: Work
+    graph: ConstraintGraph
+    tangent: TangentWorkspace
+    expansion: Expansion
+    trial: Trial
+
+
+def empty_series(orders, bodies, kept=0):
+    """An `Expansion` with the series of bodies alone, and room for so many orders; kept: size of that array."""
+    count = bodies.size // (orders * BODY_ROW)
+    low, start, low_r2 = np.zeros((2, LOW * count)), *np.zeros((2, 4 * count))
+    none, kinds = np.zeros(0), (records(kind, []) for kind in (ConstraintSeries, ForceSeries))
+    return Expansion(
+        Orders(room=orders), bodies, *low, start, low_r2, none, *kinds, np.zeros(0, np.int64), none,
+        *(records(kind, []) for kind in (MotionSeries, MotionSeries, FrictionSeries, ReactionSource)), np.zeros(kept),
+    )  # fmt: skip
+
+
+def _example():
+    """One of the right types."""
+    expansion = empty_series(1, np.zeros(1))
+    plain = plain_context()
+    return SeriesContext(plain.system, plain.work, plain.graph, plain.tangent, expansion, Trial())
+
+
+load_series = loader(_example())
+
+
+# Memory layout of the series of forces: what each kind runs, and where its instances are.
+
+
+class ForceLayout(NamedTuple):
+    """Parts of an `Expansion`."""
+
+    forces: np.ndarray
+    table: np.ndarray
+    loads: np.ndarray
+    drives: np.ndarray
+
+
+class _Kind(NamedTuple):
+    """How the series of some instances of a kind are run."""
+
+    names: tuple  # of the kernels of series, check and margin; None for none
+    sharp: bool  # whether every step is checked at all places
+    rows: int  # of the scratch of each
+    program: list  # of a traced function
+
+
+def lay_out_forces(packed, orders):
+    """The `ForceLayout` of a packed scene, with what is constant in it."""
+    nb = len(packed.bodies)
+    index = {id(body): i for i, body in enumerate(packed.bodies)}
+    rows, table, drives, written, total = [], [], [], [], 0
+    for row in packed.system.forces:
+        reals = int(row.reals)
+        for _, group in groupby(members_of(row, packed.loads), _is_driven):  # instances of a kind are run together
+            # Instances that run the same loop in one go
+            members = list(group)
+            force = members[0].force
+            kind = _kind(members)
+            found = (address(force.kernels, name, force.name, InvalidForce) if name else 0 for name in kind.names)
+            loop, check, margin = found
+            width = _width(force, kind, orders, force.sharp or _is_driven(members[0]))
+            run = run_order.address if kind.program else 0
+            rows.append([loop, total, width, len(members), row.stride, len(table), reals])
+            rows[-1] += [check, margin, int(kind.sharp), 0, run, int(kind.sharp and changes_with_state(members[0]))]
+            written.append((total, kind.program))
+            total += len(kind.program)
+            for i, load in enumerate(members):
+                # A driven force reads the series of its loads from its scratch
+                pair = [index.get(id(body), nb) for body in (load.force.a, load.force.b)]
+                table += [*pair, (pair[0] == nb) | (pair[1] == nb) << 1]
+                if _is_driven(load):
+                    first = total + i * width + orders * (8 * len(force.markers) + force.slots)
+                    _drive(load, first, orders, drives, written)
+            total += len(members) * width
+            reals += len(members) * int(row.stride)
+    loads = zeros(total + 4)
+    for at, numbers in written:
+        loads[at : at + len(numbers)] = numbers
+    return ForceLayout(records(ForceSeries, rows), np.array(table, np.int64), loads, records(MotionSeries, drives))
+
+
+def _is_driven(load):
+    return any(isinstance(value, Signal) for value in load.parameters)
+
+
+def _kind(members):
+    """The `_Kind` of instances that are alike."""
+    load, force = members[0], members[0].force
+    # A traced function: every step is checked
+    if hasattr(force.kernels, "program"):
+        program = force.kernels.program(len(load.parameters))
+        return _Kind(("series", "check", None), True, int(program[ROWS]), program)
+    # Friction in proportion to a normal load: the same
+    if load.normal >= 0:
+        size = sum(marker.size for marker in force.markers)
+        return _Kind(("series", "check", None), True, force.slots + size + FRICTION_ROWS, [])
+    # Other laws: checked everywhere if sharp, or where the margin of analyticity is used up
+    signals = [value for each in members for value in each.parameters if isinstance(value, Signal)]
+    sharp = force.sharp or not all(signal.entire for signal in signals)
+    before, numbers = ("driven_", load.alone[0].stride - 3 * len(force.markers)) if signals else ("", 0)
+    check = before + "check" if sharp or force.positive != () else None
+    margin = before + "margin" if force.positive and not sharp else None
+    return _Kind((before + "series", check, margin), sharp, force.slots + numbers, [])
+
+
+def _width(force, kind, orders, keeps):
+    """Floats of an instance; keeps: whether x and xd are kept."""
+    size = sum(marker.size for marker in force.markers)
+    rows = kind.rows + (2 * size if keeps else 0) + (-(-kind.rows // orders) if kind.program else 0)
+    return force_series.instance_width(len(force.markers), rows, orders)
+
+
+def _drive(load, first, orders, drives, written):
+    """The rows of the series of par, from `first` on: what a program writes, and what is constant."""
+    numbers = [x for value in load.parameters for x in ([None] * value.width if isinstance(value, Signal) else [value])]
+    for j, (number, program) in enumerate(zip(numbers, load.programs, strict=True)):
+        if number is None:
+            drives.append([run_program.address, program, first + j * orders])
+        else:
+            written.append((first + j * orders, [float(number)]))
+
+
+# Memory layout of the series of joint friction: which forces of which markers its reaction is made of.
+
+
+class FrictionLayout(NamedTuple):
+    """Parts of an `Expansion`."""
+
+    frictions: np.ndarray
+    sources: np.ndarray
+
+
+def kept_multipliers(graph):
+    """Size of Expansion.kept."""
+    return len(graph.row) if len(graph.frictions) else 0
+
+
+def lay_out_frictions(packed, graph, places, forces, orders):
+    """The `FrictionLayout` of a packed scene; places and forces are those of the `Expansion`."""
+    found = sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
+    frictions, sources = [], []
+    if found:
+        where = _instances(packed, graph, places)
+        index = {id(body): i for i, body in enumerate(packed.bodies)}
+        members = {id(member.constraint): member for member in packed.members}
+    for load, row in zip(found, graph.frictions, strict=True):
+        force, kind, first = load.force, packed.system.forces[row.kind], len(sources)
+        series = next(each for each in forces if each.reals == kind.reals)
+        size = sum(marker.size for marker in force.markers)
+        scratch = series.values + row.index * series.width + 8 * len(force.markers) * orders
+        on_a = row.on == 0
+        body = force.a if on_a else force.b
+        point = kind.reals + kind.stride * row.index + (0 if on_a else 6)
+        slope = address(force.kernels, "load_slope", force.name, InvalidForce)
+        for part in packed.constraints[members[id(force.joint)].parts]:
+            sources += _sources(part, body, index[id(body)], *where[id(part)], orders)
+        frictions.append(
+            [slope, scratch + (force.slots + size + REACTION) * orders, point, first, len(sources) - first]
+        )
+    return FrictionLayout(records(FrictionSeries, frictions), records(ReactionSource, sources))
+
+
+def _instances(packed, graph, places):
+    """For each constraint where the series and the floats of its instance begin."""
+    found = {}
+    for i, (_, members) in enumerate(instances(packed, graph)):
+        for at, (constraint, _) in enumerate(members):
+            series, reals = places[i].values + at * places[i].width, graph.kinds[i].reals + at * graph.kinds[i].stride
+            found[id(constraint)] = int(series), int(reals)
+    return found
+
+
+def _sources(part, body, number, series, reals, orders):
+    """Rows of Expansion.sources of the markers that a primitive has on a body."""
+    return [
+        [series + force_at(j, len(part.markers), part.rows, orders), reals + 3 * j, int(marker.code == POINT), number]
+        for j, marker in enumerate(part.markers)
+        if part.body_of(marker) is body
+    ]
+
+
+# Memory layout of a Taylor run, and the parts of a scene that have no series.
 
 SHOWN = 5  # in a message
 

@@ -1,12 +1,166 @@
-"""The engine of runs by Taylor series; see runs/run.py."""
+"""The engine of runs by Taylor series: its run workspace and dense output; see runs/driver.py."""
 
-from ..errors import InvalidArgument
-from ..runs.reader import Reading
-from .dense_output import read_series, reading_workspace
+import numpy as np
+
+from ..elements.loops.constraint_rows import place_bodies
+from ..elements.loops.constraint_series import BODY_ROW
+from ..errors import InvalidArgument, Status
+from ..formulations.locked_orientations import moving_parts
+from ..jit.kernels import entry
+from ..maths.dense_linalg import copy
+from ..model.packed import System
+from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal
+from ..rows.graph_builder import with_loops
+from ..rows.interface import allocate_tangent
+from ..runs.dense_output import Reading, put_state, recall
+from ..runs.run_memory import Memory
+from ..workspaces import B_DATA, B_START, lay_out, load_run, plain_work, words
 from .joint_friction import accelerate_with_friction_here, expand_friction_series
-from .layout import is_far, refusal, room
-from .run_memory import Series, SeriesMemory
-from .step_parts import accelerate_here, expand_far_series, expand_series, pass_singular, reach
+from .layout import (
+    SeriesContext,
+    Trial,
+    allocate_expansion,
+    empty_series,
+    is_far,
+    kept_multipliers,
+    load_series,
+    masks,
+    refusal,
+    room,
+)
+from .step_end import keep_start
+from .step_parts import (
+    accelerate_here,
+    check_laws,
+    expand_far_series,
+    expand_series,
+    pass_singular,
+    reach,
+    set_floor,
+    state_within,
+)
+from .stepper import advance_series
+from .tolerances import MANY
+
+# Dense output of a Taylor run: the series of a step, evaluated and projected onto the manifold.
+
+
+@entry
+def read_series(context, run, t, rows, blocks, charts, points, out):
+    """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows]; as runs.dense_output.read. Status."""
+    c, r = load_series(context), load_run(run)
+    w, x = c.work, c.expansion
+    for i in range(t.size):
+        # A block is the whole series of a step
+        block = blocks[rows[i]]
+        data = block[B_DATA:]
+        x.order.top = int(data[0])
+        copy(data[1:][: w.q.size], w.q)
+        copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
+        # Poses of the start are where Euler parameters are followed from
+        recall(c.system, block)
+        set_floor(c, w.q)
+        place_bodies(c.graph.bodies, w.q, c.tangent.poses)
+        keep_start(c.graph, c.tangent.poses, x.start)
+        status = state_within(context, c, r.kernels, t[i], t[i] - block[B_START])
+        if status != 0:
+            return status
+        put_state(w, out[i])
+    return 0
+
+
+def reading_workspace(system, graph, orders, size):
+    """Context and run of a reader, with room for so many orders; size: of the numbers in the constraints."""
+    own = system._replace(reals=system.reals.copy())
+    n = int(own.bodies[:, 1].sum())
+    work = plain_work(n)
+    work.control.size = size
+    expansion = empty_series(orders, np.zeros((len(graph.bodies) + 1) * BODY_ROW * orders), kept_multipliers(graph))
+    return SeriesContext(own, work, graph, allocate_tangent(graph, n), expansion, Trial()), lay_out(n, 0, 0, 0, 0)
+
+
+# Run workspace of the Taylor driver, and what all Taylor runs of a scene share.
+
+PASSAGE = Status.PASSAGE
+
+
+class Series:
+    """What the Taylor runs of a packed scene share: its graph, with the loops that they need.
+
+    Parameters
+    ----------
+    packed : Packed
+    found : str
+        Its `layout.refusal`.
+
+    Raises
+    ------
+    InvalidArgument
+        If a part of the scene has no series, or an inertia has no inverse; names them.
+    """
+
+    def __init__(self, packed, found):
+        if found:
+            raise InvalidArgument(found)
+        graph, self.kinds = moving_parts(packed)
+        self.constant_columns = _masks_once(graph, packed)
+        self.graph = with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
+        self.refined = int(len(graph.bodies) > MANY or are_unequal(packed.system))
+
+
+def _masks_once(graph, packed):
+    """As `layout.masks`, which scenes of a family with the same parameters of constraints share."""
+    shared = packed.derived.shared
+    if shared is None:
+        return masks(graph, packed)
+    key = masks, graph.row.tobytes(), graph.bodies.tobytes()
+    given, table, constant = shared.get(key, (None, None, 0))
+    if given == packed.parameters:
+        graph.table[...] = table
+        return constant
+    constant = masks(graph, packed)
+    shared[key] = packed.parameters, graph.table.copy(), constant
+    return constant
+
+
+class SeriesMemory(Memory):
+    """The memory of a run by series.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    highest : int
+        The highest order that there is room for.
+    """
+
+    advance_kernel = staticmethod(advance_series)
+
+    def __init__(self, prepared, highest):
+        self.series, packed, n = prepared.series, prepared.packed, prepared.n
+        graph, system = self.series.graph, System(*(array.copy() for array in packed.system))
+        expansion = allocate_expansion(graph, self.series.kinds, packed, highest)
+        tangent, trial = allocate_tangent(graph, n), Trial()
+        trial.left = 1.0
+        if expansion.forces["check"].any():
+            trial.check, trial.sharp = check_laws.address, int(expansion.forces["sharp"].any())
+        block = 1 + n + expansion.bodies.size
+        run = lay_out(n, 0, 0, prepared.handles.count, system.memory.size, block=block)
+        context = SeriesContext(system, plain_work(n), graph, tangent, expansion, trial)
+        super().__init__(prepared, graph, context, run)
+        self.reals = packed.system.reals
+        self._laid_out.append(words(expansion.order))
+        self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + tangent.rows.S.size + run.block.size)
+
+    def advance(self, log, most):
+        """As of `Memory`."""
+        status = super().advance(log, most)
+        if status is PASSAGE:  # the run ends next to a singular configuration
+            self.run.kernels.pass_singular = pass_singular.address
+            status = super().advance(log, most)
+        return status
+
+
+# The engine of runs by Taylor series; see runs/driver.py.
 
 
 class SeriesEngine:

@@ -11,15 +11,15 @@ whose rounding errors are in proportion to its angle; after more than about a ra
 
 import math
 
-from ..elements.loops.body_poses import OMEGA, POSE, RD, P, R, orient, set_pose
+from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R, orient, set_pose
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..formulations.projection import normalise
 from ..jit.kernels import kernel
 from ..jit.simd import add, fma, four, put, splat, sub, times, total
 from ..rows.interface import find_correction, multiply_rates
-from .compensation import put_sum
+from .coefficients import put_sum
+from .layout import L_OMEGA, L_P, L_R, L_RD, LOW
 from .tolerances import MOST_PARTS, WIDE
-from .workspace import L_OMEGA, L_P, L_R, L_RD, LOW
 
 
 @kernel

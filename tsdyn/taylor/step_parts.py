@@ -1,11 +1,8 @@
-"""The parts of a Taylor step as callbacks, each compiled once and loaded only if a run needs it.
-
-Their argument is the address of a `SeriesContext`.
-"""
+"""The parts of a Taylor step as callbacks, each compiled once and loaded only if a run needs it."""
 
 import math
 
-from ..elements.loops.body_poses import largest_coordinate, write_accelerations, write_positions, write_velocities
+from ..elements.loops.constraint_rows import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..elements.loops.law_check import ATOL, LENGTH, LIMITS, MOST, RTOL, TAU, TIME, call_check, call_margin
 from ..elements.tolerances import OFF, OFF_SELDOM
@@ -17,6 +14,7 @@ from ..jit.kernels import callback, caller, kernel, stack
 from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import set_time
+from ..motions.program import call_smooth
 from ..rows.interface import (
     accelerations_hold,
     evaluate_bias,
@@ -30,10 +28,31 @@ from ..rows.interface import (
     singularity_indicator,
 )
 from .coefficients import begin, expand
-from .prescribed_series import expand_motions
+from .layout import load_series
 from .step_end import keep_start, project_rates, sum_series
 from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL, UNEQUAL
-from .workspace import load_series
+
+# Taylor series of prescribed motions and of loads, for Taylor runs of driven scenes.
+
+
+@kernel
+def _expand_motion(system, x, rows, values):
+    """The series of some motions, onto values."""
+    for i in range(rows.shape[0]):
+        row = rows[i]
+        call_smooth(row.run, system.reals[row.program :], x.order.time, x.order.room, values[row.values :])
+
+
+@kernel
+def expand_motions(system, x):
+    """The series of all motions and loads about the time of the expansion."""
+    _expand_motion(system, x, x.motions, x.constraints)
+    _expand_motion(system, x, x.drives, x.loads)
+
+
+# The parts of a Taylor step as callbacks, each compiled once and loaded only if a run needs it.
+#
+# Their argument is the address of a `SeriesContext`.
 
 NOT_FINITE, SINGULAR, UNHELD = int(Status.NOT_FINITE), int(Status.SINGULAR), int(Status.UNHELD)
 LAWS = "pdddd"

@@ -1,6 +1,6 @@
 """Thresholds of Taylor runs: length of a step, passage of singular configurations, stiffness.
 
-Shares are values of the singularity indicator (rows/singularity.py), which falls as the square of the distance.
+Shares are values of the singularity indicator (rows/row_selection.py), which falls as the square of the distance.
 """
 
 # --- length and order ------------------------------------------------------------------------------------------------
@@ -97,3 +97,15 @@ ILL_ORDERS = 3
 
 # Orders of all bodies, about a hundred bytes each, from which series exceed the near caches (3 MB).
 FAR = 1 << 15
+
+
+# Thresholds of lanes.
+
+# Size of a coefficient, over its weight, that counts as zero: it doesn't determine the radius of convergence.
+LEAST_SIZE = 1e-300
+# log2 of the size of the last coefficient below which it loses digits, as FAINT of taylor/tolerances.py.
+FAINT_LOGARITHM = -930.0
+# s: the length of a step without a radius of convergence, which ends the lane.
+NO_STEP = 0.0
+# Times that a step which has missed the manifold is halved before its case is left to be run alone.
+HALVINGS = 4

@@ -3,8 +3,8 @@
 Imports simulation and below.
 
 Begin with primitive_checks.py: Phi_q, gamma and series of a constraint against complex steps and truncated power
-series; force_checks.py does the same for forces. integrator_checks.py fits the order of a method (observed_order.py)
-and checks its adaptive steps (adaptive_checks.py).
+series; force_checks.py does the same for forces. integrator_checks.py fits the order of a method
+and checks its adaptive steps.
 """
 
 from ..errors import CheckFailed

@@ -12,12 +12,11 @@ from ..elements.joint import Joint
 from ..elements.primitive import Primitive
 from ..errors import CheckFailed, InvalidCall, TsdynError
 from ..jit.kernels import NumbaError, twin
-from ..maths.two_jets import Jet
+from ..maths.power_series import Jet
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
-from .instances import instances, maker
-from .series_checks import check_constraint_series
+from .series_checks import check_constraint_series, instances, maker
 from .tolerances import COMPLEX_STEP, NOT_ANALYTIC, REAL_STEP, ROUNDED
 
 if TYPE_CHECKING:

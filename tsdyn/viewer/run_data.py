@@ -1,26 +1,181 @@
-"""The data of a page: poses, parts and loads of a run, as JSON with arrays in base64.
-
-Positions are float32 from an origin near the bodies, Euler parameters (e1, e2, e3, e0) and loads int16 of a full scale.
-"""
+"""The data of a page: poses, parts, contacts and loads of a run, as JSON with arrays in base64."""
 
 from __future__ import annotations
 
 import base64
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .._version import __version__
-from ..errors import InvalidArgument
+from ..constraints import PlaneContact
+from ..errors import InvalidArgument, StepFailure
 from ..shapes import Mesh
 from ..validation import sequence, vector3
-from .body_shapes import by_body, derived, drawn_solid, given
-from .contacts import contact_states
-from .frames import resample
-from .loads import UNITS, arrows, size
-from .parts import UNIT, Part, rounded
-from .sizes import attached, joint_points, reaches
-from .symbols import symbols
+from .symbols import (
+    UNIT,
+    Attached,
+    Part,
+    attached,
+    by_body,
+    derived,
+    drawn_solid,
+    given,
+    joint_points,
+    reaches,
+    rounded,
+    symbols,
+)
+
+if TYPE_CHECKING:
+    from ..hints import Floats, Solution
+
+
+# Frames of an animation: a run resampled at equal intervals of time.
+#
+# Between two outputs the coordinates are the quintic with the values, rates and accelerations of both; where a run kept
+# its dense output, they are read from that. Euler parameters are scaled to unit length.
+
+OUTPUTS = 8000  # of a stored run, that are read at most
+
+
+class Frames(NamedTuple):
+    """The run at times (k,), equally spaced; poses of b bodies. `run`: outputs beside these times."""
+
+    times: Floats
+    position: Floats  # (k, b, 3), m
+    orientation: Floats  # (k, b, 4), Euler parameters; (1, 0, 0, 0) for a point mass
+    run: Any
+
+    def interpolated(self, values: Floats) -> Floats:
+        """Values (outputs of `run`, ...) at the times of the frames, linear between outputs."""
+        i, s, _ = _intervals(self.run.t, self.times)
+        s = s.reshape(-1, *[1] * (values.ndim - 1))
+        return values[i] + s * (values[np.minimum(i + 1, len(values) - 1)] - values[i])
+
+
+def resample(solution: Solution, count: int) -> Frames:
+    """The `Frames` of a solution, at most `count`; raises InvalidArgument where it has numbers that aren't finite."""
+    times = np.linspace(solution.t[0], solution.t[-1], count if solution.t[-1] > solution.t[0] else 1)
+    run = _beside(solution, times)
+    q = _dense(solution, times)
+    if q is None:
+        q = quintic(run, times)
+    bodies = [solution.handles.where(body) for body in solution.handles.bodies]
+    position = np.stack([q[:, at : at + 3] for at, _ in bodies], axis=1)
+    orientation = np.zeros((times.size, len(bodies), 4))
+    orientation[:, :, 0] = 1.0
+    for i, (at, dimension) in enumerate(bodies):
+        if dimension == 7:
+            p = q[:, at + 3 : at + 7]
+            orientation[:, i] = p / np.linalg.norm(p, axis=1, keepdims=True)
+    if not all(np.isfinite(array).all() for array in (position, orientation, run.qd, run.qdd)):
+        raise InvalidArgument(
+            "the outputs have numbers that aren't finite, which can't be drawn: view others, solution[a:b].view()."
+        )
+    return Frames(times, position, orientation, run)
+
+
+def _dense(solution, times):
+    """Coordinates (k, n) from dense output, None where there is none, or it fails."""
+    try:
+        return None if solution._trajectory is None else solution.at(times).q
+    except (InvalidArgument, StepFailure):  # of a run that ended early, close to its end
+        return None
+
+
+def _beside(solution, times):
+    """The outputs on both sides of each time."""
+    if solution._stored is not None:
+        return solution[:: max(1, solution.t.size // OUTPUTS)]
+    after = np.clip(np.searchsorted(solution.t, times, side="right"), 1, solution.t.size - 1)
+    return solution._picked(np.union1d(after - 1, after) if solution.t.size > 1 else np.arange(1))
+
+
+def quintic(run: Solution, times: Floats) -> Floats:
+    """Coordinates (k, n) at times (k,), from those at the outputs with their rates and accelerations."""
+    i, s, h = _intervals(run.t, times)
+    j, s, h = np.minimum(i + 1, run.t.size - 1), s[:, None], h[:, None]
+    q, d = run.q[i], run.q[j] - run.q[i]
+    v, a, w, b = h * run.qd[i], h * h * run.qdd[i], h * run.qd[j], h * h * run.qdd[j]
+    c3 = 10.0 * d - 6.0 * v - 4.0 * w - 1.5 * a + 0.5 * b
+    c4 = -15.0 * d + 8.0 * v + 7.0 * w + 1.5 * a - b
+    c5 = 6.0 * d - 3.0 * (v + w) - 0.5 * (a - b)
+    return q + s * (v + s * (0.5 * a + s * (c3 + s * (c4 + s * c5))))
+
+
+def _intervals(t, times):
+    """For each time the output before it, and where it is in the interval from there, 0 to 1, of length h, s."""
+    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, max(t.size - 2, 0))
+    h = t[np.minimum(i + 1, t.size - 1)] - t[i]
+    s = np.divide(times - t[i], h, out=np.zeros_like(times), where=h > 0.0)
+    return i, np.clip(s, 0.0, 1.0), h
+
+
+# States of contacts: whether a plane pushes on its point, or holds it back, where a one-sided contact would open.
+
+OPEN, HOLDS_BACK, PUSHES = 0, 1, 2  # as the page colours them
+NO_CONTACT = 1e-6  # of the largest force of the contact: below it there is none
+
+
+def contact_states(frames: Frames, constraints: list[Attached]) -> list[Any]:
+    """The states (k,) of each PlaneContact at the frames."""
+    return [_states(frames, each.item) for each in constraints if isinstance(each.item, PlaneContact)]
+
+
+def _states(frames, item):
+    """From the sign of the multiplier: the force along the normal is -lam; NaN, of a dropped row, is none."""
+    lam = np.nan_to_num(frames.interpolated(frames.run.multipliers[:, frames.run.rows(item).start]))
+    none = NO_CONTACT * np.abs(lam).max(initial=0.0)
+    return np.where(np.abs(lam) <= none, OPEN, np.where(lam < 0.0, PUSHES, HOLDS_BACK))
+
+
+# Arrows: reactions of constraints and applied forces, with their torques, at the points where they act.
+
+NO_ARROW = 1e-9  # of the largest load: below it an arrow is left out; torques are compared with forces by a length
+UNITS = {"force": "N", "torque": "N m"}
+
+
+class Arrows(NamedTuple):
+    """Loads of one element on one body: values (k, 3) in the ground frame."""
+
+    layer: str  # "reactions" or "forces"
+    unit: str  # "force" or "torque"
+    name: str
+    body: int
+    point: Any  # (3,), body frame
+    values: Any
+    unique: bool  # False where redundant constraints may share the load in many ways
+
+
+def arrows(frames: Frames, constraints: list[Attached], forces: list[Attached], length: float) -> list[Arrows]:
+    """All loads that are not zero throughout, at the times of the frames; NaN, of singular configurations, is zero.
+
+    length: of a usual body, m.
+    """
+    found, redundant = [], bool(np.isnan(frames.run.multipliers).any())
+    for layer, items in (("reactions", constraints), ("forces", forces)):
+        for each in items:
+            on_a = each.item.on is each.item.a
+            index, point = (each.a, each.point("a")) if on_a else (each.b, each.point("b"))
+            unique = not redundant or bool(frames.run.reaction_unique(each.item).all())
+            for unit, values in zip(UNITS, frames.run.reaction(each.item), strict=True):
+                values = np.nan_to_num(frames.interpolated(values))
+                found.append(Arrows(layer, unit, each.item.name, index, point, values, unique))
+    arms = {"force": 1.0, "torque": length}
+    largest = max((size(one) / arms[one.unit] for one in found), default=0.0)
+    return [one for one in found if size(one) / arms[one.unit] > NO_ARROW * largest]
+
+
+def size(one: Arrows) -> float:
+    """The largest component."""
+    return float(np.abs(one.values).max(initial=0.0))
+
+
+# The data of a page: poses, parts and loads of a run, as JSON with arrays in base64.
+#
+# Positions are float32 from an origin near the bodies, Euler parameters (e1, e2, e3, e0) and loads int16 of a full
+# scale.
 
 FRAMES, FEWEST = 1000, 200  # at most; and at least, however many bodies there are
 ROOM = 1_600_000  # bytes of arrays at most, if not more frames than FEWEST

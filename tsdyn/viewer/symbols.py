@@ -1,13 +1,275 @@
-"""Symbols of constraints and forces, by kind: a pin, a ball, a slider in its guide, a plane, a coil."""
+"""What a page draws: shapes of bodies, and symbols of constraints and forces by kind, to scale."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .parts import Link, Part, along
-from .sizes import Attached
+from ..elements.joint import across
+from ..elements.markers import POINT
+from ..errors import InvalidArgument
+from ..shapes import AXES, Box, Cylinder, Geometry, Mesh, Shape, Sphere
+
+# What a page draws: parts that move with a body, and links that stretch between points of two bodies.
+
+UNIT = {"box": np.ones(3), "cylinder": np.array([2.0, 2.0, 1.0]), "sphere": np.full(3, 2.0)}  # dimensions, m
+DIGITS = 6  # of numbers that describe shapes
+
+
+class Part(NamedTuple):
+    """A unit shape, scaled, turned and placed in the frame of a body.
+
+    kind: "box" with edges of 1, "sphere" of radius 1, "cylinder" of radius and length 1 along z, or "mesh0", ...
+    """
+
+    layer: str  # what is shown and hidden together: "bodies", "joints"
+    kind: str
+    body: int  # -1: ground
+    colour: str
+    position: Any  # (3,), m
+    rotation: Any  # (3, 3)
+    size: Any  # (3,), m
+    contact: bool = False  # whether the state of a contact colours it
+
+    @property
+    def reach(self) -> float:
+        """A distance from the centroid of the body beyond which there is nothing of it, m; of no mesh."""
+        return float(np.linalg.norm(self.position) + np.linalg.norm(UNIT[self.kind] * self.size) / 2.0)
+
+    def data(self) -> dict[str, Any]:
+        """For the page: the columns of rotation times size, then position."""
+        columns = (np.asarray(self.rotation) * np.asarray(self.size)).T
+        matrix = rounded([*columns.ravel(), *self.position])
+        data = {"layer": self.layer, "kind": self.kind, "body": self.body, "colour": self.colour, "matrix": matrix}
+        return data | {"contact": True} if self.contact else data
+
+
+class Link(NamedTuple):
+    """A rod or a coil between a point of each of two bodies."""
+
+    kind: str  # "cylinder", "coil"
+    a: int
+    point_a: Any  # (3,), m
+    b: int
+    point_b: Any
+    radius: float
+    colour: str
+    layer: str = "joints"
+
+    def data(self) -> dict[str, Any]:
+        """For the page."""
+        points = {"point_a": rounded(self.point_a), "point_b": rounded(self.point_b)}
+        return {**self._asdict(), **points, "radius": rounded([self.radius])[0]}
+
+
+def along(axis: Any) -> Any:
+    """A rotation (3, 3) whose third column is the axis."""
+    return np.column_stack([*across(axis), axis / np.linalg.norm(axis)])
+
+
+def rounded(values: Any) -> list[float]:
+    """Numbers with few digits."""
+    return [float(f"{x:.{DIGITS}g}") for x in values]
+
+
+# Shapes of bodies: those that a user gives, or the solid of uniform density with the body's inertia, and rods.
+#
+# Of principal inertia (A, B, C) and mass m: a cuboid with the edges a^2 = 6 (B + C - A) / m, ...; where two are equal,
+# a cylinder, r^2 = 2 C / m, h^2 = 6 (2 A - C) / m; where three are, a ball, r^2 = 5 A / (2 m). So these shapes are
+# exact. A solid that extends far beyond the joints of its body, or would hide them in a link of two joints, is drawn
+# smaller, in proportion. Rods join the centroid to the points of the joints.
+
+COLOURS = ("#4c8bc9", "#e0893b", "#57a773", "#c96a9b", "#b9a23c", "#7d77c7", "#4fb0b5", "#c4605a")
+EQUAL = 1e-6  # relative difference of principal inertias
+THINNEST = 0.04  # of the least edge, per largest
+FAR, SMALL = 2.0, 0.4  # a solid that extends further than FAR reaches is drawn to extend SMALL
+SLIM = 0.5  # thickness of a link at most, per reach
+ROD = 0.05  # radius, per reach
+POINT_MASS = 0.15  # radius, per reach
+
+
+class Solid(NamedTuple):
+    """A uniform solid with the inertia of a body; extent: half its largest dimension, m."""
+
+    kind: str
+    rotation: Any
+    size: np.ndarray
+
+    @property
+    def extent(self) -> float:
+        """Half the largest dimension, m."""
+        return float(self.widths.max()) / 2.0
+
+    @property
+    def girth(self) -> float:
+        """The second largest dimension, m."""
+        return float(np.sort(self.widths)[1])
+
+    @property
+    def widths(self) -> Any:
+        """Dimensions (3,), m."""
+        return UNIT[self.kind] * self.size
+
+
+def drawn_solid(mass: float, inertia: Any, points: Any, reach: float) -> Solid:
+    """The solid of a body as it is drawn; points (j, 3) are where its joints are, m."""
+    solid = solid_of(mass, inertia)
+    factor = SMALL * reach / solid.extent if solid.extent > FAR * reach else 1.0
+    if sum(np.linalg.norm(point) > ROD * reach for point in points) == 2:
+        factor = min(factor, SLIM * reach / solid.girth)
+    return solid._replace(size=factor * solid.size)
+
+
+def solid_of(mass: float, inertia: Any) -> Solid:
+    """The solid of uniform density with a mass, kg, and an inertia (3, 3), kg m^2."""
+    moments, axes = np.linalg.eigh(inertia)
+    moments = np.maximum(moments, 0.0)  # that of a rod may be rounded below
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    least = EQUAL * moments[2]
+    if moments[2] - moments[0] <= least:
+        return Solid("sphere", np.eye(3), np.full(3, np.sqrt(2.5 * moments[2] / mass)))
+    for i, j, k in ((0, 1, 2), (1, 2, 0)):  # i and j across, k along
+        if abs(moments[i] - moments[j]) <= least:
+            radius, length = np.sqrt(2.0 * moments[k]), np.sqrt(max(0.0, 6.0 * (2.0 * moments[i] - moments[k])))
+            radius, length = max(radius, THINNEST * length / 2.0), max(length, THINNEST * 2.0 * radius)
+            return Solid("cylinder", along(axes[:, k]), np.array([radius, radius, length]) / np.sqrt(mass))
+    edges = np.sqrt(np.maximum(0.0, 6.0 * (moments.sum() - 2.0 * moments) / mass))
+    return Solid("box", axes, np.maximum(edges, THINNEST * edges.max()))
+
+
+def derived(index: int, solid: Solid | None, points: Any, reach: float) -> list[Part]:
+    """Parts of a body without a shape of its own; points (j, 3) are where its joints are. None: a point mass."""
+    colour, eye, centre = COLOURS[index % len(COLOURS)], np.eye(3), np.zeros(3)
+    if solid is None:
+        return [Part("bodies", "sphere", index, colour, centre, eye, np.full(3, POINT_MASS * reach))]
+    parts = [Part("bodies", solid.kind, index, colour, centre, solid.rotation, solid.size)]
+    for point in points:
+        length, radius = np.linalg.norm(point), ROD * reach
+        if length > radius:
+            parts.append(Part("bodies", "cylinder", index, colour, point / 2, along(point), (radius, radius, length)))
+    return parts
+
+
+def given(index: int, shapes: Any, meshes: list[Mesh], name: str) -> list[Part]:
+    """Parts of a body, or of the ground, with shapes of its user's; meshes are appended to `meshes`."""
+    parts = []
+    for piece in _pieces(shapes, name):
+        rotation = piece.rotation
+        if isinstance(piece, Box):
+            kind, size = "box", piece.size
+        elif isinstance(piece, Sphere):
+            kind, size = "sphere", np.full(3, piece.radius)
+        elif isinstance(piece, Cylinder):
+            kind, size = "cylinder", np.array([piece.radius, piece.radius, piece.length])
+            rotation = rotation @ AXES[piece.axis]
+        else:
+            kind, size = f"mesh{len(meshes)}", np.ones(3)
+            meshes.append(piece)
+        colour = piece.colour or (COLOURS[index % len(COLOURS)] if index >= 0 else "gray")
+        parts.append(Part("bodies", kind, index, colour, piece.position, rotation, size))
+    return parts
+
+
+def _pieces(shapes, name):
+    """The geometry, in the frame of the body, of a shape or a sequence of them."""
+    pieces = []
+    for shape in shapes if isinstance(shapes, (tuple, list)) else [shapes]:
+        if isinstance(shape, Shape):
+            pieces += [piece.moved(-shape.centroid) for piece in shape.pieces]
+        elif isinstance(shape, Geometry):
+            pieces.append(shape)
+        else:
+            raise InvalidArgument(
+                f"view: shapes[{name!r}] must be one of ts.shapes, such as ts.shapes.Box((1, 1, 1)), or a list of "
+                f"them, got {shape!r}."
+            )
+    return pieces
+
+
+def by_body(shapes: Any, handles: Any, ground: Any) -> dict[int, Any]:
+    """What a user gave as shapes, by the index of the body, -1 for the ground."""
+    if not isinstance(shapes, dict):
+        raise InvalidArgument(f"view: shapes must be a dictionary, body -> shape, got {shapes!r}.")
+    found = {}
+    for key, value in shapes.items():
+        if key is ground or (isinstance(key, str) and key == "ground"):
+            found[-1] = value
+        else:
+            found[handles.bodies.index(handles.body(key))] = value
+    return found
+
+
+# Where joints and forces attach to bodies, and how large things are: what symbols are scaled by.
+
+SAME = 1e-9  # distance of points that are one, per reach
+PER_MOTION = 0.1  # reach of a lone point mass, per extent of the motion
+
+
+class Attached(NamedTuple):
+    """A constraint or force with its places; a and b are indices of bodies, -1: ground, or no second body."""
+
+    item: Any
+    a: int
+    b: int
+    places: dict[str, Any]  # argument of each marker -> coordinates (3,), frame of its body
+    points: dict[str, Any]  # "a", "b" -> the first point there; absent where it has none
+
+    def point(self, letter: str) -> Any:
+        """The first point on a body, its centroid where there is none."""
+        return self.points.get(letter, np.zeros(3))
+
+
+def attached(packed: Any) -> tuple[list[Attached], list[Attached]]:
+    """Constraints, without the normalisations, and forces of a packed scene."""
+    index = {id(body): i for i, body in enumerate(packed.bodies)}
+
+    def one(item, coordinates):
+        points = {m.body: s for m, s in reversed([*zip(item.markers, coordinates, strict=True)]) if m.code == POINT}
+        places = {m.argument: s for m, s in zip(item.markers, coordinates, strict=True)}
+        return Attached(item, index.get(id(item.a), -1), index.get(id(item.b), -1), places, points)
+
+    constraints = [one(member.constraint, member.coordinates) for member in packed.members]
+    constraints = [each for each in constraints if not getattr(each.item, "normalises", False)]
+    return constraints, [one(load.force, load.coordinates) for load in packed.loads]
+
+
+def joint_points(items: list[Attached], count: int) -> list[list[Any]]:
+    """For each body the different points where something attaches."""
+    found: list[list[Any]] = [[] for _ in range(count)]
+    for each in items:
+        for index, letter in ((each.a, "a"), (each.b, "b")):
+            if index >= 0 and letter in each.points:
+                found[index].append(each.points[letter])
+    return [_different(points) for points in found]
+
+
+def _different(points):
+    kept: list[Any] = []
+    for point in points:
+        if all(np.linalg.norm(point - other) > SAME * (1.0 + np.linalg.norm(point)) for other in kept):
+            kept.append(point)
+    return kept
+
+
+def reaches(packed: Any, points: list[list[Any]], position: Any) -> Any:
+    """How far each body reaches from its centroid, m: to its farthest joint, or as its inertia does.
+
+    Of point masses, the median of the rigid bodies' reaches, or a part of the extent of the motion.
+    """
+    reach = np.zeros(len(packed.bodies))
+    for i, body in enumerate(packed.bodies):
+        reach[i] = max((float(np.linalg.norm(point)) for point in points[i]), default=0.0)
+        if reach[i] == 0.0 and body.dimension == 7:
+            reach[i] = solid_of(packed.system.mass[i], packed.system.inertia[i].reshape(3, 3)).extent
+    if (reach > 0.0).any():
+        rest = float(np.median(reach[reach > 0.0]))
+    else:
+        rest = PER_MOTION * float(np.ptp(position.reshape(-1, 3), axis=0).max()) or 1.0
+    return np.where(reach > 0.0, reach, rest)
+
+
+# Symbols of constraints and forces, by kind: a pin, a ball, a slider in its guide, a plane, a coil.
 
 STEEL, DARK, COIL, PLANE = "#8a929b", "#3f464e", "#a0522d", "#9fb4c7"
 SYMBOL = 0.08  # radius, per reach of the smaller body

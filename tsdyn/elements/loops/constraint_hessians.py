@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...jit.kernels import ANY, complex_stack, complex_stack2, integers, kernel, part, stack, stack2, vector
-from ...maths.euler_parameters import rotate_gradient
+from ...maths.vectors import rotate_gradient
 from ..markers import PARAMETERS, chain_rule, rate
 from ..tolerances import CONSTRAINT_STEP
 from .coordinate_rows import INTS, ROW, STRIDE

@@ -25,8 +25,7 @@ import numpy as np
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, stack2, vector
 from ...jit.simd import add, cross, fetch, fma, four, get, lanes, let, put, splat, times, total
 from ..markers import POINT
-from .body_poses import turned
-from .constraint_rows import INTS, MASK, ROW
+from .constraint_rows import INTS, MASK, ROW, turned
 from .template import (
     AHEAD,
     CODES,

@@ -18,17 +18,17 @@ Of a force driven by loads, the rows of its scratch from SLOTS on are the series
 Of a traced function they are those of its arguments, t first, and then the program's own; the program, one for all
 instances, stands before the first of them.
 
-Of friction in proportion to a normal load, see friction_series.py.
+Of friction in proportion to a normal load, see friction.py.
 """
 
 from ...jit.kernels import ANY, data_of, integers, kernel, matrix, part, stack, vector
 from ...jit.predicates import some, whole
 from ...jit.simd import add, cross, fma, four, lanes, put, splat, times
-from ...motions.state_program import LENGTH, ROWS, T, call_order
+from ...motions.tracing import LENGTH, ROWS, T, call_order
 from ..markers import PARAMETERS, POINT, TURN
-from .body_poses import POSE, P, turned
+from .constraint_rows import POSE, P, turned
 from .constraint_series import BODY_ROW, S_OMEGA, S_R, torque
-from .friction_series import FRICTION_ROWS, known_friction
+from .friction import FRICTION_ROWS, known_friction
 from .template import (
     CODES,
     DRIVEN,

@@ -1,17 +1,11 @@
-"""Loops over all instances of a force kind: generalised forces, their Jacobians, memory.
+"""Loops over all instances of a force kind: generalised forces, their Jacobians, memory, corotated frames."""
 
-    Q      += W^T f
-    dQ/dq  += W^T (f_x X + f_xd Y) + (W^T f)_q
-    dQ/dqd += W^T f_xd W
+import math
 
-with W = xd_qd, X = x_q, Y = xd_q of the markers. f_x and f_xd are complex steps of the force, exact to rounding, or
-central differences where it is not analytic. `force.callbacks` supplies the names in capitals and kernel_*.
-"""
-
-from ...jit.kernels import ANY, complex_stack, integers, part, stack, stack2, vector
+from ...jit.kernels import ANY, complex_stack, integers, kernel, part, stack, stack2, vector
+from ...maths.vectors import matrix_a
+from ..markers import PARAMETERS
 from ..tolerances import FORCE_QUOTIENT, FORCE_STEP
-from .corotated_frames import turn_block, turn_of_bodies, turn_of_directions
-from .marker_jacobians import MarkerDerivatives, carry_back, carry_back_derivative, derivatives, state
 from .template import (
     ALONG,
     AT,
@@ -22,13 +16,96 @@ from .template import (
     OWNERS,
     SIZE,
     STARTS,
+    MarkerDerivatives,
+    carry_back,
+    carry_back_derivative,
+    derivatives,
     force_markers,
     kernel_derivatives,
     kernel_law,
     kernel_remember,
+    state,
 )
 
-INTS = 4  # of a kind's table for each instance: template.AT and DIMENSION
+# Corotated frames of forces: derivatives of a law that are kept from an earlier configuration stay accurate in them.
+#
+# The stiffness of a spring lies along the spring, that of a bushing along the axes of its body: in such a frame a law
+# changes little as the mechanism moves. The rotation r (Euler parameters) of the frame since the derivatives were taken
+# rotates 3-vectors among x and xd by A(r) and takes Euler parameters p to r p.
+
+
+@kernel
+def turn_of_bodies(before, p, r):
+    """r = p before*, the turn from one orientation to another; all (4,)."""
+    b0, b1, b2, b3 = before[0], -before[1], -before[2], -before[3]
+    r[0] = p[0] * b0 - p[1] * b1 - p[2] * b2 - p[3] * b3
+    r[1] = p[0] * b1 + p[1] * b0 + p[2] * b3 - p[3] * b2
+    r[2] = p[0] * b2 - p[1] * b3 + p[2] * b0 + p[3] * b1
+    r[3] = p[0] * b3 + p[1] * b2 - p[2] * b1 + p[3] * b0
+
+
+@kernel
+def turn_of_directions(a, b, r):
+    """The least turn r (4,) from direction a to b, (3,) each; none where that says nothing."""
+    r[0], r[1], r[2], r[3] = 1.0, 0.0, 0.0, 0.0
+    size = math.sqrt((a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) * (b[0] * b[0] + b[1] * b[1] + b[2] * b[2]))
+    if not size > 0.0:
+        return
+    # Half-angle formulas: e0 = cos(phi / 2), e = a x b / (2 |a| |b| e0); no turn beyond 120 degrees
+    cosine = (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) / size
+    if cosine < -0.5:
+        return
+    r[0] = math.sqrt(0.5 * (1.0 + cosine))
+    f = 0.5 / (size * r[0])
+    r[1] = f * (a[1] * b[2] - a[2] * b[1])
+    r[2] = f * (a[2] * b[0] - a[0] * b[2])
+    r[3] = f * (a[0] * b[1] - a[1] * b[0])
+
+
+@kernel
+def turn_matrix(code, r, T):
+    """T with T x the turned x of one marker, (3, 3) or, for Euler parameters, (4, 4)."""
+    e0, e1, e2, e3 = r[0], r[1], r[2], r[3]
+    if code == PARAMETERS:
+        T[0, 0], T[0, 1], T[0, 2], T[0, 3] = e0, -e1, -e2, -e3
+        T[1, 0], T[1, 1], T[1, 2], T[1, 3] = e1, e0, -e3, e2
+        T[2, 0], T[2, 1], T[2, 2], T[2, 3] = e2, e3, e0, -e1
+        T[3, 0], T[3, 1], T[3, 2], T[3, 3] = e3, -e2, e1, e0
+        return
+    matrix_a(r, T)
+
+
+@kernel
+def turn_block(code_row, code_column, r, kept, size, row, column, out):
+    """out[row:, column:] = T kept T^T for the markers of one pair; kept is (size, size) row by row."""
+    A, B, g = stack2(4, 4), stack2(4, 4), stack(4)
+    turn_matrix(code_row, r, A)
+    turn_matrix(code_column, r, B)
+    n, m = 4 if code_row == PARAMETERS else 3, 4 if code_column == PARAMETERS else 3
+    # Row i of A kept
+    for i in range(n):
+        # times B^T
+        for j in range(m):
+            g[j] = 0.0
+            for k in range(n):
+                g[j] += A[i, k] * kept[(row + k) * size + column + j]
+        for j in range(m):
+            total = 0.0
+            for k in range(m):
+                total += g[k] * B[j, k]
+            out[row + i, column + j] = total
+
+
+# Loops over all instances of a force kind: generalised forces, their Jacobians, memory.
+#
+#     Q      += W^T f
+#     dQ/dq  += W^T (f_x X + f_xd Y) + (W^T f)_q
+#     dQ/dqd += W^T f_xd W
+#
+# with W = xd_qd, X = x_q, Y = xd_q of the markers. f_x and f_xd are complex steps of the force, exact to rounding, or
+# central differences where it is not analytic. `force.callbacks` supplies the names in capitals and kernel_*.
+
+FORCE_INTS = 4  # of a kind's table for each instance: template.AT and DIMENSION
 JACOBIAN = "iippppdippip"  # count, reals per instance, table, reals, q, qd, t, n, Q_q, Q_qd, renew, kept
 SPAN = 14  # coordinates of two bodies
 FRAME = 7  # floats of an instance's frame: Euler parameters of a body, or a direction
@@ -46,7 +123,7 @@ def forces(count, stride, table, reals, q, qd, t, out):
     q, qd, out = vector(q, ANY), vector(qd, ANY), vector(out, ANY)
     x, xd, f = stack(SIZE), stack(SIZE), stack(SIZE)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * FORCE_INTS : (i + 1) * FORCE_INTS], reals[i * stride : (i + 1) * stride]
         # f = law(x, xd), pulled back: Q += W^T f
         force_markers(q, qd, own, real, x, xd)
         for c in range(SIZE):
@@ -63,7 +140,7 @@ def remembers(count, stride, table, reals, q, qd, t, out):
     table, reals, q, qd = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(qd, ANY)
     x, xd = stack(SIZE), stack(SIZE)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * FORCE_INTS : (i + 1) * FORCE_INTS], reals[i * stride : (i + 1) * stride]
         force_markers(q, qd, own, real, x, xd)
         real[stride - 1] = kernel_remember(x, xd, real[3 * MARKERS :], t)
     return 0
@@ -217,7 +294,7 @@ def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, renew, kept):
     fx, fxd = stack2(SIZE, SIZE), stack2(SIZE, SIZE)
     W, X, Y = stack2(SIZE, SPAN), stack2(SIZE, SPAN), stack2(SIZE, SPAN)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * FORCE_INTS : (i + 1) * FORCE_INTS], reals[i * stride : (i + 1) * stride]
         for r in range(SIZE):
             f[r] = 0.0
         # W, X, Y; the force f; f_x and f_xd

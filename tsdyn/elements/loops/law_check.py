@@ -18,13 +18,13 @@ none of them vanishes within the step, and nothing else is evaluated. Past a zer
 
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, vector
 from ...jit.simd import first, fma, four, get, let, put, second, splat, third, times
-from ...motions.state_program import LENGTH as PROGRAM_LENGTH
-from ...motions.state_program import T
+from ...motions.tracing import LENGTH as PROGRAM_LENGTH
+from ...motions.tracing import T
 from ..markers import PARAMETERS, POINT, TURN
 from ..tolerances import LAW_NOISE, LAW_TOLERANCE
 from .constraint_series import BODY_ROW, S_OMEGA
 from .force_series import BODY, INTS, MASK, marker_coefficient, run_traced, scratch_rows
-from .friction_series import load_at
+from .friction import load_at
 from .template import (
     CODES,
     FRICTIONAL,

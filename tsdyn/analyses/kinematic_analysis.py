@@ -1,0 +1,433 @@
+"""Kinematic analysis: a configuration without freedom, followed from time to time on its branch."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..configuration.kinetic_metric import Metric, least_step
+from ..elements.loops.constraint_rows import (
+    OMEGA,
+    POSE,
+    RD,
+    largest_coordinate,
+    place_bodies,
+    write_accelerations,
+    write_positions,
+    write_velocities,
+)
+from ..errors import InconsistentState, InvalidArgument, SingularConfiguration, Status
+from ..formulations.projection import find_drift, gather_speeds, land, land_velocities, move_by
+from ..jit.compiled import clock
+from ..jit.kernels import Record, entry, kernel, loader, long_kernel, resident
+from ..maths.dense_linalg import copy, is_finite
+from ..model import handles as joint_motion
+from ..model.equations import remember, set_time
+from ..model.handles import handles_of
+from ..model.joint_turns import count_turns
+from ..model.packed import System
+from ..observables.diagnostics import constraint_rows
+from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, ConstraintGraph, no_graph
+from ..rows.graph_builder import graph_of, redundant_rows
+from ..rows.interface import TangentWorkspace, allocate_tangent, constrain, evaluate_bias, note_indicator
+from ..workspaces import Work, parts, plain_context
+from .coordinates import Variations, chosen
+from .moves import update_memory
+from .nominal_motion import Motion
+from .tolerances import (
+    CLOSE,
+    CONSISTENT,
+    DEAD,
+    GROWTH,
+    LARGEST_CHANGE,
+    LARGEST_TURN,
+    LEAST_RESIDUAL,
+    LEAST_STEPS,
+    LISTED,
+    MET,
+    NO_CHANGE,
+    POLISHINGS,
+    SEEN,
+    SHORTEST,
+    SLICE,
+    TIME_ROUNDING,
+)
+
+# What constraints leave free: the number of degrees of freedom, and their names.
+
+
+def degrees_of_freedom(packed):
+    """Of a packed scene whose redundant rows have been selected."""
+    system = packed.system
+    return int(system.bodies[:, 1].sum()) - len(system.segments) + len(redundant_rows(packed))
+
+
+def demand_driven(packed, memory, t, q, who, remedy):
+    """Refuse a scene with freedom, by the names of independent coordinates that are free; memory (slots,)."""
+    k = degrees_of_freedom(packed)
+    if k <= 0:
+        return
+    motion = Motion(packed, memory, t, q, np.zeros(q.size), still=True)
+    names = [one.name for one in chosen(motion, Variations(motion, np.zeros(3)))]
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    raise InvalidArgument(
+        f"{who}: {k} degree{'s' * (k != 1)} of freedom {'is' if k == 1 else 'are'} left: "
+        f"{', '.join(names[:LISTED])}{more}. {remedy}"
+    )
+
+
+def driven_rates(scene, t, q, who):
+    """The smallest velocities qd (n,), in the metric of lengths, with Phi_q qd + Phi_t = 0."""
+    packed = scene.packed
+    metric = Metric(packed, None, t, lengths=True)
+    _, Phi_q, Phi_t = metric.arrays(q)
+    A, drift = metric.reduced(q, Phi_q[metric.own]), Phi_t[metric.own]
+    x = least_step(A, drift)
+    for _ in range(POLISHINGS if metric.sparse else 0):  # which is regularised
+        left = A @ x + drift
+        if np.abs(left).max() <= MET * (1.0 + np.abs(x).max()):
+            break
+        x = x + least_step(A, left)
+    left = np.abs(A @ x + drift)
+    if not left.max(initial=0.0) <= DEAD * (1.0 + np.abs(x).max(initial=0.0) + np.abs(drift).max(initial=0.0)):
+        names = [scene.row_names()[metric.own[i]] for i in np.flatnonzero(drift)[:LISTED]]
+        raise SingularConfiguration(
+            f"{who}: no velocities follow the motions at t = {t:g} s ({', '.join(names)}): the mechanism is at a dead "
+            "centre of what drives it, or motions contradict each other. Start elsewhere, or drive another coordinate."
+        )
+    return metric.rates(q, x)
+
+
+def demand_consistent(scene, packed, t, q, qd, qdd):
+    """Refuse a given motion (k, n) that violates constraints, by the row that is violated most."""
+    levels = "position", "velocity", "acceleration"
+    for level, residuals, size in zip(levels, constraint_rows(packed, t, q, qd, qdd), (q, qd, qdd), strict=True):
+        share = np.abs(residuals) / (1.0 + np.abs(size).max(axis=1, keepdims=True))
+        if not share.max(initial=0.0) <= CONSISTENT:
+            i, row = np.unravel_index(int(np.nanargmax(share)), share.shape)
+            raise InconsistentState(
+                f"inverse_dynamics: the motion violates {scene.row_names()[row]} by {residuals[i, row]:.3g} "
+                f"({level}) at t = {t[i]:g} s. Give a motion of this scene, such as a Solution of it."
+            )
+
+
+# Steps along the branch of a scene without freedom: positions, velocities and accelerations from constraints alone.
+#
+#     predicted   q0 + h qd0 + h^2 qdd0 / 2
+#     Phi(q, t) = 0,    Phi_q qd = -Phi_t,    Phi_q qdd = -gamma
+#
+# Each is solved by S = H W H^T, in O(N) for chains and trees. A step counts if positions and velocities are near their
+# prediction: on another branch they are not. Otherwise it is halved.
+
+OK, NOT_FINITE, CHART_LOST = int(Status.SUCCESS), int(Status.NOT_FINITE), int(Status.CHART_LOST)
+SLICE_DONE = int(Status.SLICE_DONE)
+
+
+class Way(Record):
+    """How far a continuation has come."""
+
+    t: float  # of the last accepted point, s
+    h: float  # length of the next step, s
+    longest: float  # step, s
+    least: float  # step, s; a shorter one is none
+    size: float  # of the scene, m
+    begun: int  # whether velocities and accelerations of the start are known
+    steps: int
+    rejected: int
+    failed: int  # Status of the last step that was rejected
+
+
+class Branch(NamedTuple):
+    """What the kernels of a continuation get by one address; n coordinates, b bodies."""
+
+    system: System
+    work: Work
+    graph: ConstraintGraph
+    tangent: TangentWorkspace
+    now: np.ndarray  # (3, n)  q, qd, qdd at the last accepted point
+    speeds: np.ndarray  # (8 b,)  rd and omega' there
+    gains: np.ndarray  # (8 b,)  their derivatives
+    remembered: np.ndarray  # (angles + slots,)  angles of joints there, and what forces and constraints remember
+    frames: np.ndarray  # (angles, 9)  see joint_turns.py
+    joints: np.ndarray  # int64 (angles, 4)
+    way: Way
+
+
+def branch_of(system, graph, handles, n, tangent=None):
+    """A `Branch` of a system of its own; tangent: with room for redundant rows."""
+    b = len(graph.bodies)
+    whole = parts(system, graph, n)
+    tangent = whole.tangent if tangent is None else tangent
+    remembered = np.zeros(handles.count + system.memory.size)
+    now, speeds = np.zeros((3, n)), np.zeros((2, 8 * (b + 1)))
+    frames, joints = handles.frames.copy(), handles.joints.copy()
+    return Branch(system, whole.work, graph, tangent, now, *speeds, remembered, frames, joints, Way())
+
+
+class _NoHandles(NamedTuple):
+    count: int = 0
+    frames: np.ndarray = np.zeros((0, 9))
+    joints: np.ndarray = np.zeros((0, 4), np.int64)
+
+
+load_branch = loader(branch_of(plain_context().system, no_graph(), _NoHandles(), 0))
+
+
+@entry("pvvii")
+def follow(branch, times, out, first, most):
+    """Follow the branch to times[first:], in at most so many steps; rows (t, q, qd, qdd, remembered) go to out.
+
+    Returns the number of rows that are written. way.failed is then SLICE_DONE, or the Status with which it ended.
+    """
+    c = load_branch(branch)
+    n, way = c.work.q.size, c.way
+    if way.begun == 0:
+        place_bodies(c.graph.bodies, c.now[0], c.tangent.poses)
+        way.failed = _solve(c, way.t)
+        if way.failed != OK:
+            return first
+        _accept(c)
+        way.begun = 1
+    width, end = 1 + 3 * n + c.remembered.size, way.steps + way.rejected + most
+    for i in range(first, times.size):
+        while way.t != times[i]:
+            if way.steps + way.rejected >= end:
+                way.failed = SLICE_DONE
+                return i
+            if not _step(c, times[i]):
+                return i
+        at = i * width
+        out[at] = way.t
+        for level in range(3):
+            for j in range(n):
+                out[at + 1 + level * n + j] = c.now[level, j]
+        for j in range(c.remembered.size):
+            out[at + 1 + 3 * n + j] = c.remembered[j]
+    way.failed = OK
+    return times.size
+
+
+@long_kernel
+def _step(c, target):
+    """Take a step towards a time, or halve the next one; False where it can't be halved any more."""
+    way, left = c.way, target - c.way.t
+    last = abs(left) <= way.h * (1.0 + TIME_ROUNDING)
+    h = left if last else math.copysign(way.h, left)
+    t = target if last else way.t + h
+    place_bodies(c.graph.bodies, c.now[0], c.tangent.poses)
+    status, ratio = CHART_LOST, math.inf
+    if _predict(c, h) <= LARGEST_TURN:
+        status = _solve(c, t)
+        if status == OK:
+            ratio = _change(c, h)
+    if ratio <= 1.0:
+        if abs(h) >= way.h:
+            way.h = min(abs(h) * (GROWTH if ratio < CLOSE else 1.0), way.longest)
+        count_turns(c, c.work.q, c.work.qd, h)
+        way.t = t
+        way.steps += 1
+        _accept(c)
+        return True
+    way.rejected += 1
+    way.h = 0.5 * abs(h)
+    if way.h < way.least:
+        way.failed = status if status != OK else CHART_LOST
+        return False
+    return True
+
+
+@kernel
+def _predict(c, h):
+    """Displace the bodies by h qd + h^2 qdd / 2; the largest rotation, rad. Leaves the displacements in tangent.a."""
+    f, turn = c.tangent, 0.0
+    for i in range(c.speeds.size):
+        f.Z[i] = h * c.speeds[i] + 0.5 * h * h * c.gains[i]
+        f.a[i] = f.Z[i]
+    for b in range(c.graph.bodies.shape[0]):
+        for i in range(8 * b + 4, 8 * b + 7):
+            turn = max(turn, abs(f.Z[i]))
+    move_by(c.graph, f)
+    return turn
+
+
+@long_kernel
+def _solve(c, t):
+    """Solve for positions near the poses, for velocities and accelerations: work.q, qd, qdd, tangent.Z. Status."""
+    graph, system, w, f = c.graph, c.system, c.work, c.tangent
+    if not set_time(system, t):
+        return NOT_FINITE
+    w.control.floor = LEAST_RESIDUAL * (w.control.size + largest_coordinate(graph.bodies, c.now[0], w.control.size))
+    status = land(graph, system, w, f, t)
+    if status != OK:
+        return status
+    write_positions(graph.bodies, f.poses, w.q)
+    find_drift(graph, system, f, t)
+    land_velocities(graph, f, True)
+    write_velocities(graph.bodies, f.poses, w.qd)
+    evaluate_bias(graph, system, f, t)
+    for i in range(f.Z.size):
+        f.Z[i] = 0.0
+    for _ in range(2):
+        constrain(graph, f.rows, f.gamma, f.Z, f.b)
+    write_accelerations(graph.bodies, f.poses, f.Z, w.qdd)
+    return OK if is_finite(w.qdd) and is_finite(w.qd) and is_finite(w.q) else NOT_FINITE
+
+
+@kernel
+def _change(c, h):
+    """How far the step has come from its prediction, as a share of what is allowed."""
+    f, worst, allowed = c.tangent, 0.0, 0.0
+    for part in range(2):  # displacements, rotations
+        way, off = 0.0, 0.0
+        for b in range(c.graph.bodies.shape[0]):
+            at, o = b * POSE + (OMEGA if part == 1 else RD), 8 * b + 4 * part
+            for i in range(3):
+                speed = f.poses[at + i]
+                way = max(way, max(abs(f.a[o + i]), abs(h * speed)))
+                off = max(off, abs(h * (speed - c.speeds[o + i] - h * c.gains[o + i])))
+        most = LARGEST_CHANGE * way + NO_CHANGE * (1.0 if part == 1 else c.way.size)
+        worst, allowed = max(worst, off / most), allowed + most
+    return max(worst, f.landing.moved / allowed)
+
+
+@kernel
+def _accept(c):
+    """Take the point over."""
+    graph, f, w = c.graph, c.tangent, c.work
+    copy(f.Z, c.gains)
+    gather_speeds(graph, f)
+    copy(f.Z, c.speeds)
+    copy(w.q, c.now[0])
+    copy(w.qd, c.now[1])
+    copy(w.qdd, c.now[2])
+    note_indicator(graph, f, f.rows)
+    remember(c.system, w.q, w.qd, c.way.t, c.remembered[c.joints.shape[0] :])
+
+
+# Kinematic analysis: a configuration without freedom, followed from time to time.
+
+
+class Followed(NamedTuple):
+    """How far a branch has been followed."""
+
+    status: Status
+    rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered
+    reached: float  # s
+    last: np.ndarray  # (3, n)  q, qd, qdd there
+    remembered: np.ndarray  # (angles + slots,)  there
+    steps: int
+    rejected: int
+    newton_iterations: int
+    factorizations: int
+    seconds: float
+
+
+def analyse(packed, t0, q, remembered, times, stops):
+    """Follow the branch through q at t0 to times (k,), in their order; stops (s,) are ends of steps, too.
+
+    Parameters
+    ----------
+    packed : Packed
+        Its redundant rows have been selected, as for a run.
+    t0 : float, s
+    q : ndarray (n,)
+        Consistent.
+    remembered : ndarray (angles + slots,)
+        Angles of joints, and what forces and constraints remember.
+    """
+    branch = _branch(packed, q, remembered)
+    address, *_keep = resident(branch)
+    way = branch.way
+    way.t, way.size = t0, Metric(packed, None, t0).reach(q)
+    span = float(np.ptp(np.append(times, t0)))
+    way.longest = way.h = max(span / LEAST_STEPS, np.finfo(float).tiny)
+    way.least = max(SHORTEST * span, SEEN * max(abs(t0), np.abs(times).max()))
+    every, asked = _with_stops(t0, times, stops)
+    out = np.zeros((every.size, 1 + 3 * q.size + remembered.size))
+    started, done, status = clock(), 0, Status.SLICE_DONE
+    try:
+        while status is Status.SLICE_DONE:
+            done = follow(address, every, out.reshape(-1), done, _slice(q.size))
+            status = Status(way.failed)
+    except KeyboardInterrupt:
+        status = Status.INTERRUPTED
+    counters = branch.work.counters
+    return Followed(
+        status, out[:done][asked[:done]], way.t, branch.now.copy(), branch.remembered.copy(), way.steps, way.rejected,
+        counters.newton, counters.factorizations, clock() - started,
+    )  # fmt: skip
+
+
+def _slice(n):
+    return max(SLICE // n, 10)
+
+
+def _branch(packed, q, remembered):
+    """The `Branch` of a packed scene, placed at q."""
+    graph, handles = graph_of(packed, REDUCED, VALUES, BIAS, DRIFT), handles_of(packed)
+    system = packed.system._replace(reals=packed.system.reals.copy())
+    system.reals[system.memory] = remembered[handles.count :]
+    redundant = packed.derived.redundant is not None
+    tangent = allocate_tangent(graph, q.size, redundant=True) if redundant else None
+    branch = branch_of(system, graph, handles, q.size, tangent)
+    branch.now[0], branch.remembered[:] = q, remembered
+    branch.work.control.size = packed.size
+    return branch
+
+
+def _with_stops(t0, times, stops):
+    """Times with the stops between them, in the order of the way, and which of them were asked for."""
+    if not stops.size:
+        return np.ascontiguousarray(times), np.ones(times.size, bool)
+    every, asked = [], []
+    for start, end in zip([t0, *times[:-1].tolist()], times.tolist(), strict=True):
+        between = stops[(stops > min(start, end)) & (stops < max(start, end))]
+        every += [*(between if end >= start else between[::-1]).tolist(), end]
+        asked += [False] * between.size + [True]
+    return np.array(every), np.array(asked, bool)
+
+
+def given(packed, times, levels, motion):
+    """A motion q, qd, qdd (k, n) at times (k,), as `Followed`; angles and memory are those of `motion`, if any."""
+    handles, k = handles_of(packed), times.size
+    angles, memory = _attribute(motion, "angles"), _attribute(motion, "_remembers", "memory")
+    slots = packed.system.memory.size
+    angles = np.reshape(angles, (k, handles.count)) if np.size(angles) == k * handles.count else None
+    if angles is None:
+        angles = _unwrapped(handles, times[0], levels[0])
+    if np.size(memory) == k * slots:
+        memory = np.reshape(memory, (k, slots))
+    else:
+        memory = _remembering(packed, times, levels)
+    rows = np.column_stack((times, *levels, angles, memory))
+    last, remembered = np.stack([level[-1] for level in levels]), np.concatenate((angles[-1], memory[-1]))
+    return Followed(Status.SUCCESS, rows, float(times[-1]), last, remembered, 0, 0, 0, 0, 0.0)
+
+
+def _attribute(motion, *names):
+    """The first of some attributes that there is; an empty array without one."""
+    for name in names:
+        try:
+            return np.asarray(getattr(motion, name), float)
+        except (AttributeError, TypeError, InvalidArgument):
+            continue
+    return np.full(1, np.nan)[:0]
+
+
+def _unwrapped(handles, t, q):
+    """Angles of joints (k, count), each on the turn nearest to the one before."""
+    found, near = np.zeros((len(q), handles.count)), handles.angles_at_start(t, q[0])
+    for row in handles.rows:
+        for j, geometry in enumerate(row.angles, row.first):
+            angle = np.unwrap(joint_motion.angle(geometry, *handles.motions(geometry, (q,)), 0))
+            found[:, j] = angle + (joint_motion.counted(angle[0], near[j]) - angle[0])
+    return found
+
+
+def _remembering(packed, times, levels):
+    """What forces and constraints remember (k, slots), if each instant follows the one before."""
+    system = packed.system._replace(reals=packed.system.reals.copy())
+    found = np.zeros((times.size, system.memory.size))
+    for i, t in enumerate(times):
+        update_memory(system, levels[0][i], levels[1][i], float(t), found[i])
+    return found

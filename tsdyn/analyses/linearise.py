@@ -1,0 +1,355 @@
+"""`scene.linearise`: mass, damping and stiffness in named minimal coordinates; modes, inputs and outputs."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..calls import fitting_methods
+from ..elements.bodies import PointMass, named
+from ..elements.element import AngleGeometry
+from ..elements.force import Force
+from ..elements.loads import JointLoad
+from ..elements.primitive import Primitive
+from ..errors import InvalidArgument, InvalidBody
+from ..forces.point_force import PointForce
+from ..forces.spring import Spring
+from ..forces.torque import Torque
+from ..validation import vector3
+from .coordinates import Variations, chosen, stacked, transform_e
+from .equilibrium import demand_smooth
+from .nominal_motion import Motion
+from .reduction import Reduced, eigenpairs
+from .steady import steady_rate
+from .tolerances import NO_INPUT
+
+if TYPE_CHECKING:
+    from ..hints import Floats
+
+
+# Inputs and outputs of the linearised system: generalised forces of unit inputs, rows of outputs.
+
+RATE = " rate"
+AXES = ".x", ".y", ".z"
+
+
+class Input(NamedTuple):
+    """A load of unit size."""
+
+    name: str
+    columns: np.ndarray  # of q
+    load: np.ndarray  # generalised force, N or N m
+    whole: str = ""  # the load of which it is a component, where all of them were asked for
+
+
+def inputs_of(scene, variations, given):
+    """The `Input`s of handles and names: motors, forces and joints."""
+    found = []
+    for one in given:
+        same = [Input(joint.name, joint.columns, joint.jet[0]) for joint in variations.joints if joint.name == one]
+        if not same:
+            item, axis = item_of(scene, one, [*scene.forces, *scene.constraints], "force or joint")
+            loads = _loads_of(variations, item)
+            same = [load for load in loads if axis is None or load.name.endswith(axis)]
+            if not same:
+                names = ", ".join(repr(load.name) for load in loads)
+                raise InvalidArgument(f"{item.name!r} has no component {axis[1:]!r}: its input is {names}.")
+            same = [load._replace(whole=item.name) for load in same] if len(same) > 1 else same
+        found += same
+    names = [one.name for one in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidArgument(f"the input {name} is given twice; give it once.")
+    return found
+
+
+def demand_effective(inputs, F):
+    """Refuse inputs that constraints take up: columns of F (k, inputs) that are zero, but for some of a vector's."""
+    works = np.abs(F).max(axis=0, initial=0.0) > [NO_INPUT * np.abs(one.load).max(initial=0.0) for one in inputs]
+    vectors = {one.whole for one, moves in zip(inputs, works, strict=True) if moves}
+    for one, moves in zip(inputs, works, strict=True):
+        if not moves and not (one.whole and one.whole in vectors):
+            raise InvalidArgument(
+                f"the input {one.whole or one.name} does no work on any motion that the constraints admit. Where a "
+                "motor drives its coordinate, replace the motor by a JointTorque or JointForce."
+            )
+
+
+def item_of(scene, given, things, what):
+    """The thing that a handle or a name means, and an axis ".x" at the end of the name, or None."""
+    if not isinstance(given, str):
+        if not any(given is thing for thing in things):
+            raise InvalidArgument(f"{given!r} is no {what} of this scene: give a handle or a name.")
+        return given, None
+    axis = given[-2:] if given[-2:] in AXES and given not in {thing.name for thing in things} else None
+    return named(things, given[:-2] if axis else given, what), axis
+
+
+def _loads_of(variations, item):
+    if isinstance(item, JointLoad):
+        geometry = item.geometry
+        make = variations.angle if isinstance(geometry, AngleGeometry) else variations.displacement
+        columns, jet = make(geometry)
+        return [Input(item.name, columns, jet[0])]
+    if isinstance(item, Spring):
+        columns, row = variations.elongation(item.a, item.coordinates[0], item.b, item.coordinates[1])
+        return [Input(item.name, columns, -row)]
+    if isinstance(item, (PointForce, Torque)):
+        point = item.coordinates[0] if isinstance(item, PointForce) else None
+        return [
+            Input(item.name + axis, *variations.load(item.a, point, e, item.frame))
+            for axis, e in zip(AXES, np.eye(3), strict=True)
+        ]
+    rows = [row for row in variations.handles.rows if row.item is item and not isinstance(item, Force)]
+    found = [Input(one.name, one.columns, one.jet[0]) for row in rows for one in variations.of_row(row)]
+    if not found:
+        raise InvalidArgument(
+            f"{item.name}: a {type(item).__name__} has no input. Inputs are JointTorque and JointForce, PointForce and "
+            "Torque (three components), the actuator of a Spring, and joints with an angle or a displacement, for the "
+            "torque or force along it. A motor that prescribes a motion has none: use a JointTorque or JointForce."
+        )
+    return found
+
+
+class Outputs(NamedTuple):
+    """Names, and y = Y dx + Yd dxd."""
+
+    names: tuple
+    Y: np.ndarray  # (p, k)
+    Yd: np.ndarray
+
+
+def outputs_of(scene, variations, given, coordinates, reduced):
+    """The `Outputs` of handles and names; of none, the coordinates and their rates."""
+    k, n = len(coordinates), variations.motion.q.size
+    if not len(given):
+        names = [one.name for one in coordinates]
+        names += [name + RATE for name in names]
+        return Outputs(tuple(names), np.eye(2 * k, k), np.eye(2 * k, k, -k))
+    rows, rates = [], []
+    for one in given:
+        rate = isinstance(one, str) and one.endswith(RATE)
+        found = _of(scene, variations, one[: -len(RATE)] if rate else one, coordinates)
+        rows += found
+        rates += [rate] * len(found)
+    Z, Zd, _ = stacked(rows, n)
+    rates = np.array(rates)[:, None]
+    places, speeds = Z @ reduced.T, Z @ reduced.T1 + Zd @ reduced.T
+    names = tuple(one.name + RATE * bool(rate) for one, rate in zip(rows, rates, strict=True))
+    return Outputs(names, np.where(rates, speeds, places), np.where(rates, places, 0.0))
+
+
+def _of(scene, variations, given, coordinates):
+    """The `Variation`s that an output means."""
+    if isinstance(given, str):
+        same = [one for one in coordinates if one.name == given]
+        every = same or [one for one in (*variations.joints, *variations.bodies) if one.name == given]
+        if every:
+            return every[:1]
+    if isinstance(given, (tuple, list)) and len(given) == 2:
+        body, _ = item_of(scene, given[0], scene.bodies, "body")
+        point = vector3(given[1], f"{body.name}: point (m, body frame)", InvalidArgument)
+        return variations.point(body, point, f"{body.name}{tuple(point.tolist())}")
+    joints = [item for item in scene.constraints if not (isinstance(item, Primitive) and item.normalises)]
+    item, axis = item_of(scene, given, [*scene.bodies, *joints], "body or joint")
+    if isinstance(item, PointMass):
+        found = variations.of_body(item)[:3]
+    else:
+        found = [one for row in variations.handles.rows if row.item is item for one in variations.of_row(row)]
+    if not found:
+        raise InvalidArgument(
+            f"{item.name} has no coordinate: give a joint with an angle or a displacement, or a body."
+        )
+    return [one for one in found if axis is None or one.name.endswith(axis)]
+
+
+# Modes of the linearised system: frequencies, damping ratios, and shapes as twists of bodies.
+
+
+@fitting_methods
+class Modes:
+    """Modes in order of |lambda|; a conjugate pair of eigenvalues is one mode, and a pair of zeros.
+
+    Attributes
+    ----------
+    eigenvalues : ndarray (j,) complex, 1/s
+        Imaginary parts are not negative.
+    frequency : ndarray (j,), Hz
+        Natural frequency |lambda| / (2 pi).
+    damped_frequency : ndarray (j,), Hz
+        Im lambda / (2 pi).
+    damping_ratio : ndarray (j,)
+        -Re lambda / |lambda|: negative if the mode grows, 1 if it decays without oscillation; NaN where lambda is zero.
+    shapes : ndarray (j, k) complex
+        Variations of the coordinates. M-norm 1, the largest entry real and positive.
+    coordinates : tuple of str
+    """
+
+    def __init__(self, values: Any, shapes: Any, twists: Any, bodies: Any, coordinates: tuple[str, ...]) -> None:
+        size = np.abs(values)
+        self.eigenvalues, self.shapes, self.coordinates = values, shapes, coordinates
+        self.frequency, self.damped_frequency = size / (2.0 * np.pi), values.imag / (2.0 * np.pi)
+        self.damping_ratio: Floats = np.where(size > 0.0, (0.0 - values.real) / np.where(size > 0.0, size, 1.0), np.nan)
+        self._twists, self._bodies = twists, bodies
+
+    def __len__(self) -> int:
+        return len(self.eigenvalues)
+
+    def twist(self, body: PointMass | str) -> Any:
+        """Displacement of the centroid (m) and rotation (rad) of a body in each mode, (j, 6) complex.
+
+        Axes are those of the ground, or, in steady motion, turning with it. The rotation of a point mass is zero.
+        """
+        if isinstance(body, str):
+            body = named(self._bodies, body, "body", InvalidBody)
+        if not any(body is one for one in self._bodies):
+            raise InvalidBody(f"{body!r} is not a body of this scene.")
+        return self.shapes @ self._twists[[one is body for one in self._bodies].index(True)].T
+
+    def __repr__(self) -> str:
+        return f"<Modes: {len(self)} of {len(self.coordinates)} coordinates>"
+
+    def __str__(self) -> str:
+        lines = ["Modes", "  frequency (Hz)  damping ratio  largest in"]
+        for one in range(len(self)):
+            name = self.coordinates[int(np.abs(self.shapes[one]).argmax())]
+            lines.append(f"  {self.frequency[one]:14.6g}  {self.damping_ratio[one]:13.6g}  {name}")
+        return "\n".join(lines)
+
+
+def modes_of(pairs, twists, bodies, coordinates):
+    """The `Modes` of eigenpairs; twists (bodies, 6, k)."""
+    if not len(coordinates):
+        raise InvalidArgument("modes: the scene has no degrees of freedom.")
+    first, zero = np.flatnonzero(pairs.values.imag >= 0.0), int((pairs.values == 0.0).sum())
+    first = first[zero // 2 :] if zero else first
+    first[: zero - zero // 2] = np.arange(zero - zero // 2)  # zeros are first, and a pair of them is one mode, too
+    values, shapes = pairs.values[first], pairs.vectors[:, first].T
+    lead = shapes[np.arange(len(first)), np.abs(shapes).argmax(axis=1)]
+    return Modes(values, shapes * (np.abs(lead) / lead)[:, None], twists, bodies, coordinates)
+
+
+# `scene.linearise`: reduced mass, damping and stiffness in named minimal coordinates about a state.
+
+
+class StateSpace(NamedTuple):
+    """xd = A x + B u, y = C x + D u, with the 2 k states (coordinates, rates)."""
+
+    A: Floats  # (2k, 2k)
+    B: Floats  # (2k, inputs)
+    C: Floats  # (outputs, 2k)
+    D: Floats  # (outputs, inputs)
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+@fitting_methods
+class Linearisation:
+    """Linearised equations of motion M dxdd + C dxd + K dx = F du in k minimal coordinates x.
+
+    Attributes
+    ----------
+    M, C, K : ndarray (k, k)
+        Mass, damping with gyroscopic terms, and stiffness; SI units of the coordinates.
+    F : ndarray (k, inputs)
+        Generalised forces of unit inputs.
+    bodies : tuple of Body
+    coordinates, inputs, outputs : tuple of str
+    t : float, s
+    q, qd, qdd : ndarray (n,)
+        The state, projected onto the constraints, and its accelerations.
+    multipliers : ndarray (m,)
+        Zero for redundant rows.
+    steady : bool
+        Whether the state is an equilibrium or a steady motion: coefficients are constant, eigenvalues decide on
+        stability. Elsewhere coefficients are those of this instant.
+    rotation_rate : ndarray (3,), rad/s
+        Ground frame; the rate at which a steady motion turns as a whole, and with it the axes of displacements and
+        rotations of bodies. Zero at rest.
+    """
+
+    def __init__(self, motion: Any, every: Any, reduced: Any, ports: Any, rate: Any) -> None:
+        self.M, self.C, self.K = reduced.M, reduced.C, reduced.K
+        self.t, self.q, self.qd, self.qdd, self.multipliers = motion.t, motion.q, motion.qd, motion.qdd, motion.lam
+        self.coordinates: tuple[str, ...] = tuple(one.name for one in every)
+        self.steady, self.rotation_rate = rate is not None, np.zeros(3) if rate is None else rate
+        self.bodies, self._reduced = motion.packed.bodies, reduced
+        self._twists = _twists(motion, reduced)
+        inputs, self._outputs = ports
+        self.inputs, self.outputs = tuple(one.name for one in inputs), self._outputs.names
+        self.F: Floats = np.zeros((len(every), len(inputs)))
+        for i, one in enumerate(inputs):
+            self.F[:, i] = one.load @ reduced.T[one.columns]
+        demand_effective(inputs, self.F)
+
+    @cached_property
+    def _pairs(self):
+        return eigenpairs(self._reduced)
+
+    def eigenvalues(self) -> Any:
+        """Eigenvalues lambda of (M lambda^2 + C lambda + K) x = 0, 1/s, (2 k,) complex, in order of size."""
+        return self._pairs.values.copy()
+
+    def modes(self) -> Modes:
+        """Frequencies, damping ratios and shapes, a `Modes`."""
+        return modes_of(self._pairs, self._twists, self.bodies, self.coordinates)
+
+    def state_space(self) -> StateSpace:
+        """A, B, C, D and the names of states, inputs and outputs, a `StateSpace`."""
+        k = len(self.M)
+        inverse = np.linalg.solve(self.M, np.concatenate((self.K, self.C, self.F), axis=1))
+        A = np.block([[np.zeros((k, k)), np.eye(k)], [-inverse[:, : 2 * k]]])
+        B = np.concatenate((np.zeros((k, len(self.inputs))), inverse[:, 2 * k :]))
+        C = np.concatenate((self._outputs.Y, self._outputs.Yd), axis=1)
+        states = (*self.coordinates, *(name + RATE for name in self.coordinates))
+        D = np.zeros((len(self.outputs), len(self.inputs)))
+        return StateSpace(A, B, C, D, states, self.inputs, self.outputs)
+
+    def to_scipy(self) -> Any:
+        """The state space as a `scipy.signal.StateSpace`; without inputs, B and D have a column of zeros."""
+        from scipy.signal import StateSpace as System
+
+        A, B, C, D, *_ = self.state_space()
+        if not self.inputs:
+            B, D = np.zeros((len(A), 1)), np.zeros((len(C), 1))
+        return System(A, B, C, D)
+
+    def __repr__(self) -> str:
+        moving = bool(np.any(self.qd))
+        where = (
+            ("in steady motion" if moving else "at rest") if self.steady else "in motion" if moving else "off balance"
+        )
+        return f"<Linearisation {where}: {', '.join(self.coordinates) or 'no coordinates'}>"
+
+
+def linearise(scene, memory, state, inputs, outputs, report):
+    """The `Linearisation` of a scene at a consistent (t, q, qd), with the memory of forces and constraints.
+
+    report(fraction, said) announces the next part.
+    """
+    report(0.05, "accelerations and reactions are solved for")
+    motion = Motion(scene.packed, memory, *state)
+    demand_smooth(motion)
+    rate = steady_rate(motion)
+    variations = Variations(motion, np.zeros(3) if rate is None else rate)
+    ports = inputs_of(scene, variations, inputs)
+    report(0.2, f"{motion.freedom} coordinates are chosen")
+    every = chosen(motion, variations)
+    report(0.4, f"the equations are reduced to {motion.freedom} coordinates")
+    reduced = Reduced(motion, every)
+    report(0.8, "masses, damping and stiffness are multiplied out")
+    ports = ports, outputs_of(scene, variations, outputs, every, reduced)
+    return Linearisation(motion, every, reduced, ports, rate)
+
+
+def _twists(motion, reduced):
+    """Displacements and rotations of all bodies by the coordinates, (b, 6, k)."""
+    T, bodies = reduced.T, motion.system.bodies
+    found = np.zeros((len(bodies), 6, T.shape[1]))
+    found[:, :3] = T[bodies[:, :1] + np.arange(3)]
+    p = bodies[motion.rigid, :1] + np.arange(3, 7)
+    found[motion.rigid, 3:] = 2.0 * transform_e(motion.parameters(0)) @ T[p]
+    return found

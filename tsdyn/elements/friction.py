@@ -1,0 +1,394 @@
+"""Joint friction: laws in proportion to the reaction of their own joint or contact, and their series."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Never, Self
+
+import numpy as np
+
+from ..calls import fitting, unknown_argument
+from ..errors import InvalidForce
+from ..jit.kernels import kernel
+from ..maths.recurrences import cross, dot, exponential, inverse_root, product, root, scaled
+from ..validation import label, not_negative, positive
+from .markers import TURN, Marker, Point, Turn, Vector
+from .tolerances import LEAST_SLIP, NEGLIGIBLE_LOAD, SLIP, STRIBECK
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from ..hints import AnyBody, ArrayLike, Attachment, BodyLike, Floats, Random
+
+
+# Common parts of friction laws: slip velocity of a's point over b, reaction on both bodies, friction coefficient.
+#
+# Markers: Point a, Turn a, Point b, Turn b.
+
+
+@kernel
+def coefficient(vv, par):
+    """mu(|v|) / |v| of Coulomb's law with Stribeck's peak, smooth at rest; vv = |v|^2, par = (mu, mu_s, v_s, v_0, ...).
+
+    mu(v) = (mu + (mu_s - mu) exp(-(v / v_s)^2)) v / sqrt(v^2 + v_0^2)
+    """
+    return (par[0] + (par[1] - par[0]) * np.exp(-vv / (par[2] * par[2]))) / np.sqrt(vv + par[3] * par[3])
+
+
+@kernel
+def slip(x, xd):
+    """xd_a - xd_b - omega_b x (x_a - x_b)."""
+    d0, d1, d2 = x[0] - x[6], x[1] - x[7], x[2] - x[8]
+    return (
+        xd[0] - xd[6] - (xd[10] * d2 - xd[11] * d1),
+        xd[1] - xd[7] - (xd[11] * d0 - xd[9] * d2),
+        xd[2] - xd[8] - (xd[9] * d1 - xd[10] * d0),
+    )
+
+
+@kernel
+def act(x, F0, F1, F2, N0, N1, N2, out):
+    """F at x_a and N on a, the opposite on b at the same place."""
+    d0, d1, d2 = x[0] - x[6], x[1] - x[7], x[2] - x[8]
+    out[0], out[1], out[2], out[3], out[4], out[5] = F0, F1, F2, N0, N1, N2
+    out[6], out[7], out[8] = -F0, -F1, -F2
+    out[9] = -N0 - (d1 * F2 - d2 * F1)
+    out[10] = -N1 - (d2 * F0 - d0 * F2)
+    out[11] = -N2 - (d0 * F1 - d1 * F0)
+
+
+@kernel
+def slip_series(x, xd, k, s):
+    """Coefficient k of x_a - x_b, omega_b and the slip velocity, in rows 0 to 8 of s."""
+    for i in range(3):
+        s[i, k] = x[i] - x[6 + i]
+        s[3 + i, k] = xd[9 + i]
+    w0, w1, w2 = cross(s, 3, 0, k)
+    s[6, k] = -(w0 - xd[0] + xd[6])
+    s[7, k] = -(w1 - xd[1] + xd[7])
+    s[8, k] = -(w2 - xd[2] + xd[8])
+
+
+@kernel
+def direction_series(s, v, first, v_0, k):
+    """Coefficient k, a tuple of three, of v / sqrt(v.v + v_0^2); v in rows v to v + 2 of s, two rows are its own."""
+    s[first, k] = dot(s, v, v, k) + (v_0 * v_0 if k == 0 else 0.0)
+    s[first + 1, k] = inverse_root(s[first], s[first + 1], k)
+    return scaled(s, v, first + 1, k)
+
+
+@kernel
+def act_series(s, f, k, out):
+    """Coefficient k of what the force F in rows f to f + 2 of s is to a and b; x_a - x_b is in rows 0 to 2."""
+    n0, n1, n2 = cross(s, 0, f, k)
+    for i in range(3):
+        out[i] = s[f + i, k]
+        out[6 + i] = -s[f + i, k]
+    out[9] -= n0
+    out[10] -= n1
+    out[11] -= n2
+
+
+@kernel
+def along_and_across(x, f):
+    """Of a force f[0:3] and a torque f[3:6] the parts along the axis x[12:15], and the sizes of those across it."""
+    n0, n1, n2 = x[12], x[13], x[14]
+    along, turn = n0 * f[0] + n1 * f[1] + n2 * f[2], n0 * f[3] + n1 * f[4] + n2 * f[5]
+    f0, f1, f2 = f[0] - along * n0, f[1] - along * n1, f[2] - along * n2
+    t0, t1, t2 = f[3] - turn * n0, f[4] - turn * n1, f[5] - turn * n2
+    return along, turn, np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+
+
+def optional(check):
+    """The check of a value that may be None."""
+    return lambda value, what, error: None if value is None else check(value, what, error)
+
+
+def slip_of(given):
+    """The slip velocity of a law, m/s or rad/s: as given, no less than rounding resolves; None is the default."""
+    return SLIP if given is None else max(given, LEAST_SLIP)
+
+
+class BodyFriction:
+    """Mixed in before `Force`: friction between two bodies, by a force at a point of a and by a torque.
+
+    The first of `sources` scales the force, the second the torque.
+
+    Parameters
+    ----------
+    a, b : Body or ground
+        Two different bodies of one scene. b is the ground or a rigid body, a may be a point mass.
+    point_a : array_like (3,), m
+        Where the force acts, body frame of a.
+
+    Raises
+    ------
+    InvalidForce
+        If a number is negative or not finite, a velocity of regularisation is zero, both force and torque are zero, or
+        a torque would act on a point mass.
+    """
+
+    markers = (Point("a"), Turn("a"), Point("b"), Turn("b"))
+    particles = True
+    sources: tuple[str, ...] = ()
+
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        point_a: ArrayLike = (0.0, 0.0, 0.0),
+        name: str = "",
+        **quantities: Any,
+    ) -> None:
+        for unknown in quantities.keys() - self.quantities.keys():
+            raise TypeError(f"unknown argument {unknown}")  # answered with the arguments that there are, see calls.py
+        super().__init__(a, b, point_a=point_a, name=name)
+        for key, value in quantities.items():
+            setattr(self, key, value)
+        self.check()
+
+    def parameters(self) -> tuple[Any, ...]:
+        """The quantities, in their order."""
+        return tuple(getattr(self, key) for key in self.quantities)
+
+    def check(self) -> None:
+        """Refuse a friction without effect, and a torque on a point mass."""
+        super().check()
+        torque = self.sources[1]
+        if self.b.dimension == 3 or (self.a.dimension == 3 and getattr(self, torque) != 0.0):
+            body = self.b if self.b.dimension == 3 else self.a
+            hint = "make it a, and the other body b" if body is self.b else f"set {torque}=0"
+            raise self.error(f"{self.name}: the point mass {body.name!r} can't take the torque of it; {hint}.")
+
+
+# Series of friction coefficients, and of normal loads in bearings and guides.
+#
+#     mu(v) / v = (mu + (mu_s - mu) exp(-v^2 / v_s^2)) / sqrt(v^2 + v_0^2)                (1)
+#     N = N_0 + |F - n n.F| + w |n.G| + l |T - n n.T|     G: the force F, or the torque T  (2)
+#
+# A part of N that is negligible at order zero has no series: its coefficients are rounding. Where it is not negligible
+# later, the series are not those of the law, and the step ends before (loops/law_check.py).
+
+COEFFICIENT_ROWS, BEARING_ROWS = 5, 20
+F, T, ALONG, TURNING, F_ACROSS, T_ACROSS, SQUARES, ROOTS, PART, LOAD = 0, 3, 6, 7, 8, 11, 14, 16, 18, 19
+
+
+@kernel
+def coefficient_series(s, square, first, par, k):
+    """Coefficient k of `coefficient`, Eq. (1); v^2 is in row `square` of s, COEFFICIENT_ROWS rows are its own."""
+    s[first, k] = s[square, k] + (par[3] * par[3] if k == 0 else 0.0)
+    s[first + 1, k] = inverse_root(s[first], s[first + 1], k)
+    s[first + 2, k] = -s[square, k] / (par[2] * par[2])
+    s[first + 3, k] = exponential(s[first + 2], s[first + 3], k)
+    s[first + 4, k] = (par[1] - par[0]) * s[first + 3, k] + (par[0] if k == 0 else 0.0)
+    return product(s[first + 4], s[first + 1], k)
+
+
+@kernel
+def magnitude(s, a, k, counts):
+    """Coefficient k of |a|, a in a row of s; zero beyond order zero unless it counts."""
+    if k == 0:
+        return abs(s[a, 0])
+    return 0.0 if not counts else (s[a, k] if s[a, 0] > 0.0 else -s[a, k])
+
+
+@kernel
+def _length(s, v, square, r, k, counts):
+    """Write coefficient k of |v| into row r of s, v in rows v to v + 2."""
+    s[square, k] = dot(s, v, v, k)
+    s[r, k] = root(s[square], s[r], k) if k == 0 or counts else 0.0
+
+
+@kernel
+def _counts(s, r, weight, load, k):
+    """Whether a part of N counts: the part of order zero is in row r, N in row `load`."""
+    return k > 0 and weight * abs(s[r, 0]) > NEGLIGIBLE_LOAD * s[load, 0]
+
+
+@kernel
+def bearing_series(f, k, s, n, first, preload, turns, weight, tilt):  # nine: the rows, and the numbers of Eq. (2)
+    """Coefficient k of N, Eq. (2), from that of the reaction f; n is in rows n to n + 2 of s.
+
+    G is the torque where `turns`; BEARING_ROWS rows from `first` on are its own.
+    """
+    along, turn, load = first + ALONG, first + TURNING, first + LOAD
+    for i in range(3):
+        s[first + F + i, k], s[first + T + i, k] = f[i], f[3 + i]
+    s[along, k], s[turn, k] = dot(s, n, first + F, k), dot(s, n, first + T, k)
+    for i in range(3):
+        s[first + F_ACROSS + i, k] = f[i] - product(s[n + i], s[along], k)
+        s[first + T_ACROSS + i, k] = f[3 + i] - product(s[n + i], s[turn], k)
+    across, tilted, part, axial = first + ROOTS, first + ROOTS + 1, first + PART, turn if turns else along
+    _length(s, first + F_ACROSS, first + SQUARES, across, k, _counts(s, across, 1.0, load, k))
+    _length(s, first + T_ACROSS, first + SQUARES + 1, tilted, k, _counts(s, tilted, tilt, load, k))
+    s[part, k] = magnitude(s, axial, k, _counts(s, axial, weight, load, k))
+    s[load, k] = s[across, k] + weight * s[part, k] + tilt * s[tilted, k] + (preload if k == 0 else 0.0)
+    return s[load, k]
+
+
+# Base of joint friction: laws in proportion to the reaction of their own joint or contact.
+#
+#     friction on a   = par[-1] times `law` for unit normal load
+#     par[-1]         = normal_load(x, f, par), f (6,) the force and torque that the constraint exerts
+#
+# The normal load depends on the multipliers and they on the friction: both are solved for together (accelerations.py).
+# Taylor series take two more kernels: `series`, of `law` for par[-1] = 1, and normal_series(x, f, par, k, s), which
+# returns coefficient k of the normal load from coefficients k of x and f. It may be called twice for an order, each
+# time with all lower orders known; what it leaves out as negligible, it does so by order zero (friction.py).
+
+AXIS = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("a"))
+
+
+class JointFriction:
+    """Mixed in before `Force`: friction that follows from the reaction of a constraint.
+
+    Set `joints` and `markers` (Point a, Turn a, Point b, Turn b, then what the law needs, all of them arguments of the
+    constraint), write `law`, linear in par[-1], and `normal_load`, in one file of your own.
+
+    Parameters
+    ----------
+    joint : constraint
+        A joint or contact of the scene; it determines where the friction acts.
+    kinetic : float
+        Coefficient of friction while sliding.
+    static : float, optional
+        Coefficient near rest, at least the kinetic one (default).
+    slip_velocity : float, m/s, optional
+        Regularisation: velocity at which the friction is 71% of its magnitude. Sticking is replaced by slower creep: by
+        default 1e-9 m/s, so that a joint under nine tenths of its friction creeps by 2e-7 m in 100 s. Less than
+        1e-11 m/s acts as 1e-11 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in
+        proportion to it where the joint comes to rest: give 1e-3 m/s for them.
+    stribeck_velocity : float, m/s, optional
+        Velocity at which the excess of the static over the kinetic coefficient has fallen to 37%; by default
+        10 slip_velocity, or 0.01 m/s where that is left out.
+    preload : float, N
+        Normal load in addition to the reaction.
+    name : str, optional
+
+    Raises
+    ------
+    InvalidForce
+        If the joint is of another class or isn't in its scene, or a number is negative, not finite or impossible.
+    RedundantConstraints
+        At the start of a run, if the reaction is not unique.
+
+    Attributes
+    ----------
+    joints : tuple of classes
+        The constraints whose friction it can be.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene()
+    >>> block = scene.add_point_mass(mass=1.0)
+    >>> table = scene.add(ts.constraints.PlaneContact(block, scene.ground, normal_b=(0, 0, 1), name="table"))
+    >>> friction = scene.add(ts.forces.ContactFriction(table, kinetic=0.2, static=0.3))
+    >>> isinstance(friction, ts.JointFriction), friction
+    (True, <ContactFriction 'ContactFriction(table)'>)
+    """
+
+    joints: tuple[type, ...] = ()
+    sources = ("kinetic", "static")
+    markers: tuple[Marker, ...] = ()
+    particles = True
+    slips = sharp = True  # at rest, and where a part of the normal load passes zero
+    quantities: Mapping[str, Callable[..., Any]] = MappingProxyType(
+        {
+            "kinetic": not_negative,
+            "static": optional(not_negative),
+            "slip_velocity": optional(positive),
+            "stribeck_velocity": optional(positive),
+            "preload": not_negative,
+        }
+    )
+
+    @fitting
+    def __init__(
+        self,
+        joint: Attachment,
+        *,
+        kinetic: float,
+        static: float | None = None,
+        slip_velocity: float | None = None,
+        stribeck_velocity: float | None = None,
+        preload: float = 0.0,
+        name: str = "",
+        **geometry: Any,
+    ) -> None:
+        kind = self._kind()
+        name = label(name, kind, InvalidForce)
+        if not isinstance(joint, self.joints):
+            names = " or ".join(cls.__name__ for cls in self.joints)
+            raise InvalidForce(f"{name or kind}: joint must be a {names} of the scene, got {joint!r}.")
+        for unknown in geometry.keys() - self.quantities.keys():
+            raise unknown_argument(kind, unknown, [*self.quantities, "name"])
+        self.__dict__["joint"] = joint
+        super().__init__(joint.a, joint.b, self.coordinates, name)
+        self.kinetic, self.static, self.preload = kinetic, static, preload
+        self.slip_velocity, self.stribeck_velocity = slip_velocity, stribeck_velocity
+        for key, value in geometry.items():
+            setattr(self, key, value)
+        self.check()
+
+    def _untitled(self, bodies):
+        return f"{self._kind()}({self.joint.name})"
+
+    @property
+    def coordinates(self) -> tuple[Floats, ...]:
+        """Where the markers are, (3,) each: where the joint's are."""
+        return tuple(
+            np.zeros(3) if marker.code == TURN else getattr(self.joint, marker.argument) for marker in self.markers
+        )
+
+    def __setattr__(self, name: str, value: Never) -> None:
+        """Set an attribute, checked; where it acts is the joint's."""
+        if name == "coordinates":
+            return
+        if name == "joint" or name in [marker.argument for marker in self.markers if marker.code != TURN]:
+            raise self.error(f"{self.name}: {name} is that of its joint {self.joint.name!r}; set it there.")
+        super().__setattr__(name, value)
+
+    def check(self) -> None:
+        """A joint that the scene has, and friction no smaller at rest than sliding."""
+        if not self.joint.added:
+            raise self.error(f"{self.name}: add its joint {self.joint.name!r} to the scene first.")
+        if self.__dict__.get("static") is not None and self.static < self.kinetic:
+            raise self.error(
+                f"{self.name}: static must be at least kinetic = {self.kinetic:g}, got {self.static:g}; leave it out "
+                "where they are the same."
+            )
+
+    def parameters(self) -> tuple[Any, ...]:
+        """(mu, mu_s, v_s, v_0, preload), then the geometry."""
+        static = self.kinetic if self.static is None else self.static
+        stribeck = self.stribeck_velocity
+        if stribeck is None:
+            stribeck = STRIBECK if self.slip_velocity is None else 10.0 * self.slip_velocity
+        return self.kinetic, static, stribeck, slip_of(self.slip_velocity), self.preload, *self.geometry()
+
+    def geometry(self) -> tuple[float, ...]:
+        """What `law` and `normal_load` need besides, floats."""
+        return ()
+
+    def __getattr__(self, name: str) -> Any:
+        """The body-frame coordinates of a marker, by its argument: those of the joint."""
+        if name in [marker.argument for marker in self.markers] and "joint" in self.__dict__:
+            return getattr(self.joint, name)
+        return super().__getattr__(name)
+
+    @classmethod
+    def example(cls, rng: Random, a: AnyBody, b: AnyBody) -> Self:
+        """A random one, on a joint that is added to the scene, regularised over the velocities of a test."""
+        kind = cls.joints[0]
+        places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != TURN}
+        places |= {m.argument: rng.normal(size=3) for m in kind.markers if m.argument.startswith("axis")}
+        joint = a.scene.add(kind(a, b, **places))
+        (mu, more), (v0, vs) = rng.uniform(0.5, 1.0, 2), rng.uniform(4.0, 6.0, 2)
+        return cls(joint, kinetic=mu, static=mu + more, slip_velocity=v0, stribeck_velocity=vs, **cls.sizes(rng))
+
+    @classmethod
+    def sizes(cls, rng: Random) -> dict[str, float]:
+        """Random arguments of the geometry, for tests."""
+        return {}

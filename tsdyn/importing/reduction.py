@@ -1,0 +1,359 @@
+"""Links that a scene doesn't need: fixed links are merged, massless links get a share, slides in a row join."""
+
+import numpy as np
+
+from .description import GROUND, Slide
+from .tolerances import HALVINGS, NO_INERTIA, NO_MASS, ORTHOGONAL, PARALLEL, REACH, SHARE, SLIGHT, SOLID, TRIFLE
+
+# Links that are fixed to each other become one body: the one nearest to the root, with the mass of all.
+#
+# m = sum m_i,  r = sum m_i r_i / m,  J = sum (J_i + m_i (d.d I - d d^T)),  d = r_i - r
+
+
+def merge(description, report):
+    """Merge links along fixed joints that are no loops; joints, springs and frames then name what they belong to."""
+    head = {name: name for name in (GROUND, *description.links)}
+
+    def top(name):
+        while head[name] != name:
+            head[name] = head[head[name]]
+            name = head[name]
+        return name
+
+    kept = []
+    for joint in description.joints:
+        one, other = top(joint.a), top(joint.b)
+        if joint.kind == "fixed" and not joint.loop:
+            head[one if other == GROUND else other] = other if other == GROUND else one
+        else:
+            kept.append(joint)
+    description.joints = kept
+    groups = {}
+    for name in description.links:
+        groups.setdefault(top(name), []).append(name)
+    frames = {name: (top(name), inside(description, name, top(name))) for name in description.links}
+    for name, (link, frame) in description.frames.items():
+        owner, at = (GROUND, frame) if link == GROUND else (frames[link][0], frames[link][1] @ frame)
+        frames[name if name not in frames else f"{name} (site)"] = owner, at
+    for name, members in groups.items():
+        _join(description, name, members, report)
+    description.frames = frames
+    _rename(description, top, report)
+    description.links = {name: link for name, link in description.links.items() if top(name) == name}
+
+
+def inside(description, name, outer):
+    """The frame of a link in that of another one, or of the ground."""
+    return description.frame_of(outer).inverse @ description.frame_of(name)
+
+
+def _join(description, name, members, report):
+    """Give the mass and the shapes of links to the one that they are fixed to."""
+    others = [member for member in members if member != name]
+    if name == GROUND:
+        for member in others:
+            frame = description.links[member].frame
+            description.ground_shapes += [shape.within(frame) for shape in description.links[member].shapes]
+        if others:
+            report.note(f"fixed to the ground: {', '.join(others)}")
+        return
+    if not others:
+        return
+    link = description.links[name]
+    parts = [(description.links[member], inside(description, member, name)) for member in members]
+    link.shapes = [shape.within(frame) for part, frame in parts for shape in part.shapes]
+    link.mass, link.centroid, link.inertia = together(
+        [(part.mass, frame.point(part.centroid), frame.R @ part.inertia @ frame.R.T) for part, frame in parts]
+    )
+    report.note(f"merged into {name}, to which they are fixed: {', '.join(others)}")
+
+
+def together(parts):
+    """(mass, centroid, inertia) of several (mass, centroid, inertia) in one frame."""
+    mass = sum(m for m, _, _ in parts)
+    if len([m for m, _, _ in parts if m > 0.0]) == 1 and not any(J.any() for m, _, J in parts if m == 0.0):
+        return next(part for part in parts if part[0] > 0.0)  # to the bit
+    centroid = sum(m * r for m, r, _ in parts) / mass if mass > 0.0 else np.zeros(3)
+    inertia = sum(J + m * steiner(r - centroid) for m, r, J in parts)
+    return mass, centroid, inertia
+
+
+def steiner(d):
+    """d.d I - d d^T."""
+    return (d @ d) * np.eye(3) - np.outer(d, d)
+
+
+def _rename(description, top, report):
+    kept = []
+    for joint in description.joints:
+        joint.a, joint.b = top(joint.a), top(joint.b)
+        if joint.a != joint.b:
+            kept.append(joint)
+        elif joint.kind != "free":
+            report.leave("joint between links that are fixed to each other", joint.name)
+    description.joints = kept
+    for spring in description.springs:
+        spring.a, spring.b = top(spring.a), top(spring.b)
+
+
+# Links without mass or inertia between joints: a share of a neighbour's mass is moved to them, exactly.
+#
+# Both bodies of a revolute joint move alike on its axis, those of a spherical joint at its point, and those of a
+# prismatic joint turn alike. Mass that is moved from one to the other there changes no motion:
+#
+#     S = [[J_2, m r], [m r^T, m]],  J_2 = tr(J) I / 2 - J + m r r^T       the second moments of a body, (4, 4)
+#     S_donor - x L,  S_link + x L                                         (1)  L: of the points that both have
+#     x = SHARE / max eig(S_donor^-1/2 L S_donor^-1/2)                     (2)  what is left is the inertia of a body
+#
+# Links that only frames hang from don't move on their own: their joint is held, and listed. Links that no neighbour can
+# share with, as in chains of particles, are given a trifle, which is listed, too. Whether all of it has enough inertia
+# is checked when a run starts.
+
+
+def complete(description, report):
+    """Hold joints of leaves without mass, then give mass to the links between joints that have none."""
+    if _hold_idle_joints(description, report):
+        frames = description.frames
+        merge(description, report)
+        description.frames = frames | _deeper(frames, description.frames)
+    joints = description.joints_by_link()
+    for link in [link for link in description.links.values() if link.mass <= 0.0 and not joints[link.name]]:
+        report.leave("link without mass", link.name)
+        del description.links[link.name]
+    usual = _usual_mass(description)
+    all_poor = poor = [link for link in reversed(description.links.values()) if is_poor(link, SLIGHT * usual)]
+    waiting = None
+    while poor != waiting:  # one may have to wait for its neighbour
+        waiting = poor
+        poor = [link for link in poor if not _endow(description, joints[link.name], link, usual)]
+    poor = [link for link in poor if is_poor(link)]
+    given = [link.name for link in all_poor if link not in poor]
+    if given:
+        report.note(
+            f"without mass or inertia, given a share of what their neighbours carry for them: {', '.join(given)}"
+        )
+    for link in poor:
+        _add_trifle(link, usual, report)
+
+
+def _deeper(before, now):
+    """Frames that were on a link that has been merged in the meantime."""
+    return {name: (now[link][0], now[link][1] @ at) for name, (link, at) in before.items() if link in now}
+
+
+def is_poor(link, least=NO_MASS):
+    """Whether a link lacks mass or inertia."""
+    return link.mass <= least or not np.abs(link.inertia).max() > NO_INERTIA
+
+
+def _hold_idle_joints(description, report):
+    """Fix joints that nothing with mass hangs from on one side; whether there are any."""
+    joints, found = description.joints_by_link(), False
+    ahead = [link for link in description.links.values() if link.mass <= NO_MASS]
+    while ahead:
+        link = ahead.pop()
+        joint = next(iter(joints[link.name]), None)
+        if link.mass > NO_MASS or len(joints[link.name]) != 1 or joint.kind in ("free", "fixed"):
+            continue
+        report.leave("joint of a link without mass, held", joint.name)
+        joint.kind, joint.loop, found = "fixed", False, True
+        for name in (joint.a, joint.b):
+            del joints[name][joint]
+            if name not in (GROUND, link.name):
+                ahead.append(description.links[name])
+    return found
+
+
+def _endow(description, joints, link, usual):
+    """Move mass to a link from its neighbours at its joints; whether it has enough then."""
+    least = SLIGHT * usual
+    for joint in joints:
+        name = joint.a if joint.b == link.name else joint.b
+        donor = None if name == GROUND else description.links[name]
+        if donor is not None and is_poor(donor, least):
+            continue
+        common = _common(joint, link, donor)
+        if common is None:
+            continue
+        if donor is None:
+            share, size = common, usual
+        else:
+            there = moments(donor)
+            moved = _between(link, donor, common)
+            size = SHARE * _largest(there, moved)
+            if not size:
+                continue
+            take(donor, there - size * moved)
+            share = common
+        take(link, moments(link) + size * share)
+    return not is_poor(link, least)
+
+
+def _add_trifle(link, usual, report):
+    """Give a link that no neighbour can share with as little as rounding allows; that is no longer exact."""
+    mass, inertia = max(link.mass, TRIFLE * usual), TRIFLE * usual * REACH**2
+    link.mass, link.inertia = mass, link.inertia + inertia * np.eye(3)
+    report.leave("link without mass or inertia, given a trifle", link.name, f"{mass:.2g} kg, {inertia:.2g} kg m^2")
+
+
+def _common(joint, link, donor):
+    """Second moments (4, 4) of points that both bodies of a joint have, in the frame of the link, of mass 1 kg."""
+    if joint.kind in ("revolute", "universal", "spherical"):
+        at, reach = link.frame.seen(joint.point), _reach(link, donor, joint)
+        directions = [link.frame.R.T @ joint.axis] if joint.kind == "revolute" else []
+        points = [at + sign * reach * u for u in directions for sign in (-1.0, 1.0)] or [at]
+        rows = np.array([[*point, 1.0] for point in points])
+        return rows.T @ rows / len(rows)
+    return None
+
+
+def _reach(link, donor, joint):
+    """Half the length of a rod on the axis: as far as the donor extends, m."""
+    if donor is None:
+        return REACH
+    extent = np.sqrt(max(np.trace(donor.inertia), 0.0) / donor.mass)
+    return max(float(extent), 1e-3)
+
+
+def _usual_mass(description):
+    masses = [link.mass for link in description.links.values() if link.mass > NO_MASS]
+    return float(np.median(masses)) if masses else 1.0
+
+
+def moments(link):
+    """Second moments S (4, 4) of a link in its own frame."""
+    second = (
+        0.5 * np.trace(link.inertia) * np.eye(3) - link.inertia + link.mass * np.outer(link.centroid, link.centroid)
+    )
+    first = link.mass * link.centroid[:, None]
+    return np.block([[second, first], [first.T, np.array([[link.mass]])]])
+
+
+def take(link, S):
+    """Give a link the mass, centroid and inertia of second moments."""
+    link.mass = float(S[3, 3])
+    link.centroid = S[:3, 3] / link.mass
+    second = S[:3, :3] - link.mass * np.outer(link.centroid, link.centroid)
+    inertia = np.trace(second) * np.eye(3) - second
+    link.inertia = (inertia + inertia.T) / 2.0
+
+
+def _between(link, donor, S):
+    """Second moments in the frame of the donor."""
+    at = donor.frame.inverse @ link.frame
+    T = np.block([[at.R, at.p[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
+    return T @ S @ T.T
+
+
+def _largest(there, moved):
+    """The largest x for which there - x moved is the inertia of a body, by (2).
+
+    Where `there` is that of no solid: as far as its mass and its principal moments remain positive.
+    """
+    values, vectors = np.linalg.eigh(there)
+    if values[0] > SOLID * values[-1]:
+        root = vectors / np.sqrt(values)
+        return 1.0 / float(np.linalg.eigvalsh(root.T @ moved @ root)[-1])
+    x, least = there[3, 3] / moved[3, 3], _least_moment(there)
+    for _ in range(HALVINGS if least > 0.0 else 0):
+        x /= 2.0
+        if _least_moment(there - x * moved) > SHARE * least:
+            return x
+    return 0.0
+
+
+def _least_moment(S):
+    """The least principal moment of inertia about the centroid."""
+    second = S[:3, :3] - np.outer(S[:3, 3], S[:3, 3]) / S[3, 3]
+    return float(np.linalg.eigvalsh(np.trace(second) * np.eye(3) - second)[0])
+
+
+# Prismatic joints one after another, with nothing but massless links between them, become one joint.
+#
+# two                        two displacements, no rotation      rows: Parallel, Dot1, Dot2
+# two, and a hinge across    Planar                              of the hinge's name, with its angle
+# three                      three displacements, no rotation    rows: Parallel, Dot1
+# three, and a ball or three hinges                              the link is free
+
+
+def gather(description, report):
+    """Replace chains of prismatic joints."""
+    joints = description.joints_by_link()
+    for first, link, second in _pairs(description, joints, _joins):
+        slides = [*_slides(first), *_slides(second)]
+        second.kind, second.slides = "translations", slides
+        second.servos = first.servos + second.servos  # without counterpart there, so listed
+        second.stiffness = second.damping = second.free = second.load = 0.0
+        second.name = ", ".join(slide.name for slide in slides)
+        _drop(description, joints, first, link)
+    for first, link, second in _pairs(description, joints, _is_planar):
+        second.kind, second.slides = "planar", first.slides
+        for servo in first.servos:
+            report.leave("actuator", servo.name)
+        _drop(description, joints, first, link)
+        report.note(f"{first.name}, {second.name}: one planar joint")
+    for joint in [joint for joint in description.joints if len(joint.slides) == 3]:
+        _free(description, joints, joint, report)
+    description.joints = [joint for joint in description.joints if joint in joints[joint.a]]
+    description.frames = {
+        name: (owner, at) for name, (owner, at) in description.frames.items() if owner in joints
+    }  # fmt: skip
+
+
+def _pairs(description, joints, fits):
+    """(joint, massless link, next joint), of which `fits` is true; each is dropped before the next one."""
+    for link in list(description.links.values()):
+        pair = sorted(joints[link.name], key=lambda joint: joint.a == link.name)
+        if len(pair) == 2 and is_poor(link) and link.mass <= 0.0:
+            first, second = pair
+            if first.b == link.name and second.a == link.name and fits(first, second):
+                yield first, link, second
+
+
+def _joins(first, second):
+    """Whether two joints slide along independent axes."""
+    if {first.kind, second.kind} - {"prismatic", "translations"} or first.loop or second.loop:
+        return False
+    axes = np.array([slide.axis for slide in (*_slides(first), *_slides(second))])
+    return len(axes) <= 3 and np.linalg.svd(axes, compute_uv=False)[-1] > PARALLEL
+
+
+def _slides(joint):
+    return joint.slides or [Slide(joint.name, joint.axis, joint.stiffness, joint.damping, joint.free, joint.load)]
+
+
+def _drop(description, joints, joint, link):
+    """Drop a joint and the link beyond it; what hangs from the link hangs from the one before."""
+    del joints[joint.a][joint], joints[link.name][joint]
+    for following in joints.pop(link.name):
+        following.a = joint.a
+        joints[joint.a][following] = None
+    del description.links[link.name]
+
+
+def _is_planar(first, second):
+    """Whether a hinge is across two slides."""
+    if first.kind != "translations" or len(first.slides) != 2 or second.kind != "revolute" or second.loop:
+        return False
+    return abs(abs(first.normal() @ second.axis) - 1.0) < ORTHOGONAL
+
+
+def _free(description, joints, joint, report):
+    """Three slides, then a ball or three hinges, hold nothing."""
+    chain = [joint]
+    while chain[-1].b != GROUND and sum(3 if one.kind == "spherical" else 1 for one in chain[1:]) < 3:
+        link = description.links[chain[-1].b]
+        following = [one for one in joints[link.name] if one.a == link.name]
+        if not is_poor(link) or len(following) != 1 or following[0].kind not in ("revolute", "spherical"):
+            return
+        chain.append(following[0])
+    axes = [one.axis for one in chain[1:] if one.kind == "revolute"]
+    plain = not any(one.stiffness or one.damping or one.load for one in chain)
+    plain = plain and not any(slide.stiffness or slide.damping or slide.load for slide in joint.slides)
+    if not plain or (axes and (len(axes) != 3 or abs(np.linalg.det(axes)) < PARALLEL)):
+        return
+    for one in chain:
+        report.note(f"{one.name}: the link {chain[-1].b} is free")
+    for one in chain[:-1]:
+        _drop(description, joints, one, description.links[one.b])
+    chain[-1].kind = "free"

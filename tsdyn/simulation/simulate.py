@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..calls import fitting
 from ..methods.integrator import is_plain
+from ..runs.arguments import interval, output_times
 from .prepared_run import Run, demand_scene
 from .run_options import RunCall, RunOptions, documented, from_names
 
@@ -85,11 +86,12 @@ def simulate(  # many arguments, by name: each is an option of a run
         integrator, rtol, atol, formulation, constraint_tol, initial_tol, redundancy, dense_output, events, max_steps,
         max_step, history, chart_interval,
     )  # fmt: skip
-    return run_of(scene, options)._solve(RunCall(t_span, t_eval, store, checkpoint, progress, state))
+    call = RunCall(t_span, t_eval, store, checkpoint, progress, state)
+    return _run_of(scene, options, call)._solve(call)
 
 
-def run_of(scene: Scene, options: RunOptions) -> Run:
-    """The `Run` of a scene with these options: one of the last ones, or a new one.
+def _run_of(scene, options, call):
+    """The `Run` of a scene with these options: one of the last ones, or a new one, for a call that is checked first.
 
     Runs of a method or of events of a user aren't kept: what they do may change unseen.
     """
@@ -99,6 +101,7 @@ def run_of(scene: Scene, options: RunOptions) -> Run:
     for run in () if kept is None else kept.runs:
         if run.options == options:
             return run
+    output_times(call.t_eval, *interval(call.t_span))
     run = Run(scene, options)
     if options.events is None and is_plain(run.method):
         kept = run._prepared

@@ -1,4 +1,8 @@
-"""Mass and inertia of shapes of uniform density: box, sphere, cylinder, rod, from_mesh, and what they compose."""
+"""Mass and inertia of shapes, and shapes to draw: scene.add_body(**ts.shapes.box((1, 2, 3), density=7850)).
+
+`box`, `sphere`, `cylinder`, `rod` and `from_mesh` have mass and inertia; +, moved and rotated make one body of several.
+`Box`, `Sphere`, `Cylinder` and `Mesh` are geometry alone, for the viewer.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +27,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .hints import ArrayLike, Axis, Floats, Place, Rotation
+
+__all__ = ["Box", "Cylinder", "Mesh", "Shape", "Sphere", "box", "cylinder", "from_mesh", "rod", "sphere"]
+
+
+def __dir__():
+    """What users use, for completion."""
+    return sorted(__all__)
 
 
 # Volume, centroid and second moments of a closed triangle mesh, and the check that it is closed.

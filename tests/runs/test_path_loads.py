@@ -85,7 +85,7 @@ def test_the_work_of_bumps_and_notches_anywhere(make, name):
         assert speed(found) == pytest.approx(math.sqrt(1.0 + 2.0 * work), abs=LOOSE)
 
 
-@pytest.mark.slow_but("dop853", "rk45")
+@pytest.mark.slow_but("*dop853", "*rk45")
 @pytest.mark.parametrize("name", STAGES)
 def test_a_box_of_a_thousandth_of_the_way(name):
     for at in (0.1, 0.3217, 0.9):
@@ -113,7 +113,7 @@ def wall(t, state, *, at=0.9, stiffness=1e5):
     return (-state[0] - stiffness * max(0.0, state[0] - at), 0.0, 0.0)
 
 
-@pytest.mark.slow_but("dop853", "rk45")
+@pytest.mark.slow_but("*dop853", "*rk45")
 @pytest.mark.parametrize("name", STAGES)
 def test_a_wall_that_an_oscillation_grazes(name):
     """x = sin t meets a wall at cos(w / 2), and leaves it after a half period of the wall's spring, w being 0.02."""
@@ -170,7 +170,7 @@ def smooth(t, state, *, k=1.0):
     return (-k * np.tanh(3.0 * state[0]) - 0.1 * state[7], 0.3 * np.exp(-state[0]), -k * state[2] ** 3)
 
 
-@pytest.mark.slow_but("dop853", "rk45")
+@pytest.mark.slow_but("*dop853", "*rk45")
 @pytest.mark.parametrize("name", [name for name in STAGES if name != "default"])
 @pytest.mark.parametrize("tol", [1e-4, 1e-8])
 def test_smooth_loads_reject_no_step(name, tol, monkeypatch):

@@ -1,4 +1,4 @@
-"""The arrays that the runs of one thread have in common: each case writes its numbers into them; which can share them."""
+"""The arrays that the runs of one thread have in common; which cases can share them. Each case writes its numbers there."""
 
 from types import SimpleNamespace
 

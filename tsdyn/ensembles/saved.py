@@ -111,6 +111,7 @@ class SavedEnsemble(Ensemble):
 def _options(record):
     """The arguments of the cases, checked; none that is no option of an ensemble, such as where a run is stored."""
     options = record["options"]
+    demand(options.keys() <= {"t_span", *OPTIONS}, "options")
     given = {**OPTIONS, "t_span": options.get("t_span"), **{name: options[name] for name in OWN if name in options}}
     if not record["lacking"]:
         demand_arguments_of_file(given)

@@ -18,8 +18,8 @@ BOX = {"boxstyle": "round,pad=0.35", "facecolor": "#e8eef7", "edgecolor": "#3550
 STEP = (
     (0, "simulation.simulate", "simulate"),
     (1, "model.packed", "pack"),
-    (1, "runs.run", "run"),
-    (2, "runs.slices", "drive"),
+    (1, "runs.driver", "run"),
+    (2, "runs.driver", "drive"),
     (3, "runs.stepper", "advance"),
     (4, "methods.explicit", "second_order_step"),
     (5, "formulations.tangent", "place"),
@@ -29,7 +29,7 @@ STEP = (
     (5, "formulations.tangent", "accelerate"),
     (6, "formulations.accelerations", "solve_accelerations"),
     (4, "runs.step_control", "accept"),
-    (4, "runs.outputs", "record"),
+    (4, "runs.dense_output", "record"),
     (4, "formulations.tangent", "start_chart"),
 )
 

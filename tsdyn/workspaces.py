@@ -257,7 +257,7 @@ class Clock(Record):
     largest_landing: float  # m; how far a projection near a singular configuration has moved a body at most
 
 
-class Numbers(Record):
+class RunNumbers(Record):
     """Counts, settings and states of a run; settings and states that are no numbers are 0 or 1."""
 
     first_order: int
@@ -290,7 +290,7 @@ class Numbers(Record):
     stiff: int
 
 
-class Kernels(Record):
+class RunKernels(Record):
     """Addresses of what drivers call; zero for what a run doesn't."""
 
     place: int  # the formulation's: place to error_norm
@@ -313,7 +313,7 @@ class Kernels(Record):
     pass_singular: int
 
 
-class Run(NamedTuple):
+class RunState(NamedTuple):
     """The state of a run, and the driver's scratch. x, y are v, vd (tangent-space ODE) or q, w (Maggi/Kane)."""
 
     x: np.ndarray  # (nx,)
@@ -346,8 +346,8 @@ class Run(NamedTuple):
     memory: np.ndarray  # the method's scratch
     block: np.ndarray  # the present step's: start, h, end, chart; the interpolant's data; what is remembered
     clock: Clock
-    numbers: Numbers
-    kernels: Kernels
+    numbers: RunNumbers
+    kernels: RunKernels
 
 
 def enter_joints(run, handles, remembered):
@@ -356,7 +356,7 @@ def enter_joints(run, handles, remembered):
 
 
 def lay_out(n, nx, ny, angles, slots, *, tableau=0, memory=0, warm=0, block=0, path=0, watched=0, loaded=0):
-    """The `Run` of a system of sizes nx, ny, whose forces remember so many `slots`.
+    """The `RunState` of a system of sizes nx, ny, whose forces remember so many `slots`.
 
     The other lengths are those of its arrays; a block is longer than its interpolant's data, which is what is given.
     """
@@ -374,7 +374,7 @@ def lay_out(n, nx, ny, angles, slots, *, tableau=0, memory=0, warm=0, block=0, p
     }
     whole = {"joints": (angles, 4), "watched": (watched,), "loaded": (loaded,)}
     integers = {name: np.zeros(shape, np.int64) for name, shape in whole.items()}
-    return Run(**carve(shapes, clock=Clock, numbers=Numbers, kernels=Kernels), **integers)
+    return RunState(**carve(shapes, clock=Clock, numbers=RunNumbers, kernels=RunKernels), **integers)
 
 
 load_run = loader(lay_out(1, 1, 1, 1, 1))

@@ -11,7 +11,7 @@ from tests.helpers.every_force import everything
 from tests.helpers.hanging_chains import DOWN, G, pendulum_matrices, pendulums
 from tests.helpers.tolerances import CLOSE, FINE, HELD
 from tsdyn.analyses.coordinates import Variations, stacked
-from tsdyn.analyses.nominal_motion import Motion
+from tsdyn.analyses.nominal_motion import NominalMotion
 from tsdyn.elements.bodies import transform_g
 
 C, F = ts.constraints, ts.forces
@@ -272,7 +272,7 @@ def test_every_force_and_a_driven_rod_in_motion(seed):
     q, qd, _ = state(np.concatenate((q, qd)))
     scene.place(q, qd)
     linear = scene.linearise()
-    motion = Motion(scene.packed, np.zeros(scene.system.memory.size), t, q, qd)
+    motion = NominalMotion(scene.packed, np.zeros(scene.system.memory.size), t, q, qd)
     variations = Variations(motion, np.zeros(3))
     every = {one.name: one for one in (*variations.joints, *variations.bodies)}
     Z, Zd, Zdd = stacked([every[name] for name in linear.coordinates], q.size)

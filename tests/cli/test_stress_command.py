@@ -9,7 +9,7 @@ import pytest
 from tests.helpers.processes import ROOT
 from tsdyn.cli.command import main
 from tsdyn.stress import campaign, report
-from tsdyn.stress.judgement import Outcome
+from tsdyn.stress.judgement import Judgement
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_random_scenes_and_calls_as_json(capsys):
 
 def test_faults_are_counted_and_their_command_given(monkeypatch, capsys):
     job = campaign.Job("scenes", 7)
-    outcomes = [Outcome(7, "tree, 3 bodies", "FAULT energy less work", "1e-3"), Outcome(8, "net", "success")]
+    outcomes = [Judgement(7, "tree, 3 bodies", "FAULT energy less work", "1e-3"), Judgement(8, "net", "success")]
     monkeypatch.setattr(campaign, "work", lambda plan, processes, limit=0: (each for each in [(job, outcomes)]))
     assert main(["stress", "--fuzz", "--processes", "1"]) == 1
     out = capsys.readouterr().out
@@ -67,7 +67,7 @@ def test_faults_are_counted_and_their_command_given(monkeypatch, capsys):
 
 def test_ctrl_c_gives_what_there_is(monkeypatch, capsys):
     def work(plan, processes, limit=0):
-        yield campaign.Job("scenes", 0), [Outcome(0, "net", "success")]
+        yield campaign.Job("scenes", 0), [Judgement(0, "net", "success")]
         raise KeyboardInterrupt
 
     monkeypatch.setattr(campaign, "work", work)

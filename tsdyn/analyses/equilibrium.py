@@ -14,7 +14,7 @@ from ..observables.generalised_forces import force_loads, velocity_forces
 from ..observables.state import Anchor, RememberingState
 from .coordinates import Variations, chosen
 from .moves import Moves
-from .nominal_motion import Motion
+from .nominal_motion import NominalMotion
 from .reduction import Reduced, eigenpairs, stiffnesses
 from .steady import SteadyRest, is_invariant
 from .tolerances import (
@@ -269,7 +269,7 @@ class Descent(Moves):
 # amended potential V - Omega . J Omega / 2 (Simo, Lewis, Marsden 1991).
 
 
-class SteadyMotion(Motion):
+class SteadyMotion(NominalMotion):
     """A `Motion` with the velocities of a `SteadyField`; qdd are the accelerations that are left over."""
 
     def __init__(self, packed, memory, t, q, field):
@@ -346,7 +346,7 @@ def find_steady(descent):
 def _stability_of_spin(descent):
     """Whether stable, the smallest amended stiffness, number of neutral directions; and dq of growth, or None."""
     at, field = descent.motion, descent.field
-    motion = Motion(at.packed, at.memory, at.t, at.q, at.qd)
+    motion = NominalMotion(at.packed, at.memory, at.t, at.q, at.qd)
     size = motion.packed.size or descent.reach
     rate = max(np.abs(motion.spins(1)).max(initial=0.0), np.linalg.norm(field.spin))
     if not is_invariant(motion, field.spin, size, rate):

@@ -33,7 +33,7 @@ from ..rows.interface import TangentWorkspace, allocate_tangent, constrain, eval
 from ..workspaces import Work, parts, plain_context
 from .coordinates import Variations, chosen
 from .moves import update_memory
-from .nominal_motion import Motion
+from .nominal_motion import NominalMotion
 from .tolerances import (
     CLOSE,
     CONSISTENT,
@@ -67,7 +67,7 @@ def demand_driven(packed, memory, t, q, who, remedy):
     k = degrees_of_freedom(packed)
     if k <= 0:
         return
-    motion = Motion(packed, memory, t, q, np.zeros(q.size), still=True)
+    motion = NominalMotion(packed, memory, t, q, np.zeros(q.size), still=True)
     names = [one.name for one in chosen(motion, Variations(motion, np.zeros(3)))]
     more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
     raise InvalidArgument(

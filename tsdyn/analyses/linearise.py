@@ -20,7 +20,7 @@ from ..forces.torque import Torque
 from ..validation import vector3
 from .coordinates import Variations, chosen, stacked, transform_e
 from .equilibrium import demand_smooth
-from .nominal_motion import Motion
+from .nominal_motion import NominalMotion
 from .reduction import Reduced, eigenpairs
 from .steady import steady_rate
 from .tolerances import NO_INPUT
@@ -331,7 +331,7 @@ def linearise(scene, memory, state, inputs, outputs, report):
     report(fraction, said) announces the next part.
     """
     report(0.05, "accelerations and reactions are solved for")
-    motion = Motion(scene.packed, memory, *state)
+    motion = NominalMotion(scene.packed, memory, *state)
     demand_smooth(motion)
     rate = steady_rate(motion)
     variations = Variations(motion, np.zeros(3) if rate is None else rate)

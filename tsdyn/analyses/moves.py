@@ -13,8 +13,8 @@ from ..model.equations import WIDTH, places, remember, set_time, with_short_rows
 from ..model.handles import all_angles, counted
 from ..rows.constraint_graph import REDUCED
 from ..rows.graph_builder import graph_of, redundant_rows
-from .nominal_motion import Motion, Pairs
-from .rest import Increments, Pattern, Rest
+from .nominal_motion import NominalMotion, Pairs
+from .rest import Increments, Rest, SparsePattern
 from .tolerances import (
     DENSE,
     FINAL,
@@ -73,18 +73,18 @@ class Frame:
     def _make_patterns(self):
         each, m, size = self.increments, self.own.size, self.increments.size
         columns = each.columns_of(self.by_parts)
-        pairs = Pattern.of_blocks(columns, columns, (size, size))
-        self.blocks = Pattern.of_parts([(pairs, 0, 0), (each.own, 0, 0)], (size, size))
+        pairs = SparsePattern.of_blocks(columns, columns, (size, size))
+        self.blocks = SparsePattern.of_parts([(pairs, 0, 0), (each.own, 0, 0)], (size, size))
         self._pairs = pairs
-        self.rows = Pattern.of_blocks(np.arange(m)[:, None], each.columns_of(self._by_rows), (m, size))
-        turned = Pattern(self.rows.columns, self.rows.rows, (size, m))
-        below = Pattern(np.arange(m), np.arange(m), (m, m))
+        self.rows = SparsePattern.of_blocks(np.arange(m)[:, None], each.columns_of(self._by_rows), (m, size))
+        turned = SparsePattern(self.rows.columns, self.rows.rows, (size, m))
+        below = SparsePattern(np.arange(m), np.arange(m), (m, m))
         whole = size + m, size + m
         self._across, self._turned = self.rows, turned
         order = [(self.blocks, 0, 0), (self.rows, size, 0), (turned, 0, size), (below, size, size)]
-        self.saddle = Pattern.of_parts(order, whole)
-        diagonal = Pattern(np.arange(size), np.arange(size), (size, size))
-        self.light = Pattern.of_parts([(diagonal, 0, 0), *order[1:]], whole)
+        self.saddle = SparsePattern.of_parts(order, whole)
+        diagonal = SparsePattern(np.arange(size), np.arange(size), (size, size))
+        self.light = SparsePattern.of_parts([(diagonal, 0, 0), *order[1:]], whole)
 
     def _weights(self):
         """G of rest.py: the pattern of its saddle-point matrix, its numbers, their places, and its diagonal (size,)."""
@@ -212,7 +212,7 @@ class Moves:
         return self._motion
 
     def _motion_at(self, q):
-        return Motion(self.packed, self.memory, self.t, q, np.zeros(q.size), still=True)
+        return NominalMotion(self.packed, self.memory, self.t, q, np.zeros(q.size), still=True)
 
     @property
     def unbalanced(self):

@@ -99,7 +99,7 @@ class Pairs:
 
 
 def derivatives(motion):
-    """The `Derivatives` at a `Motion`."""
+    """The `Derivatives` at a `NominalMotion`."""
     packed, pairs = motion.packed, Pairs(motion.packed)
     (nc, _), m, n = pairs.counts, len(motion.lam), motion.q.size
     K, rows, Q_q, Q_qd = pairs.blocks(motion, motion.lam)
@@ -150,7 +150,7 @@ def _scatter(blocks, columns, used, n):
 # Sparse, so the cost is O(N) for chains and trees.
 
 
-class Motion:
+class NominalMotion:
     """Equations of motion at a consistent state of a packed scene.
 
     Parameters

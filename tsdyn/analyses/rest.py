@@ -32,7 +32,7 @@ from .tolerances import (
 # Sparse matrices of one sparsity and many values: sums of blocks, whose places are found once.
 
 
-class Pattern:
+class SparsePattern:
     """Where numbers at (rows, columns), both (k,), of a matrix add up; a negative row or column has none."""
 
     def __init__(self, rows, columns, shape):
@@ -95,7 +95,7 @@ class Increments:
         self._columns = np.full((len(metric.at) + 1, 6), -1)  # of each body, the ground's last
         self._columns[:-1, :3] = metric.move
         self._columns[:-1][metric.rigid, 3:] = metric.turn
-        self.own = Pattern.of_blocks(self._columns[:-1], self._columns[:-1], (self.size, self.size))
+        self.own = SparsePattern.of_blocks(self._columns[:-1], self._columns[:-1], (self.size, self.size))
 
     def bodies_at(self, places, lengths):
         """Numbers of the bodies whose coordinates begin at some places, and are so many; the ground's is the last."""

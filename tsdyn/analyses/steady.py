@@ -11,7 +11,7 @@ from ..observables.evaluate import mass_matrix_sparse
 from ..observables.generalised_forces import velocity_forces
 from ..validation import floats, vector3
 from .coordinates import transform_e
-from .nominal_motion import Motion
+from .nominal_motion import NominalMotion
 from .reduction import inertia_derivatives
 from .rest import Rest
 from .tolerances import EQUAL_INERTIA, ON_AXIS, STEADY, TURNS
@@ -116,7 +116,7 @@ def _continued(motion, Omega, tau):
         q[p] = np.roll(turned.as_quat(), 1, axis=1)
         omega = spins @ R.T  # pd = E^T omega / 2
         qd[p] = 0.5 * np.einsum("bij,bi->bj", transform_e(q[p]), omega)
-    return R, Motion(motion.packed, motion.memory, motion.t + tau, q, qd)
+    return R, NominalMotion(motion.packed, motion.memory, motion.t + tau, q, qd)
 
 
 def _cross(v):

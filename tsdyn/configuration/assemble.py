@@ -18,13 +18,13 @@ from .kinetic_metric import Metric, least_energy, least_step, rotation_vectors
 from .motor_starts import approach, demand_aligned, demand_finite, has_motors, refuse_vanished
 from .tolerances import (
     ASSEMBLED,
-    CLEAR,
-    FLAT,
+    CLEAR_FOLD,
+    FLAT_FOLD,
     LEAST_VELOCITY_TOL,
     POINT_LIKE,
-    ROUNDING,
     SHOWN,
     STAGES,
+    START_ROUNDING,
     STIFFER,
     UNFOLDED,
 )
@@ -68,7 +68,7 @@ class Folds:
         if not self.folds:
             return np.zeros(0)
         links, places = self._angles(metric, q, False), self._angles(metric, q, True)
-        clear = (np.abs(links) >= CLEAR) & (np.abs(places) >= CLEAR) & (links * places > 0.0)
+        clear = (np.abs(links) >= CLEAR_FOLD) & (np.abs(places) >= CLEAR_FOLD) & (links * places > 0.0)
         return np.where(clear, np.sign(links), 0.0)
 
     def shown(self, metric, q):
@@ -220,7 +220,7 @@ def _link(edge, near, body, axis):
     if near.slide:
         n = edge.axis.get(body)
         across = None if n is None else np.cross(n, near.slide[body])
-        return across if across is not None and np.linalg.norm(across) > FLAT else None
+        return across if across is not None and np.linalg.norm(across) > FLAT_FOLD else None
     link = near.points[body] - edge.points[body]
     return link if np.linalg.norm(link) > POINT_LIKE else None
 
@@ -467,7 +467,7 @@ def _velocities(metric, q, sketch, A, Phi_q, Phi_t):
     fitted = given
     for _ in range(3):
         residual = A @ x + Phi_t
-        if np.abs(residual).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(fitted).max()):
+        if np.abs(residual).max(initial=0.0) <= START_ROUNDING * (1.0 + np.abs(fitted).max()):
             break
         x = least_energy(metric, q, A, x, Phi_t) if exact else x + least_step(A, residual)
         fitted = metric.rates(q, x)

@@ -11,20 +11,20 @@ from ..maths.matrix_rank import row_lengths
 from .kinetic_metric import least_step, soft_step
 from .tolerances import (
     CLOSED,
-    CONVERGED,
     DECREASE,
+    LAST_CONVERGED,
     LEAST_DIVISOR,
     LEFT_OVER,
-    MANY,
+    MANY_COORDINATES,
     MOST_CLOSING,
+    MOST_ROTATION,
     MOST_SETTLING,
     MOST_SLIDE,
-    MOST_TURN,
-    NEAR,
+    NEAR_SKETCH,
     NO_AXIS,
-    PASSED,
     SETTLED,
     SHAKES,
+    STAGE_CONVERGED,
     STAGES,
     STEEP,
     STUCK,
@@ -61,7 +61,7 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
     If continuation from the sketch fails, other starts are tried: `also`, and random perturbations of the sketch.
     """
     rng, best, total = np.random.default_rng(0), None, 0
-    shakes = shakes[:2] if metric.n > MANY else shakes
+    shakes = shakes[:2] if metric.n > MANY_COORDINATES else shakes
     Phi = metric.linear(sketch, rows)[0]
     if np.abs(Phi).max(initial=0.0) <= CLOSED * (1.0 + np.abs(sketch).max()):
         return Found(sketch, Phi, 0, True)
@@ -125,7 +125,7 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
         return q, 0
     steps, relative = 0, None if kept is None else _Relative(metric, sketch, kept)
     lengths = row_lengths(A)
-    if kept is None and q is sketch and _strain(Phi, lengths) < NEAR * metric.reach(q) * metric.root.min():
+    if kept is None and q is sketch and _strain(Phi, lengths) < NEAR_SKETCH * metric.reach(q) * metric.root.min():
         stages = stages[-1:]
 
     def strained(q):
@@ -151,10 +151,10 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
             *arrays, energy = now
             step = soft_step(arrays[1], arrays[0], arrays[2], arrays[3])
             size = np.linalg.norm(step)
-            if size <= CONVERGED * np.linalg.norm(arrays[2]):
+            if size <= LAST_CONVERGED * np.linalg.norm(arrays[2]):
                 break
             turn = metric.largest_turn(step)
-            factor = min(1.0, MOST_TURN / turn) if turn > 0.0 else 1.0
+            factor = min(1.0, MOST_ROTATION / turn) if turn > 0.0 else 1.0
             steps += 1
             for _ in range(10):
                 trial = metric.moved(q, factor * step)
@@ -165,7 +165,7 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
             else:
                 break
             q, now = trial, after
-            if softness != stages[-1][0] and size <= PASSED * (np.linalg.norm(now[2]) + LEAST_DIVISOR):
+            if softness != stages[-1][0] and size <= STAGE_CONVERGED * (np.linalg.norm(now[2]) + LEAST_DIVISOR):
                 break
     return q, steps
 
@@ -180,7 +180,7 @@ def close(metric, q, rows=None):
         steps += 1
         step = least_step(A, Phi, STEEP)
         turn = metric.largest_turn(step)
-        factor = min(1.0, MOST_TURN / turn) if turn > 0.0 else 1.0
+        factor = min(1.0, MOST_ROTATION / turn) if turn > 0.0 else 1.0
         size = np.linalg.norm(Phi)
         for _ in range(12):
             trial = metric.moved(q, factor * step)

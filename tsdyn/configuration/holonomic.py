@@ -12,7 +12,7 @@ from ..jit.code_hash import is_ours
 from ..jit.kernels import twin
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import starts_of
-from .tolerances import LEAST_X, QUOTIENT_ERROR, QUOTIENT_STEPS
+from .tolerances import LEAST_X, PHI_STEPS, QUOTIENT_ERROR
 
 TRIED = 3  # instances of each kind
 
@@ -66,7 +66,7 @@ def _wrong_row(constraint, par, x, t):
         jacobian(x, par, t, Phi_x)
         rate, size = Phi_x @ direction, np.abs(Phi_x) @ np.abs(direction)
         off = np.full(kind.rows, np.inf)
-        for step in QUOTIENT_STEPS:
+        for step in PHI_STEPS:
             h = step * max(np.abs(x).max(), LEAST_X) * direction
             quotient = (value(x + h) - value(x - h)) * np.abs(direction).max() / (2.0 * np.abs(h).max())
             off = np.fmin(off, np.abs(quotient - rate))

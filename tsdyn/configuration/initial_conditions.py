@@ -38,16 +38,16 @@ from .start_kernels import (
 )
 from .tolerances import (
     DENSE_ENTRIES,
-    KEPT_FLOATS,
+    KEPT_START_FLOATS,
     LEAST_NEIGHBOURHOOD,
-    LEAST_SIZE,
     LISTED_ENTRIES,
     MANY_ROWS,
     NEIGHBOURHOOD,
+    POINT_SIZE,
     REDUNDANT_SHARES,
-    ROUNDING,
     SHORTENING,
     SHORTEST_LEG,
+    START_ROUNDING,
 )
 
 # The workspace in which a start is checked; one that is idle serves the next start of the scene.
@@ -91,7 +91,7 @@ class StartWorkspace:
         far = np.abs(q)
         if is_small(size):
             far[self.at] *= size
-        control.floor = ROUNDING * (size + far.max())
+        control.floor = START_ROUNDING * (size + far.max())
 
     def entered(self):
         """The arrays that `enter` sets but for reals."""
@@ -112,7 +112,7 @@ def taken(packed, graph, n):
 
 def give(packed, workspace):
     """Take back a workspace that is no longer in use, unless it is large."""
-    small = workspace.tangent.rows.S.size + workspace.tangent.rows.H.size < KEPT_FLOATS
+    small = workspace.tangent.rows.S.size + workspace.tangent.rows.H.size < KEPT_START_FLOATS
     if small and packed.derived.redundant is None and not packed.derived.start_workspaces:
         packed.derived.start_workspaces.append(workspace)
 
@@ -303,13 +303,13 @@ class _Start:
         demand_finite(scene, Phi, H, velocity)
         demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi", (self.t, q))
         self.velocity = velocity
-        self.far = np.abs(Phi).max(initial=0.0) > ROUNDING * (1.0 + np.abs(q).max())
-        self.fast = np.abs(velocity).max(initial=0.0) > ROUNDING * (1.0 + np.abs(qd).max())
+        self.far = np.abs(Phi).max(initial=0.0) > START_ROUNDING * (1.0 + np.abs(q).max())
+        self.fast = np.abs(velocity).max(initial=0.0) > START_ROUNDING * (1.0 + np.abs(qd).max())
         return NONE if dependent == HOLDS else dependent
 
     def evaluate(self, every=1):
         """As of `evaluate_start`; HOLDS is to rounding."""
-        where, tol = self.workspace.first_parameters, min(ROUNDING, self.tol)
+        where, tol = self.workspace.first_parameters, min(START_ROUNDING, self.tol)
         return evaluate_start(self.context, self.q, self.qd, self.t, self.rates, every, where, tol)
 
     def is_regular(self):
@@ -324,7 +324,7 @@ class _Start:
         if gone.size:
             refuse_vanished(names[row[gone[0]]])
         way = np.random.default_rng(0).normal(size=(len(self.graph.bodies) + 1, 8))
-        way[:, :3] *= max(self.packed.size, LEAST_SIZE)
+        way[:, :3] *= max(self.packed.size, POINT_SIZE)
         way[-1] = way[:, 3] = way[:, 7] = 0.0
         loose = -1
         for share in REDUNDANT_SHARES:

@@ -27,7 +27,7 @@ from ..rows.interface import (
     singularity_indicator,
 )
 from ..workspaces import Parts, no_parts
-from .tolerances import DOUBTFUL_SHARE, IMMOBILE, LEAST_SIZE, ROUNDING
+from .tolerances import DOUBTFUL_SHARE, IMMOBILE, POINT_SIZE, START_ROUNDING
 
 # In place of a row that depends on others: there is none; rounding may hide one.
 NONE, DOUBTFUL = -1, -2
@@ -171,18 +171,18 @@ def take_start(context, q, qd, velocity, at, count, t, tol):  # eight: addresses
         return 0
     if (c.graph.axes.rows.shape[0] > 0 or parts.unequal[0] != 0) and _failing_row(c, x, t) >= 0:
         return 0
-    if _hold(f.b, rates, f.rows.H, x, xd, at, min(ROUNDING, tol)) == 1:
+    if _hold(f.b, rates, f.rows.H, x, xd, at, min(START_ROUNDING, tol)) == 1:
         return PLAIN
     far, fast = _residuals(c, rates, x, xd, at)
     whole, rate = 1.0 + largest(x), 1.0 + largest(xd)
     if not (far <= tol * whole and fast <= tol * rate and is_finite(f.rows.H)):
         return 0
-    if far > ROUNDING * whole:
+    if far > START_ROUNDING * whole:
         for i in at:
             length = math.sqrt(x[i] * x[i] + x[i + 1] * x[i + 1] + x[i + 2] * x[i + 2] + x[i + 3] * x[i + 3])
             for j in range(i, i + 4):
                 x[j] /= length
-    elif fast <= ROUNDING * rate:
+    elif fast <= START_ROUNDING * rate:
         return PLAIN
     copy(x, w.q)
     copy(xd, w.qd)
@@ -204,7 +204,7 @@ def _set_floor(control, q, at):
             far = max(far, abs(q[i]) * scale if turns else abs(q[i]))
             if turns and i == at[last] + 3:
                 last += 1
-    control.floor = ROUNDING * (control.size + far)
+    control.floor = START_ROUNDING * (control.size + far)
 
 
 @kernel
@@ -252,7 +252,7 @@ def go_near_by(context, t, way, far):
 @kernel
 def _farthest(c):
     """Return the largest entry of Z: rotations, and displacements as shares of the scene's size."""
-    Z, part, found = c.tangent.Z, 1.0 / max(c.work.control.size, LEAST_SIZE), 0.0
+    Z, part, found = c.tangent.Z, 1.0 / max(c.work.control.size, POINT_SIZE), 0.0
     for b in range(c.graph.bodies.shape[0]):
         for i in range(3):
             found = max(found, max(abs(Z[8 * b + i]) * part, abs(Z[8 * b + 4 + i])))

@@ -6,7 +6,7 @@ Shares are without unit; q has m and Euler parameters side by side, so residuals
 # --- residuals ---
 # A start whose residuals are below this share of 1 + max |q| is taken as it is: one rounding of q, so projection would
 # only exchange one rounding for another.
-ROUNDING = 2e-16
+START_ROUNDING = 2e-16
 # The same of a residual that Gauss-Newton steps have left: their sums round several times.
 CLOSED = 1e-15
 # Residuals of configurations that are asked for their mobility: looser than a start's, since positions may be typed.
@@ -33,7 +33,7 @@ SHORTENING, SHORTEST_LEG = 0.25, 1e-3
 # Share of a direction that remains after projection onto the tangent space: less is rounding, and nothing can move.
 IMMOBILE = 1e-9
 # m; the size of a scene whose points coincide.
-LEAST_SIZE = 1e-3
+POINT_SIZE = 1e-3
 # Entries of Phi_q (8 bytes each): up to the first, dependent rows are listed with their partners; up to the second,
 # rows are selected by dense QR where blocks fail.
 LISTED_ENTRIES, DENSE_ENTRIES = 1 << 20, 1 << 23
@@ -64,37 +64,37 @@ DENSE = 200
 # (softness of the constraints' springs, steps at most) from stage to stage; the last is stiff enough for Gauss-Newton.
 STAGES = ((1.0, 4), (0.3, 4), (0.1, 4), (0.03, 4), (0.01, 4), (1e-3, 5), (1e-4, 5), (1e-6, 5), (1e-8, 40))
 # A sketch that is off by less (share of the scene's reach) takes the last stage only.
-NEAR = 0.02
+NEAR_SKETCH = 0.02
 # rad; the largest rotation of a step, and of one along the constraints.
-MOST_TURN, MOST_SLIDE = 0.5, 0.2
+MOST_ROTATION, MOST_SLIDE = 0.5, 0.2
 # Steps at most: of Gauss-Newton, and of the descent along the constraints.
 MOST_CLOSING, MOST_SETTLING = 60, 60
 # Length of a step, as a share of the wish, at which a stage has converged: the last one, and those before it. Springs
 # of softness 1e-8 round steps to 1e-8 of it and more; Gauss-Newton steps and the descent go on from there.
-CONVERGED, PASSED = 1e-6, 0.03
+LAST_CONVERGED, STAGE_CONVERGED = 1e-6, 0.03
 # What is left of the slope, as a share of the distance, when the descent ends; and the least decrease of a step.
 SETTLED, DECREASE = 1e-11, 0.9
 # Residual, as a share of the largest, above which a row whose derivative vanishes is named.
 STUCK = 1e-6
 # Shares of the scene's size, and rad, by which a sketch is shaken where the way from it ends elsewhere; two for scenes
-# of more coordinates than MANY.
-SHAKES, MANY = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0), 200
+# of more coordinates than MANY_COORDINATES.
+SHAKES, MANY_COORDINATES = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0), 200
 # Softness of the springs that keep a fold, from try to try.
 STIFFER = (0.1, 0.01, 0.001)
 
 # --- loops, conflicts, mobility, plug-ins ---
 # rad; an angle of a fold that is drawn deliberately, and one that is reported when it comes out on the other side.
-CLEAR, SHOWN = 0.2, 0.1
+CLEAR_FOLD, SHOWN = 0.2, 0.1
 # rad; rotations of the three directions of a fold, each by at most this, reverse none of SHOWN: sin(0.1) > 3 * 0.025.
 UNFOLDED = SHOWN / 4.0
 # Share of a slide's direction across the axis beside it below which the two make no fold; m, of a link without length.
-FLAT, POINT_LIKE = 0.1, 1e-9
+FLAT_FOLD, POINT_LIKE = 0.1, 1e-9
 # Share of the largest |Phi| below which a row takes no part in a conflict.
 LEFT_OVER = 1e-4
 # Share of the scene's size, and rad: how far away the rank is compared. Singular positions are isolated, and no closer.
 ASIDE = 0.02
 # Relative steps of difference quotients of phi, and their error: a wrong entry is further off by orders of magnitude.
-QUOTIENT_STEPS, QUOTIENT_ERROR = (1e-2, 1e-4, 1e-6), 1e-3
+PHI_STEPS, QUOTIENT_ERROR = (1e-2, 1e-4, 1e-6), 1e-3
 # The least x that such a step is relative to, m.
 LEAST_X = 1e-6
 # A joint in a loop is driven by steps of this, rad, or share of the scene's size; the least share of a step.
@@ -111,7 +111,7 @@ NO_AXIS = 1e-12
 
 # --- memory ---
 # Floats of rows and factors up to which the workspace of a start is kept for the next one (8 MB): a thousand bodies.
-KEPT_FLOATS = 1 << 20
+KEPT_START_FLOATS = 1 << 20
 
 # rad, m and their rates, relative to what a motor prescribes: a joint further away is said to stand elsewhere; initial
 # conditions are as exact (initial_tol).

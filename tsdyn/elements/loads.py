@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 STATE = 13  # position, Euler parameters, velocity, angular velocity
 
 
-class Kernels(dict):
+class FunctionKernels(dict):
     """The callbacks of one kind with one function; pickled as the two."""
 
     def __init__(self, kind, function):
@@ -88,7 +88,7 @@ def kernels_of(kind, function):
     """The kernels of a kind with a user's function; the same ones for the same two, whatever the function's numbers."""
     function = getattr(function, "py_func", function)
     plain = positional(function) if numbers_of(function) else function
-    return compiled_once(kind, plain, partial(Kernels, kind, function))
+    return compiled_once(kind, plain, partial(FunctionKernels, kind, function))
 
 
 BEGIN = COUNT = 0  # where the numbers of a function are in par; filled in, as is the function

@@ -1,7 +1,7 @@
 """Limits of bodies, markers and compiled loops, each with its unit and where it comes from."""
 
 # m: squares of a point's coordinates must be numbers.
-FARTHEST = 1e150
+FARTHEST_POINT = 1e150
 
 # kg, and kg m^2 of the largest moment of inertia: reciprocals must be numbers, and so must products of two of them.
 LEAST_MASS, MOST_MASS = 1e-300, 1e150

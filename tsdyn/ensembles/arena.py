@@ -1,4 +1,4 @@
-"""The arrays that the runs of one thread have in common; which cases can share them. Each case writes its numbers there."""
+"""The arrays that the runs of one thread share, into which each case writes its numbers; which cases can share them."""
 
 from types import SimpleNamespace
 

@@ -16,7 +16,7 @@ from ..model.packed import SMALL, checked_motions, is_small
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..rows.massless_axes import lean_bodies, levers
-from ..rows.tolerances import MASSLESS, THIN, UNEQUAL
+from ..rows.tolerances import MASSLESS, THIN, UNEQUAL_MASSES
 from ..simulation.local_origin import are_within
 from ..simulation.parameters import sketch, with_attributes
 
@@ -501,7 +501,7 @@ class Weights:
             every = [own[others][None], *(column[:, None] for column in varied.values())]
             every = np.hstack([np.broadcast_to(columns, (count, columns.shape[1])) for columns in every])
             if every.size:
-                found |= every.max(axis=1) > UNEQUAL * every.min(axis=1)
+                found |= every.max(axis=1) > UNEQUAL_MASSES * every.min(axis=1)
         return found
 
 

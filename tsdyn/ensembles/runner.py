@@ -23,7 +23,7 @@ from .tolerances import ARENAS
 PLAIN = Status.SUCCESS.sentence
 
 
-class Record(NamedTuple):
+class CaseRecord(NamedTuple):
     """What is known of a case that has been run."""
 
     status: Status
@@ -143,13 +143,13 @@ class Runner:
         return self._arenas[0].run_cases(room, k) if self._arenas else k
 
     def run(self, room, k):
-        """The `Record` of case k of a chunk."""
+        """The `CaseRecord` of case k of a chunk."""
         try:
             return self._run(room, k)
         except TsdynError as error:
-            return Record(Status.CASE_FAILED, str(error), {})
+            return CaseRecord(Status.CASE_FAILED, str(error), {})
         except Exception as error:  # of a user's function: the other cases go on
-            return Record(Status.CASE_FAILED, f"{type(error).__name__}: {error}", {})
+            return CaseRecord(Status.CASE_FAILED, f"{type(error).__name__}: {error}", {})
 
     def _run(self, room, k):
         study = self.study
@@ -200,13 +200,13 @@ class Runner:
         return of_numbers(self.study.scene, family, changes, *found)
 
     def _record(self, changes, arena, task, outcome):
-        """The `Record` of a run in an arena."""
+        """The `CaseRecord` of a run in an arena."""
         study, keep = self.study, self.study.keep
         plain = isinstance(outcome, Finished) or (
             outcome.status is Status.SUCCESS and not (outcome.reason or outcome.end.near_steps or callable(keep))
         )
         if plain and not arena.is_immobile:
-            return Record(Status.SUCCESS, PLAIN, record_of(keep, outcome, study.n, task.times))
+            return CaseRecord(Status.SUCCESS, PLAIN, record_of(keep, outcome, study.n, task.times))
         scene = self._scene(changes)
         scene._packed.derived.redundant = arena.packed.derived.redundant
         solution = Solution(scene, task._replace(prepared=scene._prepared), outcome, {"prepare": 0.0, "run": 0.0})
@@ -220,7 +220,7 @@ class Runner:
         status, message = solution.status, solution.message
         if callable(study.keep):
             arrays |= reduced(study.keep, solution)
-        return Record(status, message, arrays)
+        return CaseRecord(status, message, arrays)
 
 
 def _repeated(value, count):

@@ -17,7 +17,7 @@ from .. import validation
 from .._version import __version__
 from ..errors import Status, StorageError
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
-from ..storage.formats import Column, Table, demand_shapes, demand_writable, format_of, writing
+from ..storage.formats import Column, StoredTable, demand_shapes, demand_writable, format_of, writing
 from ..validation import NO_LINKS, damaged
 from .cases import TIMES
 from .executors import empty, fitted
@@ -235,7 +235,7 @@ def table_of(study, parameters, kept):
         dimensions = tuple(f"axis {i} of {name}" for i in range(np.ndim(array) - 1))
         labels |= {each: [str(i) for i in range(size)] for each, size in zip(dimensions, array.shape[1:], strict=True)}
         columns.append(Column(name, dimensions, _said(name, units)))
-    return Table(CASE, tuple(columns), labels)
+    return StoredTable(CASE, tuple(columns), labels)
 
 
 def _unlinked(path, flags):

@@ -27,10 +27,10 @@ def callee(function, options):
 
 def entry(function, options, around):
     """What compiles a kernel that Python calls; `around` decorates what compiles it."""
-    return Entry(function, options, around)
+    return StockEntry(function, options, around)
 
 
-class Entry:
+class StockEntry:
     """A kernel that Python calls, compiled for the types of the arguments that it is given."""
 
     def __init__(self, function, options, around):

@@ -14,17 +14,17 @@ from .tolerances import (
     DEEPEST,
     EPS,
     EXTREME,
-    FAINT,
-    HOPELESS,
     MOST_SCALED,
-    NEAR,
+    NEAR_ZERO,
     NO_NOISE,
     NOISE_RATIO,
     REAL,
+    ROUGH_SHARE,
     SAFE,
-    SHORTEST,
+    SHORTEST_INTERVAL,
     TIGHT,
-    TINY,
+    UNDERFLOWING,
+    UNRESOLVED,
     WIDEST_NOISE,
 )
 
@@ -34,7 +34,7 @@ FINE = 4  # cells of the fine grid between two nodes
 CHECK = -float(np.cos(0.3 * np.pi))  # far from the nodes of every degree that is a power of two
 
 
-class Table(NamedTuple):
+class ChebyshevTable(NamedTuple):
     """The interpolant of degree N, a power of two, through samples at N + 1 nodes; one more sample checks it."""
 
     nodes: np.ndarray  # (N + 1,)  Chebyshev points of the second kind, increasing; those of N / 2 are every other one
@@ -51,7 +51,7 @@ class Table(NamedTuple):
 
 @cache
 def table(N):
-    """The `Table` of degree N."""
+    """The `ChebyshevTable` of degree N."""
     nodes, fine = (-np.cos(np.pi / k * np.arange(k + 1)) for k in (N, FINE * N))
     nodes[N // 2] = fine[FINE * N // 2] = 0.0
     coefficients = 2.0 / N * chebyshev.chebvander(nodes, N).T
@@ -63,7 +63,7 @@ def table(N):
     known.sort()
     missed = chebyshev.chebvander(CHECK, N).ravel() @ widened
     missed[check] = -1.0
-    return Table(
+    return ChebyshevTable(
         nodes,
         points,
         np.delete(np.arange(N + 2), check),
@@ -105,7 +105,7 @@ class TooFast(Exception):
 
 
 class Fit(NamedTuple):
-    """Samples of a function at the points of a `Table` on [a, b], and the interpolant through them."""
+    """Samples of a function at the points of a `ChebyshevTable` on [a, b], and the interpolant through them."""
 
     a: float
     b: float
@@ -149,10 +149,10 @@ class Search:
 
         Return the degree needed and the value at b. Raises TooFast.
         """
-        self._shortest = max(DEEPEST * (b - a), SHORTEST * max(abs(a), abs(b)))
+        self._shortest = max(DEEPEST * (b - a), SHORTEST_INTERVAL * max(abs(a), abs(b)))
         self._measure_by(SAFE)
         whole = self._fit(a, b, SAFE * value, None, degree)
-        if whole.scale < FAINT:
+        if whole.scale < UNDERFLOWING:
             exponent = -math.frexp(whole.scale)[1] if whole.scale else MOST_SCALED  # denormal numbers times SAFE are 0
             self._measure_by(math.ldexp(SAFE, min(exponent, MOST_SCALED)))
             whole = self._fit(a, b, self._unit * value, None, degree)
@@ -187,7 +187,7 @@ class Search:
             samples[1:-1], samples[-1] = self._values(times[1:-1]), last
         while True:
             fit = self._judged(a, b, degree, times, samples)
-            hopeless = degree == LARGEST or (degree == LARGEST // 2 and fit.off > HOPELESS * fit.scale)
+            hopeless = degree == LARGEST or (degree == LARGEST // 2 and fit.off > UNRESOLVED * fit.scale)
             if fit.resolved or hopeless or fit.off != fit.off:
                 return fit
             degree *= 2
@@ -206,8 +206,8 @@ class Search:
 
     def _rounding(self, fit):
         """Return the rounding error of the values: high coefficients where a smooth function has none."""
-        t, least = fit.a + 0.382 * (fit.b - fit.a), SHORTEST * max(abs(fit.a), abs(fit.b))
-        half, found = max(TINY * (fit.b - fit.a), least), np.inf
+        t, least = fit.a + 0.382 * (fit.b - fit.a), SHORTEST_INTERVAL * max(abs(fit.a), abs(fit.b))
+        half, found = max(ROUGH_SHARE * (fit.b - fit.a), least), np.inf
         while half < WIDEST_NOISE * (fit.b - fit.a):
             rough = table(8).coefficients[5:] @ self._values(t + half * table(8).nodes)
             found = min(found, 10.0 * float(np.abs(rough).max()))
@@ -236,7 +236,7 @@ class Search:
         if fit.scale <= self.noise:
             return
         found = dict(zip(fit.times.tolist(), fit.samples.tolist(), strict=True))
-        if fit.clear <= NEAR * fit.scale:
+        if fit.clear <= NEAR_ZERO * fit.scale:
             grid = fit.a + 0.5 * (fit.b - fit.a) * (table(fit.degree).fine + 1.0)
             grid[-1] = fit.b
             for i, j in self._spans(fit):
@@ -250,7 +250,7 @@ class Search:
         fine[::FINE] = fit.samples[table(fit.degree).at_nodes]
         size, sign = np.abs(fine), np.sign(fine)
         least = (size[1:-1] <= np.minimum(size[:-2], size[2:])) & (sign[:-2] == sign[2:])
-        yield from ((i, i + 2) for i in np.flatnonzero(least & (size[1:-1] <= NEAR * fit.scale)).tolist())
+        yield from ((i, i + 2) for i in np.flatnonzero(least & (size[1:-1] <= NEAR_ZERO * fit.scale)).tolist())
         runs = (np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist()
         yield from ((i - 1, j) for i, j in pairwise(runs) if -(-i // FINE) * FINE >= j)  # without a node
         yield from ((i, i + 1) for i, end in ((0, 0), (last - 1, last)) if size[end] <= AT_ZERO * fit.scale)

@@ -21,21 +21,21 @@ LONG_SOLVE = 1 << 21
 
 # --- isolation of roots by interpolants at Chebyshev nodes, see root_isolation.py ---
 # Error of an interpolant, as a share of the scale: resolved; and not worth one of twice the degree.
-TIGHT, HOPELESS = 1e-10, 0.05
+TIGHT, UNRESOLVED = 1e-10, 0.05
 # An extreme whose value is nearer to zero (share of the scale) is sampled; one beside an end that is nearer than the
 # second is looked for.
-NEAR, AT_ZERO = 0.01, 1e-6
+NEAR_ZERO, AT_ZERO = 0.01, 1e-6
 # Values that exceed the higher half of the coefficients by this factor exclude a zero.
 CLEAR = 10.0
 # Share of the interval on which roughness is rounding; the least interval, in roundings of the time; the least share of
 # the whole.
-TINY, SHORTEST, DEEPEST = 1e-7, 1e4 * EPS, 2.0**-24
-# Noise is measured on intervals of the share TINY, then this many times as long, up to the second share; less than the
-# third share of the scale is none.
+ROUGH_SHARE, SHORTEST_INTERVAL, DEEPEST = 1e-7, 1e4 * EPS, 2.0**-24
+# Noise is measured on intervals of the share ROUGH_SHARE, then this many times as long, up to the second share; less
+# than the third share of the scale is none.
 NOISE_RATIO, WIDEST_NOISE, NO_NOISE = 1e-3, 1e-3, 1e-12
 # Values are multiplied by a power of two: by SAFE, so that no sum of them is infinite; by one that makes the largest
-# about SAFE where it is below FAINT then, since parts of it would vanish; its exponent is limited.
-SAFE, FAINT, MOST_SCALED = 2.0**-16, 2.0**-500, 1000
+# about SAFE where it is below UNDERFLOWING then, since parts of it would vanish; its exponent is limited.
+SAFE, UNDERFLOWING, MOST_SCALED = 2.0**-16, 2.0**-500, 1000
 # Position of a minimum, as a share of the interval: the root of rounding, twice.
 EXTREME = 1e-9
 # Imaginary part, on the interval -1 to 1, up to which a root of a polynomial is real: double roots split by the root of

@@ -26,6 +26,7 @@ from .explicit import STEP, call_norm, combine
 from .tolerances import (
     COUPLED_ITERATIONS,
     DIVERGING,
+    FAR_STAGE,
     FIXED_ITERATIONS,
     KAPPA,
     KAPPA_COUPLED,
@@ -34,8 +35,7 @@ from .tolerances import (
     SAME_STEP,
     SAME_TIME,
     SLOW_COUPLED,
-    STALLED,
-    TOO_FAR,
+    STALLED_CORRECTION,
     TRUSTED,
 )
 
@@ -218,7 +218,7 @@ def _iterate(context, c, r, own, t, h):
     moved, zeros, adaptive = r.memory[_rest(r) :][:n], r.memory[_rest(r) + n :][:n], r.numbers.adaptive == 1
     # Sizes of corrections are error norms: rounding of 1 + |value| is RESIDUAL_FLOOR / tol
     tol = numbers.rtol + numbers.atol
-    floor, stalled, kappa = RESIDUAL_FLOOR / tol, STALLED / tol, KAPPA_COUPLED if adaptive else KAPPA
+    floor, stalled, kappa = RESIDUAL_FLOOR / tol, STALLED_CORRECTION / tol, KAPPA_COUPLED if adaptive else KAPPA
     for e in range(n):
         moved[e] = zeros[e] = 0.0
     before, theta, rate, renewals, fresh, newest = math.inf, 0.0, 1.0, 0, False, False
@@ -263,7 +263,7 @@ def _iterate(context, c, r, own, t, h):
             own[RENEW] = 1.0 if theta > SLOW_COUPLED else 0.0
             if (
                 adaptive
-                and not call_norm(linear.kernels.distance, context, moved, zeros, linear.now, 1.0, 1.0) < TOO_FAR
+                and not call_norm(linear.kernels.distance, context, moved, zeros, linear.now, 1.0, 1.0) < FAR_STAGE
             ):
                 return STAGE_FAILED
             return 0

@@ -9,7 +9,6 @@ from ..workspaces import load, load_run
 from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combine
 from .tolerances import (
     AGEING,
-    APART,
     APART_AT_LEAST,
     APART_SLIPPING,
     AT_FLOOR,
@@ -17,6 +16,7 @@ from .tolerances import (
     EAGER_LOST,
     EAGER_SPARSE,
     EAGER_STAGES,
+    FAR_STAGE,
     FIXED_ITERATIONS,
     FIXED_TOL,
     FORGET,
@@ -31,10 +31,9 @@ from .tolerances import (
     SAME_G,
     SAME_TIME,
     SLIP_LEFT,
-    SLOW,
+    SLOW_DENSE,
     SLOW_SPARSE,
-    TOO_FAR,
-    WORSE,
+    WORSE_CONTRACTION,
 )
 
 # First guesses of the stages of a step, k_i = vdd, on the polynomial through stages that are known already.
@@ -257,7 +256,7 @@ def _is_near(context, c, g, k, guess, f, dx):
         f[i] = 0.0  # of velocities a stiff transient may change any amount
         dx[i] = g * g * (k[i] - guess[i])
     norm = linear.kernels.distance if _is_direct(c) else linear.kernels.error_norm
-    return call_norm(norm, context, dx, f, linear.now, 1.0, 1.0) < TOO_FAR
+    return call_norm(norm, context, dx, f, linear.now, 1.0, 1.0) < FAR_STAGE
 
 
 @kernel
@@ -291,7 +290,7 @@ def _begin_iteration(c, r):
     one.first, one.trusted, one.renewed, one.poor, one.diverged = 0.0, 1, 0, 0, 0
     one.floor = RESIDUAL_FLOOR / (numbers.rtol + numbers.atol)
     # What stages of fixed steps leave adds up over thousands of steps
-    one.limit = SLOW_SPARSE if numbers.every_chart == 1 and r.numbers.adaptive == 1 else SLOW
+    one.limit = SLOW_SPARSE if numbers.every_chart == 1 and r.numbers.adaptive == 1 else SLOW_DENSE
     one.eager = 1 if numbers.eager > 0 else 0
     numbers.eager -= 1
 
@@ -343,9 +342,9 @@ def _measure(c, size):
     # No other matrix contracts better: that much contraction has to do
     sparse, slips = numbers.every_chart == 1, numbers.slips == 1
     if sparse and not slips and one.poor == MATRICES and numbers.slow == 0.0:
-        numbers.slow = min(WORSE * one.theta, DIVERGING)
+        numbers.slow = min(WORSE_CONTRACTION * one.theta, DIVERGING)
     one.diverged += 1 if one.renewed == 1 and one.theta > DIVERGING else 0
-    return one.diverged < (APART_SLIPPING if slips else APART)
+    return one.diverged < (APART_SLIPPING if slips else DIVERGING)
 
 
 @kernel

@@ -24,8 +24,8 @@ SLIP_LEFT = 1e-13
 # Contraction above which the iteration matrix is rebuilt: up to it three corrections reach KAPPA
 # (docs/design-decisions.md, one Jacobian for many steps; benchmarks/stiff.py counts matrices).
 # The matrix of the tangent form costs as much as eight iterations: kept up to SLOW_SPARSE, a quarter as many matrices
-# take a fifth more iterations in stiff chains and joints than with SLOW.
-SLOW, SLOW_SPARSE = 0.1, 0.25
+# take a fifth more iterations in stiff chains and joints than with SLOW_DENSE.
+SLOW_DENSE, SLOW_SPARSE = 0.1, 0.25
 
 # Contraction assumed where none has been measured, and the least that a measurement is trusted with: with fixed steps
 # what stages leave adds up over thousands of them.
@@ -45,11 +45,11 @@ DIVERGING = 0.9
 # New matrices within one stage, of which the last has new stiffness and damping; diverging iterations, all with a new
 # matrix, with which a stage is given up. Where friction breaks loose, corrections grow from slip velocities of 1e-9 m/s
 # to the velocities of the motion, by the power of three each, before they contract.
-MATRICES, APART, APART_SLIPPING = 3, 3, 8
+MATRICES, DIVERGING, APART_SLIPPING = 3, 3, 8
 
 # Contraction over that of a matrix with new stiffness and damping, above which the matrix is rebuilt in the tangent
 # form: if bodies rotate far within a step, no matrix contracts below SLOW_SPARSE.
-WORSE = 2.0
+WORSE_CONTRACTION = 2.0
 
 # Stages that begin with a matrix of their own after an older one has failed: five steps of SDIRK54. In the tangent form
 # one stage, but one step where iterations diverged: matrices of overdamped springs that turn serve one stage only.
@@ -68,7 +68,7 @@ AT_FLOOR = 100.0
 
 # Distance of a stage's positions from their prediction, relative to 1 + size: a solution further away may be another
 # one of the nonlinear equations.
-TOO_FAR = 0.1
+FAR_STAGE = 0.1
 
 # rtol and atol of the iteration with a fixed step, where no tolerance sets the step. What is left of the stages of
 # thousands of steps adds up: to 1e-10 of a driven pendulum at 1e-12, while a matrix serves across charts.
@@ -80,7 +80,7 @@ FIXED_TOL = 1e-13
 COUPLED_ITERATIONS, KAPPA_COUPLED, SLOW_COUPLED, TRUSTED = 12, 3e-3, 0.1, 0.3
 
 # Corrections that no longer contract, relative to 1 + size: below it they are rounding of large forces.
-STALLED = 2e-12
+STALLED_CORRECTION = 2e-12
 
 # Relative change of the step up to which matrices are kept.
 SAME_STEP = 0.02

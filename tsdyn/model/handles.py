@@ -143,7 +143,7 @@ class Row(NamedTuple):
     first: int  # of its angles among all
 
 
-class Driven(NamedTuple):
+class DrivenCoordinate(NamedTuple):
     """A coordinate of a joint that a motor prescribes."""
 
     motor: Row
@@ -281,7 +281,7 @@ def _driven(motor, joint):
     for i, geometry in enumerate(getattr(joint, kind)):
         same = geometry[:2] == own[:2]
         if same and np.allclose(geometry[2:], own[2:], rtol=SAME_COORDINATE, atol=SAME_COORDINATE):
-            yield Driven(motor, joint, geometry, joint.first + i if kind == "angles" else -1)
+            yield DrivenCoordinate(motor, joint, geometry, joint.first + i if kind == "angles" else -1)
 
 
 def counts(item):

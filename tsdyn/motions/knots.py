@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import InvalidConstraint
 from ..jit.kernels import entry, kernel
-from .tolerances import CLEAR, FAINT, JUMP, LEAST_SPAN, OF_STEP, ROUNDING, SAMPLES, STRIDES, TOGETHER
+from .tolerances import CLEAR_CHANGE, JUMP, LEAST_SPAN, NO_CHANGE, OF_STEP, RATE_ROUNDING, SAMPLES, STRIDES, TOGETHER
 
 # Knots of piecewise motions and loads: stops of a run, and jumps that no run may cross.
 
@@ -39,7 +39,7 @@ def demand_followed(motion, t0, t1, what):
     sides = motion.sides(times)
     largest = np.abs(sides).max(axis=(0, 2))
     piece = np.diff(np.concatenate(([t0], times, [t1])))
-    noise = ROUNDING * largest[0] / np.minimum(piece[1:], piece[:-1])
+    noise = RATE_ROUNDING * largest[0] / np.minimum(piece[1:], piece[:-1])
     jumps = np.abs(sides[1] - sides[0])
     for level, name, allowed in ((0, "value", 0.0), (1, "rate", noise)):
         excess = jumps[level] - (JUMP * largest[level] + allowed)
@@ -142,7 +142,7 @@ def is_noise(samples):
     """Whether most differences of samples within a step are as large as what they vary by."""
     with np.errstate(all="ignore"):
         varies = np.ptp(samples)
-        return bool(FAINT * np.abs(samples).max() < varies < np.median(np.abs(np.diff(samples, ORDER))))
+        return bool(NO_CHANGE * np.abs(samples).max() < varies < np.median(np.abs(np.diff(samples, ORDER))))
 
 
 @kernel
@@ -179,7 +179,7 @@ def mark_changes(values, strides, d, marks):
                 first = -1
             if i >= count:
                 continue
-            limit = CLEAR * _before(d, i, s == 1) + FAINT
+            limit = CLEAR_CHANGE * _before(d, i, s == 1) + NO_CHANGE
             if d[i] > limit:
                 least = least if i <= until else limit
                 until, quiet = i + REACH, False

@@ -6,7 +6,7 @@ TOGETHER, LEAST_SPAN = 1e-14, 1e-3
 # Of the largest value or rate at a knot: smaller differences between its sides are rounding of data.
 JUMP = 1e-9
 # Of the largest value, over the shortest piece at a knot, s: the rounding error of a rate.
-ROUNDING = 1e-12
+RATE_ROUNDING = 1e-12
 
 # Derivatives given as functions are compared with quotients over these shares of the run's length (at most 1 s each),
 # four points each; of the largest value, the noise that a function may have; of both sizes, an error that is no slip.
@@ -30,7 +30,7 @@ SAMPLES, STRIDES = 2048, (1, 4, 16, 64)
 # Ratio of a sixth difference of samples to those before it, above which there is a change: beside a double zero
 # differences grow by 20 within nine samples, at a pulse on a sine of 26 samples a period by 1e5. Share of the largest
 # value, below which a change is none.
-CLEAR, FAINT = 100.0, 1e-9
+CLEAR_CHANGE, NO_CHANGE = 100.0, 1e-9
 # Degree up to which a polynomial of the state is seen by the stages of a step; x^40 is a wall.
 PLAIN_DEGREE = 8
 # Intervals of a step at which a function is sampled for noise.

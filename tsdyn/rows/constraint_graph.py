@@ -6,9 +6,9 @@ import numpy as np
 
 from ..jit.kernels import Record, records
 from ..model.packed import FrictionPlace
-from .massless_axes import AXIS_OWN, Axes, levers, no_axes
+from .massless_axes import AXIS_OWN, MasslessAxes, levers, no_axes
 from .symbolic import Pattern, analyse
-from .tolerances import LEAST_ARM, UNEQUAL
+from .tolerances import LEAST_ARM, UNEQUAL_MASSES
 
 # The constraint graph of a scene for the basis-free forms: rows, bodies, and the addresses of their products.
 #
@@ -84,7 +84,7 @@ class ConstraintGraph(NamedTuple):
     frictions: np.ndarray  # (frictions,) of FrictionPlace: those that follow from reactions
     friction_rows: np.ndarray  # int64 (rows of their joints, 2): which row, and on which side its reaction is taken
     friction_solver: np.ndarray  # int64 (1,): address of what solves for them, as the form needs it
-    axes: Axes  # rows of bodies with next to no inertia about an axis
+    axes: MasslessAxes  # rows of bodies with next to no inertia about an axis
 
 
 def no_graph():
@@ -137,7 +137,7 @@ def by_lengths(packed, graph):
 def are_unequal(system):
     """Whether heavy bodies may load light ones: the factors of S, and accelerations, lose digits to their ratio."""
     largest = np.abs(system.inertia).max(axis=1)  # zero for a point mass
-    return any(x.max() > UNEQUAL * x.min() for x in (system.mass, largest[largest > 0.0]) if x.size)
+    return any(x.max() > UNEQUAL_MASSES * x.min() for x in (system.mass, largest[largest > 0.0]) if x.size)
 
 
 def mass_ratio(packed, least=0.0):

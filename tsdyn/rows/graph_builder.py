@@ -40,7 +40,7 @@ from .tolerances import FAN, LARGEST, LEAF
 # in the graph meet at neighbouring parts.
 
 
-class Part(NamedTuple):
+class SplitPart(NamedTuple):
     """A part of a hub."""
 
     body: int
@@ -113,7 +113,7 @@ def _tree(hub, nodes, sizes, degrees):
     parts, below = [], []
     # Every level carries the same share of the mass
     for count in levels:
-        level = [Part(hub, float(len(levels) * count), [] if below else leaves[i], []) for i in range(count)]
+        level = [SplitPart(hub, float(len(levels) * count), [] if below else leaves[i], []) for i in range(count)]
         for i, part in enumerate(below):
             weld, above = len(sizes), level[i * count // len(below)]
             sizes.append(degrees)

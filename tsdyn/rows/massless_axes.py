@@ -42,7 +42,7 @@ class AxisProduct(Record):
 AXIS_H, AXIS_Y, AXIS_OWN, AXIS_WIDTH = 0, 4, 8, 12
 
 
-class Axes(NamedTuple):
+class MasslessAxes(NamedTuple):
     """The axis rows of a graph."""
 
     rows: np.ndarray  # Axis (axes,)
@@ -131,8 +131,8 @@ class Share(NamedTuple):
 
 
 def no_axes():
-    """The `Axes` of a graph without lean bodies."""
-    return Axes(records(Axis), np.zeros((0, AXIS_WIDTH)), records(AxisProduct), np.zeros(0))
+    """The `MasslessAxes` of a graph without lean bodies."""
+    return MasslessAxes(records(Axis), np.zeros((0, AXIS_WIDTH)), records(AxisProduct), np.zeros(0))
 
 
 def axis_of(axes, row):
@@ -143,7 +143,7 @@ def axis_of(axes, row):
 
 
 def axes_of(shares, lean, joints, inside, starts, where):
-    """The `Axes` of these shares.
+    """The `MasslessAxes` of these shares.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def axes_of(shares, lean, joints, inside, starts, where):
                 for r in range(3):
                     products.append((k, -1 - r, target + (3 + r) * stride + a))
                     scales.append(sign * share.scale)
-    return Axes(
+    return MasslessAxes(
         records(Axis, rows),
         np.array(values, float).reshape(-1, AXIS_WIDTH),
         records(AxisProduct, products),

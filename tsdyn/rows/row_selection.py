@@ -25,12 +25,12 @@ from .schur_complement import (
     weigh_rows,
 )
 from .tolerances import (
-    FAINT,
     FEWER,
     FIRST_SHARE,
     HARDLY_CONDITIONED,
     HELD,
     ILL_CONDITIONED,
+    LEAST_TERM,
     NEAR,
     NEXT_TO,
     NO_RATE,
@@ -304,7 +304,7 @@ def has_redundant_rows(f):
 @kernel
 def redundant_rows_hold(graph, f, floor):
     """Return True if the redundant rows hold on the manifold, by the residuals of the last evaluation."""
-    return f.dropped[0] == 0 or f.selection.excess <= floor + HELD * FAINT * _extent(graph, f)
+    return f.dropped[0] == 0 or f.selection.excess <= floor + HELD * LEAST_TERM * _extent(graph, f)
 
 
 @kernel
@@ -403,7 +403,7 @@ def _hold(graph, f, known, q, rates, most, fastest):
             # H_r rd
             k = graph.bodies[b, 0]
             residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
-            terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + FAINT * most * length(H, at)
+            terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + LEAST_TERM * most * length(H, at)
             if graph.bodies[b, 1] == 7:
                 # H_pi' omega'
                 e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
@@ -413,7 +413,7 @@ def _hold(graph, f, known, q, rates, most, fastest):
                 z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
                 residual += 2.0 * (H[at + 4] * x + H[at + 5] * y + H[at + 6] * z)
                 spin = 2.0 * math.sqrt(d0 * d0 + square(rates, k + 4))
-                terms += length(H, at + 4) * (spin + FAINT * fastest)
+                terms += length(H, at + 4) * (spin + LEAST_TERM * fastest)
         if not abs(residual) <= HELD * terms:
             return False
     return True

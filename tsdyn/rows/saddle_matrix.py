@@ -175,7 +175,7 @@ class Block(Record):
     place: int
 
 
-class Instance(Record):
+class SaddleInstance(Record):
     """A force or a constraint, its two bodies and the blocks that it adds to."""
 
     loop: int  # address of forces.jacobian, or of constraint_hessians.loop
@@ -224,7 +224,7 @@ class SaddleGraph(NamedTuple):
 
 def no_saddle():
     """The `SaddleGraph` of nothing, for its type."""
-    none, blocks, instances = np.zeros(0, np.int64), records(Block), records(Instance)
+    none, blocks, instances = np.zeros(0, np.int64), records(Block), records(SaddleInstance)
     sides, axes = np.zeros((0, 0, 0), np.int64), records(LeanAxis)
     return SaddleGraph(analyse([], [])[1], blocks, instances, instances, none, none, sides, none, axes)
 
@@ -282,7 +282,7 @@ class _Builder:
         return int(own[AT]), int(own[AT + 1]), int(own[DIMENSION]), int(own[DIMENSION + 1])
 
     def _forces(self):
-        """Of every force its bodies and what its `Instance` begins with."""
+        """Of every force its bodies and what its `SaddleInstance` begins with."""
         found = []
         for kind in self.system.forces:
             size = kept_size(members_of(kind, self.packed.loads)[0].force.markers)
@@ -341,9 +341,9 @@ class _Builder:
                         target, stride, transposed = self.where(node, int(b))
                         sides[e, k] = (target + r, stride) if transposed else (target + r * stride, 1)
         return SaddleGraph(
-            with_kernels(self.pattern, unsymmetric=True), records(Block, self.blocks), records(Instance, self.forces),
-            records(Instance, self.constraints), self.starts[: self.nb].copy(), row_at, sides, diagonal,
-            records(LeanAxis, self._axes()),
+            with_kernels(self.pattern, unsymmetric=True), records(Block, self.blocks),
+            records(SaddleInstance, self.forces), records(SaddleInstance, self.constraints),
+            self.starts[: self.nb].copy(), row_at, sides, diagonal, records(LeanAxis, self._axes()),
         )  # fmt: skip
 
     def _axes(self):

@@ -27,7 +27,7 @@ WORSE = 0.1
 # count the terms of a rotation as less than half.
 HELD = 2e-10
 # Terms of a row count as at least this fraction of the largest in the scene: smaller ones are themselves rounding.
-FAINT = 1e-3
+LEAST_TERM = 1e-3
 # Velocities of a scene at rest over those of a fall through its extent under its loads; rates over that extent (1/s, or
 # 1/s^2 for accelerations): smaller ones are rounding.
 RESTING, NO_RATE = 1e-9, 1e-20
@@ -72,7 +72,7 @@ LOOKUP = 1.1  # cost of one block over that of its parts up to which they are me
 LEAST_ARM = 1e-3
 # Ratio of masses, or of the largest inertias of bodies, above which factors of S lose as many digits: the start is
 # looked at once more, and multipliers of series are refined.
-UNEQUAL = 1e4
+UNEQUAL_MASSES = 1e4
 # The same ratio, above which masses are named as the reason where a run can't begin, or ends singular: half of the
 # digits are lost.
 TOO_UNEQUAL = 1e8

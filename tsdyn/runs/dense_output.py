@@ -319,7 +319,7 @@ def record_step(context, run, c, r, log, t0, t1):
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class TrajectoryReading:
     """How the steps of runs are read: what a `Reader` is made of, in the process of the run."""
 
     read: object  # the kernel; arguments as of dense_output.read
@@ -374,7 +374,7 @@ class Reader:
 # What a run with dense output leaves to its solution: the blocks of its steps, read at any time.
 
 
-class Pieces:
+class StepPieces:
     """The trajectories of a run's parts, one after the other, as one `Trajectory`."""
 
     def __init__(self, parts):
@@ -414,7 +414,7 @@ class Trajectory:
     Parameters
     ----------
     readings : tuple
-        The `Reading` of this process; a function and its arguments, which make it in another one.
+        The `TrajectoryReading` of this process; a function and its arguments, which make it in another one.
     records : tuple of ndarray
         Blocks (steps, ...), charts (charts, 5), and q0 of each chart (charts, n).
     start : float, s
@@ -437,7 +437,7 @@ class Trajectory:
 
     @property
     def reading(self):
-        """The `Reading`; made anew in another process than the run's."""
+        """The `TrajectoryReading`; made anew in another process than the run's."""
         if self._reading is None:
             make, *arguments = self.again
             self._reading = make(*arguments)

@@ -25,7 +25,7 @@ from .dense_output import Trajectory
 from .events import Watch
 from .run_log import CHART_ROOM, NO_ROWS, RecordedEnd, Recorder, RunLog, left_open
 from .task import Outcome
-from .tolerances import GETTING_ON, HOPELESS, MOST_INSTANTS, NOISY, PACED, SAME_INSTANT, SLICE_SECONDS, TRIES
+from .tolerances import GETTING_ON, HOPELESS_STEPS, MOST_INSTANTS, NOISY, PACED, SAME_INSTANT, SLICE_SECONDS, TRIES
 
 # A run in slices: the compiled driver is called again and again, with room for the records of each slice.
 #
@@ -67,7 +67,7 @@ class Pace:
         # s of motion a step
         before, now = self.before, (t - self.t) / self.tries
         self.t, self.tries, self.before = t, 0, now
-        if now > 0.0 and (end - t <= HOPELESS * now or now > GETTING_ON * before):
+        if now > 0.0 and (end - t <= HOPELESS_STEPS * now or now > GETTING_ON * before):
             return SLICE_DONE, ""
         left = f"{(end - t) / now:.0e} more" if now > 0.0 else "infinitely many more"
         return Status.STEP_COLLAPSED, (

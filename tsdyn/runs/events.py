@@ -28,20 +28,20 @@ class Event(NamedTuple):
     direction: float  # of the changes that count; 0 for both
 
     def value(self, t, instant):
-        """The function's value; raises `Failed`."""
+        """The function's value; raises `EventFailed`."""
         try:
             given = self.function(t, instant)
         except Exception as error:
-            raise Failed(
+            raise EventFailed(
                 f"{self.name} raised {type(error).__name__} at t = {t:.9g} s: {str(error).rstrip('.')}.", t
             ) from error
         value = number(given)
         if not math.isfinite(value):
-            raise Failed(f"{self.name} must return a finite number; at t = {t:.9g} s it gave {given!r}.", t)
+            raise EventFailed(f"{self.name} must return a finite number; at t = {t:.9g} s it gave {given!r}.", t)
         return value
 
 
-class Failed(Exception):
+class EventFailed(Exception):
     """An event function raised, or gave no finite number; t is when, s."""
 
     def __init__(self, message, t):
@@ -74,7 +74,7 @@ def prepare(events):
     return found
 
 
-class Instant(Exerting, Kinematics):
+class EventInstant(Exerting, Kinematics):
     """What an event function is given: a `State`, with multipliers made when asked for.
 
     Parameters
@@ -152,7 +152,7 @@ class Inside:
         """The state (3, n) at t."""
         (state,) = self.states(np.array([t]))
         if state is None:
-            raise Failed(f"there is no state at t = {t:.9g} s to evaluate events at.", t)
+            raise EventFailed(f"there is no state at t = {t:.9g} s to evaluate events at.", t)
         return state
 
 
@@ -199,7 +199,7 @@ class Watch:
         self.start = self.t = start
         self.state = self.memory = None  # at t, and what is remembered of it: joints' angles, and what forces do
         self.angles = handles_of(packed).count
-        self.beside = None  # the start of the present step, for `Instant`
+        self.beside = None  # the start of the present step, for `EventInstant`
         self.tracks = None
         self.list = [[] for _ in events]
         rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
@@ -231,7 +231,7 @@ class Watch:
             if self.tracks is None:
                 try:
                     self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
-                except Failed as failure:
+                except EventFailed as failure:
                     raise InvalidArgument(f"events: {failure}") from failure.__cause__
         stiff = run.numbers.stiff
         # One step at a time, searched before the next one
@@ -241,7 +241,7 @@ class Watch:
             if run.numbers.steps > done:
                 try:
                     last = self._search_step(run, log)
-                except Failed as failure:
+                except EventFailed as failure:
                     return Status.EVENT_FAILED, str(failure)
                 if last is not None:
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
@@ -283,7 +283,7 @@ class Watch:
         self.beside = self.t, self.state, self.memory[: self.angles]
 
     def _instant(self, t, state):
-        return Instant(self.packed, self.memory[self.angles :], self.beside, t, state)
+        return EventInstant(self.packed, self.memory[self.angles :], self.beside, t, state)
 
     def _value(self, i, t, state):
         return self.events[i].value(t, self._instant(t, state))
@@ -309,7 +309,7 @@ class Watch:
             try:
                 # Events among them
                 mine = self._walk(i, step, points)
-            except Failed as failed:
+            except EventFailed as failed:
                 mine, failure, end = [], failed, min(end, failed.t)
             found += mine
             # The run ends with the event that reaches its limit
@@ -332,7 +332,7 @@ class Watch:
         return None
 
     def _points(self, i, step, end):
-        """Times up to `end`, and values of event i, between which its sign changes once at most; what `Failed`."""
+        """Times up to `end`, and values of event i, between which its sign changes once at most; what `EventFailed`."""
         track, good, failure = self.tracks[i], [step.t0], None
 
         def sample(times):
@@ -351,10 +351,10 @@ class Watch:
                 track.degree, track.end = search.run(step.t0, track.value, end, degree)
                 track.noise = search.noise
                 return search.points, failure
-            except Failed as failed:
+            except EventFailed as failed:
                 failure, end = failed, max(t for t in good if t < failed.t)
             except TooFast:
-                return [(step.t0, track.value)], Failed(
+                return [(step.t0, track.value)], EventFailed(
                     f"{self.events[i].name} changes too fast to be followed: {search.spent} values between "
                     f"t = {step.t0:.9g} and {end:.9g} s were not enough. Give a max_step, or a smoother function.",
                     step.t0,
@@ -407,7 +407,7 @@ class Watch:
             state, value = step.at(t), self._at(i, step, t)
             size = SHAKEN * np.abs(state).max(axis=1, keepdims=True)
             shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
-        except Failed:
+        except EventFailed:
             return 0.0
         return NOISE * max(abs(each - value) for each in shaken)
 

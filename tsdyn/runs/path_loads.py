@@ -19,7 +19,7 @@ from ..methods.interpolants import quintic
 from ..model.equations import set_time
 from ..motions.tolerances import SAMPLES
 from ..workspaces import load, load_run
-from .tolerances import DISTINCT, IMPLICIT_PLACES, NOISE_OF_LOADS, PLACES
+from .tolerances import DISTINCT, IMPLICIT_PLACES, LEAST_PLACES, NOISE_OF_LOADS
 
 WATCH = "ppdd"
 ORDER = 8  # of the differences
@@ -106,7 +106,7 @@ def watch(context, run, t1, h):
         k += c.system.bodies[r.loaded[i], 1]
     f, d, weights = stack(ROOM), r.path[: 6 * k], r.path[6 * k : 7 * k]
     tol = r.clock.atol + r.clock.rtol * _gather(c.system, r, c.work.q, c.work.qd, c.work.qdd, d, weights)
-    places = min(max(IMPLICIT_PLACES if r.numbers.stage_at > 0 else PLACES, math.ceil(density)), ROOM - 1)
+    places = min(max(IMPLICIT_PLACES if r.numbers.stage_at > 0 else LEAST_PLACES, math.ceil(density)), ROOM - 1)
     noise = max(NOISE_OF_LOADS, r.clock.atol + r.clock.rtol)
     noise *= _sample(c.system, r, h, t1 - h, places, d, weights, f)
     set_time(c.system, t1)

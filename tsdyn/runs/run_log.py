@@ -10,14 +10,14 @@ import numpy as np
 from ..jit.kernels import Record, kernel
 from ..motions.tracing import LENGTH
 from ..validation import EXACT, damaged, demand, is_count
-from ..workspaces import STORED, Clock, Control, Counters, Kernels, Numbers
+from ..workspaces import STORED, Clock, Control, Counters, RunKernels, RunNumbers
 from .tolerances import TRIES
 
 # The log of a run: what is asked of it, and rows of what it records.
 
 
 class RunLog(NamedTuple):
-    """Arrays of a run's own, unlike those of `Run`: room for a slice of it."""
+    """Arrays of a run's own, unlike those of `RunState`: room for a slice of it."""
 
     t_eval: np.ndarray  # output times, or empty: every step
     stops: np.ndarray  # (stops, 3)  times at which a step ends, increasing, as of `motions.knots.stops_of`
@@ -233,7 +233,7 @@ class Counts(Mapping):
 
 # The state of a run between two slices: what a run that goes on begins with, to the bit.
 #
-# All that kernels see is in the context and in the `Run` of a memory: arrays and records. What follows from the scene
+# All that kernels see is in the context and in the `RunState` of a memory: arrays and records. What follows from the scene
 # and the method (tables, programs, addresses, places in memory) is laid out anew by the process that goes on; all else
 # is saved. What comes from a file is checked before kernels see it: shapes, and each number that is a place or a count.
 
@@ -243,7 +243,7 @@ LAID_OUT = (  # fields that follow from scene and method, or are filled in befor
 )  # fmt: skip
 OWN = {  # numbers of records, likewise
     "Orders": ("top", "room", "lowest", "highest", "refined", "sweeps"),
-    "Numbers": (
+    "RunNumbers": (
         "first_order", "adaptive", "steps_wanted", "chart_interval", "dense", "last_stage", "stage_at", "rows",
         "history", "blocks",
     ),
@@ -269,7 +269,7 @@ def saved(memory):
 
 
 def restore(memory, arrays, limits):
-    """Write them back; limits: of numbers of the `Run`, by name.
+    """Write them back; limits: of numbers of the `RunState`, by name.
 
     Raises
     ------
@@ -332,7 +332,7 @@ def _parts(name, value):
 # What a run leaves at its end: the last state, its counts and its histories.
 
 NUMBERS, COUNTERS = ctypes.sizeof(Clock), ctypes.sizeof(Control)  # bytes before them, as `Memory` lays them out
-NOW = sum(map(ctypes.sizeof, (Clock, Numbers, Kernels))) // 8  # numbers before q
+NOW = sum(map(ctypes.sizeof, (Clock, RunNumbers, RunKernels))) // 8  # numbers before q
 
 
 class RunEnd(NamedTuple):
@@ -410,7 +410,7 @@ class RecordedEnd:
         return Counts(self._numbers(), counters, clock.largest_landing, self._layout.skipped, self._layout.has_forces)
 
     def _numbers(self):
-        return Numbers.from_buffer(self._run, NUMBERS)
+        return RunNumbers.from_buffer(self._run, NUMBERS)
 
 
 def _logged(rows):

@@ -135,7 +135,7 @@ class Memory:
     graph : ConstraintGraph
         Of the scene, as the form needs it.
     context : Context or SeriesContext
-    run : Run
+    run : RunState
     """
 
     reason = ""  # of the end of a run, beyond its status

@@ -9,7 +9,7 @@ from ..model.packed import System
 from ..rows.interface import redundancy
 from ..rows.saddle_matrix import saddle_of
 from ..workspaces import Context, allocate, allocate_linear, basis_free_parts, divided, lay_out, words
-from .dense_output import Reading, read, warm_size
+from .dense_output import TrajectoryReading, read, warm_size
 from .path_loads import watch
 from .run_memory import Memory
 from .stepper import advance
@@ -169,7 +169,7 @@ def _reading(packed, form, constraint_tol, kernels):
         _set(run.kernels, kernels)
         return Context(own, work, allocate_linear(own, n, m, False), *parts), run
 
-    return Reading(read, workspace, system, shift=1, degree=8)
+    return TrajectoryReading(read, workspace, system, shift=1, degree=8)
 
 
 def kernels_of(method, form, step, interpolant, adaptive, within):

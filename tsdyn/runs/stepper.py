@@ -47,8 +47,8 @@ from .tolerances import (
     SHRINK,
     SLIDES,
     SLIVER,
-    TOO_FAR,
     TURN_GAIN,
+    TURNED_TOO_FAR,
 )
 
 # Rotation limit of a step in driven scenes.
@@ -87,7 +87,7 @@ def too_far(bodies, now, qd, h):
             for c in range(bodies[b, 0] + 3, bodies[b, 0] + 7):
                 one += now[1, c] * now[1, c]
                 other += qd[c] * qd[c]
-            if (math.sqrt(one) + math.sqrt(other)) * h > TOO_FAR:
+            if (math.sqrt(one) + math.sqrt(other)) * h > TURNED_TOO_FAR:
                 return True
     return False
 
@@ -495,7 +495,7 @@ def _finish(context, run, c, r, log, t0, last, reason):
 def advance(context, run, log, most):
     """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or the reason to stop.
 
-    context and run are the addresses of a `Context` and a `Run`, log is a `RunLog`. The first call, but one with
+    context and run are the addresses of a `Context` and a `RunState`, log is a `RunLog`. The first call, but one with
     most = 0, begins the run; with most = -1 it does no more.
     """
     c, r = load(context), load_run(run)

@@ -32,10 +32,10 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 PI_ERROR, PI_BEFORE = 0.7, 0.4
 
 # Loads along a step (path_loads.py). DISTINCT: a difference over the time between samples, as a velocity over the
-# tolerance: a bump at one sample makes 70 times its impulse. PLACES: intervals of a step at least; differences of a
+# tolerance: a bump at one sample makes 70 times its impulse. LEAST_PLACES: intervals of a step; differences of a
 # cosine in a step of one radian are 1e-9 then, and with IMPLICIT_PLACES in one of three radians, as at order 13, 1e-8.
 # NOISE_OF_LOADS: rounding of differences, relative to the load.
-DISTINCT, PLACES, IMPLICIT_PLACES, NOISE_OF_LOADS = 100.0, 8, 16, 1e-13
+DISTINCT, LEAST_PLACES, IMPLICIT_PLACES, NOISE_OF_LOADS = 100.0, 8, 16, 1e-13
 
 # Ratio of steps within which an implicit method goes on with the same step, and so with the same matrix: chains make
 # 0.04 to 0.5 matrices a step, not 0.5 to 0.8, and as many steps. A longer one only, as in Solving ODEs II, IV.8, takes
@@ -81,7 +81,7 @@ HARDLY_TURNED = 0.1
 # rad in a step, from speeds and accelerations at its start: a sine is sampled six times a turn.
 MOST_TURN = 1.0
 # rad, from the speeds at both ends, from which a step is rejected: short of half a turn, which reads as one backwards.
-TOO_FAR = 2.5
+TURNED_TOO_FAR = 2.5
 # Growth of the part of MOST_TURN that is tried, from step to step, after a chart has failed at all of it.
 TURN_GAIN = 1.05
 
@@ -111,8 +111,8 @@ LONG_STEPS = 1 << 13
 # Numbers that are set to zero at once, so that Ctrl-C is answered: new memory takes up to 1 ns a byte.
 PIECE = 1 << 22
 
-# Steps over which the progress of a run is measured; a run that needs HOPELESS more would take days.
-PACED, HOPELESS = 1000, 1e10
+# Steps over which the progress of a run is measured; a run that needs HOPELESS_STEPS more would take days.
+PACED, HOPELESS_STEPS = 1000, 1e10
 
 # Functions are checked for noise if a run needs more steps than this at the present length: a second or more.
 NOISY = 1e6

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 
 from ..elements.bodies import Ground
-from ..elements.loads import Kernels
+from ..elements.loads import FunctionKernels
 from ..elements.markers import POINT
 from ..formulations.tolerances import ROUNDING
 from ..jit.code_hash import is_ours
 from ..model.packed import Derived, classes, size_of
 from ..rows.massless_axes import levers
-from ..runs.events import Instant
+from ..runs.events import EventInstant
 from ..runs.run_log import RunEnd
 from .scene_cache import Prepared
 from .tolerances import FAR_LEVER, FAR_ORIGIN
@@ -98,7 +98,7 @@ def _sees_differences(packed):
     items = [*packed.constraints, *(load.force for load in packed.loads)]
     joined = packed.loads or not all(constraint.normalises for constraint in packed.constraints)
     own = joined and all(is_ours(type(item).__module__) for item in items)
-    return own and not any(isinstance(load.force.kernels, Kernels) for load in packed.loads)
+    return own and not any(isinstance(load.force.kernels, FunctionKernels) for load in packed.loads)
 
 
 def run_near(driver, task, scene, origin, tol):
@@ -179,7 +179,7 @@ def _away(function, packed, shift):
         states = [np.array(state), np.array([instant.q, instant.qd, instant.qdd])]
         for each in states:
             each[0] += shift
-        return function(t, Instant(packed, instant.memory, (begin, states[0], angles), t, states[1]))
+        return function(t, EventInstant(packed, instant.memory, (begin, states[0], angles), t, states[1]))
 
     return moved
 

@@ -16,7 +16,7 @@ from ..observables.diagnostics import ConstraintError
 from ..rows.graph_builder import graph_of, set_redundant
 from ..rows.interface import redundancy
 from ..runs import step_engine
-from ..runs.dense_output import Pieces, Trajectory
+from ..runs.dense_output import StepPieces, Trajectory
 from ..runs.run_log import NAMES, RunEnd, demand_noted
 from ..taylor import series_engine
 from ..taylor.layout import series_width
@@ -39,7 +39,7 @@ ARRAYS = ("blocks", "charts", "points", "first", "angles", "asked")
 
 def record_of(trajectory):
     """Numbers (for JSON) and arrays by name of a trajectory; raises TypeError for a method that numbers don't tell."""
-    if isinstance(trajectory, Pieces):
+    if isinstance(trajectory, StepPieces):
         parts = [record_of(part) for part in trajectory.parts]
         arrays = {f"{i}_{name}": array for i, (_, found) in enumerate(parts) for name, array in found.items()}
         return {"kind": "parts", "parts": [numbers for numbers, _ in parts]}, arrays
@@ -87,7 +87,7 @@ def trajectory_of(numbers, arrays, scene, packed):
         parts = numbers["parts"]
         own = [{name[len(f"{i}_") :]: array for name, array in arrays.items() if name.startswith(f"{i}_")}
                for i in range(len(parts))]  # fmt: skip
-        return Pieces([trajectory_of(part, found, scene, packed) for part, found in zip(parts, own, strict=True)])
+        return StepPieces([trajectory_of(part, found, scene, packed) for part, found in zip(parts, own, strict=True)])
     if kind == "moved":
         shift = arrays["shift"]
         demand(shift.shape == (int(packed.system.bodies[:, 1].sum()),), "the origin")

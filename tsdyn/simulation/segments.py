@@ -13,7 +13,7 @@ from ..formulations.registry import formulation
 from ..integrators import SDIRK54, Radau, Taylor
 from ..jit.compiled import clock
 from ..methods.integrator import frozen
-from ..runs.dense_output import Pieces
+from ..runs.dense_output import StepPieces
 from ..runs.driver import SegmentLink, begin, run
 from ..runs.run_log import NAMES, ChartLog, RunEnd, StepLog
 from ..runs.step_engine import StepEngine
@@ -502,7 +502,7 @@ class _Segments:
             reason=" ".join(part for part in said if part),
             rows=self._rows(),
             end=RunEnd(last.end.reached, last.end.last, last.end.remembered, counts, steps, charts),
-            trajectory=Pieces([part.trajectory for part in parts]) if task.dense_output else None,
+            trajectory=StepPieces([part.trajectory for part in parts]) if task.dense_output else None,
             began=parts[0].began,
             method=self._methods(),
         )

@@ -117,12 +117,12 @@ def _of_loads(solution, t, q, qd, near):
 
 def _of_motion(solution, t, q, qd, near):
     """The same with the constraints; zero where accelerations can't be found."""
-    from ..analyses.nominal_motion import Motion  # imported here: few runs end early
+    from ..analyses.nominal_motion import NominalMotion  # imported here: few runs end early
 
     packed, slots = solution.packed, solution._remembered
     try:
-        here = Motion(packed, slots, t, q, qd).qdd
-        return np.max([np.abs(Motion(packed, slots, t, place, qd).qdd - here) for place in near], axis=0)
+        here = NominalMotion(packed, slots, t, q, qd).qdd
+        return np.max([np.abs(NominalMotion(packed, slots, t, place, qd).qdd - here) for place in near], axis=0)
     except (TsdynError, ArithmeticError):
         return np.zeros(q.size)
 

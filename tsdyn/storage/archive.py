@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import StorageError
 from ..formulations.chart_validity import REASONS
 from . import checkpoint
-from .formats import Column, Table, format_of
+from .formats import Column, StoredTable, format_of
 
 # What a run with a store writes to: outputs and histories, buffered, and checkpoints when they are due.
 
@@ -42,11 +42,11 @@ def tables_of(bodies, remembered, history):
         columns.append(
             Column("remembered", ("slot",), _attributes("joint angles, and what forces remember", "rad or 1"))
         )
-    tables = {OUTPUTS: Table("time", tuple(columns), labels)}
+    tables = {OUTPUTS: StoredTable("time", tuple(columns), labels)}
     for name, dimension, said in ((STEPS, "step_time", _STEPS), (CHARTS, "chart_time", _CHARTS)):
         if history:
             rest = [Column(column, (), _attributes(*words)) for column, words in said.items()]
-            tables[name] = Table(dimension, (_times(dimension, "start"), *rest), {})
+            tables[name] = StoredTable(dimension, (_times(dimension, "start"), *rest), {})
     return tables
 
 

@@ -85,7 +85,7 @@ def writing(path, remedies=ELSEWHERE):
 #
 # A format is a module with a class `Store`, which has
 #
-#   create(path, tables, attributes)           a new store, of `Table`s by name
+#   create(path, tables, attributes)           a new store, of `StoredTable`s by name
 #   reopen(path, tables, attributes, counts, size)
 #                                              one to go on with, its tables cut to so many rows; its `size` was this
 #   write(start, rows)                         rows (k, ...) of a table from `start` on, by column; what follows is cut
@@ -126,7 +126,7 @@ class Column(NamedTuple):
     attributes: dict  # units, long_name
 
 
-class Table(NamedTuple):
+class StoredTable(NamedTuple):
     """Arrays that grow together."""
 
     dimension: str

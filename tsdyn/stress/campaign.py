@@ -19,7 +19,7 @@ from typing import NamedTuple
 from .checks import figures, without_figures
 from .closed_forms import CLOSED_FORMS, Measured, measured
 from .gallery.cases import CASES
-from .judgement import FAULT, Outcome, judge_scene
+from .judgement import FAULT, Judgement, judge_scene
 from .random_calls import judge_calls
 
 LIMIT = 300.0  # s of processor time, of a job: also of those that compile kernels
@@ -110,7 +110,7 @@ def _run_all(kind, indices, processes, without, report):
     try:
         with closing(work([Job(kind, i) for i in indices], processes, GALLERY_LIMIT)) as done:
             for job, [result] in done:
-                failed = isinstance(result, Outcome)
+                failed = isinstance(result, Judgement)
                 found[job.seed] = without(job.seed, f"{result.word} {result.said}") if failed else result
                 if report:
                     report(found[job.seed])
@@ -184,7 +184,7 @@ class Worker:
 
     def fault(self, word, said):
         """Return the outcome of a job that gave none."""
-        return Outcome(self.job.seed, self.job.kind, f"{FAULT} {word}", said)
+        return Judgement(self.job.seed, self.job.kind, f"{FAULT} {word}", said)
 
     def end(self):
         """End the process."""

@@ -17,7 +17,7 @@ PASSAGES = 4
 FAULT = "FAULT"
 
 
-class Outcome(NamedTuple):
+class Judgement(NamedTuple):
     """How a scene or a block of calls came out; a fault's word begins with FAULT."""
 
     seed: int
@@ -33,7 +33,7 @@ class Outcome(NamedTuple):
 
 
 def judge_scene(seed, least=None, most=None):
-    """Return the `Outcome` of the scene of a seed; one in PASSAGES passes places where a law is not analytic."""
+    """Return the `Judgement` of the scene of a seed; one in PASSAGES passes places where a law is not analytic."""
     if least is None and seed % PASSAGES == PASSAGES - 1:
         return judge_case(random_scenes.draw(seed), (comparisons.another_method,), seed)
     return judge_case(generate(seed, least, most), comparison(np.random.default_rng((seed, 1))), seed)
@@ -45,7 +45,7 @@ def comparison(rng):
 
 
 def judge_case(case, others, seed=None):
-    """Return the `Outcome` of a case, judged by the laws of its run and by comparisons with others."""
+    """Return the `Judgement` of a case, judged by the laws of its run and by comparisons with others."""
     began = time.perf_counter()
     try:
         word, said = judge(case, others)
@@ -55,7 +55,7 @@ def judge_case(case, others, seed=None):
             word, said = f"{FAULT} no message", word
     except Exception as error:
         word, said = f"{FAULT} {type(error).__name__}", str(error)
-    return Outcome(seed, case.name, word, said, time.perf_counter() - began)
+    return Judgement(seed, case.name, word, said, time.perf_counter() - began)
 
 
 def judge(case, others):

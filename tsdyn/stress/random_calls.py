@@ -33,7 +33,7 @@ from ..simulation.run_options import RunOptions
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
-from .judgement import FAULT, Outcome
+from .judgement import FAULT, Judgement
 
 # Arguments of random calls: right, wrong, and absurd.
 
@@ -332,6 +332,6 @@ def fuzz(count, seed, runs=RUNS):
 def judge_calls(seed, count):
     """Return the `Outcome`s of so many calls of a seed."""
     return [
-        Outcome(seed, found.call, f"{FAULT} {found.outcome}" if found.story else found.outcome, found.story)
+        Judgement(seed, found.call, f"{FAULT} {found.outcome}" if found.story else found.outcome, found.story)
         for found in fuzz(count, seed)
     ]

@@ -12,7 +12,7 @@ from ..model.packed import System
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal
 from ..rows.graph_builder import with_loops
 from ..rows.interface import allocate_tangent
-from ..runs.dense_output import Reading, put_state, recall
+from ..runs.dense_output import TrajectoryReading, put_state, recall
 from ..runs.run_memory import Memory
 from ..workspaces import B_DATA, B_START, lay_out, load_run, plain_work, words
 from .joint_friction import accelerate_with_friction_here, expand_friction_series
@@ -40,7 +40,7 @@ from .step_parts import (
     state_within,
 )
 from .stepper import advance_series
-from .tolerances import MANY
+from .tolerances import MANY_BODIES
 
 # Dense output of a Taylor run: the series of a step, evaluated and projected onto the manifold.
 
@@ -105,7 +105,7 @@ class Series:
         graph, self.kinds = moving_parts(packed)
         self.constant_columns = _masks_once(graph, packed)
         self.graph = with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
-        self.refined = int(len(graph.bodies) > MANY or are_unequal(packed.system))
+        self.refined = int(len(graph.bodies) > MANY_BODIES or are_unequal(packed.system))
 
 
 def _masks_once(graph, packed):
@@ -217,7 +217,7 @@ def _reading(packed, graph, highest):
         return context, run
 
     system = packed.system
-    return Reading(read_series, workspace, system, shift=0, degree=16)
+    return TrajectoryReading(read_series, workspace, system, shift=0, degree=16)
 
 
 def expanding(rough, far):

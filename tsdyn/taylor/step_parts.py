@@ -30,7 +30,7 @@ from ..rows.interface import (
 from .coefficients import begin, expand
 from .layout import load_series
 from .step_end import keep_start, project_rates, sum_series
-from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL, UNEQUAL
+from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL, UNEQUAL_PIVOTS
 
 # Taylor series of prescribed motions and of loads, for Taylor runs of driven scenes.
 
@@ -290,7 +290,7 @@ def pass_singular(context, t, h):
 @kernel
 def is_singular(c, status):
     """Whether the state of `reach`, or the one that it failed to reach, is near a singular configuration."""
-    limit = NEXT_TO_SINGULAR * min(1.0, c.tangent.indicator.largest / UNEQUAL)
+    limit = NEXT_TO_SINGULAR * min(1.0, c.tangent.indicator.largest / UNEQUAL_PIVOTS)
     return status == SINGULAR or (status == 0 and singularity_indicator(c.graph, c.tangent.rows) < limit)
 
 

@@ -21,7 +21,6 @@ from .layout import load_series
 from .step_length import finite_top, is_near, longest, loosest, radius, step_length, weights
 from .step_parts import call_expand, call_laws, call_reach, hold_accelerations, is_singular, set_floor, state_within
 from .tolerances import (
-    APART,
     AT_REST,
     AVOID,
     AVOIDING,
@@ -31,6 +30,7 @@ from .tolerances import (
     FASTER,
     HALVED,
     HOP,
+    HOP_APART,
     LEAST_STEPS,
     LOOSER,
     MINUTE,
@@ -46,9 +46,9 @@ from .tolerances import (
     SMALL_STEPS,
     SPARE,
     STILL,
+    STILL_STEP,
     TIGHTER,
     TIGHTEST,
-    TINY,
     WARY,
 )
 
@@ -270,7 +270,7 @@ def _hop(context, c, r, log, stop):
     s, t = c.trial, r.clock.t
     # A few units in the last place of t; twice as long right after another one
     s.h = HOP * SHORTEST * max(abs(t), FROM_ZERO * (r.clock.t_end - r.clock.t_origin))
-    s.hops = 0 if t > s.hopped + APART * s.h else s.hops + 1
+    s.hops = 0 if t > s.hopped + HOP_APART * s.h else s.hops + 1
     if s.hops > MOST_HOPS or s.check == 0 or r.numbers.adaptive == 0:
         return STEP_COLLAPSED
     s.h *= 2.0**s.hops
@@ -438,7 +438,7 @@ def _watch_stiffness(c, r, h):
             r.numbers.at_limit = 0
             return False
     # Steps in which little moves are counted; with sharp forces many more are needed
-    before, enough, tiny, faster = r.numbers.at_limit, SMALL_STEPS, TINY, FASTER
+    before, enough, tiny, faster = r.numbers.at_limit, SMALL_STEPS, STILL_STEP, FASTER
     if c.trial.sharp == 1:
         enough, tiny, faster = SHARP_STEPS, MINUTE, AT_REST
     r.numbers.at_limit += faster if most < tiny else 1

@@ -41,9 +41,9 @@ PLACES, LEAST_STEPS = 4, 8
 COARSE = 1e-3
 
 # HOP: length of a step over a place where a law is not analytic, over the shortest step (runs/tolerances.py, SHORTEST):
-# forces are bounded there, so its error is rounding. Within APART lengths of the one before, such a step is twice as
-# long; after MOST_HOPS of them the run ends: the motion comes to rest there.
-HOP, MOST_HOPS, APART = 16.0, 8, 1e3
+# forces are bounded there, so its error is rounding. Within HOP_APART lengths of the one before, such a step is
+# twice as long; after MOST_HOPS of them the run ends: the motion comes to rest there.
+HOP, MOST_HOPS, HOP_APART = 16.0, 8, 1e3
 
 # Angular velocity (rad/s) that counts as none.
 NO_SPEED = 1e-300
@@ -54,8 +54,8 @@ NO_SPEED = 1e-300
 SMALL, SMALL_STEPS = 0.02, 40
 # Margin of analyticity of the force laws (law_check.py): where it is less, a law limits the step, not stiffness.
 STILL = 0.9
-# A step by less than TINY counts as FASTER steps.
-TINY, FASTER = 0.002, 4
+# A step by less than STILL_STEP counts as FASTER steps.
+STILL_STEP, FASTER = 0.002, 4
 # The same in scenes with sharp forces, which need some ten short steps wherever a velocity reverses; steps by less than
 # MINUTE count for AT_REST there: a reversal at a slip velocity of 1e-9 m/s takes 13, and rest any number.
 SHARP_STEPS, MINUTE, AT_REST = 400, 1e-6, 8
@@ -66,7 +66,7 @@ SHARP_STEPS, MINUTE, AT_REST = 400, 1e-6, 8
 # beyond the error of the series.
 NEXT_TO_SINGULAR, GONE = 1e-8, 1e-10
 # Largest pivot of a run below which masses are so unequal that no pivot is large: NEXT_TO_SINGULAR is relative to it.
-UNEQUAL = 1e-4
+UNEQUAL_PIVOTS = 1e-4
 
 # Indicator at the end of a step over that at its start, below which the step approaches a singular configuration; ends
 # too close to continue; ends too close even beyond it. Measured on rows of parallelograms
@@ -90,7 +90,7 @@ WARY, SPARE = 0.06, 0.1
 
 # --- size ------------------------------------------------------------------------------------------------------------
 # Bodies from which lam is refined once in every run: errors of a solution by elimination grow with their number.
-MANY = 100
+MANY_BODIES = 100
 
 # Orders of lam, from zero on, that are refined where S is ill-conditioned; all are where it takes two refinements.
 ILL_ORDERS = 3

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 OUTPUTS = 8000  # of a stored run, that are read at most
 
 
-class Frames(NamedTuple):
+class AnimationFrames(NamedTuple):
     """The run at times (k,), equally spaced; poses of b bodies. `run`: outputs beside these times."""
 
     times: Floats
@@ -54,8 +54,8 @@ class Frames(NamedTuple):
         return values[i] + s * (values[np.minimum(i + 1, len(values) - 1)] - values[i])
 
 
-def resample(solution: Solution, count: int) -> Frames:
-    """The `Frames` of a solution, at most `count`; raises InvalidArgument where it has numbers that aren't finite."""
+def resample(solution: Solution, count: int) -> AnimationFrames:
+    """The `AnimationFrames` of a solution, at most `count`; InvalidArgument where numbers aren't finite."""
     times = np.linspace(solution.t[0], solution.t[-1], count if solution.t[-1] > solution.t[0] else 1)
     run = _beside(solution, times)
     q = _dense(solution, times)
@@ -73,7 +73,7 @@ def resample(solution: Solution, count: int) -> Frames:
         raise InvalidArgument(
             "the outputs have numbers that aren't finite, which can't be drawn: view others, solution[a:b].view()."
         )
-    return Frames(times, position, orientation, run)
+    return AnimationFrames(times, position, orientation, run)
 
 
 def _dense(solution, times):
@@ -118,7 +118,7 @@ OPEN, HOLDS_BACK, PUSHES = 0, 1, 2  # as the page colours them
 NO_CONTACT = 1e-6  # of the largest force of the contact: below it there is none
 
 
-def contact_states(frames: Frames, constraints: list[Attached]) -> list[Any]:
+def contact_states(frames: AnimationFrames, constraints: list[Attached]) -> list[Any]:
     """The states (k,) of each PlaneContact at the frames."""
     return [_states(frames, each.item) for each in constraints if isinstance(each.item, PlaneContact)]
 
@@ -148,7 +148,7 @@ class Arrows(NamedTuple):
     unique: bool  # False where redundant constraints may share the load in many ways
 
 
-def arrows(frames: Frames, constraints: list[Attached], forces: list[Attached], length: float) -> list[Arrows]:
+def arrows(frames: AnimationFrames, constraints: list[Attached], forces: list[Attached], length: float) -> list[Arrows]:
     """All loads that are not zero throughout, at the times of the frames; NaN, of singular configurations, is zero.
 
     length: of a usual body, m.

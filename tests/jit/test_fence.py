@@ -79,7 +79,7 @@ def test_the_processor_is_the_one_that_numba_compiles_for():
 GONE = {
     "a pass": "from numba.core import untyped_passes; del untyped_passes.WithLifting",
     "a class": "from numba.core import codegen; del codegen.JITCodeLibrary",
-    "a module": "import sys, numba; sys.modules['numba.core.ccallback'] = None",
+    "a module": "import sys, numba; sys.modules['numba.core.compiler_machinery'] = None",
     "an option": "from numba.core import options; del options.DefaultOptions._nrt",
     "another signature": """
 from numba.core.compiler_machinery import PassManager
@@ -90,8 +90,8 @@ PassManager.add_pass = lambda self, kind, what='': add(self, kind, what)
 from numba.core.compiler import CompileResult
 replace = CompileResult._replace
 def refuse(self, **given):
-    if "cfunc" in given:
-        raise TypeError("no such field: cfunc")
+    if "type_annotation" in given:
+        raise TypeError("no such field: type_annotation")
     return replace(self, **given)
 CompileResult._replace = refuse
 """,
@@ -107,7 +107,7 @@ ctypes.CFUNCTYPE = lambda *types: (lambda address: lambda i: 40) if types == (ct
 @pytest.mark.parametrize("gone", GONE)
 def test_where_something_is_gone_numba_as_it_comes_serves(gone, tmp_path):
     """With one warning; parts that are used by compilation alone need an empty cache."""
-    code = TINY if "number" in gone else SMALL
+    code = TINY if " that " in gone else SMALL
     found, errors = run(GONE[gone] + code, {"TSDYN_CACHE_DIR": str(tmp_path)} if " that " in gone else {})
     assert found.get("value", 2.0) == 2.0
     assert found.get("Phi", 0.0) == 0.0

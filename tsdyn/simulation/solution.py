@@ -378,7 +378,6 @@ class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
     t_events: list[Floats] | Any  # None without events
     q_events: list[Floats] | Any
     qd_events: list[Floats] | Any
-    _turned = ""  # the methods of a run that turned
     _made_by = "ts.simulate(scene, t_span), or read one by ts.load(path)"
 
     @fitting

@@ -472,7 +472,8 @@ class SegmentLink:
 #   serves(memory)              whether a memory that was made before is that of the scene as it is now
 #   lay_out(memory)             enter the system, and the numbers and kernels of the method
 #   reading(memory, prepared, constraint_tol)
-#                               a `TrajectoryReading` of the steps, and a picklable function with its arguments that makes it anew
+#                               a `TrajectoryReading` of the steps, and a picklable function with arguments that
+#                               makes it again
 #   skipped         bodies without gyroscopic torque, bodies that never turn, constant columns of series
 
 SUCCESS, NOT_FINITE, PASSAGE, STIFF = Status.SUCCESS, Status.NOT_FINITE, Status.PASSAGE, Status.STIFF

@@ -103,7 +103,8 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
     tangent = TangentWorkspace(
         poses, allocate_rows(graph), zeros(m), zeros(m), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n),
         zeros(4), Landing(), Selection(), Indicator(), RedundantRows(*(zeros(k * left) for k in (16, 1, 1))),
-        *(np.zeros(size, np.int64) for size in (m + 1, m + 1, m + 1, m)),
+        np.zeros(m + 1, np.int64), zeros(left), np.zeros(m + 1, np.int64), zeros(left),
+        *(np.zeros(size, np.int64) for size in (m + 1, m)),
         zeros(max(widest, m if choosing else 0) ** 2), _allocate_friction(graph, n, basis), np.zeros(2, np.int64),
     )  # fmt: skip
     reset_selection(graph, tangent)
@@ -135,7 +136,8 @@ def reset_selection(graph, tangent):
         friction.load.fill(0.0)
     set_selection(tangent, graph.dropped)
     selection = tangent.selection
-    selection.weakest, selection.push, selection.twist = 1.0, 0.0, 0.0
+    selection.push = selection.twist = 0.0
+    tangent.best.fill(1.0)
     if tangent.redundant[0].size:
         for array in tangent.redundant:
             array.fill(0.0)
@@ -145,7 +147,8 @@ def reset_selection(graph, tangent):
 def selection_parts(tangent):
     """The arrays and the records that `reset_selection` sets."""
     friction = tangent.friction
-    return [friction.lam, friction.load, tangent.dropped, *tangent.redundant], [tangent.selection, tangent.indicator]
+    arrays = [friction.lam, friction.load, tangent.dropped, tangent.best, *tangent.redundant]
+    return arrays, [tangent.selection, tangent.indicator]
 
 
 def set_selection(tangent, redundant):

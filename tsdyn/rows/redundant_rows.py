@@ -9,6 +9,7 @@ import math
 from ..elements.loops.constraint_rows import POSE, R
 from ..jit.kernels import kernel
 from ..jit.simd import four, put, splat
+from ..maths.dense_linalg import copy
 from .tolerances import HELD
 
 
@@ -96,7 +97,7 @@ def save_selection(f):
     """Save the selection of redundant rows before a passing one."""
     for i in range(f.dropped[0] + 1):
         f.saved[i] = f.dropped[i]
-    f.selection.saved = f.selection.weakest
+    copy(f.best, f.saved_best)
 
 
 @kernel
@@ -104,7 +105,7 @@ def return_to_selection(f):
     """Return to the saved selection of redundant rows."""
     for i in range(f.saved[0] + 1):
         f.dropped[i] = f.saved[i]
-    f.selection.weakest = f.selection.saved
+    copy(f.saved_best, f.best)
 
 
 @kernel
@@ -120,9 +121,10 @@ def take_noted_selection(f, given):
     """Select the rows of `note_selection`, which no others are to replace now."""
     if given.size == 0 or given[0] < 0.0:
         return
-    f.dropped[0], f.selection.weakest = given.size, 0.0
+    f.dropped[0] = given.size
     for i in range(given.size):
         f.dropped[1 + i] = int(given[i])
+    f.best[:] = 0.0
 
 
 @kernel

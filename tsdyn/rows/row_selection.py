@@ -64,20 +64,6 @@ def weakest(graph, values):
     return least
 
 
-@kernel
-def weakest_of_all(graph, values):
-    """The same, or the smallest pivot of an axis row, which is the part of an inertia that the other rows account for.
-
-    In METRIC these pivots are one.
-    """
-    least = weakest(graph, values)
-    for i in range(graph.axes.rows.shape[0]):
-        share = abs(values[graph.diagonal[graph.axes.rows[i].row]])
-        if not share * least < 1.0:
-            least = 1.0 / share
-    return least
-
-
 @long_kernel
 def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
     """Select rows by global pivoting, A (m, m) scratch; return the number of rows with pivots below `least`."""
@@ -457,7 +443,8 @@ def _choose_again(graph, reals, f, rows, t, metric):
     regular = factorise_selected_rows(graph, f, rows, metric) < 0
     # The new pivots are what later ones are measured by
     if found and regular:
-        f.selection.weakest = weakest_of_all(graph, rows.S)
+        for e in range(f.best.size):
+            f.best[e] = _share(graph, rows.S, e)
     return regular
 
 
@@ -483,20 +470,30 @@ else:
 @kernel
 def doubt_selection(f):
     """Request a new selection of rows at the next chart."""
-    f.selection.weakest = math.inf
+    f.best[:] = math.inf
 
 
 @kernel
 def selection_serves(graph, f, rows):
     """Return True if the selected rows are nearly as independent as at their best, judged by the factors of S.
 
-    Another selection is also asked for, once, before a configuration would pass for one near a singular one.
+    The smallest share of all isn't enough: another row may fall by orders of magnitude before it is the smallest.
     """
     if f.dropped[0] == 0:
         return True
-    share, near = weakest_of_all(graph, rows.S), WORSE * f.indicator.largest
-    f.selection.weakest = max(f.selection.weakest, share)  # a selection next to a singular configuration is no measure
-    return share >= WORSE * f.selection.weakest and not share < near <= f.selection.weakest
+    serves = True
+    for e in range(f.best.size):
+        # A pivot may grow: its largest value is the measure
+        share = _share(graph, rows.S, e)
+        f.best[e] = max(f.best[e], share)  # a selection next to a singular configuration is no measure
+        serves = serves and share >= WORSE * f.best[e]
+    return serves
+
+
+@kernel
+def _share(graph, values, e):
+    """The pivot of row e over its diagonal entry; values are factors of S, with reciprocals of pivots."""
+    return 1.0 / abs(values[graph.diagonal[e]] * values[graph.pattern.shape[1] + e])
 
 
 @long_kernel

@@ -52,8 +52,6 @@ class Landing(Record):
 class Selection(Record):
     """Quality of the selection of redundant rows, and loads that they are judged by."""
 
-    weakest: float  # the smallest relative pivot of the others: its largest value since the selection
-    saved: float  # the same before a passing selection
     excess: float  # by how much |Phi| of the redundant rows exceeds HELD of its terms, at most
     push: float  # the largest |W F| of a body, m/s^2
     twist: float  # and rad/s^2
@@ -83,7 +81,9 @@ class TangentWorkspace(NamedTuple):
     indicator: Indicator
     redundant: RedundantRows
     dropped: np.ndarray  # int64 (m + 1,)  how many rows are redundant, and which; independent_rows.select
-    saved: np.ndarray  # int64 (m + 1,)  the same before a passing selection; redundant_rows.save_selection
+    best: np.ndarray  # (m,), or (0,)  pivots of S relative to their diagonal entries: the largest since the selection
+    saved: np.ndarray  # int64 (m + 1,)  rows before a passing selection; redundant_rows.save_selection
+    saved_best: np.ndarray  # and pivots
     chosen: np.ndarray  # int64 (m + 1,)  scratch of independent_rows.select, as the next two
     order: np.ndarray  # int64 (m,)
     block: np.ndarray  # (largest block, or m, squared)
@@ -96,4 +96,6 @@ def no_tangent_workspace():
     none, whole, square = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
     friction = Friction(*[none] * 7, square, square, whole, none)
     rows, records = Rows(none, none, none), (Landing(), Selection(), Indicator(), RedundantRows(none, none, none))
-    return TangentWorkspace(none, rows, *[none] * 6, *records, whole, whole, whole, whole, none, friction, whole)
+    return TangentWorkspace(
+        none, rows, *[none] * 6, *records, whole, none, whole, none, whole, whole, none, friction, whole
+    )

@@ -17,9 +17,8 @@ SADDLE_PIVOT = 1e-14
 # singular.
 FIRST_SHARE, FEWER = 1e-3, 1e-2
 
-# Share of the weakest row over its largest value since the selection: below it the selection is renewed, so that S
-# loses no more than one digit to an old selection. The same over the largest indicator of the run, once: before a
-# configuration passes for one near a singular one (NEAR, and WARY of taylor/tolerances.py).
+# Share of a row over its largest value since the selection: below it the selection is renewed, so that S loses no more
+# than one digit to an old selection.
 WORSE = 0.1
 
 # Residual of a redundant row, its rate or its acceleration over the sum of its absolute terms: above it the row doesn't

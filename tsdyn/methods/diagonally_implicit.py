@@ -9,6 +9,7 @@ from ..workspaces import load, load_run
 from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combine
 from .tolerances import (
     AGEING,
+    APART,
     APART_AT_LEAST,
     APART_SLIPPING,
     AT_FLOOR,
@@ -344,7 +345,7 @@ def _measure(c, size):
     if sparse and not slips and one.poor == MATRICES and numbers.slow == 0.0:
         numbers.slow = min(WORSE_CONTRACTION * one.theta, DIVERGING)
     one.diverged += 1 if one.renewed == 1 and one.theta > DIVERGING else 0
-    return one.diverged < (APART_SLIPPING if slips else DIVERGING)
+    return one.diverged < (APART_SLIPPING if slips else APART)
 
 
 @kernel

@@ -45,7 +45,7 @@ DIVERGING = 0.9
 # New matrices within one stage, of which the last has new stiffness and damping; diverging iterations, all with a new
 # matrix, with which a stage is given up. Where friction breaks loose, corrections grow from slip velocities of 1e-9 m/s
 # to the velocities of the motion, by the power of three each, before they contract.
-MATRICES, DIVERGING, APART_SLIPPING = 3, 3, 8
+MATRICES, APART, APART_SLIPPING = 3, 3, 8
 
 # Contraction over that of a matrix with new stiffness and damping, above which the matrix is rebuilt in the tangent
 # form: if bodies rotate far within a step, no matrix contracts below SLOW_SPARSE.

@@ -54,7 +54,7 @@ def command(code, environment, cwd, before=()):
 
 def finish(process):
     """What the process has reported by its last line, and stderr."""
-    out, err = process.communicate(timeout=300)
+    out, err = process.communicate(timeout=900)
     assert process.returncode == 0, err
     return {"misses": 0, "hits": 0, **json.loads(out.splitlines()[-1])}, err
 

@@ -54,7 +54,7 @@ def _gather(s, r, q, qd, qdd, d, weights):
 @kernel
 def _sample(s, r, h, t0, places, d, weights, f):
     """f (places + 1,): the weighted sum of the loads at so many places of the step, equally far apart. The largest."""
-    n, k, size = r.now.shape[1], weights.size, 0.0
+    n, k, largest = r.now.shape[1], weights.size, 0.0
     x, xd = r.path[7 * k : 8 * k], r.path[8 * k : 9 * k]
     Q, q, qd = r.path[9 * k : 9 * k + n], r.path[9 * k + n : 9 * k + 2 * n], r.path[9 * k + 2 * n :]
     for place in range(places + 1):
@@ -79,8 +79,8 @@ def _sample(s, r, h, t0, places, d, weights, f):
                 Q[c] = 0.0
                 j += 1
         f[place] = total
-        size = max(size, abs(total))
-    return size
+        largest = max(largest, abs(total))
+    return largest
 
 
 @kernel

@@ -304,9 +304,6 @@ def _accept(c):
     remember(c.system, w.q, w.qd, c.way.t, c.remembered[c.joints.shape[0] :])
 
 
-# Kinematic analysis: a configuration without freedom, followed from time to time.
-
-
 class Followed(NamedTuple):
     """How far a branch has been followed."""
 

@@ -231,9 +231,6 @@ def modes_of(pairs, twists, bodies, coordinates):
     return Modes(values, shapes * (np.abs(lead) / lead)[:, None], twists, bodies, coordinates)
 
 
-# `scene.linearise`: reduced mass, damping and stiffness in named minimal coordinates about a state.
-
-
 class StateSpace(NamedTuple):
     """xd = A x + B u, y = C x + D u, with the 2 k states (coordinates, rates)."""
 

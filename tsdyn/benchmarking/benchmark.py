@@ -336,9 +336,6 @@ def machine() -> str:
     return f"{name}, {platform.system()}; tsdyn {__version__}, {versions}; {datetime.date.today()}."
 
 
-# `benchmark`: work-precision of integration methods on a user's scene.
-
-
 @fitting
 def benchmark(  # many arguments, by name: those of runs, and of how they are measured
     scene: Scene,

@@ -47,8 +47,6 @@ def _all(parser):
             yield from _all(child)
 
 
-# The command `tsdyn`, also `python -m tsdyn`: scene files and their runs, studies, measurements, hard cases.
-
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
 

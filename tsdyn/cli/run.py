@@ -14,8 +14,6 @@ from ..viewer.view import page_path
 from .parser import print_json, text_cell
 from .scene_file import load_document, load_run, robot_options
 
-# The command `tsdyn run`: a run of a scene file, its summary, results in files.
-
 TABLES = (".csv",)
 METAVARS = {float: "X", int: "N", str: "NAME"}  # what a flag is followed by
 

@@ -157,8 +157,6 @@ def _pivots(scene, rows):
     return np.concatenate((first, rest[farthest_first(left)[0]])).astype(int)
 
 
-# `scene.mobility`: degrees of freedom, rank, redundant rows, and whether the configuration is singular.
-
 TRIES = 3
 MOST_ROWS = 3000  # of closed loops, which take a dense factorisation
 

@@ -56,8 +56,6 @@ def _some(names):
     return f"{shown} and {len(names) - 8} more" if len(names) > 8 else shown
 
 
-# Rigid bodies, point masses and the ground, with attributes that are validated when set.
-
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 

@@ -159,8 +159,6 @@ class Starts:
         return own
 
 
-# The compiled loop over cases: each is written into the arrays of an arena and run by series, without Python.
-
 SUCCESS = int(Status.SUCCESS)
 call_take = caller("pppppidd")
 

@@ -102,8 +102,6 @@ def _number(value):
     raise TypeError
 
 
-# The result of an ensemble.
-
 COORDINATES = ("x", "y", "z", "e0", "e1", "e2", "e3")
 
 

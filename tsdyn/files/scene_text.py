@@ -15,8 +15,6 @@ from .reading import Mistakes
 from .toml_text import Places
 from .types import encode
 
-# A scene as TOML text, and the text as a scene.
-
 KEEP = "A class of your own must keep each argument of its __init__ as an attribute of the same name."
 LARGEST = 1 << 26  # bytes of a file that is read: what Python makes of it takes some thirty times as many
 DEEP = 64  # parts of a key between dots: reading one takes time and memory by their square

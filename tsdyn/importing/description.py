@@ -75,8 +75,6 @@ def fresh(name, taken):
     return next(one for one in chain([name], (f"{name} {i}" for i in count(2))) if one not in taken)
 
 
-# What a file describes: links, joints and forces, at zero joint coordinates, in the ground frame.
-
 GROUND = ""  # in place of the name of a link
 
 

@@ -6,8 +6,6 @@ from ..jit.kernels import kernel
 from ..jit.simd import first, fma, four, fourth, larger, second, splat, third, total
 from .tolerances import CONVERGED, ORTHOGONAL
 
-# Dense factorisations for small matrices, without LAPACK and without allocation.
-
 
 @kernel
 def is_finite(x):

@@ -101,8 +101,6 @@ def _reaction(packed, load, q, qd, Phi_q):
     return find
 
 
-# `scene.evaluate(q, qd, t)`: the paper's quantities at one state, in plain NumPy.
-
 NOT_UNIQUE = (
     "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
     "leave free carries no inertia."

@@ -148,8 +148,6 @@ def with_normal_loads(packed, t, q, qd, qdd, memory):
     return np.hstack((memory, loads))
 
 
-# Multipliers and constraint reactions, from positions, velocities and accelerations.
-
 MATRIX = np.zeros((0, 0))  # its type
 
 

@@ -109,8 +109,6 @@ def advance(kernel, arguments, run, called):
         raise
 
 
-# Run workspace of a driver, allocated once and reused by successive runs.
-
 UNLIMITED = 2**62  # steps wanted of an adaptive run
 STATUSES = {int(status): status for status in Status}
 

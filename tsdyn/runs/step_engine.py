@@ -79,8 +79,6 @@ class StepMemory(Memory):
                 own[:] = new
 
 
-# The engine of methods with a step kernel; see driver.py.
-
 NOTHING = np.empty((2, 0), np.int64)
 
 

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Floats, GivenMotions, ItemLike, Scene, State
 
 
-# Motions that are given, as solutions: base of the results of `scene.kinematics` and `scene.inverse_dynamics`.
-
 INITIAL_TOL = 1e-9  # of residuals of a start, as in `simulate`
 
 

@@ -133,8 +133,6 @@ def _demand_steps(blocks, charts, points, width, highest):
     demand(highest is None or np.isin(blocks[:, B_DATA], orders).all(), "the orders of steps")
 
 
-# Solutions in files: what `Solution.save` writes, and `load` reads.
-
 RECORD = {  # of every file, with the types of it
     "provenance": dict, "formulation": str, "span": list, "method": str, "status": int, "reason": str, "message": str,
     "reached": (int, float), "counts": dict, "seconds": dict, "derived": dict, "tables": dict,

@@ -174,9 +174,6 @@ def write_text(path: Place, text: str) -> Path:
     return path
 
 
-# The scene: bodies, constraints and forces, validated as they are added.
-
-
 @fitting_methods
 class Scene(OfFile):
     """Bodies, constraints, forces and gravity.

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Scene, Solution, Span, State
 
 
-# `simulate`: prepare a run, or take the last one of the same options, and run it.
-
 KEPT = 8  # runs of a scene
 
 

@@ -127,8 +127,6 @@ def _of_motion(solution, t, q, qd, near):
         return np.zeros(q.size)
 
 
-# Termination report of a run: what happened, where, and what to try.
-
 FEW = 3  # items named in a message
 NO_NUMBERS = Status.NOT_FINITE, Status.STEP_COLLAPSED
 AHEAD = 10.0 ** np.arange(-12, 2)  # parts of a usual step; the last ones may be longer

@@ -12,8 +12,6 @@ from ..formulations.chart_validity import REASONS
 from . import checkpoint
 from .formats import Column, StoredTable, format_of
 
-# What a run with a store writes to: outputs and histories, buffered, and checkpoints when they are due.
-
 READERS = 1.0  # s, after which readers see what has been written; later in proportion where that takes longer than
 BRIEF = 0.01  # s
 OUTPUTS, STEPS, CHARTS = "outputs", "steps", "charts"

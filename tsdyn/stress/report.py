@@ -44,8 +44,6 @@ def figure(found):
     return drawn
 
 
-# The report of `tsdyn stress` as text, as Markdown and as plain data.
-
 MARKS = "<!-- tsdyn stress: begin -->", "<!-- tsdyn stress: end -->"  # of a page, around what is written anew
 LONGEST = 400  # characters of what a fault said
 NONE = "-"  # of a figure that a case doesn't have

@@ -117,9 +117,6 @@ def _check_load(kind, name, x, reaction, par):
     return load
 
 
-# The check of a force plug-in: `tsdyn.testing.check_force`.
-
-
 @entry
 def evaluate_force_jacobian(s, q, qd, t, Q_q, Q_qd, renew, kept):
     """Q_q, Q_qd (n, n) += the Jacobians of the forces; s is from `with_force_jacobians`."""

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -128,11 +129,28 @@ def test_an_executor_that_has_been_shut_down(kind, tmp_path):
         ts.ensemble(top.build(), TABLE, SPAN, executor=kind)
 
 
+class _Closing(ThreadPoolExecutor):
+    """Takes one chunk; by the time of the second one it has been shut down."""
+
+    def __init__(self):
+        super().__init__(1)
+        self.refused = threading.Event()
+
+    def submit(self, *given):
+        try:
+            return super().submit(*given)
+        except RuntimeError:
+            self.refused.set()
+            raise
+        finally:
+            self.shutdown(wait=False)
+
+
 def test_an_executor_that_is_shut_down_meanwhile_keeps_what_has_come_back():
-    pool = ThreadPoolExecutor(1)
+    pool = _Closing()
 
     def keep(solution):
-        pool.shutdown(wait=False)
+        assert pool.refused.wait(60)
         return solution.state.q[2]
 
     with pytest.warns(UserWarning, match="The executor broke: .*after shutdown"):

@@ -375,8 +375,7 @@ class _Sender:
                 report(0)
                 self._send()
         except (BrokenExecutor, KeyboardInterrupt) as error:
-            for future in self.pending:
-                future.cancel()
+            self._end(report, waits=isinstance(error, BrokenExecutor))
             if isinstance(error, BrokenExecutor):
                 self.sink.reason = f"The executor broke: {type(error).__name__}: {error}"
                 warnings.warn(f"{self.sink.reason} Cases that had come back are kept.", stacklevel=4)
@@ -386,6 +385,16 @@ class _Sender:
                 future.cancel()
             raise
         return False
+
+    def _end(self, report, waits):
+        """Cancel what hasn't begun; take over what is done, and what still runs if the end is worth waiting for."""
+        running = [future for future in self.pending if not future.cancel()]
+        if waits:
+            with contextlib.suppress(KeyboardInterrupt):
+                wait(running)
+        for future in running:
+            if future.done() and future.exception() is None:
+                report(self._collect(future))
 
     def _send(self):
         while len(self.pending) < self.most and (self.again or not self.sink.is_full):

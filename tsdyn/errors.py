@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .hints import Solution
+
+
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x80-\x9f]")  # what a terminal would obey, but for lines and tabs
 
 
 class TsdynError(Exception):
@@ -20,6 +24,9 @@ class TsdynError(Exception):
     Traceback (most recent call last):
     tsdyn.errors.InvalidBody: the scene has no bodies; add one with scene.add_body(...).
     """
+
+    def __init__(self, message: str = "", *more: Any) -> None:
+        super().__init__(CONTROL.sub(lambda found: repr(found[0])[1:-1], str(message)), *more)
 
 
 class InvalidArgument(TsdynError, ValueError):

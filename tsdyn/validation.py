@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import InvalidArgument, StorageError, UnknownAttribute
+from .errors import CONTROL, InvalidArgument, StorageError, UnknownAttribute
 
 if TYPE_CHECKING:
     from .hints import Place
@@ -210,9 +210,11 @@ def one_of(value, options, what, error=InvalidArgument):
 
 def label(name, what, error):
     """Return a name as text, "" for None, or raise `error`."""
-    if name is None or (isinstance(name, (str, int, np.integer)) and not isinstance(name, bool)):
-        return "" if name is None else str(name)
-    raise error(f"{what}: name must be text, got {name!r}.")
+    if name is None:
+        return ""
+    if isinstance(name, (str, int, np.integer)) and not isinstance(name, bool) and not CONTROL.search(str(name)):
+        return str(name)
+    raise error(f"{what}: name must be text without control characters, got {name!r}.")
 
 
 def counted(count, noun, nouns=None):

@@ -1,5 +1,6 @@
 """Impossible arguments of `simulate` and `evaluate`, and questions to which a solution has no answer."""
 
+import json
 import pickle
 import re
 
@@ -280,3 +281,20 @@ def test_parts_of_solutions_that_there_are_not(part):
     scene.add_point_mass(1.0)
     with pytest.raises(ts.InvalidArgument, match="outputs are taken by slices"):
         ts.simulate(scene, (0.0, 1.0))[part]
+
+
+@pytest.mark.parametrize("name", ["a\x1b[2Jb", "a\x9b31m", "a\rb", "a\x00"])
+def test_control_characters_of_names_and_files_do_not_reach_a_terminal(name, tmp_path):
+    scene = ts.Scene()
+    ball = scene.add_point_mass(mass=1.0, name="größe 球")
+    with pytest.raises(ts.InvalidBody, match="without control characters"):
+        scene.add_point_mass(mass=1.0, name=name)
+    with pytest.raises(ts.InvalidBody, match="holds no control characters"):
+        ball.name = name
+    with pytest.raises(ts.InvalidConstraint, match="without control characters"):
+        ts.constraints.Distance(ball, "ground", length=1.0, name=name)
+    path = tmp_path / "scene.toml"
+    path.write_text(f'version = 1\n[[body]]\nname = "a"\n{json.dumps(name)} = 1\n', encoding="utf-8")
+    with pytest.raises(ts.InvalidFile) as raised:
+        ts.load(path)
+    assert all(character.isprintable() or character == "\n" for character in str(raised.value))

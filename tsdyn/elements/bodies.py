@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Generic, Never, TypeVar
 import numpy as np
 
 from ..calls import fitting
-from ..errors import InvalidArgument, InvalidBody
+from ..errors import CONTROL, InvalidArgument, InvalidBody
 from ..validation import close, demand_known, floats, positive, shown, vector3
 from .tolerances import INERTIA_ROUNDING, LEAST_MASS, MOST_MASS, TRIANGLE, UNIT_LENGTH
 
@@ -44,8 +44,10 @@ def named(things, name, what, error=InvalidArgument):
 
 def new_name(value, thing, others, error):
     """Return a name that a thing may be given in its scene: text, which none of some others has; or raise `error`."""
-    if not isinstance(value, str) or not value:
-        raise error(f"{thing.name}: name must be text that is not empty, got {shown(value)}.")
+    if not isinstance(value, str) or not value or CONTROL.search(value):
+        raise error(
+            f"{thing.name}: name must be text that is not empty and holds no control characters, got {shown(value)}."
+        )
     if any(other is not thing and other.name == value for other in others):
         raise error(f"{thing.name}: the scene has another named {value!r}; choose another name.")
     return value

@@ -21,6 +21,7 @@ from ..formulations.projection import find_drift, gather_speeds, land, land_velo
 from ..jit.compiled import clock
 from ..jit.kernels import Record, entry, kernel, loader, long_kernel, resident
 from ..maths.dense_linalg import copy, is_finite
+from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, ROUNDING
 from ..model import handles as joint_motion
 from ..model.equations import remember, set_time
 from ..model.handles import handles_of
@@ -37,14 +38,11 @@ from .nominal_motion import NominalMotion
 from .tolerances import (
     CLOSE,
     CONSISTENT,
-    DEAD,
     GROWTH,
     LARGEST_CHANGE,
-    LARGEST_TURN,
-    LEAST_RESIDUAL,
     LEAST_STEPS,
     LISTED,
-    MET,
+    MOST_TURN,
     NO_CHANGE,
     POLISHINGS,
     SEEN,
@@ -85,11 +83,11 @@ def driven_rates(scene, t, q, who):
     x = least_step(A, drift)
     for _ in range(POLISHINGS if metric.sparse else 0):  # which is regularised
         left = A @ x + drift
-        if np.abs(left).max() <= MET * (1.0 + np.abs(x).max()):
+        if np.abs(left).max() <= NEGLIGIBLE * (1.0 + np.abs(x).max()):
             break
         x = x + least_step(A, left)
     left = np.abs(A @ x + drift)
-    if not left.max(initial=0.0) <= DEAD * (1.0 + np.abs(x).max(initial=0.0) + np.abs(drift).max(initial=0.0)):
+    if not left.max(initial=0.0) <= HALF_DIGITS * (1.0 + np.abs(x).max(initial=0.0) + np.abs(drift).max(initial=0.0)):
         names = [scene.row_names()[metric.own[i]] for i in np.flatnonzero(drift)[:LISTED]]
         raise SingularConfiguration(
             f"{who}: no velocities follow the motions at t = {t:g} s ({', '.join(names)}): the mechanism is at a dead "
@@ -216,7 +214,7 @@ def _step(c, target):
     t = target if last else way.t + h
     place_bodies(c.graph.bodies, c.now[0], c.tangent.poses)
     status, ratio = CHART_LOST, math.inf
-    if _predict(c, h) <= LARGEST_TURN:
+    if _predict(c, h) <= MOST_TURN:
         status = _solve(c, t)
         if status == OK:
             ratio = _change(c, h)
@@ -256,7 +254,7 @@ def _solve(c, t):
     graph, system, w, f = c.graph, c.system, c.work, c.tangent
     if not set_time(system, t):
         return NOT_FINITE
-    w.control.floor = LEAST_RESIDUAL * (w.control.size + largest_coordinate(graph.bodies, c.now[0], w.control.size))
+    w.control.floor = ROUNDING * (w.control.size + largest_coordinate(graph.bodies, c.now[0], w.control.size))
     status = land(graph, system, w, f, t)
     if status != OK:
         return status

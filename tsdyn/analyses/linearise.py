@@ -17,13 +17,13 @@ from ..errors import InvalidArgument, InvalidBody
 from ..forces.point_force import PointForce
 from ..forces.spring import Spring
 from ..forces.torque import Torque
+from ..maths.tolerances import NEGLIGIBLE
 from ..validation import vector3
 from .coordinates import Variations, chosen, stacked, transform_e
 from .equilibrium import demand_smooth
 from .nominal_motion import NominalMotion
 from .reduction import Reduced, eigenpairs
 from .steady import steady_rate
-from .tolerances import NO_INPUT
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -67,7 +67,7 @@ def inputs_of(scene, variations, given):
 
 def demand_effective(inputs, F):
     """Refuse inputs that constraints take up: columns of F (k, inputs) that are zero, but for some of a vector's."""
-    works = np.abs(F).max(axis=0, initial=0.0) > [NO_INPUT * np.abs(one.load).max(initial=0.0) for one in inputs]
+    works = np.abs(F).max(axis=0, initial=0.0) > [NEGLIGIBLE * np.abs(one.load).max(initial=0.0) for one in inputs]
     vectors = {one.whole for one, moves in zip(inputs, works, strict=True) if moves}
     for one, moves in zip(inputs, works, strict=True):
         if not moves and not (one.whole and one.whole in vectors):

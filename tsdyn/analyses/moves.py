@@ -9,6 +9,7 @@ from ..errors import SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
 from ..jit.kernels import entry
 from ..maths.matrix_rank import dependent
+from ..maths.tolerances import PIVOT_ROUNDING, TINY
 from ..model.equations import WIDTH, places, remember, set_time, with_short_rows
 from ..model.handles import all_angles, counted
 from ..rows.constraint_graph import REDUCED
@@ -16,18 +17,16 @@ from ..rows.graph_builder import graph_of, redundant_rows
 from .nominal_motion import NominalMotion, Pairs
 from .rest import Increments, Rest, SparsePattern
 from .tolerances import (
+    ACCEPTED,
     DENSE,
     FINAL,
     GOOD,
     HALVINGS,
-    LEAST_SHIFT,
     MASSLESS,
     MOST_TURN,
-    NO_STIFFNESS,
     REDUNDANT_SHARE,
     SHORT,
     SHORTER,
-    TURNED,
     WORTH,
 )
 
@@ -136,7 +135,7 @@ class Frame:
     def closed(self, q):
         """The consistent configuration next to q by Gauss-Newton steps; None where there is none."""
         q, Phi, _ = close(self.metric, q)
-        return q if np.abs(Phi).max(initial=0.0) <= TURNED * (1.0 + np.abs(q).max()) else None
+        return q if np.abs(Phi).max(initial=0.0) <= ACCEPTED * (1.0 + np.abs(q).max()) else None
 
     def left_out(self, A, q):
         """Which of the own rows are redundant at q, bool (m',); A are numbers for `rows`."""
@@ -222,7 +221,7 @@ class Moves:
     def nothing(self, reduced):
         """Stiffness, 1/s^2, that counts as zero: rounding of its terms, and apparent stiffness of residual loads."""
         left = self.unbalanced * self.rest.acceleration_scale / self.reach
-        return NO_STIFFNESS * reduced.scale + len(reduced.K_hat) * left
+        return PIVOT_ROUNDING * reduced.scale + len(reduced.K_hat) * left
 
     def size(self, u):
         """The largest shift, as a share of the reach, or turn, rad, of an increment."""
@@ -232,7 +231,7 @@ class Moves:
     def length(self, u):
         """The same over that of the longest move."""
         shift, turn = self.increments.extent(u)
-        return max(shift / self.longest, turn / MOST_TURN, LEAST_SHIFT)
+        return max(shift / self.longest, turn / MOST_TURN, TINY)
 
     def advance(self, u, factors):
         """Move by an increment, or a fraction along which loads do the predicted work; whether it moves."""

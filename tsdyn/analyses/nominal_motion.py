@@ -13,13 +13,14 @@ from ..errors import InvalidForce, SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
 from ..jit.kernels import entry
 from ..maths.matrix_rank import dependent, sparse_lu
+from ..maths.tolerances import PIVOT_ROUNDING, ROUNDING, TINY
 from ..model.equations import WIDTH, as_csr, call_jacobian, constraint_curvature, set_time, with_short_rows
 from ..model.packed import with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..rows.constraint_graph import REDUCED, are_unequal, coordinate_scales
 from ..rows.graph_builder import graph_of, redundant_rows
-from .tolerances import DENSE, LEAST_DIVISOR, REDUNDANT_SHARE, ROUNDED, SINGULAR, UNEQUAL_SWEEPS
+from .tolerances import DENSE, REDUNDANT_SHARE, UNEQUAL_SWEEPS
 
 # Derivatives of all constraints and forces, each as a block of the 14 coordinates of its two bodies.
 #
@@ -223,7 +224,7 @@ class NominalMotion:
     def _factor(self):
         self._factors, self._weights = self._factored(self.H)
         pivots = np.abs(self._factors.U.diagonal())
-        if pivots.min() < SINGULAR * pivots.max():
+        if pivots.min() < ROUNDING * pivots.max():
             raise SingularConfiguration(NOT_UNIQUE)
 
     def _factored(self, H):
@@ -232,7 +233,7 @@ class NominalMotion:
 
         unit = diags_array(1.0 / self.root)
         M, H = unit @ self.M @ unit, H @ unit
-        lengths = np.maximum(np.sqrt(H.multiply(H).sum(axis=1)), LEAST_DIVISOR)
+        lengths = np.maximum(np.sqrt(H.multiply(H).sum(axis=1)), TINY)
         H = diags_array(1.0 / lengths) @ H
         try:
             factors = sparse_lu(block_array([[M, H.T], [H, None]], format="csc"))
@@ -289,7 +290,7 @@ class NominalMotion:
     def is_balanced(self):
         """Whether the accelerations are rounding of contributions that cancel."""
         loads = max(float(np.abs(load / self.root**2).max(initial=0.0)) for load in (self.Q_A, self.Phi_q.T @ self.lam))
-        return bool(np.abs(self.qdd).max(initial=0.0) <= ROUNDED * loads)
+        return bool(np.abs(self.qdd).max(initial=0.0) <= PIVOT_ROUNDING * loads)
 
     def acceleration_scale(self, size):
         """The acceleration, m/s^2, that others are compared with: of loads, reactions, a spring stretched by size.

@@ -10,8 +10,9 @@ from ..elements.bodies import transform_g
 from ..errors import SingularConfiguration
 from ..jit.interrupts import interruptible
 from ..maths.matrix_rank import interruptible_solver, sparse_lu
+from ..maths.tolerances import NEGLIGIBLE, PIVOT_ROUNDING
 from .coordinates import stacked
-from .tolerances import NEUTRAL_ASYMMETRY, NO_STIFFNESS, SYMMETRIC, ZERO
+from .tolerances import NEUTRAL_ASYMMETRY
 
 # The linearised equations of motion, reduced to minimal coordinates x.
 #
@@ -227,9 +228,9 @@ def eigenpairs(reduced, nothing=None):
     from scipy.linalg import solve_triangular
 
     C, K, scale = reduced.C_hat, reduced.K_hat, reduced.scale
-    nothing = NO_STIFFNESS * scale if nothing is None else nothing
-    undamped = np.abs(C).max(initial=0.0) <= SYMMETRIC * np.sqrt(scale)
-    if undamped and np.abs(K - K.T).max(initial=0.0) <= SYMMETRIC * scale:
+    nothing = PIVOT_ROUNDING * scale if nothing is None else nothing
+    undamped = np.abs(C).max(initial=0.0) <= NEGLIGIBLE * np.sqrt(scale)
+    if undamped and np.abs(K - K.T).max(initial=0.0) <= NEGLIGIBLE * scale:
         values, vectors = _symmetric(K, nothing)
     else:
         values, vectors = _general(C, K, nothing)
@@ -255,7 +256,7 @@ def _general(C, K, nothing):
     kept, free = V[stiff].T, V[~stiff].T  # K x = (K kept) kept^T x
     A = np.block([[np.zeros((stiff.sum(), stiff.sum())), kept.T], [-K @ kept, -C]])
     values, vectors = interruptible(lambda: np.linalg.eig(A))
-    values = np.where(np.abs(values) <= ZERO * np.abs(values).max(initial=0.0), 0.0, values)
+    values = np.where(np.abs(values) <= NEGLIGIBLE * np.abs(values).max(initial=0.0), 0.0, values)
     speeds, places = vectors[-k:], kept @ vectors[: len(vectors) - k]
     moving = np.linalg.norm(speeds, axis=0) >= np.linalg.norm(places, axis=0) * np.abs(values) * 0.5
     shapes = np.where(moving & (np.linalg.norm(speeds, axis=0) > 0.0), speeds, places)

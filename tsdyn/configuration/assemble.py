@@ -12,22 +12,12 @@ from ..elements.bodies import named
 from ..errors import InconsistentState, InvalidArgument, InvalidBody
 from ..jit.interrupts import CollectionsDeferred
 from ..maths.matrix_rank import row_lengths
+from ..maths.tolerances import LAST_PLACE
 from ..validation import number, one_of, positive, sequence
 from .continuation import Found, Kept, approach_sketch, close, nearest, refuse, relax, stuck
 from .kinetic_metric import Metric, least_energy, least_step, rotation_vectors
 from .motor_starts import approach, demand_aligned, demand_finite, has_motors, refuse_vanished
-from .tolerances import (
-    ASSEMBLED,
-    CLEAR_FOLD,
-    FLAT_FOLD,
-    LEAST_VELOCITY_TOL,
-    POINT_LIKE,
-    SHOWN,
-    STAGES,
-    START_ROUNDING,
-    STIFFER,
-    UNFOLDED,
-)
+from .tolerances import ASSEMBLED, CLEAR_FOLD, FLAT_FOLD, INITIAL_TOL, POINT_LIKE, SHOWN, STAGES, STIFFER, UNFOLDED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -368,7 +358,7 @@ def assembled_nearby(scene, fixed, t, tol=ASSEMBLED, folds="free"):
     demand_aligned(packed, q, t)
     given, qd = _velocities(whole, q, (sketch, qd), A, Phi_q, Phi_t[whole.own])
     residual = Phi_q @ qd + Phi_t
-    _demand_compatible(scene, residual, max(tol, LEAST_VELOCITY_TOL) * (1.0 + np.abs(qd).max()))
+    _demand_compatible(scene, residual, max(tol, INITIAL_TOL) * (1.0 + np.abs(qd).max()))
     over = () if links is None else links.turned(metric, q, links.shown(metric, sketch))
     scene.place(q, qd)
     return AssemblyReport(
@@ -467,7 +457,7 @@ def _velocities(metric, q, sketch, A, Phi_q, Phi_t):
     fitted = given
     for _ in range(3):
         residual = A @ x + Phi_t
-        if np.abs(residual).max(initial=0.0) <= START_ROUNDING * (1.0 + np.abs(fitted).max()):
+        if np.abs(residual).max(initial=0.0) <= LAST_PLACE * (1.0 + np.abs(fitted).max()):
             break
         x = least_energy(metric, q, A, x, Phi_t) if exact else x + least_step(A, residual)
         fitted = metric.rates(q, x)

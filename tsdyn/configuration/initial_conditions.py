@@ -8,6 +8,7 @@ from ..errors import InvalidArgument, RedundantConstraints, SingularConfiguratio
 from ..formulations.locked_orientations import keep_turning, release_loose_bodies, still
 from ..jit.kernels import resident
 from ..maths.matrix_rank import dependent
+from ..maths.tolerances import LAST_PLACE
 from ..model.packed import is_small
 from ..observables.evaluate import constraint_arrays
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, by_lengths, coordinate_scales
@@ -47,7 +48,6 @@ from .tolerances import (
     REDUNDANT_SHARES,
     SHORTENING,
     SHORTEST_LEG,
-    START_ROUNDING,
 )
 
 # The workspace in which a start is checked; one that is idle serves the next start of the scene.
@@ -91,7 +91,7 @@ class StartWorkspace:
         far = np.abs(q)
         if is_small(size):
             far[self.at] *= size
-        control.floor = START_ROUNDING * (size + far.max())
+        control.floor = LAST_PLACE * (size + far.max())
 
     def entered(self):
         """The arrays that `enter` sets but for reals."""
@@ -303,13 +303,13 @@ class _Start:
         demand_finite(scene, Phi, H, velocity)
         demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi", (self.t, q))
         self.velocity = velocity
-        self.far = np.abs(Phi).max(initial=0.0) > START_ROUNDING * (1.0 + np.abs(q).max())
-        self.fast = np.abs(velocity).max(initial=0.0) > START_ROUNDING * (1.0 + np.abs(qd).max())
+        self.far = np.abs(Phi).max(initial=0.0) > LAST_PLACE * (1.0 + np.abs(q).max())
+        self.fast = np.abs(velocity).max(initial=0.0) > LAST_PLACE * (1.0 + np.abs(qd).max())
         return NONE if dependent == HOLDS else dependent
 
     def evaluate(self, every=1):
         """As of `evaluate_start`; HOLDS is to rounding."""
-        where, tol = self.workspace.first_parameters, min(START_ROUNDING, self.tol)
+        where, tol = self.workspace.first_parameters, min(LAST_PLACE, self.tol)
         return evaluate_start(self.context, self.q, self.qd, self.t, self.rates, every, where, tol)
 
     def is_regular(self):

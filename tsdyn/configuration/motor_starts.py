@@ -15,7 +15,7 @@ from ..model.handles import counts, handles_of
 from ..motions.elementary import Polynomial
 from ..motions.prescribed import Motion
 from ..rows.constraint_graph import MASS_REMEDY, mass_ratio
-from .tolerances import DRIVE_TURN, ELSEWHERE
+from .tolerances import DRIVE_TURN, INITIAL_TOL
 
 # Rigid displacement of one part of a scene relative to the other, across the only joint between them.
 #
@@ -231,12 +231,12 @@ def elsewhere(packed, t, q, qd=None):
         away = wanted - here if kind != "angle" or counts(joint) else joint_motion.counted(wanted - here, 0.0)
         if qd is not None:
             moves = getattr(joint_motion, kind)(one.geometry, *bodies, 1)
-        if abs(away) > ELSEWHERE * (1.0 + abs(wanted)):
+        if abs(away) > INITIAL_TOL * (1.0 + abs(wanted)):
             said.append(
                 f"{motor.title} prescribes {wanted:.9g} {unit} at t = {t:g} s, where {joint.title} stands at "
                 f"{here:.9g} {unit}: call scene.assemble(), or let the motion begin at the present {kind}."
             )
-        elif abs(moves - rate) > ELSEWHERE * (1.0 + abs(rate)):
+        elif abs(moves - rate) > INITIAL_TOL * (1.0 + abs(rate)):
             said.append(
                 f"{motor.title} prescribes {rate:.9g} {unit}/s at t = {t:g} s, where {joint.title} moves at "
                 f"{moves:.9g} {unit}/s: call scene.assemble(), or scene.set({joint.name!r}, rate={rate:.9g})."

@@ -4,25 +4,18 @@ Shares are without unit; q has m and Euler parameters side by side, so residuals
 """
 
 # --- residuals ---
-# A start whose residuals are below this share of 1 + max |q| is taken as it is: one rounding of q, so projection would
-# only exchange one rounding for another.
-START_ROUNDING = 2e-16
-# The same of a residual that Gauss-Newton steps have left: their sums round several times.
-CLOSED = 1e-15
-# Residuals of configurations that are asked for their mobility: looser than a start's, since positions may be typed.
-CONSISTENT = 1e-9
-# ... and of neighbours that were found by Gauss-Newton steps, which end at CLOSED where they converge at all.
-NEIGHBOUR_MET = 1e-10
-# Residuals Phi_q qd + Phi_t of the velocities that fit best, at least: no smaller than `initial_tol` of `simulate`.
-LEAST_VELOCITY_TOL = 1e-9
+# A start whose residuals are below LAST_PLACE of 1 + max |q| is taken as it is: projection would only exchange one
+# rounding for another. Gauss-Newton steps end at ROUNDING: their sums round several times.
+#
+# Residuals that are accepted without being told otherwise, as by `initial_tol` of `simulate`, since positions may be
+# typed: of a start's positions and velocities, of loops in files, of positions and rates of a joint beside what a motor
+# prescribes (rad, m), of configurations that are asked for their mobility, and of their neighbours.
+INITIAL_TOL = 1e-9
 
 # --- redundant rows of a start ---
 # Shares of a pivot of S in its diagonal entry below which the row is dropped, tried in turn. Pivots are squares of
 # distances between rows: inexact joint data bring them to 1e-3, rounding leaves 1e-15.
 REDUNDANT_SHARES = 1e-3, 1e-6, 1e-9, 1e-12
-# Share below which rounding may hide a redundant row from elimination without pivoting: a pivot p leaves rounding of
-# 1e-16 / p in later ones, so the smaller of the two is at most 1e-8; ten times as much for sums.
-DOUBTFUL_SHARE = 1e-7
 # Rows of a straight chain from which the share of its weakest one, an inverse cube of its links, may be rounding.
 MANY_ROWS = 50_000
 # How far a dropped row must hold on the way from the start, and at least: rad, or share of the scene's size. A row that
@@ -39,13 +32,14 @@ POINT_SIZE = 1e-3
 LISTED_ENTRIES, DENSE_ENTRIES = 1 << 20, 1 << 23
 
 # --- dependence of rows at unit length ---
-# Weight from which on a row is named among those that another depends on; rounding of weights is RANK_TOL at most.
-TAKES_PART = 1e-6
+# Weight from which on a row is named among those that another depends on; rounding of weights is RANK_TOL at most. Also
+# residual, as a share of the largest, above which a row whose derivative vanishes is named.
+NAMED_SHARE = 1e-6
 # Singular value, as a share of the largest, from which on the rows of a body are independent for sure.
 FIRM = 1e-3
 # The same below which a direction isn't corrected: by steps towards a sketch while the constraints aren't met yet, by
-# Gauss-Newton steps, by tangents. The last two are below RANK_TOL and at it.
-STEEP, SOLVED, TANGENT = 1e-6, 1e-10, 1e-7
+# Gauss-Newton steps. The latter is below RANK_TOL, which is that of tangents.
+STEEP, SOLVED = 1e-6, 1e-10
 # Distance of a unit row from the rows before it, down to which all are independent for sure: the smallest singular
 # value is hardly smaller by more than the square root of their number, and normal equations lose its square.
 PLAIN = 1e-2
@@ -55,8 +49,6 @@ SOFT = 1e-13
 # mass and inertia of light bodies, as a share of the largest: the metric of kinetic energy stays a metric, of numbers
 # whose roots are four digits apart at most.
 THIN, LIGHTEST = 1e-6, 1e-8
-# Share of the largest root of an inertia below which that of a motion is none: rounding of a direction without mass.
-NO_INERTIA = 1e-14
 
 # --- the way from a sketch ---
 # Coordinates up to which matrices are dense: with 30 bodies both ways take the same time, and dense ones know the rank.
@@ -74,8 +66,6 @@ MOST_CLOSING, MOST_SETTLING = 60, 60
 LAST_CONVERGED, STAGE_CONVERGED = 1e-6, 0.03
 # What is left of the slope, as a share of the distance, when the descent ends; and the least decrease of a step.
 SETTLED, DECREASE = 1e-11, 0.9
-# Residual, as a share of the largest, above which a row whose derivative vanishes is named.
-STUCK = 1e-6
 # Shares of the scene's size, and rad, by which a sketch is shaken where the way from it ends elsewhere; two for scenes
 # of more coordinates than MANY_COORDINATES.
 SHAKES, MANY_COORDINATES = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0), 200
@@ -101,21 +91,13 @@ LEAST_X = 1e-6
 DRIVE_TURN, DRIVE_SHARE, DRIVE_LEAST = 0.25, 0.05, 2.0**-8
 
 # --- arithmetic ---
-# The least divisor: no length that matters is so small, and zero isn't divided by.
-LEAST_DIVISOR = 1e-300
 # a = |v|, rad, below which (1 - a/2 cot(a/2)) / a^2 is its limit 1/12: the next term is a^2 / 720; the formula loses
 # eps / a^2 by cancellation.
 SMALL_ANGLE = 1e-3
-# Sine below which a rotation has no axis.
-NO_AXIS = 1e-12
 
 # --- memory ---
 # Floats of rows and factors up to which the workspace of a start is kept for the next one (8 MB): a thousand bodies.
 KEPT_START_FLOATS = 1 << 20
-
-# rad, m and their rates, relative to what a motor prescribes: a joint further away is said to stand elsewhere; initial
-# conditions are as exact (initial_tol).
-ELSEWHERE = 1e-9
 
 # |Phi| relative to 1 + max |q| that `assemble` leaves by default: rounding of Phi along closed loops, two digits more.
 ASSEMBLED = 1e-12

@@ -8,8 +8,9 @@ import numpy as np
 
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidBody
+from ..maths.tolerances import NEGLIGIBLE, TYPED
 from ..validation import close, demand_known, floats, positive, shown, vector3
-from .tolerances import INERTIA_ROUNDING, LEAST_MASS, MOST_MASS, TRIANGLE, UNIT_LENGTH
+from .tolerances import LEAST_MASS, MOST_MASS, UNIT_LENGTH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -137,16 +138,16 @@ def _inertia(value, body):
         _demand_within(scale, value, "largest moment of inertia (kg m^2)", body)
     unit = given / (scale or 1.0)  # no square or sum of its entries overflows
     skew = np.abs(unit - unit.T).max()
-    if skew > INERTIA_ROUNDING:
+    if skew > NEGLIGIBLE:
         raise InvalidBody(f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {skew * scale:.3g}.")
     principal = np.linalg.eigvalsh(unit / 2.0 + unit.T / 2.0)
     moments = principal * scale
-    if principal[0] < -INERTIA_ROUNDING or scale == 0.0:
+    if principal[0] < -NEGLIGIBLE or scale == 0.0:
         raise InvalidBody(
             f"{body.name}: the principal moments of inertia {moments} kg m^2 must not be negative, nor all "
             "zero; a body without extent is scene.add_point_mass(...)."
         )
-    if principal[2] > (principal[0] + principal[1]) * (1.0 + TRIANGLE):
+    if principal[2] > (principal[0] + principal[1]) * (1.0 + TYPED):
         raise InvalidBody(
             f"{body.name}: no body has the principal moments {moments} kg m^2: the largest exceeds the sum "
             "of the others (triangle inequality). Are products of inertia or units mixed up?"

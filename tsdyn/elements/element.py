@@ -22,7 +22,7 @@ from ..maths.vectors import IDENTITY, unit
 from ..validation import demand_known, floats, label, number
 from .bodies import Ground, PointMass, named, new_name, rotation_matrix
 from .markers import PARAMETERS, POINT, TURN, Marker, entries
-from .tolerances import OPPOSED, PARALLEL_FOUND
+from .tolerances import UNDIRECTED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -218,7 +218,7 @@ def _across(axis, direction=None):
     if direction is not None:
         along = dot(axis, direction)
         f = tuple(d - along * u for d, u in zip(direction, axis, strict=True))
-        if dot(f, f) > PARALLEL_FOUND**2 * dot(direction, direction):
+        if dot(f, f) > UNDIRECTED**2 * dot(direction, direction):
             return unit(f)
     least = min(range(3), key=lambda i: abs(axis[i]))
     return unit(cross(tuple(float(i == least) for i in range(3)), axis))
@@ -227,7 +227,7 @@ def _across(axis, direction=None):
 def _swung(u, v, d):
     """The direction d turned by the least that takes the unit vector u to v; as it is where they are opposed."""
     n, cosine = cross(u, v), dot(u, v)
-    if cosine <= -1.0 + OPPOSED:
+    if cosine <= -1.0 + UNDIRECTED:
         return d
     side, along = cross(n, d), dot(n, d) / (1.0 + cosine)
     return tuple(cosine * x + y + along * z for x, y, z in zip(d, side, n, strict=True))

@@ -9,9 +9,10 @@ from ..elements.bodies import Ground, PointMass, transform_g
 from ..elements.element import checked_parameters
 from ..elements.joint import Joint
 from ..elements.markers import POINT
-from ..elements.tolerances import INERTIA_ROUNDING, LEAST_MASS, MOST_MASS, TRIANGLE, UNIT_LENGTH
+from ..elements.tolerances import LEAST_MASS, MOST_MASS, UNIT_LENGTH
 from ..errors import TsdynError
 from ..jit.code_hash import is_ours
+from ..maths.tolerances import NEGLIGIBLE, TYPED
 from ..model.packed import SMALL, checked_motions, is_small
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
@@ -52,10 +53,10 @@ def inertias(values):
     scale = np.abs(values).max(axis=(1, 2))
     fits &= (scale >= LEAST_MASS) & (scale <= MOST_MASS)
     unit = values / scale[:, None, None]
-    fits &= np.abs(unit - unit.swapaxes(1, 2)).max(axis=(1, 2)) <= INERTIA_ROUNDING
+    fits &= np.abs(unit - unit.swapaxes(1, 2)).max(axis=(1, 2)) <= NEGLIGIBLE
     principal = np.linalg.eigvalsh(unit / 2.0 + unit.swapaxes(1, 2) / 2.0)
-    fits &= principal[:, 0] >= -INERTIA_ROUNDING
-    fits &= principal[:, 2] <= (principal[:, 0] + principal[:, 1]) * (1.0 + TRIANGLE)
+    fits &= principal[:, 0] >= -NEGLIGIBLE
+    fits &= principal[:, 2] <= (principal[:, 0] + principal[:, 1]) * (1.0 + TYPED)
     return values / 2.0 + values.swapaxes(1, 2) / 2.0, fits
 
 

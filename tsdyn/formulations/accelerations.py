@@ -9,6 +9,7 @@ from ..errors import Status
 from ..jit.kernels import callback, caller, kernel, long_kernel, stack
 from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, times
 from ..maths.dense_linalg import copy, largest
+from ..maths.tolerances import LAST_PLACE
 from ..model.equations import applied_forces
 from ..rows.interface import (
     acceleration_residuals,
@@ -26,7 +27,7 @@ from ..rows.interface import (
     weigh_bodies,
 )
 from ..workspaces import load
-from .tolerances import DAMPED, DAMPED_SHARE, EXACT, LOAD_ROUNDING, LOAD_SWEEPS, NEWTON_DONE, REFINEMENTS, SLOW_LOADS
+from .tolerances import DAMPED, DAMPED_SHARE, EXACT, LOAD_SWEEPS, NEWTON_DONE, REFINEMENTS, SLOW_FACTORS
 
 # Accelerations and multipliers on the constraint manifold, without a basis of the tangent space.
 #
@@ -300,9 +301,9 @@ def find_reactions(graph, system, f, q, qd, t):
             r.lam[e] += share * f.b[e]
         # Converged: the correction is rounding, or that of a new matrix is so small that its square is
         cold, size = size == 0.0, largest(r.lam)
-        done = has_converged(change, before, share, sweep, LOAD_ROUNDING * size)
+        done = has_converged(change, before, share, sweep, LAST_PLACE * size)
         done = done or (renew and not cold and change <= NEWTON_DONE * size)
-        renew, before = cold or sweep >= DAMPED or change > SLOW_LOADS * before, change
+        renew, before = cold or sweep >= DAMPED or change > SLOW_FACTORS * before, change
     return False
 
 

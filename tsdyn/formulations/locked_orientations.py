@@ -11,11 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.markers import PARAMETERS, VECTOR
+from ..maths.tolerances import ROUNDING
 from ..model.packed import classes
 from ..motions.prescribed import Motion
 from ..rows.graph_builder import build, graph_of, redundant_rows, with_loops
 from ..rows.interface import MOST_ROWS
-from .tolerances import HOLDING, UNIT_ROUNDING
+from .tolerances import HOLDING
 
 
 class Still(NamedTuple):
@@ -92,7 +93,7 @@ def hold(packed, q, qd):
     at = first[:, None] + np.arange(3, 7)
     p, q, qd = q[at], q.copy(), qd.copy()
     square = (p * p).sum(axis=1)
-    q[at] = np.where((np.abs(square - 1.0) > UNIT_ROUNDING)[:, None], p / np.sqrt(square)[:, None], p)
+    q[at] = np.where((np.abs(square - 1.0) > ROUNDING)[:, None], p / np.sqrt(square)[:, None], p)
     qd[at] = 0.0
     return q, qd
 

@@ -6,6 +6,7 @@ from ..elements.loops.constraint_rows import move_bodies, place_bodies
 from ..errors import Status
 from ..jit.kernels import callback, kernel, stack, vector
 from ..maths.dense_linalg import cholesky, cholesky_solve, copy, is_finite, largest, lu, lu_solve, transposed_times
+from ..maths.tolerances import SUM_ROUNDING
 from ..maths.vectors import multiply_g
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import applied_forces, is_rheonomic, set_time
@@ -33,7 +34,7 @@ from .null_space_chart import (
     solve_positions,
     tangent_map,
 )
-from .tolerances import BASIS_LOAD_ROUNDING, LOAD_SWEEPS, MASS_PIVOT
+from .tolerances import BASIS_LOAD_ROUNDING, LOAD_SWEEPS
 
 # Coupled friction and reactions in the null-space form: accelerations and multipliers are linear in the normal loads.
 #
@@ -278,7 +279,7 @@ def reduced_mass(system, w):
                 for j in range(i + 1):
                     w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
     w.counters.factorizations += 1
-    return OK if cholesky(w.A, k, MASS_PIVOT) else MASS_SINGULAR
+    return OK if cholesky(w.A, k, SUM_ROUNDING) else MASS_SINGULAR
 
 
 @kernel

@@ -11,6 +11,7 @@ from ..errors import Status
 from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import add, four, put
 from ..maths.dense_linalg import largest, largest_of
+from ..maths.tolerances import LAST_PLACE, ROUNDING
 from ..rows.interface import (
     DYNAMICS,
     constrain,
@@ -25,7 +26,7 @@ from ..rows.interface import (
     singularity_indicator,
 )
 from .chart_coordinates import largest_rates
-from .tolerances import LAND_SWEEPS, LEAST_MOVE, ROUNDING, ROUNDING_AT_MOST, SPEED_ROUNDING, STALLED, WALK
+from .tolerances import LAND_SWEEPS, ROUNDING_AT_MOST, STALLED, WALK
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
@@ -48,7 +49,7 @@ def largest_residual(graph, w, f):
 def velocity_floor(graph, w, f):
     """|Phi_q qd + Phi_t| that rounding leaves at the velocities of the poses, m/s."""
     speed, spin = largest_rates(graph, f.poses)
-    return SPEED_ROUNDING * (speed + (w.control.size if graph.turns.size == 0 else lever(w)) * spin)
+    return LAST_PLACE * (speed + (w.control.size if graph.turns.size == 0 else lever(w)) * spin)
 
 
 @long_kernel
@@ -67,7 +68,7 @@ def land(graph, system, w, f, t):
     if status == OK:
         status = _correct_positions(graph, system, w, f, t)
     # Bodies that have moved by more than rounding have another H
-    if status == OK and f.landing.moved > LEAST_MOVE * lever(w):
+    if status == OK and f.landing.moved > ROUNDING * lever(w):
         status = factorise(graph, system, w, f, t)
     elif status == OK and f.landing.moved == 0.0:
         w.counters.at_rounding += 1

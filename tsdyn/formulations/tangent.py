@@ -35,16 +35,7 @@ from .chart_coordinates import (
 )
 from .chart_validity import every_level_holds, reason_to_leave, set_base_point
 from .projection import largest_residual, velocity_floor
-from .tolerances import (
-    CONTRACTION_LOST,
-    CURVATURE,
-    RENEWALS,
-    ROUNDING_AT_MOST,
-    SLOW,
-    SLOW_VELOCITIES,
-    STALLED,
-    SWEEPS,
-)
+from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, ROUNDING_AT_MOST, SLOW, SLOW_FACTORS, STALLED, SWEEPS
 
 # Error norm of the tangent form: errors of chart coordinates without their normal part, in terms of q and qd.
 
@@ -269,7 +260,7 @@ def solve_velocities(graph, system, w, f, l, t):
             w.counters.kept += 0 if factored else 1
             return True
         # S is too far from N
-        if not factored and worst > SLOW_VELOCITIES * before:
+        if not factored and worst > SLOW_FACTORS * before:
             if not factorise_normal(graph, w, f, l):
                 return False
             lower, upper, factored = l.lower, l.upper, True

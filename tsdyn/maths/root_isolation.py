@@ -16,7 +16,7 @@ from .tolerances import (
     EXTREME,
     MOST_SCALED,
     NEAR_ZERO,
-    NO_NOISE,
+    NEGLIGIBLE,
     NOISE_RATIO,
     REAL,
     ROUGH_SHARE,
@@ -211,7 +211,7 @@ class Search:
         while half < WIDEST_NOISE * (fit.b - fit.a):
             rough = table(8).coefficients[5:] @ self._values(t + half * table(8).nodes)
             found = min(found, 10.0 * float(np.abs(rough).max()))
-            if found <= NO_NOISE * fit.scale or half == least:
+            if found <= NEGLIGIBLE * fit.scale or half == least:
                 break
             half = max(NOISE_RATIO * half, least)
         return found if found < np.inf else 0.0

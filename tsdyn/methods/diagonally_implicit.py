@@ -29,7 +29,7 @@ from .tolerances import (
     LEAST_FIXED,
     MATRICES,
     RESIDUAL_FLOOR,
-    SAME_G,
+    SAME_STEP,
     SAME_TIME,
     SLIP_LEFT,
     SLOW_DENSE,
@@ -310,7 +310,7 @@ def _renew_if_needed(context, c, t, g, f):
     one.eager = 0
     off_chart = not sparse and numbers.chart != c.work.counters.charts
     poor = one.measured == 1 and one.theta > max(one.limit, numbers.slow)
-    stale = eager or off_chart or abs(g - numbers.g) > SAME_G * g
+    stale = eager or off_chart or abs(g - numbers.g) > SAME_STEP * g
     if not (stale or poor):
         return True
     if not stale:

@@ -3,10 +3,6 @@
 Sizes of corrections are error norms: 1 is the step's tolerance. Contraction is the ratio of two such sizes in a row.
 """
 
-# Residual of an order condition of a tableau, relative to the size of its terms: rounding of coefficients that are
-# written as quotients of integers.
-ORDER_CONDITION = 1e-14
-
 # Corrections of a stage at most: as many as KAPPA takes at a contraction of 0.7, and some after a new matrix. With
 # fixed steps, which can't be shortened, as many as rounding takes at a contraction of 0.4.
 ITERATIONS, FIXED_ITERATIONS = 20, 40
@@ -55,11 +51,11 @@ WORSE_CONTRACTION = 2.0
 # one stage, but one step where iterations diverged: matrices of overdamped springs that turn serve one stage only.
 EAGER_STAGES, EAGER_SPARSE, EAGER_LOST = 30, 1, 6
 
-# Relative change of g = h a_ii up to which the factors of P are tried again. A damped stiff mode contracts by
+# Relative change of g = h a_ii, or of h, up to which the factors of P are tried again. A damped stiff mode contracts by
 # |1 - g / g_P|, so the first correction of a stage is nearly always good enough: chains take half the iterations that
 # they take with 0.3, with 0.1 or 0.005 10 or 2 % more. With 0.3 the null-space form takes a sixth more steps, too: the
 # error estimate is filtered by the same factors.
-SAME_G = 0.02
+SAME_STEP = 0.02
 
 # Correction, relative to 1 + size, that is rounding of v and vd: 18 units in the last place of f evaluated by a
 # factorised matrix. Residuals within AT_FLOOR of it that no longer contract are rounding, too.
@@ -81,6 +77,3 @@ COUPLED_ITERATIONS, KAPPA_COUPLED, SLOW_COUPLED, TRUSTED = 12, 3e-3, 0.1, 0.3
 
 # Corrections that no longer contract, relative to 1 + size: below it they are rounding of large forces.
 STALLED_CORRECTION = 2e-12
-
-# Relative change of the step up to which matrices are kept.
-SAME_STEP = 0.02

@@ -9,10 +9,10 @@ import numpy as np
 from ..elements.bodies import PointMass, named
 from ..elements.element import Attachment, angles, displacements
 from ..elements.force import Force
-from ..elements.tolerances import SAME_COORDINATE
 from ..errors import InvalidBody, InvalidConstraint
 from ..jit.kernels import twin
 from ..maths import vectors
+from ..maths.tolerances import TYPED
 from . import joint_turns
 
 # Values, rates and accelerations of joint coordinates on a motion (q, qd, qdd), in plain Python.
@@ -280,7 +280,7 @@ def _driven(motor, joint):
     (own,) = getattr(motor, kind)
     for i, geometry in enumerate(getattr(joint, kind)):
         same = geometry[:2] == own[:2]
-        if same and np.allclose(geometry[2:], own[2:], rtol=SAME_COORDINATE, atol=SAME_COORDINATE):
+        if same and np.allclose(geometry[2:], own[2:], rtol=TYPED, atol=TYPED):
             yield DrivenCoordinate(motor, joint, geometry, joint.first + i if kind == "angles" else -1)
 
 

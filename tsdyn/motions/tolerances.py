@@ -3,19 +3,14 @@
 # Of the time: knots, stops and instants that are nearer to each other are one (some 50 roundings); of the run's length,
 # the time that this is at least a share of.
 TOGETHER, LEAST_SPAN = 1e-14, 1e-3
-# Of the largest value or rate at a knot: smaller differences between its sides are rounding of data.
-JUMP = 1e-9
-# Of the largest value, over the shortest piece at a knot, s: the rounding error of a rate.
-RATE_ROUNDING = 1e-12
 
 # Derivatives given as functions are compared with quotients over these shares of the run's length (at most 1 s each),
-# four points each; of the largest value, the noise that a function may have; of both sizes, an error that is no slip.
+# four points each; of both sizes, an error that is no slip.
 QUOTIENT_STEPS = (1e-2, 1e-3, 1e-4, 1e-5)
-QUOTIENT_NOISE = 1e-9
 QUOTIENT_ERROR = 1e-3
 
-# A traced function's values are those of the function but for rounding, relative to 1 + size; times (s) at which one of
-# time is compared.
+# Noise that a function may have, relative to 1 + size: a traced function has the same values but for it; times (s) at
+# which a function of time is compared.
 SAME_VALUE = 1e-9
 TIMES = (0.37, 1.3, 11.0)
 

@@ -20,7 +20,8 @@ import numpy as np
 
 from ..elements.markers import POINT
 from ..jit.kernels import Record, records
-from .tolerances import GIVEN, MASSLESS, NONE, RAISED, THIN
+from ..maths.tolerances import SUM_ROUNDING
+from .tolerances import GIVEN, MASSLESS, RAISED, THIN
 
 
 class Axis(Record):
@@ -75,7 +76,7 @@ def lean_bodies(packed):
     # Axes below their limit; what is rounding of zero counts as zero
     for i in np.flatnonzero(size[:, 0] < least):
         few = size[i] < least[i]
-        true = np.where(size[i, few] > NONE * size[i, 2], size[i, few], 0.0)
+        true = np.where(size[i, few] > SUM_ROUNDING * size[i, 2], size[i, few], 0.0)
         found[int(rigid[i])] = Lean(axes[i].T[few], true, given[i])
     return found
 

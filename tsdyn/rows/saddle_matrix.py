@@ -10,12 +10,12 @@ from ..elements.loops.forces import kept_size
 from ..elements.loops.template import AT, DIMENSION
 from ..jit.kernels import Record, complex_vector, data_of, kernel, records, stack
 from ..jit.simd import let
+from ..maths.tolerances import SUM_ROUNDING
 from ..model.packed import members_of
 from .elimination import factor_lu, solve_lu, with_kernels
 from .massless_axes import lean_bodies
 from .schur_complement import more
 from .symbolic import Pattern, analyse, fill_reducing_order, lay_out_in_order
-from .tolerances import SADDLE_PIVOT
 
 # Order of elimination of the saddle-point matrix of bodies and constraint rows.
 #
@@ -414,7 +414,7 @@ def _write_axes(s):
 @kernel
 def factorise_saddle(s):
     """Factorise the saddle-point matrix; return True if it is nonsingular."""
-    return factor_lu(s.graph.pattern, s.lower, s.upper, SADDLE_PIVOT) < 0
+    return factor_lu(s.graph.pattern, s.lower, s.upper, SUM_ROUNDING) < 0
 
 
 @kernel
@@ -429,7 +429,7 @@ def factorise_complex_saddle(s, pair):
     size = s.graph.pattern.shape[2]
     lower = complex_vector(data_of(s.complex_lower[pair]), size)
     upper = complex_vector(data_of(s.complex_upper[pair]), size)
-    return factor_lu(s.graph.pattern, lower, upper, SADDLE_PIVOT) < 0
+    return factor_lu(s.graph.pattern, lower, upper, SUM_ROUNDING) < 0
 
 
 @kernel

@@ -5,13 +5,6 @@ row that is orthogonal to the rows before it in the metric W, in general the squ
 makes with them.
 """
 
-# Share: below it the pivot counts as zero. The angle is 3e-7 rad.
-ZERO_PIVOT = 1e-13
-
-# Pivot of the saddle-point matrix over the diagonal entry, of bodies: below it the matrix is singular. A hundred
-# roundings.
-SADDLE_PIVOT = 1e-14
-
 # Share: below it rows are dropped where a given number must be dropped; while too many fall below it, it is multiplied
 # by FEWER. The first share, an angle of 0.03 rad, parts redundant rows from others unless the configuration is nearly
 # singular.
@@ -25,8 +18,10 @@ WORSE = 0.1
 # hold (docs/theory.md). Points and axes that are typed with ten digits hold. Laws of random scenes have 1e-9, but may
 # count the terms of a rotation as less than half.
 HELD = 2e-10
-# Terms of a row count as at least this fraction of the largest in the scene: smaller ones are themselves rounding.
-LEAST_TERM = 1e-3
+# Terms of a row, and arms of a body's joints, count as at least this share of the largest in the scene: smaller terms
+# are themselves rounding, and rotations of bodies with short arms, or none, are as visible as the longest allow. Pivots
+# are squares of it, far above rounding.
+LEAST_SHARE = 1e-3
 # Velocities of a scene at rest over those of a fall through its extent under its loads; rates over that extent (1/s, or
 # 1/s^2 for accelerations): smaller ones are rounding.
 RESTING, NO_RATE = 1e-9, 1e-20
@@ -66,9 +61,6 @@ PIVOTS_COST, NUMBER_COST, PRODUCT_COST, UPDATE_COST, LINK_COST = 49.0, 2.4, 0.24
 LOOKUP = 1.1  # cost of one block over that of its parts up to which they are merged: what parts look up isn't in it
 
 # --- the metric of lengths
-# Arm of a body's joints over the longest in the scene, at least: rotations of bodies with short arms, or none, are as
-# visible as the longest allow. Pivots are squares of it, far above rounding.
-LEAST_ARM = 1e-3
 # Ratio of masses, or of the largest inertias of bodies, above which factors of S lose as many digits: the start is
 # looked at once more, and multipliers of series are refined.
 UNEQUAL_MASSES = 1e4
@@ -84,4 +76,3 @@ THIN = 1e-6
 # to rounding, and all moments below the second, its root, are raised. Radau takes shorter steps then.
 MASSLESS, RAISED = 1e-12, 1e-8
 GIVEN = 0.1  # the raised moment of inertia J over the same: a condition of ten
-NONE = 1e-14  # moment of inertia over the largest about the centroid: less is rounding of the eigenvalues, and zero

@@ -6,9 +6,10 @@ from operator import lt
 import numpy as np
 
 from ..errors import InvalidArgument
+from ..maths.tolerances import EPS, NEGLIGIBLE
 from ..methods.integrator import Integrator, is_own, registered
 from ..validation import FEW, checked_once, finite_vector, floats, number, shown, unknown_name
-from .tolerances import EPS, FROM_ZERO, SAME_COUNT, SHORTEST
+from .tolerances import FROM_ZERO, SHORTEST
 
 TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
 NO_TIMES = np.empty(0)
@@ -58,7 +59,7 @@ def step_count(t0, t1, step):
     count = (t1 - t0) / step
     if not count < 2**53 or t0 + step == t0:
         raise InvalidArgument(f"the step of {step:g} s is too small for the interval ({t0:g}, {t1:g}).")
-    return max(1, math.ceil(count - max(SAME_COUNT * count, EPS * max(abs(t0), abs(t1)) / step)))
+    return max(1, math.ceil(count - max(NEGLIGIBLE * count, EPS * max(abs(t0), abs(t1)) / step)))
 
 
 def demand_steps_seen(method, t0, t1):

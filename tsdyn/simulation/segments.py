@@ -18,6 +18,7 @@ from ..runs.driver import SegmentLink, begin, run
 from ..runs.run_log import NAMES, ChartLog, RunEnd, StepLog
 from ..runs.step_engine import StepEngine
 from ..runs.task import Outcome
+from ..runs.tolerances import SLIVER
 from ..taylor.series_engine import SeriesEngine
 from ..validation import damaged, demand, demand_numbers, is_count
 from .local_origin import within_rounding
@@ -29,7 +30,6 @@ from .tolerances import (
     FIRST_WINDOW,
     GOT_ON,
     LOOSEST,
-    NO_STEP,
     PASSES,
     PATIENCE,
     REGULAR,
@@ -40,7 +40,6 @@ from .tolerances import (
     SHARP_COST,
     STEP_EVALUATIONS,
     STIFF_SAFETY,
-    TRIAL,
     TRIED,
 )
 
@@ -163,7 +162,7 @@ class Turns:
 
     def _pays(self, rate, t):
         """Whether what is left at this rate is worth a turn."""
-        return rate * (self.end - t) > self._cost * TRIAL * STEP_EVALUATIONS
+        return rate * (self.end - t) > self._cost * TRIED * STEP_EVALUATIONS
 
     def _back(self, memory, steps, rate):
         """Whether the explicit method is to go on: it would take less work for the rest, or is to be tried.
@@ -293,7 +292,7 @@ class Carrier:
     def _next(self):
         """Return the next time of the grid."""
         done = (self.run.clock.t - self.origin) / self.step
-        return min(self.origin + math.ceil(done + NO_STEP) * self.step, self.end)
+        return min(self.origin + math.ceil(done + SLIVER) * self.step, self.end)
 
 
 # Segments of a run, each by one method: what a segment begins with, and how all of them make one outcome.

@@ -11,11 +11,11 @@ import numpy as np
 
 from ..errors import TsdynError
 from ..integrators import DOP853, Nystrom4, Taylor
+from ..maths.tolerances import EPS
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
 from .gallery.cases import Case
 from .laws import energy_left, findings, resumed_is_same, same_bits
-from .tolerances import EPS
 
 TOLERANCE = 1e-15, 1e-12  # of Taylor, and of the other method
 OUTPUTS = 129  # output times of a run

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InvalidArgument
 from ..integrators import Nystrom4
+from ..maths.tolerances import EPS
 from .laws import (
     Finding,
     energy_left,
@@ -22,7 +23,7 @@ from .laws import (
     resumed_is_same,
     same_bits,
 )
-from .tolerances import EPS, FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, SHORTER, TIGHTER
+from .tolerances import FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, SHORTER, TIGHTER
 
 FEW = 20  # bodies
 DEFAULT = 1e-8  # rtol, and atol, of a run without one

@@ -5,10 +5,11 @@ import math
 from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R, orient
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..elements.loops.law_check import call_margin
-from ..formulations.tolerances import LAND_SWEEPS, ROUNDING, ROUNDING_AT_MOST, STALLED, WALK
+from ..formulations.tolerances import LAND_SWEEPS, ROUNDING_AT_MOST, STALLED, WALK
 from ..jit.kernels import kernel, long_kernel, specialised
 from ..jit.lanes import any_of, below, binary_log, binary_power, both, choose, either, every, floor, opposite
 from ..jit.simd import add, first, fma, four, fourth, get, larger, let, put, second, splat, sub, third, times, total
+from ..maths.tolerances import ROUNDING, TINY
 from ..rows.interface import (
     DYNAMICS,
     ILL_CONDITIONED,
@@ -18,7 +19,7 @@ from ..rows.interface import (
     find_correction,
 )
 from ..runs.step_control import stretch
-from ..runs.tolerances import FROM_ZERO, SHORTEST
+from ..runs.tolerances import FROM_ZERO, HALVED, SHORTEST
 from . import coefficients
 from .coefficients import put_sum
 from .lane_memory import (
@@ -48,9 +49,7 @@ from .step_end import keep_start, project_rates
 from .step_length import largest_of_three, size_of_order
 from .tolerances import (
     FAINT_LOGARITHM,
-    HALVED,
     HALVINGS,
-    LEAST_SIZE,
     MISSED,
     MOST_PARTS,
     NO_STEP,
@@ -352,7 +351,7 @@ def _radii(c, least, most, far, fast):
         size = size_of_order(x.bodies, nb, x.order.room, k, far, fast)
         own = below(k - 1.5, top)
         finite = choose(both(own, below(-1.0, 0.0 * size)), finite, choose(own, 0.0, finite))
-        here = choose(below(LEAST_SIZE, size), binary_log(max(size, LEAST_SIZE)) * (-1.0 / k), math.inf)
+        here = choose(below(TINY, size), binary_log(max(size, TINY)) * (-1.0 / k), math.inf)
         # Orders top + 1 to top - 2
         rho = choose(both(own, below(top - 2.5, k)), min(rho, here), rho)
         # Orders top - 1 to top - 4, for two orders less
@@ -361,7 +360,7 @@ def _radii(c, least, most, far, fast):
     likely = 0.0 * top - math.inf  # log2 of coefficient top + 1, from those of orders 4 and 5
     for k in range(4, 6):
         size = size_of_order(x.bodies, nb, x.order.room, k, far, fast)
-        here = choose(below(0.0, size), binary_log(max(size, LEAST_SIZE)) * ((top + 1.0) / k), -math.inf)
+        here = choose(below(0.0, size), binary_log(max(size, TINY)) * ((top + 1.0) / k), -math.inf)
         likely = max(likely, here)
     finite = choose(both(below(-math.inf, likely), below(likely, FAINT_LOGARITHM)), 0.0, finite)
     return choose(below(0.5, finite), rho, -math.inf), lower

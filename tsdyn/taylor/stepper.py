@@ -7,6 +7,7 @@ from ..errors import Status
 from ..formulations.chart_validity import AT_START, BY_SERIES, extent
 from ..jit.kernels import entry, kernel, long_kernel
 from ..maths.dense_linalg import copy, is_finite
+from ..maths.tolerances import TINY
 from ..model.equations import remember, set_time
 from ..model.joint_turns import count_turns
 from ..motions.tolerances import SAMPLES
@@ -15,7 +16,7 @@ from ..runs.dense_output import head_block, is_wanted_before, record, record_end
 from ..runs.run_log import close_chart, is_full, no_log, note_accepted, note_try, open_chart
 from ..runs.step_control import gets_on, stretch
 from ..runs.stepper import amend, fixed_end, is_sampled, next_stop, take_pieces
-from ..runs.tolerances import AT_LONGEST, FROM_ZERO, SHORTEST, TRIES
+from ..runs.tolerances import AT_LONGEST, FROM_ZERO, HALVED, MOST_TURN, SHORTEST, TRIES
 from ..workspaces import B_DATA, load_run
 from .layout import load_series
 from .step_length import finite_top, is_near, longest, loosest, radius, step_length, weights
@@ -28,7 +29,6 @@ from .tolerances import (
     CLOSER,
     COARSE,
     FASTER,
-    HALVED,
     HOP,
     HOP_APART,
     LEAST_STEPS,
@@ -36,8 +36,6 @@ from .tolerances import (
     MINUTE,
     MISSED,
     MOST_HOPS,
-    MOST_TURN,
-    NO_SPEED,
     PASSED,
     PLACES,
     RATES,
@@ -150,7 +148,7 @@ def _propose(c, r, tol):
         s.h *= min(1.0, RATES * s.h / (order.top + 2)) ** (1.0 / (order.top + 2))
         s.limit = min(s.limit, (r.clock.t_end - r.clock.t_origin) / LEAST_STEPS)
     if c.system.memory.size > 0:  # what counts turns must see each of them
-        s.limit = min(s.limit, MOST_TURN / max(_fastest(c), NO_SPEED))
+        s.limit = min(s.limit, MOST_TURN / max(_fastest(c), TINY))
     if r.numbers.steps == 0 and r.clock.h > 0.0:
         s.limit = min(s.limit, r.clock.h)
     s.h = min(s.h, s.limit)

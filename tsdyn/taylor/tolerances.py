@@ -14,17 +14,11 @@ FAINT, VAST = 1e-280, 1e280
 # convergence was overestimated.
 MISSED = 100.0
 
-# rad of the fastest body in a step where joint angles are counted by forces: two steps a turn would do.
-MOST_TURN = 1.0
-
 # Parts of a step in which Euler parameters are followed, one for each radian, at most.
 MOST_PARTS = 100.0
 
 # d0^2 of the rotation of a step, above which p follows from its increment: 2 rad.
 WIDE = 0.3
-
-# Factor of a step whose end was not reached.
-HALVED = 0.5
 
 # Velocity error over position error, 1/s, up to which only the latter limits the steps of sharp forces. Such steps can
 # be very short, and the velocity error is the position error over the step.
@@ -44,9 +38,6 @@ COARSE = 1e-3
 # forces are bounded there, so its error is rounding. Within HOP_APART lengths of the one before, such a step is
 # twice as long; after MOST_HOPS of them the run ends: the motion comes to rest there.
 HOP, MOST_HOPS, HOP_APART = 16.0, 8, 1e3
-
-# Angular velocity (rad/s) that counts as none.
-NO_SPEED = 1e-300
 
 # --- stiffness -------------------------------------------------------------------------------------------------------
 # rad, and part of the scene's size: after SMALL_STEPS successive steps in which no body rotates or moves by more, the
@@ -101,8 +92,6 @@ FAR = 1 << 15
 
 # Thresholds of lanes.
 
-# Size of a coefficient, over its weight, that counts as zero: it doesn't determine the radius of convergence.
-LEAST_SIZE = 1e-300
 # log2 of the size of the last coefficient below which it loses digits, as FAINT of taylor/tolerances.py.
 FAINT_LOGARITHM = -930.0
 # s: the length of a step without a radius of convergence, which ends the lane.

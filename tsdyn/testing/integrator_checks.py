@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import CheckFailed, InvalidArgument, StepFailure
 from ..formulations.registry import FORMULATIONS
+from ..maths.tolerances import EPS
 from ..methods.integrator import Integrator
 from ..observables.diagnostics import ConstraintError, constraint_error
 from ..simulation.simulate import simulate
@@ -18,7 +19,6 @@ from .tolerances import (
     BY_ORDER,
     COARSEST,
     DENSE_TOLERANCE,
-    EPS,
     FACTOR,
     FEWEST,
     FINEST,

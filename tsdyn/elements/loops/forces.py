@@ -3,9 +3,10 @@
 import math
 
 from ...jit.kernels import ANY, complex_stack, integers, kernel, part, stack, stack2, vector
+from ...maths.tolerances import COMPLEX_STEP
 from ...maths.vectors import matrix_a
 from ..markers import PARAMETERS
-from ..tolerances import FORCE_QUOTIENT, FORCE_STEP
+from ..tolerances import FORCE_QUOTIENT
 from .template import (
     ALONG,
     AT,
@@ -153,11 +154,11 @@ def _complex_slope(z, zd, along, c, par, t, g, slope):
         g[r] = 0.0
     # Im f(x + i h) / h = f' + O(h^2), without cancellation
     here = along[c]
-    along[c] = complex(here.real, FORCE_STEP)
+    along[c] = complex(here.real, COMPLEX_STEP)
     kernel_law(z, zd, par, t, g)
     along[c] = here
     for r in range(SIZE):
-        slope[r, c] = g[r].imag / FORCE_STEP
+        slope[r, c] = g[r].imag / COMPLEX_STEP
 
 
 def complex_steps(x, xd, par, t, fx, fxd):

@@ -18,10 +18,11 @@ none of them vanishes within the step, and nothing else is evaluated. Past a zer
 
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, vector
 from ...jit.simd import first, fma, four, get, let, put, second, splat, third, times
+from ...maths.tolerances import PIVOT_ROUNDING
 from ...motions.tracing import LENGTH as PROGRAM_LENGTH
 from ...motions.tracing import T
 from ..markers import PARAMETERS, POINT, TURN
-from ..tolerances import LAW_NOISE, LAW_TOLERANCE
+from ..tolerances import LAW_TOLERANCE
 from .constraint_series import BODY_ROW, S_OMEGA
 from .force_series import BODY, INTS, MASK, marker_coefficient, run_traced, scratch_rows
 from .friction import load_at
@@ -84,7 +85,7 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
         for k in range(known):
             terms = max(terms, abs(power * values[forces + 4 * k + i]))
             power *= tau
-    return not off <= max(LAW_NOISE, limits[ATOL] + limits[RTOL]) * terms
+    return not off <= max(PIVOT_ROUNDING, limits[ATOL] + limits[RTOL]) * terms
 
 
 @kernel

@@ -52,7 +52,7 @@ def fill_blocks(s, x, lam, rows, Q_q, Q_qd, kept):
     for i in range(s.forces.shape[0]):
         kind = s.forces[i]
         table, reals, own = s.table[kind.table :], s.reals[kind.reals :], kept[kind.kept :]
-        call_jacobian(kind.jacobian, kind.count, kind.stride, table, reals, x[0], x[1], t, 14, Q_q, Q_qd, 1, own)
+        call_jacobian(kind.jacobian, kind, table, reals, x[0], x[1], t, Q_q, Q_qd, 1, own)
 
 
 class Pairs:
@@ -68,8 +68,7 @@ class Pairs:
 
     def __init__(self, packed):
         self.packed = packed
-        whole = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
-        system, self._size = whole
+        system, self._size = with_force_jacobians(packed._replace(system=with_curvatures(packed)), WIDTH)
         constraints, forces = _entries(system, system.kinds, INTS), _entries(system, system.forces, FORCE_INTS)
         constraints = constraints[np.argsort(constraints[:, 1 + ROW], kind="stable")]
         places = np.concatenate((constraints[:, 1 + AT : 5 + AT], forces[:, 1 + AT : 5 + AT]))

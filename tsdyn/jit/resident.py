@@ -167,6 +167,22 @@ def _type_of(value):
     return _type_of_record(value, None)
 
 
+def record_at(layout):
+    """Make the kernel that gives sight of a `Record` of a layout by its address."""
+    if DEBUG:
+        return lambda value: value
+    kind = _type_of_record(layout(), None)
+
+    @intrinsic
+    def view(typing, address):
+        def generate(context, builder, signature, arguments):
+            return builder.inttoptr(arguments[0], context.get_value_type(kind))
+
+        return kind(types.int64), generate
+
+    return view
+
+
 def loader(example):
     """Make the kernel that gives sight of a named tuple of example's type by its address.
 

@@ -275,13 +275,11 @@ def _body_loop(count, stride, table, reals, poses, unused, t, out, H):
     return status
 
 
-def _series(mode, k, orders, count, stride, size, table, reals, bodies, values, b, Z):
+def _series(mode, k, kind, table, reals, bodies, values, b, Z):
     header = integers(table - 8 * HEADER, HEADER)
     notes = integers(header[T_NOTES], ANY)
     _enter(notes, header[T_SLOT] + (IN_ORDERS + mode) * ROLES, ROWS)
-    status = call_series(
-        header[T_LOOPS + IN_ORDERS], mode, k, orders, count, stride, size, table, reals, bodies, values, b, Z
-    )  # fmt: skip
+    status = call_series(header[T_LOOPS + IN_ORDERS], mode, k, kind, table, reals, bodies, values, b, Z)
     _leave(notes)
     return status
 

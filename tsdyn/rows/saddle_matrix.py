@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.loops.coordinate_rows import INTS as CONSTRAINT_INTS
-from ..elements.loops.forces import FORCE_INTS as FORCE_INTS
-from ..elements.loops.forces import kept_size
+from ..elements.loops.forces import FORCE_INTS, SPAN, kept_size
 from ..elements.loops.template import AT, DIMENSION
 from ..jit.kernels import Record, complex_vector, data_of, kernel, records, stack
 from ..jit.simd import let
@@ -176,12 +175,14 @@ class Block(Record):
 
 
 class SaddleInstance(Record):
-    """A force or a constraint, its two bodies and the blocks that it adds to."""
+    """A force or a constraint, its two bodies and the blocks that it adds to; it begins as a `ForceExtent`."""
 
-    loop: int  # address of forces.jacobian, or of constraint_hessians.loop
+    count: int  # one
+    stride: int  # reals
+    columns: int  # of both bodies
+    loop: int  # address of forces.jacobian, or of constraint_hessians.geometric_stiffness
     rows_loop: int  # of a constraint: address of coordinate_rows.jacobian
-    stride: int  # floats, and where they begin
-    reals: int
+    reals: int  # where they begin
     at_a: int  # where the coordinates of its bodies begin, and how many they are
     at_b: int
     size_a: int
@@ -291,8 +292,8 @@ class _Builder:
                 pair = tuple(
                     self.body_of[at] if length else GROUND for at, length in zip(own[:2], own[2:], strict=True)
                 )
-                loops, reals = (kind.jacobian, 0), (kind.stride, kind.reals + kind.stride * i)
-                found.append((pair, (*loops, *reals, *own, kind.kept + size * i, 0, 0)))
+                extent, reals = (1, kind.stride, SPAN), kind.reals + kind.stride * i
+                found.append((pair, (*extent, kind.jacobian, 0, reals, *own, kind.kept + size * i, 0, 0)))
         return found
 
     def _constraints(self):
@@ -307,8 +308,9 @@ class _Builder:
             if constraint.normalises or e is None:
                 continue
             pair = tuple(self._body(b) for b in self.graph.sides[e])
-            own, reals = self._places(kind.table + CONSTRAINT_INTS * i), (kind.stride, kind.reals + kind.stride * i)
-            found.append((pair, (kind.curvature, kind.jacobian, *reals, *own, 0, e, constraint.rows)))
+            own, reals = self._places(kind.table + CONSTRAINT_INTS * i), kind.reals + kind.stride * i
+            loops = kind.stiffness, kind.jacobian
+            found.append((pair, (1, kind.stride, SPAN, *loops, reals, *own, 0, e, constraint.rows)))
         return found
 
     def _instance(self, pair, values):

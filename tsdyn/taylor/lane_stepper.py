@@ -481,10 +481,7 @@ def _keep_away(c, most):
         if kind.margin != 0:
             # Share of what laws divide by
             let(s, LEFT, 0.0 * get(s, H) + 1.0)
-            call_margin(
-                kind.margin, kind.count, kind.stride, kind.width, x.order.room, most, s[H:],
-                x.loads[kind.values :], s[LEFT:],
-            )  # fmt: skip
+            call_margin(kind.margin, most, kind, s[H:], x.loads[kind.values :], s[LEFT:])
             short = below(STIFF_RATES * get(s, H), get(s, TOP))
             _find_lost(c, opposite(below(choose(short, STILL, 0.0 * get(s, H)), get(s, LEFT))))
 

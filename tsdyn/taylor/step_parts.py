@@ -196,8 +196,8 @@ def _is_off(c, i, limits):
     x, kind = c.expansion, c.expansion.forces[i]
     limits[MOST] = OFF if kind.sharp == 1 else OFF_SELDOM
     off = call_check(
-        kind.check, kind.run, kind.count, kind.stride, kind.width, x.order.room, x.order.top, limits,
-        x.table[kind.table :], c.system.reals[kind.reals :], x.bodies, x.loads[kind.values :], c.graph.inverse,
+        kind.check, kind.run, x.order.top, kind, limits, x.table[kind.table :], c.system.reals[kind.reals :],
+        x.bodies, x.loads[kind.values :], c.graph.inverse,
     )  # fmt: skip
     return off != 0
 
@@ -219,10 +219,7 @@ def _may_differ(c, t, limits):
         # sum_{k>0} |a_k| h^k < a_0 leaves a share of a_0: none of what the law divides by vanishes
         if kind.margin != 0:
             left[0] = 1.0
-            call_margin(
-                kind.margin, kind.count, kind.stride, kind.width, x.order.room, x.order.top, limits[LENGTH:],
-                x.loads[kind.values :], left,
-            )  # fmt: skip
+            call_margin(kind.margin, x.order.top, kind, limits[LENGTH:], x.loads[kind.values :], left)
             kind.near = 0 if left[0] > (STILL if is_short else 0.0) else 1
             if not left[0] >= c.trial.left:
                 c.trial.left = left[0]

@@ -41,6 +41,7 @@ from .template import (
     SLOTS,
     STARTS,
     TRACED,
+    extent,
     kernel_inputs,
     kernel_series,
 )
@@ -120,10 +121,12 @@ def run_traced(run, program, x, xd, par, k, rows, orders, scratch):
     call_order(run, program, scratch, rows, orders, k)
 
 
-def series(run, k, orders, count, stride, size, table, reals, bodies, values, poses, Z):
+def series(run, k, kind, table, reals, bodies, values, poses, Z):
     """Order k of the forces, onto the bodies' Z; p_0 from the poses."""
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
     values, poses, Z = vector(values, ANY), vector(poses, ANY), vector(Z, ANY)
+    kind = extent(kind)
+    count, stride, size, orders = kind.count, kind.stride, kind.width, kind.orders
     x, xd, f = stack(ROOM), stack(ROOM), stack(ROOM)
     wide, body_size = 4 * orders, BODY_ROW * orders
     own_scratch, rows = 2 * MARKERS * wide, scratch_rows(stride, values)

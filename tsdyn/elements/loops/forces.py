@@ -2,7 +2,7 @@
 
 import math
 
-from ...jit.kernels import ANY, complex_stack, integers, kernel, part, stack, stack2, vector
+from ...jit.kernels import ANY, Record, complex_stack, integers, kernel, part, record_at, stack, stack2, vector
 from ...maths.tolerances import COMPLEX_STEP
 from ...maths.vectors import matrix_a
 from ..markers import PARAMETERS
@@ -107,7 +107,7 @@ def turn_block(code_row, code_column, r, kept, size, row, column, out):
 # central differences where it is not analytic. `force.callbacks` supplies the names in capitals and kernel_*.
 
 FORCE_INTS = 4  # of a kind's table for each instance: template.AT and DIMENSION
-JACOBIAN = "iippppdippip"  # count, reals per instance, table, reals, q, qd, t, n, Q_q, Q_qd, renew, kept
+JACOBIAN = "pppppdppip"  # extent, table, reals, q, qd, t, Q_q, Q_qd, renew, kept
 SPAN = 14  # coordinates of two bodies
 FRAME = 7  # floats of an instance's frame: Euler parameters of a body, or a direction
 
@@ -282,15 +282,27 @@ def _add_products(own, fx, fxd, W, X, Y, n, Q_q, Q_qd):
                 Q_qd[place] += yd
 
 
-def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, renew, kept):
+class ForceExtent(Record):
+    """What the loop of Jacobians reads of all instances of a kind; the records of their kinds begin with it."""
+
+    count: int
+    stride: int  # reals of each
+    columns: int  # of Q_q and Q_qd
+
+
+force_extent = record_at(ForceExtent)
+
+
+def jacobian(kind, table, reals, q, qd, t, Q_q, Q_qd, renew, kept):
     """Q_q, Q_qd (n, n) += the Jacobians of all instances.
 
     With `renew` the derivatives of the law are evaluated and stored, (2 SIZE^2 + FRAME) floats an instance; otherwise
-    the stored ones are rotated with the force's frame. What follows from geometry is always exact. A callback is given
-    each array by its address, hence twelve arguments.
+    the stored ones are rotated with the force's frame. What follows from geometry is always exact.
     """
     kept, table, reals = vector(kept, ANY), integers(table, ANY), vector(reals, ANY)
     q, qd, Q_q, Q_qd = vector(q, ANY), vector(qd, ANY), vector(Q_q, ANY), vector(Q_qd, ANY)
+    kind = force_extent(kind)
+    count, stride, n = kind.count, kind.stride, kind.columns
     x, xd, f = stack(SIZE), stack(SIZE), stack(SIZE)
     fx, fxd = stack2(SIZE, SIZE), stack2(SIZE, SIZE)
     W, X, Y = stack2(SIZE, SPAN), stack2(SIZE, SPAN), stack2(SIZE, SPAN)

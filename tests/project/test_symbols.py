@@ -1,6 +1,7 @@
 """One symbol, one meaning (docs/notation.md), within every function of the core."""
 
 import ast
+from collections import defaultdict
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2] / "tsdyn"
@@ -49,6 +50,18 @@ def test_a_name_is_bound_to_one_thing_in_a_function():
             if isinstance(node, ast.FunctionDef) and (names := double_names(node)):
                 found[f"{path.relative_to(ROOT)}: {node.name}"] = names
     assert found == {}
+
+
+def test_a_class_name_has_one_meaning():
+    """`Store` is one thing in two formats."""
+    places = defaultdict(set)
+    for folder in (ROOT, ROOT.parent / "constraints", ROOT.parent / "integrators"):
+        for path in folder.rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ClassDef):
+                    places[node.name].add(path.relative_to(ROOT.parent).as_posix())
+    double = {name: found for name, found in places.items() if len(found) > 1}
+    assert double == {"Store": {"tsdyn/storage/hdf5.py", "tsdyn/storage/zarr_folder.py"}}
 
 
 def test_functions_take_ten_positional_arguments_at_most():

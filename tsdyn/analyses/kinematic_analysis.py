@@ -121,7 +121,7 @@ OK, NOT_FINITE, CHART_LOST = int(Status.SUCCESS), int(Status.NOT_FINITE), int(St
 SLICE_DONE = int(Status.SLICE_DONE)
 
 
-class Way(Record):
+class ContinuationProgress(Record):
     """How far a continuation has come."""
 
     t: float  # of the last accepted point, s
@@ -148,7 +148,7 @@ class Branch(NamedTuple):
     remembered: np.ndarray  # (angles + slots,)  angles of joints there, and what forces and constraints remember
     frames: np.ndarray  # (angles, 9)  see joint_turns.py
     joints: np.ndarray  # int64 (angles, 4)
-    way: Way
+    way: ContinuationProgress
 
 
 def branch_of(system, graph, handles, n, tangent=None):
@@ -159,7 +159,7 @@ def branch_of(system, graph, handles, n, tangent=None):
     remembered = np.zeros(handles.count + system.memory.size)
     now, speeds = np.zeros((3, n)), np.zeros((2, 8 * (b + 1)))
     frames, joints = handles.frames.copy(), handles.joints.copy()
-    return Branch(system, whole.work, graph, tangent, now, *speeds, remembered, frames, joints, Way())
+    return Branch(system, whole.work, graph, tangent, now, *speeds, remembered, frames, joints, ContinuationProgress())
 
 
 class _NoHandles(NamedTuple):

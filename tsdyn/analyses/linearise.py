@@ -113,7 +113,7 @@ def _loads_of(variations, item):
     return found
 
 
-class Outputs(NamedTuple):
+class OutputMatrices(NamedTuple):
     """Names, and y = Y dx + Yd dxd."""
 
     names: tuple
@@ -122,12 +122,12 @@ class Outputs(NamedTuple):
 
 
 def outputs_of(scene, variations, given, coordinates, reduced):
-    """The `Outputs` of handles and names; of none, the coordinates and their rates."""
+    """The `OutputMatrices` of handles and names; of none, the coordinates and their rates."""
     k, n = len(coordinates), variations.motion.q.size
     if not len(given):
         names = [one.name for one in coordinates]
         names += [name + RATE for name in names]
-        return Outputs(tuple(names), np.eye(2 * k, k), np.eye(2 * k, k, -k))
+        return OutputMatrices(tuple(names), np.eye(2 * k, k), np.eye(2 * k, k, -k))
     rows, rates = [], []
     for one in given:
         rate = isinstance(one, str) and one.endswith(RATE)
@@ -138,7 +138,7 @@ def outputs_of(scene, variations, given, coordinates, reduced):
     rates = np.array(rates)[:, None]
     places, speeds = Z @ reduced.T, Z @ reduced.T1 + Zd @ reduced.T
     names = tuple(one.name + RATE * bool(rate) for one, rate in zip(rows, rates, strict=True))
-    return Outputs(names, np.where(rates, speeds, places), np.where(rates, places, 0.0))
+    return OutputMatrices(names, np.where(rates, speeds, places), np.where(rates, places, 0.0))
 
 
 def _of(scene, variations, given, coordinates):

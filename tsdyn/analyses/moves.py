@@ -33,7 +33,7 @@ from .tolerances import (
 # What is constant during a search for an equilibrium: kinds of rows, bodies of each part, sparsity.
 
 
-class Frame:
+class SceneStructure:
     """Of a packed scene at time t, s; reach is a length of it, m.
 
     Attributes
@@ -195,7 +195,7 @@ class Moves:
         self.report = report
         self.packed, self.handles, self.t = packed, handles, t
         self.angles, self.memory = remembered[: handles.count].copy(), remembered[handles.count :].copy()
-        self.frame = Frame(packed, t, q)
+        self.frame = SceneStructure(packed, t, q)
         self.reach, self.increments = self.frame.reach, self.frame.increments
         self.rest, self._motion = self._at(q), None
         self.gone, self.turned, self.longest, self.trust = 0.0, 0.0, 0.5 * self.reach, 1.0

@@ -190,7 +190,7 @@ def _crossed(h):
 # What is `nothing`, 1/s^2, is the stiffness up to which a direction belongs to the null space.
 
 
-class Pairs(NamedTuple):
+class EigenPairs(NamedTuple):
     """2 k eigenvalues and, in their order, vectors of coordinates (k, 2 k) complex, of unit kinetic energy norm."""
 
     values: np.ndarray
@@ -224,7 +224,7 @@ def stiffnesses(reduced, nothing):
 
 
 def eigenpairs(reduced, nothing=None):
-    """The `Pairs` of `Reduced` equations."""
+    """The `EigenPairs` of `Reduced` equations."""
     from scipy.linalg import solve_triangular
 
     C, K, scale = reduced.C_hat, reduced.K_hat, reduced.scale
@@ -237,7 +237,7 @@ def eigenpairs(reduced, nothing=None):
     values = values + 0.0
     order = np.lexsort((-values.imag, np.abs(values.imag), np.abs(values)))
     values, vectors = values[order], vectors[:, order]
-    return Pairs(values, interruptible(lambda: solve_triangular(reduced.R, vectors)))
+    return EigenPairs(values, interruptible(lambda: solve_triangular(reduced.R, vectors)))
 
 
 def _symmetric(K, nothing):

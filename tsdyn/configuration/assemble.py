@@ -14,7 +14,7 @@ from ..jit.interrupts import CollectionsDeferred
 from ..maths.matrix_rank import row_lengths
 from ..maths.tolerances import LAST_PLACE
 from ..validation import number, one_of, positive, sequence
-from .continuation import Found, Kept, approach_sketch, close, nearest, refuse, relax, stuck
+from .continuation import ContinuationEnd, Kept, approach_sketch, close, nearest, refuse, relax, stuck
 from .kinetic_metric import Metric, least_energy, least_step, rotation_vectors
 from .motor_starts import approach, demand_aligned, demand_finite, has_motors, refuse_vanished
 from .tolerances import ASSEMBLED, CLEAR_FOLD, FLAT_FOLD, INITIAL_TOL, POINT_LIKE, SHOWN, STAGES, STIFFER, UNFOLDED
@@ -430,7 +430,7 @@ def _unfolded(metric, sketch, found, links, tol):
             fits = np.abs(Phi_freed).max() <= tol * (1.0 + np.abs(freed).max())
             if fits and not links.turned(metric, freed, drawn).size:
                 q, Phi = freed, Phi_freed
-            return Found(q, Phi, total, True)
+            return ContinuationEnd(q, Phi, total, True)
     stories = [
         f"  {links.folds[k].title}: {np.degrees(links.angle(metric, sketch, k)):.0f} degrees from straight in the "
         f"sketch, {np.degrees(links.angle(metric, found.q, k)):.0f} when assembled"

@@ -37,7 +37,7 @@ from .tolerances import (
 # remaining residual, and steps along the constraints minimise the distance to the sketch.
 
 
-class Found(NamedTuple):
+class ContinuationEnd(NamedTuple):
     """End of a continuation."""
 
     q: np.ndarray  # (n,)
@@ -62,7 +62,7 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
     shakes = shakes[:2] if metric.n > MANY_COORDINATES else shakes
     Phi = metric.linear(sketch, rows)[0]
     if np.abs(Phi).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(sketch).max()):
-        return Found(sketch, Phi, 0, True)
+        return ContinuationEnd(sketch, Phi, 0, True)
     for attempt in range(2 + len(also) + len(shakes)):
         if attempt == 0:
             q, count = relax(metric, sketch, sketch, rows)
@@ -76,7 +76,7 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
         total += count + more
         met = bool(np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max()))
         if best is None or met or np.linalg.norm(Phi) < np.linalg.norm(best.Phi):
-            best = Found(q, Phi, total, met)
+            best = ContinuationEnd(q, Phi, total, met)
         if met or (attempt == 1 and stuck(metric, q, Phi, rows).size):
             break
     if best.met:

@@ -129,7 +129,7 @@ def _product(p, o):
 # followed by an assembly, so that the mechanism stays on its branch.
 
 
-class Way:
+class MotorApproach:
     """The way of a motor from the present angle to the one prescribed at t; a goal of `RigidShift`."""
 
     turns = True
@@ -189,7 +189,7 @@ def approach(scene, t, fixed, assembled, besides=()):
     """
     motors = [each for each in scene.constraints if isinstance(each, RotationMotor) and each not in besides]
     threaded = any(isinstance(part, Thread) for part in scene.primitives)
-    ways = [way for way in (Way(scene, motor, t, threaded) for motor in motors) if way.length > DRIVE_TURN]
+    ways = [way for way in (MotorApproach(scene, motor, t, threaded) for motor in motors) if way.length > DRIVE_TURN]
     for way in list(ways):
         shift = None if threaded else RigidShift.of(scene, way.motor)
         if shift is not None and not {body.index for body in shift.bodies} & set(fixed):

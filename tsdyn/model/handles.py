@@ -134,7 +134,7 @@ def displacement(geometry, own, other, level):
 _lock = threading.Lock()  # of aliases, which scenes of a family share
 
 
-class Row(NamedTuple):
+class HandleCoordinates(NamedTuple):
     """The joint coordinates of one constraint or force."""
 
     item: object
@@ -146,8 +146,8 @@ class Row(NamedTuple):
 class DrivenCoordinate(NamedTuple):
     """A coordinate of a joint that a motor prescribes."""
 
-    motor: Row
-    joint: Row
+    motor: HandleCoordinates
+    joint: HandleCoordinates
     geometry: object  # of the joint
     place: int  # of an angle among all; -1 for a displacement
 
@@ -181,7 +181,7 @@ class Handles:
         rows, joints, frames = [], [], []
         for item in self.items:
             if item.joint_coordinates:
-                rows.append(Row(item, tuple(angles(item)), tuple(displacements(item)), len(joints)))
+                rows.append(HandleCoordinates(item, tuple(angles(item)), tuple(displacements(item)), len(joints)))
                 for angle in rows[-1].angles:
                     joints.append([*self.where(angle.own), *self.where(angle.other)])
                     frames.append([*angle.f, *angle.g, *angle.h])
@@ -241,7 +241,7 @@ class Handles:
             return list(self._aliases.items())
 
     def row(self, joint, kind):
-        """The `Row` of a joint that has some of a kind of coordinates: "angle" or "displacement"."""
+        """The `HandleCoordinates` of a joint that has some of a kind of coordinates: "angle" or "displacement"."""
         if self._by_item is None:
             self._by_item = {id(row.item): row for row in self.rows}
         joint = self.item(joint)

@@ -234,11 +234,11 @@ def saddle_of(packed, graph, system):
     """The `SaddleGraph` of a packed scene, its constraint graph, and its system with the loops of implicit methods."""
     known = packed.derived
     if known.saddle is None or known.saddle[0] is not graph or known.saddle[1] is not system:
-        known.saddle = graph, system, _Builder(packed, graph, system).saddle()
+        known.saddle = graph, system, _SaddleBuilder(packed, graph, system).saddle()
     return known.saddle[2]
 
 
-class _Builder:
+class _SaddleBuilder:
     """What the steps hand on to each other."""
 
     def __init__(self, packed, graph, system):

@@ -241,7 +241,7 @@ def _shaken(solution):
     return other
 
 
-class Loads(NamedTuple):
+class BodyBalance(NamedTuple):
     """What acts on a body less the rate of its momentum, ground frame, and sums of absolute values."""
 
     body: object
@@ -268,7 +268,7 @@ def _loads(solution, body, items):
         force, size = force + load, size + amount
         torque = torque + moment + np.cross(arm, load)
         turning = turning + np.linalg.norm(moment, axis=1) + np.linalg.norm(arm, axis=1) * amount
-    return Loads(body, force, torque, size, turning)
+    return BodyBalance(body, force, torque, size, turning)
 
 
 def _neighbours(scene):

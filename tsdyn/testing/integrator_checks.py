@@ -297,7 +297,7 @@ def check_bounds(method, case, form, where):
 FORMS = ("tangent", "maggi-kane")
 
 
-class Finding(NamedTuple):
+class SceneFinding(NamedTuple):
     """Results of a method on one scene."""
 
     scene: str
@@ -309,7 +309,7 @@ class Finding(NamedTuple):
 
 def check_integrator(
     method: type[Integrator] | Callable[..., Integrator], *, order: int | None = None, dense_order: int | None = None
-) -> tuple[Finding, ...]:
+) -> tuple[SceneFinding, ...]:
     """Check an integration method on scenes with known solutions; raise naming what failed and by how much.
 
     Parameters
@@ -385,7 +385,7 @@ def check_integrator(
                 if kind.driver == "steps":  # series know a step's error before it is made
                     check_rejections(method, case, form, where)
                 check_bounds(method, case, form, where)
-            findings.append(Finding(case.name, form, found, dense, errors))
+            findings.append(SceneFinding(case.name, form, found, dense, errors))
     if not findings:
         raise CheckFailed(f"{type(kind).__name__} serves none of the formulations {', '.join(map(repr, FORMS))}.")
     if (least := min(finding.order for finding in findings)) > order + slack(order):

@@ -15,7 +15,7 @@ GRID = 16  # equal parts of the span, at whose ends fixed steps are compared
 INNER = np.sort(np.random.default_rng(1).uniform(0.01, 0.99, 40))  # fractions of the span, within the steps
 
 
-class Case(NamedTuple):
+class ReferenceScene(NamedTuple):
     """A scene and where it is at times t, by two methods that agree to `trusted`, relative to 1 + the size."""
 
     name: str
@@ -72,7 +72,7 @@ SCENES: dict[str, tuple[Callable[[], Scene], float]] = {
 
 
 def cases(kind, order=2):
-    """Yield a `Case` for each scene, for methods of an order; the reference is not by the method `kind`, the judged."""
+    """Yield a `ReferenceScene` for each scene, for methods of an order; its reference isn't by the judged `kind`."""
     first, second = (RK45, DOP853) if isinstance(kind, type) and issubclass(kind, DOP853) else (DOP853, RK45)
     for name, (build, end) in SCENES.items():
         end *= BRIEF if order == 1 else 1.0
@@ -83,7 +83,7 @@ def cases(kind, order=2):
             for method in (first, second)
         )
         at, within = np.searchsorted(times, grid), np.searchsorted(times, inner)
-        yield Case(
+        yield ReferenceScene(
             name, scene, end, grid, inner, best.q[at], best.qd[at], best.q[within], best.qd[within],
             max(distance(best.q, other.q), distance(best.qd, other.qd)),
         )  # fmt: skip

@@ -52,6 +52,17 @@ def test_a_name_is_bound_to_one_thing_in_a_function():
     assert found == {}
 
 
+def test_a_threshold_of_the_core_has_a_name_of_its_own():
+    places = defaultdict(set)
+    for path in (ROOT / package / "tolerances.py" for package in (*CORE, "elements")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body if path.exists() else ():
+            if isinstance(node, ast.Assign):
+                for name in names_in(node.targets[0]):
+                    places[name].add(path.parent.name)
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}
+    assert {"ROUNDING", "SLIP", "SAFETY"} <= places.keys()
+
+
 def test_a_class_name_has_one_meaning():
     """`Store` is one thing in two formats."""
     places = defaultdict(set)

@@ -13,7 +13,7 @@ from ..errors import InvalidArgument, SingularConfiguration
 from ..forces.point_force import PointForce
 from ..forces.spring import Spring
 from ..forces.torque import Torque
-from ..maths.tolerances import TINY
+from ..maths.tolerances import NEGLIGIBLE, TINY
 from ..model import handles as joint_motion
 from ..model.equations import WIDTH, as_csr, with_short_rows
 from ..motions.signals import Signal
@@ -24,7 +24,7 @@ from ..validation import sequence
 from .coordinates import arm_by_parameters, named_coordinates, transform_e
 from .linearise import AXES, item_of
 from .nominal_motion import roots_of_masses
-from .tolerances import ACCEPTED, CONSISTENT, DELTA, DENSE_INSTANT, NO_LOAD, REFINEMENTS
+from .tolerances import ACCEPTED, CONSISTENT, DELTA, DENSE_INSTANT, REGULARISED_SWEEPS
 
 # Generalised forces of unit loads along a motion q (k, n): each as columns (c,) of q and values (k, c).
 #
@@ -228,7 +228,7 @@ class Instant:
             return None
         x, n, m = 0.0, load.size, self.kept.size
         self._left = load
-        for _ in range(1 + REFINEMENTS):
+        for _ in range(1 + REGULARISED_SWEEPS):
             x = x + solve(self._left)
             self.carried = self.H.T @ x[n : n + m]
             self._left = load - self.carried + self.B @ x[n + m :]
@@ -367,7 +367,7 @@ def _demand_effective(instant, actuators, used):
         id(one.item) for one, u in zip(actuators, used, strict=True) if u > ACCEPTED * used.max()
     }
     which = [j for j, one in enumerate(actuators) if id(one.item) in idle]
-    effective = {id(actuators[j].item) for j in which if instant.effect(j) > NO_LOAD}
+    effective = {id(actuators[j].item) for j in which if instant.effect(j) > NEGLIGIBLE}
     for j in which:
         if id(actuators[j].item) not in effective:
             raise InvalidArgument(

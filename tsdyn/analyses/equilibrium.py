@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..calls import fitting_methods
+from ..configuration.tolerances import MOST_ROTATION
 from ..errors import InconsistentState, InvalidForce, NoEquilibrium
 from ..jit.interrupts import interruptible
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, PIVOT_ROUNDING, ROUNDING, SUM_ROUNDING, TINY
@@ -32,7 +33,6 @@ from .tolerances import (
     MOST_SADDLES,
     MOST_STEPS,
     MOST_TRIES,
-    MOST_TURN,
     MOST_TURNED,
     ROUGH,
     SEARCH,
@@ -223,7 +223,7 @@ class Descent(Moves):
 
     def _is_fit(self, u, mu):
         """Whether an increment is short enough to be tried; a larger mu makes it shorter."""
-        slides = self.trust == 1.0 and self.increments.extent(u)[1] <= TOO_FAR * MOST_TURN
+        slides = self.trust == 1.0 and self.increments.extent(u)[1] <= TOO_FAR * MOST_ROTATION
         return slides or mu >= 1.0 or self.length(u) <= TOO_FAR * self.trust or not self.rest.quadratic.shift.any()
 
     def _leave(self, factors, step):

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.kinetic_metric import Metric, least_step
+from ..configuration.tolerances import MOST_ROTATION
 from ..elements.loops.constraint_rows import (
     OMEGA,
     POSE,
@@ -22,6 +23,7 @@ from ..jit.compiled import clock
 from ..jit.kernels import Record, entry, kernel, loader, long_kernel, resident
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, ROUNDING
+from ..methods.tolerances import SAME_TIME
 from ..model import handles as joint_motion
 from ..model.equations import remember, set_time
 from ..model.handles import handles_of
@@ -31,6 +33,7 @@ from ..observables.diagnostics import constraint_rows
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, ConstraintGraph, no_graph
 from ..rows.graph_builder import graph_of, redundant_rows
 from ..rows.interface import TangentWorkspace, allocate_tangent, constrain, evaluate_bias, note_indicator
+from ..validation import listed
 from ..workspaces import Work, parts, plain_context
 from .coordinates import Variations, chosen
 from .moves import update_memory
@@ -41,14 +44,11 @@ from .tolerances import (
     GROWTH,
     LARGEST_CHANGE,
     LEAST_STEPS,
-    LISTED,
-    MOST_TURN,
+    MOST_TRIES,
     NO_CHANGE,
-    POLISHINGS,
     SEEN,
     SHORTEST,
     SLICE,
-    TIME_ROUNDING,
 )
 
 # What constraints leave free: the number of degrees of freedom, and their names.
@@ -67,10 +67,8 @@ def demand_driven(packed, memory, t, q, who, remedy):
         return
     motion = NominalMotion(packed, memory, t, q, np.zeros(q.size), still=True)
     names = [one.name for one in chosen(motion, Variations(motion, np.zeros(3)))]
-    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
     raise InvalidArgument(
-        f"{who}: {k} degree{'s' * (k != 1)} of freedom {'is' if k == 1 else 'are'} left: "
-        f"{', '.join(names[:LISTED])}{more}. {remedy}"
+        f"{who}: {k} degree{'s' * (k != 1)} of freedom {'is' if k == 1 else 'are'} left: {listed(names)}. {remedy}"
     )
 
 
@@ -81,16 +79,16 @@ def driven_rates(scene, t, q, who):
     _, Phi_q, Phi_t = metric.arrays(q)
     A, drift = metric.reduced(q, Phi_q[metric.own]), Phi_t[metric.own]
     x = least_step(A, drift)
-    for _ in range(POLISHINGS if metric.sparse else 0):  # which is regularised
+    for _ in range(MOST_TRIES if metric.sparse else 0):  # which is regularised
         left = A @ x + drift
         if np.abs(left).max() <= NEGLIGIBLE * (1.0 + np.abs(x).max()):
             break
         x = x + least_step(A, left)
     left = np.abs(A @ x + drift)
     if not left.max(initial=0.0) <= HALF_DIGITS * (1.0 + np.abs(x).max(initial=0.0) + np.abs(drift).max(initial=0.0)):
-        names = [scene.row_names()[metric.own[i]] for i in np.flatnonzero(drift)[:LISTED]]
+        names = [scene.row_names()[metric.own[i]] for i in np.flatnonzero(drift)]
         raise SingularConfiguration(
-            f"{who}: no velocities follow the motions at t = {t:g} s ({', '.join(names)}): the mechanism is at a dead "
+            f"{who}: no velocities follow the motions at t = {t:g} s ({listed(names)}): the mechanism is at a dead "
             "centre of what drives it, or motions contradict each other. Start elsewhere, or drive another coordinate."
         )
     return metric.rates(q, x)
@@ -209,12 +207,12 @@ def follow(branch, times, out, first, most):
 def _step(c, target):
     """Take a step towards a time, or halve the next one; False where it can't be halved any more."""
     way, left = c.way, target - c.way.t
-    last = abs(left) <= way.h * (1.0 + TIME_ROUNDING)
+    last = abs(left) <= way.h * (1.0 + SAME_TIME)
     h = left if last else math.copysign(way.h, left)
     t = target if last else way.t + h
     place_bodies(c.graph.bodies, c.now[0], c.tangent.poses)
     status, ratio = CHART_LOST, math.inf
-    if _predict(c, h) <= MOST_TURN:
+    if _predict(c, h) <= MOST_ROTATION:
         status = _solve(c, t)
         if status == OK:
             ratio = _change(c, h)

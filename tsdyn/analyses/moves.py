@@ -4,6 +4,7 @@ import numpy as np
 
 from ..configuration.continuation import close
 from ..configuration.kinetic_metric import Metric
+from ..configuration.tolerances import MOST_ROTATION
 from ..elements.markers import POINT
 from ..errors import SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
@@ -16,19 +17,7 @@ from ..rows.constraint_graph import REDUCED
 from ..rows.graph_builder import graph_of, redundant_rows
 from .nominal_motion import NominalMotion, Pairs
 from .rest import Increments, Rest, SparsePattern
-from .tolerances import (
-    ACCEPTED,
-    DENSE,
-    FINAL,
-    GOOD,
-    HALVINGS,
-    MASSLESS,
-    MOST_TURN,
-    REDUNDANT_SHARE,
-    SHORT,
-    SHORTER,
-    WORTH,
-)
+from .tolerances import ACCEPTED, DENSE, FINAL, GOOD, HALVINGS, REDUNDANT_SHARE, REGULARISED, SHORT, SHORTER, WORTH
 
 # What is constant during a search for an equilibrium: kinds of rows, bodies of each part, sparsity.
 
@@ -88,13 +77,13 @@ class SceneStructure:
     def _weights(self):
         """G of rest.py: the pattern of its saddle-point matrix, its numbers, their places, and its diagonal (size,)."""
         shifts, size = self.increments.translates, self.increments.size
-        diagonal, rods = np.where(shifts, MASSLESS, 1.0), self._rods()
+        diagonal, rods = np.where(shifts, REGULARISED, 1.0), self._rods()
         if not rods.size:
             return self.light, diagonal, (np.arange(size), np.arange(size)), diagonal
         pairs, own = self.no_pairs.copy(), np.zeros((len(self.metric.at), 6, 6))
         for i, j, sign in ((0, 0, 1.0), (6, 6, 1.0), (0, 6, -1.0), (6, 0, -1.0)):
             pairs[rods, i : i + 3, j : j + 3] = sign * np.eye(3)
-        own[:, range(6), range(6)] = np.repeat([[MASSLESS, 1.0]], 3, axis=1)
+        own[:, range(6), range(6)] = np.repeat([[REGULARISED, 1.0]], 3, axis=1)
         top = self.stiffness(pairs, own)
         return self.saddle, top, (self.blocks.rows, self.blocks.columns), self.blocks.matrix(top).diagonal()
 
@@ -231,7 +220,7 @@ class Moves:
     def length(self, u):
         """The same over that of the longest move."""
         shift, turn = self.increments.extent(u)
-        return max(shift / self.longest, turn / MOST_TURN, TINY)
+        return max(shift / self.longest, turn / MOST_ROTATION, TINY)
 
     def advance(self, u, factors):
         """Move by an increment, or a fraction along which loads do the predicted work; whether it moves."""
@@ -241,7 +230,7 @@ class Moves:
         for _ in range(HALVINGS):
             if self.attempt(factor * u, factors):
                 limited = factor * far > 0.99 * self.trust
-                if limited and self.trust == 1.0 and factor * turn < 0.99 * MOST_TURN:
+                if limited and self.trust == 1.0 and factor * turn < 0.99 * MOST_ROTATION:
                     self.longest *= 2.0
                 self.trust = min(1.0, self.trust * 2.0) if limited or factor == 1.0 else factor * far
                 return True

@@ -11,6 +11,7 @@ from ..elements.loops.forces import FORCE_INTS as FORCE_INTS
 from ..elements.loops.template import AT
 from ..errors import InvalidForce, SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
+from ..formulations.tolerances import REFINEMENTS
 from ..jit.kernels import entry
 from ..maths.matrix_rank import dependent, sparse_lu
 from ..maths.tolerances import PIVOT_ROUNDING, ROUNDING, TINY
@@ -20,7 +21,7 @@ from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sp
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..rows.constraint_graph import REDUCED, are_unequal, coordinate_scales
 from ..rows.graph_builder import graph_of, redundant_rows
-from .tolerances import DENSE, REDUNDANT_SHARE, UNEQUAL_SWEEPS
+from .tolerances import DENSE, REDUNDANT_SHARE
 
 # Derivatives of all constraints and forces, each as a block of the 14 coordinates of its two bodies.
 #
@@ -244,7 +245,7 @@ class NominalMotion:
         """Return (x, lam) with M x + H^T lam = load, H x = bias; vectors, or matrices of as many columns."""
         weights, n = self._weights if load.ndim == 1 else self._weights[:, None], self.q.size
         found = weights * self._factors.solve(weights * np.concatenate((load, bias)))
-        for _ in range(UNEQUAL_SWEEPS if are_unequal(self.system) else 0):
+        for _ in range(REFINEMENTS if are_unequal(self.system) else 0):
             x, lam = found[:n], found[n:]
             left = np.concatenate((load - self.M @ x - self.H.T @ lam, bias - self.H @ x))
             found = found + weights * self._factors.solve(weights * left)

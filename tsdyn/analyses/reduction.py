@@ -12,7 +12,7 @@ from ..jit.interrupts import interruptible
 from ..maths.matrix_rank import interruptible_solver, sparse_lu
 from ..maths.tolerances import NEGLIGIBLE, PIVOT_ROUNDING
 from .coordinates import stacked
-from .tolerances import NEUTRAL_ASYMMETRY
+from .tolerances import STIFFNESS_ROUNDING
 
 # The linearised equations of motion, reduced to minimal coordinates x.
 #
@@ -214,7 +214,7 @@ def stiffnesses(reduced, nothing):
     """The `Stiffnesses` of `Reduced` equations."""
     K = reduced.K_hat
     K_s = 0.5 * (K + K.T)
-    if np.abs(K - K.T).max(initial=0.0) <= NEUTRAL_ASYMMETRY * reduced.scale:
+    if np.abs(K - K.T).max(initial=0.0) <= STIFFNESS_ROUNDING * reduced.scale:
         w = interruptible(lambda: np.linalg.eigvalsh(K_s))
         stiff = w[np.abs(w) > nothing]
         return Stiffnesses(stiff, len(w) - len(stiff), True)

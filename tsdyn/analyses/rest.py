@@ -13,15 +13,13 @@ from ..observables.evaluate import NOT_UNIQUE, constraint_arrays
 from ..observables.generalised_forces import applied_loads
 from .tolerances import (
     ACCEPTED,
-    MASSLESS,
+    CONSISTENT,
     MOST_SWEEPS,
-    NEUTRAL_ASYMMETRY,
-    REFINEMENTS,
+    REGULARISED,
+    REGULARISED_SWEEPS,
     SHIFTS,
     SLOWEST,
-    SOFTENED,
-    SOFTEST,
-    STALLED,
+    STIFFNESS_ROUNDING,
     SWEEPS,
 )
 
@@ -192,7 +190,7 @@ class Factors:
 
     def _signed(self, share):
         """Factors, and how many eigenvalues of K + mu D + a share of S are negative."""
-        factors = splu_of(self._matrix(share, SOFTENED), symmetric=True)
+        factors = splu_of(self._matrix(share, REGULARISED), symmetric=True)
         if factors is None or not np.array_equal(factors.perm_r, factors.perm_c):
             return None, -1
         return factors, int((factors.U.diagonal() < 0.0).sum()) - self._quadratic.frame.own.size
@@ -252,7 +250,7 @@ class Factors:
 
     def newton(self, load):
         """The same by factors that are accurate down to a smaller floor."""
-        factors = splu_of(self._matrix(SOFTEST, 0.0))
+        factors = splu_of(self._matrix(STIFFNESS_ROUNDING, 0.0))
         return None if factors is None else self._solved(factors, load)
 
     def correction(self, bias):
@@ -371,7 +369,7 @@ class Quadratic:
     @cached_property
     def strain(self):
         """Numbers for `Frame.blocks` of a norm that exceeds K, in which increments of little strain are small."""
-        return self.frame.stiffness(self._structured(self._norms), _diagonal(MASSLESS * self.local))
+        return self.frame.stiffness(self._structured(self._norms), _diagonal(REGULARISED * self.local))
 
     @cached_property
     def rate(self):
@@ -405,7 +403,7 @@ class Quadratic:
     def circulatory(self):
         """Whether loads have no potential: K isn't symmetric."""
         apart = self.whole - self.whole.T
-        return bool(np.abs(apart.data).max(initial=0.0) > NEUTRAL_ASYMMETRY * np.abs(self.K).max(initial=0.0))
+        return bool(np.abs(apart.data).max(initial=0.0) > STIFFNESS_ROUNDING * np.abs(self.K).max(initial=0.0))
 
     def along(self, u):
         """u.K u."""
@@ -511,7 +509,7 @@ class Rest:
         size = load.size
         right = np.concatenate((self._weights * load, self._scales * np.where(self.left_out, 0.0, bias)))
         found = self._factors.solve(right)
-        for _ in range(REFINEMENTS):
+        for _ in range(REGULARISED_SWEEPS):
             found = found + self._factors.solve(right - self._matrix @ found)
         return self._weights * found[:size], self._scales * found[size:]
 
@@ -558,7 +556,7 @@ class Rest:
         q, size = self._swept(q, correction, ROUNDING * allowed)
         if size <= ACCEPTED * allowed:
             return q
-        return self.frame.closed(q) if size <= STALLED * allowed else None
+        return self.frame.closed(q) if size <= CONSISTENT * allowed else None
 
     def _swept(self, q, correction, limit):
         """Positions after sweeps of simplified Newton, and what is left of the constraints."""

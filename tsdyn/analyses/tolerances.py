@@ -1,8 +1,6 @@
 """Limits of linearisation, equilibria, kinematic analysis and inverse dynamics: unit, and where each comes from."""
 
 # --- factorisation ---
-# Refinements of accelerations and multipliers where masses are unequal: the factors lose their ratio, each regains it.
-UNEQUAL_SWEEPS = 3
 
 # Coordinates up to which redundant rows are chosen by QR with pivoting, which costs their cube; of larger scenes by
 # elimination, with this share of a pivot of S in its diagonal entry as in configuration.
@@ -36,16 +34,13 @@ ROUGH = 1e-2
 # accelerations that actuators leave where their matrix is regular, over the largest (rounding, of long chains too); and
 # of loads: one below this share of the largest is idle, and is examined.
 ACCEPTED = 1e-9
-# Weight of a translation by the scene's size against a rotation by one radian in the stiffness of massless bodies:
-# chains of up to its inverse square root in links transmit forces.
-MASSLESS = 1e-8
+# Regularisation of singular factors. Weight of a translation by the scene's size against a rotation by one radian in
+# the stiffness of massless bodies: chains of up to its inverse square root in links transmit forces. Softness of rows
+# of unit length: factors without exchange of rows round by 1e-16 over it, so that a sign is certain above HALF_DIGITS
+# of the stiffness of a body.
+REGULARISED = 1e-8
 # Refinements of what is solved with it, which lose half of the digits at first.
-REFINEMENTS = 2
-# Softness of rows of unit length: factors without exchange of rows round by 1e-16 over it, so that a sign is certain
-# above HALF_DIGITS of the stiffness of a body.
-SOFTENED = 1e-8
-# rad, of a step: angles are counted by the nearest turn, the trapezoidal rule holds, and predictions serve.
-MOST_TURN = 0.5
+REGULARISED_SWEEPS = 2
 # Factors of mu after an accepted and after a rejected step; its first and its least value; above STIFF the diagonal D
 # doesn't suffice.
 SOFTER, STIFFER, FIRST_MU, LEAST_MU, STIFF = 0.25, 5.0, 1e-2, 1e-9, 60.0
@@ -53,8 +48,9 @@ SOFTER, STIFFER, FIRST_MU, LEAST_MU, STIFF = 0.25, 5.0, 1e-2, 1e-9, 60.0
 SHORTER = 0.3
 # Where there is no stiffness, this fraction of the loads replaces it: steps then have their greatest length.
 SLIDING = 1e-6
-# Share of the stiffness of a body that a direction without stiffness has.
-SOFTEST = 1e-10
+# Share of the terms of the stiffness that is rounding: an asymmetry up to it, and what a direction without stiffness
+# has.
+STIFFNESS_ROUNDING = 1e-10
 # A step must do this fraction of the predicted work; a short one may leave this fraction of the residual loads.
 WORTH, GOOD = 0.1, 0.9
 # So many successive steps that don't halve a residual near rounding: it is rounding.
@@ -62,7 +58,7 @@ IN_VAIN = 3
 # rad, or shares of the scene's size: the work of steps shorter than SHORT is rounding; if a step shorter than FINAL
 # fails, the search ends.
 SHORT, FINAL = 1e-4, 1e-9
-# mu grows if a step exceeds its greatest length by this factor; tries of a step.
+# mu grows if a step exceeds its greatest length by this factor; tries of a step, or sweeps of refinement of velocities.
 TOO_FAR, MOST_TRIES = 4.0, 20
 # Fraction of the progress bar for the steps; the check of stability has the rest.
 SEARCH = 0.7
@@ -73,12 +69,8 @@ MOST_TURNED = 60.0
 # Constraints after a step: sweeps end at ROUNDING of 1 + max |q|; one that leaves more than the fraction SLOWEST has
 # stalled.
 SLOWEST, MOST_SWEEPS = 0.7, 40
-# Constraints relative to 1 + max |q|: above it the step is too long.
-STALLED = 1e-6
 # rad, or shares of the scene's size: displacements away from a saddle, tried in turn.
 KICKS = 0.1, 0.03, 0.01
-# Share of the terms of the stiffness up to which an asymmetry is rounding.
-NEUTRAL_ASYMMETRY = 1e-10
 # Residual accelerations over those of the loads alone, up to which a configuration without positive stiffness is near a
 # saddle; sweeps of inverse iteration for a descent direction.
 AT_SADDLE, SWEEPS = 1e-3, 8
@@ -106,27 +98,16 @@ CLOSE, GROWTH = 0.2, 2.0
 LEAST_STEPS = 50
 # Share of the span below which a step is none; and share of the time: rounding of a shorter one is a thousandth of it.
 SHORTEST, SEEN = 1e-11, 2e-13
-# Shares of a time, or step, that are rounding.
-TIME_ROUNDING = 1e-10
 # Steps in one call of the compiled code: some hundredths of a second, so that Ctrl-C is answered.
 SLICE = 20000
-
-# --- velocities of a start, by sparse matrices ---
-# Sweeps of refinement at most, until NEGLIGIBLE is left of a rate of a constraint, as a share of the velocities.
-POLISHINGS = 20
-
-# --- messages ---
-# Names in a list, at most.
-LISTED = 6
 
 # --- inverse dynamics ---
 # Weight of accelerations that actuators can't give, over the largest square of a unit load with unit masses: small
 # against the loads that they can give, and large enough for a pivot.
 DELTA = 1e-10
 # Residual of a given motion that is accepted, relative to 1 + max |q|, |qd| or |qdd|, and accelerations that actuators
-# may leave, over the largest: runs give them to their tolerances.
+# may leave, over the largest: runs give them to their tolerances. Constraints that a step towards an equilibrium may
+# leave, relative to 1 + max |q|.
 CONSISTENT = 1e-6
 # Coordinates up to which the matrices of an instant are dense: a dense factorisation takes less time there.
 DENSE_INSTANT = 120
-# Share of a unit load's own accelerations below which those under the constraints are rounding.
-NO_LOAD = 1e-11

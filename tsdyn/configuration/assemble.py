@@ -12,12 +12,12 @@ from ..elements.bodies import named
 from ..errors import InconsistentState, InvalidArgument, InvalidBody
 from ..jit.interrupts import CollectionsDeferred
 from ..maths.matrix_rank import row_lengths
-from ..maths.tolerances import LAST_PLACE
+from ..maths.tolerances import LAST_PLACE, NEGLIGIBLE
 from ..validation import number, one_of, positive, sequence
 from .continuation import ContinuationEnd, Kept, approach_sketch, close, nearest, refuse, relax, stuck
 from .kinetic_metric import Metric, least_energy, least_step, rotation_vectors
 from .motor_starts import approach, demand_aligned, demand_finite, has_motors, refuse_vanished
-from .tolerances import ASSEMBLED, CLEAR_FOLD, FLAT_FOLD, INITIAL_TOL, POINT_LIKE, SHOWN, STAGES, STIFFER, UNFOLDED
+from .tolerances import CLEAR_FOLD, FLAT_FOLD, INITIAL_TOL, POINT_LIKE, SHOWN, STAGES, STIFFER
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -259,7 +259,7 @@ class AssemblyReport:
 @CollectionsDeferred()
 def assemble(
     scene: Scene,
-    tol: float = ASSEMBLED,
+    tol: float = NEGLIGIBLE,
     fixed: Sequence[PointMass | str] = (),
     t: float = 0.0,
     folds: Folds = "keep",
@@ -337,7 +337,7 @@ def assemble(
     return replace(report, moved=float(np.abs(scene.start[0] - sketch[0]).max()))
 
 
-def assembled_nearby(scene, fixed, t, tol=ASSEMBLED, folds="free"):
+def assembled_nearby(scene, fixed, t, tol=NEGLIGIBLE, folds="free"):
     """Assemble without a way to the angles of motors; return the `AssemblyReport`."""
     packed, (sketch, qd) = scene.packed, scene.start
     metric = whole = Metric(packed, None, t)
@@ -348,7 +348,7 @@ def assembled_nearby(scene, fixed, t, tol=ASSEMBLED, folds="free"):
     if not found.met:
         _demand_direction(scene, metric, found)
         refuse(scene, metric, sketch, found, tol, [scene.bodies[i] for i in fixed])
-    links = Folds(packed) if _largest_turn(metric, sketch, found.q) > UNFOLDED else None
+    links = Folds(packed) if _largest_turn(metric, sketch, found.q) > SHOWN / 4.0 else None
     if links is not None and folds == "keep":
         found = _unfolded(metric, sketch, found, links, tol)
     q = found.q

@@ -13,7 +13,6 @@ from .kinetic_metric import least_step, soft_step
 from .tolerances import (
     DECREASE,
     LAST_CONVERGED,
-    LEFT_OVER,
     MANY_COORDINATES,
     MOST_CLOSING,
     MOST_ROTATION,
@@ -265,7 +264,7 @@ def refuse(scene, metric, sketch, found, tol, held=()):
     left = np.zeros(len(packed.system.segments))
     left[metric.own] = np.abs(found.Phi)
     sizes = np.array([left[member.rows].max() for member in members])
-    suspects = [member for member, size in zip(members, sizes, strict=True) if size > LEFT_OVER * sizes.max()]
+    suspects = [member for member, size in zip(members, sizes, strict=True) if size > NAMED_SHARE * sizes.max()]
     trial = _Trial(metric, sketch, found.q, tol)
     conflict = False
     while len(suspects) <= MOST and not (conflict or trial.over):

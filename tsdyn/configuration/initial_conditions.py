@@ -9,8 +9,9 @@ from ..formulations.locked_orientations import keep_turning, release_loose_bodie
 from ..jit.kernels import resident
 from ..maths.matrix_rank import dependent
 from ..maths.tolerances import LAST_PLACE
-from ..model.packed import is_small
+from ..model.packed import POINT_SIZE, is_small
 from ..observables.evaluate import constraint_arrays
+from ..observables.tolerances import KEPT_FLOATS
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, by_lengths, coordinate_scales
 from ..rows.graph_builder import graph_of, set_redundant
 from ..rows.interface import (
@@ -39,12 +40,10 @@ from .start_kernels import (
 )
 from .tolerances import (
     DENSE_ENTRIES,
-    KEPT_START_FLOATS,
     LEAST_NEIGHBOURHOOD,
     LISTED_ENTRIES,
     MANY_ROWS,
     NEIGHBOURHOOD,
-    POINT_SIZE,
     REDUNDANT_SHARES,
     SHORTENING,
     SHORTEST_LEG,
@@ -112,7 +111,7 @@ def taken(packed, graph, n):
 
 def give(packed, workspace):
     """Take back a workspace that is no longer in use, unless it is large."""
-    small = workspace.tangent.rows.S.size + workspace.tangent.rows.H.size < KEPT_START_FLOATS
+    small = workspace.tangent.rows.S.size + workspace.tangent.rows.H.size < KEPT_FLOATS
     if small and packed.derived.redundant is None and not packed.derived.start_workspaces:
         packed.derived.start_workspaces.append(workspace)
 

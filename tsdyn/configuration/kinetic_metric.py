@@ -9,12 +9,13 @@ Euler parameters stay normalised, so A has no normalisation rows.
 import numpy as np
 
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
+from ..elements.tolerances import UNDIRECTED
 from ..maths.matrix_rank import row_lengths, sparse_lu
-from ..maths.tolerances import RANK_TOL, SUM_ROUNDING, TINY
+from ..maths.tolerances import PIVOT_ROUNDING, RANK_TOL, SUM_ROUNDING, TINY
 from ..model.equations import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
 from ..rows.constraint_graph import arms
-from .tolerances import DENSE, IMMOBILE, LIGHTEST, PLAIN, SMALL_ANGLE, SOFT, SOLVED, THIN
+from .tolerances import DENSE, FIRM, LIGHTEST, SMALL_ANGLE, SOLVED, THIN
 
 _G = transform_g(np.eye(4)).reshape(4, 12)  # G is linear in p
 
@@ -224,7 +225,7 @@ def least_step(A, residual, rcond=SOLVED):
     from scipy.sparse import diags_array
 
     unit = diags_array(1.0 / lengths[some]) @ A[some]
-    return soft_step(unit, residual[some] / lengths[some], np.zeros(A.shape[1]), np.full(some.sum(), SOFT))
+    return soft_step(unit, residual[some] / lengths[some], np.zeros(A.shape[1]), np.full(some.sum(), PIVOT_ROUNDING))
 
 
 def _of_independent(unit, target):
@@ -234,7 +235,7 @@ def _of_independent(unit, target):
         far = np.linalg.cholesky(K).diagonal().min()
     except np.linalg.LinAlgError:
         return None
-    return unit.T @ np.linalg.solve(K, target) if far > PLAIN else None
+    return unit.T @ np.linalg.solve(K, target) if far > FIRM else None
 
 
 def kinetic_rows(system, q, rates):
@@ -279,4 +280,4 @@ def unit_tangent(metric, q, rng):
     wish = wish + least_step(A, A @ wish, RANK_TOL)
     shift, turn = metric.extent(wish)
     size = max(shift / reach, turn)
-    return wish / size if size > IMMOBILE else None
+    return wish / size if size > UNDIRECTED else None

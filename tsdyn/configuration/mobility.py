@@ -20,7 +20,7 @@ from ..validation import counted, finite_vector, number
 from .continuation import close
 from .kinetic_metric import Metric, unit_tangent
 from .motor_starts import demand_finite, demand_small, refuse_vanished
-from .tolerances import ASIDE, FIRM, INITIAL_TOL, NAMED_SHARE
+from .tolerances import FIRM, INITIAL_TOL, NAMED_SHARE, NEIGHBOURHOOD
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Attachment, Scene
@@ -374,7 +374,7 @@ def _neighbours(metric, q, A):
         step = unit_tangent(metric, q, rng)
         if step is None:
             return
-        other, Phi, _ = close(metric, metric.moved(q, ASIDE * step))
+        other, Phi, _ = close(metric, metric.moved(q, NEIGHBOURHOOD * step))
         if np.abs(Phi).max(initial=0.0) <= INITIAL_TOL * (1.0 + np.abs(q).max()):
             yield other
 

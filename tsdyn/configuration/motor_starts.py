@@ -15,6 +15,7 @@ from ..model.handles import counts, handles_of
 from ..motions.elementary import Polynomial
 from ..motions.prescribed import Motion
 from ..rows.constraint_graph import MASS_REMEDY, mass_ratio
+from ..validation import listed
 from .tolerances import DRIVE_TURN, INITIAL_TOL
 
 # Rigid displacement of one part of a scene relative to the other, across the only joint between them.
@@ -267,9 +268,8 @@ def demand_aligned(packed, q, t):
     opposed = np.flatnonzero(opposed)
     if opposed.size:
         names = list(dict.fromkeys(titles[i] for i in opposed))
-        more = f" and {len(names) - 8} more" if len(names) > 8 else ""
         raise InconsistentState(
-            f"{', '.join(names[:8])}{more}: directions that the joint keeps parallel point opposite ways here. Its "
+            f"{listed(names)}: directions that the joint keeps parallel point opposite ways here. Its "
             "rows hold so, too, but it is the mirrored joint. Give one of the axes (or references) the other sign, or "
             "turn a body half a turn." + "".join(f"\n{each}" for each in elsewhere(packed, t, q))
         )

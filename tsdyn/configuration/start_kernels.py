@@ -9,12 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.loops.constraint_rows import move_bodies, place_bodies, write_positions, write_velocities
+from ..elements.tolerances import UNDIRECTED
 from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.kernels import callback, entry, integers, kernel, loader, vector
 from ..maths.dense_linalg import copy, is_finite, largest
 from ..maths.tolerances import HALF_DIGITS, LAST_PLACE
 from ..model.equations import set_time
-from ..model.packed import SMALL
+from ..model.packed import POINT_SIZE
 from ..rows.interface import (
     DYNAMICS,
     METRIC,
@@ -28,7 +29,6 @@ from ..rows.interface import (
     singularity_indicator,
 )
 from ..workspaces import Parts, no_parts
-from .tolerances import IMMOBILE, POINT_SIZE
 
 # In place of a row that depends on others: there is none; rounding may hide one.
 NONE, DOUBTFUL = -1, -2
@@ -198,7 +198,7 @@ def take_start(context, q, qd, velocity, at, count, t, tol):  # eight: addresses
 def _set_floor(control, q, at):
     """As `StartWorkspace.enter` sets it."""
     far, scale = largest(q), 1.0
-    if 0.0 < control.size < SMALL:
+    if 0.0 < control.size < POINT_SIZE:
         far, scale, last = 0.0, control.size, 0
         for i in range(q.size):
             turns = last < at.size and i >= at[last]
@@ -243,7 +243,7 @@ def go_near_by(context, t, way, far):
     for _ in range(2):
         project(graph, f.rows, f.Z, f.b)
     found = _farthest(c)
-    scale = far / found if found > IMMOBILE * wanted else 0.0
+    scale = far / found if found > UNDIRECTED * wanted else 0.0
     for i in range(f.Z.size):
         f.Z[i] *= scale
     move_by(graph, f)

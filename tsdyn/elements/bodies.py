@@ -8,9 +8,9 @@ import numpy as np
 
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidBody
-from ..maths.tolerances import NEGLIGIBLE, TYPED
-from ..validation import close, demand_known, floats, positive, shown, vector3
-from .tolerances import LEAST_MASS, MOST_MASS, UNIT_LENGTH
+from ..maths.tolerances import NEGLIGIBLE, TINY, TYPED
+from ..validation import close, demand_known, floats, listed, positive, shown, vector3
+from .tolerances import SQUARABLE, UNIT_LENGTH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,7 +39,11 @@ def named(things, name, what, error=InvalidArgument):
         )
     known = list(dict.fromkeys(thing.name for thing in things))
     near = close(name, known)
-    there = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {_some(known)}."
+    there = (
+        f"did you mean {' or '.join(map(repr, near))}?"
+        if near
+        else f"there are {listed([*map(repr, known)]) or 'none'}."
+    )
     raise error(f"no {what} is named {name!r}; {there}")
 
 
@@ -50,11 +54,6 @@ def new_name(value, thing, others, error):
     if any(other is not thing and other.name == value for other in others):
         raise error(f"{thing.name}: the scene has another named {value!r}; choose another name.")
     return value
-
-
-def _some(names):
-    shown = ", ".join(map(repr, names[:8])) or "none"
-    return f"{shown} and {len(names) - 8} more" if len(names) > 8 else shown
 
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -117,9 +116,9 @@ def _mass(value, body):
 
 
 def _demand_within(size, value, what, body):
-    if not LEAST_MASS <= size <= MOST_MASS:
+    if not TINY <= size <= SQUARABLE:
         raise InvalidBody(
-            f"{body.name}: the {what} must be from {LEAST_MASS:g} to {MOST_MASS:g}, got {shown(value)}: its reciprocal "
+            f"{body.name}: the {what} must be from {TINY:g} to {SQUARABLE:g}, got {shown(value)}: its reciprocal "
             "and its products must be finite numbers."
         )
 

@@ -19,7 +19,7 @@ from ..errors import InvalidConstraint
 from ..jit.kernels import NumbaError, kernel, twin
 from ..maths import vectors
 from ..maths.vectors import IDENTITY, unit
-from ..validation import demand_known, floats, label, number
+from ..validation import demand_known, floats, label, listed, number
 from .bodies import Ground, PointMass, named, new_name, rotation_matrix
 from .markers import PARAMETERS, POINT, TURN, Marker, entries
 from .tolerances import UNDIRECTED
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 
 # Bookkeeping of the constraints and forces made for a scene: which were added, and under which names.
-
-SHOWN = 5
 
 _may_be_idle = ContextVar("whether forces that are made may be zero", default=False)
 
@@ -66,10 +64,8 @@ def warn_of_waiting(scene, stacklevel):
         return
     titles = [item.title for item in scene._waiting.values()]
     scene._waiting.clear()
-    more = f" and {len(titles) - SHOWN} more" if len(titles) > SHOWN else ""
     warnings.warn(
-        f"made for this scene and never added: {', '.join(titles[:SHOWN])}{more}. What scene.add(...) isn't given has "
-        "no effect.",
+        f"made for this scene and never added: {listed(titles)}. What scene.add(...) isn't given has no effect.",
         stacklevel=stacklevel + 1,
     )
 

@@ -1,10 +1,7 @@
 """Limits of bodies, markers and compiled loops, each with its unit and where it comes from."""
 
-# m: squares of a point's coordinates must be numbers.
-FARTHEST_POINT = 1e150
-
-# kg, and kg m^2 of the largest moment of inertia: reciprocals must be numbers, and so must products of two of them.
-LEAST_MASS, MOST_MASS = 1e-300, 1e150
+# Largest numbers whose squares are numbers: m, of a point; kg, and kg m^2 of the largest moment of inertia.
+SQUARABLE = 1e150
 
 # | |p| - 1 | of Euler parameters as they are given: those written with seven digits pass, degrees in place of radians
 # do not. They are made of unit length afterwards. Of A^T A - I of a rotation matrix likewise.

@@ -7,6 +7,7 @@ from ..errors import Status
 from ..jit.kernels import ANY, callback, complex_vector, data_of, kernel, vector
 from ..jit.simd import add, cross, fma, four, lanes, put, splat, times, total
 from ..maths.dense_linalg import copy, largest
+from ..maths.tolerances import ROUNDING_AT_MOST
 from ..maths.vectors import spin
 from ..methods.collocation import parts_of
 from ..methods.explicit import NORM
@@ -39,18 +40,7 @@ from .chart_validity import measure_turns
 from .projection import largest_residual, velocity_floor
 from .saddle_point import add_blocks, degrees, factorise, linearise, reduce, soften, solve, take_solution, turned_back
 from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, weighted_square, write_state
-from .tolerances import (
-    FARTHEST_AHEAD,
-    LAG,
-    LEAST_LAG,
-    LEFT,
-    REACTION_SWEEPS,
-    REACTIONS_LEFT,
-    ROUNDING_AT_MOST,
-    SLOW,
-    STALLED,
-    SWEEPS,
-)
+from .tolerances import FARTHEST_AHEAD, LAG, LEAST_LAG, LEFT, REACTION_SWEEPS, REACTIONS_LEFT, SLOW, STALLED, SWEEPS
 
 # Right-hand side of a Newton correction of a stage: the normal part of accelerations, and the unbalanced loads.
 

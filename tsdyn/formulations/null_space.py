@@ -6,7 +6,7 @@ from ..elements.loops.constraint_rows import move_bodies, place_bodies
 from ..errors import Status
 from ..jit.kernels import callback, kernel, stack, vector
 from ..maths.dense_linalg import cholesky, cholesky_solve, copy, is_finite, largest, lu, lu_solve, transposed_times
-from ..maths.tolerances import SUM_ROUNDING
+from ..maths.tolerances import LAST_PLACE, SUM_ROUNDING
 from ..maths.vectors import multiply_g
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import applied_forces, is_rheonomic, set_time
@@ -34,7 +34,7 @@ from .null_space_chart import (
     solve_positions,
     tangent_map,
 )
-from .tolerances import BASIS_LOAD_ROUNDING, LOAD_SWEEPS
+from .tolerances import LOAD_SWEEPS
 
 # Coupled friction and reactions in the null-space form: accelerations and multipliers are linear in the normal loads.
 #
@@ -221,7 +221,7 @@ def solve_friction(context, t, vdd):
         for i in range(frictions):
             loads[i] += share * b[i]
             size = max(size, abs(loads[i]))
-        done = has_converged(change, before, share, sweep, BASIS_LOAD_ROUNDING * size)
+        done = has_converged(change, before, share, sweep, 2.0 * LAST_PLACE * size)
         before = change
     # vdd += sum_i a_i F_n,i
     for i in range(frictions):

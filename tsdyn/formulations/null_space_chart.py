@@ -13,11 +13,11 @@ from ..maths.dense_linalg import (
     multiply,
     null_space,
 )
-from ..maths.tolerances import SUM_ROUNDING
+from ..maths.tolerances import ROUNDING_AT_MOST, SUM_ROUNDING, TINY
 from ..model.equations import acceleration_bias, constraint_jacobian, constraints, time_derivative
 from ..rows.interface import list_redundant
 from .chart_validity import set_base_point
-from .tolerances import B_OUTDATED, B_SWEEPS, HUGE, LAG, ROUNDING_AT_MOST, SLOW, STALLED, USUAL
+from .tolerances import B_OUTDATED, B_SWEEPS, LAG, SLOW, STALLED, USUAL
 
 # Dense constraint rows of the forms with a basis: evaluate, factorise, solve. Redundant rows are dropped here.
 #
@@ -256,7 +256,7 @@ def update_b(w):
             worst = max(worst, total)
         # Eq. 28 converges from |R| < 1 only
         if worst > B_OUTDATED and before == math.inf:
-            before = HUGE  # a factorisation is tried once
+            before = 1.0 / TINY  # a factorisation is tried once
             if not invert_normal_matrix(w):
                 return SINGULAR
             continue

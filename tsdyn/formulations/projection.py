@@ -11,7 +11,7 @@ from ..errors import Status
 from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import add, four, put
 from ..maths.dense_linalg import largest, largest_of
-from ..maths.tolerances import LAST_PLACE, ROUNDING
+from ..maths.tolerances import LAST_PLACE, ROUNDING, ROUNDING_AT_MOST
 from ..rows.interface import (
     DYNAMICS,
     constrain,
@@ -26,7 +26,7 @@ from ..rows.interface import (
     singularity_indicator,
 )
 from .chart_coordinates import largest_rates
-from .tolerances import LAND_SWEEPS, ROUNDING_AT_MOST, STALLED, WALK
+from .tolerances import LAND_SWEEPS, STALLED, WALK
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)

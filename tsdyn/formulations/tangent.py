@@ -6,6 +6,7 @@ from ..elements.loops.constraint_rows import largest_coordinate, write_accelerat
 from ..errors import Status
 from ..jit.kernels import callback, kernel, long_kernel, vector
 from ..maths.dense_linalg import copy, is_finite
+from ..maths.tolerances import ROUNDING_AT_MOST
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
@@ -35,7 +36,7 @@ from .chart_coordinates import (
 )
 from .chart_validity import every_level_holds, reason_to_leave, set_base_point
 from .projection import largest_residual, velocity_floor
-from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, ROUNDING_AT_MOST, SLOW, SLOW_FACTORS, STALLED, SWEEPS
+from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, SLOW, SLOW_FACTORS, STALLED, SWEEPS
 
 # Error norm of the tangent form: errors of chart coordinates without their normal part, in terms of q and qd.
 

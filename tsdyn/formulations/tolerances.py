@@ -10,13 +10,6 @@ NO_SIZE = 0.01
 # Correcting smaller ones would displace bodies by the rounding of Phi in every step, and change the energy.
 WALK = 0.5
 
-# Correction of normal loads of the null-space form, which are sums over the multipliers of a joint: two roundings.
-BASIS_LOAD_ROUNDING = 4e-16
-
-# Residuals over the rounding of Phi: a residual that has stopped falling is rounding up to this, an error above it.
-# Two digits: rounding grows along closed loops and with the distance from the origin.
-ROUNDING_AT_MOST = 100.0
-
 # Residual of the rows over the largest acceleration, up to which one correction of accelerations leaves rounding; and
 # corrections at most. Masses that are unequal by 1e10 need two.
 EXACT, REFINEMENTS = 1e-11, 3
@@ -73,10 +66,3 @@ SAME = 1e-6
 # m: numbers up to it, and down to its reciprocal, are of usual size. Beyond it an orthonormal V mixes positions with
 # Euler parameters that are smaller by as much, and D^T M D loses twice as many digits.
 USUAL = 64.0
-
-# --- rank
-# Smallest over largest squared singular value of the rows that hold an orientation: less doesn't hold a body; 1e-6 rad.
-HOLDING = 1e-12
-
-# Largest finite size: a sum above it is taken for an overflow.
-HUGE = 1e300

@@ -23,7 +23,11 @@ NEGLIGIBLE = 1e-12
 TYPED = 1e-9
 # Half of the digits: what is left of quotients of differences, of double eigenvalues, of states from runs.
 HALF_DIGITS = 1e-7
-# No number that matters is so small: the least divisor, the largest number that counts as none.
+# Residuals over their rounding: one that has stopped falling is rounding up to this, an error above it. Two digits,
+# since rounding grows along closed loops and with the distance from the origin.
+ROUNDING_AT_MOST = 100.0
+# No number that matters is so small: the least divisor, mass (kg) and moment of inertia, the largest that counts as
+# none.
 TINY = 1e-300
 # Complex steps: f(x + i h) / h cancels nothing and truncates h^2 f'''. So h is as small as it may be without products
 # of h, such as h^2 of a law's squares of small numbers, that reach the least number there is (5e-324) where they count.

@@ -5,6 +5,7 @@ import math
 from ..errors import Status
 from ..jit.kernels import ANY, callback, caller, kernel, stack, vector
 from ..maths.dense_linalg import copy
+from ..maths.tolerances import ROUNDING_AT_MOST
 from ..workspaces import load, load_run
 from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combine
 from .tolerances import (
@@ -12,14 +13,12 @@ from .tolerances import (
     APART,
     APART_AT_LEAST,
     APART_SLIPPING,
-    AT_FLOOR,
     DIVERGING,
     EAGER_LOST,
     EAGER_SPARSE,
     EAGER_STAGES,
     FAR_STAGE,
     FIXED_ITERATIONS,
-    FIXED_TOL,
     FORGET,
     GUESS,
     ITERATIONS,
@@ -27,11 +26,11 @@ from .tolerances import (
     KAPPA_SPARSE,
     LEAST,
     LEAST_FIXED,
+    LEAST_LEFT,
     MATRICES,
     RESIDUAL_FLOOR,
     SAME_STEP,
     SAME_TIME,
-    SLIP_LEFT,
     SLOW_DENSE,
     SLOW_SPARSE,
     WORSE_CONTRACTION,
@@ -356,7 +355,7 @@ def _is_solved(c, size, adaptive, is_last):
     """
     numbers, one, theta = c.linear.numbers, c.linear.iteration, c.linear.iteration.theta
     # Rounding
-    if size <= one.floor or (theta > DIVERGING and size <= AT_FLOOR * one.floor):
+    if size <= one.floor or (theta > DIVERGING and size <= ROUNDING_AT_MOST * one.floor):
         return True
     # What is left: the sum of the corrections to come, or what first corrections have left before
     left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
@@ -481,11 +480,11 @@ def prepare_implicit(linear, method, addresses, every_chart, slips):
     """
     numbers = linear.numbers
     numbers.every_chart = int(every_chart)
-    numbers.rtol, numbers.atol = (FIXED_TOL, FIXED_TOL) if method.step else method.step_tolerances()
+    numbers.rtol, numbers.atol = (LEAST_LEFT, LEAST_LEFT) if method.step else method.step_tolerances()
     numbers.slips = int(slips)
     numbers.kappa = KAPPA_SPARSE if every_chart and not method.step else KAPPA
     if slips:
-        numbers.kappa = min(numbers.kappa, SLIP_LEFT / (numbers.rtol + numbers.atol))
+        numbers.kappa = min(numbers.kappa, LEAST_LEFT / (numbers.rtol + numbers.atol))
     numbers.left, numbers.first, numbers.t_before = math.inf, 1.0, -math.inf
     for name, address in addresses.items():
         setattr(linear.kernels, name, address)

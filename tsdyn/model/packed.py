@@ -136,12 +136,12 @@ def _of(redundant, turning, handles):
 
 # Lengths of a scene: in a small one positions are held to rounding of these, not of the pure numbers beside them.
 
-SMALL = 1e-3  # m: a scene without longer lengths; rounding of one is 1e-12 of it
+POINT_SIZE = 1e-3  # m: a scene without longer lengths, or whose points coincide; rounding of one is 1e-12 of it
 
 
 def is_small(size):
     """Return True for the size of a scene in which pure numbers, such as the coordinates of axes, are no lengths."""
-    return 0.0 < size < SMALL
+    return 0.0 < size < POINT_SIZE
 
 
 def has_lengths(primitive):

@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import InvalidConstraint
 from ..jit.kernels import entry, kernel
 from ..maths.tolerances import NEGLIGIBLE, TYPED
-from .tolerances import CLEAR_CHANGE, LEAST_SPAN, NO_CHANGE, OF_STEP, SAMPLES, STRIDES, TOGETHER
+from .tolerances import CLEAR_CHANGE, LEAST_SPAN, NO_CHANGE, SAMPLES, STRIDES, TOGETHER
 
 # Knots of piecewise motions and loads: stops of a run, and jumps that no run may cross.
 
@@ -136,7 +136,7 @@ def changes(t, functions):
 
 def within_step(t, h):
     """The times within a step at which `is_noise` is asked."""
-    return np.linspace(t, t + h, OF_STEP + 1)
+    return np.linspace(t, t + h, STRIDES[-1] + 1)
 
 
 def is_noise(samples):

@@ -19,8 +19,9 @@ TIMES = (0.37, 1.3, 11.0)
 # where they have an extremum (a sine of four values a period: 0.21; four values of a hump, unevenly spaced: 0.37).
 OVERSHOOT, EXTREMUM = 0.1, 0.5
 
-# Samples of a function over a run, of which there are two or more in a pulse of a thousandth of the run; and strides
-# at which they are looked at, up to a 32nd of the run: steps are that long.
+# Samples of a function over a run, of which there are two or more in a pulse of a thousandth of the run; and strides at
+# which they are looked at, up to a 32nd of the run: steps are that long. Of a step, as many are sampled for noise as
+# the longest stride.
 SAMPLES, STRIDES = 2048, (1, 4, 16, 64)
 # Ratio of a sixth difference of samples to those before it, above which there is a change: beside a double zero
 # differences grow by 20 within nine samples, at a pulse on a sine of 26 samples a period by 1e5. Share of the largest
@@ -28,5 +29,3 @@ SAMPLES, STRIDES = 2048, (1, 4, 16, 64)
 CLEAR_CHANGE, NO_CHANGE = 100.0, 1e-9
 # Degree up to which a polynomial of the state is seen by the stages of a step; x^40 is a wall.
 PLAIN_DEGREE = 8
-# Intervals of a step at which a function is sampled for noise.
-OF_STEP = 64

@@ -6,6 +6,6 @@ REDUNDANT_SHARES = 3e-2, 1e-3, 1e-6, 1e-9
 INDEPENDENT = 1e-3
 # Coordinates from which on matrices are sparse (a dense solution takes 0.1 s there).
 LARGE = 1000
-# Floats of a workspace of rows, or of a reader of dense output, up to which it is kept for the next call (1 MB): a
-# hundred bodies or more.
-KEPT_FLOATS = 1 << 17
+# Floats of a workspace of rows, of a start, or of a reader of dense output, up to which it is kept for the next call (8
+# MB): a thousand bodies.
+KEPT_FLOATS = 1 << 20

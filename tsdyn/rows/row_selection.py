@@ -35,9 +35,9 @@ from .tolerances import (
     NEAR,
     NEXT_TO,
     NO_RATE,
+    ONE_DIGIT,
     RESTING,
     WITHIN_A_STEP,
-    WORSE,
     WORST_CONDITIONED,
 )
 
@@ -486,7 +486,7 @@ def selection_serves(graph, f, rows):
         # A pivot may grow: its largest value is the measure
         share = _share(graph, rows.S, e)
         f.best[e] = max(f.best[e], share)  # a selection next to a singular configuration is no measure
-        serves = serves and share >= WORSE * f.best[e]
+        serves = serves and share >= ONE_DIGIT * f.best[e]
     return serves
 
 

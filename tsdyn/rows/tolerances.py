@@ -11,8 +11,9 @@ makes with them.
 FIRST_SHARE, FEWER = 1e-3, 1e-2
 
 # Share of a row over its largest value since the selection: below it the selection is renewed, so that S loses no more
-# than one digit to an old selection.
-WORSE = 0.1
+# than one digit to an old selection. The moment of inertia J that an axis without inertia is given, over the body's
+# largest: a condition of ten.
+ONE_DIGIT = 0.1
 
 # Residual of a redundant row, its rate or its acceleration over the sum of its absolute terms: above it the row doesn't
 # hold (docs/theory.md). Points and axes that are typed with ten digits hold. Laws of random scenes have 1e-9, but may
@@ -31,7 +32,9 @@ RESTING, NO_RATE = 1e-9, 1e-20
 MOST_ROWS = 1500
 
 # Singularity indicator over its largest value in the run, dimensionless; it falls as the square of the distance.
-NEAR = 0.02  # below, at 0.14 of the distance: multipliers are refined at each order, Taylor steps tightened
+NEAR = (
+    0.02  # below, at 0.14 of the distance: multipliers are refined at each order, Taylor steps tightened; regular above
+)
 NEXT_TO = 1e-3  # below, at 0.03: a step method hands over to series
 WITHIN_A_STEP = 0.2  # below, at 0.45: so does a fixed step that fails
 
@@ -62,11 +65,9 @@ LOOKUP = 1.1  # cost of one block over that of its parts up to which they are me
 
 # --- the metric of lengths
 # Ratio of masses, or of the largest inertias of bodies, above which factors of S lose as many digits: the start is
-# looked at once more, and multipliers of series are refined.
+# looked at once more, and multipliers of series are refined. Above its square, half of the digits, masses are named as
+# the reason where a run can't begin, or ends singular.
 UNEQUAL_MASSES = 1e4
-# The same ratio, above which masses are named as the reason where a run can't begin, or ends singular: half of the
-# digits are lost.
-TOO_UNEQUAL = 1e8
 
 # --- axes with next to no inertia, docs/design-decisions.md, "Inertia is added and taken back"
 # Moment of inertia over the largest of the body, about its centroid or by its lever arms: less takes an axis row. The
@@ -75,4 +76,3 @@ THIN = 1e-6
 # The same over the largest of the scene, of a body that carries heavier ones: below the first, pivots of S come close
 # to rounding, and all moments below the second, its root, are raised. Radau takes shorter steps then.
 MASSLESS, RAISED = 1e-12, 1e-8
-GIVEN = 0.1  # the raised moment of inertia J over the same: a condition of ten

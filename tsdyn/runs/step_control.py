@@ -6,6 +6,7 @@ from ..formulations.chart_validity import extent
 from ..jit.kernels import kernel
 from ..methods.diagonally_implicit import call_soften
 from ..methods.explicit import call_error, call_norm
+from ..methods.tolerances import SAME_TIME
 from .dense_output import evaluate
 from .tolerances import (
     AT_LONGEST,
@@ -23,7 +24,6 @@ from .tolerances import (
     NO_SLOPE,
     PI_BEFORE,
     PI_ERROR,
-    ROUNDING_STRETCH,
     SAFETY,
     SAME_FROM,
     SAME_TO,
@@ -50,7 +50,7 @@ def stretch(h, longest):
     # Below max_step the last step may be a little longer; at max_step by rounding only
     if h < AT_LONGEST * longest or longest == math.inf:
         return STRETCH * h
-    return max(longest - h, ROUNDING_STRETCH * h)
+    return max(longest - h, SAME_TIME * h)
 
 
 @kernel

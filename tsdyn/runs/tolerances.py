@@ -9,7 +9,7 @@ SHORTEST, FROM_ZERO = 4e-16, 1e-3
 # Part of a step by which the last one of a run may be longer than chosen, so that no tiny one is left: a thousandth
 # changes its error by less than a hundredth at order 8. A step that is at max_step already (AT_LONGEST of it) may pass
 # it by rounding only.
-STRETCH, AT_LONGEST, ROUNDING_STRETCH = 1e-3, 0.999, 1e-9
+STRETCH, AT_LONGEST = 1e-3, 0.999
 
 # Part of a fixed step: a stop nearer than this to a time of the grid replaces it, so that no step is left of the size
 # of rounding.
@@ -17,9 +17,6 @@ SLIVER = 1e-6
 
 # A step that a stop shortens to less than this part of its proposed length isn't used to predict the next one.
 CUT_SHORT = 0.5
-
-# Part of a sampling period: instants that are nearer are the same one, computed in two ways.
-SAME_INSTANT = 1e-9
 
 # Sampling instants of a run at most: 16 bytes each, 0.5 GB.
 MOST_INSTANTS = 1 << 25

@@ -13,6 +13,7 @@ from ..formulations.registry import formulation
 from ..integrators import SDIRK54, Radau, Taylor
 from ..jit.compiled import clock
 from ..methods.integrator import frozen
+from ..rows.tolerances import NEAR
 from ..runs.dense_output import StepPieces
 from ..runs.driver import SegmentLink, begin, run
 from ..runs.run_log import NAMES, ChartLog, RunEnd, StepLog
@@ -20,6 +21,7 @@ from ..runs.step_engine import StepEngine
 from ..runs.task import Outcome
 from ..runs.tolerances import SLIVER
 from ..taylor.series_engine import SeriesEngine
+from ..taylor.tolerances import SHARP_TOL
 from ..validation import damaged, demand, demand_numbers, is_count
 from .local_origin import within_rounding
 from .progress import silent
@@ -29,10 +31,8 @@ from .tolerances import (
     FINEST,
     FIRST_WINDOW,
     GOT_ON,
-    LOOSEST,
     PASSES,
     PATIENCE,
-    REGULAR,
     RESTING,
     RISKED,
     SERIES_COST,
@@ -59,7 +59,7 @@ KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "beg
 def implicit(method, prepared, form):
     """Return the implicit method of the same tolerances: Radau, or SDIRK54 where all stages at once aren't served."""
     coupled = form.basis_free and not prepared.rough
-    most = LOOSEST if coupled and prepared.sharp else math.inf
+    most = SHARP_TOL if coupled and prepared.sharp else math.inf
     found = (Radau if coupled else SDIRK54)(min(method.rtol, most), min(method.atol, most), max_step=method.max_step)
     if not coupled:
         found.safety = STIFF_SAFETY
@@ -287,7 +287,7 @@ class Carrier:
 
     def _is_regular(self):
         indicator = self.context.tangent.indicator
-        return indicator.start >= max(REGULAR * indicator.largest, self.share)
+        return indicator.start >= max(NEAR * indicator.largest, self.share)
 
     def _next(self):
         """Return the next time of the grid."""

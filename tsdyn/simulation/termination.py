@@ -13,7 +13,7 @@ from ..observables.evaluate import constraint_arrays
 from ..observables.generalised_forces import NotFinite, applied_loads, jumping, not_finite
 from ..rows.constraint_graph import MASS_REMEDY, mass_ratio
 from ..rows.graph_builder import redundant_rows
-from ..rows.tolerances import TOO_UNEQUAL
+from ..rows.tolerances import UNEQUAL_MASSES
 from ..runs.tolerances import AT_LONGEST
 from ..taylor.layout import without_series
 from ..validation import counted
@@ -129,7 +129,7 @@ def account(solution, scene, reason, goes_on=""):
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
     steps = counted(solution.stats.steps, "step")
     where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
-    masses = mass_ratio(solution.packed, TOO_UNEQUAL) if solution.status is Status.SINGULAR else ""
+    masses = mass_ratio(solution.packed, UNEQUAL_MASSES**2) if solution.status is Status.SINGULAR else ""
     if masses:
         return " ".join(part for part in (f"{masses[0].upper()}{masses[1:]}.", reason, where, MASS_REMEDY) if part)
     found, limit = suspect(solution, scene), step_limit(solution)

@@ -23,9 +23,6 @@ COST, SERIES_COST = 1.4, 6.5
 STEP_EVALUATIONS = 16  # of a step of SDIRK54, about
 # Safety factor between tolerances and step errors of SDIRK54 where it goes on: fast modes decay, and with them errors.
 STIFF_SAFETY = 50.0
-# The loosest tolerance of Radau where there are sharp forces: at 0.005 a step flies over the place where a body breaks
-# loose, whose error is a hundred times that at 0.001.
-LOOSEST = 1e-3
 # Cost of an order of a series in scenes with sharp forces, where steps are as short as they are for a while only, over
 # that of an evaluation: chains of four with friction, slip velocities of 1e-3 to 1e-1.
 SHARP_COST = 0.1
@@ -37,8 +34,6 @@ FAR_ORIGIN = 100.0
 FAR_LEVER = 1e4
 
 # --- singular configurations ---
-# Of the largest share that the weakest row has had: as much is regular again, for other methods and for Taylor alike.
-REGULAR = 0.02
 # Tolerance of the series that cross a singular configuration, if the method has none that is tighter.
 FINEST = 1e-10
 # Smallest singular value, of the largest, below which a failure is put down to a singular configuration; coordinates up

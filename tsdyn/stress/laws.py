@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..elements.bodies import rotation_matrix
 from ..elements.markers import POINT
-from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE
+from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, ROUNDING_AT_MOST, SUM_ROUNDING
 from ..model.equations import WIDTH, places, with_short_rows
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
@@ -22,7 +22,6 @@ from ..simulation.simulate import simulate
 from .tolerances import (
     BODIES,
     FLOOR,
-    HELD,
     ILL_CONDITIONED,
     NEAR_SINGULAR,
     NEAR_SINGULAR_ENDS,
@@ -32,7 +31,6 @@ from .tolerances import (
     ROUNDINGS,
     ROW_SHARE,
     SMALL_SCENE,
-    TIME,
 )
 
 # What a law of a run has found.
@@ -338,7 +336,7 @@ def dense_output(solution):
     state = solution.at(solution.t[at])
     limit = off_steps(solution)
     amplified = np.minimum(ROUNDED_ROWS * EPS / weakest_rows(solution, at) ** 2, NEAR_SINGULAR_ENDS)
-    rounding = TIME * EPS * np.abs(solution.t).max()  # of an instant
+    rounding = ROUNDING_AT_MOST * EPS * np.abs(solution.t).max()  # of an instant
     for name, rate in (("q", "qd"), ("qd", "qdd")):
         given, change = getattr(solution, name)[at], rounding * np.abs(getattr(solution, rate)[at])
         size = 1.0 + np.abs(given).max(initial=0.0)
@@ -362,7 +360,7 @@ def weakest_rows(solution, at):
 
 def off_steps(solution):
     """How far dense output may be off the ends of steps, relative to the coordinates."""
-    near = HELD * _farthest(solution) / (extent(solution) or 1.0)
+    near = SUM_ROUNDING * _farthest(solution) / (extent(solution) or 1.0)
     return ROUNDED * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + near
 
 

@@ -13,11 +13,6 @@ MULTIPLE, TIGHTER, SHORTER, FALL = 1e3, 1e-3, 8.0, 0.1
 ROUNDED = 1e-10
 # Of the ends of two runs past singular configurations, which amplify rounding; the other branch is off by far more.
 NEAR_SINGULAR_ENDS = 1e-4
-# Roundings of an instant, and of places that are passed within as many: what is interpolated there changes by its rate
-# times these.
-TIME = 1e2
-# Share of the farthest position to which positions are held: in small scenes far away angles are, over their size.
-HELD = 1e-14
 # Next to a singular configuration, where a chart has a condition of ILL_CONDITIONED or more, rounding is amplified by
 # so much.
 NEAR_SINGULAR, ILL_CONDITIONED = 1e3, 1e8

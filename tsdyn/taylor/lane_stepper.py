@@ -5,11 +5,11 @@ import math
 from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R, orient
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..elements.loops.law_check import call_margin
-from ..formulations.tolerances import LAND_SWEEPS, ROUNDING_AT_MOST, STALLED, WALK
+from ..formulations.tolerances import LAND_SWEEPS, STALLED, WALK
 from ..jit.kernels import kernel, long_kernel, specialised
 from ..jit.lanes import any_of, below, binary_log, binary_power, both, choose, either, every, floor, opposite
 from ..jit.simd import add, first, fma, four, fourth, get, larger, let, put, second, splat, sub, third, times, total
-from ..maths.tolerances import ROUNDING, TINY
+from ..maths.tolerances import ROUNDING, ROUNDING_AT_MOST, TINY
 from ..rows.interface import (
     DYNAMICS,
     ILL_CONDITIONED,
@@ -47,20 +47,7 @@ from .lane_memory import (
 from .layout import L_OMEGA, L_P, L_R, L_RD, LOW
 from .step_end import keep_start, project_rates
 from .step_length import largest_of_three, size_of_order
-from .tolerances import (
-    FAINT_LOGARITHM,
-    HALVINGS,
-    MISSED,
-    MOST_PARTS,
-    NO_STEP,
-    SMALL,
-    SMALL_STEPS,
-    STEP_COST,
-    STIFF_RATES,
-    STILL,
-    WARY,
-    WIDE,
-)
+from .tolerances import FAINT, HALVINGS, MOST_PARTS, SMALL, SMALL_STEPS, STEP_COST, STIFF_RATES, STILL, WARY, WIDE
 
 # Projection of each lane onto the constraint manifold, as formulations/projection.py has it for one case.
 #
@@ -362,7 +349,7 @@ def _radii(c, least, most, far, fast):
         size = size_of_order(x.bodies, nb, x.order.room, k, far, fast)
         here = choose(below(0.0, size), binary_log(max(size, TINY)) * ((top + 1.0) / k), -math.inf)
         likely = max(likely, here)
-    finite = choose(both(below(-math.inf, likely), below(likely, FAINT_LOGARITHM)), 0.0, finite)
+    finite = choose(both(below(-math.inf, likely), below(likely, math.log2(FAINT))), 0.0, finite)
     return choose(below(0.5, finite), rho, -math.inf), lower
 
 
@@ -382,7 +369,7 @@ def propose(c, least, most):
     rho, lower = _radii(c, least, most, far, fast)
     # log2 of tol
     accuracy = math.log(n.atol + n.rtol) / math.log(2.0)
-    h = choose(below(-math.inf, rho), _held(rho + accuracy / (top + 2.0), rate, top + 2.0), NO_STEP)
+    h = choose(below(-math.inf, rho), _held(rho + accuracy / (top + 2.0), rate, top + 2.0), 0.0)  # none ends the lane
     if order.highest > order.lowest:
         # Higher order if it advances further per unit of work
         other = _held(lower + accuracy / top, rate, top)
@@ -455,8 +442,8 @@ def _is_missed(c, again):
     """Whether lanes have missed the manifold: their steps are halved, or, if not to be tried `again`, they are lost."""
     s, tol, missed = c.single, c.numbers.atol + c.numbers.rtol, False
     for l in range(s.shape[1]):
-        # As MISSED of taylor/stepper.py
-        lands = s[BAD, l] == 0.0 and s[RESIDUAL, l] <= MISSED * (tol + s[FLOOR, l])
+        # As in taylor/stepper.py
+        lands = s[BAD, l] == 0.0 and s[RESIDUAL, l] <= ROUNDING_AT_MOST * (tol + s[FLOOR, l])
         if s[RUNS, l] != 0.0 and s[LOST, l] == 0.0 and not lands:
             if not again:
                 s[LOST, l] = 1.0

@@ -27,10 +27,11 @@ from ..rows.interface import (
     select_rows,
     singularity_indicator,
 )
+from ..rows.tolerances import UNEQUAL_MASSES
 from .coefficients import begin, expand
 from .layout import load_series
 from .step_end import keep_start, project_rates, sum_series
-from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL, UNEQUAL_PIVOTS
+from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL
 
 # Taylor series of prescribed motions and of loads, for Taylor runs of driven scenes.
 
@@ -287,7 +288,7 @@ def pass_singular(context, t, h):
 @kernel
 def is_singular(c, status):
     """Whether the state of `reach`, or the one that it failed to reach, is near a singular configuration."""
-    limit = NEXT_TO_SINGULAR * min(1.0, c.tangent.indicator.largest / UNEQUAL_PIVOTS)
+    limit = NEXT_TO_SINGULAR * min(1.0, c.tangent.indicator.largest * UNEQUAL_MASSES)
     return status == SINGULAR or (status == 0 and singularity_indicator(c.graph, c.tangent.rows) < limit)
 
 

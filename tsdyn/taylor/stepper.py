@@ -7,7 +7,7 @@ from ..errors import Status
 from ..formulations.chart_validity import AT_START, BY_SERIES, extent
 from ..jit.kernels import entry, kernel, long_kernel
 from ..maths.dense_linalg import copy, is_finite
-from ..maths.tolerances import TINY
+from ..maths.tolerances import ROUNDING_AT_MOST, TINY
 from ..model.equations import remember, set_time
 from ..model.joint_turns import count_turns
 from ..motions.tolerances import SAMPLES
@@ -27,19 +27,18 @@ from .tolerances import (
     AVOIDING,
     CLOSE,
     CLOSER,
-    COARSE,
     FASTER,
     HOP,
     HOP_APART,
     LEAST_STEPS,
     LOOSER,
     MINUTE,
-    MISSED,
     MOST_HOPS,
     PASSED,
     PLACES,
     RATES,
     SHARP_STEPS,
+    SHARP_TOL,
     SMALL,
     SMALL_STEPS,
     SPARE,
@@ -302,7 +301,7 @@ def make_step(context, c, r, log, stop):
         # Fixed steps end the run where the series leaves a law, adaptive ones are shortened
         note_try(r, log, r.clock.t, s.t1 - r.clock.t)
         if not adaptive and s.check != 0:
-            call_laws(s.check, context, r.clock.t, s.t1 - r.clock.t, COARSE, COARSE)
+            call_laws(s.check, context, r.clock.t, s.t1 - r.clock.t, SHARP_TOL, SHARP_TOL)
             if s.good < 1.0:
                 return SERIES_ENDED
         if adaptive and s.check != 0 and not _follows_laws(context, c, r):
@@ -321,7 +320,9 @@ def make_step(context, c, r, log, stop):
             _reject(r, log)
             continue
         # A projection that moves further than the tolerance corrects no truncation error: the radius was wrong
-        landed = status == 0 and (not adaptive or f.landing.residual <= MISSED * (s.tol + c.work.control.floor))
+        landed = status == 0 and (
+            not adaptive or f.landing.residual <= ROUNDING_AT_MOST * (s.tol + c.work.control.floor)
+        )
         if landed:
             f.indicator.end = singularity_indicator(c.graph, f.rows)
         if not adaptive:

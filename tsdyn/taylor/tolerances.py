@@ -10,10 +10,6 @@ STEP_COST = 3
 # Range of the coefficients of a step's last order: products of smaller ones lose digits, those of larger ones overflow.
 FAINT, VAST = 1e-280, 1e280
 
-# |Phi| at the end of a step, over tolerance and rounding: a larger residual is no truncation error, so the radius of
-# convergence was overestimated.
-MISSED = 100.0
-
 # Parts of a step in which Euler parameters are followed, one for each radian, at most.
 MOST_PARTS = 100.0
 
@@ -31,8 +27,9 @@ STIFF_RATES = 1000.0
 # more (motions/tolerances.py, SAMPLES). Steps of a run at least, since a pulse between two places is missed.
 PLACES, LEAST_STEPS = 4, 8
 # atol and rtol of that comparison where steps are fixed and have no tolerance: above the errors of series in too long a
-# step, below those of series that have ended.
-COARSE = 1e-3
+# step, below those of series that have ended. Also the loosest tolerance of Radau where there are sharp forces: at
+# 0.005 a step flies over the place where a body breaks loose, whose error is a hundred times that at 0.001.
+SHARP_TOL = 1e-3
 
 # HOP: length of a step over a place where a law is not analytic, over the shortest step (runs/tolerances.py, SHORTEST):
 # forces are bounded there, so its error is rounding. Within HOP_APART lengths of the one before, such a step is
@@ -56,8 +53,7 @@ SHARP_STEPS, MINUTE, AT_REST = 400, 1e-6, 8
 # those of the series are used. Below GONE a row is omitted from a projection, which would amplify position errors
 # beyond the error of the series.
 NEXT_TO_SINGULAR, GONE = 1e-8, 1e-10
-# Largest pivot of a run below which masses are so unequal that no pivot is large: NEXT_TO_SINGULAR is relative to it.
-UNEQUAL_PIVOTS = 1e-4
+# Where masses are so unequal that no pivot of a run is above 1 / UNEQUAL_MASSES, NEXT_TO_SINGULAR is relative to it.
 
 # Indicator at the end of a step over that at its start, below which the step approaches a singular configuration; ends
 # too close to continue; ends too close even beyond it. Measured on rows of parallelograms
@@ -92,9 +88,5 @@ FAR = 1 << 15
 
 # Thresholds of lanes.
 
-# log2 of the size of the last coefficient below which it loses digits, as FAINT of taylor/tolerances.py.
-FAINT_LOGARITHM = -930.0
-# s: the length of a step without a radius of convergence, which ends the lane.
-NO_STEP = 0.0
 # Times that a step which has missed the manifold is halved before its case is left to be run alone.
 HALVINGS = 4

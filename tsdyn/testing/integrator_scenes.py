@@ -5,11 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..benchmarking.tolerances import REFERENCE_TOLERANCES
 from ..constraints import Distance, PlaneContact, Spherical
 from ..integrators import DOP853, RK45
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
-from .tolerances import BRIEF, TIGHT
+from .tolerances import BRIEF
 
 GRID = 16  # equal parts of the span, at whose ends fixed steps are compared
 INNER = np.sort(np.random.default_rng(1).uniform(0.01, 0.99, 40))  # fractions of the span, within the steps
@@ -78,8 +79,9 @@ def cases(kind, order=2):
         end *= BRIEF if order == 1 else 1.0
         scene, grid, inner = build(), np.linspace(0.0, end, GRID + 1), end * INNER
         times = np.union1d(grid, inner)
+        tightest = REFERENCE_TOLERANCES[-1]
         best, other = (
-            simulate(scene, (0.0, end), integrator=method(TIGHT, TIGHT), t_eval=times).raise_if_failed()
+            simulate(scene, (0.0, end), integrator=method(tightest, tightest), t_eval=times).raise_if_failed()
             for method in (first, second)
         )
         at, within = np.searchsorted(times, grid), np.searchsorted(times, inner)

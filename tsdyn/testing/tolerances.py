@@ -30,7 +30,3 @@ REPEATED, REJECTED, BOUNDED = 1e-4, 1e-6, 1e-3
 # Trace that a rejected step may leave in the next one: none but rounding; of implicit methods, this share of the
 # tolerance of an iteration.
 NO_TRACE, ITERATION_TRACE = 1e-12, 0.1
-# The last step may be stretched by a thousandth, to end on time.
-STRETCHED = 1.002
-# Agreement of the two references of a scene.
-TIGHT = 1e-13

@@ -8,25 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from .tolerances import (
-    AT_ZERO,
-    CLEAR,
-    DEEPEST,
-    EPS,
-    EXTREME,
-    MOST_SCALED,
-    NEAR_ZERO,
-    NEGLIGIBLE,
-    NOISE_RATIO,
-    REAL,
-    ROUGH_SHARE,
-    SAFE,
-    SHORTEST_INTERVAL,
-    TIGHT,
-    UNDERFLOWING,
-    UNRESOLVED,
-    WIDEST_NOISE,
-)
+from .tolerances import (  # isort: skip
+    AT_ZERO, CLEAR, DEEPEST, EPS, EXTREME, MOST_SCALED, NEAR_ZERO, NEGLIGIBLE, NOISE_RATIO, REAL, ROUGH_SHARE, SAFE,
+    SHORTEST_INTERVAL, TIGHT, UNDERFLOWING, UNRESOLVED, WIDEST_NOISE,
+)  # fmt: skip
 
 # Chebyshev interpolation on [-1, 1]; tables are made once for each degree.
 

@@ -26,19 +26,9 @@ from ..validation import one_of, positive, whole
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..hints import (
-        ArrayLike,
-        Event,
-        Formulation,
-        Function,
-        Integrator,
-        Method,
-        Place,
-        Progress,
-        Redundancy,
-        Span,
-        State,
-    )
+    from ..hints import (  # isort: skip
+        ArrayLike, Event, Formulation, Function, Integrator, Method, Place, Progress, Redundancy, Span, State,
+    )  # fmt: skip
 
 
 def _positive(value, name):

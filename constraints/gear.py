@@ -17,26 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    PARALLEL,
-    Point,
-    Primitive,
-    Vector,
-    across,
-    angle_near,
-    beside,
-    cross,
-    dot,
-    ground_point,
-    kernel,
-    number,
-    quotient,
-    rotation_matrix,
-    scaled,
-    shown,
-    square,
-    vectors,
-)
+from ..plugins import (  # isort: skip
+    PARALLEL, Point, Primitive, Vector, across, angle_near, beside, cross, dot, ground_point, kernel, number, quotient,
+    rotation_matrix, scaled, shown, square, vectors,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from ..hints import BodyLike

@@ -12,18 +12,9 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..plugins import (
-    PARALLEL,
-    Angle,
-    FramedJoint,
-    InvalidConstraint,
-    Motion,
-    across,
-    angles,
-    beside,
-    fitting,
-    turned_about,
-)
+from ..plugins import (  # isort: skip
+    PARALLEL, Angle, FramedJoint, InvalidConstraint, Motion, across, angles, beside, fitting, turned_about,
+)  # fmt: skip
 from .angle_driver import AngleDriver
 
 if TYPE_CHECKING:

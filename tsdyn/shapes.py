@@ -20,7 +20,7 @@ import numpy as np
 from . import validation
 from .calls import fitting, fitting_constructor
 from .errors import InvalidArgument, InvalidFile
-from .maths.tolerances import FLAT
+from .maths.tolerances import NEGLIGIBLE
 from .validation import floats, number, positive, vector3
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def moments(vertices, faces):
     a, b, c = corners.transpose(1, 0, 2)
     d = np.einsum("fi,fi->f", a, np.cross(b, c))
     volume = d.sum() / 6.0
-    if abs(volume) <= FLAT:
+    if abs(volume) <= NEGLIGIBLE:
         raise InvalidArgument("from_mesh: the mesh encloses no volume; all of its faces lie in a plane, or cancel out.")
     if volume < 0.0:
         raise InvalidArgument("from_mesh: all faces are oriented inward; reverse them: faces[:, ::-1].")

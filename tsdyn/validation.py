@@ -222,6 +222,11 @@ def counted(count, noun, nouns=None):
     return f"{count} {noun if count == 1 else nouns or noun + 's'}"
 
 
+def listed(names, most=8):
+    """Return names one after the other, and how many more there are than some."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
 def close(name, known):
     """Return up to three known names similar to a wrong one."""
     return difflib.get_close_matches(str(name), known, 3)

@@ -130,12 +130,11 @@ class SaddleWorkspace(NamedTuple):
     complex_x: np.ndarray  # (2 s,)
     q: np.ndarray  # (14,)  coordinates of an instance's two bodies
     qd: np.ndarray  # (14,)
-    zero: np.ndarray  # (14,)  accelerations that its derivatives don't depend on
     R: np.ndarray  # (14,)  generalised forces
     lam: np.ndarray  # (r,)  its multipliers
     X: np.ndarray  # (14, 14)  its derivatives in these coordinates
     Xd: np.ndarray  # (14, 14)
-    rows: np.ndarray  # (3 r, 14)  its rows of Phi_q, and what constraint_hessians.loop writes besides
+    rows: np.ndarray  # (r, 14)  its rows of Phi_q
     own: np.ndarray  # int64 (8,)  its table, as if there were no other bodies: coordinate_rows.py
 
 
@@ -159,10 +158,10 @@ def allocate_saddle(graph=None, coupled=0):
         "changes": (coupled, 8 * (nb + 1)),
         **dict.fromkeys(("complex_lower", "complex_upper"), (pairs, 2 * size)),
         "complex_x": (2 * s if coupled else 0,),
-        **dict.fromkeys(("q", "qd", "zero", "R"), (local,)),
+        **dict.fromkeys(("q", "qd", "R"), (local,)),
         "lam": (most,),
         **dict.fromkeys(("X", "Xd"), (local, local)),
-        "rows": (3 * most, local),
+        "rows": (most, local),
     }
     return SaddleWorkspace(graph, **carve(shapes), own=np.array([0, 7, 0, 0, 0, 7, 0, LOCAL], np.int64))
 

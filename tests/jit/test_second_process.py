@@ -76,7 +76,7 @@ IMPLICIT = (
 from tsdyn.formulations import saddle_point
 from benchmarks.stiff import hung, jointed
 def loaded(scene):
-    kinds = {type(c): c.kernels["curvature"] for c in scene.constraints}.values()
+    kinds = {type(c): c.kernels["stiffness"] for c in scene.constraints}.values()
     forces = [force.kernels["jacobian"] for force in scene.forces]
     own = [getattr(saddle_point, name) for name in ("linearise", "reduce", "factorise", "solve", "soften")]
     return [sum(kernel._address is not None for kernel in kernels) for kernels in (kinds, forces, own)]

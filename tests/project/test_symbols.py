@@ -1,6 +1,7 @@
 """One symbol, one meaning (docs/notation.md), within every function of the core."""
 
 import ast
+from collections import defaultdict
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2] / "tsdyn"
@@ -51,12 +52,27 @@ def test_a_name_is_bound_to_one_thing_in_a_function():
     assert found == {}
 
 
-# templates of callbacks, which are given each array by its address
-BY_ADDRESS = {
-    "elements/loops/constraint_hessians.py: loop", "elements/loops/constraint_series.py: series",
-    "elements/loops/force_series.py: series", "elements/loops/forces.py: jacobian",
-    "elements/loops/law_check.py: check", "profiling/timers.py: _series",
-}  # fmt: skip
+def test_a_threshold_of_the_core_has_a_name_of_its_own():
+    places = defaultdict(set)
+    for path in (ROOT / package / "tolerances.py" for package in (*CORE, "elements")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body if path.exists() else ():
+            if isinstance(node, ast.Assign):
+                for name in names_in(node.targets[0]):
+                    places[name].add(path.parent.name)
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}
+    assert {"ROUNDING", "SLIP", "SAFETY"} <= places.keys()
+
+
+def test_a_class_name_has_one_meaning():
+    """`Store` is one thing in two formats."""
+    places = defaultdict(set)
+    for folder in (ROOT, ROOT.parent / "constraints", ROOT.parent / "integrators"):
+        for path in folder.rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ClassDef):
+                    places[node.name].add(path.relative_to(ROOT.parent).as_posix())
+    double = {name: found for name, found in places.items() if len(found) > 1}
+    assert double == {"Store": {"tsdyn/storage/hdf5.py", "tsdyn/storage/zarr_folder.py"}}
 
 
 def test_functions_take_ten_positional_arguments_at_most():
@@ -67,4 +83,4 @@ def test_functions_take_ten_positional_arguments_at_most():
                 names = [argument.arg for argument in (*node.args.posonlyargs, *node.args.args)]
                 if len(names) - (names[:1] in (["self"], ["cls"])) > 10:
                     found.add(f"{path.relative_to(ROOT).as_posix()}: {node.name}")
-    assert found <= BY_ADDRESS
+    assert found == set()

@@ -5,7 +5,7 @@ import pytest
 
 import tsdyn as ts
 from tsdyn.stress import comparisons, laws
-from tsdyn.stress.random_scenes import Case
+from tsdyn.stress.random_scenes import DrawnCase
 
 C = ts.constraints
 
@@ -87,14 +87,14 @@ def test_momenta_of_a_loaded_scene_are_not_judged():
     made = ts.Scene(gravity=(0, 0, 0))
     body = made.add_body(1.0, (0.1, 0.2, 0.25))
     made.add(ts.forces.PointForce(body, force=(1, 0, 0), point_a=(0, 0.1, 0)))
-    case = Case("loaded", made, (0.0, 0.5), {})
+    case = DrawnCase("loaded", made, (0.0, 0.5), {})
     assert comparisons.momenta(case, ts.simulate(made, case.span, dense_output=True), None) == []
 
 
 def test_an_error_that_does_not_fall_with_the_tolerance_is_found():
     """A method that is wrong whatever its tolerance: its runs end with the velocities of another scene."""
     made, other = scene(), scene(gravity=(0.0, 0.0, -9.80))
-    case = Case("double pendulum", made, (0.0, 0.5), {"rtol": 1e-8, "atol": 1e-8})
+    case = DrawnCase("double pendulum", made, (0.0, 0.5), {"rtol": 1e-8, "atol": 1e-8})
 
     def right(case, **options):
         return ts.simulate(made, case.span, **{"dense_output": True} | case.options | options)

@@ -7,6 +7,7 @@ from ..integrators import DOP853, Taylor
 from ..jit.compiled import DEBUG
 from ..methods.explicit import called_for
 from ..model.equations import is_of_user
+from ..model.packed import second_derivatives
 from ..motions import program, tracing
 from ..motions.signals import Signal
 from ..rows.interface import ELIMINATION
@@ -56,7 +57,8 @@ def of_scene(scene, method, form, far, rough):
         if rough or not series:
             yield from ELIMINATION["unsymmetric"]
     for kind, moving in _kinds(scene).items():
-        yield from of_constraint(kind, moving, series, far, implicit)
+        second = second_derivatives(form.basis_free) if implicit else ()
+        yield from of_constraint(kind, moving, series, far, second)
     if not series and any(is_of_user(force) for force in scene.forces):
         yield watch
     if series and any(_is_checked(force) for force in scene.forces):
@@ -70,13 +72,13 @@ def of_scene(scene, method, form, far, rough):
             yield program.run_program
 
 
-def of_constraint(kind, moving, series=True, far=False, implicit=False):
-    """The loops over constraints of a class; moving: whether one of them depends on time."""
+def of_constraint(kind, moving, series=True, far=False, second=()):
+    """The loops over constraints of a class; moving: whether one of them depends on time; second: derivatives."""
     names = ["phi", "jacobian", "gamma", *["phi_t"] * moving, *["remember"] * bool(kind.memory)]
     if not kind.normalises:
         names += ["reduced", "values", "bias", *["drift"] * moving]
         names += ["far_" * far + "driven_" * moving + "series"] * series
-    names += ["curvature"] * implicit
+    names += second
     return [kind.kernels[name] for name in names if name in kind.kernels]
 
 

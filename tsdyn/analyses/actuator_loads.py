@@ -13,6 +13,7 @@ from ..errors import InvalidArgument, SingularConfiguration
 from ..forces.point_force import PointForce
 from ..forces.spring import Spring
 from ..forces.torque import Torque
+from ..maths.tolerances import NEGLIGIBLE, TINY
 from ..model import handles as joint_motion
 from ..model.equations import WIDTH, as_csr, with_short_rows
 from ..motions.signals import Signal
@@ -23,7 +24,7 @@ from ..validation import sequence
 from .coordinates import arm_by_parameters, named_coordinates, transform_e
 from .linearise import AXES, item_of
 from .nominal_motion import roots_of_masses
-from .tolerances import DELTA, DENSE_INSTANT, IDLE, LEAST_DIVISOR, MISSING, NO_LOAD, REFINEMENTS, SOLVED
+from .tolerances import ACCEPTED, CONSISTENT, DELTA, DENSE_INSTANT, REGULARISED_SWEEPS
 
 # Generalised forces of unit loads along a motion q (k, n): each as columns (c,) of q and values (k, c).
 #
@@ -197,7 +198,7 @@ class Instant:
             if x is None:
                 continue
             largest = max(np.abs(part / self.root**2).max() for part in (load, self.carried))
-            if delta or np.abs(self._left / self.root**2).max() <= SOLVED * largest:
+            if delta or np.abs(self._left / self.root**2).max() <= ACCEPTED * largest:
                 lam = np.full(self.Phi_q.shape[0], np.nan)
                 lam[self.kept], self.u = x[n : n + m], x[n + m :]
                 return np.concatenate((x[:n], lam))
@@ -213,7 +214,7 @@ class Instant:
         if solve is None:
             return 1.0
         gains, alone = solve(b[:, 0])[: self.q.size] * self.root, b[:, 0] / self.root
-        return np.abs(gains).max() / max(np.abs(alone).max(), LEAST_DIVISOR)
+        return np.abs(gains).max() / max(np.abs(alone).max(), TINY)
 
     def missing(self, load):
         """Accelerations (n,) that the actuators can't give."""
@@ -227,7 +228,7 @@ class Instant:
             return None
         x, n, m = 0.0, load.size, self.kept.size
         self._left = load
-        for _ in range(1 + REFINEMENTS):
+        for _ in range(1 + REGULARISED_SWEEPS):
             x = x + solve(self._left)
             self.carried = self.H.T @ x[n : n + m]
             self._left = load - self.carried + self.B @ x[n + m :]
@@ -243,7 +244,7 @@ class Instant:
         """The same of the matrix with scaled rows and columns: unit masses, unit rows of H."""
         dense, a = isinstance(self.H, np.ndarray), self.B.shape[1]
         H, B = _scaled(self.H, self.root, axis=1), _scaled(self.B, self.root, axis=0)
-        lengths = np.maximum(np.sqrt((H * H).sum(axis=1)), LEAST_DIVISOR)
+        lengths = np.maximum(np.sqrt((H * H).sum(axis=1)), TINY)
         H, M = _scaled(H, lengths, axis=0), None
         if delta:
             M = mass_matrix_sparse(self.system, self.q)
@@ -363,10 +364,10 @@ def _demand_effective(instant, actuators, used):
     Only those that aren't used, (actuators,), may be such.
     """
     idle = {id(one.item) for one in actuators} - {
-        id(one.item) for one, u in zip(actuators, used, strict=True) if u > IDLE * used.max()
+        id(one.item) for one, u in zip(actuators, used, strict=True) if u > ACCEPTED * used.max()
     }
     which = [j for j, one in enumerate(actuators) if id(one.item) in idle]
-    effective = {id(actuators[j].item) for j in which if instant.effect(j) > NO_LOAD}
+    effective = {id(actuators[j].item) for j in which if instant.effect(j) > NEGLIGIBLE}
     for j in which:
         if id(actuators[j].item) not in effective:
             raise InvalidArgument(
@@ -405,8 +406,8 @@ def _sparse(actuators, i, n):
 
 def demand_produced(solution, actuators, found):
     """The share (k,) of accelerations that actuators can't give; a motion with more than rounding is refused."""
-    share = np.abs(found.missing).max(axis=1, initial=0.0) / np.maximum(found.scale, LEAST_DIVISOR)
-    if not share.max(initial=0.0) <= MISSING:
+    share = np.abs(found.missing).max(axis=1, initial=0.0) / np.maximum(found.scale, TINY)
+    if not share.max(initial=0.0) <= CONSISTENT:
         i = int(np.nan_to_num(share, nan=np.inf).argmax())
         name, value = _largest_missing(solution, solution.q[i], found.missing[i])
         raise InvalidArgument(

@@ -9,8 +9,9 @@ import numpy as np
 from ..elements.bodies import transform_g
 from ..elements.element import AngleGeometry
 from ..errors import SingularConfiguration
+from ..maths.tolerances import PIVOT_ROUNDING
 from ..model.handles import handles_of
-from .tolerances import BATCH, CLEAR, DENSE, HELD, IN_TURN, INDEPENDENT
+from .tolerances import BATCH, CLEAR, DENSE, IN_TURN, INDEPENDENT
 
 # Functions of time to second order along the nominal motion: arrays of value, rate and half the second derivative.
 
@@ -412,7 +413,7 @@ def _independent(motion, every, given, k, size):
     none, free = motion.holding(Z[:0]), motion.holding(Z[:given])
     own = _left(none, Z, np.arange(len(every)))
     weights = Z.multiply(Z) @ (1.0 / motion.root**2)
-    own[own <= HELD * weights] = 0.0  # the constraints hold it
+    own[own <= PIVOT_ROUNDING * weights] = 0.0  # the constraints hold it
     remaining = own if not given else _left(free, Z, np.arange(len(every)))
     least = INDEPENDENT * np.maximum(own, 1e-3 * own.max(initial=0.0))
     while len(taken) < k:

@@ -15,6 +15,7 @@ from ..elements.bodies import PointMass
 from ..elements.element import AngleGeometry
 from ..elements.force import Force
 from ..errors import InvalidArgument
+from ..maths.tolerances import NEGLIGIBLE
 from ..model import handles as joint_motion
 from ..model.handles import handles_of
 from ..motions.elementary import Polynomial, Smooth
@@ -22,7 +23,6 @@ from ..motions.prescribed import Motion
 from ..validation import nearest, vector3
 from .coordinates import named_coordinates
 from .linearise import AXES, item_of
-from .tolerances import THERE
 
 WHO = "inverse_dynamics"
 MOST_NAMED = 10  # coordinates and bodies in a message
@@ -152,6 +152,6 @@ def way_to_start(twin, driven, t):
         there = np.array([motion.value(t)[0] for motion in one.motions])
         away = max(away, np.abs(there - here).max() / (1.0 if isinstance(one.geometry, AngleGeometry) else size))
         ways.append(tuple(Polynomial((a, b - a)) for a, b in zip(here.tolist(), there.tolist(), strict=True)))
-    if away <= THERE:
+    if away <= NEGLIGIBLE:
         return None
     return [one.constraint(twin, way) for one, way in zip(driven, ways, strict=True)]

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..calls import fitting_methods
+from ..configuration.tolerances import MOST_ROTATION
 from ..errors import InconsistentState, InvalidForce, NoEquilibrium
 from ..jit.interrupts import interruptible
+from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, PIVOT_ROUNDING, ROUNDING, SUM_ROUNDING, TINY
 from ..observables import reactions
 from ..observables.generalised_forces import force_loads, velocity_forces
 from ..observables.state import Anchor, RememberingState
@@ -17,42 +19,11 @@ from .moves import Moves
 from .nominal_motion import NominalMotion
 from .reduction import Reduced, eigenpairs, stiffnesses
 from .steady import SteadyRest, is_invariant
-from .tolerances import (
-    AT_SADDLE,
-    BALANCED,
-    CLEARLY,
-    FARTHEST,
-    FEW_NEGATIVE,
-    FINAL,
-    FIRST_MU,
-    GROWING,
-    IN_VAIN,
-    KICKS,
-    LEAST_MU,
-    LEAST_SHIFT,
-    LEAST_STEP,
-    MOST_NEWTON,
-    MOST_SADDLES,
-    MOST_STEPS,
-    MOST_TRIES,
-    MOST_TURN,
-    MOST_TURNED,
-    PROBE,
-    ROUGH,
-    ROUNDED,
-    ROUNDING,
-    SEARCH,
-    SETTLED,
-    SLIDING,
-    SMALL,
-    SOFT,
-    SOFTER,
-    STEADY,
-    STIFF,
-    STIFFER,
-    TOO_FAR,
-    TURNED,
-)
+
+from .tolerances import (  # isort: skip
+    ACCEPTED, AT_SADDLE, FARTHEST, FEW_NEGATIVE, FINAL, FIRST_MU, IN_VAIN, KICKS, LEAST_MU, MOST_NEWTON, MOST_SADDLES,
+    MOST_STEPS, MOST_TRIES, MOST_TURNED, ROUGH, SEARCH, SLIDING, SMALL, SOFT, SOFTER, STIFF, STIFFER, TOO_FAR,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Floats, ItemLike
@@ -92,13 +63,13 @@ def _rough(motion, forces):
     scale[(motion.system.bodies[:, :1] + np.arange(3)).ravel()] = size
     t, memory = np.full(3, motion.t), np.tile(motion.memory, (3, 1))
     for place, speed in ((1.0, 0.0), (0.0, 1.0)):
-        way = PROBE * scale * rng.normal(size=motion.q.size)
+        way = HALF_DIGITS * scale * rng.normal(size=motion.q.size)
         side = np.array([-1.0, 0.0, 1.0])[:, None]
         Q = force_loads(system, t, motion.q + place * side * way, motion.qd + speed * side * way, memory)
         if not np.isfinite(Q).all():
             return True
         bend, slope = np.abs(Q[0] - 2.0 * Q[1] + Q[2]).max(), np.abs(Q[2] - Q[0]).max()
-        if bend > ROUGH * slope + ROUNDING * np.abs(Q).max():
+        if bend > ROUGH * slope + NEGLIGIBLE * np.abs(Q).max():
             return True
     return False
 
@@ -128,8 +99,8 @@ def _by_all(factors, load):
     w, v = np.linalg.eigh(0.5 * Z.T @ (K + K.T) @ Z)
     v, scale = Z @ v, factors.scale
     along = v.T @ (scale * load)
-    along[(np.abs(w) <= SOFT) & (np.abs(along) <= ROUNDED * factors.size_of_loads)] = 0.0  # neutral
-    return scale * (v @ (along / np.maximum(np.abs(w), CLEARLY)))
+    along[(np.abs(w) <= SOFT) & (np.abs(along) <= PIVOT_ROUNDING * factors.size_of_loads)] = 0.0  # neutral
+    return scale * (v @ (along / np.maximum(np.abs(w), HALF_DIGITS)))
 
 
 def _by_few(factors, load):
@@ -148,7 +119,7 @@ def _by_few(factors, load):
         return None
     v, w = v[:, w < 0.0], w[w < 0.0]
     scale = factors.scale
-    return newton + scale * (v @ (2.0 * (v.T @ (scale * load)) / np.maximum(-w, CLEARLY)))
+    return newton + scale * (v @ (2.0 * (v.T @ (scale * load)) / np.maximum(-w, HALF_DIGITS)))
 
 
 # Descent of the potential energy on the constraint manifold, to a static equilibrium.
@@ -175,7 +146,7 @@ class Descent(Moves):
     def report_steps(self):
         """Report progress: digits gained over digits required."""
         left = self.unbalanced
-        digits = np.log(left) / np.log(BALANCED) if left > 0.0 else 1.0
+        digits = np.log(left) / np.log(SUM_ROUNDING) if left > 0.0 else 1.0
         self.report(
             SEARCH * min(max(digits, 0.0), 1.0), f"{self.steps} steps, {left:.1e} of the loads are not balanced"
         )
@@ -186,13 +157,13 @@ class Descent(Moves):
         while self.steps < MOST_STEPS and self.gone < FARTHEST * self.reach and self.turned < MOST_TURNED:
             before = self.unbalanced
             self.report_steps()
-            if before <= BALANCED or not self._step():
+            if before <= SUM_ROUNDING or not self._step():
                 break
             self.steps += 1
-            vain = vain + 1 if before <= TURNED and not self.unbalanced < 0.5 * before else 0
+            vain = vain + 1 if before <= ACCEPTED and not self.unbalanced < 0.5 * before else 0
             if vain == IN_VAIN:
                 break  # rounding
-        return self.unbalanced <= TURNED
+        return self.unbalanced <= ACCEPTED
 
     def _step(self):
         """Take a step; False if no step is left along which the loads do work."""
@@ -207,7 +178,7 @@ class Descent(Moves):
             factors = quadratic.factors(mu, self._least(mu))
             if factors.positive:
                 u = factors.step(load) if mu > 0.0 else factors.newton(load)
-                if u is not None and self.size(u) <= LEAST_STEP:
+                if u is not None and self.size(u) <= ROUNDING:
                     return False
                 if u is not None and self._is_fit(u, mu):
                     leaves = near and mu > 0.0 and not self.relative
@@ -232,7 +203,7 @@ class Descent(Moves):
 
     def _is_fit(self, u, mu):
         """Whether an increment is short enough to be tried; a larger mu makes it shorter."""
-        slides = self.trust == 1.0 and self.increments.extent(u)[1] <= TOO_FAR * MOST_TURN
+        slides = self.trust == 1.0 and self.increments.extent(u)[1] <= TOO_FAR * MOST_ROTATION
         return slides or mu >= 1.0 or self.length(u) <= TOO_FAR * self.trust or not self.rest.quadratic.shift.any()
 
     def _leave(self, factors, step):
@@ -307,7 +278,7 @@ class SteadyDescent(Descent):
         for _ in range(MOST_NEWTON):
             before, rest = self.unbalanced, self.rest
             self.report_steps()
-            if before <= BALANCED:
+            if before <= SUM_ROUNDING:
                 break
             u = rest.quadratic.factors(0.0, 0.0).newton(rest.left)
             if u is None:
@@ -315,7 +286,7 @@ class SteadyDescent(Descent):
             self.steps += 1
             if not self.approach_by(u):
                 break
-        return self.unbalanced <= TURNED
+        return self.unbalanced <= ACCEPTED
 
 
 def find_steady(descent):
@@ -363,7 +334,7 @@ def _stability_of_spin(descent):
     descent.report(0.9, f"balanced in {descent.steps} steps, eigenvalues of {motion.freedom} coordinates")
     found, pairs = stiffnesses(reduced, nothing), eigenpairs(reduced, nothing)
     worst = int(pairs.values.real.argmax())
-    if pairs.values.real[worst] <= GROWING * np.abs(pairs.values).max(initial=0.0):
+    if pairs.values.real[worst] <= HALF_DIGITS * np.abs(pairs.values).max(initial=0.0):
         return True, found.smallest, found.neutral, None
     shape = pairs.vectors[:, worst]
     real = shape.real if np.linalg.norm(shape.real) >= np.linalg.norm(shape.imag) else shape.imag
@@ -372,8 +343,8 @@ def _stability_of_spin(descent):
 
 def demand_admitted(scene, rates, qd):
     """Refuse a spin that constraints don't admit, by the row; rates (m,) are Phi_q qd + Phi_t."""
-    size = max(scene.packed.size, 1.0) * max(np.abs(qd).max(), LEAST_SHIFT)
-    if not np.abs(rates).max(initial=0.0) <= STEADY * size:
+    size = max(scene.packed.size, 1.0) * max(np.abs(qd).max(), TINY)
+    if not np.abs(rates).max(initial=0.0) <= HALF_DIGITS * size:
         row = int(np.abs(rates).argmax())
         raise InconsistentState(
             f"equilibrium: {scene.row_names()[row]} doesn't admit this spin: Phi_q qd + Phi_t = {rates[row]:.3g}. "
@@ -478,14 +449,14 @@ def _stability(descent):
     descent.report(0.7, f"balanced in {descent.steps} steps, {motion.freedom} coordinates are chosen for its stability")
     every = chosen(motion, Variations(motion, np.zeros(3)))
     descent.report(0.8, f"balanced in {descent.steps} steps, the stiffness is reduced to {motion.freedom} coordinates")
-    reduced = Reduced(motion, every, descent.unbalanced <= SETTLED)
+    reduced = Reduced(motion, every, descent.unbalanced <= NEGLIGIBLE)
     nothing = descent.nothing(reduced)
     descent.report(0.9, f"balanced in {descent.steps} steps, eigenvalues of {motion.freedom} coordinates")
     found = stiffnesses(reduced, nothing)
     smallest = found.smallest
     if not found.symmetric:
         values = eigenpairs(reduced, nothing).values
-        return bool(values.real.max() <= GROWING * np.abs(values).max()), smallest, found.neutral, None
+        return bool(values.real.max() <= HALF_DIGITS * np.abs(values).max()), smallest, found.neutral, None
     if smallest >= 0.0:
         return True, smallest, found.neutral, None
     from scipy.linalg import eigh, solve_triangular

@@ -6,21 +6,18 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.kinetic_metric import Metric, least_step
-from ..elements.loops.constraint_rows import (
-    OMEGA,
-    POSE,
-    RD,
-    largest_coordinate,
-    place_bodies,
-    write_accelerations,
-    write_positions,
-    write_velocities,
-)
+from ..configuration.tolerances import MOST_ROTATION
+
+from ..elements.loops.constraint_rows import (  # isort: skip
+    OMEGA, POSE, RD, largest_coordinate, place_bodies, write_accelerations, write_positions, write_velocities,
+)  # fmt: skip
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration, Status
 from ..formulations.projection import find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.compiled import clock
 from ..jit.kernels import Record, entry, kernel, loader, long_kernel, resident
 from ..maths.dense_linalg import copy, is_finite
+from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, ROUNDING
+from ..methods.tolerances import SAME_TIME
 from ..model import handles as joint_motion
 from ..model.equations import remember, set_time
 from ..model.handles import handles_of
@@ -30,28 +27,15 @@ from ..observables.diagnostics import constraint_rows
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, ConstraintGraph, no_graph
 from ..rows.graph_builder import graph_of, redundant_rows
 from ..rows.interface import TangentWorkspace, allocate_tangent, constrain, evaluate_bias, note_indicator
+from ..validation import listed
 from ..workspaces import Work, parts, plain_context
 from .coordinates import Variations, chosen
 from .moves import update_memory
 from .nominal_motion import NominalMotion
-from .tolerances import (
-    CLOSE,
-    CONSISTENT,
-    DEAD,
-    GROWTH,
-    LARGEST_CHANGE,
-    LARGEST_TURN,
-    LEAST_RESIDUAL,
-    LEAST_STEPS,
-    LISTED,
-    MET,
-    NO_CHANGE,
-    POLISHINGS,
-    SEEN,
-    SHORTEST,
-    SLICE,
-    TIME_ROUNDING,
-)
+
+from .tolerances import (  # isort: skip
+    CLOSE, CONSISTENT, GROWTH, LARGEST_CHANGE, LEAST_STEPS, MOST_TRIES, NO_CHANGE, SEEN, SHORTEST, SLICE,
+)  # fmt: skip
 
 # What constraints leave free: the number of degrees of freedom, and their names.
 
@@ -69,10 +53,8 @@ def demand_driven(packed, memory, t, q, who, remedy):
         return
     motion = NominalMotion(packed, memory, t, q, np.zeros(q.size), still=True)
     names = [one.name for one in chosen(motion, Variations(motion, np.zeros(3)))]
-    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
     raise InvalidArgument(
-        f"{who}: {k} degree{'s' * (k != 1)} of freedom {'is' if k == 1 else 'are'} left: "
-        f"{', '.join(names[:LISTED])}{more}. {remedy}"
+        f"{who}: {k} degree{'s' * (k != 1)} of freedom {'is' if k == 1 else 'are'} left: {listed(names)}. {remedy}"
     )
 
 
@@ -83,16 +65,16 @@ def driven_rates(scene, t, q, who):
     _, Phi_q, Phi_t = metric.arrays(q)
     A, drift = metric.reduced(q, Phi_q[metric.own]), Phi_t[metric.own]
     x = least_step(A, drift)
-    for _ in range(POLISHINGS if metric.sparse else 0):  # which is regularised
+    for _ in range(MOST_TRIES if metric.sparse else 0):  # which is regularised
         left = A @ x + drift
-        if np.abs(left).max() <= MET * (1.0 + np.abs(x).max()):
+        if np.abs(left).max() <= NEGLIGIBLE * (1.0 + np.abs(x).max()):
             break
         x = x + least_step(A, left)
     left = np.abs(A @ x + drift)
-    if not left.max(initial=0.0) <= DEAD * (1.0 + np.abs(x).max(initial=0.0) + np.abs(drift).max(initial=0.0)):
-        names = [scene.row_names()[metric.own[i]] for i in np.flatnonzero(drift)[:LISTED]]
+    if not left.max(initial=0.0) <= HALF_DIGITS * (1.0 + np.abs(x).max(initial=0.0) + np.abs(drift).max(initial=0.0)):
+        names = [scene.row_names()[metric.own[i]] for i in np.flatnonzero(drift)]
         raise SingularConfiguration(
-            f"{who}: no velocities follow the motions at t = {t:g} s ({', '.join(names)}): the mechanism is at a dead "
+            f"{who}: no velocities follow the motions at t = {t:g} s ({listed(names)}): the mechanism is at a dead "
             "centre of what drives it, or motions contradict each other. Start elsewhere, or drive another coordinate."
         )
     return metric.rates(q, x)
@@ -123,7 +105,7 @@ OK, NOT_FINITE, CHART_LOST = int(Status.SUCCESS), int(Status.NOT_FINITE), int(St
 SLICE_DONE = int(Status.SLICE_DONE)
 
 
-class Way(Record):
+class ContinuationProgress(Record):
     """How far a continuation has come."""
 
     t: float  # of the last accepted point, s
@@ -150,7 +132,7 @@ class Branch(NamedTuple):
     remembered: np.ndarray  # (angles + slots,)  angles of joints there, and what forces and constraints remember
     frames: np.ndarray  # (angles, 9)  see joint_turns.py
     joints: np.ndarray  # int64 (angles, 4)
-    way: Way
+    way: ContinuationProgress
 
 
 def branch_of(system, graph, handles, n, tangent=None):
@@ -161,7 +143,7 @@ def branch_of(system, graph, handles, n, tangent=None):
     remembered = np.zeros(handles.count + system.memory.size)
     now, speeds = np.zeros((3, n)), np.zeros((2, 8 * (b + 1)))
     frames, joints = handles.frames.copy(), handles.joints.copy()
-    return Branch(system, whole.work, graph, tangent, now, *speeds, remembered, frames, joints, Way())
+    return Branch(system, whole.work, graph, tangent, now, *speeds, remembered, frames, joints, ContinuationProgress())
 
 
 class _NoHandles(NamedTuple):
@@ -211,12 +193,12 @@ def follow(branch, times, out, first, most):
 def _step(c, target):
     """Take a step towards a time, or halve the next one; False where it can't be halved any more."""
     way, left = c.way, target - c.way.t
-    last = abs(left) <= way.h * (1.0 + TIME_ROUNDING)
+    last = abs(left) <= way.h * (1.0 + SAME_TIME)
     h = left if last else math.copysign(way.h, left)
     t = target if last else way.t + h
     place_bodies(c.graph.bodies, c.now[0], c.tangent.poses)
     status, ratio = CHART_LOST, math.inf
-    if _predict(c, h) <= LARGEST_TURN:
+    if _predict(c, h) <= MOST_ROTATION:
         status = _solve(c, t)
         if status == OK:
             ratio = _change(c, h)
@@ -256,7 +238,7 @@ def _solve(c, t):
     graph, system, w, f = c.graph, c.system, c.work, c.tangent
     if not set_time(system, t):
         return NOT_FINITE
-    w.control.floor = LEAST_RESIDUAL * (w.control.size + largest_coordinate(graph.bodies, c.now[0], w.control.size))
+    w.control.floor = ROUNDING * (w.control.size + largest_coordinate(graph.bodies, c.now[0], w.control.size))
     status = land(graph, system, w, f, t)
     if status != OK:
         return status

@@ -17,13 +17,13 @@ from ..errors import InvalidArgument, InvalidBody
 from ..forces.point_force import PointForce
 from ..forces.spring import Spring
 from ..forces.torque import Torque
+from ..maths.tolerances import NEGLIGIBLE
 from ..validation import vector3
 from .coordinates import Variations, chosen, stacked, transform_e
 from .equilibrium import demand_smooth
 from .nominal_motion import NominalMotion
 from .reduction import Reduced, eigenpairs
 from .steady import steady_rate
-from .tolerances import NO_INPUT
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -67,7 +67,7 @@ def inputs_of(scene, variations, given):
 
 def demand_effective(inputs, F):
     """Refuse inputs that constraints take up: columns of F (k, inputs) that are zero, but for some of a vector's."""
-    works = np.abs(F).max(axis=0, initial=0.0) > [NO_INPUT * np.abs(one.load).max(initial=0.0) for one in inputs]
+    works = np.abs(F).max(axis=0, initial=0.0) > [NEGLIGIBLE * np.abs(one.load).max(initial=0.0) for one in inputs]
     vectors = {one.whole for one, moves in zip(inputs, works, strict=True) if moves}
     for one, moves in zip(inputs, works, strict=True):
         if not moves and not (one.whole and one.whole in vectors):
@@ -113,7 +113,7 @@ def _loads_of(variations, item):
     return found
 
 
-class Outputs(NamedTuple):
+class OutputMatrices(NamedTuple):
     """Names, and y = Y dx + Yd dxd."""
 
     names: tuple
@@ -122,12 +122,12 @@ class Outputs(NamedTuple):
 
 
 def outputs_of(scene, variations, given, coordinates, reduced):
-    """The `Outputs` of handles and names; of none, the coordinates and their rates."""
+    """The `OutputMatrices` of handles and names; of none, the coordinates and their rates."""
     k, n = len(coordinates), variations.motion.q.size
     if not len(given):
         names = [one.name for one in coordinates]
         names += [name + RATE for name in names]
-        return Outputs(tuple(names), np.eye(2 * k, k), np.eye(2 * k, k, -k))
+        return OutputMatrices(tuple(names), np.eye(2 * k, k), np.eye(2 * k, k, -k))
     rows, rates = [], []
     for one in given:
         rate = isinstance(one, str) and one.endswith(RATE)
@@ -138,7 +138,7 @@ def outputs_of(scene, variations, given, coordinates, reduced):
     rates = np.array(rates)[:, None]
     places, speeds = Z @ reduced.T, Z @ reduced.T1 + Zd @ reduced.T
     names = tuple(one.name + RATE * bool(rate) for one, rate in zip(rows, rates, strict=True))
-    return Outputs(names, np.where(rates, speeds, places), np.where(rates, places, 0.0))
+    return OutputMatrices(names, np.where(rates, speeds, places), np.where(rates, places, 0.0))
 
 
 def _of(scene, variations, given, coordinates):

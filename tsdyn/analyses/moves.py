@@ -4,37 +4,25 @@ import numpy as np
 
 from ..configuration.continuation import close
 from ..configuration.kinetic_metric import Metric
+from ..configuration.tolerances import MOST_ROTATION
 from ..elements.markers import POINT
 from ..errors import SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
 from ..jit.kernels import entry
 from ..maths.matrix_rank import dependent
+from ..maths.tolerances import PIVOT_ROUNDING, TINY
 from ..model.equations import WIDTH, places, remember, set_time, with_short_rows
 from ..model.handles import all_angles, counted
 from ..rows.constraint_graph import REDUCED
 from ..rows.graph_builder import graph_of, redundant_rows
 from .nominal_motion import NominalMotion, Pairs
 from .rest import Increments, Rest, SparsePattern
-from .tolerances import (
-    DENSE,
-    FINAL,
-    GOOD,
-    HALVINGS,
-    LEAST_SHIFT,
-    MASSLESS,
-    MOST_TURN,
-    NO_STIFFNESS,
-    REDUNDANT_SHARE,
-    SHORT,
-    SHORTER,
-    TURNED,
-    WORTH,
-)
+from .tolerances import ACCEPTED, DENSE, FINAL, GOOD, HALVINGS, REDUNDANT_SHARE, REGULARISED, SHORT, SHORTER, WORTH
 
 # What is constant during a search for an equilibrium: kinds of rows, bodies of each part, sparsity.
 
 
-class Frame:
+class SceneStructure:
     """Of a packed scene at time t, s; reach is a length of it, m.
 
     Attributes
@@ -89,13 +77,13 @@ class Frame:
     def _weights(self):
         """G of rest.py: the pattern of its saddle-point matrix, its numbers, their places, and its diagonal (size,)."""
         shifts, size = self.increments.translates, self.increments.size
-        diagonal, rods = np.where(shifts, MASSLESS, 1.0), self._rods()
+        diagonal, rods = np.where(shifts, REGULARISED, 1.0), self._rods()
         if not rods.size:
             return self.light, diagonal, (np.arange(size), np.arange(size)), diagonal
         pairs, own = self.no_pairs.copy(), np.zeros((len(self.metric.at), 6, 6))
         for i, j, sign in ((0, 0, 1.0), (6, 6, 1.0), (0, 6, -1.0), (6, 0, -1.0)):
             pairs[rods, i : i + 3, j : j + 3] = sign * np.eye(3)
-        own[:, range(6), range(6)] = np.repeat([[MASSLESS, 1.0]], 3, axis=1)
+        own[:, range(6), range(6)] = np.repeat([[REGULARISED, 1.0]], 3, axis=1)
         top = self.stiffness(pairs, own)
         return self.saddle, top, (self.blocks.rows, self.blocks.columns), self.blocks.matrix(top).diagonal()
 
@@ -136,7 +124,7 @@ class Frame:
     def closed(self, q):
         """The consistent configuration next to q by Gauss-Newton steps; None where there is none."""
         q, Phi, _ = close(self.metric, q)
-        return q if np.abs(Phi).max(initial=0.0) <= TURNED * (1.0 + np.abs(q).max()) else None
+        return q if np.abs(Phi).max(initial=0.0) <= ACCEPTED * (1.0 + np.abs(q).max()) else None
 
     def left_out(self, A, q):
         """Which of the own rows are redundant at q, bool (m',); A are numbers for `rows`."""
@@ -196,7 +184,7 @@ class Moves:
         self.report = report
         self.packed, self.handles, self.t = packed, handles, t
         self.angles, self.memory = remembered[: handles.count].copy(), remembered[handles.count :].copy()
-        self.frame = Frame(packed, t, q)
+        self.frame = SceneStructure(packed, t, q)
         self.reach, self.increments = self.frame.reach, self.frame.increments
         self.rest, self._motion = self._at(q), None
         self.gone, self.turned, self.longest, self.trust = 0.0, 0.0, 0.5 * self.reach, 1.0
@@ -222,7 +210,7 @@ class Moves:
     def nothing(self, reduced):
         """Stiffness, 1/s^2, that counts as zero: rounding of its terms, and apparent stiffness of residual loads."""
         left = self.unbalanced * self.rest.acceleration_scale / self.reach
-        return NO_STIFFNESS * reduced.scale + len(reduced.K_hat) * left
+        return PIVOT_ROUNDING * reduced.scale + len(reduced.K_hat) * left
 
     def size(self, u):
         """The largest shift, as a share of the reach, or turn, rad, of an increment."""
@@ -232,7 +220,7 @@ class Moves:
     def length(self, u):
         """The same over that of the longest move."""
         shift, turn = self.increments.extent(u)
-        return max(shift / self.longest, turn / MOST_TURN, LEAST_SHIFT)
+        return max(shift / self.longest, turn / MOST_ROTATION, TINY)
 
     def advance(self, u, factors):
         """Move by an increment, or a fraction along which loads do the predicted work; whether it moves."""
@@ -242,7 +230,7 @@ class Moves:
         for _ in range(HALVINGS):
             if self.attempt(factor * u, factors):
                 limited = factor * far > 0.99 * self.trust
-                if limited and self.trust == 1.0 and factor * turn < 0.99 * MOST_TURN:
+                if limited and self.trust == 1.0 and factor * turn < 0.99 * MOST_ROTATION:
                     self.longest *= 2.0
                 self.trust = min(1.0, self.trust * 2.0) if limited or factor == 1.0 else factor * far
                 return True

@@ -11,15 +11,17 @@ from ..elements.loops.forces import FORCE_INTS as FORCE_INTS
 from ..elements.loops.template import AT
 from ..errors import InvalidForce, SingularConfiguration
 from ..formulations.dependent_rows import dependent_rows
+from ..formulations.tolerances import REFINEMENTS
 from ..jit.kernels import entry
 from ..maths.matrix_rank import dependent, sparse_lu
+from ..maths.tolerances import PIVOT_ROUNDING, ROUNDING, TINY
 from ..model.equations import WIDTH, as_csr, call_jacobian, constraint_curvature, set_time, with_short_rows
 from ..model.packed import with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..rows.constraint_graph import REDUCED, are_unequal, coordinate_scales
 from ..rows.graph_builder import graph_of, redundant_rows
-from .tolerances import DENSE, LEAST_DIVISOR, REDUNDANT_SHARE, ROUNDED, SINGULAR, UNEQUAL_SWEEPS
+from .tolerances import DENSE, REDUNDANT_SHARE
 
 # Derivatives of all constraints and forces, each as a block of the 14 coordinates of its two bodies.
 #
@@ -51,7 +53,7 @@ def fill_blocks(s, x, lam, rows, Q_q, Q_qd, kept):
     for i in range(s.forces.shape[0]):
         kind = s.forces[i]
         table, reals, own = s.table[kind.table :], s.reals[kind.reals :], kept[kind.kept :]
-        call_jacobian(kind.jacobian, kind.count, kind.stride, table, reals, x[0], x[1], t, 14, Q_q, Q_qd, 1, own)
+        call_jacobian(kind.jacobian, kind, table, reals, x[0], x[1], t, Q_q, Q_qd, 1, own)
 
 
 class Pairs:
@@ -67,8 +69,7 @@ class Pairs:
 
     def __init__(self, packed):
         self.packed = packed
-        whole = with_force_jacobians(packed._replace(system=with_curvatures(packed)))
-        system, self._size = whole
+        system, self._size = with_force_jacobians(packed._replace(system=with_curvatures(packed)), WIDTH)
         constraints, forces = _entries(system, system.kinds, INTS), _entries(system, system.forces, FORCE_INTS)
         constraints = constraints[np.argsort(constraints[:, 1 + ROW], kind="stable")]
         places = np.concatenate((constraints[:, 1 + AT : 5 + AT], forces[:, 1 + AT : 5 + AT]))
@@ -223,7 +224,7 @@ class NominalMotion:
     def _factor(self):
         self._factors, self._weights = self._factored(self.H)
         pivots = np.abs(self._factors.U.diagonal())
-        if pivots.min() < SINGULAR * pivots.max():
+        if pivots.min() < ROUNDING * pivots.max():
             raise SingularConfiguration(NOT_UNIQUE)
 
     def _factored(self, H):
@@ -232,7 +233,7 @@ class NominalMotion:
 
         unit = diags_array(1.0 / self.root)
         M, H = unit @ self.M @ unit, H @ unit
-        lengths = np.maximum(np.sqrt(H.multiply(H).sum(axis=1)), LEAST_DIVISOR)
+        lengths = np.maximum(np.sqrt(H.multiply(H).sum(axis=1)), TINY)
         H = diags_array(1.0 / lengths) @ H
         try:
             factors = sparse_lu(block_array([[M, H.T], [H, None]], format="csc"))
@@ -244,7 +245,7 @@ class NominalMotion:
         """Return (x, lam) with M x + H^T lam = load, H x = bias; vectors, or matrices of as many columns."""
         weights, n = self._weights if load.ndim == 1 else self._weights[:, None], self.q.size
         found = weights * self._factors.solve(weights * np.concatenate((load, bias)))
-        for _ in range(UNEQUAL_SWEEPS if are_unequal(self.system) else 0):
+        for _ in range(REFINEMENTS if are_unequal(self.system) else 0):
             x, lam = found[:n], found[n:]
             left = np.concatenate((load - self.M @ x - self.H.T @ lam, bias - self.H @ x))
             found = found + weights * self._factors.solve(weights * left)
@@ -289,7 +290,7 @@ class NominalMotion:
     def is_balanced(self):
         """Whether the accelerations are rounding of contributions that cancel."""
         loads = max(float(np.abs(load / self.root**2).max(initial=0.0)) for load in (self.Q_A, self.Phi_q.T @ self.lam))
-        return bool(np.abs(self.qdd).max(initial=0.0) <= ROUNDED * loads)
+        return bool(np.abs(self.qdd).max(initial=0.0) <= PIVOT_ROUNDING * loads)
 
     def acceleration_scale(self, size):
         """The acceleration, m/s^2, that others are compared with: of loads, reactions, a spring stretched by size.

@@ -10,8 +10,9 @@ from ..elements.bodies import transform_g
 from ..errors import SingularConfiguration
 from ..jit.interrupts import interruptible
 from ..maths.matrix_rank import interruptible_solver, sparse_lu
+from ..maths.tolerances import NEGLIGIBLE, PIVOT_ROUNDING
 from .coordinates import stacked
-from .tolerances import NEUTRAL_ASYMMETRY, NO_STIFFNESS, SYMMETRIC, ZERO
+from .tolerances import STIFFNESS_ROUNDING
 
 # The linearised equations of motion, reduced to minimal coordinates x.
 #
@@ -189,7 +190,7 @@ def _crossed(h):
 # What is `nothing`, 1/s^2, is the stiffness up to which a direction belongs to the null space.
 
 
-class Pairs(NamedTuple):
+class EigenPairs(NamedTuple):
     """2 k eigenvalues and, in their order, vectors of coordinates (k, 2 k) complex, of unit kinetic energy norm."""
 
     values: np.ndarray
@@ -213,7 +214,7 @@ def stiffnesses(reduced, nothing):
     """The `Stiffnesses` of `Reduced` equations."""
     K = reduced.K_hat
     K_s = 0.5 * (K + K.T)
-    if np.abs(K - K.T).max(initial=0.0) <= NEUTRAL_ASYMMETRY * reduced.scale:
+    if np.abs(K - K.T).max(initial=0.0) <= STIFFNESS_ROUNDING * reduced.scale:
         w = interruptible(lambda: np.linalg.eigvalsh(K_s))
         stiff = w[np.abs(w) > nothing]
         return Stiffnesses(stiff, len(w) - len(stiff), True)
@@ -223,20 +224,20 @@ def stiffnesses(reduced, nothing):
 
 
 def eigenpairs(reduced, nothing=None):
-    """The `Pairs` of `Reduced` equations."""
+    """The `EigenPairs` of `Reduced` equations."""
     from scipy.linalg import solve_triangular
 
     C, K, scale = reduced.C_hat, reduced.K_hat, reduced.scale
-    nothing = NO_STIFFNESS * scale if nothing is None else nothing
-    undamped = np.abs(C).max(initial=0.0) <= SYMMETRIC * np.sqrt(scale)
-    if undamped and np.abs(K - K.T).max(initial=0.0) <= SYMMETRIC * scale:
+    nothing = PIVOT_ROUNDING * scale if nothing is None else nothing
+    undamped = np.abs(C).max(initial=0.0) <= NEGLIGIBLE * np.sqrt(scale)
+    if undamped and np.abs(K - K.T).max(initial=0.0) <= NEGLIGIBLE * scale:
         values, vectors = _symmetric(K, nothing)
     else:
         values, vectors = _general(C, K, nothing)
     values = values + 0.0
     order = np.lexsort((-values.imag, np.abs(values.imag), np.abs(values)))
     values, vectors = values[order], vectors[:, order]
-    return Pairs(values, interruptible(lambda: solve_triangular(reduced.R, vectors)))
+    return EigenPairs(values, interruptible(lambda: solve_triangular(reduced.R, vectors)))
 
 
 def _symmetric(K, nothing):
@@ -255,7 +256,7 @@ def _general(C, K, nothing):
     kept, free = V[stiff].T, V[~stiff].T  # K x = (K kept) kept^T x
     A = np.block([[np.zeros((stiff.sum(), stiff.sum())), kept.T], [-K @ kept, -C]])
     values, vectors = interruptible(lambda: np.linalg.eig(A))
-    values = np.where(np.abs(values) <= ZERO * np.abs(values).max(initial=0.0), 0.0, values)
+    values = np.where(np.abs(values) <= NEGLIGIBLE * np.abs(values).max(initial=0.0), 0.0, values)
     speeds, places = vectors[-k:], kept @ vectors[: len(vectors) - k]
     moving = np.linalg.norm(speeds, axis=0) >= np.linalg.norm(places, axis=0) * np.abs(values) * 0.5
     shapes = np.where(moving & (np.linalg.norm(speeds, axis=0) > 0.0), speeds, places)

@@ -7,27 +7,14 @@ import numpy as np
 from ..elements.bodies import transform_g
 from ..errors import SingularConfiguration
 from ..maths.matrix_rank import sparse_lu
+from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, ROUNDING, TINY
 from ..model.equations import WIDTH, as_csr
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays
 from ..observables.generalised_forces import applied_loads
-from .tolerances import (
-    CLEARLY,
-    CLOSED,
-    LEAST_DIVISOR,
-    MASSLESS,
-    MOST_SWEEPS,
-    NEUTRAL_ASYMMETRY,
-    NOTHING,
-    REFINEMENTS,
-    SHIFTS,
-    SINGULAR,
-    SLOWEST,
-    SOFTENED,
-    SOFTEST,
-    STALLED,
-    SWEEPS,
-    TURNED,
-)
+
+from .tolerances import (  # isort: skip
+    ACCEPTED, CONSISTENT, MOST_SWEEPS, REGULARISED, REGULARISED_SWEEPS, SHIFTS, SLOWEST, STIFFNESS_ROUNDING, SWEEPS,
+)  # fmt: skip
 
 # Sparse matrices of one sparsity and many values: sums of blocks, whose places are found once.
 
@@ -185,18 +172,18 @@ class Factors:
     def __init__(self, quadratic, mu, least):
         frame, rest = quadratic.frame, quadratic.rest
         self._quadratic, self._mu, self._least = quadratic, mu, least
-        local = np.maximum(quadratic.local + mu * quadratic.shift, LEAST_DIVISOR)
+        local = np.maximum(quadratic.local + mu * quadratic.shift, TINY)
         self.scale = 1.0 / np.sqrt(local[frame.increments.body, 1 * ~frame.increments.translates])
         A = rest.A * self.scale[frame.rows.columns]
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))
-        self._lengths = np.where(rest.left_out, 1.0, np.maximum(lengths, LEAST_DIVISOR))
+        self._lengths = np.where(rest.left_out, 1.0, np.maximum(lengths, TINY))
         self._A, self._left_out = A / self._lengths[frame.rows.rows], rest.left_out
-        self._factors, self.negative = self._signed(CLEARLY)
+        self._factors, self.negative = self._signed(HALF_DIGITS)
         self._closing = None
 
     def _signed(self, share):
         """Factors, and how many eigenvalues of K + mu D + a share of S are negative."""
-        factors = splu_of(self._matrix(share, SOFTENED), symmetric=True)
+        factors = splu_of(self._matrix(share, REGULARISED), symmetric=True)
         if factors is None or not np.array_equal(factors.perm_r, factors.perm_c):
             return None, -1
         return factors, int((factors.U.diagonal() < 0.0).sum()) - self._quadratic.frame.own.size
@@ -256,7 +243,7 @@ class Factors:
 
     def newton(self, load):
         """The same by factors that are accurate down to a smaller floor."""
-        factors = splu_of(self._matrix(SOFTEST, 0.0))
+        factors = splu_of(self._matrix(STIFFNESS_ROUNDING, 0.0))
         return None if factors is None else self._solved(factors, load)
 
     def correction(self, bias):
@@ -283,7 +270,7 @@ class Factors:
             if u is None:
                 return None
             u = u / np.linalg.norm(u / self.scale)
-        if not self._quadratic.along(u) < -CLEARLY:
+        if not self._quadratic.along(u) < -HALF_DIGITS:
             return None
         return u if load @ u >= 0.0 else -u
 
@@ -351,8 +338,8 @@ class Quadratic:
         least, some = np.zeros(len(forces)), np.flatnonzero(forces.any(axis=(1, 2)))
         if some.size:
             least[some] = -np.linalg.eigvalsh(0.5 * (forces[some] + forces[some].swapaxes(1, 2)))[:, 0]
-        least = np.where(least > NOTHING * np.abs(forces).max(axis=(1, 2), initial=0.0), least, 0.0)
-        has = norms > NOTHING * norms.max(axis=1, initial=0.0)[:, None]
+        least = np.where(least > NEGLIGIBLE * np.abs(forces).max(axis=(1, 2), initial=0.0), least, 0.0)
+        has = norms > NEGLIGIBLE * norms.max(axis=1, initial=0.0)[:, None]
         negative[first:] = np.where(has[first:], least[:, None], 0.0)
         return norms, negative
 
@@ -375,7 +362,7 @@ class Quadratic:
     @cached_property
     def strain(self):
         """Numbers for `Frame.blocks` of a norm that exceeds K, in which increments of little strain are small."""
-        return self.frame.stiffness(self._structured(self._norms), _diagonal(MASSLESS * self.local))
+        return self.frame.stiffness(self._structured(self._norms), _diagonal(REGULARISED * self.local))
 
     @cached_property
     def rate(self):
@@ -398,8 +385,8 @@ class Quadratic:
         alike = (rows - columns) % 2 == 0
         np.maximum.at(found.reshape(-1), rows[alike], np.abs(self.K[alike]))
         found = np.maximum(found, self.shift)
-        found = np.where(found > NOTHING * found.max(axis=1, initial=0.0)[:, None], found, found[:, ::-1])
-        return np.where(found > NOTHING * found.max(initial=0.0), found, found.max(initial=0.0))
+        found = np.where(found > NEGLIGIBLE * found.max(axis=1, initial=0.0)[:, None], found, found[:, ::-1])
+        return np.where(found > NEGLIGIBLE * found.max(initial=0.0), found, found.max(initial=0.0))
 
     def factors(self, mu, least):
         """The `Factors` at mu; least (b,), N m, stands for K where there is none."""
@@ -409,7 +396,7 @@ class Quadratic:
     def circulatory(self):
         """Whether loads have no potential: K isn't symmetric."""
         apart = self.whole - self.whole.T
-        return bool(np.abs(apart.data).max(initial=0.0) > NEUTRAL_ASYMMETRY * np.abs(self.K).max(initial=0.0))
+        return bool(np.abs(apart.data).max(initial=0.0) > STIFFNESS_ROUNDING * np.abs(self.K).max(initial=0.0))
 
     def along(self, u):
         """u.K u."""
@@ -463,7 +450,7 @@ class Rest:
         self.left_out = frame.left_out(A, q)
         A = np.where(self.left_out[frame.rows.rows], 0.0, A)
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))
-        self.lengths = np.where(self.left_out, 1.0, np.maximum(lengths, LEAST_DIVISOR))
+        self.lengths = np.where(self.left_out, 1.0, np.maximum(lengths, TINY))
         self.A = A / self.lengths[frame.rows.rows]
         self.Q = self.loads_at(q)
         self.load = frame.increments.load(self.P, self.Q)
@@ -499,7 +486,7 @@ class Rest:
         self._weights = 1.0 / np.sqrt(diagonal)
         A = self.A * self._weights[frame.rows.columns]
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))
-        self._scales = 1.0 / np.where(self.left_out, 1.0, np.maximum(lengths, LEAST_DIVISOR))
+        self._scales = 1.0 / np.where(self.left_out, 1.0, np.maximum(lengths, TINY))
         A = A * self._scales[frame.rows.rows]
         self._matrix = frame.matrix(pattern, top * self._weights[i] * self._weights[j], A, self.left_out * 1.0)
         try:
@@ -507,7 +494,7 @@ class Rest:
         except RuntimeError as error:
             raise SingularConfiguration(NOT_UNIQUE) from error
         pivots = np.abs(self._factors.U.diagonal())
-        if pivots.min(initial=np.inf) < SINGULAR * pivots.max(initial=0.0):
+        if pivots.min(initial=np.inf) < ROUNDING * pivots.max(initial=0.0):
             raise SingularConfiguration(NOT_UNIQUE)
 
     def solve(self, load, bias):
@@ -515,7 +502,7 @@ class Rest:
         size = load.size
         right = np.concatenate((self._weights * load, self._scales * np.where(self.left_out, 0.0, bias)))
         found = self._factors.solve(right)
-        for _ in range(REFINEMENTS):
+        for _ in range(REGULARISED_SWEEPS):
             found = found + self._factors.solve(right - self._matrix @ found)
         return self._weights * found[:size], self._scales * found[size:]
 
@@ -559,10 +546,10 @@ class Rest:
     def closed(self, q, correction=None):
         """The consistent configuration next to q, by corrections with factors at hand; None where there is none."""
         allowed, correction = 1.0 + np.abs(q).max(), correction or self._shifted
-        q, size = self._swept(q, correction, CLOSED * allowed)
-        if size <= TURNED * allowed:
+        q, size = self._swept(q, correction, ROUNDING * allowed)
+        if size <= ACCEPTED * allowed:
             return q
-        return self.frame.closed(q) if size <= STALLED * allowed else None
+        return self.frame.closed(q) if size <= CONSISTENT * allowed else None
 
     def _swept(self, q, correction, limit):
         """Positions after sweeps of simplified Newton, and what is left of the constraints."""

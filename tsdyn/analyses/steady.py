@@ -7,6 +7,7 @@ import numpy as np
 
 from ..elements.bodies import Body, named, rotation_matrix
 from ..errors import InvalidArgument, InvalidBody, TsdynError
+from ..maths.tolerances import HALF_DIGITS, TYPED
 from ..observables.evaluate import mass_matrix_sparse
 from ..observables.generalised_forces import velocity_forces
 from ..validation import floats, vector3
@@ -14,7 +15,7 @@ from .coordinates import transform_e
 from .nominal_motion import NominalMotion
 from .reduction import inertia_derivatives
 from .rest import Rest
-from .tolerances import EQUAL_INERTIA, ON_AXIS, STEADY, TURNS
+from .tolerances import TURNS
 
 # Steady motion: all bodies turn together at a constant rate, and each may spin about an axis of symmetry of its own.
 #
@@ -30,7 +31,7 @@ def steady_rate(motion):
     size = motion.packed.size or 1.0
     speeds = np.concatenate((motion.translations(1).ravel() / size, motion.spins(1).ravel()))
     rate = np.abs(speeds).max(initial=0.0)
-    limit = STEADY * _largest_acceleration(motion, size, rate)
+    limit = HALF_DIGITS * _largest_acceleration(motion, size, rate)
     gains = np.concatenate((motion.translations(2).ravel(), size * motion.spins(2).ravel()))
     if size * rate * rate <= limit:
         return np.zeros(3) if np.abs(gains).max(initial=0.0) <= limit else None
@@ -60,14 +61,14 @@ def _rate(motion, symmetric, size, rate):
         rows.append(across)
         values.append(across @ omega)
     rows, values = np.concatenate(rows), np.concatenate(values)
-    Omega = np.linalg.lstsq(rows, values, rcond=STEADY)[0]
-    return Omega if np.abs(rows @ Omega - values).max(initial=0.0) <= STEADY * rate else None
+    Omega = np.linalg.lstsq(rows, values, rcond=HALF_DIGITS)[0]
+    return Omega if np.abs(rows @ Omega - values).max(initial=0.0) <= HALF_DIGITS * rate else None
 
 
 def asymmetry(J):
     """Projection onto the axes about which a body can't spin unseen: none of a sphere, two of a solid of rotation."""
     values, axes = np.linalg.eigh(J)
-    equal = np.diff(values) <= EQUAL_INERTIA * values.sum()
+    equal = np.diff(values) <= TYPED * values.sum()
     if equal.all():
         return np.zeros((3, 3))
     if not equal.any():
@@ -78,7 +79,7 @@ def asymmetry(J):
 
 def is_invariant(motion, Omega, size, rate):
     """Whether the motion continued rigidly is a motion of the scene."""
-    limit = STEADY * _largest_acceleration(motion, size, rate)
+    limit = HALF_DIGITS * _largest_acceleration(motion, size, rate)
     for turn in TURNS:
         try:
             R, later = _continued(motion, Omega, turn / rate)
@@ -88,7 +89,8 @@ def is_invariant(motion, Omega, size, rate):
         moved = np.abs(later.translations(2) - motion.translations(2) @ R.T).max(initial=0.0)
         turned = np.abs(later.spins(2) - motion.spins(2) @ R.T).max(initial=0.0)
         held = (
-            np.abs(later.Phi).max(initial=0.0) <= STEADY * max(size, 1.0) and speeds <= STEADY * max(size, 1.0) * rate
+            np.abs(later.Phi).max(initial=0.0) <= HALF_DIGITS * max(size, 1.0)
+            and speeds <= HALF_DIGITS * max(size, 1.0) * rate
         )
         if not (held and max(moved, size * turned) <= limit):  # NaN is no motion
             return False
@@ -201,7 +203,7 @@ def _own_spin(body, rate):
             f"rotors: the rate of {body.name} must be a number in rad/s, or an angular velocity (3,), got {rate!r}."
         )
     spin = vector3(values, f"rotors: angular velocity of {body.name} (rad/s, body frame)", InvalidArgument)
-    if np.linalg.norm(across @ spin) > ON_AXIS * np.linalg.norm(spin):
+    if np.linalg.norm(across @ spin) > TYPED * np.linalg.norm(spin):
         raise InvalidArgument(
             f"rotors: {body.name} spins about {spin}, which is no axis of symmetry of it, so the motion is not steady."
         )

@@ -36,7 +36,7 @@ class Experiment:
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class PaperRow:
     """One run: the largest constraint errors over all outputs, beside those of the paper."""
 
     formulation: str
@@ -66,7 +66,7 @@ class Row:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class PaperTable:
     """An experiment, its rows by the tangent-space ODE and by Maggi/Kane, and (description, row) of other starts."""
 
     experiment: Experiment
@@ -153,13 +153,13 @@ def _table(experiment):
     variants = tuple(
         (text, _row(experiment, build, TANGENT_SPACE, PAPER_TOLERANCES[-1])) for text, build in experiment.variants
     )
-    return Table(experiment, rows, baseline, variants)
+    return PaperTable(experiment, rows, baseline, variants)
 
 
 def _row(experiment, build, formulation, tolerance):
     solution = _simulate(build(), formulation, experiment.step, tolerance, DURATION)
     error = solution.constraint_error
-    return Row(
+    return PaperRow(
         formulation=formulation,
         tolerance=tolerance,
         measured=ConstraintError(*(float(level.max()) for level in error)),

@@ -26,7 +26,7 @@ class Move(NamedTuple):
     axis: Any = None
 
 
-class Link(NamedTuple):
+class TreeLink(NamedTuple):
     """A body, what it hangs from, and how it moves there."""
 
     body: Any
@@ -36,18 +36,18 @@ class Link(NamedTuple):
 
 
 def spanning_tree(scene):
-    """`Link`s, parents first, and the constraints that are left over."""
+    """`TreeLink`s, parents first, and the constraints that are left over."""
     waiting = [item for item in scene.constraints if not getattr(item, "normalises", False)]
     placed, links = {scene.ground}, []
     while len(links) < len(scene.bodies):
         item = next((one for one in waiting if _kind(one) in TREE and (one.a in placed) != (one.b in placed)), None)
         if item is None:
             body = next(body for body in scene.bodies if body not in placed)
-            links.append(Link(body, scene.ground, _free(body)))
+            links.append(TreeLink(body, scene.ground, _free(body)))
         else:
             waiting.remove(item)
             body, parent = (item.b, item.a) if item.a in placed else (item.a, item.b)
-            links.append(Link(body, parent, moves_of(item, body), item))
+            links.append(TreeLink(body, parent, moves_of(item, body), item))
         placed.add(links[-1].body)
     return links, waiting
 

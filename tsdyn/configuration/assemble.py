@@ -12,22 +12,12 @@ from ..elements.bodies import named
 from ..errors import InconsistentState, InvalidArgument, InvalidBody
 from ..jit.interrupts import CollectionsDeferred
 from ..maths.matrix_rank import row_lengths
+from ..maths.tolerances import LAST_PLACE, NEGLIGIBLE
 from ..validation import number, one_of, positive, sequence
-from .continuation import Found, Kept, approach_sketch, close, nearest, refuse, relax, stuck
+from .continuation import ContinuationEnd, Kept, approach_sketch, close, nearest, refuse, relax, stuck
 from .kinetic_metric import Metric, least_energy, least_step, rotation_vectors
 from .motor_starts import approach, demand_aligned, demand_finite, has_motors, refuse_vanished
-from .tolerances import (
-    ASSEMBLED,
-    CLEAR_FOLD,
-    FLAT_FOLD,
-    LEAST_VELOCITY_TOL,
-    POINT_LIKE,
-    SHOWN,
-    STAGES,
-    START_ROUNDING,
-    STIFFER,
-    UNFOLDED,
-)
+from .tolerances import CLEAR_FOLD, FLAT_FOLD, INITIAL_TOL, POINT_LIKE, SHOWN, STAGES, STIFFER
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -269,7 +259,7 @@ class AssemblyReport:
 @CollectionsDeferred()
 def assemble(
     scene: Scene,
-    tol: float = ASSEMBLED,
+    tol: float = NEGLIGIBLE,
     fixed: Sequence[PointMass | str] = (),
     t: float = 0.0,
     folds: Folds = "keep",
@@ -347,7 +337,7 @@ def assemble(
     return replace(report, moved=float(np.abs(scene.start[0] - sketch[0]).max()))
 
 
-def assembled_nearby(scene, fixed, t, tol=ASSEMBLED, folds="free"):
+def assembled_nearby(scene, fixed, t, tol=NEGLIGIBLE, folds="free"):
     """Assemble without a way to the angles of motors; return the `AssemblyReport`."""
     packed, (sketch, qd) = scene.packed, scene.start
     metric = whole = Metric(packed, None, t)
@@ -358,7 +348,7 @@ def assembled_nearby(scene, fixed, t, tol=ASSEMBLED, folds="free"):
     if not found.met:
         _demand_direction(scene, metric, found)
         refuse(scene, metric, sketch, found, tol, [scene.bodies[i] for i in fixed])
-    links = Folds(packed) if _largest_turn(metric, sketch, found.q) > UNFOLDED else None
+    links = Folds(packed) if _largest_turn(metric, sketch, found.q) > SHOWN / 4.0 else None
     if links is not None and folds == "keep":
         found = _unfolded(metric, sketch, found, links, tol)
     q = found.q
@@ -368,7 +358,7 @@ def assembled_nearby(scene, fixed, t, tol=ASSEMBLED, folds="free"):
     demand_aligned(packed, q, t)
     given, qd = _velocities(whole, q, (sketch, qd), A, Phi_q, Phi_t[whole.own])
     residual = Phi_q @ qd + Phi_t
-    _demand_compatible(scene, residual, max(tol, LEAST_VELOCITY_TOL) * (1.0 + np.abs(qd).max()))
+    _demand_compatible(scene, residual, max(tol, INITIAL_TOL) * (1.0 + np.abs(qd).max()))
     over = () if links is None else links.turned(metric, q, links.shown(metric, sketch))
     scene.place(q, qd)
     return AssemblyReport(
@@ -440,7 +430,7 @@ def _unfolded(metric, sketch, found, links, tol):
             fits = np.abs(Phi_freed).max() <= tol * (1.0 + np.abs(freed).max())
             if fits and not links.turned(metric, freed, drawn).size:
                 q, Phi = freed, Phi_freed
-            return Found(q, Phi, total, True)
+            return ContinuationEnd(q, Phi, total, True)
     stories = [
         f"  {links.folds[k].title}: {np.degrees(links.angle(metric, sketch, k)):.0f} degrees from straight in the "
         f"sketch, {np.degrees(links.angle(metric, found.q, k)):.0f} when assembled"
@@ -467,7 +457,7 @@ def _velocities(metric, q, sketch, A, Phi_q, Phi_t):
     fitted = given
     for _ in range(3):
         residual = A @ x + Phi_t
-        if np.abs(residual).max(initial=0.0) <= START_ROUNDING * (1.0 + np.abs(fitted).max()):
+        if np.abs(residual).max(initial=0.0) <= LAST_PLACE * (1.0 + np.abs(fitted).max()):
             break
         x = least_energy(metric, q, A, x, Phi_t) if exact else x + least_step(A, residual)
         fitted = metric.rates(q, x)

@@ -8,27 +8,13 @@ import numpy as np
 
 from ..errors import InconsistentState
 from ..maths.matrix_rank import row_lengths
+from ..maths.tolerances import NEGLIGIBLE, ROUNDING, TINY
 from .kinetic_metric import least_step, soft_step
-from .tolerances import (
-    CLOSED,
-    DECREASE,
-    LAST_CONVERGED,
-    LEAST_DIVISOR,
-    LEFT_OVER,
-    MANY_COORDINATES,
-    MOST_CLOSING,
-    MOST_ROTATION,
-    MOST_SETTLING,
-    MOST_SLIDE,
-    NEAR_SKETCH,
-    NO_AXIS,
-    SETTLED,
-    SHAKES,
-    STAGE_CONVERGED,
-    STAGES,
-    STEEP,
-    STUCK,
-)
+
+from .tolerances import (  # isort: skip
+    DECREASE, LAST_CONVERGED, MANY_COORDINATES, MOST_CLOSING, MOST_ROTATION, MOST_SETTLING, MOST_SLIDE, NAMED_SHARE,
+    NEAR_SKETCH, SETTLED, SHAKES, STAGE_CONVERGED, STAGES, STEEP,
+)  # fmt: skip
 
 # Continuation (homotopy) from a sketch to the nearest configuration that satisfies the constraints.
 #
@@ -39,7 +25,7 @@ from .tolerances import (
 # remaining residual, and steps along the constraints minimise the distance to the sketch.
 
 
-class Found(NamedTuple):
+class ContinuationEnd(NamedTuple):
     """End of a continuation."""
 
     q: np.ndarray  # (n,)
@@ -63,8 +49,8 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
     rng, best, total = np.random.default_rng(0), None, 0
     shakes = shakes[:2] if metric.n > MANY_COORDINATES else shakes
     Phi = metric.linear(sketch, rows)[0]
-    if np.abs(Phi).max(initial=0.0) <= CLOSED * (1.0 + np.abs(sketch).max()):
-        return Found(sketch, Phi, 0, True)
+    if np.abs(Phi).max(initial=0.0) <= ROUNDING * (1.0 + np.abs(sketch).max()):
+        return ContinuationEnd(sketch, Phi, 0, True)
     for attempt in range(2 + len(also) + len(shakes)):
         if attempt == 0:
             q, count = relax(metric, sketch, sketch, rows)
@@ -78,7 +64,7 @@ def nearest(metric, sketch, tol, rows=None, shakes=SHAKES, also=()):
         total += count + more
         met = bool(np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max()))
         if best is None or met or np.linalg.norm(Phi) < np.linalg.norm(best.Phi):
-            best = Found(q, Phi, total, met)
+            best = ContinuationEnd(q, Phi, total, met)
         if met or (attempt == 1 and stuck(metric, q, Phi, rows).size):
             break
     if best.met:
@@ -100,11 +86,9 @@ def approach_sketch(metric, sketch, q, rows=None):
         if size <= SETTLED * np.linalg.norm(wish) or size >= DECREASE * last:
             break
         turn = metric.largest_turn(step)
-        trial, residual, more = close(
-            metric, metric.moved(q, min(1.0, MOST_SLIDE / max(turn, LEAST_DIVISOR)) * step), rows
-        )
+        trial, residual, more = close(metric, metric.moved(q, min(1.0, MOST_SLIDE / max(turn, TINY)) * step), rows)
         steps += 1 + more
-        allowed = 10.0 * np.abs(Phi).max(initial=0.0) + CLOSED * (1.0 + np.abs(q).max())
+        allowed = 10.0 * np.abs(Phi).max(initial=0.0) + ROUNDING * (1.0 + np.abs(q).max())
         if np.abs(residual).max(initial=0.0) > allowed:
             break
         last, q = size, trial
@@ -115,7 +99,9 @@ def approach_sketch(metric, sketch, q, rows=None):
 def stuck(metric, q, Phi, rows=None):
     """Return violated rows whose derivative vanishes."""
     size = np.abs(Phi)
-    return np.flatnonzero((row_lengths(metric.linear(q, rows)[1]) == 0.0) & (size > STUCK * size.max(initial=0.0)))
+    return np.flatnonzero(
+        (row_lengths(metric.linear(q, rows)[1]) == 0.0) & (size > NAMED_SHARE * size.max(initial=0.0))
+    )
 
 
 def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
@@ -165,7 +151,7 @@ def relax(metric, sketch, q, rows=None, kept=None, stages=STAGES):
             else:
                 break
             q, now = trial, after
-            if softness != stages[-1][0] and size <= STAGE_CONVERGED * (np.linalg.norm(now[2]) + LEAST_DIVISOR):
+            if softness != stages[-1][0] and size <= STAGE_CONVERGED * (np.linalg.norm(now[2]) + TINY):
                 break
     return q, steps
 
@@ -175,7 +161,7 @@ def close(metric, q, rows=None):
     Phi, A = metric.linear(q, rows)
     steps = 0
     while steps < MOST_CLOSING and Phi.size and metric.columns.size:
-        if np.abs(Phi).max() <= CLOSED * (1.0 + np.abs(q).max()):
+        if np.abs(Phi).max() <= ROUNDING * (1.0 + np.abs(q).max()):
             break
         steps += 1
         step = least_step(A, Phi, STEEP)
@@ -215,7 +201,7 @@ class _Relative:
                 if self.places[body][0] >= 0:
                     B[3 * k : 3 * k + 3, self.places[body]] = block
         B = B[:, self.metric.columns]
-        lengths = np.maximum(row_lengths(B), LEAST_DIVISOR)
+        lengths = np.maximum(row_lengths(B), TINY)
         some = row_lengths(B) > 0.0
         return np.where(some, residual.ravel() / lengths, 0.0), B / lengths[:, None]
 
@@ -224,7 +210,7 @@ def _logarithm(E):
     """Return the rotation vector (3,) of a rotation matrix, for angles below pi."""
     v = np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]]) / 2.0
     sine = np.linalg.norm(v)
-    return v * (np.arctan2(sine, (np.trace(E) - 1.0) / 2.0) / sine) if sine > NO_AXIS else v
+    return v * (np.arctan2(sine, (np.trace(E) - 1.0) / 2.0) / sine) if sine > NEGLIGIBLE else v
 
 
 def _strain(Phi, lengths):
@@ -267,7 +253,7 @@ def refuse(scene, metric, sketch, found, tol, held=()):
     left = np.zeros(len(packed.system.segments))
     left[metric.own] = np.abs(found.Phi)
     sizes = np.array([left[member.rows].max() for member in members])
-    suspects = [member for member, size in zip(members, sizes, strict=True) if size > LEFT_OVER * sizes.max()]
+    suspects = [member for member, size in zip(members, sizes, strict=True) if size > NAMED_SHARE * sizes.max()]
     trial = _Trial(metric, sketch, found.q, tol)
     conflict = False
     while len(suspects) <= MOST and not (conflict or trial.over):

@@ -11,8 +11,9 @@ from ..errors import InvalidConstraint
 from ..jit.code_hash import is_ours
 from ..jit.kernels import twin
 from ..motions.prescribed import Motion
+from ..motions.tolerances import QUOTIENT_ERROR
 from ..observables.diagnostics import starts_of
-from .tolerances import LEAST_X, PHI_STEPS, QUOTIENT_ERROR
+from .tolerances import LEAST_X, PHI_STEPS
 
 TRIED = 3  # instances of each kind
 

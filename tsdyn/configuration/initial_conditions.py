@@ -8,47 +8,29 @@ from ..errors import InvalidArgument, RedundantConstraints, SingularConfiguratio
 from ..formulations.locked_orientations import keep_turning, release_loose_bodies, still
 from ..jit.kernels import resident
 from ..maths.matrix_rank import dependent
-from ..model.packed import is_small
+from ..maths.tolerances import LAST_PLACE
+from ..model.packed import POINT_SIZE, is_small
 from ..observables.evaluate import constraint_arrays
+from ..observables.tolerances import KEPT_FLOATS
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, by_lengths, coordinate_scales
 from ..rows.graph_builder import graph_of, set_redundant
-from ..rows.interface import (
-    allocate_tangent,
-    redundant_of,
-    reset_selection,
-    selection_parts,
-    set_selection,
-    with_reselection,
-)
+
+from ..rows.interface import (  # isort: skip
+    allocate_tangent, redundant_of, reset_selection, selection_parts, set_selection, with_reselection,
+)  # fmt: skip
 from ..rows.massless_axes import axis_of
 from ..workspaces import parts, words
 from .mobility import check_rank, mobility_at
 from .motor_starts import demand_finite, demand_small, refuse_masses, refuse_vanished
-from .start_kernels import (
-    DOUBTFUL,
-    HOLDS,
-    NONE,
-    StartParts,
-    evaluate_start,
-    failing_row,
-    go_near_by,
-    land_start,
-    select_redundant,
+
+from .start_kernels import (  # isort: skip
+    DOUBTFUL, HOLDS, NONE, StartParts, evaluate_start, failing_row, go_near_by, land_start, select_redundant,
     take_start,
-)
-from .tolerances import (
-    DENSE_ENTRIES,
-    KEPT_START_FLOATS,
-    LEAST_NEIGHBOURHOOD,
-    LISTED_ENTRIES,
-    MANY_ROWS,
-    NEIGHBOURHOOD,
-    POINT_SIZE,
-    REDUNDANT_SHARES,
-    SHORTENING,
+)  # fmt: skip
+from .tolerances import (  # isort: skip
+    DENSE_ENTRIES, LEAST_NEIGHBOURHOOD, LISTED_ENTRIES, MANY_ROWS, NEIGHBOURHOOD, REDUNDANT_SHARES, SHORTENING,
     SHORTEST_LEG,
-    START_ROUNDING,
-)
+)  # fmt: skip
 
 # The workspace in which a start is checked; one that is idle serves the next start of the scene.
 
@@ -91,7 +73,7 @@ class StartWorkspace:
         far = np.abs(q)
         if is_small(size):
             far[self.at] *= size
-        control.floor = START_ROUNDING * (size + far.max())
+        control.floor = LAST_PLACE * (size + far.max())
 
     def entered(self):
         """The arrays that `enter` sets but for reals."""
@@ -112,7 +94,7 @@ def taken(packed, graph, n):
 
 def give(packed, workspace):
     """Take back a workspace that is no longer in use, unless it is large."""
-    small = workspace.tangent.rows.S.size + workspace.tangent.rows.H.size < KEPT_START_FLOATS
+    small = workspace.tangent.rows.S.size + workspace.tangent.rows.H.size < KEPT_FLOATS
     if small and packed.derived.redundant is None and not packed.derived.start_workspaces:
         packed.derived.start_workspaces.append(workspace)
 
@@ -303,13 +285,13 @@ class _Start:
         demand_finite(scene, Phi, H, velocity)
         demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi", (self.t, q))
         self.velocity = velocity
-        self.far = np.abs(Phi).max(initial=0.0) > START_ROUNDING * (1.0 + np.abs(q).max())
-        self.fast = np.abs(velocity).max(initial=0.0) > START_ROUNDING * (1.0 + np.abs(qd).max())
+        self.far = np.abs(Phi).max(initial=0.0) > LAST_PLACE * (1.0 + np.abs(q).max())
+        self.fast = np.abs(velocity).max(initial=0.0) > LAST_PLACE * (1.0 + np.abs(qd).max())
         return NONE if dependent == HOLDS else dependent
 
     def evaluate(self, every=1):
         """As of `evaluate_start`; HOLDS is to rounding."""
-        where, tol = self.workspace.first_parameters, min(START_ROUNDING, self.tol)
+        where, tol = self.workspace.first_parameters, min(LAST_PLACE, self.tol)
         return evaluate_start(self.context, self.q, self.qd, self.t, self.rates, every, where, tol)
 
     def is_regular(self):

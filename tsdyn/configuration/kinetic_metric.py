@@ -9,24 +9,13 @@ Euler parameters stay normalised, so A has no normalisation rows.
 import numpy as np
 
 from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
+from ..elements.tolerances import UNDIRECTED
 from ..maths.matrix_rank import row_lengths, sparse_lu
-from ..maths.tolerances import RANK_TOL
+from ..maths.tolerances import PIVOT_ROUNDING, RANK_TOL, SUM_ROUNDING, TINY
 from ..model.equations import WIDTH, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
 from ..rows.constraint_graph import arms
-from .tolerances import (
-    DENSE,
-    IMMOBILE,
-    LEAST_DIVISOR,
-    LIGHTEST,
-    NO_INERTIA,
-    PLAIN,
-    SMALL_ANGLE,
-    SOFT,
-    SOLVED,
-    TANGENT,
-    THIN,
-)
+from .tolerances import DENSE, FIRM, LIGHTEST, SMALL_ANGLE, SOLVED, THIN
 
 _G = transform_g(np.eye(4)).reshape(4, 12)  # G is linear in p
 
@@ -205,7 +194,7 @@ def rotation_vectors(p, target):
     e = np.einsum("bij,bj->bi", _transforms(p), target)
     e0, size = np.einsum("bi,bi->b", p, target), np.linalg.norm(e, axis=1)
     angle = 2.0 * np.arctan2(size, np.abs(e0))
-    factor = np.where(size > 0.0, angle / np.maximum(size, LEAST_DIVISOR), 0.0)
+    factor = np.where(size > 0.0, angle / np.maximum(size, TINY), 0.0)
     return (np.where(e0 < 0.0, -1.0, 1.0) * factor)[:, None] * e
 
 
@@ -236,7 +225,7 @@ def least_step(A, residual, rcond=SOLVED):
     from scipy.sparse import diags_array
 
     unit = diags_array(1.0 / lengths[some]) @ A[some]
-    return soft_step(unit, residual[some] / lengths[some], np.zeros(A.shape[1]), np.full(some.sum(), SOFT))
+    return soft_step(unit, residual[some] / lengths[some], np.zeros(A.shape[1]), np.full(some.sum(), PIVOT_ROUNDING))
 
 
 def _of_independent(unit, target):
@@ -246,7 +235,7 @@ def _of_independent(unit, target):
         far = np.linalg.cholesky(K).diagonal().min()
     except np.linalg.LinAlgError:
         return None
-    return unit.T @ np.linalg.solve(K, target) if far > PLAIN else None
+    return unit.T @ np.linalg.solve(K, target) if far > FIRM else None
 
 
 def kinetic_rows(system, q, rates):
@@ -279,7 +268,7 @@ def least_energy(metric, q, A, x, drift):
     rates = np.stack([metric.rates(q, each) for each in (d, *V[rank:])], axis=1)
     F = kinetic_rows(metric.system, q, rates)
     F = F[np.argsort(-np.linalg.norm(F, axis=1))]
-    y = lstsq(F[:, 1:], -F[:, 0], cond=NO_INERTIA, lapack_driver="gelsy")[0] if rank < len(V) else np.zeros(0)
+    y = lstsq(F[:, 1:], -F[:, 0], cond=SUM_ROUNDING, lapack_driver="gelsy")[0] if rank < len(V) else np.zeros(0)
     return x + d + V[rank:].T @ y
 
 
@@ -288,7 +277,7 @@ def unit_tangent(metric, q, rng):
     _, A = metric.linear(q)
     reach = metric.reach(q)
     wish = metric.speeds(reach * rng.normal(size=metric.r.shape), rng.normal(size=(len(metric.p), 3)))
-    wish = wish + least_step(A, A @ wish, TANGENT)
+    wish = wish + least_step(A, A @ wish, RANK_TOL)
     shift, turn = metric.extent(wish)
     size = max(shift / reach, turn)
-    return wish / size if size > IMMOBILE else None
+    return wish / size if size > UNDIRECTED else None

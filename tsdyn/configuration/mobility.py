@@ -20,7 +20,7 @@ from ..validation import counted, finite_vector, number
 from .continuation import close
 from .kinetic_metric import Metric, unit_tangent
 from .motor_starts import demand_finite, demand_small, refuse_vanished
-from .tolerances import ASIDE, CONSISTENT, FIRM, NEIGHBOUR_MET, TAKES_PART
+from .tolerances import FIRM, INITIAL_TOL, NAMED_SHARE, NEIGHBOURHOOD
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Attachment, Scene
@@ -60,7 +60,9 @@ def partners(A, kept, redundant):
     if not (kept and redundant):
         return [[] for _ in redundant]
     weights = np.linalg.lstsq(unit[kept].T, unit[redundant].T, rcond=None)[0]
-    return [[row for row, weight in zip(kept, column, strict=True) if abs(weight) > TAKES_PART] for column in weights.T]
+    return [
+        [row for row, weight in zip(kept, column, strict=True) if abs(weight) > NAMED_SHARE] for column in weights.T
+    ]
 
 
 def put_aside(A, owners):
@@ -308,7 +310,7 @@ def mobility_at(scene, q, t):
     metric = Metric(packed, None, t, lengths=True)
     Phi, Phi_q, Phi_t = metric.arrays(q)
     demand_finite(scene, Phi, Phi_q, Phi_t)
-    demand_small(scene, Phi, CONSISTENT * (1.0 + np.abs(q).max()), "position", "Phi", (float(t), q))
+    demand_small(scene, Phi, INITIAL_TOL * (1.0 + np.abs(q).max()), "position", "Phi", (float(t), q))
     rows, A = _core(metric, q, None)
     here = rank_of(A)
     beside, generic = A, here
@@ -372,8 +374,8 @@ def _neighbours(metric, q, A):
         step = unit_tangent(metric, q, rng)
         if step is None:
             return
-        other, Phi, _ = close(metric, metric.moved(q, ASIDE * step))
-        if np.abs(Phi).max(initial=0.0) <= NEIGHBOUR_MET * (1.0 + np.abs(q).max()):
+        other, Phi, _ = close(metric, metric.moved(q, NEIGHBOURHOOD * step))
+        if np.abs(Phi).max(initial=0.0) <= INITIAL_TOL * (1.0 + np.abs(q).max()):
             yield other
 
 

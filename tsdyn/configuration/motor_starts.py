@@ -15,7 +15,8 @@ from ..model.handles import counts, handles_of
 from ..motions.elementary import Polynomial
 from ..motions.prescribed import Motion
 from ..rows.constraint_graph import MASS_REMEDY, mass_ratio
-from .tolerances import DRIVE_TURN, ELSEWHERE
+from ..validation import listed
+from .tolerances import DRIVE_TURN, INITIAL_TOL
 
 # Rigid displacement of one part of a scene relative to the other, across the only joint between them.
 #
@@ -129,7 +130,7 @@ def _product(p, o):
 # followed by an assembly, so that the mechanism stays on its branch.
 
 
-class Way:
+class MotorApproach:
     """The way of a motor from the present angle to the one prescribed at t; a goal of `RigidShift`."""
 
     turns = True
@@ -189,7 +190,7 @@ def approach(scene, t, fixed, assembled, besides=()):
     """
     motors = [each for each in scene.constraints if isinstance(each, RotationMotor) and each not in besides]
     threaded = any(isinstance(part, Thread) for part in scene.primitives)
-    ways = [way for way in (Way(scene, motor, t, threaded) for motor in motors) if way.length > DRIVE_TURN]
+    ways = [way for way in (MotorApproach(scene, motor, t, threaded) for motor in motors) if way.length > DRIVE_TURN]
     for way in list(ways):
         shift = None if threaded else RigidShift.of(scene, way.motor)
         if shift is not None and not {body.index for body in shift.bodies} & set(fixed):
@@ -231,12 +232,12 @@ def elsewhere(packed, t, q, qd=None):
         away = wanted - here if kind != "angle" or counts(joint) else joint_motion.counted(wanted - here, 0.0)
         if qd is not None:
             moves = getattr(joint_motion, kind)(one.geometry, *bodies, 1)
-        if abs(away) > ELSEWHERE * (1.0 + abs(wanted)):
+        if abs(away) > INITIAL_TOL * (1.0 + abs(wanted)):
             said.append(
                 f"{motor.title} prescribes {wanted:.9g} {unit} at t = {t:g} s, where {joint.title} stands at "
                 f"{here:.9g} {unit}: call scene.assemble(), or let the motion begin at the present {kind}."
             )
-        elif abs(moves - rate) > ELSEWHERE * (1.0 + abs(rate)):
+        elif abs(moves - rate) > INITIAL_TOL * (1.0 + abs(rate)):
             said.append(
                 f"{motor.title} prescribes {rate:.9g} {unit}/s at t = {t:g} s, where {joint.title} moves at "
                 f"{moves:.9g} {unit}/s: call scene.assemble(), or scene.set({joint.name!r}, rate={rate:.9g})."
@@ -267,9 +268,8 @@ def demand_aligned(packed, q, t):
     opposed = np.flatnonzero(opposed)
     if opposed.size:
         names = list(dict.fromkeys(titles[i] for i in opposed))
-        more = f" and {len(names) - 8} more" if len(names) > 8 else ""
         raise InconsistentState(
-            f"{', '.join(names[:8])}{more}: directions that the joint keeps parallel point opposite ways here. Its "
+            f"{listed(names)}: directions that the joint keeps parallel point opposite ways here. Its "
             "rows hold so, too, but it is the mirrored joint. Give one of the axes (or references) the other sign, or "
             "turn a body half a turn." + "".join(f"\n{each}" for each in elsewhere(packed, t, q))
         )

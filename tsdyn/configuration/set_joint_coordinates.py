@@ -17,13 +17,14 @@ from ..constraints.dot2 import Dot2
 from ..constraints.thread import Thread
 from ..elements.element import Angle, AngleGeometry, stop_waiting
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
+from ..maths.tolerances import TINY
 from ..model import handles as joint_motion
 from ..model.handles import counts, handles_of
 from ..motions.elementary import Polynomial
 from ..validation import floats, number, sequence
 from .assemble import assembled_nearby
 from .motor_starts import RigidShift, approach, prescribed
-from .tolerances import DRIVE_LEAST, DRIVE_SHARE, DRIVE_TURN, ELSEWHERE, LEAST_DIVISOR
+from .tolerances import DRIVE_LEAST, DRIVE_SHARE, DRIVE_TURN, INITIAL_TOL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -193,7 +194,7 @@ def _as_prescribed(joint, motor, given, t):
         away = 0.0 if value is None else value - wanted
         if name == "angle" and not counts(joint):
             away = joint_motion.counted(away, 0.0)
-        if abs(away) > ELSEWHERE * (1.0 + abs(wanted)):
+        if abs(away) > INITIAL_TOL * (1.0 + abs(wanted)):
             raise InconsistentState(
                 f"set: {name}={value:.9g} of {joint.title} contradicts {motor.title}, which prescribes {wanted:.9g} at "
                 f"t = {t:g} s. Leave {name} out, change the motion, or remove the motor."
@@ -268,4 +269,4 @@ def _assembled(scene, drivers, t, motors):
 def _size(scene):
     """Return the extent of the scene, m."""
     places = np.array([body.position for body in scene.bodies])
-    return max(float(np.ptp(places, axis=0).max()), scene.packed.size, LEAST_DIVISOR)
+    return max(float(np.ptp(places, axis=0).max()), scene.packed.size, TINY)

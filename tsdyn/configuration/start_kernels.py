@@ -9,25 +9,19 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.loops.constraint_rows import move_bodies, place_bodies, write_positions, write_velocities
+from ..elements.tolerances import UNDIRECTED
 from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.kernels import callback, entry, integers, kernel, loader, vector
 from ..maths.dense_linalg import copy, is_finite, largest
+from ..maths.tolerances import HALF_DIGITS, LAST_PLACE
 from ..model.equations import set_time
-from ..model.packed import SMALL
-from ..rows.interface import (
-    DYNAMICS,
-    METRIC,
-    evaluate_rows,
-    factorise_selected_rows,
-    keep_every_row,
-    multiply_rows,
-    project,
-    restore_selection,
-    select_rows,
-    singularity_indicator,
-)
+from ..model.packed import POINT_SIZE
+
+from ..rows.interface import (  # isort: skip
+    DYNAMICS, METRIC, evaluate_rows, factorise_selected_rows, keep_every_row, multiply_rows, project, restore_selection,
+    select_rows, singularity_indicator,
+)  # fmt: skip
 from ..workspaces import Parts, no_parts
-from .tolerances import DOUBTFUL_SHARE, IMMOBILE, POINT_SIZE, START_ROUNDING
 
 # In place of a row that depends on others: there is none; rounding may hide one.
 NONE, DOUBTFUL = -1, -2
@@ -78,7 +72,7 @@ def _evaluate(c, q, qd, t, velocity, every):
     failed = factorise_selected_rows(graph, f, f.rows, METRIC)
     if every == 1:
         restore_selection(f, count)
-        if failed < 0 and singularity_indicator(graph, f.rows) < DOUBTFUL_SHARE:
+        if failed < 0 and singularity_indicator(graph, f.rows) < HALF_DIGITS:
             return DOUBTFUL
     return failed
 
@@ -171,18 +165,18 @@ def take_start(context, q, qd, velocity, at, count, t, tol):  # eight: addresses
         return 0
     if (c.graph.axes.rows.shape[0] > 0 or parts.unequal[0] != 0) and _failing_row(c, x, t) >= 0:
         return 0
-    if _hold(f.b, rates, f.rows.H, x, xd, at, min(START_ROUNDING, tol)) == 1:
+    if _hold(f.b, rates, f.rows.H, x, xd, at, min(LAST_PLACE, tol)) == 1:
         return PLAIN
     far, fast = _residuals(c, rates, x, xd, at)
     whole, rate = 1.0 + largest(x), 1.0 + largest(xd)
     if not (far <= tol * whole and fast <= tol * rate and is_finite(f.rows.H)):
         return 0
-    if far > START_ROUNDING * whole:
+    if far > LAST_PLACE * whole:
         for i in at:
             length = math.sqrt(x[i] * x[i] + x[i + 1] * x[i + 1] + x[i + 2] * x[i + 2] + x[i + 3] * x[i + 3])
             for j in range(i, i + 4):
                 x[j] /= length
-    elif fast <= START_ROUNDING * rate:
+    elif fast <= LAST_PLACE * rate:
         return PLAIN
     copy(x, w.q)
     copy(xd, w.qd)
@@ -197,14 +191,14 @@ def take_start(context, q, qd, velocity, at, count, t, tol):  # eight: addresses
 def _set_floor(control, q, at):
     """As `StartWorkspace.enter` sets it."""
     far, scale = largest(q), 1.0
-    if 0.0 < control.size < SMALL:
+    if 0.0 < control.size < POINT_SIZE:
         far, scale, last = 0.0, control.size, 0
         for i in range(q.size):
             turns = last < at.size and i >= at[last]
             far = max(far, abs(q[i]) * scale if turns else abs(q[i]))
             if turns and i == at[last] + 3:
                 last += 1
-    control.floor = START_ROUNDING * (control.size + far)
+    control.floor = LAST_PLACE * (control.size + far)
 
 
 @kernel
@@ -242,7 +236,7 @@ def go_near_by(context, t, way, far):
     for _ in range(2):
         project(graph, f.rows, f.Z, f.b)
     found = _farthest(c)
-    scale = far / found if found > IMMOBILE * wanted else 0.0
+    scale = far / found if found > UNDIRECTED * wanted else 0.0
     for i in range(f.Z.size):
         f.Z[i] *= scale
     move_by(graph, f)

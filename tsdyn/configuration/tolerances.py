@@ -4,59 +4,45 @@ Shares are without unit; q has m and Euler parameters side by side, so residuals
 """
 
 # --- residuals ---
-# A start whose residuals are below this share of 1 + max |q| is taken as it is: one rounding of q, so projection would
-# only exchange one rounding for another.
-START_ROUNDING = 2e-16
-# The same of a residual that Gauss-Newton steps have left: their sums round several times.
-CLOSED = 1e-15
-# Residuals of configurations that are asked for their mobility: looser than a start's, since positions may be typed.
-CONSISTENT = 1e-9
-# ... and of neighbours that were found by Gauss-Newton steps, which end at CLOSED where they converge at all.
-NEIGHBOUR_MET = 1e-10
-# Residuals Phi_q qd + Phi_t of the velocities that fit best, at least: no smaller than `initial_tol` of `simulate`.
-LEAST_VELOCITY_TOL = 1e-9
+# A start whose residuals are below LAST_PLACE of 1 + max |q| is taken as it is: projection would only exchange one
+# rounding for another. Gauss-Newton steps end at ROUNDING: their sums round several times.
+#
+# Residuals that are accepted without being told otherwise, as by `initial_tol` of `simulate`, since positions may be
+# typed: of a start's positions and velocities, of loops in files, of positions and rates of a joint beside what a motor
+# prescribes (rad, m), of configurations that are asked for their mobility, and of their neighbours.
+INITIAL_TOL = 1e-9
 
 # --- redundant rows of a start ---
 # Shares of a pivot of S in its diagonal entry below which the row is dropped, tried in turn. Pivots are squares of
 # distances between rows: inexact joint data bring them to 1e-3, rounding leaves 1e-15.
 REDUNDANT_SHARES = 1e-3, 1e-6, 1e-9, 1e-12
-# Share below which rounding may hide a redundant row from elimination without pivoting: a pivot p leaves rounding of
-# 1e-16 / p in later ones, so the smaller of the two is at most 1e-8; ten times as much for sums.
-DOUBTFUL_SHARE = 1e-7
 # Rows of a straight chain from which the share of its weakest one, an inverse cube of its links, may be rounding.
 MANY_ROWS = 50_000
-# How far a dropped row must hold on the way from the start, and at least: rad, or share of the scene's size. A row that
-# is dependent at the start alone is violated by the square of the distance: 1e-4 at 1e-2, far above rounding.
+# How far away the rank is compared, since singular positions are isolated, and no closer; how far a dropped row must
+# hold on the way from the start, and at least: rad, or share of the scene's size. A row that is dependent at the start
+# alone is violated by the square of the distance: 1e-4 at 1e-2, far above rounding.
 NEIGHBOURHOOD, LEAST_NEIGHBOURHOOD = 1e-2, 1e-3
 # A leg of that way whose end can't be projected is shortened to a quarter, down to this share of the whole.
 SHORTENING, SHORTEST_LEG = 0.25, 1e-3
-# Share of a direction that remains after projection onto the tangent space: less is rounding, and nothing can move.
-IMMOBILE = 1e-9
-# m; the size of a scene whose points coincide.
-POINT_SIZE = 1e-3
 # Entries of Phi_q (8 bytes each): up to the first, dependent rows are listed with their partners; up to the second,
 # rows are selected by dense QR where blocks fail.
 LISTED_ENTRIES, DENSE_ENTRIES = 1 << 20, 1 << 23
 
 # --- dependence of rows at unit length ---
-# Weight from which on a row is named among those that another depends on; rounding of weights is RANK_TOL at most.
-TAKES_PART = 1e-6
-# Singular value, as a share of the largest, from which on the rows of a body are independent for sure.
-FIRM = 1e-3
+# Weight from which on a row is named among those that another depends on; rounding of weights is RANK_TOL at most. Also
+# residual, as a share of the largest, above which a row is named whose derivative vanishes, or that is in conflict.
+NAMED_SHARE = 1e-6
 # The same below which a direction isn't corrected: by steps towards a sketch while the constraints aren't met yet, by
-# Gauss-Newton steps, by tangents. The last two are below RANK_TOL and at it.
-STEEP, SOLVED, TANGENT = 1e-6, 1e-10, 1e-7
-# Distance of a unit row from the rows before it, down to which all are independent for sure: the smallest singular
-# value is hardly smaller by more than the square root of their number, and normal equations lose its square.
-PLAIN = 1e-2
-# Softness of rows in sparse least squares, which no rank is known of: above the rounding of their squares.
-SOFT = 1e-13
+# Gauss-Newton steps. The latter is below RANK_TOL, which is that of tangents.
+STEEP, SOLVED = 1e-6, 1e-10
+# Distance of a unit row from the rows before it, or singular value as a share of the largest, down to which all are
+# independent for sure: the smallest singular value is hardly smaller than the distance by more than the square root of
+# their number, and normal equations lose its square.
+FIRM = 1e-2
 # Inertia of an axis that has none, as a share of the body's mean moment, or of its mass at the arm of its joints; and
 # mass and inertia of light bodies, as a share of the largest: the metric of kinetic energy stays a metric, of numbers
 # whose roots are four digits apart at most.
 THIN, LIGHTEST = 1e-6, 1e-8
-# Share of the largest root of an inertia below which that of a motion is none: rounding of a direction without mass.
-NO_INERTIA = 1e-14
 
 # --- the way from a sketch ---
 # Coordinates up to which matrices are dense: with 30 bodies both ways take the same time, and dense ones know the rank.
@@ -65,7 +51,8 @@ DENSE = 200
 STAGES = ((1.0, 4), (0.3, 4), (0.1, 4), (0.03, 4), (0.01, 4), (1e-3, 5), (1e-4, 5), (1e-6, 5), (1e-8, 40))
 # A sketch that is off by less (share of the scene's reach) takes the last stage only.
 NEAR_SKETCH = 0.02
-# rad; the largest rotation of a step, and of one along the constraints.
+# rad; the largest rotation of a step, also of an analysis: angles are counted by the nearest turn, the trapezoidal rule
+# holds, and predictions serve. The same of a step along the constraints.
 MOST_ROTATION, MOST_SLIDE = 0.5, 0.2
 # Steps at most: of Gauss-Newton, and of the descent along the constraints.
 MOST_CLOSING, MOST_SETTLING = 60, 60
@@ -74,8 +61,6 @@ MOST_CLOSING, MOST_SETTLING = 60, 60
 LAST_CONVERGED, STAGE_CONVERGED = 1e-6, 0.03
 # What is left of the slope, as a share of the distance, when the descent ends; and the least decrease of a step.
 SETTLED, DECREASE = 1e-11, 0.9
-# Residual, as a share of the largest, above which a row whose derivative vanishes is named.
-STUCK = 1e-6
 # Shares of the scene's size, and rad, by which a sketch is shaken where the way from it ends elsewhere; two for scenes
 # of more coordinates than MANY_COORDINATES.
 SHAKES, MANY_COORDINATES = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0), 200
@@ -85,37 +70,17 @@ STIFFER = (0.1, 0.01, 0.001)
 # --- loops, conflicts, mobility, plug-ins ---
 # rad; an angle of a fold that is drawn deliberately, and one that is reported when it comes out on the other side.
 CLEAR_FOLD, SHOWN = 0.2, 0.1
-# rad; rotations of the three directions of a fold, each by at most this, reverse none of SHOWN: sin(0.1) > 3 * 0.025.
-UNFOLDED = SHOWN / 4.0
+# Rotations of the three directions of a fold, each by a quarter of SHOWN, reverse none of it: sin(0.1) > 3 * 0.025.
 # Share of a slide's direction across the axis beside it below which the two make no fold; m, of a link without length.
 FLAT_FOLD, POINT_LIKE = 0.1, 1e-9
-# Share of the largest |Phi| below which a row takes no part in a conflict.
-LEFT_OVER = 1e-4
-# Share of the scene's size, and rad: how far away the rank is compared. Singular positions are isolated, and no closer.
-ASIDE = 0.02
-# Relative steps of difference quotients of phi, and their error: a wrong entry is further off by orders of magnitude.
-PHI_STEPS, QUOTIENT_ERROR = (1e-2, 1e-4, 1e-6), 1e-3
+# Relative steps of difference quotients of phi.
+PHI_STEPS = (1e-2, 1e-4, 1e-6)
 # The least x that such a step is relative to, m.
 LEAST_X = 1e-6
 # A joint in a loop is driven by steps of this, rad, or share of the scene's size; the least share of a step.
 DRIVE_TURN, DRIVE_SHARE, DRIVE_LEAST = 0.25, 0.05, 2.0**-8
 
 # --- arithmetic ---
-# The least divisor: no length that matters is so small, and zero isn't divided by.
-LEAST_DIVISOR = 1e-300
 # a = |v|, rad, below which (1 - a/2 cot(a/2)) / a^2 is its limit 1/12: the next term is a^2 / 720; the formula loses
 # eps / a^2 by cancellation.
 SMALL_ANGLE = 1e-3
-# Sine below which a rotation has no axis.
-NO_AXIS = 1e-12
-
-# --- memory ---
-# Floats of rows and factors up to which the workspace of a start is kept for the next one (8 MB): a thousand bodies.
-KEPT_START_FLOATS = 1 << 20
-
-# rad, m and their rates, relative to what a motor prescribes: a joint further away is said to stand elsewhere; initial
-# conditions are as exact (initial_tol).
-ELSEWHERE = 1e-9
-
-# |Phi| relative to 1 + max |q| that `assemble` leaves by default: rounding of Phi along closed loops, two digits more.
-ASSEMBLED = 1e-12

@@ -8,8 +8,9 @@ import numpy as np
 
 from ..calls import fitting
 from ..errors import CONTROL, InvalidArgument, InvalidBody
-from ..validation import close, demand_known, floats, positive, shown, vector3
-from .tolerances import INERTIA_ROUNDING, LEAST_MASS, MOST_MASS, TRIANGLE, UNIT_LENGTH
+from ..maths.tolerances import NEGLIGIBLE, TINY, TYPED
+from ..validation import close, demand_known, floats, listed, positive, shown, vector3
+from .tolerances import SQUARABLE, UNIT_LENGTH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,7 +39,11 @@ def named(things, name, what, error=InvalidArgument):
         )
     known = list(dict.fromkeys(thing.name for thing in things))
     near = close(name, known)
-    there = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {_some(known)}."
+    there = (
+        f"did you mean {' or '.join(map(repr, near))}?"
+        if near
+        else f"there are {listed([*map(repr, known)]) or 'none'}."
+    )
     raise error(f"no {what} is named {name!r}; {there}")
 
 
@@ -51,11 +56,6 @@ def new_name(value, thing, others, error):
     if any(other is not thing and other.name == value for other in others):
         raise error(f"{thing.name}: the scene has another named {value!r}; choose another name.")
     return value
-
-
-def _some(names):
-    shown = ", ".join(map(repr, names[:8])) or "none"
-    return f"{shown} and {len(names) - 8} more" if len(names) > 8 else shown
 
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -118,9 +118,9 @@ def _mass(value, body):
 
 
 def _demand_within(size, value, what, body):
-    if not LEAST_MASS <= size <= MOST_MASS:
+    if not TINY <= size <= SQUARABLE:
         raise InvalidBody(
-            f"{body.name}: the {what} must be from {LEAST_MASS:g} to {MOST_MASS:g}, got {shown(value)}: its reciprocal "
+            f"{body.name}: the {what} must be from {TINY:g} to {SQUARABLE:g}, got {shown(value)}: its reciprocal "
             "and its products must be finite numbers."
         )
 
@@ -139,16 +139,16 @@ def _inertia(value, body):
         _demand_within(scale, value, "largest moment of inertia (kg m^2)", body)
     unit = given / (scale or 1.0)  # no square or sum of its entries overflows
     skew = np.abs(unit - unit.T).max()
-    if skew > INERTIA_ROUNDING:
+    if skew > NEGLIGIBLE:
         raise InvalidBody(f"{body.name}: the inertia matrix is not symmetric; J - J^T is up to {skew * scale:.3g}.")
     principal = np.linalg.eigvalsh(unit / 2.0 + unit.T / 2.0)
     moments = principal * scale
-    if principal[0] < -INERTIA_ROUNDING or scale == 0.0:
+    if principal[0] < -NEGLIGIBLE or scale == 0.0:
         raise InvalidBody(
             f"{body.name}: the principal moments of inertia {moments} kg m^2 must not be negative, nor all "
             "zero; a body without extent is scene.add_point_mass(...)."
         )
-    if principal[2] > (principal[0] + principal[1]) * (1.0 + TRIANGLE):
+    if principal[2] > (principal[0] + principal[1]) * (1.0 + TYPED):
         raise InvalidBody(
             f"{body.name}: no body has the principal moments {moments} kg m^2: the largest exceeds the sum "
             "of the others (triangle inequality). Are products of inertia or units mixed up?"

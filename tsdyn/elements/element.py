@@ -19,10 +19,10 @@ from ..errors import InvalidConstraint
 from ..jit.kernels import NumbaError, kernel, twin
 from ..maths import vectors
 from ..maths.vectors import IDENTITY, unit
-from ..validation import demand_known, floats, label, number
+from ..validation import demand_known, floats, label, listed, number
 from .bodies import Ground, PointMass, named, new_name, rotation_matrix
 from .markers import PARAMETERS, POINT, TURN, Marker, entries
-from .tolerances import OPPOSED, PARALLEL_FOUND
+from .tolerances import UNDIRECTED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 
 # Bookkeeping of the constraints and forces made for a scene: which were added, and under which names.
-
-SHOWN = 5
 
 _may_be_idle = ContextVar("whether forces that are made may be zero", default=False)
 
@@ -66,10 +64,8 @@ def warn_of_waiting(scene, stacklevel):
         return
     titles = [item.title for item in scene._waiting.values()]
     scene._waiting.clear()
-    more = f" and {len(titles) - SHOWN} more" if len(titles) > SHOWN else ""
     warnings.warn(
-        f"made for this scene and never added: {', '.join(titles[:SHOWN])}{more}. What scene.add(...) isn't given has "
-        "no effect.",
+        f"made for this scene and never added: {listed(titles)}. What scene.add(...) isn't given has no effect.",
         stacklevel=stacklevel + 1,
     )
 
@@ -218,7 +214,7 @@ def _across(axis, direction=None):
     if direction is not None:
         along = dot(axis, direction)
         f = tuple(d - along * u for d, u in zip(direction, axis, strict=True))
-        if dot(f, f) > PARALLEL_FOUND**2 * dot(direction, direction):
+        if dot(f, f) > UNDIRECTED**2 * dot(direction, direction):
             return unit(f)
     least = min(range(3), key=lambda i: abs(axis[i]))
     return unit(cross(tuple(float(i == least) for i in range(3)), axis))
@@ -227,7 +223,7 @@ def _across(axis, direction=None):
 def _swung(u, v, d):
     """The direction d turned by the least that takes the unit vector u to v; as it is where they are opposed."""
     n, cosine = cross(u, v), dot(u, v)
-    if cosine <= -1.0 + OPPOSED:
+    if cosine <= -1.0 + UNDIRECTED:
         return d
     side, along = cross(n, d), dot(n, d) / (1.0 + cosine)
     return tuple(cosine * x + y + along * z for x, y, z in zip(d, side, n, strict=True))

@@ -11,9 +11,10 @@ from ..calls import fitting, unknown_argument
 from ..errors import InvalidForce
 from ..jit.kernels import kernel
 from ..maths.recurrences import cross, dot, exponential, inverse_root, product, root, scaled
+from ..maths.tolerances import PIVOT_ROUNDING
 from ..validation import label, not_negative, positive
 from .markers import TURN, Marker, Point, Turn, Vector
-from .tolerances import LEAST_SLIP, NEGLIGIBLE_LOAD, SLIP, STRIBECK
+from .tolerances import LEAST_SLIP, SLIP, STRIBECK
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -203,7 +204,7 @@ def _length(s, v, square, r, k, counts):
 @kernel
 def _counts(s, r, weight, load, k):
     """Whether a part of N counts: the part of order zero is in row r, N in row `load`."""
-    return k > 0 and weight * abs(s[r, 0]) > NEGLIGIBLE_LOAD * s[load, 0]
+    return k > 0 and weight * abs(s[r, 0]) > PIVOT_ROUNDING * s[load, 0]
 
 
 @kernel

@@ -15,7 +15,7 @@ from .bodies import rotation_matrix
 from .element import Attachment, stop_waiting
 from .markers import TURN, Marker, Point, Vector
 from .primitive import Primitive
-from .tolerances import OPPOSED, PARALLEL
+from .tolerances import PARALLEL, UNDIRECTED
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -269,6 +269,6 @@ def carried(a, axis_a, direction, b, axis_b):
     one, other = rotation_matrix(a.orientation), rotation_matrix(b.orientation)
     u, v, d = one @ axis_a, other @ axis_b, one @ direction
     n, cosine = np.cross(u, v), u @ v
-    if cosine > -1.0 + OPPOSED:
+    if cosine > -1.0 + UNDIRECTED:
         d = d * cosine + np.cross(n, d) + n * (n @ d) / (1.0 + cosine)
     return other.T @ d

@@ -22,7 +22,7 @@ from ..errors import InvalidBody, InvalidConstraint
 from ..jit.kernels import kernel, stack
 from ..maths.vectors import rotate, rotate_gradient, rotate_rate
 from ..validation import vector3
-from .tolerances import FARTHEST_POINT
+from .tolerances import SQUARABLE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -88,8 +88,8 @@ class Point(Marker):
         """Return the coordinates; a point mass has no other point than itself."""
         if body.dimension == 3 and place.any():
             raise error(f"{what} must be (0, 0, 0) on the point mass {body.name!r}.")
-        if not np.abs(place).max() < FARTHEST_POINT:
-            raise error(f"{what} must be within {FARTHEST_POINT:g} m: squares of its coordinates overflow.")
+        if not np.abs(place).max() < SQUARABLE:
+            raise error(f"{what} must be within {SQUARABLE:g} m: squares of its coordinates overflow.")
         return place
 
 

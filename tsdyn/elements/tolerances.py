@@ -1,16 +1,7 @@
 """Limits of bodies, markers and compiled loops, each with its unit and where it comes from."""
 
-# m: squares of a point's coordinates must be numbers.
-FARTHEST_POINT = 1e150
-
-# kg, and kg m^2 of the largest moment of inertia: reciprocals must be numbers, and so must products of two of them.
-LEAST_MASS, MOST_MASS = 1e-300, 1e150
-
-# Inertia, relative to its largest entry. A tensor turned to other axes is symmetric, and its principal moments are
-# right, to some 10 roundings; sums of hundreds of parts to 1000. The triangle inequality is a limit that a flat body
-# reaches, and tables of masses have nine digits.
-INERTIA_ROUNDING = 1e-12
-TRIANGLE = 1e-9
+# Largest numbers whose squares are numbers: m, of a point; kg, and kg m^2 of the largest moment of inertia.
+SQUARABLE = 1e150
 
 # | |p| - 1 | of Euler parameters as they are given: those written with seven digits pass, degrees in place of radians
 # do not. They are made of unit length afterwards. Of A^T A - I of a rotation matrix likewise.
@@ -18,32 +9,20 @@ UNIT_LENGTH = 1e-6
 
 # Sine of an angle. Of a reference the part across an axis gives a direction; at 1e-6 ten digits of it are left.
 PARALLEL = 1e-6
-# The same for a direction that is found, not given: seven digits suffice to count turns by.
-PARALLEL_FOUND = 1e-9
-# 1 + cosine of two axes: below it they are opposed, and the least turn from one to the other is not unique.
-OPPOSED = 1e-9
+# The same for a direction that is found, not given: seven digits suffice to count turns by. Also 1 + cosine of two
+# axes, below which they are opposed, and the least turn from one to the other is not unique.
+UNDIRECTED = 1e-9
 
-# Complex steps: f(x + i h) / h cancels nothing and truncates h^2 f'''. So h is as small as it may be without products
-# of h, such as h^2 of a law's squares of small numbers, that reach the least number there is (5e-324) where they count.
+# Complex step of constraints, whose products of steps are of second order at most; of forces, COMPLEX_STEP of maths.
 CONSTRAINT_STEP = 1e-100
-FORCE_STEP = 1e-40
 # Of central differences of fourth order, relative to x: the fifth root of the rounding error, their optimum.
 FORCE_QUOTIENT = 7e-4
 
 # Series of forces against their laws (loops/law_check.py). OFF: what sharp ones may be off by, as a velocity over the
 # tolerance of a step. OFF_SELDOM: the same of laws that are analytic but at few places; flights past the anchor of a
 # spring are off by twice the tolerance at most at 200, as at 20, and by forty times at 1000. LAW_TOLERANCE: the least
-# velocity, m/s or rad/s, below which terms that cancel within a law count. LAW_NOISE: rounding of a law, relative to
-# the terms of its series.
-OFF, OFF_SELDOM, LAW_TOLERANCE, LAW_NOISE = 1000.0, 200.0, 1e-12, 1e-13
-
-# Part of a normal load, relative to the whole: below it a part is rounding of the reactions, in a mechanism in a plane
-# for instance, and so are all its coefficients.
-NEGLIGIBLE_LOAD = 1e-13
-
-# Differences of directions (1) and points (m) of a motor and a joint, up to which the motor prescribes the joint's
-# coordinate: rounding of unit vectors that are orthogonalised again, and of files written by hand to nine digits.
-SAME_COORDINATE = 1e-9
+# velocity, m/s or rad/s, below which terms that cancel within a law count.
+OFF, OFF_SELDOM, LAW_TOLERANCE = 1000.0, 200.0, 1e-12
 
 # m/s and rad/s: velocity at which friction is 71% of its magnitude, where none is given. A joint under nine tenths of
 # its friction creeps by 2e-7 m in 100 s. Less costs more: chains with friction in all joints twice as much at 1e-10.

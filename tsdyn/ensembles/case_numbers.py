@@ -9,10 +9,11 @@ from ..elements.bodies import Ground, PointMass, transform_g
 from ..elements.element import checked_parameters
 from ..elements.joint import Joint
 from ..elements.markers import POINT
-from ..elements.tolerances import INERTIA_ROUNDING, LEAST_MASS, MOST_MASS, TRIANGLE, UNIT_LENGTH
+from ..elements.tolerances import SQUARABLE, UNIT_LENGTH
 from ..errors import TsdynError
 from ..jit.code_hash import is_ours
-from ..model.packed import SMALL, checked_motions, is_small
+from ..maths.tolerances import NEGLIGIBLE, TINY, TYPED
+from ..model.packed import POINT_SIZE, checked_motions, is_small
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..rows.massless_axes import lean_bodies, levers
@@ -37,7 +38,7 @@ def masses(values):
     """Masses (k,)."""
     if values.ndim != 1:
         return np.ones(len(values)), np.zeros(len(values), bool)
-    return values, (values >= LEAST_MASS) & (values <= MOST_MASS)
+    return values, (values >= TINY) & (values <= SQUARABLE)
 
 
 def inertias(values):
@@ -50,12 +51,12 @@ def inertias(values):
     fits = np.isfinite(values).all(axis=(1, 2)) & values.any(axis=(1, 2))
     values = np.where(fits[:, None, None], values, np.eye(3))
     scale = np.abs(values).max(axis=(1, 2))
-    fits &= (scale >= LEAST_MASS) & (scale <= MOST_MASS)
+    fits &= (scale >= TINY) & (scale <= SQUARABLE)
     unit = values / scale[:, None, None]
-    fits &= np.abs(unit - unit.swapaxes(1, 2)).max(axis=(1, 2)) <= INERTIA_ROUNDING
+    fits &= np.abs(unit - unit.swapaxes(1, 2)).max(axis=(1, 2)) <= NEGLIGIBLE
     principal = np.linalg.eigvalsh(unit / 2.0 + unit.swapaxes(1, 2) / 2.0)
-    fits &= principal[:, 0] >= -INERTIA_ROUNDING
-    fits &= principal[:, 2] <= (principal[:, 0] + principal[:, 1]) * (1.0 + TRIANGLE)
+    fits &= principal[:, 0] >= -NEGLIGIBLE
+    fits &= principal[:, 2] <= (principal[:, 0] + principal[:, 1]) * (1.0 + TYPED)
     return values / 2.0 + values.swapaxes(1, 2) / 2.0, fits
 
 
@@ -422,7 +423,7 @@ class GeometryColumns:
         for _, s in found:
             most = np.abs(s).max(axis=1)
             length, whole = np.maximum(length, most), np.maximum(whole, most)
-        small = (length > 0.0) & (length < SMALL)
+        small = (length > 0.0) & (length < POINT_SIZE)
         size = np.where(small, length, whole)
         numbers[:, 0], numbers[:, 1] = size, np.where((size > 0.0) & (size < 1.0), self._tol * size, self._tol)
         self._enter_levers(points)

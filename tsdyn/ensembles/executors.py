@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidArgument, MissingDependency, Status
+from ..runs.tolerances import SLICE_SECONDS
 from .cases import TIMES
 from .runner import PLAIN, Runner, Study
-from .tolerances import AHEAD, ALONE_SECONDS, CHUNK_SECONDS, GROWTH, LOOK, MOST_CASES, RETRIES, SENT_SECONDS, STUDIES
+from .tolerances import AHEAD, CHUNK_SECONDS, GROWTH, MOST_CASES, MOST_KEPT, RETRIES, SENT_SECONDS
 
 # Chunks of cases: what threads and processes are given, and what they give back.
 
@@ -179,7 +180,7 @@ def run_threads(study, sink, threads, report):
             return 1, False
         if _run(runner, pair, queue, sink, report):
             return 1, True
-        if time.perf_counter() - began > ALONE_SECONDS:
+        if time.perf_counter() - began > CHUNK_SECONDS:
             threads = processors()
     if threads == 1:
         return 1, _run_here(runner, queue, sink, report)
@@ -231,7 +232,7 @@ class _Pool:
     def _may_go_on(self):
         """Wait while results wait for others to be written."""
         while self.sink.is_full and not self.study.stopped:
-            time.sleep(LOOK)
+            time.sleep(SLICE_SECONDS)
         return not self.study.stopped
 
     def run(self, report):
@@ -253,7 +254,7 @@ class _Pool:
         told = 0
         for thread in self.threads:
             while thread.is_alive():
-                thread.join(LOOK)
+                thread.join(SLICE_SECONDS)
                 report(self.finished - told)
                 told = self.finished
         report(self.finished - told)
@@ -290,7 +291,7 @@ def run_job(sent, part, offset):
 
 def _runners_of(digest):
     """The idle runners of a study, which are kept for the last few studies."""
-    while digest not in _idle and len(_idle) >= STUDIES:
+    while digest not in _idle and len(_idle) >= MOST_KEPT:
         _idle.pop(next(iter(_idle)), None)
     return _idle.setdefault(digest, [])
 
@@ -369,7 +370,7 @@ class _Sender:
         try:
             self._send()
             while self.pending:
-                done, _ = wait(self.pending, LOOK, FIRST_COMPLETED)
+                done, _ = wait(self.pending, SLICE_SECONDS, FIRST_COMPLETED)
                 for future in done:
                     report(self._collect(future))
                 report(0)

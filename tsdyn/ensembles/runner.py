@@ -18,7 +18,7 @@ from ..simulation.variants import family_of, of_numbers, packed_anew, start_name
 from .arena import Arena, serves
 from .case_loop import Finished
 from .cases import demand_keep, record_of, reduced, started
-from .tolerances import ARENAS
+from .tolerances import MOST_KEPT
 
 PLAIN = Status.SUCCESS.sentence
 
@@ -174,7 +174,7 @@ class Runner:
         Each has the redundant rows of its first case, if there are any: the order of these follows from the numbers.
         """
         for arena in (*self._arenas, None):
-            if arena is None and len(self._arenas) < ARENAS:
+            if arena is None and len(self._arenas) < MOST_KEPT:
                 arena = Arena(self.study)
                 self._arenas.append(arena)
             if arena is None:

@@ -215,7 +215,7 @@ class _StoredArrays(Mapping):
 
 
 def table_of(study, parameters, kept):
-    """The `Table` of a store: parameters by name with one case each, what is kept with any number of them."""
+    """The `StoredTable` of a store: parameters by name with one case each, what is kept with any number of them."""
     bodies = study.family.packed.bodies
     names = [f"{body.name}.{x}" for body in bodies for x in ("x", "y", "z", "e0", "e1", "e2", "e3")[: body.dimension]]
     labels, grid = {"coordinate": names}, ()

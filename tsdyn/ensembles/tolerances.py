@@ -1,6 +1,7 @@
 """Limits of ensembles."""
 
-# s: what a chunk of cases takes, so that handing it out costs nothing and the last ones end together
+# s: what a chunk of cases takes, so that handing it out costs nothing and the last ones end together; an ensemble that
+# takes less is run without threads of its own, each of which makes arrays of its own
 CHUNK_SECONDS = 0.02
 # s: the same for an executor, which sends chunks to other processes
 SENT_SECONDS = 0.5
@@ -8,10 +9,6 @@ SENT_SECONDS = 0.5
 MOST_CASES = 4096
 # of a chunk to the next at most: the first cases are no measure of the others
 GROWTH = 8
-# s: an ensemble that takes less is run without threads of its own, each of which makes arrays of its own
-ALONE_SECONDS = 0.02
-# s: between reports of the progress
-LOOK = 0.1
 # chunks in the hands of an executor for each of its workers: none waits for the next
 AHEAD = 2
 # times that a chunk of a lost worker is sent again
@@ -20,10 +17,8 @@ RETRIES = 3
 WAITING = 1 << 16
 # s: after which readers of a store see what has been written
 FLUSH = 1.0
-# sets of arrays of a thread: one for each selection of redundant rows that has been met
-ARENAS = 8
-# studies whose runners a worker keeps
-STUDIES = 4
+# sets of arrays that a thread keeps, one for each selection of redundant rows; studies whose runners a worker keeps
+MOST_KEPT = 8
 # cases that one thread may run at once
 LANES = 1, 4
 # cases after which it is asked whether they are long; the loop of cases runs them if fewer than one in FEW_LONG are

@@ -18,20 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    Force,
-    Parameters,
-    Point,
-    Turn,
-    cross,
-    floats,
-    kernel,
-    rotated,
-    rotated_back,
-    rotation,
-    shown,
-    some,
-)
+from ..plugins import (  # isort: skip
+    Force, Parameters, Point, Turn, cross, floats, kernel, rotated, rotated_back, rotation, shown, some,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike

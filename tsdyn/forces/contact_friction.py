@@ -11,22 +11,11 @@ F is the force that the contact exerts; mu is given by friction_laws.coefficient
 import numpy as np
 
 from ..constraints.plane_contact import PlaneContact
-from ..plugins import (
-    Force,
-    JointFriction,
-    Point,
-    Turn,
-    Vector,
-    act,
-    act_series,
-    coefficient,
-    coefficient_series,
-    dot,
-    magnitude,
-    scaled,
-    slip,
-    slip_series,
-)
+
+from ..plugins import (  # isort: skip
+    Force, JointFriction, Point, Turn, Vector, act, act_series, coefficient, coefficient_series, dot, magnitude, scaled,
+    slip, slip_series,
+)  # fmt: skip
 
 
 class ContactFriction(JointFriction, Force):

@@ -17,28 +17,10 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..plugins import (
-    PARALLEL,
-    Angle,
-    Force,
-    InvalidForce,
-    Placing,
-    Signal,
-    Turn,
-    Vector,
-    across,
-    angle_about,
-    angle_series,
-    dot,
-    finite,
-    in_frame,
-    kernel,
-    load,
-    not_negative,
-    rotation_matrix,
-    scaled,
-    vector3,
-)
+from ..plugins import (  # isort: skip
+    PARALLEL, Angle, Force, InvalidForce, Placing, Signal, Turn, Vector, across, angle_about, angle_series, dot, finite,
+    in_frame, kernel, load, not_negative, rotation_matrix, scaled, vector3,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Floats, Load

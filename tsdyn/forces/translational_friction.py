@@ -18,26 +18,11 @@ from typing import Any
 import numpy as np
 
 from ..constraints.translational import Translational
-from ..plugins import (
-    AXIS,
-    BEARING_ROWS,
-    Force,
-    JointFriction,
-    act,
-    act_series,
-    along_and_across,
-    bearing_series,
-    coefficient,
-    coefficient_series,
-    dot,
-    optional,
-    positive,
-    product,
-    scaled,
-    slip,
-    slip_series,
-    square,
-)
+
+from ..plugins import (  # isort: skip
+    AXIS, BEARING_ROWS, Force, JointFriction, act, act_series, along_and_across, bearing_series, coefficient,
+    coefficient_series, dot, optional, positive, product, scaled, slip, slip_series, square,
+)  # fmt: skip
 
 
 class TranslationalFriction(JointFriction, Force):

@@ -15,22 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    STATE,
-    ByState,
-    Force,
-    Parameters,
-    Point,
-    Turn,
-    arguments_of,
-    cross,
-    fill_state,
-    fill_state_series,
-    floats,
-    numbers_of,
-    shown,
-    stack,
-)
+from ..plugins import (  # isort: skip
+    STATE, ByState, Force, Parameters, Point, Turn, arguments_of, cross, fill_state, fill_state_series, floats,
+    numbers_of, shown, stack,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from collections.abc import Callable

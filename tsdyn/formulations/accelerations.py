@@ -9,24 +9,15 @@ from ..errors import Status
 from ..jit.kernels import callback, caller, kernel, long_kernel, stack
 from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, times
 from ..maths.dense_linalg import copy, largest
+from ..maths.tolerances import LAST_PLACE
 from ..model.equations import applied_forces
-from ..rows.interface import (
-    acceleration_residuals,
-    add_axis_multipliers,
-    apply_multipliers,
-    clear_redundant,
-    constrain,
-    constrain_accelerations,
-    evaluate_bias,
-    factorise_product,
-    inner,
-    note_loads,
-    solve_product,
-    weigh,
-    weigh_bodies,
-)
+
+from ..rows.interface import (  # isort: skip
+    acceleration_residuals, add_axis_multipliers, apply_multipliers, clear_redundant, constrain,
+    constrain_accelerations, evaluate_bias, factorise_product, inner, note_loads, solve_product, weigh, weigh_bodies,
+)  # fmt: skip
 from ..workspaces import load
-from .tolerances import DAMPED, DAMPED_SHARE, EXACT, LOAD_ROUNDING, LOAD_SWEEPS, NEWTON_DONE, REFINEMENTS, SLOW_LOADS
+from .tolerances import DAMPED, DAMPED_SHARE, EXACT, LOAD_SWEEPS, NEWTON_DONE, REFINEMENTS, SLOW_FACTORS
 
 # Accelerations and multipliers on the constraint manifold, without a basis of the tangent space.
 #
@@ -300,9 +291,9 @@ def find_reactions(graph, system, f, q, qd, t):
             r.lam[e] += share * f.b[e]
         # Converged: the correction is rounding, or that of a new matrix is so small that its square is
         cold, size = size == 0.0, largest(r.lam)
-        done = has_converged(change, before, share, sweep, LOAD_ROUNDING * size)
+        done = has_converged(change, before, share, sweep, LAST_PLACE * size)
         done = done or (renew and not cold and change <= NEWTON_DONE * size)
-        renew, before = cold or sweep >= DAMPED or change > SLOW_LOADS * before, change
+        renew, before = cold or sweep >= DAMPED or change > SLOW_FACTORS * before, change
     return False
 
 

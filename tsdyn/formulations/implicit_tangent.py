@@ -7,31 +7,18 @@ from ..errors import Status
 from ..jit.kernels import ANY, callback, complex_vector, data_of, kernel, vector
 from ..jit.simd import add, cross, fma, four, lanes, put, splat, times, total
 from ..maths.dense_linalg import copy, largest
+from ..maths.tolerances import ROUNDING_AT_MOST
 from ..maths.vectors import spin
 from ..methods.collocation import parts_of
 from ..methods.explicit import NORM
 from ..model.equations import is_rheonomic, set_time
-from ..rows.interface import (
-    DYNAMICS,
-    apply_multipliers,
-    clear_redundant,
-    evaluate_bias,
-    evaluate_drift,
-    evaluate_rows,
-    factorise_complex_saddle,
-    factorise_saddle,
-    factorise_selected_rows,
-    multiply_rates,
-    multiply_rows,
-    solve_complex_saddle,
-    solve_product,
-    solve_rows,
-    solve_saddle,
-    take_reactions,
-    weigh,
-    weigh_bodies,
+
+from ..rows.interface import (  # isort: skip
+    DYNAMICS, apply_multipliers, clear_redundant, evaluate_bias, evaluate_drift, evaluate_rows,
+    factorise_complex_saddle, factorise_saddle, factorise_selected_rows, multiply_rates, multiply_rows,
+    solve_complex_saddle, solve_product, solve_rows, solve_saddle, take_reactions, weigh, weigh_bodies,
     write_saddle_rows,
-)
+)  # fmt: skip
 from ..workspaces import load
 from .accelerations import body_forces
 from .chart_coordinates import displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
@@ -39,18 +26,7 @@ from .chart_validity import measure_turns
 from .projection import largest_residual, velocity_floor
 from .saddle_point import add_blocks, degrees, factorise, linearise, reduce, soften, solve, take_solution, turned_back
 from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, weighted_square, write_state
-from .tolerances import (
-    FARTHEST_AHEAD,
-    LAG,
-    LEAST_LAG,
-    LEFT,
-    REACTION_SWEEPS,
-    REACTIONS_LEFT,
-    ROUNDING_AT_MOST,
-    SLOW,
-    STALLED,
-    SWEEPS,
-)
+from .tolerances import FARTHEST_AHEAD, LAG, LEAST_LAG, LEFT, REACTION_SWEEPS, REACTIONS_LEFT, SLOW, STALLED, SWEEPS
 
 # Right-hand side of a Newton correction of a stage: the normal part of accelerations, and the unbalanced loads.
 

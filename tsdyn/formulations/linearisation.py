@@ -13,21 +13,16 @@ derivatives of the force laws in corotated frames (forces.py). At the current co
 """
 
 from ..jit.kernels import callback, kernel, stack, stack2, vector
-from ..maths.dense_linalg import (
-    add_product,
-    add_transposed_product,
-    clear_matrix,
-    lu,
-    lu_solve,
-    multiply,
-    transposed_times,
-)
+
+from ..maths.dense_linalg import (  # isort: skip
+    add_product, add_transposed_product, clear_matrix, lu, lu_solve, multiply, transposed_times,
+)  # fmt: skip
+from ..maths.tolerances import TINY
 from ..maths.vectors import matrix_a, matrix_g
 from ..model.equations import applied_forces, constraint_curvature, force_jacobian
 from ..workspaces import load
 from .null_space import find_accelerations
 from .null_space_chart import NOT_FINITE, OK, SINGULAR
-from .tolerances import HUGE
 
 
 @kernel
@@ -209,7 +204,7 @@ def linearise(context, t, vdd):
     _to_body_frames(system, w.q, linear.K, linear.Z, linear.K_body)
     _to_body_frames(system, w.q, linear.C, linear.Z, linear.C_body)
     w.counters.jacobians += 1
-    return OK if total < HUGE else NOT_FINITE
+    return OK if total < 1.0 / TINY else NOT_FINITE
 
 
 @kernel

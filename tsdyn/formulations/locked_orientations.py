@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.markers import PARAMETERS, VECTOR
+from ..maths.tolerances import NEGLIGIBLE, ROUNDING
 from ..model.packed import classes
 from ..motions.prescribed import Motion
 from ..rows.graph_builder import build, graph_of, redundant_rows, with_loops
 from ..rows.interface import MOST_ROWS
-from .tolerances import HOLDING, UNIT_ROUNDING
 
 
 class Still(NamedTuple):
@@ -78,7 +78,7 @@ def release_loose_bodies(packed, graph, H):
         torques, squares = H.reshape(-1, 2, 8)[rows, side, 4:7], np.zeros((len(found.bodies), 3, 3))
         np.add.at(squares, which, torques[:, :, None] * torques[:, None, :])
         sizes = np.linalg.eigvalsh(squares)
-        loose = ~(sizes[:, 0] > HOLDING * sizes[:, 2])
+        loose = ~(sizes[:, 0] > NEGLIGIBLE * sizes[:, 2])
         if not loose.any():
             return
         keep_turning(packed, found.bodies[loose].tolist())
@@ -92,7 +92,7 @@ def hold(packed, q, qd):
     at = first[:, None] + np.arange(3, 7)
     p, q, qd = q[at], q.copy(), qd.copy()
     square = (p * p).sum(axis=1)
-    q[at] = np.where((np.abs(square - 1.0) > UNIT_ROUNDING)[:, None], p / np.sqrt(square)[:, None], p)
+    q[at] = np.where((np.abs(square - 1.0) > ROUNDING)[:, None], p / np.sqrt(square)[:, None], p)
     qd[at] = 0.0
     return q, qd
 

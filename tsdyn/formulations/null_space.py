@@ -6,34 +6,23 @@ from ..elements.loops.constraint_rows import move_bodies, place_bodies
 from ..errors import Status
 from ..jit.kernels import callback, kernel, stack, vector
 from ..maths.dense_linalg import cholesky, cholesky_solve, copy, is_finite, largest, lu, lu_solve, transposed_times
+from ..maths.tolerances import LAST_PLACE, SUM_ROUNDING
 from ..maths.vectors import multiply_g
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import applied_forces, is_rheonomic, set_time
 from ..rows.interface import evaluate_bias, evaluate_drift, evaluate_rows, has_redundant_rows, redundant_rows_hold
 from ..workspaces import load
-from .accelerations import (
-    SOLVE_FRICTION,
-    body_of,
-    call_friction,
-    forget_loads,
-    has_converged,
-    normal_load,
-    step_share,
-    unit_friction,
-)
+
+from .accelerations import (  # isort: skip
+    SOLVE_FRICTION, body_of, call_friction, forget_loads, has_converged, normal_load, step_share, unit_friction,
+)  # fmt: skip
 from .chart_validity import every_level_holds, measure_turns, reason_to_leave
-from .null_space_chart import (
-    NOT_FINITE,
-    OK,
-    correct,
-    evaluate_dense_bias,
-    evaluate_dense_drift,
-    multiply_dense_row,
-    new_chart,
-    solve_positions,
+
+from .null_space_chart import (  # isort: skip
+    NOT_FINITE, OK, correct, evaluate_dense_bias, evaluate_dense_drift, multiply_dense_row, new_chart, solve_positions,
     tangent_map,
-)
-from .tolerances import BASIS_LOAD_ROUNDING, LOAD_SWEEPS, MASS_PIVOT
+)  # fmt: skip
+from .tolerances import LOAD_SWEEPS
 
 # Coupled friction and reactions in the null-space form: accelerations and multipliers are linear in the normal loads.
 #
@@ -220,7 +209,7 @@ def solve_friction(context, t, vdd):
         for i in range(frictions):
             loads[i] += share * b[i]
             size = max(size, abs(loads[i]))
-        done = has_converged(change, before, share, sweep, BASIS_LOAD_ROUNDING * size)
+        done = has_converged(change, before, share, sweep, 2.0 * LAST_PLACE * size)
         before = change
     # vdd += sum_i a_i F_n,i
     for i in range(frictions):
@@ -278,7 +267,7 @@ def reduced_mass(system, w):
                 for j in range(i + 1):
                     w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
     w.counters.factorizations += 1
-    return OK if cholesky(w.A, k, MASS_PIVOT) else MASS_SINGULAR
+    return OK if cholesky(w.A, k, SUM_ROUNDING) else MASS_SINGULAR
 
 
 @kernel

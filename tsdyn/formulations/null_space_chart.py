@@ -4,19 +4,15 @@ import math
 
 from ..errors import Status
 from ..jit.kernels import kernel
-from ..maths.dense_linalg import (
-    add_product,
-    add_transposed_product,
-    clear_matrix,
-    invert,
-    largest,
-    multiply,
-    null_space,
-)
+
+from ..maths.dense_linalg import (  # isort: skip
+    add_product, add_transposed_product, clear_matrix, invert, largest, multiply, null_space,
+)  # fmt: skip
+from ..maths.tolerances import ROUNDING_AT_MOST, SUM_ROUNDING, TINY
 from ..model.equations import acceleration_bias, constraint_jacobian, constraints, time_derivative
 from ..rows.interface import list_redundant
 from .chart_validity import set_base_point
-from .tolerances import B_OUTDATED, B_SWEEPS, FIRST_RATE, HUGE, RANK_LIMIT, ROUNDING_AT_MOST, SLOW, STALLED, USUAL
+from .tolerances import B_OUTDATED, B_SWEEPS, LAG, SLOW, STALLED, USUAL
 
 # Dense constraint rows of the forms with a basis: evaluate, factorise, solve. Redundant rows are dropped here.
 #
@@ -255,7 +251,7 @@ def update_b(w):
             worst = max(worst, total)
         # Eq. 28 converges from |R| < 1 only
         if worst > B_OUTDATED and before == math.inf:
-            before = HUGE  # a factorisation is tried once
+            before = 1.0 / TINY  # a factorisation is tried once
             if not invert_normal_matrix(w):
                 return SINGULAR
             continue
@@ -315,7 +311,7 @@ def new_chart(graph, system, w, f, l, t):
         w.v[j] = 0.0
     # V: the columns of Q that Householder QR of U adds; low and high are the extreme singular values
     low, high = null_space(w.householder, n, kept, w.V, w.R, w.z)
-    if m > 0 and not (regular and low > RANK_LIMIT * high):
+    if m > 0 and not (regular and low > SUM_ROUNDING * high):
         return SINGULAR
     _scale_positions(graph, metres, w.V)
     # U, B = (Phi_q0 U)^-1 with a step of Eq. 28, L
@@ -324,7 +320,7 @@ def new_chart(graph, system, w, f, l, t):
     if not invert_normal_matrix(w) or update_b(w) != OK:
         return SINGULAR
     _left_inverse(graph, w, metres)
-    w.control.rate = FIRST_RATE
+    w.control.rate = LAG
     return OK
 
 

@@ -11,21 +11,14 @@ from ..errors import Status
 from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import add, four, put
 from ..maths.dense_linalg import largest, largest_of
-from ..rows.interface import (
-    DYNAMICS,
-    constrain,
-    evaluate_drift,
-    evaluate_residuals,
-    evaluate_rows,
-    factorise_rows,
-    find_correction,
-    is_near_singular,
-    project,
-    redundant_rows_hold,
-    singularity_indicator,
-)
+from ..maths.tolerances import LAST_PLACE, ROUNDING, ROUNDING_AT_MOST
+
+from ..rows.interface import (  # isort: skip
+    DYNAMICS, constrain, evaluate_drift, evaluate_residuals, evaluate_rows, factorise_rows, find_correction,
+    is_near_singular, project, redundant_rows_hold, singularity_indicator,
+)  # fmt: skip
 from .chart_coordinates import largest_rates
-from .tolerances import LAND_SWEEPS, LEAST_MOVE, ROUNDING, ROUNDING_AT_MOST, SPEED_ROUNDING, STALLED, WALK
+from .tolerances import LAND_SWEEPS, STALLED, WALK
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 NOT_FINITE, NEWTON_FAILED = int(Status.NOT_FINITE), int(Status.NEWTON_FAILED)
@@ -48,7 +41,7 @@ def largest_residual(graph, w, f):
 def velocity_floor(graph, w, f):
     """|Phi_q qd + Phi_t| that rounding leaves at the velocities of the poses, m/s."""
     speed, spin = largest_rates(graph, f.poses)
-    return SPEED_ROUNDING * (speed + (w.control.size if graph.turns.size == 0 else lever(w)) * spin)
+    return LAST_PLACE * (speed + (w.control.size if graph.turns.size == 0 else lever(w)) * spin)
 
 
 @long_kernel
@@ -67,7 +60,7 @@ def land(graph, system, w, f, t):
     if status == OK:
         status = _correct_positions(graph, system, w, f, t)
     # Bodies that have moved by more than rounding have another H
-    if status == OK and f.landing.moved > LEAST_MOVE * lever(w):
+    if status == OK and f.landing.moved > ROUNDING * lever(w):
         status = factorise(graph, system, w, f, t)
     elif status == OK and f.landing.moved == 0.0:
         w.counters.at_rounding += 1

@@ -6,32 +6,20 @@ from ..errors import Status
 from ..jit.kernels import callback, kernel, long_kernel, stack, stack2, vector
 from ..jit.simd import add, cross, fma, four, lanes, put, splat, sub
 from ..maths.dense_linalg import clear_matrix, copy
-from ..model.equations import applied_forces, call_curvature, call_jacobian
+from ..model.equations import applied_forces, call_jacobian, call_stiffness
 from ..rows.constraint_graph import W_MASS, W_ROTATION, WEIGHTS
-from ..rows.interface import (
-    DYNAMICS,
-    apply_multipliers,
-    factorise_saddle,
-    factorise_selected_rows,
-    inner,
-    more,
-    multiply_rows,
-    solve_product,
-    solve_saddle,
-    weigh,
-    write_saddle_rows,
-)
+
+from ..rows.interface import (  # isort: skip
+    DYNAMICS, apply_multipliers, factorise_saddle, factorise_selected_rows, inner, more, multiply_rows, solve_product,
+    solve_saddle, weigh, write_saddle_rows,
+)  # fmt: skip
 from ..rows.saddle_matrix import BLOCK, LOWER, OWN, UPPER
 from ..workspaces import load
 from .accelerations import body_of, solve_accelerations
-from .chart_coordinates import (
-    acceleration_by_turn,
-    add_gyroscopic,
-    add_inertia,
-    factorise_normal,
-    rate_by_turn,
-    to_bodies,
-)
+
+from .chart_coordinates import (  # isort: skip
+    acceleration_by_turn, add_gyroscopic, add_inertia, factorise_normal, rate_by_turn, to_bodies,
+)  # fmt: skip
 
 # Stiffness and damping blocks of bodies: exact derivatives of their loads by (r, pi') and (rd, omega').
 #
@@ -178,7 +166,7 @@ def add_forces(system, w, s, t, renew, kept, Q):
         _take_bodies(w, s, one)
         clear_matrix(s.Xd)
         reals, own = system.reals[one.reals :], kept[one.kept :]
-        call_jacobian(one.loop, 1, one.stride, s.own, reals, s.q, s.qd, t, 14, s.X, s.Xd, renew, own)
+        call_jacobian(one.loop, one, s.own, reals, s.q, s.qd, t, s.X, s.Xd, renew, own)
         _spread(s, one, 1.0, True)
     # tau' = G Q_p / 2 of all applied forces turns with the body
     for b in range(system.bodies.shape[0]):
@@ -189,7 +177,6 @@ def add_forces(system, w, s, t, renew, kept, Q):
 @kernel
 def add_constraints(system, w, s, t, lam):
     """K -= (H^T lam)_(r, pi'): the geometric stiffness of the reactions."""
-    most = s.lam.size
     for i in range(s.graph.constraints.shape[0]):
         one, size = s.graph.constraints[i], 0.0
         copy(lam[one.row : one.row + one.rows], s.lam)
@@ -200,10 +187,10 @@ def add_constraints(system, w, s, t, lam):
             continue
         _take_bodies(w, s, one)
         clear_matrix(s.rows)
-        reals, G1, G2 = system.reals[one.reals :], s.rows[most:], s.rows[2 * most :]
+        reals = system.reals[one.reals :]
         # Phi_q of the instance, then X = (Phi_q^T lam)_q
         call_kind(one.rows_loop, 1, one.stride, s.own, reals, s.q, s.qd, t, s.rows)
-        call_curvature(one.loop, 1, one.stride, s.own, reals, s.q, s.qd, s.zero, t, s.lam, s.X, G1, G2)
+        call_stiffness(one.loop, 1, one.stride, s.own, reals, s.q, t, s.lam, s.X)
         # R = Phi_q^T lam, whose torque turns with the body
         for c in range(14):
             s.R[c] = 0.0

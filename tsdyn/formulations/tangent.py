@@ -6,45 +6,24 @@ from ..elements.loops.constraint_rows import largest_coordinate, write_accelerat
 from ..errors import Status
 from ..jit.kernels import callback, kernel, long_kernel, vector
 from ..maths.dense_linalg import copy, is_finite
+from ..maths.tolerances import ROUNDING_AT_MOST
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-from ..rows.interface import (
-    DYNAMICS,
-    apply_multipliers,
-    evaluate_drift,
-    evaluate_residuals,
-    evaluate_rows,
-    factorise_selected_rows,
-    is_axis,
-    multiply_rates,
-    multiply_rows,
-    project,
-    redundant_rows_hold,
-    refinements,
-    solve_product,
-    solve_rows,
-)
+
+from ..rows.interface import (  # isort: skip
+    DYNAMICS, apply_multipliers, evaluate_drift, evaluate_residuals, evaluate_rows, factorise_selected_rows, is_axis,
+    multiply_rates, multiply_rows, project, redundant_rows_hold, refinements, solve_product, solve_rows,
+)  # fmt: skip
 from ..workspaces import load
 from .accelerations import call_friction, refine_accelerations, solve_accelerations
-from .chart_coordinates import (
-    displace,
-    factorise_normal,
-    turn_rates,
-    write_back,
-)
+
+from .chart_coordinates import (  # isort: skip
+    displace, factorise_normal, turn_rates, write_back,
+)  # fmt: skip
 from .chart_validity import every_level_holds, reason_to_leave, set_base_point
 from .projection import largest_residual, velocity_floor
-from .tolerances import (
-    CONTRACTION_LOST,
-    CURVATURE,
-    RENEWALS,
-    ROUNDING_AT_MOST,
-    SLOW,
-    SLOW_VELOCITIES,
-    STALLED,
-    SWEEPS,
-)
+from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, SLOW, SLOW_FACTORS, STALLED, SWEEPS
 
 # Error norm of the tangent form: errors of chart coordinates without their normal part, in terms of q and qd.
 
@@ -269,7 +248,7 @@ def solve_velocities(graph, system, w, f, l, t):
             w.counters.kept += 0 if factored else 1
             return True
         # S is too far from N
-        if not factored and worst > SLOW_VELOCITIES * before:
+        if not factored and worst > SLOW_FACTORS * before:
             if not factorise_normal(graph, w, f, l):
                 return False
             lower, upper, factored = l.lower, l.upper, True

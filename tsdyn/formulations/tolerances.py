@@ -1,9 +1,7 @@
 """Thresholds of the formulations: quantity, unit, and where each number comes from."""
 
-# --- rounding
-# |Phi| over the size of the numbers that enter Phi: below it a residual is rounding. A row is a sum of a dozen products
-# of these numbers, each rounded by 1.1e-16: 4e-16 as a random walk, 1.3e-15 at worst.
-ROUNDING = 1e-15
+# --- rounding: |Phi| below ROUNDING of the numbers that enter it, |Phi_q qd + Phi_t| below LAST_PLACE of |rd| + size
+# |omega'|, corrections of multipliers below LAST_PLACE of the largest (maths/tolerances.py).
 
 # m: size of a scene at least, where no constraint has one, for what counts as hardly moved.
 NO_SIZE = 0.01
@@ -12,36 +10,15 @@ NO_SIZE = 0.01
 # Correcting smaller ones would displace bodies by the rounding of Phi in every step, and change the energy.
 WALK = 0.5
 
-# |Phi_q qd + Phi_t| over |rd| + size |omega'|, in the same way: one unit in the last place, since few terms of a row
-# are large.
-SPEED_ROUNDING = 2e-16
-
-# Correction of the multipliers over the largest multiplier: below it the correction is one rounding.
-LOAD_ROUNDING = 2e-16
-
-# The same for normal loads of the null-space form, which are sums over the multipliers of a joint.
-BASIS_LOAD_ROUNDING = 4e-16
-
-# Residuals over the rounding of Phi: a residual that has stopped falling is rounding up to this, an error above it.
-# Two digits: rounding grows along closed loops and with the distance from the origin.
-ROUNDING_AT_MOST = 100.0
-
 # Residual of the rows over the largest acceleration, up to which one correction of accelerations leaves rounding; and
 # corrections at most. Masses that are unequal by 1e10 need two.
 EXACT, REFINEMENTS = 1e-11, 3
 
-# m and rad: a correction of positions above it has changed H by more than rounding, so S is factorised again. In scenes
-# of less than a metre it is in proportion to their size.
-LEAST_MOVE = 1e-15
-
-# |p.p - 1|: below it p is a unit quaternion to rounding, four squares of 1.1e-16 each and their sum.
-UNIT_ROUNDING = 1e-15
-
 # --- convergence of Newton's method, ratios of successive residuals or corrections
 SLOW = 0.25  # positions: above it the matrix of an older configuration is replaced; two sweeps gain a digit at it
 STALLED = 0.5  # projection, Eq. 28, velocities: above it nothing is gained but rounding; twice that diverges
-SLOW_VELOCITIES = 0.1  # velocities with the factors of S: above it N is factorised; below, a sweep gains a digit
-SLOW_LOADS = 0.1  # reactions with friction: the same for the matrix of the normal loads
+# velocities with the factors of S, reactions with friction: above it N or the matrix of the normal loads is factorised
+SLOW_FACTORS = 0.1  # below it a sweep gains a digit
 
 # Residual of Eq. 28, ||Phi_q U B - I||: above it B is factorised afresh. The iteration squares it and diverges from 1.
 B_OUTDATED = 0.5
@@ -60,7 +37,8 @@ NEWTON_DONE = 1e-10
 # Error norm that the solves for u and z may leave at each iterate of a stage: less than the iteration itself (KAPPA).
 LEFT = 1e-4
 
-# Contraction of corrections by factors of N of an older configuration: assumed in a new chart; least value trusted.
+# Contraction of corrections by factors of N of an older configuration, or ratio of residuals in the null-space form:
+# assumed in a new chart; least value trusted.
 LAG, LEAST_LAG = 0.1, 0.01
 
 # Distance in time of a stage from the last one, over that of the last two, up to which multipliers are extrapolated.
@@ -75,9 +53,6 @@ REACTION_SWEEPS, REACTIONS_LEFT = 8, 1e-7
 # links of usual size.
 CURVATURE = 1.0
 
-# The same for the null-space form, as a ratio.
-FIRST_RATE = 0.1
-
 # --- charts, dimensionless; docs/design-decisions.md, "Charts are small"
 CONTRACTION_LIMIT = 0.15  # relative loss of a pivot of N since q0
 TURN_LIMIT = 0.25  # |d|: the sine of half the rotation of a body since q0; 29 degrees
@@ -91,17 +66,3 @@ SAME = 1e-6
 # m: numbers up to it, and down to its reciprocal, are of usual size. Beyond it an orthonormal V mixes positions with
 # Euler parameters that are smaller by as much, and D^T M D loses twice as many digits.
 USUAL = 64.0
-
-# --- rank
-# Pivot of D^T M D over its diagonal entry: below it the reduced mass is singular. A hundred roundings.
-MASS_PIVOT = 1e-14
-
-# Smallest singular value of Phi_q over the largest, rows of length one: less is rounding. S, in the metric of the
-# masses, says what is independent: rows of points that are a nanometre apart differ by 1e-9.
-RANK_LIMIT = 1e-14
-
-# Smallest over largest squared singular value of the rows that hold an orientation: less doesn't hold a body; 1e-6 rad.
-HOLDING = 1e-12
-
-# Largest finite size: a sum above it is taken for an overflow.
-HUGE, TINY = 1e300, 1e-300

@@ -24,9 +24,9 @@ from ..forces.bushing import Bushing
 from ..forces.spring import Spring
 from ..forces.torsional_spring import TorsionalSpring
 from ..forces.viscous_friction import ViscousFriction
+from ..maths.tolerances import TYPED
 from .description import GROUND, fresh
 from .report import FrameOn
-from .tolerances import ORTHOGONAL, PARALLEL, TRIANGLE
 
 # Joints that mimic others: gear pairs, where the wheels are hinged to a common carrier on parallel axes.
 
@@ -62,7 +62,7 @@ def _reason(one, other, coupling):
         return "a gear pair needs two hinges"
     if one.a != other.a:
         return "a gear pair needs hinges on one body"
-    if np.linalg.norm(np.cross(one.axis, other.axis)) > PARALLEL:
+    if np.linalg.norm(np.cross(one.axis, other.axis)) > TYPED:
         return "a gear pair needs parallel axes"
     if not coupling.ratio:
         return "a gear pair needs a ratio"
@@ -150,7 +150,7 @@ def _slides(scene, joint, a, b, report):
             continue
         along = np.abs(A.T @ slide.axis)
         i = int(along.argmax())
-        if abs(along[i] - 1.0) > ORTHOGONAL or slide.load or min(slide.stiffness, slide.damping) < 0.0:
+        if abs(along[i] - 1.0) > TYPED or slide.load or min(slide.stiffness, slide.damping) < 0.0:
             report.leave("spring or load of a slide in a plane", slide.name)
             continue
         stiffness[i], damping[i] = slide.stiffness, slide.damping
@@ -212,7 +212,7 @@ def _add_body(scene, link, report):
         "orientation": Rotation.from_matrix(link.frame.R),
         "name": named,
     }
-    if values[2] <= (values[0] + values[1]) * (1.0 + TRIANGLE):
+    if values[2] <= (values[0] + values[1]) * (1.0 + TYPED):
         return scene.add_body(link.mass, link.inertia, **placed)
     report.note(
         f"{named}: no solid has the principal moments of inertia {', '.join(f'{x:.4g}' for x in values)} kg m^2, as "

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InvalidArgument, TsdynError
 from ..observables.diagnostics import constraint_error
 from . import mjcf, sdf, urdf
 from .building import build
 from .reduction import complete, gather, merge
 from .report import ImportReport
-from .tolerances import HUGE, NO_MASS, OPEN
+from .tolerances import HUGE, NO_MASS
 from .xml_file import OutsideFiles, read
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def _close(scene: Scene, report: ImportReport) -> None:
     q, qd = scene.start
     rest = np.zeros((1, q.size))
     gap = float(constraint_error(scene.packed, np.zeros(1), q[None], qd[None], rest).position[0])
-    if gap <= OPEN:
+    if gap <= INITIAL_TOL:
         return
     try:
         scene.assemble()

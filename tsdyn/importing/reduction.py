@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from ..maths.tolerances import HALF_DIGITS, TYPED
 from .description import GROUND, Slide
-from .tolerances import HALVINGS, NO_INERTIA, NO_MASS, ORTHOGONAL, PARALLEL, REACH, SHARE, SLIGHT, SOLID, TRIFLE
+from .tolerances import HALVINGS, NO_INERTIA, NO_MASS, REACH, SHARE, SLIGHT
 
 # Links that are fixed to each other become one body: the one nearest to the root, with the mass of all.
 #
@@ -191,7 +192,7 @@ def _endow(description, joints, link, usual):
 
 def _add_trifle(link, usual, report):
     """Give a link that no neighbour can share with as little as rounding allows; that is no longer exact."""
-    mass, inertia = max(link.mass, TRIFLE * usual), TRIFLE * usual * REACH**2
+    mass, inertia = max(link.mass, HALF_DIGITS * usual), HALF_DIGITS * usual * REACH**2
     link.mass, link.inertia = mass, link.inertia + inertia * np.eye(3)
     report.leave("link without mass or inertia, given a trifle", link.name, f"{mass:.2g} kg, {inertia:.2g} kg m^2")
 
@@ -251,7 +252,7 @@ def _largest(there, moved):
     Where `there` is that of no solid: as far as its mass and its principal moments remain positive.
     """
     values, vectors = np.linalg.eigh(there)
-    if values[0] > SOLID * values[-1]:
+    if values[0] > TYPED * values[-1]:
         root = vectors / np.sqrt(values)
         return 1.0 / float(np.linalg.eigvalsh(root.T @ moved @ root)[-1])
     x, least = there[3, 3] / moved[3, 3], _least_moment(there)
@@ -315,7 +316,7 @@ def _joins(first, second):
     if {first.kind, second.kind} - {"prismatic", "translations"} or first.loop or second.loop:
         return False
     axes = np.array([slide.axis for slide in (*_slides(first), *_slides(second))])
-    return len(axes) <= 3 and np.linalg.svd(axes, compute_uv=False)[-1] > PARALLEL
+    return len(axes) <= 3 and np.linalg.svd(axes, compute_uv=False)[-1] > TYPED
 
 
 def _slides(joint):
@@ -335,7 +336,7 @@ def _is_planar(first, second):
     """Whether a hinge is across two slides."""
     if first.kind != "translations" or len(first.slides) != 2 or second.kind != "revolute" or second.loop:
         return False
-    return abs(abs(first.normal() @ second.axis) - 1.0) < ORTHOGONAL
+    return abs(abs(first.normal() @ second.axis) - 1.0) < TYPED
 
 
 def _free(description, joints, joint, report):
@@ -350,7 +351,7 @@ def _free(description, joints, joint, report):
     axes = [one.axis for one in chain[1:] if one.kind == "revolute"]
     plain = not any(one.stiffness or one.damping or one.load for one in chain)
     plain = plain and not any(slide.stiffness or slide.damping or slide.load for slide in joint.slides)
-    if not plain or (axes and (len(axes) != 3 or abs(np.linalg.det(axes)) < PARALLEL)):
+    if not plain or (axes and (len(axes) != 3 or abs(np.linalg.det(axes)) < TYPED)):
         return
     for one in chain:
         report.note(f"{one.name}: the link {chain[-1].b} is free")

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from ..maths.tolerances import TYPED
 from .description import GROUND, HERE, Description, Frame, JointItem, Link, fresh, of_quaternion, roll_pitch_yaw
 from .drawn_shapes import add_sdf_shapes
-from .tolerances import ORTHOGONAL
 
 # Frames of an SDF model: links, joints, frames and inner models, each given in another one.
 
@@ -161,7 +161,7 @@ def _add(found, node, joint, frames, report):
         _dynamics(node.one(tag), joint, tag, report)
     if joint.kind == "screw":
         joint.lead = _lead(node)
-    if joint.kind == "universal" and abs(joint.axis @ joint.axis_b) > ORTHOGONAL:
+    if joint.kind == "universal" and abs(joint.axis @ joint.axis_b) > TYPED:
         _two_hinges(found, joint)
     else:
         found.joints.append(joint)

@@ -5,15 +5,8 @@ NO_INERTIA = 1e-15  # kg m^2, of the largest entry: a cube of steel with edges o
 HUGE = 1e50  # kg, kg m^2 or m: mass times length squared, and its square, are finite below
 SLIGHT = 1e-6  # of the median mass: links with less are given a share of their neighbours', or rounding would grow
 SHARE = 0.5  # of what a donor could give: both keep what is well-conditioned
-TRIANGLE = 1e-9  # relative excess of a principal moment over the sum of the others, above which it is noted
-OPEN = 1e-9  # of a loop's scaled residual, as `initial_tol` of simulate: above, the scene is assembled
-PARALLEL = 1e-9  # sine of the angle between axes
-ORTHOGONAL = 1e-9  # cosine of the angle between axes
-
-SOLID = 1e-9  # least eigenvalue of second moments per largest, below which a body is none with extent on all sides
 HALVINGS = 30  # of a share, until a body keeps half of its least moment of inertia
 REACH = 0.1  # m: of a rod on an axis of the ground, where its length changes nothing
-TRIFLE = 1e-7  # of the median mass: errors of the motion and of rounding, 1e-16 / TRIFLE, are about equal
 
 OBJECTS = 1 << 16  # elements of MJCF, copies included: half a gigabyte in MuJoCo's compiler and in the scene
 CELLS = 1 << 22  # of a height field: 16 MB

@@ -16,24 +16,15 @@ from numba import NumbaError, types
 from numba.extending import intrinsic
 
 from ..errors import InvalidConstraint
-from .arrays import (
-    ANY,
-    HAS_CYCLES,
-    complex_stack,
-    complex_stack2,
-    complex_vector,
-    cycles,
-    data_of,
-    integers,
-    matrix,
-    stack,
-    stack2,
+
+from .arrays import (  # isort: skip
+    ANY, HAS_CYCLES, complex_stack, complex_stack2, complex_vector, cycles, data_of, integers, matrix, stack, stack2,
     vector,
-)
+)  # fmt: skip
 from .code_hash import is_ours
 from .compiled import DEBUG, OPTIONS, Callback, Callee, callback, entry, letters, table
 from .compilers import current
-from .resident import Record, Seen, image_of, loader, records, resident, row_of
+from .resident import Record, Seen, image_of, loader, record_at, records, resident, row_of
 
 __all__ = [  # what is to be found here, too
     "ANY",
@@ -52,6 +43,7 @@ __all__ = [  # what is to be found here, too
     "integers",
     "loader",
     "matrix",
+    "record_at",
     "records",
     "resident",
     "row_of",
@@ -139,8 +131,8 @@ def specialised(template, name, owner, make=kernel, **constants):
 def caller(signature, result="i", linked=None):
     """Make the kernel that calls a `Callback` of this signature: call(address, *arguments).
 
-    Arrays, and what a loader gives, are passed as they are. Where an array isn't of floats, but of lanes or complex
-    numbers, the kernel `linked` is called with the same arguments.
+    Arrays, records, and what a loader gives, are passed as they are. Where an array isn't of floats, but of lanes or
+    complex numbers, the kernel `linked` is called with the same arguments.
     """
     if DEBUG:
         return lambda address, *arguments: table[address](*arguments)
@@ -149,7 +141,7 @@ def caller(signature, result="i", linked=None):
     @intrinsic
     def call(typing, address, *arguments):
         wanted = [
-            given if isinstance(given, (types.Array, Seen)) else letters[letter]
+            given if isinstance(given, (types.Array, types.Record, Seen)) else letters[letter]
             for letter, given in zip(signature, arguments, strict=True)
         ]
         own = None
@@ -165,6 +157,8 @@ def caller(signature, result="i", linked=None):
                 if isinstance(kind, types.Array):
                     data = context.make_array(kind)(context, builder, value=value).data
                     value = builder.ptrtoint(data, native["p"])  # something seen is its address
+                elif isinstance(kind, types.Record):
+                    value = builder.ptrtoint(value, native["p"])
                 words.append(value)
             # the one typed pointer: llvmlite reads the signature of a call by address from it
             target = ir.PointerType(ir.FunctionType(native[result], [native[c] for c in signature]))

@@ -33,13 +33,13 @@ known_types = {}  # dtype: Numba's type of a number, where Numba knows none of i
 _NUMBERS = {float: (ctypes.c_double, types.float64), int: (ctypes.c_int64, types.int64)}
 
 
-class _Layout(type(ctypes.Structure)):
+class _RecordType(type(ctypes.Structure)):
     def __init__(cls, *arguments):
         super().__init__(*arguments)
         cls._fields_ = [(name, _NUMBERS[kind][0]) for name, kind in getattr(cls, "__annotations__", {}).items()]
 
 
-class Record(ctypes.Structure, metaclass=_Layout):
+class Record(ctypes.Structure, metaclass=_RecordType):
     """Numbers with names, zero at first: floats and integers of 64 bits, as a subclass annotates them."""
 
     def clear(self):
@@ -165,6 +165,22 @@ def _type_of(value):
     if isinstance(value, np.ndarray):
         return _array_type(value.dtype, value.ndim)
     return _type_of_record(value, None)
+
+
+def record_at(layout):
+    """Make the kernel that gives sight of a `Record` of a layout by its address."""
+    if DEBUG:
+        return lambda value: value
+    kind = _type_of_record(layout(), None)
+
+    @intrinsic
+    def view(typing, address):
+        def generate(context, builder, signature, arguments):
+            return builder.inttoptr(arguments[0], context.get_value_type(kind))
+
+        return kind(types.int64), generate
+
+    return view
 
 
 def loader(example):

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from ..jit.interrupts import interruptible
-from .tolerances import LONG_LU, LONG_SOLVE, NO_LENGTH, RANK_TOL
+from .tolerances import LONG_LU, LONG_SOLVE, NEGLIGIBLE, RANK_TOL
 
 # Rank of dense rows by singular values; selection of independent rows by pivoted QR.
 
@@ -14,7 +14,7 @@ def row_lengths(A):
     """Return the lengths of the rows of A, dense or sparse; rounding counts as zero."""
     squares = (A * A).sum(axis=1) if isinstance(A, np.ndarray) else A.multiply(A).sum(axis=1)
     lengths = np.sqrt(np.asarray(squares).ravel())
-    return np.where(lengths > NO_LENGTH * lengths.max(initial=0.0), lengths, 0.0)
+    return np.where(lengths > NEGLIGIBLE * lengths.max(initial=0.0), lengths, 0.0)
 
 
 def unit_rows(A):

@@ -8,25 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from .tolerances import (
-    AT_ZERO,
-    CLEAR,
-    DEEPEST,
-    EPS,
-    EXTREME,
-    MOST_SCALED,
-    NEAR_ZERO,
-    NO_NOISE,
-    NOISE_RATIO,
-    REAL,
-    ROUGH_SHARE,
-    SAFE,
-    SHORTEST_INTERVAL,
-    TIGHT,
-    UNDERFLOWING,
-    UNRESOLVED,
-    WIDEST_NOISE,
-)
+from .tolerances import (  # isort: skip
+    AT_ZERO, CLEAR, DEEPEST, EPS, EXTREME, MOST_SCALED, NEAR_ZERO, NEGLIGIBLE, NOISE_RATIO, REAL, ROUGH_SHARE, SAFE,
+    SHORTEST_INTERVAL, TIGHT, UNDERFLOWING, UNRESOLVED, WIDEST_NOISE,
+)  # fmt: skip
 
 # Chebyshev interpolation on [-1, 1]; tables are made once for each degree.
 
@@ -211,7 +196,7 @@ class Search:
         while half < WIDEST_NOISE * (fit.b - fit.a):
             rough = table(8).coefficients[5:] @ self._values(t + half * table(8).nodes)
             found = min(found, 10.0 * float(np.abs(rough).max()))
-            if found <= NO_NOISE * fit.scale or half == least:
+            if found <= NEGLIGIBLE * fit.scale or half == least:
                 break
             half = max(NOISE_RATIO * half, least)
         return found if found < np.inf else 0.0

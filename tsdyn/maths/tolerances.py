@@ -1,15 +1,42 @@
-"""Limits of root isolation, rank and dense factors, without unit where none is given."""
+"""Levels of rounding that all packages share; limits of root isolation and rank. Without unit where none is given."""
 
 import numpy as np
 
 EPS = float(np.finfo(float).eps)
 
+# --- levels of rounding: shares of the terms of a sum, or of the largest number of its kind, up to which it is zero ---
+# One unit in the last place: of sums of few terms that are large.
+LAST_PLACE = 2e-16
+# Sums of a dozen products, each rounded by 1.1e-16: 4e-16 as a random walk, 1.3e-15 at worst. Such are |Phi|, four
+# squares of a quaternion, and displacements (m, rad) that have changed H by no more.
+ROUNDING = 1e-15
+# A hundred roundings: pivots of a matrix of unit rows or unit diagonal, its singular values, moments of inertia as
+# eigenvalues, sums of the loads of a body.
+SUM_ROUNDING = 1e-14
+# A thousand: pivots of products such as S = H W H^T, squares of the sine of an angle of 3e-7 rad; sums of hundreds of
+# terms and what is solved for with such pivots, as reactions.
+PIVOT_ROUNDING = 1e-13
+# Results of several such steps.
+NEGLIGIBLE = 1e-12
+# Numbers typed by hand, from tables or from files of other programs have nine digits: directions (sines and cosines of
+# angles), points (m), moments of inertia over the largest, data over the largest value.
+TYPED = 1e-9
+# Half of the digits: what is left of quotients of differences, of double eigenvalues, of states from runs.
+HALF_DIGITS = 1e-7
+# Residuals over their rounding: one that has stopped falling is rounding up to this, an error above it. Two digits,
+# since rounding grows along closed loops and with the distance from the origin.
+ROUNDING_AT_MOST = 100.0
+# No number that matters is so small: the least divisor, mass (kg) and moment of inertia, the largest that counts as
+# none.
+TINY = 1e-300
+# Complex steps: f(x + i h) / h cancels nothing and truncates h^2 f'''. So h is as small as it may be without products
+# of h, such as h^2 of a law's squares of small numbers, that reach the least number there is (5e-324) where they count.
+COMPLEX_STEP = 1e-40
+
 # --- rank of rows of unit length ---
 # Singular value, as a share of the largest, up to which it is zero. Formulations factor products of two matrices of
 # rows, so a share of 1e-7 is 1e-14 there, next to rounding.
 RANK_TOL = 1e-7
-# Length of a row, as a share of the longest, up to which the row is zero: rounding of its entries is 1e-16.
-NO_LENGTH = 1e-12
 # Jacobi rotations: cosine of the angle of two rows below which they are orthogonal, and below which all are converged
 # (the next sweep squares it).
 ORTHOGONAL, CONVERGED = 1e-15, 1e-10
@@ -30,9 +57,8 @@ CLEAR = 10.0
 # Share of the interval on which roughness is rounding; the least interval, in roundings of the time; the least share of
 # the whole.
 ROUGH_SHARE, SHORTEST_INTERVAL, DEEPEST = 1e-7, 1e4 * EPS, 2.0**-24
-# Noise is measured on intervals of the share ROUGH_SHARE, then this many times as long, up to the second share; less
-# than the third share of the scale is none.
-NOISE_RATIO, WIDEST_NOISE, NO_NOISE = 1e-3, 1e-3, 1e-12
+# Noise is measured on intervals of the share ROUGH_SHARE, then this many times as long, up to the second share.
+NOISE_RATIO, WIDEST_NOISE = 1e-3, 1e-3
 # Values are multiplied by a power of two: by SAFE, so that no sum of them is infinite; by one that makes the largest
 # about SAFE where it is below UNDERFLOWING then, since parts of it would vanish; its exponent is limited.
 SAFE, UNDERFLOWING, MOST_SCALED = 2.0**-16, 2.0**-500, 1000
@@ -41,7 +67,3 @@ EXTREME = 1e-9
 # Imaginary part, on the interval -1 to 1, up to which a root of a polynomial is real: double roots split by the root of
 # rounding.
 REAL = 1e-6
-
-# --- volumes ---
-# Volume of a mesh, as a share of the cube of its size, up to which the mesh is flat.
-FLAT = 1e-12

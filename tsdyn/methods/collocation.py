@@ -144,7 +144,7 @@ class CollocationTableau:
         return np.concatenate([[s + 1], np.ravel(rows), a[-1], self.error_weights(), [0.0], *map(np.ravel, parts)])
 
 
-class Parts(NamedTuple):
+class CollocationPlaces(NamedTuple):
     """Where numbers of a collocation method of s nodes begin: s s each, but s of `shifts`, (s + 1)^2 of `output`."""
 
     a: int  # A
@@ -157,11 +157,11 @@ class Parts(NamedTuple):
 
 @kernel
 def parts_of(tableau):
-    """The `Parts` of the numbers of a tableau."""
+    """The `CollocationPlaces` of the numbers of a tableau."""
     stages = int(tableau[0])
     s, at = stages - 1, 1 + stages * (2 + stages) + 2 * stages + 1
     m = s * s
-    return Parts(at, at + m, at + 2 * m, at + 2 * m + s, at + 3 * m + s, at + 4 * m + s)
+    return CollocationPlaces(at, at + m, at + 2 * m, at + 2 * m + s, at + 3 * m + s, at + 4 * m + s)
 
 
 # Motion inside a step of a collocation method: a polynomial x'' and its integrals.

@@ -5,37 +5,15 @@ import math
 from ..errors import Status
 from ..jit.kernels import ANY, callback, caller, kernel, stack, vector
 from ..maths.dense_linalg import copy
+from ..maths.tolerances import ROUNDING_AT_MOST
 from ..workspaces import load, load_run
 from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combine
-from .tolerances import (
-    AGEING,
-    APART,
-    APART_AT_LEAST,
-    APART_SLIPPING,
-    AT_FLOOR,
-    DIVERGING,
-    EAGER_LOST,
-    EAGER_SPARSE,
-    EAGER_STAGES,
-    FAR_STAGE,
-    FIXED_ITERATIONS,
-    FIXED_TOL,
-    FORGET,
-    GUESS,
-    ITERATIONS,
-    KAPPA,
-    KAPPA_SPARSE,
-    LEAST,
-    LEAST_FIXED,
-    MATRICES,
-    RESIDUAL_FLOOR,
-    SAME_G,
-    SAME_TIME,
-    SLIP_LEFT,
-    SLOW_DENSE,
-    SLOW_SPARSE,
-    WORSE_CONTRACTION,
-)
+
+from .tolerances import (  # isort: skip
+    AGEING, APART, APART_AT_LEAST, APART_SLIPPING, DIVERGING, EAGER_LOST, EAGER_SPARSE, EAGER_STAGES, FAR_STAGE,
+    FIXED_ITERATIONS, FORGET, GUESS, ITERATIONS, KAPPA, KAPPA_SPARSE, LEAST, LEAST_FIXED, LEAST_LEFT, MATRICES,
+    RESIDUAL_FLOOR, SAME_STEP, SAME_TIME, SLOW_DENSE, SLOW_SPARSE, WORSE_CONTRACTION,
+)  # fmt: skip
 
 # First guesses of the stages of a step, k_i = vdd, on the polynomial through stages that are known already.
 #
@@ -310,7 +288,7 @@ def _renew_if_needed(context, c, t, g, f):
     one.eager = 0
     off_chart = not sparse and numbers.chart != c.work.counters.charts
     poor = one.measured == 1 and one.theta > max(one.limit, numbers.slow)
-    stale = eager or off_chart or abs(g - numbers.g) > SAME_G * g
+    stale = eager or off_chart or abs(g - numbers.g) > SAME_STEP * g
     if not (stale or poor):
         return True
     if not stale:
@@ -356,7 +334,7 @@ def _is_solved(c, size, adaptive, is_last):
     """
     numbers, one, theta = c.linear.numbers, c.linear.iteration, c.linear.iteration.theta
     # Rounding
-    if size <= one.floor or (theta > DIVERGING and size <= AT_FLOOR * one.floor):
+    if size <= one.floor or (theta > DIVERGING and size <= ROUNDING_AT_MOST * one.floor):
         return True
     # What is left: the sum of the corrections to come, or what first corrections have left before
     left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
@@ -481,11 +459,11 @@ def prepare_implicit(linear, method, addresses, every_chart, slips):
     """
     numbers = linear.numbers
     numbers.every_chart = int(every_chart)
-    numbers.rtol, numbers.atol = (FIXED_TOL, FIXED_TOL) if method.step else method.step_tolerances()
+    numbers.rtol, numbers.atol = (LEAST_LEFT, LEAST_LEFT) if method.step else method.step_tolerances()
     numbers.slips = int(slips)
     numbers.kappa = KAPPA_SPARSE if every_chart and not method.step else KAPPA
     if slips:
-        numbers.kappa = min(numbers.kappa, SLIP_LEFT / (numbers.rtol + numbers.atol))
+        numbers.kappa = min(numbers.kappa, LEAST_LEFT / (numbers.rtol + numbers.atol))
     numbers.left, numbers.first, numbers.t_before = math.inf, 1.0, -math.inf
     for name, address in addresses.items():
         setattr(linear.kernels, name, address)

@@ -12,7 +12,7 @@ from ..workspaces import load_run
 #     accelerate(context, t, y, yd, xd)   set velocities; return yd and, for a first-order system, xd
 #
 # A step kernel, step(context, run, t, h), makes a step h from t. It reads x, y and their derivatives xd, yd at the
-# start of the step from the `Run`, and writes the increments dx, dy there, which the driver adds by compensated
+# start of the step from the `RunState`, and writes the increments dx, dy there, which the driver adds by compensated
 # summation. The memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then (x', y') of each stage.
 
 PLACE, ACCELERATE, STEP = "pdp", "pdppp", "ppdd"
@@ -188,7 +188,7 @@ def second_embedded_error(h, nx, ny, y, yd, tableau, memory, ex, ey):  # nine: a
 
 # Step kernels of plug-ins, written to the documented interface: docs/plug-ins.md.
 #
-# A plug-in's step kernel has its arrays as arguments, not the `Run`. `plug_in_step` is what the driver
+# A plug-in's step kernel has its arrays as arguments, not the `RunState`. `plug_in_step` is what the driver
 # calls in its place.
 
 PLUG_IN_STEP = "piiddiipppppppp"

@@ -1,10 +1,10 @@
 """Interpolants: one block of numbers a step, and the motion inside the step from that block.
 
-    fill(context, run)                    the data of the step that the `Run` has just made, in its block; Status
+    fill(context, run)                    the data of the step that the `RunState` has just made, in its block; Status
     value(s, h, n, nx, ny, data, x, y)    x and y at t + s h
 
-In the `Run`, x, y, yd, xd and now (q, qd, qdd) are those of the step's end, x_old, y_old, yd_old and before those of
-its start; start and length are in the block. A fill may evaluate the equations; the caller restores the workspace.
+In the `RunState`, x, y, yd, xd and now (q, qd, qdd) are those of the step's end, x_old, y_old, yd_old and before those
+of its start; start and length are in the block. A fill may evaluate the equations; the caller restores the workspace.
 """
 
 from collections.abc import Callable

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..calls import fitting_constructor
 from ..errors import InvalidArgument
+from ..maths.tolerances import SUM_ROUNDING
 from ..validation import floats, shown
-from .tolerances import ORDER_CONDITION
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,7 +60,7 @@ def _lower(values, stages, what):
 def demand(what, size=1.0, **conditions):
     """Refuse what fails by more than rounding of coefficients of that size."""
     for name, value in conditions.items():
-        if not np.abs(value).max() <= ORDER_CONDITION * size:
+        if not np.abs(value).max() <= SUM_ROUNDING * size:
             raise InvalidArgument(f"{what}: the condition {name} fails by {np.abs(value).max():.3g}.")
 
 

@@ -3,10 +3,6 @@
 Sizes of corrections are error norms: 1 is the step's tolerance. Contraction is the ratio of two such sizes in a row.
 """
 
-# Residual of an order condition of a tableau, relative to the size of its terms: rounding of coefficients that are
-# written as quotients of integers.
-ORDER_CONDITION = 1e-14
-
 # Corrections of a stage at most: as many as KAPPA takes at a contraction of 0.7, and some after a new matrix. With
 # fixed steps, which can't be shortened, as many as rounding takes at a contraction of 0.4.
 ITERATIONS, FIXED_ITERATIONS = 20, 40
@@ -17,9 +13,11 @@ ITERATIONS, FIXED_ITERATIONS = 20, 40
 # hundredth shows in the number of steps at the loosest tolerances.
 KAPPA, KAPPA_SPARSE = 1e-3, 3e-3
 
-# m/s: what it may leave of a velocity where there is friction. At rest friction balances the loads at some velocity
-# below the slip velocity, 1e-11 m/s at least: the error then changes the friction by a hundredth of it.
-SLIP_LEFT = 1e-13
+# The least that it may leave. m/s, of a velocity where there is friction: at rest friction balances the loads at some
+# velocity below the slip velocity, 1e-11 m/s at least, so the error changes the friction by a hundredth of it. And rtol
+# and atol with a fixed step, where no tolerance sets the step: what is left of the stages of thousands of steps adds
+# up, to 1e-10 of a driven pendulum at 1e-12, while a matrix serves across charts.
+LEAST_LEFT = 1e-13
 
 # Contraction above which the iteration matrix is rebuilt: up to it three corrections reach KAPPA
 # (docs/design-decisions.md, one Jacobian for many steps; benchmarks/stiff.py counts matrices).
@@ -36,7 +34,7 @@ GUESS, LEAST, LEAST_FIXED = 0.3, 1e-6, 0.02
 FORGET, AGEING = 0.1, 1.3
 
 # Stages that a prediction interpolates: least distance in time, over the longer of the two steps; distance of two equal
-# times, over the step.
+# times, over the step or the sampling period, computed in two ways.
 APART_AT_LEAST, SAME_TIME = 0.1, 1e-9
 
 # Contraction above which an iteration counts as diverging.
@@ -55,24 +53,19 @@ WORSE_CONTRACTION = 2.0
 # one stage, but one step where iterations diverged: matrices of overdamped springs that turn serve one stage only.
 EAGER_STAGES, EAGER_SPARSE, EAGER_LOST = 30, 1, 6
 
-# Relative change of g = h a_ii up to which the factors of P are tried again. A damped stiff mode contracts by
+# Relative change of g = h a_ii, or of h, up to which the factors of P are tried again. A damped stiff mode contracts by
 # |1 - g / g_P|, so the first correction of a stage is nearly always good enough: chains take half the iterations that
 # they take with 0.3, with 0.1 or 0.005 10 or 2 % more. With 0.3 the null-space form takes a sixth more steps, too: the
 # error estimate is filtered by the same factors.
-SAME_G = 0.02
+SAME_STEP = 0.02
 
 # Correction, relative to 1 + size, that is rounding of v and vd: 18 units in the last place of f evaluated by a
-# factorised matrix. Residuals within AT_FLOOR of it that no longer contract are rounding, too.
+# factorised matrix. Residuals within ROUNDING_AT_MOST of it that no longer contract are rounding, too.
 RESIDUAL_FLOOR = 4e-15
-AT_FLOOR = 100.0
 
 # Distance of a stage's positions from their prediction, relative to 1 + size: a solution further away may be another
 # one of the nonlinear equations.
 FAR_STAGE = 0.1
-
-# rtol and atol of the iteration with a fixed step, where no tolerance sets the step. What is left of the stages of
-# thousands of steps adds up: to 1e-10 of a driven pendulum at 1e-12, while a matrix serves across charts.
-FIXED_TOL = 1e-13
 
 # --- collocation methods: all stages at once (collocation_step.py) ---
 # Corrections at most; error norm that the iteration may leave; contraction from which the next step has new matrices,
@@ -81,6 +74,3 @@ COUPLED_ITERATIONS, KAPPA_COUPLED, SLOW_COUPLED, TRUSTED = 12, 3e-3, 0.1, 0.3
 
 # Corrections that no longer contract, relative to 1 + size: below it they are rounding of large forces.
 STALLED_CORRECTION = 2e-12
-
-# Relative change of the step up to which matrices are kept.
-SAME_STEP = 0.02

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..elements.element import address, checked_parameters
 from ..elements.force import Force
-from ..elements.loops.constraint_hessians import SIGNATURE as CURVATURE_SIGNATURE
+from ..elements.loops.constraint_hessians import SLOPES, STIFFNESS
 from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE, call_kind
 from ..elements.loops.forces import FORCE_INTS
 from ..elements.loops.forces import JACOBIAN as FORCE_JACOBIAN_SIGNATURE
@@ -19,8 +19,7 @@ from ..motions.program import HOLD, call_smooth
 from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
 
-call_curvature = caller(CURVATURE_SIGNATURE)
-
+call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
 call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
 
 
@@ -103,7 +102,8 @@ def constraint_curvature(s, q, qd, qdd, t, lam, K, G1, G2):
     for i in range(s.kinds.shape[0]):
         kind = s.kinds[i]
         table, reals = s.table[kind.table :], s.reals[kind.reals :]
-        call_curvature(kind.curvature, kind.count, kind.stride, table, reals, q, qd, qdd, t, lam, K, G1, G2)
+        call_stiffness(kind.stiffness, kind.count, kind.stride, table, reals, q, t, lam, K)
+        call_slopes(kind.slopes, kind.count, kind.stride, table, reals, q, qd, qdd, t, G1, G2)
 
 
 @kernel
@@ -134,7 +134,7 @@ def force_jacobian(s, q, qd, t, Q_q, Q_qd, renew, kept):
     for i in range(s.forces.shape[0]):
         kind = s.forces[i]
         table, reals, own = s.table[kind.table :], s.reals[kind.reals :], kept[kind.kept :]
-        call_jacobian(kind.jacobian, kind.count, kind.stride, table, reals, q, qd, t, q.size, Q_q, Q_qd, renew, own)
+        call_jacobian(kind.jacobian, kind, table, reals, q, qd, t, Q_q, Q_qd, renew, own)
 
 
 @kernel

@@ -9,10 +9,10 @@ import numpy as np
 from ..elements.bodies import PointMass, named
 from ..elements.element import Attachment, angles, displacements
 from ..elements.force import Force
-from ..elements.tolerances import SAME_COORDINATE
 from ..errors import InvalidBody, InvalidConstraint
 from ..jit.kernels import twin
 from ..maths import vectors
+from ..maths.tolerances import TYPED
 from . import joint_turns
 
 # Values, rates and accelerations of joint coordinates on a motion (q, qd, qdd), in plain Python.
@@ -134,7 +134,7 @@ def displacement(geometry, own, other, level):
 _lock = threading.Lock()  # of aliases, which scenes of a family share
 
 
-class Row(NamedTuple):
+class HandleCoordinates(NamedTuple):
     """The joint coordinates of one constraint or force."""
 
     item: object
@@ -146,8 +146,8 @@ class Row(NamedTuple):
 class DrivenCoordinate(NamedTuple):
     """A coordinate of a joint that a motor prescribes."""
 
-    motor: Row
-    joint: Row
+    motor: HandleCoordinates
+    joint: HandleCoordinates
     geometry: object  # of the joint
     place: int  # of an angle among all; -1 for a displacement
 
@@ -181,7 +181,7 @@ class Handles:
         rows, joints, frames = [], [], []
         for item in self.items:
             if item.joint_coordinates:
-                rows.append(Row(item, tuple(angles(item)), tuple(displacements(item)), len(joints)))
+                rows.append(HandleCoordinates(item, tuple(angles(item)), tuple(displacements(item)), len(joints)))
                 for angle in rows[-1].angles:
                     joints.append([*self.where(angle.own), *self.where(angle.other)])
                     frames.append([*angle.f, *angle.g, *angle.h])
@@ -241,7 +241,7 @@ class Handles:
             return list(self._aliases.items())
 
     def row(self, joint, kind):
-        """The `Row` of a joint that has some of a kind of coordinates: "angle" or "displacement"."""
+        """The `HandleCoordinates` of a joint that has some of a kind of coordinates: "angle" or "displacement"."""
         if self._by_item is None:
             self._by_item = {id(row.item): row for row in self.rows}
         joint = self.item(joint)
@@ -280,7 +280,7 @@ def _driven(motor, joint):
     (own,) = getattr(motor, kind)
     for i, geometry in enumerate(getattr(joint, kind)):
         same = geometry[:2] == own[:2]
-        if same and np.allclose(geometry[2:], own[2:], rtol=SAME_COORDINATE, atol=SAME_COORDINATE):
+        if same and np.allclose(geometry[2:], own[2:], rtol=TYPED, atol=TYPED):
             yield DrivenCoordinate(motor, joint, geometry, joint.first + i if kind == "angles" else -1)
 
 

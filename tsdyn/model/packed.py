@@ -31,7 +31,8 @@ class ConstraintKind(Record):
     gamma: int
     phi_t: int
     remember: int
-    curvature: int  # address of constraint_hessians.loop; implicit methods load it
+    stiffness: int  # addresses of the loops of constraint_hessians.py; implicit methods load them
+    slopes: int
     count: int  # instances
     stride: int  # reals of each
     table: int  # where the entries of the first begin in System.table
@@ -41,11 +42,12 @@ class ConstraintKind(Record):
 class ForceKind(Record):
     """All instances of one kind of force; user functions have kinds of their own."""
 
+    count: int  # these three are a `ForceExtent`
+    stride: int
+    columns: int  # of Q_q; set with the address of the loop
     force: int  # addresses of the loops of forces.py
     jacobian: int  # implicit methods load it
     remember: int
-    count: int
-    stride: int
     table: int
     reals: int
     kept: int  # where its derivatives begin among those that implicit methods keep
@@ -134,12 +136,12 @@ def _of(redundant, turning, handles):
 
 # Lengths of a scene: in a small one positions are held to rounding of these, not of the pure numbers beside them.
 
-SMALL = 1e-3  # m: a scene without longer lengths; rounding of one is 1e-12 of it
+POINT_SIZE = 1e-3  # m: a scene without longer lengths, or whose points coincide; rounding of one is 1e-12 of it
 
 
 def is_small(size):
     """Return True for the size of a scene in which pure numbers, such as the coordinates of axes, are no lengths."""
-    return 0.0 < size < SMALL
+    return 0.0 < size < POINT_SIZE
 
 
 def has_lengths(primitive):
@@ -224,12 +226,12 @@ def pack_forces(forces, where, table, reals):
                     f"{force.name}: parameters() must return as many values as for every other {type(force).__name__}."
                 )
             stride = size
-            alone = records(ForceKind, [[force_address, 0, remember, 1, stride, *begin, 0]])
+            alone = records(ForceKind, [[1, stride, 0, force_address, 0, remember, *begin, 0]])
             slot = len(memory) - 1 if force.memory else -1
             normal = len(normals) - 1 if "normal_load" in kernels else -1
             loads[id(force)] = Load(force, parameters, force.coordinates, alone, slot, normal, ())
             expanded[id(force)] = [motion for value in parameters for motion in _series(value)]
-        rows.append([force_address, 0, remember, len(members), stride, *first, 0])
+        rows.append([len(members), stride, 0, force_address, 0, remember, *first, 0])
     begins = {id(None): -1}
     for motion in (*(motion for _, motion in programs), *(motion for each in expanded.values() for motion in each)):
         if id(motion) not in begins:  # one program for all that are given the same
@@ -253,12 +255,15 @@ def _series(value):
         return (None,) * value.width
 
 
-def with_force_jacobians(packed):
-    """The system of a packed scene with the forces' Jacobian loops, which are loaded now; and the floats they keep."""
-    rows, total = packed.system.forces.copy(), 0
+def with_force_jacobians(packed, n=0):
+    """The system of a packed scene with the forces' Jacobian loops, which are loaded now; and the floats they keep.
+
+    Their matrices have n columns, by default as many as q.
+    """
+    rows, total, n = packed.system.forces.copy(), 0, n or int(packed.system.bodies[:, 1].sum())
     for row in rows:
         force = members_of(row, packed.loads)[0].force
-        row.jacobian, row.kept = _force_address(force, "jacobian"), total
+        row.jacobian, row.kept, row.columns = _force_address(force, "jacobian"), total, n
         total += row.count * kept_size(force.markers)
     return packed.system._replace(forces=rows), int(total)
 
@@ -422,7 +427,7 @@ def _found_again(process, *parts):
     for row, kind in zip(system.kinds, kinds, strict=True):
         for name in ("phi", "jacobian", "gamma", "phi_t", "remember"):
             row[name] = _address(kind, name) if row[name] else 0
-        row["curvature"] = 0
+        row["stiffness"] = row["slopes"] = 0
     values = [
         value
         for kind in kinds
@@ -597,10 +602,16 @@ def user_functions(packed):
             yield load.force, (load.force.function_of_state,)
 
 
-def with_curvatures(packed):
+def second_derivatives(basis_free):
+    """What implicit methods load of constraint_hessians.py, by its names in `ConstraintKind`."""
+    return ("stiffness",) if basis_free else ("stiffness", "slopes")
+
+
+def with_curvatures(packed, basis_free=False):
     """The system with the kernels of second derivatives, which only implicit methods load."""
     kinds = packed.system.kinds.copy()
-    kinds["curvature"] = [_address(kind, "curvature") for kind in classes(packed)]
+    for name in second_derivatives(basis_free):
+        kinds[name] = [_address(kind, name) for kind in classes(packed)]
     return packed.system._replace(kinds=kinds)
 
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from ..errors import InvalidConstraint
 from ..jit.kernels import entry, kernel
-from .tolerances import CLEAR_CHANGE, JUMP, LEAST_SPAN, NO_CHANGE, OF_STEP, RATE_ROUNDING, SAMPLES, STRIDES, TOGETHER
+from ..maths.tolerances import NEGLIGIBLE, TYPED
+from .tolerances import CLEAR_CHANGE, LEAST_SPAN, NO_CHANGE, SAMPLES, STRIDES, TOGETHER
 
 # Knots of piecewise motions and loads: stops of a run, and jumps that no run may cross.
 
@@ -39,10 +40,10 @@ def demand_followed(motion, t0, t1, what):
     sides = motion.sides(times)
     largest = np.abs(sides).max(axis=(0, 2))
     piece = np.diff(np.concatenate(([t0], times, [t1])))
-    noise = RATE_ROUNDING * largest[0] / np.minimum(piece[1:], piece[:-1])
+    noise = NEGLIGIBLE * largest[0] / np.minimum(piece[1:], piece[:-1])
     jumps = np.abs(sides[1] - sides[0])
     for level, name, allowed in ((0, "value", 0.0), (1, "rate", noise)):
-        excess = jumps[level] - (JUMP * largest[level] + allowed)
+        excess = jumps[level] - (TYPED * largest[level] + allowed)
         i = int(np.argmax(excess))
         if not excess[i] <= 0.0:
             raise InvalidConstraint(
@@ -135,7 +136,7 @@ def changes(t, functions):
 
 def within_step(t, h):
     """The times within a step at which `is_noise` is asked."""
-    return np.linspace(t, t + h, OF_STEP + 1)
+    return np.linspace(t, t + h, STRIDES[-1] + 1)
 
 
 def is_noise(samples):

@@ -19,7 +19,7 @@ from .knots import demand_covered, demand_followed
 from .program import run_program
 from .signals import demand_time_alone
 from .tables import Table, is_data
-from .tolerances import QUOTIENT_ERROR, QUOTIENT_NOISE, QUOTIENT_STEPS, SAME_VALUE, TIMES
+from .tolerances import QUOTIENT_ERROR, QUOTIENT_STEPS, SAME_VALUE, TIMES
 from .tracing import Untraceable, of_time, retold
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ class Motion:
                 near = [self._at(i, times + k * h) for k in (-2, -1, 1, 2)]
                 with np.errstate(invalid="ignore"):
                     quotient = (near[0] - 8.0 * near[1] + 8.0 * near[2] - near[3]) / (12.0 * h)
-                    off = np.fmin(off, np.abs(quotient - given) - QUOTIENT_NOISE * np.abs(values) / h)
+                    off = np.fmin(off, np.abs(quotient - given) - SAME_VALUE * np.abs(values) / h)
             if not (np.isfinite(given).all() and np.isfinite(values).all()):
                 continue  # the run ends there with a message
             if (off > QUOTIENT_ERROR * (np.abs(given).max() + np.abs(values).max())).sum() > times.size // 2:

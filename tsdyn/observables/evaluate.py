@@ -13,14 +13,14 @@ from ..formulations.dependent_rows import dependent_rows
 from ..jit.interrupts import CollectionsDeferred
 from ..jit.kernels import twin
 from ..maths.matrix_rank import dependent, farthest_first, sparse_lu
-from ..maths.tolerances import RANK_TOL
+from ..maths.tolerances import COMPLEX_STEP, PIVOT_ROUNDING, RANK_TOL, ROUNDING, SUM_ROUNDING, TINY
 from ..model.equations import WIDTH, as_csr, evaluate_constraints, with_short_rows
 from ..rows.constraint_graph import coordinate_scales
 from ..validation import finite_vector, number
 from .diagnostics import starts_of
 from .generalised_forces import applied_loads, force_loads, velocity_forces
 from .power import marker_states
-from .tolerances import BALANCED, COMPLEX_STEP, INDEPENDENT, LARGE, LEAST_DIVISOR, LOST, LOST_DENSE, REDUNDANT_SHARES
+from .tolerances import INDEPENDENT, LARGE, REDUNDANT_SHARES
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Floats, Matrix, Scene
@@ -56,7 +56,7 @@ def balance(packed, t, q, qd, Phi_q, solve):
         except np.linalg.LinAlgError as error:
             raise SingularConfiguration(JAMMED) from error
         N = N + step
-        if not np.abs(step).max() > BALANCED * np.abs(N).max():
+        if not np.abs(step).max() > ROUNDING * np.abs(N).max():
             return N @ np.array(units), first + N @ parts
     raise SingularConfiguration(JAMMED)
 
@@ -293,12 +293,12 @@ def _independent(rows, solve, still):
         count *= 4
 
 
-def _sparse_solver(M, Phi_q, lost=LOST):
+def _sparse_solver(M, Phi_q, lost=PIVOT_ROUNDING):
     """Return the solver (load, gamma) -> (qdd, lam) by a sparse factorisation; None if it is numerically singular."""
     from scipy.sparse import block_array, diags_array
 
     kkt = block_array([[M, Phi_q.T], [Phi_q, None]], format="csc")
-    scale = 1.0 / np.sqrt(np.maximum(abs(kkt).max(axis=1).toarray().ravel(), LEAST_DIVISOR))
+    scale = 1.0 / np.sqrt(np.maximum(abs(kkt).max(axis=1).toarray().ravel(), TINY))
     weights = diags_array(scale)
     try:
         factors = sparse_lu((weights @ kkt @ weights).tocsc())
@@ -312,9 +312,9 @@ def _sparse_solver(M, Phi_q, lost=LOST):
 
 def equilibrated_solve(A, b):
     """Solve a symmetric system scaled to unit rows; LinAlgError if it is numerically singular."""
-    scale = 1.0 / np.sqrt(np.maximum(np.abs(A).max(axis=1), LEAST_DIVISOR))
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(A).max(axis=1), TINY))
     scaled = A * scale[:, None] * scale
-    if A.size and np.linalg.cond(scaled) > 1.0 / LOST_DENSE:
+    if A.size and np.linalg.cond(scaled) > 1.0 / SUM_ROUNDING:
         raise np.linalg.LinAlgError
     return np.linalg.solve(scaled, b * scale) * scale
 

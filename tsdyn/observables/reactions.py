@@ -18,27 +18,20 @@ from ..errors import InvalidBody, InvalidConstraint, RedundantConstraints
 from ..formulations.accelerations import find_reactions, normal_load
 from ..jit.kernels import entry, kernel, long_kernel, resident, stack
 from ..maths.dense_linalg import copy
+from ..maths.tolerances import RANK_TOL, TINY
 from ..model.equations import WIDTH, constraint_jacobian, set_time, with_short_rows
 from ..model.handles import handles_of
 from ..model.packed import classes, index_of, member_of
 from ..rows.constraint_graph import REDUCED
 from ..rows.graph_builder import graph_of
-from ..rows.interface import (
-    METRIC,
-    Rows,
-    balance_loads,
-    count_self_stresses,
-    evaluate_every_row,
-    evaluate_rows,
-    factorise_rows,
-    mark_redundant,
-    redundancy,
-    self_stress,
-    weigh_bodies,
-)
+
+from ..rows.interface import (  # isort: skip
+    METRIC, Rows, balance_loads, count_self_stresses, evaluate_every_row, evaluate_rows, factorise_rows, mark_redundant,
+    redundancy, self_stress, weigh_bodies,
+)  # fmt: skip
 from ..workspaces import arrays_of, load_parts, parts
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
-from .tolerances import KEPT_FLOATS, LEAST_DIVISOR, NO_STRESS
+from .tolerances import KEPT_FLOATS
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Floats, Handles, ItemLike
@@ -329,7 +322,7 @@ def free_loads(context, t, q, rows, sides, whole, out):
                     load += f.b[rows[i]] * h
                 f.Z[c] = load
             for c in range(8):
-                out[k] = max(out[k], abs(f.Z[c]) / max(largest * size, LEAST_DIVISOR))
+                out[k] = max(out[k], abs(f.Z[c]) / max(largest * size, TINY))
 
 
 def unique(solution, rows, body):
@@ -343,7 +336,7 @@ def unique(solution, rows, body):
     context, *_keep = resident(parts(system, graph, solution.q.shape[1]))
     out = np.zeros(solution.t.size)
     free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(graph.row)), out)
-    return out < NO_STRESS
+    return out < RANK_TOL
 
 
 # Refusal of joint friction that depends on a reaction which redundant constraints leave undetermined.
@@ -382,7 +375,7 @@ def demand_unique(packed, q, t):
     context, *_keep = resident(parts(system, graph, q.size))
     free = np.zeros(len(graph.frictions))
     _free_loads(context, t, q, np.zeros(16 * len(graph.row)), free)
-    wrong = [load.force for load in packed.loads if load.normal >= 0 and free[load.normal] > NO_STRESS]
+    wrong = [load.force for load in packed.loads if load.normal >= 0 and free[load.normal] > RANK_TOL]
     if wrong:
         names = ", ".join(force.name for force in wrong)
         joints = ", ".join(force.joint.name for force in wrong)

@@ -17,23 +17,11 @@ from ..integrators import SDIRK54, Taylor
 from ..simulation.scene_cache import prepared
 from ..taylor.layout import lacking, without_series
 from .phases import duration
-from .tolerances import (
-    ALTERNATIVE,
-    CAPPED,
-    CHARTS,
-    ERRORS,
-    FORCE,
-    LARGEST_GAP,
-    LONGEST,
-    LOOSER,
-    LOOSEST,
-    ONCE,
-    OUTPUTS,
-    PYTHON,
-    QUICKER,
-    REJECTED,
-    SHORT,
-)
+
+from .tolerances import (  # isort: skip
+    ALTERNATIVE, CAPPED, CHARTS, ERRORS, FORCE, LARGEST_GAP, LONGEST, LOOSER, LOOSEST, ONCE, OUTPUTS, PYTHON, QUICKER,
+    REJECTED, SHORT,
+)  # fmt: skip
 
 SHOWN = 3
 

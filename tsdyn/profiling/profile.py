@@ -197,7 +197,7 @@ def _once(scene, method, options, state, start):
     else:
         form = options.form.serving(method)
         form.graph(kept.packed)
-        kept.system(method.implicit)
+        kept.system(method.implicit, form.basis_free)
     seconds["order of elimination"] = clock() - began
     given = scene.start if state is None else state_arrays(state, kept.n)
     began = clock()

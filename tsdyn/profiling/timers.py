@@ -12,19 +12,10 @@ from ..elements.loops.constraint_series import SIGNATURE as SERIES
 from ..elements.loops.constraint_series import call_series
 from ..elements.loops.coordinate_rows import SIGNATURE as LOOP
 from ..elements.loops.coordinate_rows import call_kind
-from ..jit.kernels import (
-    ANY,
-    HAS_CYCLES,
-    Callback,
-    caller,
-    cycles,
-    data_of,
-    entry,
-    integers,
-    kernel,
-    specialised,
-    vector,
-)
+
+from ..jit.kernels import (  # isort: skip
+    ANY, HAS_CYCLES, Callback, caller, cycles, data_of, entry, integers, kernel, specialised, vector,
+)  # fmt: skip
 from ..methods.collocation_step import call_balance, call_factorise, call_solve
 from ..methods.diagonally_implicit import call_correct, call_reduce, call_residual, call_soften
 from ..methods.explicit import ACCELERATE as ACCELERATE_SIGNATURE
@@ -275,13 +266,11 @@ def _body_loop(count, stride, table, reals, poses, unused, t, out, H):
     return status
 
 
-def _series(mode, k, orders, count, stride, size, table, reals, bodies, values, b, Z):
+def _series(mode, k, kind, table, reals, bodies, values, b, Z):
     header = integers(table - 8 * HEADER, HEADER)
     notes = integers(header[T_NOTES], ANY)
     _enter(notes, header[T_SLOT] + (IN_ORDERS + mode) * ROLES, ROWS)
-    status = call_series(
-        header[T_LOOPS + IN_ORDERS], mode, k, orders, count, stride, size, table, reals, bodies, values, b, Z
-    )  # fmt: skip
+    status = call_series(header[T_LOOPS + IN_ORDERS], mode, k, kind, table, reals, bodies, values, b, Z)
     _leave(notes)
     return status
 

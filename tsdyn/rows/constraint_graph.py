@@ -8,7 +8,7 @@ from ..jit.kernels import Record, records
 from ..model.packed import FrictionPlace
 from .massless_axes import AXIS_OWN, MasslessAxes, levers, no_axes
 from .symbolic import Pattern, analyse
-from .tolerances import LEAST_ARM, UNEQUAL_MASSES
+from .tolerances import LEAST_SHARE, UNEQUAL_MASSES
 
 # The constraint graph of a scene for the basis-free forms: rows, bodies, and the addresses of their products.
 #
@@ -112,7 +112,7 @@ def arms(packed):
     """L of each body, (bodies,), m: no less than a share of the longest; one in a scene without arms."""
     found = levers(packed)
     longest = found.max(initial=0.0)
-    return np.maximum(found, LEAST_ARM * longest) if longest > 0.0 else np.ones(found.size)
+    return np.maximum(found, LEAST_SHARE * longest) if longest > 0.0 else np.ones(found.size)
 
 
 def coordinate_scales(packed):

@@ -9,19 +9,10 @@ from ..elements.loops.constraint_rows import BODY, INTS, MASK, ROW, STILL
 from ..errors import InvalidConstraint
 from ..jit.kernels import records, row_of
 from ..model.packed import frictions_of, has_lengths, is_small
-from .constraint_graph import (
-    DRIFT,
-    ROWS,
-    ROWS_WELD,
-    W_MASS,
-    WEIGHTS,
-    WELD_ROWS,
-    WELDS,
-    ConstraintGraph,
-    PartProduct,
-    Product,
-    RowKind,
-)
+
+from .constraint_graph import (  # isort: skip
+    DRIFT, ROWS, ROWS_WELD, W_MASS, WEIGHTS, WELD_ROWS, WELDS, ConstraintGraph, PartProduct, Product, RowKind,
+)  # fmt: skip
 from .elimination import with_kernels
 from .massless_axes import Share, axes_of, inverses, lean_bodies
 from .symbolic import analyse
@@ -157,11 +148,11 @@ def build(packed, still=None):
     # Axis rows depend on inertias, so a scene that has any is not shared
     shared = packed.derived.shared
     if shared is None or lean_bodies(packed):
-        return _Builder(packed, still).graph()
+        return _GraphBuilder(packed, still).graph()
     place = None if still is None else (still.bodies.tobytes(), still.omitted)
     key = build, packed.derived.redundant is None, is_small(packed.size), place
     if key not in shared:
-        shared[key] = _Builder(packed, still).graph()
+        shared[key] = _GraphBuilder(packed, still).graph()
     graph, used = shared[key]
     inverse, mass, spins = weights(packed.system, graph.bodies, {})
     dropped = dropped_rows(packed, still, graph.row)
@@ -169,7 +160,7 @@ def build(packed, still=None):
     return graph._replace(**own), used
 
 
-class _Builder:
+class _GraphBuilder:
     """What the steps hand on to each other."""
 
     def __init__(self, packed, still):

@@ -20,7 +20,8 @@ import numpy as np
 
 from ..elements.markers import POINT
 from ..jit.kernels import Record, records
-from .tolerances import GIVEN, MASSLESS, NONE, RAISED, THIN
+from ..maths.tolerances import SUM_ROUNDING
+from .tolerances import MASSLESS, ONE_DIGIT, RAISED, THIN
 
 
 class Axis(Record):
@@ -68,14 +69,14 @@ def lean_bodies(packed):
     whole = np.maximum(size[:, 2], system.mass[rigid] * levers(packed)[rigid] ** 2)
     most, found = whole.max(initial=0.0), {}
     # Bodies far lighter than others matter only where they carry these
-    light = np.where(size[:, 0] < THIN * whole, GIVEN * whole, size[:, 0]) < MASSLESS * most
+    light = np.where(size[:, 0] < THIN * whole, ONE_DIGIT * whole, size[:, 0]) < MASSLESS * most
     carries = np.isin(rigid, _carriers(packed, set(rigid[light].tolist()))) if light.any() else light
     least = np.where(carries, RAISED * most, THIN * whole)
-    given = np.where(carries, np.sqrt(whole * most), GIVEN * whole)
+    given = np.where(carries, np.sqrt(whole * most), ONE_DIGIT * whole)
     # Axes below their limit; what is rounding of zero counts as zero
     for i in np.flatnonzero(size[:, 0] < least):
         few = size[i] < least[i]
-        true = np.where(size[i, few] > NONE * size[i, 2], size[i, few], 0.0)
+        true = np.where(size[i, few] > SUM_ROUNDING * size[i, 2], size[i, few], 0.0)
         found[int(rigid[i])] = Lean(axes[i].T[few], true, given[i])
     return found
 

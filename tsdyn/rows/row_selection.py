@@ -8,38 +8,21 @@ import numpy as np
 from ..elements.loops.constraint_rows import POSE, R
 from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
 from ..jit.predicates import most
+from ..maths.tolerances import PIVOT_ROUNDING
 from .block_operations import eliminate, subtract_products
 from .constraint_graph import ConstraintGraph, no_graph
 from .evaluation import evaluate_all, evaluate_every_row
 from .factorisation import keep_diagonal, update_later_blocks
 from .redundant_rows import keep_every_row, leave_redundant_rows, length, square
 from .row_workspace import Rows, TangentWorkspace, no_tangent_workspace
-from .schur_complement import (
-    factorise_selected_rows,
-    form_schur_complement,
-    inner,
-    leave_axes_out,
-    multiply_rows,
-    solve_rows,
-    weigh,
-    weigh_rows,
-)
-from .tolerances import (
-    FEWER,
-    FIRST_SHARE,
-    HARDLY_CONDITIONED,
-    HELD,
-    ILL_CONDITIONED,
-    LEAST_TERM,
-    NEAR,
-    NEXT_TO,
-    NO_RATE,
-    RESTING,
-    WITHIN_A_STEP,
-    WORSE,
-    WORST_CONDITIONED,
-    ZERO_PIVOT,
-)
+
+from .schur_complement import (  # isort: skip
+    factorise_selected_rows, form_schur_complement, inner, leave_axes_out, multiply_rows, solve_rows, weigh, weigh_rows,
+)  # fmt: skip
+from .tolerances import (  # isort: skip
+    FEWER, FIRST_SHARE, HARDLY_CONDITIONED, HELD, ILL_CONDITIONED, LEAST_SHARE, NEAR, NEXT_TO, NO_RATE, ONE_DIGIT,
+    RESTING, WITHIN_A_STEP, WORST_CONDITIONED,
+)  # fmt: skip
 
 # Selection of independent rows of H among redundant ones, by rank-revealing elimination of S.
 #
@@ -205,7 +188,7 @@ def select(graph, f, rows, wanted, least):
     # Few rows: choose among all at once
     if f.block.size >= m * m and graph.welds.shape[0] == 0:
         weigh_rows(graph, rows.H, rows.Y)
-        share = ZERO_PIVOT if wanted >= 0 else least
+        share = PIVOT_ROUNDING if wanted >= 0 else least
         count = _choose_of_all(graph, rows.H, rows.Y, wanted, share, f.chosen, f.block, f.order)
         return _accept(f, count, wanted)
     # Many rows: within the blocks of the elimination order, with an ever smaller share until the number is right
@@ -290,7 +273,7 @@ def has_redundant_rows(f):
 @kernel
 def redundant_rows_hold(graph, f, floor):
     """Return True if the redundant rows hold on the manifold, by the residuals of the last evaluation."""
-    return f.dropped[0] == 0 or f.selection.excess <= floor + HELD * LEAST_TERM * _extent(graph, f)
+    return f.dropped[0] == 0 or f.selection.excess <= floor + HELD * LEAST_SHARE * _extent(graph, f)
 
 
 @kernel
@@ -389,7 +372,7 @@ def _hold(graph, f, known, q, rates, most, fastest):
             # H_r rd
             k = graph.bodies[b, 0]
             residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
-            terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + LEAST_TERM * most * length(H, at)
+            terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + LEAST_SHARE * most * length(H, at)
             if graph.bodies[b, 1] == 7:
                 # H_pi' omega'
                 e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
@@ -399,7 +382,7 @@ def _hold(graph, f, known, q, rates, most, fastest):
                 z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
                 residual += 2.0 * (H[at + 4] * x + H[at + 5] * y + H[at + 6] * z)
                 spin = 2.0 * math.sqrt(d0 * d0 + square(rates, k + 4))
-                terms += length(H, at + 4) * (spin + LEAST_TERM * fastest)
+                terms += length(H, at + 4) * (spin + LEAST_SHARE * fastest)
         if not abs(residual) <= HELD * terms:
             return False
     return True
@@ -438,7 +421,7 @@ def _choose_again(graph, reals, f, rows, t, metric):
     """Renew the selection of rows; f.b, H, Y and the factors of S follow it. True if S is nonsingular."""
     # Every row, the dropped ones included, competes
     evaluate_all(graph, reals, f, rows, t)
-    found = select(graph, f, rows, f.dropped[0], ZERO_PIVOT)
+    found = select(graph, f, rows, f.dropped[0], PIVOT_ROUNDING)
     leave_redundant_rows(graph, f, f.b, rows.H)
     regular = factorise_selected_rows(graph, f, rows, metric) < 0
     # The new pivots are what later ones are measured by
@@ -486,7 +469,7 @@ def selection_serves(graph, f, rows):
         # A pivot may grow: its largest value is the measure
         share = _share(graph, rows.S, e)
         f.best[e] = max(f.best[e], share)  # a selection next to a singular configuration is no measure
-        serves = serves and share >= WORSE * f.best[e]
+        serves = serves and share >= ONE_DIGIT * f.best[e]
     return serves
 
 

@@ -5,17 +5,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.loops.coordinate_rows import INTS as CONSTRAINT_INTS
-from ..elements.loops.forces import FORCE_INTS as FORCE_INTS
-from ..elements.loops.forces import kept_size
+from ..elements.loops.forces import FORCE_INTS, SPAN, kept_size
 from ..elements.loops.template import AT, DIMENSION
 from ..jit.kernels import Record, complex_vector, data_of, kernel, records, stack
 from ..jit.simd import let
+from ..maths.tolerances import SUM_ROUNDING
 from ..model.packed import members_of
 from .elimination import factor_lu, solve_lu, with_kernels
 from .massless_axes import lean_bodies
 from .schur_complement import more
 from .symbolic import Pattern, analyse, fill_reducing_order, lay_out_in_order
-from .tolerances import SADDLE_PIVOT
 
 # Order of elimination of the saddle-point matrix of bodies and constraint rows.
 #
@@ -176,12 +175,14 @@ class Block(Record):
 
 
 class SaddleInstance(Record):
-    """A force or a constraint, its two bodies and the blocks that it adds to."""
+    """A force or a constraint, its two bodies and the blocks that it adds to; it begins as a `ForceExtent`."""
 
-    loop: int  # address of forces.jacobian, or of constraint_hessians.loop
+    count: int  # one
+    stride: int  # reals
+    columns: int  # of both bodies
+    loop: int  # address of forces.jacobian, or of constraint_hessians.geometric_stiffness
     rows_loop: int  # of a constraint: address of coordinate_rows.jacobian
-    stride: int  # floats, and where they begin
-    reals: int
+    reals: int  # where they begin
     at_a: int  # where the coordinates of its bodies begin, and how many they are
     at_b: int
     size_a: int
@@ -233,11 +234,11 @@ def saddle_of(packed, graph, system):
     """The `SaddleGraph` of a packed scene, its constraint graph, and its system with the loops of implicit methods."""
     known = packed.derived
     if known.saddle is None or known.saddle[0] is not graph or known.saddle[1] is not system:
-        known.saddle = graph, system, _Builder(packed, graph, system).saddle()
+        known.saddle = graph, system, _SaddleBuilder(packed, graph, system).saddle()
     return known.saddle[2]
 
 
-class _Builder:
+class _SaddleBuilder:
     """What the steps hand on to each other."""
 
     def __init__(self, packed, graph, system):
@@ -291,8 +292,8 @@ class _Builder:
                 pair = tuple(
                     self.body_of[at] if length else GROUND for at, length in zip(own[:2], own[2:], strict=True)
                 )
-                loops, reals = (kind.jacobian, 0), (kind.stride, kind.reals + kind.stride * i)
-                found.append((pair, (*loops, *reals, *own, kind.kept + size * i, 0, 0)))
+                extent, reals = (1, kind.stride, SPAN), kind.reals + kind.stride * i
+                found.append((pair, (*extent, kind.jacobian, 0, reals, *own, kind.kept + size * i, 0, 0)))
         return found
 
     def _constraints(self):
@@ -307,8 +308,9 @@ class _Builder:
             if constraint.normalises or e is None:
                 continue
             pair = tuple(self._body(b) for b in self.graph.sides[e])
-            own, reals = self._places(kind.table + CONSTRAINT_INTS * i), (kind.stride, kind.reals + kind.stride * i)
-            found.append((pair, (kind.curvature, kind.jacobian, *reals, *own, 0, e, constraint.rows)))
+            own, reals = self._places(kind.table + CONSTRAINT_INTS * i), kind.reals + kind.stride * i
+            loops = kind.stiffness, kind.jacobian
+            found.append((pair, (1, kind.stride, SPAN, *loops, reals, *own, 0, e, constraint.rows)))
         return found
 
     def _instance(self, pair, values):
@@ -414,7 +416,7 @@ def _write_axes(s):
 @kernel
 def factorise_saddle(s):
     """Factorise the saddle-point matrix; return True if it is nonsingular."""
-    return factor_lu(s.graph.pattern, s.lower, s.upper, SADDLE_PIVOT) < 0
+    return factor_lu(s.graph.pattern, s.lower, s.upper, SUM_ROUNDING) < 0
 
 
 @kernel
@@ -429,7 +431,7 @@ def factorise_complex_saddle(s, pair):
     size = s.graph.pattern.shape[2]
     lower = complex_vector(data_of(s.complex_lower[pair]), size)
     upper = complex_vector(data_of(s.complex_upper[pair]), size)
-    return factor_lu(s.graph.pattern, lower, upper, SADDLE_PIVOT) < 0
+    return factor_lu(s.graph.pattern, lower, upper, SUM_ROUNDING) < 0
 
 
 @kernel

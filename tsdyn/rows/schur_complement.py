@@ -3,11 +3,12 @@
 from ..elements.loops.constraint_rows import POSE, RD
 from ..jit.kernels import kernel, long_kernel, stack
 from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, times, total
+from ..maths.tolerances import PIVOT_ROUNDING
 from .constraint_graph import ROWS, ROWS_WELD, W_MASS, W_ROTATION, WEIGHTS, WELD_ROWS, WELDS
 from .elimination import factor, factor_lu, solve, solve_lu
 from .massless_axes import AXIS_H, AXIS_OWN, AXIS_Y
 from .redundant_rows import set_redundant_diagonal
-from .tolerances import COMPENSATED, ZERO_PIVOT
+from .tolerances import COMPENSATED
 
 # Products of axis rows (massless_axes.py): contributions to S, to matrices of its pattern and right-hand sides.
 #
@@ -219,7 +220,7 @@ def factorise_selected_rows(graph, f, rows, metric):
             leave_axes_out(graph, rows.S)
         else:
             multiply_axes(graph, rows.H, rows.Y, rows.S)
-    return factor(graph.pattern, rows.S, ZERO_PIVOT)
+    return factor(graph.pattern, rows.S, PIVOT_ROUNDING)
 
 
 @kernel
@@ -428,7 +429,7 @@ def factorise_chart_matrix(graph, f, l):
     for values in (l.lower, l.upper):
         set_redundant_diagonal(graph, f, values)
         leave_axes_out(graph, values)
-    return factor_lu(graph.pattern, l.lower, l.upper, ZERO_PIVOT) < 0
+    return factor_lu(graph.pattern, l.lower, l.upper, PIVOT_ROUNDING) < 0
 
 
 @kernel
@@ -438,7 +439,7 @@ def factorise_product(graph, f, X, lower, upper):
     multiply_axes_both(graph, f.rows.H, X, lower, upper)
     set_redundant_diagonal(graph, f, lower)
     set_redundant_diagonal(graph, f, upper)
-    return factor_lu(graph.pattern, lower, upper, ZERO_PIVOT) < 0
+    return factor_lu(graph.pattern, lower, upper, PIVOT_ROUNDING) < 0
 
 
 @kernel

@@ -38,11 +38,11 @@ class Pattern(NamedTuple):
 
 def lay_out(sizes, cliques, groups):
     """Rows of each node, the pattern but for negative pivots, and `where`, as `analyse` returns them."""
-    layout = _Layout(sizes, cliques, groups)
+    layout = _PanelLayout(sizes, cliques, groups)
     return layout.rows, layout.pattern(), layout.where
 
 
-class _Layout:
+class _PanelLayout:
     """Places of all entries in the panels of the blocks.
 
     Parameters

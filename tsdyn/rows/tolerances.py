@@ -5,28 +5,24 @@ row that is orthogonal to the rows before it in the metric W, in general the squ
 makes with them.
 """
 
-# Share: below it the pivot counts as zero. The angle is 3e-7 rad.
-ZERO_PIVOT = 1e-13
-
-# Pivot of the saddle-point matrix over the diagonal entry, of bodies: below it the matrix is singular. A hundred
-# roundings.
-SADDLE_PIVOT = 1e-14
-
 # Share: below it rows are dropped where a given number must be dropped; while too many fall below it, it is multiplied
 # by FEWER. The first share, an angle of 0.03 rad, parts redundant rows from others unless the configuration is nearly
 # singular.
 FIRST_SHARE, FEWER = 1e-3, 1e-2
 
 # Share of a row over its largest value since the selection: below it the selection is renewed, so that S loses no more
-# than one digit to an old selection.
-WORSE = 0.1
+# than one digit to an old selection. The moment of inertia J that an axis without inertia is given, over the body's
+# largest: a condition of ten.
+ONE_DIGIT = 0.1
 
 # Residual of a redundant row, its rate or its acceleration over the sum of its absolute terms: above it the row doesn't
 # hold (docs/theory.md). Points and axes that are typed with ten digits hold. Laws of random scenes have 1e-9, but may
 # count the terms of a rotation as less than half.
 HELD = 2e-10
-# Terms of a row count as at least this fraction of the largest in the scene: smaller ones are themselves rounding.
-LEAST_TERM = 1e-3
+# Terms of a row, and arms of a body's joints, count as at least this share of the largest in the scene: smaller terms
+# are themselves rounding, and rotations of bodies with short arms, or none, are as visible as the longest allow. Pivots
+# are squares of it, far above rounding.
+LEAST_SHARE = 1e-3
 # Velocities of a scene at rest over those of a fall through its extent under its loads; rates over that extent (1/s, or
 # 1/s^2 for accelerations): smaller ones are rounding.
 RESTING, NO_RATE = 1e-9, 1e-20
@@ -36,7 +32,9 @@ RESTING, NO_RATE = 1e-9, 1e-20
 MOST_ROWS = 1500
 
 # Singularity indicator over its largest value in the run, dimensionless; it falls as the square of the distance.
-NEAR = 0.02  # below, at 0.14 of the distance: multipliers are refined at each order, Taylor steps tightened
+NEAR = (
+    0.02  # below, at 0.14 of the distance: multipliers are refined at each order, Taylor steps tightened; regular above
+)
 NEXT_TO = 1e-3  # below, at 0.03: a step method hands over to series
 WITHIN_A_STEP = 0.2  # below, at 0.45: so does a fixed step that fails
 
@@ -66,15 +64,10 @@ PIVOTS_COST, NUMBER_COST, PRODUCT_COST, UPDATE_COST, LINK_COST = 49.0, 2.4, 0.24
 LOOKUP = 1.1  # cost of one block over that of its parts up to which they are merged: what parts look up isn't in it
 
 # --- the metric of lengths
-# Arm of a body's joints over the longest in the scene, at least: rotations of bodies with short arms, or none, are as
-# visible as the longest allow. Pivots are squares of it, far above rounding.
-LEAST_ARM = 1e-3
 # Ratio of masses, or of the largest inertias of bodies, above which factors of S lose as many digits: the start is
-# looked at once more, and multipliers of series are refined.
+# looked at once more, and multipliers of series are refined. Above its square, half of the digits, masses are named as
+# the reason where a run can't begin, or ends singular.
 UNEQUAL_MASSES = 1e4
-# The same ratio, above which masses are named as the reason where a run can't begin, or ends singular: half of the
-# digits are lost.
-TOO_UNEQUAL = 1e8
 
 # --- axes with next to no inertia, docs/design-decisions.md, "Inertia is added and taken back"
 # Moment of inertia over the largest of the body, about its centroid or by its lever arms: less takes an axis row. The
@@ -83,5 +76,3 @@ THIN = 1e-6
 # The same over the largest of the scene, of a body that carries heavier ones: below the first, pivots of S come close
 # to rounding, and all moments below the second, its root, are raised. Radau takes shorter steps then.
 MASSLESS, RAISED = 1e-12, 1e-8
-GIVEN = 0.1  # the raised moment of inertia J over the same: a condition of ten
-NONE = 1e-14  # moment of inertia over the largest about the centroid: less is rounding of the eigenvalues, and zero

@@ -6,9 +6,10 @@ from operator import lt
 import numpy as np
 
 from ..errors import InvalidArgument
-from ..methods.integrator import Integrator, is_own, registered
+from ..maths.tolerances import EPS, NEGLIGIBLE
+from ..methods.integrator import Integrator, frozen, is_own, registered
 from ..validation import FEW, checked_once, finite_vector, floats, number, shown, unknown_name
-from .tolerances import EPS, FROM_ZERO, SAME_COUNT, SHORTEST
+from .tolerances import FROM_ZERO, SHORTEST
 
 TOLERANCE = 1e-8  # rtol and atol of a run, if none are given
 NO_TIMES = np.empty(0)
@@ -58,7 +59,7 @@ def step_count(t0, t1, step):
     count = (t1 - t0) / step
     if not count < 2**53 or t0 + step == t0:
         raise InvalidArgument(f"the step of {step:g} s is too small for the interval ({t0:g}, {t1:g}).")
-    return max(1, math.ceil(count - max(SAME_COUNT * count, EPS * max(abs(t0), abs(t1)) / step)))
+    return max(1, math.ceil(count - max(NEGLIGIBLE * count, EPS * max(abs(t0), abs(t1)) / step)))
 
 
 def demand_steps_seen(method, t0, t1):
@@ -93,18 +94,18 @@ def state_arrays(state, n):
 
 
 def adaptive(kind, rtol, atol):
-    """A method of a class with these tolerances, TOLERANCE for None; one of tsdyn's own is made once."""
+    """A method of a class with these tolerances, TOLERANCE for None, frozen; one of tsdyn's own is made once."""
     make = _own if is_own(kind) else _own.__wrapped__
     return make(kind, TOLERANCE if rtol is None else rtol, TOLERANCE if atol is None else atol)
 
 
 @checked_once
 def _own(kind, rtol, atol):
-    return kind(rtol=rtol, atol=atol)
+    return frozen(kind(rtol=rtol, atol=atol))
 
 
 def method_of(integrator, rtol, atol):
-    """The method that is given as an instance, a class or a name; tolerances are for a name."""
+    """The method that is given as an instance, a class or a name, frozen; tolerances are for a name."""
     known = registered()
     named = isinstance(integrator, str)
     kind = kind_named(integrator) if named else integrator if isinstance(integrator, type) else type(integrator)
@@ -124,14 +125,14 @@ def method_of(integrator, rtol, atol):
             f"integrator='rk45', not of {integrator!r}; give an instance its own, such as RK45(rtol=1e-8)."
         )
     if named:
-        return adaptive(kind, rtol, atol) if adapts else kind()
+        return adaptive(kind, rtol, atol) if adapts else frozen(kind())
     if isinstance(integrator, type) and integrator in known.values():
-        return integrator()
+        return frozen(integrator())
     if not isinstance(integrator, Integrator):
         raise InvalidArgument(
             f"integrator must be a name or an instance such as ts.integrators.Nystrom4(step=1e-3), got {integrator!r}."
         )
-    return integrator
+    return frozen(integrator)
 
 
 def kind_named(name):

@@ -10,10 +10,11 @@ from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import call_accelerate, call_place
 from ..methods.interpolants import call_fill, call_value
 from ..model.joint_turns import angle_after
+from ..observables.tolerances import KEPT_FLOATS
 from ..rows.interface import take_noted_selection
 from ..workspaces import B_CHART, B_DATA, B_END, B_H, B_START, STORED, arrays_of, load, load_run
 from .run_memory import call
-from .tolerances import FEW, KEPT_FLOATS, LEGS, LONG_STEPS
+from .tolerances import FEW, LEGS, LONG_STEPS
 
 # Outputs of a driver: the records of accepted states.
 

@@ -13,19 +13,20 @@ import numpy as np
 from ..errors import InconsistentState, InvalidArgument, InvalidForce, SingularConfiguration, Status
 from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
+from ..methods.tolerances import SAME_TIME
 from ..model import handles
 from ..motions.tolerances import TOGETHER
 from ..observables.generalised_forces import not_finite
 from ..rows.constraint_graph import MASS_REMEDY, mass_ratio
 from ..rows.interface import redundant_of
-from ..rows.tolerances import TOO_UNEQUAL
+from ..rows.tolerances import UNEQUAL_MASSES
 from ..validation import damaged, demand_numbers, number
 from . import run_log
 from .dense_output import Trajectory
 from .events import Watch
 from .run_log import CHART_ROOM, NO_ROWS, RecordedEnd, Recorder, RunLog, left_open
 from .task import Outcome
-from .tolerances import GETTING_ON, HOPELESS_STEPS, MOST_INSTANTS, NOISY, PACED, SAME_INSTANT, SLICE_SECONDS, TRIES
+from .tolerances import GETTING_ON, HOPELESS_STEPS, MOST_INSTANTS, NOISY, PACED, SLICE_SECONDS, TRIES
 
 # A run in slices: the compiled driver is called again and again, with room for the records of each slice.
 #
@@ -149,7 +150,7 @@ class Slices:
             # A run without a first step is an error, whose cause is named
             singular = status in (Status.SINGULAR, Status.MASS_SINGULAR)
             if status in (Status.SINGULAR, Status.UNHELD):
-                masses = mass_ratio(self.task.prepared.packed, TOO_UNEQUAL)
+                masses = mass_ratio(self.task.prepared.packed, UNEQUAL_MASSES**2)
                 if masses:
                     raise SingularConfiguration(f"no step could be made from the start: {masses}. {MASS_REMEDY}")
             kind = SingularConfiguration if singular else InconsistentState
@@ -397,7 +398,7 @@ def sampled(packed):
 
 def is_due(t, period):
     """Return True if t is an instant of a period."""
-    return abs(t - round(t / period) * period) <= max(SAME_INSTANT * period, TOGETHER * abs(t))
+    return abs(t - round(t / period) * period) <= max(SAME_TIME * period, TOGETHER * abs(t))
 
 
 def instants_of(packed, t0, t1):

@@ -15,11 +15,12 @@ import math
 
 from ..elements.loops.coordinate_rows import call_kind
 from ..jit.kernels import callback, caller, kernel, stack
+from ..maths.tolerances import PIVOT_ROUNDING
 from ..methods.interpolants import quintic
 from ..model.equations import set_time
 from ..motions.tolerances import SAMPLES
 from ..workspaces import load, load_run
-from .tolerances import DISTINCT, IMPLICIT_PLACES, LEAST_PLACES, NOISE_OF_LOADS
+from .tolerances import DISTINCT, IMPLICIT_PLACES, LEAST_PLACES
 
 WATCH = "ppdd"
 ORDER = 8  # of the differences
@@ -107,7 +108,7 @@ def watch(context, run, t1, h):
     f, d, weights = stack(ROOM), r.path[: 6 * k], r.path[6 * k : 7 * k]
     tol = r.clock.atol + r.clock.rtol * _gather(c.system, r, c.work.q, c.work.qd, c.work.qdd, d, weights)
     places = min(max(IMPLICIT_PLACES if r.numbers.stage_at > 0 else LEAST_PLACES, math.ceil(density)), ROOM - 1)
-    noise = max(NOISE_OF_LOADS, r.clock.atol + r.clock.rtol)
+    noise = max(PIVOT_ROUNDING, r.clock.atol + r.clock.rtol)
     noise *= _sample(c.system, r, h, t1 - h, places, d, weights, f)
     set_time(c.system, t1)
     stride = 1

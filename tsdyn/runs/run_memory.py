@@ -206,21 +206,8 @@ class Memory:
         self.engine = None
         for array in self._laid_out:
             array.fill(0)
-        self._enter_method(engine.method)
-        engine.lay_out(self)
-        engine.layouts += 1
-        self.engine, numbers = engine, self.run.numbers
-        self.layout = Layout(self.run.now.shape[1], self.run.remembered.size, engine.skipped, bool(self.packed.loads))
-        self._enter_start(task)
-        reset_selection(self.graph, self.context.tangent)
-        numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
-        numbers.may_pass, numbers.chart_interval = may_pass, task.interval
-        numbers.leave_when_stiff = task.choose is not None
-        self.load()
-
-    def _enter_method(self, method):
-        """Steps and tolerances."""
-        clock, numbers = self.run.clock, self.run.numbers
+        method, clock, numbers = engine.method, self.run.clock, self.run.numbers
+        # Steps and tolerances
         if method.step is None:
             numbers.adaptive, numbers.steps_wanted = 1, UNLIMITED
             clock.rtol, clock.atol = method.step_tolerances()
@@ -228,6 +215,16 @@ class Memory:
             clock.h = min(method.first_step or 0.0, clock.max_step)  # 0: of the driver's own choice
         else:
             clock.h = method.step
+        engine.lay_out(self)
+        engine.layouts += 1
+        self.engine = engine
+        self.layout = Layout(self.run.now.shape[1], self.run.remembered.size, engine.skipped, bool(self.packed.loads))
+        self._enter_start(task)
+        reset_selection(self.graph, self.context.tangent)
+        numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
+        numbers.may_pass, numbers.chart_interval = may_pass, task.interval
+        numbers.leave_when_stiff = task.choose is not None
+        self.load()
 
     def _enter_start(self, task):
         """Positions and velocities, and how closely the constraints are held."""

@@ -6,36 +6,14 @@ from ..formulations.chart_validity import extent
 from ..jit.kernels import kernel
 from ..methods.diagonally_implicit import call_soften
 from ..methods.explicit import call_error, call_norm
+from ..methods.tolerances import SAME_TIME
 from .dense_output import evaluate
-from .tolerances import (
-    AT_LONGEST,
-    FIRST_ERROR,
-    FIRST_GROWTH,
-    FIRST_LEAST,
-    FIRST_PART,
-    FIRST_SEEN,
-    FROM_ZERO,
-    GROW,
-    HARDLY,
-    LEAST_BEFORE,
-    LEAST_ERROR,
-    MILD_STEPS,
-    NO_SLOPE,
-    PI_BEFORE,
-    PI_ERROR,
-    ROUNDING_STRETCH,
-    SAFETY,
-    SAME_FROM,
-    SAME_TO,
-    SECOND_ESTIMATE,
-    SHORTEST,
-    SHRINK,
-    STIFF_STEPS,
-    STILL_STEPS,
-    STRETCH,
-    TOO_SMALL,
-    TRIAL,
-)
+
+from .tolerances import (  # isort: skip
+    AT_LONGEST, FIRST_ERROR, FIRST_GROWTH, FIRST_LEAST, FIRST_PART, FIRST_SEEN, FROM_ZERO, GROW, HARDLY, LEAST_BEFORE,
+    LEAST_ERROR, MILD_STEPS, NO_SLOPE, PI_BEFORE, PI_ERROR, SAFETY, SAME_FROM, SAME_TO, SECOND_ESTIMATE, SHORTEST,
+    SHRINK, STIFF_STEPS, STILL_STEPS, STRETCH, TOO_SMALL, TRIAL,
+)  # fmt: skip
 
 
 @kernel
@@ -50,7 +28,7 @@ def stretch(h, longest):
     # Below max_step the last step may be a little longer; at max_step by rounding only
     if h < AT_LONGEST * longest or longest == math.inf:
         return STRETCH * h
-    return max(longest - h, ROUNDING_STRETCH * h)
+    return max(longest - h, SAME_TIME * h)
 
 
 @kernel

@@ -43,7 +43,7 @@ class StepMemory(Memory):
     def __init__(self, prepared, graph, saddle, coupled, basis_free, implicit, sizes, lengths):
         n, m, packed = prepared.n, prepared.m, prepared.packed
         self.implicit, self.basis_free = implicit, basis_free
-        self.source, kept = prepared.system(implicit)
+        self.source, kept = prepared.system(implicit, basis_free)
         system, redundant = System(*(array.copy() for array in self.source)), redundancy(graph)
         rows = len(graph.row) if basis_free else None
         work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant)
@@ -101,7 +101,7 @@ class StepEngine:
         names = "tableau", "memory", "block", "path", "watched", "loaded"
         self.lengths = dict(zip(names, lengths, strict=True))
         self.slips = prepared.slips
-        self.system, kept = prepared.system(method.implicit)
+        self.system, kept = prepared.system(method.implicit, form.basis_free)
         self.saddle = saddle_of(packed, self.graph, self.system) if method.implicit and form.basis_free else None
         rows = len(self.graph.row) if form.basis_free else None
         self.kind = form.name, rows, method.implicit, method.coupled, kept, *self.sizes, *lengths

@@ -1,6 +1,6 @@
 """Thresholds of the drivers: step control, stops, charts, events, slices. Those of root isolation are in maths."""
 
-from ..maths.root_isolation import EPS
+from ..maths.tolerances import EPS
 
 # --- times -----------------------------------------------------------------------------------------------------------
 # Shortest step, relative to |t|: two units in the last place. Near t = 0 relative to FROM_ZERO of the interval.
@@ -9,7 +9,7 @@ SHORTEST, FROM_ZERO = 4e-16, 1e-3
 # Part of a step by which the last one of a run may be longer than chosen, so that no tiny one is left: a thousandth
 # changes its error by less than a hundredth at order 8. A step that is at max_step already (AT_LONGEST of it) may pass
 # it by rounding only.
-STRETCH, AT_LONGEST, ROUNDING_STRETCH = 1e-3, 0.999, 1e-9
+STRETCH, AT_LONGEST = 1e-3, 0.999
 
 # Part of a fixed step: a stop nearer than this to a time of the grid replaces it, so that no step is left of the size
 # of rounding.
@@ -17,9 +17,6 @@ SLIVER = 1e-6
 
 # A step that a stop shortens to less than this part of its proposed length isn't used to predict the next one.
 CUT_SHORT = 0.5
-
-# Part of a sampling period: instants that are nearer are the same one, computed in two ways.
-SAME_INSTANT = 1e-9
 
 # Sampling instants of a run at most: 16 bytes each, 0.5 GB.
 MOST_INSTANTS = 1 << 25
@@ -34,8 +31,7 @@ PI_ERROR, PI_BEFORE = 0.7, 0.4
 # Loads along a step (path_loads.py). DISTINCT: a difference over the time between samples, as a velocity over the
 # tolerance: a bump at one sample makes 70 times its impulse. LEAST_PLACES: intervals of a step; differences of a
 # cosine in a step of one radian are 1e-9 then, and with IMPLICIT_PLACES in one of three radians, as at order 13, 1e-8.
-# NOISE_OF_LOADS: rounding of differences, relative to the load.
-DISTINCT, LEAST_PLACES, IMPLICIT_PLACES, NOISE_OF_LOADS = 100.0, 8, 16, 1e-13
+DISTINCT, LEAST_PLACES, IMPLICIT_PLACES = 100.0, 8, 16
 
 # Ratio of steps within which an implicit method goes on with the same step, and so with the same matrix: chains make
 # 0.04 to 0.5 matrices a step, not 0.5 to 0.8, and as many steps. A longer one only, as in Solving ODEs II, IV.8, takes
@@ -56,7 +52,8 @@ TOO_SMALL, TRIAL, FIRST_ERROR, NO_SLOPE, FIRST_GROWTH, FIRST_PART = 1e-5, 1e-6, 
 # asks for less where rates are 1e15 / s. A step that is too long is rejected.
 FIRST_LEAST, FIRST_SEEN = 1e-12, 4.0
 
-# Factors of the step after a stage that was not solved, and after a step that left a chart at once.
+# Factors of the step after a stage that was not solved, or a step whose end was not reached, and after a step that left
+# a chart at once.
 HALVED, QUARTERED = 0.5, 0.25
 
 # Where friction brings a joint to rest: part of the time until then that a step takes (at 0.99 velocities predicted for
@@ -120,9 +117,6 @@ NOISY = 1e6
 # The run counts as progressing if simulated time per step has more than doubled since the last check.
 GETTING_ON = 2.0
 
-# Relative rounding error of (t1 - t0) / step, beside that of t0 and t1: an excess below it makes no further step.
-SAME_COUNT = 1e-12
-
 # Rejected Taylor steps for which the history of a slice has room, beyond one row for each of its steps.
 TRIES = 32
 
@@ -130,6 +124,3 @@ TRIES = 32
 # A state inside a step is reached from the base point of its chart in so many legs. More are taken if a leg needs more
 # than FEW factorisations; a short leg needs one of N, and one of S or of the masses.
 LEGS, FEW = (1, 4, 16), 2
-
-# Floats of the workspace of a reader up to which it is kept for the next one (1 MB): a hundred bodies or more.
-KEPT_FLOATS = 1 << 17

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..calls import fitting
+from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InconsistentState, InvalidArgument
 from ..observables.state import remembered
 from ..runs.arguments import demand_one_state, state_arrays
@@ -17,9 +18,6 @@ from .scene_cache import prepared
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Equilibrium, Linearisation, Progress, Scene, State
-
-
-INITIAL_TOL = 1e-9  # of residuals of a state, as in `simulate`
 
 
 @fitting

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
 
+from ..analyses.tolerances import CONSISTENT
 from ..calls import fitting, fitting_methods
+from ..configuration.tolerances import INITIAL_TOL
 from ..drawing import Drawn, new_figure
 from ..elements.force import Force
 from ..errors import InvalidArgument, Status
@@ -27,9 +29,6 @@ from .termination import suspect
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Floats, GivenMotions, ItemLike, Scene, State
-
-
-INITIAL_TOL = 1e-9  # of residuals of a start, as in `simulate`
 
 
 @fitting_methods
@@ -357,7 +356,6 @@ class InverseDynamics(Drawn, GivenMotion):
 # `scene.inverse_dynamics`: forces and torques of actuators that drive a given motion.
 
 WHO = "inverse_dynamics"
-CONSISTENT = 1e-6  # of residuals of a given motion
 GIVE_MOTIONS = "Give their motions, too; or integrate with ts.simulate, and give the Solution as the motion."
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from ..elements.bodies import Ground
 from ..elements.loads import FunctionKernels
 from ..elements.markers import POINT
-from ..formulations.tolerances import ROUNDING
 from ..jit.code_hash import is_ours
+from ..maths.tolerances import ROUNDING
 from ..model.packed import Derived, classes, size_of
 from ..rows.massless_axes import levers
 from ..runs.events import EventInstant

@@ -18,7 +18,7 @@ from ..calls import fitting_constructor
 from ..docstrings import entries_of
 from ..errors import InvalidArgument
 from ..formulations.registry import formulation as find_formulation
-from ..methods.integrator import frozen, registered
+from ..methods.integrator import registered
 from ..runs.arguments import interval, method_of, output_times
 from ..runs.events import prepare
 from ..validation import one_of, positive, whole
@@ -26,19 +26,9 @@ from ..validation import one_of, positive, whole
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..hints import (
-        ArrayLike,
-        Event,
-        Formulation,
-        Function,
-        Integrator,
-        Method,
-        Place,
-        Progress,
-        Redundancy,
-        Span,
-        State,
-    )
+    from ..hints import (  # isort: skip
+        ArrayLike, Event, Formulation, Function, Integrator, Method, Place, Progress, Redundancy, Span, State,
+    )  # fmt: skip
 
 
 def _positive(value, name):
@@ -176,7 +166,8 @@ class RunOptions:
                 put(self, name, check(given[name], name))
         method = None
         if self.integrator is not None:
-            method = _method(self.integrator, self.rtol, self.atol, self.form)
+            method = method_of(self.integrator, self.rtol, self.atol)
+            _demand_served(method, self.form)
             if not isinstance(self.integrator, str):
                 put(self, "integrator", method)
         put(self, "method", method)
@@ -267,9 +258,8 @@ def documented(*names: str) -> Callable[[Function], Function]:
     return decorate
 
 
-def _method(integrator, rtol, atol, form):
-    """Return the requested method, as it is now."""
-    method = frozen(method_of(integrator, rtol, atol))
+def _demand_served(method, form):
+    """Refuse a method that solves its stages in another form."""
     if (method.implicit and form.first_order) or (method.coupled and not form.basis_free):
         kinds = {name: kind for name, kind in registered().items() if not kind.coupled}
         others = ", ".join(repr(name) for name, kind in kinds.items() if not (kind.implicit and form.first_order))
@@ -277,4 +267,3 @@ def _method(integrator, rtol, atol, form):
             f"{type(method).__name__} solves its stages in the tangent-space form only; formulation={form.name!r} is "
             f"served by {others}."
         )
-    return method

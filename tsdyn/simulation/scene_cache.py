@@ -77,8 +77,8 @@ class Prepared:
 
     @cached_property
     def implicit(self):
-        """The system with the arrays of implicit methods, and their number of floats for forces."""
-        return with_force_jacobians(self.packed._replace(system=with_curvatures(self.packed)))
+        """The system with the loops of implicit methods, and floats for forces: by whether the form is basis-free."""
+        return {}
 
     @cached_property
     def spheres(self):
@@ -217,9 +217,14 @@ class Prepared:
                 known[key] = engine
         return engine
 
-    def system(self, implicit):
-        """Return the system for a method, and its number of floats for forces."""
-        return self.implicit if implicit else (self.packed.system, 0)
+    def system(self, implicit, basis_free):
+        """Return the system for a method and a form, and its number of floats for forces."""
+        if not implicit:
+            return self.packed.system, 0
+        if basis_free not in self.implicit:
+            system = with_curvatures(self.packed, basis_free)
+            self.implicit[basis_free] = with_force_jacobians(self.packed._replace(system=system))
+        return self.implicit[basis_free]
 
     def start(self, scene, given, t, tol, remembered, redundant_allowed):
         """Return given positions and velocities (q, qd) checked and projected, not to be written to.

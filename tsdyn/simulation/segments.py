@@ -13,36 +13,23 @@ from ..formulations.registry import formulation
 from ..integrators import SDIRK54, Radau, Taylor
 from ..jit.compiled import clock
 from ..methods.integrator import frozen
+from ..rows.tolerances import NEAR
 from ..runs.dense_output import StepPieces
 from ..runs.driver import SegmentLink, begin, run
 from ..runs.run_log import NAMES, ChartLog, RunEnd, StepLog
 from ..runs.step_engine import StepEngine
 from ..runs.task import Outcome
+from ..runs.tolerances import SLIVER
 from ..taylor.series_engine import SeriesEngine
+from ..taylor.tolerances import SHARP_TOL
 from ..validation import damaged, demand, demand_numbers, is_count
 from .local_origin import within_rounding
 from .progress import silent
-from .tolerances import (
-    AGAIN,
-    COST,
-    FINEST,
-    FIRST_WINDOW,
-    GOT_ON,
-    LOOSEST,
-    NO_STEP,
-    PASSES,
-    PATIENCE,
-    REGULAR,
-    RESTING,
-    RISKED,
-    SERIES_COST,
-    SETTLED,
-    SHARP_COST,
-    STEP_EVALUATIONS,
-    STIFF_SAFETY,
-    TRIAL,
-    TRIED,
-)
+
+from .tolerances import (  # isort: skip
+    AGAIN, COST, FINEST, FIRST_WINDOW, GOT_ON, PASSES, PATIENCE, RESTING, RISKED, SERIES_COST, SETTLED, SHARP_COST,
+    STEP_EVALUATIONS, STIFF_SAFETY, TRIED,
+)  # fmt: skip
 
 # Turns of the default method: from its explicit method to the implicit one where the motion is stiff, and back.
 #
@@ -60,7 +47,7 @@ KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "beg
 def implicit(method, prepared, form):
     """Return the implicit method of the same tolerances: Radau, or SDIRK54 where all stages at once aren't served."""
     coupled = form.basis_free and not prepared.rough
-    most = LOOSEST if coupled and prepared.sharp else math.inf
+    most = SHARP_TOL if coupled and prepared.sharp else math.inf
     found = (Radau if coupled else SDIRK54)(min(method.rtol, most), min(method.atol, most), max_step=method.max_step)
     if not coupled:
         found.safety = STIFF_SAFETY
@@ -163,7 +150,7 @@ class Turns:
 
     def _pays(self, rate, t):
         """Whether what is left at this rate is worth a turn."""
-        return rate * (self.end - t) > self._cost * TRIAL * STEP_EVALUATIONS
+        return rate * (self.end - t) > self._cost * TRIED * STEP_EVALUATIONS
 
     def _back(self, memory, steps, rate):
         """Whether the explicit method is to go on: it would take less work for the rest, or is to be tried.
@@ -288,12 +275,12 @@ class Carrier:
 
     def _is_regular(self):
         indicator = self.context.tangent.indicator
-        return indicator.start >= max(REGULAR * indicator.largest, self.share)
+        return indicator.start >= max(NEAR * indicator.largest, self.share)
 
     def _next(self):
         """Return the next time of the grid."""
         done = (self.run.clock.t - self.origin) / self.step
-        return min(self.origin + math.ceil(done + NO_STEP) * self.step, self.end)
+        return min(self.origin + math.ceil(done + SLIVER) * self.step, self.end)
 
 
 # Segments of a run, each by one method: what a segment begins with, and how all of them make one outcome.

@@ -20,7 +20,7 @@ from ..observables.reactions import acted, exerted, member, multipliers, with_no
 from ..observables.state import Anchor, Kinematics, RememberingState
 from ..validation import counted, floats
 from .records import Records
-from .stored_runs import Outputs
+from .stored_runs import RunOutputs
 from .termination import account, cause_of
 from .tolerances import AGREE, DEEPEST, NO_POWER
 
@@ -332,7 +332,7 @@ class Charts(NamedTuple):
 
 
 @fitting_methods
-class Solution(Outputs, Balances, Records, Showing, Kinematics["Floats"]):
+class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     """The result of `simulate`; k outputs, n coordinates, m constraint rows.
 
     Attributes

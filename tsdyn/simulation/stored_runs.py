@@ -148,7 +148,7 @@ def method_of(record: list[Any]) -> Any:
 _COLUMNS = {"t": "time", "q": "q", "qd": "qd", "qdd": "qdd", "anchor": "remembered", "_remembers": "remembered"}
 
 
-class Outputs:
+class RunOutputs:
     """Mixed into `Solution`: t (k,), q, qd, qdd (k, n), the turns of joint angles, what forces remember (k, slots)."""
 
     t: Floats

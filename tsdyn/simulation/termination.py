@@ -8,26 +8,16 @@ from ..configuration.mobility import weakest_row
 from ..errors import Status, TsdynError
 from ..formulations.dependent_rows import dependent_rows
 from ..maths.root_isolation import EPS
+from ..maths.tolerances import TINY
 from ..observables.evaluate import constraint_arrays
 from ..observables.generalised_forces import NotFinite, applied_loads, jumping, not_finite
 from ..rows.constraint_graph import MASS_REMEDY, mass_ratio
 from ..rows.graph_builder import redundant_rows
-from ..rows.tolerances import TOO_UNEQUAL
+from ..rows.tolerances import UNEQUAL_MASSES
 from ..runs.tolerances import AT_LONGEST
 from ..taylor.layout import without_series
 from ..validation import counted
-from .tolerances import (
-    AT_ONCE,
-    BLOW_UP,
-    CLEAR,
-    COARSE,
-    LEAST,
-    MOST_SINGULAR,
-    NEAR_BY,
-    NEARLY_SINGULAR,
-    SHORTENED,
-    TRIALS,
-)
+from .tolerances import AT_ONCE, BLOW_UP, CLEAR, COARSE, MOST_SINGULAR, NEAR_BY, NEARLY_SINGULAR, SHORTENED, TRIALS
 
 # What has kept the steps of a run short, where it isn't the motion: a `max_step`, or rounding of the forces.
 #
@@ -80,7 +70,7 @@ def _rounding(solution, method):
 
     def compared(da):
         """Rates w (n,), and changes of velocities da / w over the tolerances (n,)."""
-        rates = np.sqrt(da / np.maximum(dq, LEAST))
+        rates = np.sqrt(da / np.maximum(dq, TINY))
         own = np.where(rates > 0.0, rates, np.inf)
         return rates, da / own / (method.atol + method.rtol * np.hypot(qd, qdd / own))
 
@@ -112,7 +102,7 @@ def _of_loads(solution, t, q, qd, near):
         np.repeat((mass, 4.0 * np.linalg.eigvalsh(J.reshape(3, 3))[0]), (3, length - 3))
         for (_, length), mass, J in zip(system.bodies, system.mass, system.inertia, strict=True)
     ]
-    return np.abs(Q[1:] - Q[0]).max(axis=0) / np.maximum(np.concatenate(least), LEAST)
+    return np.abs(Q[1:] - Q[0]).max(axis=0) / np.maximum(np.concatenate(least), TINY)
 
 
 def _of_motion(solution, t, q, qd, near):
@@ -139,7 +129,7 @@ def account(solution, scene, reason, goes_on=""):
         return " ".join(part for part in (solution.status.sentence, reason, _locked(solution)) if part)
     steps = counted(solution.stats.steps, "step")
     where = f"It stopped at t = {solution._reached:.9g} s of {solution.span[1]:g} s, after {steps}."
-    masses = mass_ratio(solution.packed, TOO_UNEQUAL) if solution.status is Status.SINGULAR else ""
+    masses = mass_ratio(solution.packed, UNEQUAL_MASSES**2) if solution.status is Status.SINGULAR else ""
     if masses:
         return " ".join(part for part in (f"{masses[0].upper()}{masses[1:]}.", reason, where, MASS_REMEDY) if part)
     found, limit = suspect(solution, scene), step_limit(solution)

@@ -1,8 +1,6 @@
 """Limits of the preparation and assessment of runs; dimensionless unless a unit is named."""
 
 # --- choice of the method ---
-# Steps of the implicit method that what is left of a run must be worth.
-TRIAL = 20
 # Steps over which work is measured first; each measurement takes as many steps as there were before. Up to SETTLED
 # steps the implicit method may take (SETTLED / steps)^2 times the work of the explicit one: its steps are short until
 # fast modes have decayed, which steps at the limit of stability have kept alive.
@@ -12,7 +10,8 @@ RESTING = 40
 # Share of what the explicit method would take for the rest of a run that the implicit one may lose before it gains: on
 # bushings and springs of 1e6 to 1e12 N/m the default method takes 1.9 times the better of both at most, 4 with 0.25.
 RISKED = 0.5
-# Implicit steps after which the explicit method is tried, and its steps in such a trial.
+# Implicit steps after which the explicit method is tried; steps of either method in a trial, as many as what is left of
+# a run must be worth.
 PATIENCE, TRIED = 30, 20
 # Factor of the steps until a method that did not pay is considered again, and until the explicit one is tried though
 # the Jacobian has served all the time; of the work, with which a trial ends early.
@@ -24,9 +23,6 @@ COST, SERIES_COST = 1.4, 6.5
 STEP_EVALUATIONS = 16  # of a step of SDIRK54, about
 # Safety factor between tolerances and step errors of SDIRK54 where it goes on: fast modes decay, and with them errors.
 STIFF_SAFETY = 50.0
-# The loosest tolerance of Radau where there are sharp forces: at 0.005 a step flies over the place where a body breaks
-# loose, whose error is a hundred times that at 0.001.
-LOOSEST = 1e-3
 # Cost of an order of a series in scenes with sharp forces, where steps are as short as they are for a while only, over
 # that of an evaluation: chains of four with friction, slip velocities of 1e-3 to 1e-1.
 SHARP_COST = 0.1
@@ -38,12 +34,8 @@ FAR_ORIGIN = 100.0
 FAR_LEVER = 1e4
 
 # --- singular configurations ---
-# Of the largest share that the weakest row has had: as much is regular again, for other methods and for Taylor alike.
-REGULAR = 0.02
 # Tolerance of the series that cross a singular configuration, if the method has none that is tighter.
 FINEST = 1e-10
-# Of a fixed step: a time of the grid that is nearer has been reached.
-NO_STEP = 1e-6
 # Smallest singular value, of the largest, below which a failure is put down to a singular configuration; coordinates up
 # to which singular values are computed for that.
 NEARLY_SINGULAR, MOST_SINGULAR = 0.05, 600
@@ -54,8 +46,8 @@ BLOW_UP = 1e4
 
 # Of the time in which forces vary: steps of a run that rounding of the forces keeps short are shorter. Changes of the
 # positions by a last digit, of random signs, by which that rounding is measured; tolerances that are CLEAR of it.
-# COARSE ones are above it, w EPS of a size, for rates w of 5e6 / s: it is not measured then. LEAST divisor.
-SHORTENED, TRIALS, CLEAR, COARSE, LEAST = 0.1, 3, 10.0, 1e-9, 1e-300
+# COARSE ones are above it, w EPS of a size, for rates w of 5e6 / s: it is not measured then.
+SHORTENED, TRIALS, CLEAR, COARSE = 0.1, 3, 10.0, 1e-9
 
 # --- progress ---
 # s: a calculation that takes less shows no bar.

@@ -1,6 +1,6 @@
 """Figures of a case of the gallery, one function each: CHECKS lists them, and report.py their columns.
 
-A check takes a `Run` and returns figures by name. A figure that a case doesn't have is NaN.
+A check takes a `CheckedRun` and returns figures by name. A figure that a case doesn't have is NaN.
 """
 
 import time
@@ -11,11 +11,11 @@ import numpy as np
 
 from ..errors import TsdynError
 from ..integrators import DOP853, Nystrom4, Taylor
+from ..maths.tolerances import EPS
 from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
 from .gallery.cases import Case
 from .laws import energy_left, findings, resumed_is_same, same_bits
-from .tolerances import EPS
 
 TOLERANCE = 1e-15, 1e-12  # of Taylor, and of the other method
 OUTPUTS = 129  # output times of a run
@@ -23,7 +23,7 @@ PARTS = 5  # doublings of time, over which the growth of the energy error is fit
 SEEN = 2.0 * EPS  # energy errors below this are rounding: their growth is not fitted
 
 
-class Run(NamedTuple):
+class CheckedRun(NamedTuple):
     """A run of a case by the Taylor integrator, at the limit of rounding."""
 
     case: Case
@@ -31,10 +31,10 @@ class Run(NamedTuple):
 
 
 def run(case):
-    """Return the `Run` of a case."""
+    """Return the `CheckedRun` of a case."""
     t = np.linspace(0.0, case.end, OUTPUTS)
     options = {"integrator": Taylor(TOLERANCE[0]), "t_eval": t, "dense_output": True}
-    return Run(case, simulate(case.build(), (0.0, case.end), **options))
+    return CheckedRun(case, simulate(case.build(), (0.0, case.end), **options))
 
 
 def size(run):

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..elements.bodies import rotation_matrix
 from ..elements.markers import POINT
+from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, ROUNDING_AT_MOST, SUM_ROUNDING
 from ..model.equations import WIDTH, places, with_short_rows
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
@@ -18,24 +19,11 @@ from ..simulation.prepared_run import Run
 from ..simulation.resume import resume
 from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
 from ..simulation.simulate import simulate
-from .tolerances import (
-    BALANCE,
-    BODIES,
-    EPS,
-    FLOOR,
-    HELD,
-    ILL_CONDITIONED,
-    NEAR_SINGULAR,
-    NEAR_SINGULAR_ENDS,
-    OUTPUTS,
-    REDUNDANT,
-    ROUNDED_ROWS,
-    ROUNDINGS,
-    ROW_SHARE,
-    SAME,
-    SMALL_SCENE,
-    TIME,
-)
+
+from .tolerances import (  # isort: skip
+    BODIES, FLOOR, ILL_CONDITIONED, NEAR_SINGULAR, NEAR_SINGULAR_ENDS, OUTPUTS, ROUNDED, ROUNDED_ROWS, ROUNDINGS,
+    ROW_SHARE, SMALL_SCENE,
+)  # fmt: skip
 
 # What a law of a run has found.
 
@@ -243,7 +231,7 @@ def _shaken(solution):
     return other
 
 
-class Loads(NamedTuple):
+class BodyBalance(NamedTuple):
     """What acts on a body less the rate of its momentum, ground frame, and sums of absolute values."""
 
     body: object
@@ -270,7 +258,7 @@ def _loads(solution, body, items):
         force, size = force + load, size + amount
         torque = torque + moment + np.cross(arm, load)
         turning = turning + np.linalg.norm(moment, axis=1) + np.linalg.norm(arm, axis=1) * amount
-    return Loads(body, force, torque, size, turning)
+    return BodyBalance(body, force, torque, size, turning)
 
 
 def _neighbours(scene):
@@ -312,13 +300,13 @@ def _farthest(solution):
 
 def _balance_limit(solution):
     """Share of the terms of a balance that may be left."""
-    return BALANCE * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + rounding_of_places(solution)
+    return HALF_DIGITS * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + rounding_of_places(solution)
 
 
 def _balance(law, left, shaken, sizes, largest, limit, body):
     """Relative to the body's own terms; what is rounding of the largest terms in the scene doesn't count."""
     left = np.maximum(np.linalg.norm(left, axis=1) - np.linalg.norm(left - shaken, axis=1).max(), 0.0)
-    share = left / (sizes + (FLOOR / BALANCE * largest or 1.0))
+    share = left / (sizes + (FLOOR / HALF_DIGITS * largest or 1.0))
     return Finding(law, float(share.max(initial=0.0)), limit, body.name)
 
 
@@ -340,7 +328,7 @@ def dense_output(solution):
     state = solution.at(solution.t[at])
     limit = off_steps(solution)
     amplified = np.minimum(ROUNDED_ROWS * EPS / weakest_rows(solution, at) ** 2, NEAR_SINGULAR_ENDS)
-    rounding = TIME * EPS * np.abs(solution.t).max()  # of an instant
+    rounding = ROUNDING_AT_MOST * EPS * np.abs(solution.t).max()  # of an instant
     for name, rate in (("q", "qd"), ("qd", "qdd")):
         given, change = getattr(solution, name)[at], rounding * np.abs(getattr(solution, rate)[at])
         size = 1.0 + np.abs(given).max(initial=0.0)
@@ -358,14 +346,14 @@ def weakest_rows(solution, at):
         if len(rows):
             sizes = np.linalg.norm(rows, axis=1)
             values = np.linalg.svd(rows / np.where(sizes > 0.0, sizes, 1.0)[:, None], compute_uv=False)
-            found[i] = values[values > REDUNDANT].min(initial=1.0)
+            found[i] = values[values > NEGLIGIBLE].min(initial=1.0)
     return found
 
 
 def off_steps(solution):
     """How far dense output may be off the ends of steps, relative to the coordinates."""
-    near = HELD * _farthest(solution) / (extent(solution) or 1.0)
-    return SAME * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + near
+    near = SUM_ROUNDING * _farthest(solution) / (extent(solution) or 1.0)
+    return ROUNDED * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + near
 
 
 def is_near_singular(solution):

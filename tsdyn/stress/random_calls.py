@@ -207,7 +207,7 @@ WRITE = ("save", "view", "plot")  # files, and windows of a browser
 SPACES = (constraints, forces, integrators, motions)
 
 
-class Found(NamedTuple):
+class CallOutcome(NamedTuple):
     """One call: what it was, and its outcome; `story` is empty where that is allowed."""
 
     call: str
@@ -275,7 +275,7 @@ def leaks(result):
 
 
 def attempt(label, function, positional, keywords):
-    """The `Found` of one call."""
+    """The `CallOutcome` of one call."""
     given = [*map(_shown, positional), *(f"{name}={_shown(value)}" for name, value in keywords.items())]
     call = f"{label}({', '.join(given)})"
     result, story = None, ""
@@ -298,7 +298,7 @@ def attempt(label, function, positional, keywords):
         last = traceback.extract_tb(error.__traceback__)[-1]
         outcome = f"RAW {type(error).__name__}"
         story = f"{error} ({last.filename.rpartition('/')[2]}:{last.lineno})"
-    return Found(call, outcome, story), result
+    return CallOutcome(call, outcome, story), result
 
 
 def _shown(value):
@@ -310,7 +310,7 @@ def _shown(value):
 
 
 def fuzz(count, seed, runs=RUNS):
-    """Yield a `Found` for each of so many calls; the same ones for the same seed."""
+    """Yield a `CallOutcome` for each of so many calls; the same ones for the same seed."""
     rng = np.random.default_rng(seed)
     w = None
     for i in range(count):

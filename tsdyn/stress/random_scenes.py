@@ -130,7 +130,7 @@ METHODS = ("default", "default", "default", "taylor", "dop853", "rk45", "nystrom
 SIZES = ((0.9, 2, 12), (0.99, 12, 60), (1.0, 60, 400))  # share of scenes up to here, bodies from, to
 
 
-class Case(NamedTuple):
+class DrawnCase(NamedTuple):
     """A scene and how it is to be run."""
 
     name: str
@@ -278,12 +278,12 @@ KINDS = {
 
 
 def generate(seed, least=None, most=None):
-    """Return the `Case` of a seed; of so many bodies, about, where that is given."""
+    """Return the `DrawnCase` of a seed; of so many bodies, about, where that is given."""
     return drawn(np.random.default_rng(seed), least, most)
 
 
 def drawn(rng, least=None, most=None):
-    """Return the `Case` that a generator of random numbers draws."""
+    """Return the `DrawnCase` that a generator of random numbers draws."""
     share = rng.random()
     if least is None:
         least, most = next(sizes for limit, *sizes in SIZES if share < limit)
@@ -303,7 +303,7 @@ def drawn(rng, least=None, most=None):
     if rng.random() < 0.1 and len(d.scene.bodies) < 15 and method != "taylor" and d.is_si:
         options["formulation"] = "null-space"
     span = 0.0, float(rng.uniform(0.02, 0.5)) * d.time
-    return Case(f"{name}, {len(d.scene.bodies)} bodies, {method}", d.scene, span, options, d.assembled, d.length)
+    return DrawnCase(f"{name}, {len(d.scene.bodies)} bodies, {method}", d.scene, span, options, d.assembled, d.length)
 
 
 def moving(d):
@@ -484,7 +484,7 @@ PASSAGES = anchors, anchors, anchors, pendulum, loads, loads, of_time, friction,
 
 
 def draw(seed):
-    """Return the `Case` of a seed."""
+    """Return the `DrawnCase` of a seed."""
     rng = np.random.default_rng((seed, 2))
     scene = Scene(gravity=rng.choice((0.0, 1.0)) * rng.normal(size=3))
     kind = PASSAGES[rng.integers(len(PASSAGES))]
@@ -493,4 +493,4 @@ def draw(seed):
     options = {"rtol": tolerance, "atol": tolerance}
     if rng.random() < 0.5:
         options["integrator"] = "taylor"
-    return Case(f"{kind.__name__} by series", scene, (0.0, float(rng.uniform(0.5, 1.0))), options)
+    return DrawnCase(f"{kind.__name__} by series", scene, (0.0, float(rng.uniform(0.5, 1.0))), options)

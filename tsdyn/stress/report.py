@@ -49,7 +49,7 @@ LONGEST = 400  # characters of what a fault said
 NONE = "-"  # of a figure that a case doesn't have
 
 
-class Column(NamedTuple):
+class FigureColumn(NamedTuple):
     """A column of the table: its head, the figure, and how that is written."""
 
     head: str
@@ -58,21 +58,21 @@ class Column(NamedTuple):
 
 
 COLUMNS = (
-    Column("case", "case", ""),
-    Column("bodies", "bodies", "d"),
-    Column("rows", "rows", "d"),
-    Column("steps", "steps", "d"),
-    Column("time (s)", "seconds", ".2f"),
-    Column("Phi", "position", ".1e"),
-    Column("velocity", "velocity", ".1e"),
-    Column("acceleration", "acceleration", ".1e"),
-    Column("energy", "energy", ".1e"),
-    Column("exponent", "exponent", ".2f"),
-    Column("order", "order", ".2f"),
-    Column("methods", "agreement", ".1e"),
-    Column("same bits", "same", "yes"),
-    Column("resumed", "resumed", "yes"),
-    Column("laws", "broken", "kept"),
+    FigureColumn("case", "case", ""),
+    FigureColumn("bodies", "bodies", "d"),
+    FigureColumn("rows", "rows", "d"),
+    FigureColumn("steps", "steps", "d"),
+    FigureColumn("time (s)", "seconds", ".2f"),
+    FigureColumn("Phi", "position", ".1e"),
+    FigureColumn("velocity", "velocity", ".1e"),
+    FigureColumn("acceleration", "acceleration", ".1e"),
+    FigureColumn("energy", "energy", ".1e"),
+    FigureColumn("exponent", "exponent", ".2f"),
+    FigureColumn("order", "order", ".2f"),
+    FigureColumn("methods", "agreement", ".1e"),
+    FigureColumn("same bits", "same", "yes"),
+    FigureColumn("resumed", "resumed", "yes"),
+    FigureColumn("laws", "broken", "kept"),
 )
 LEGEND = (
     "Taylor at tolerance 1e-15. Phi, velocity, acceleration: largest constraint errors (m, m/s, m/s^2).",

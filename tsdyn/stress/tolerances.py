@@ -1,36 +1,23 @@
 """Limits of the laws; shares of the largest terms unless a unit is named."""
 
-import numpy as np
-
-EPS = float(np.finfo(float).eps)
-
 # A constraint error above this share of the sum of the absolute terms of its row is a wrong result. Terms that are
 # themselves rounding count as FLOOR of the largest coordinates of their kind in the scene.
 ROW_SHARE, FLOOR = 1e-9, 1e-12
-# Forces and torques of a body against its momentum's rate: multipliers solve S to rounding times its condition, in the
-# null-space form to constraint_tol times it.
-BALANCE = 1e-7
 # Roundings of positions and of moments about the origin that are allowed: they are differences of large numbers.
 ROUNDINGS = 1e5
 # Energy less work, momenta, and two methods or forms: this multiple of the tolerance, relative to the motion's size;
 # beyond it a run at a TIGHTER tolerance, or of SHORTER fixed steps, must come closer by FALL at least.
 MULTIPLE, TIGHTER, SHORTER, FALL = 1e3, 1e-3, 8.0, 0.1
-# Below this change relative to the size nothing is judged by convergence: it is rounding, amplified.
+# Below this change relative to the size nothing is judged by convergence: it is rounding, amplified. Of dense output at
+# the ends of steps, and of output times beside steps, likewise.
 ROUNDED = 1e-10
 # Of the ends of two runs past singular configurations, which amplify rounding; the other branch is off by far more.
 NEAR_SINGULAR_ENDS = 1e-4
-# Dense output at the ends of steps; output times beside steps.
-SAME = 1e-10
-# Roundings of an instant, and of places that are passed within as many: what is interpolated there changes by its rate
-# times these.
-TIME = 1e2
-# Share of the farthest position to which positions are held: in small scenes far away angles are, over their size.
-HELD = 1e-14
 # Next to a singular configuration, where a chart has a condition of ILL_CONDITIONED or more, rounding is amplified by
 # so much.
 NEAR_SINGULAR, ILL_CONDITIONED = 1e3, 1e8
 # Velocities change by a rounding of positions over the square of the smallest singular value of unit rows; so many
-# roundings. Smaller values than REDUNDANT are those of redundant rows. Coordinates up to which they are computed.
-ROUNDED_ROWS, REDUNDANT, SMALL_SCENE = 10.0, 1e-12, 200
+# roundings. Values below NEGLIGIBLE are those of redundant rows. Coordinates up to which they are computed.
+ROUNDED_ROWS, SMALL_SCENE = 10.0, 200
 # Outputs of a run that are judged, and bodies whose balance is: the first, the last, and some between.
 OUTPUTS, BODIES = 25, 12

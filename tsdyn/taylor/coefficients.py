@@ -170,8 +170,7 @@ def run_loops(graph, reals, mode, k, x, f):
     for i in range(graph.kinds.shape[0]):
         kind, series = graph.kinds[i], x.places[i]
         call_series(
-            series.loop, mode, k, x.order.room, kind.count, kind.stride, series.width,
-            graph.table[kind.table :], reals[kind.reals :],
+            series.loop, mode, k, series, graph.table[kind.table :], reals[kind.reals :],
             x.bodies, x.constraints[series.values :], f.b, f.Z,
         )  # fmt: skip
 
@@ -184,8 +183,8 @@ def run_forces(reals, x, k, f):
         if kind.run != 0:
             x.loads[kind.values] = x.order.time
         call_series(
-            kind.loop, kind.run, k, x.order.room, kind.count, kind.stride, kind.width,
-            x.table[kind.table :], reals[kind.reals :], x.bodies, x.loads[kind.values :], f.poses, f.Z,
+            kind.loop, kind.run, k, kind, x.table[kind.table :], reals[kind.reals :],
+            x.bodies, x.loads[kind.values :], f.poses, f.Z,
         )  # fmt: skip
 
 

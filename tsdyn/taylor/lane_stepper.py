@@ -5,63 +5,28 @@ import math
 from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R, orient
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..elements.loops.law_check import call_margin
-from ..formulations.tolerances import LAND_SWEEPS, ROUNDING, ROUNDING_AT_MOST, STALLED, WALK
+from ..formulations.tolerances import LAND_SWEEPS, STALLED, WALK
 from ..jit.kernels import kernel, long_kernel, specialised
 from ..jit.lanes import any_of, below, binary_log, binary_power, both, choose, either, every, floor, opposite
 from ..jit.simd import add, first, fma, four, fourth, get, larger, let, put, second, splat, sub, third, times, total
-from ..rows.interface import (
-    DYNAMICS,
-    ILL_CONDITIONED,
-    evaluate_residuals,
-    evaluate_without_redundant,
-    factorise_selected_rows,
-    find_correction,
-)
+from ..maths.tolerances import ROUNDING, ROUNDING_AT_MOST, TINY
+
+from ..rows.interface import (  # isort: skip
+    DYNAMICS, ILL_CONDITIONED, evaluate_residuals, evaluate_without_redundant, factorise_selected_rows, find_correction,
+)  # fmt: skip
 from ..runs.step_control import stretch
-from ..runs.tolerances import FROM_ZERO, SHORTEST
+from ..runs.tolerances import FROM_ZERO, HALVED, SHORTEST
 from . import coefficients
 from .coefficients import put_sum
-from .lane_memory import (
-    BAD,
-    BEFORE,
-    DONE,
-    FLOOR,
-    INDICATOR,
-    LEFT,
-    LOST,
-    MOVED,
-    NEXT,
-    RESIDUAL,
-    RUNS,
-    SIZE,
-    SLOW,
-    STEPS,
-    T_NEXT,
-    TOP,
-    H,
-    T,
-    spin,
-    turn_ahead,
-)
+
+from .lane_memory import (  # isort: skip
+    BAD, BEFORE, DONE, FLOOR, INDICATOR, LEFT, LOST, MOVED, NEXT, RESIDUAL, RUNS, SIZE, SLOW, STEPS, T_NEXT, TOP, H, T,
+    spin, turn_ahead,
+)  # fmt: skip
 from .layout import L_OMEGA, L_P, L_R, L_RD, LOW
 from .step_end import keep_start, project_rates
 from .step_length import largest_of_three, size_of_order
-from .tolerances import (
-    FAINT_LOGARITHM,
-    HALVED,
-    HALVINGS,
-    LEAST_SIZE,
-    MISSED,
-    MOST_PARTS,
-    NO_STEP,
-    SMALL,
-    SMALL_STEPS,
-    STEP_COST,
-    STIFF_RATES,
-    STILL,
-    WARY,
-    WIDE,
-)
+from .tolerances import FAINT, HALVINGS, MOST_PARTS, SMALL, SMALL_STEPS, STEP_COST, STIFF_RATES, STILL, WARY, WIDE
 
 # Projection of each lane onto the constraint manifold, as formulations/projection.py has it for one case.
 #
@@ -352,7 +317,7 @@ def _radii(c, least, most, far, fast):
         size = size_of_order(x.bodies, nb, x.order.room, k, far, fast)
         own = below(k - 1.5, top)
         finite = choose(both(own, below(-1.0, 0.0 * size)), finite, choose(own, 0.0, finite))
-        here = choose(below(LEAST_SIZE, size), binary_log(max(size, LEAST_SIZE)) * (-1.0 / k), math.inf)
+        here = choose(below(TINY, size), binary_log(max(size, TINY)) * (-1.0 / k), math.inf)
         # Orders top + 1 to top - 2
         rho = choose(both(own, below(top - 2.5, k)), min(rho, here), rho)
         # Orders top - 1 to top - 4, for two orders less
@@ -361,9 +326,9 @@ def _radii(c, least, most, far, fast):
     likely = 0.0 * top - math.inf  # log2 of coefficient top + 1, from those of orders 4 and 5
     for k in range(4, 6):
         size = size_of_order(x.bodies, nb, x.order.room, k, far, fast)
-        here = choose(below(0.0, size), binary_log(max(size, LEAST_SIZE)) * ((top + 1.0) / k), -math.inf)
+        here = choose(below(0.0, size), binary_log(max(size, TINY)) * ((top + 1.0) / k), -math.inf)
         likely = max(likely, here)
-    finite = choose(both(below(-math.inf, likely), below(likely, FAINT_LOGARITHM)), 0.0, finite)
+    finite = choose(both(below(-math.inf, likely), below(likely, math.log2(FAINT))), 0.0, finite)
     return choose(below(0.5, finite), rho, -math.inf), lower
 
 
@@ -383,7 +348,7 @@ def propose(c, least, most):
     rho, lower = _radii(c, least, most, far, fast)
     # log2 of tol
     accuracy = math.log(n.atol + n.rtol) / math.log(2.0)
-    h = choose(below(-math.inf, rho), _held(rho + accuracy / (top + 2.0), rate, top + 2.0), NO_STEP)
+    h = choose(below(-math.inf, rho), _held(rho + accuracy / (top + 2.0), rate, top + 2.0), 0.0)  # none ends the lane
     if order.highest > order.lowest:
         # Higher order if it advances further per unit of work
         other = _held(lower + accuracy / top, rate, top)
@@ -456,8 +421,8 @@ def _is_missed(c, again):
     """Whether lanes have missed the manifold: their steps are halved, or, if not to be tried `again`, they are lost."""
     s, tol, missed = c.single, c.numbers.atol + c.numbers.rtol, False
     for l in range(s.shape[1]):
-        # As MISSED of taylor/stepper.py
-        lands = s[BAD, l] == 0.0 and s[RESIDUAL, l] <= MISSED * (tol + s[FLOOR, l])
+        # As in taylor/stepper.py
+        lands = s[BAD, l] == 0.0 and s[RESIDUAL, l] <= ROUNDING_AT_MOST * (tol + s[FLOOR, l])
         if s[RUNS, l] != 0.0 and s[LOST, l] == 0.0 and not lands:
             if not again:
                 s[LOST, l] = 1.0
@@ -482,10 +447,7 @@ def _keep_away(c, most):
         if kind.margin != 0:
             # Share of what laws divide by
             let(s, LEFT, 0.0 * get(s, H) + 1.0)
-            call_margin(
-                kind.margin, kind.count, kind.stride, kind.width, x.order.room, most, s[H:],
-                x.loads[kind.values :], s[LEFT:],
-            )  # fmt: skip
+            call_margin(kind.margin, most, kind, s[H:], x.loads[kind.values :], s[LEFT:])
             short = below(STIFF_RATES * get(s, H), get(s, TOP))
             _find_lost(c, opposite(below(choose(short, STILL, 0.0 * get(s, H)), get(s, LEFT))))
 

@@ -32,21 +32,25 @@ from .tolerances import FAR
 
 
 class ConstraintSeries(Record):
-    """All instances of one class of primitive."""
+    """All instances of one class of primitive; it begins as an `Extent`."""
 
+    count: int
+    stride: int  # reals of each
+    width: int  # floats of each one's series
+    orders: int  # that there is room for
     loop: int  # address of constraint_series.loop
     values: int  # where the series of the first begin in Expansion.constraints
-    width: int  # floats of each
 
 
 class ForceSeries(Record):
-    """All instances of one kind of force."""
+    """All instances of one kind of force; it begins as an `Extent`."""
 
-    loop: int  # address of force_series.loop
-    values: int  # where the series of the first begin in Expansion.loads
-    width: int  # floats of each
     count: int
     stride: int  # reals of each
+    width: int  # floats of each one's series
+    orders: int  # that there is room for
+    loop: int  # address of force_series.loop
+    values: int  # where the series of the first begin in Expansion.loads
     table: int  # where the entries of the first begin in Expansion.table
     reals: int  # and in System.reals
     check: int  # address of law_check.check; 0 where the law is analytic everywhere
@@ -222,7 +226,7 @@ def lay_out_forces(packed, orders):
             loop, check, margin = found
             width = _width(force, kind, orders, force.sharp or _is_driven(members[0]))
             run = run_order.address if kind.program else 0
-            rows.append([loop, total, width, len(members), row.stride, len(table), reals])
+            rows.append([len(members), row.stride, width, orders, loop, total, len(table), reals])
             rows[-1] += [check, margin, int(kind.sharp), 0, run, int(kind.sharp and changes_with_state(members[0]))]
             written.append((total, kind.program))
             total += len(kind.program)
@@ -454,7 +458,8 @@ def allocate_expansion(graph, kinds, packed, highest):
         driven = bool(graph.kinds[i].drift)
         slots = kind.slots + (len(kind.quantities()) if driven else 0)
         width = instance_width(len(kind.markers), kind.rows, slots, orders, varies, driven)
-        rows.append([address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint), total, width])
+        loop = address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint)
+        rows.append([count, graph.kinds[i].stride, width, orders, loop, total])
         total += count * width
     places = records(ConstraintSeries, rows)
     constraints, forces = zeros(total + 4), lay_out_forces(packed, orders)

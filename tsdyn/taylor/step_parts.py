@@ -15,22 +15,16 @@ from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import set_time
 from ..motions.program import call_smooth
-from ..rows.interface import (
-    accelerations_hold,
-    evaluate_bias,
-    has_redundant_rows,
-    is_near_singular,
-    rates_hold,
-    refinements,
-    return_to_selection,
-    save_selection,
-    select_rows,
-    singularity_indicator,
-)
+
+from ..rows.interface import (  # isort: skip
+    accelerations_hold, evaluate_bias, has_redundant_rows, is_near_singular, rates_hold, refinements,
+    return_to_selection, save_selection, select_rows, singularity_indicator,
+)  # fmt: skip
+from ..rows.tolerances import UNEQUAL_MASSES
 from .coefficients import begin, expand
 from .layout import load_series
 from .step_end import keep_start, project_rates, sum_series
-from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL, UNEQUAL_PIVOTS
+from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL
 
 # Taylor series of prescribed motions and of loads, for Taylor runs of driven scenes.
 
@@ -196,8 +190,8 @@ def _is_off(c, i, limits):
     x, kind = c.expansion, c.expansion.forces[i]
     limits[MOST] = OFF if kind.sharp == 1 else OFF_SELDOM
     off = call_check(
-        kind.check, kind.run, kind.count, kind.stride, kind.width, x.order.room, x.order.top, limits,
-        x.table[kind.table :], c.system.reals[kind.reals :], x.bodies, x.loads[kind.values :], c.graph.inverse,
+        kind.check, kind.run, x.order.top, kind, limits, x.table[kind.table :], c.system.reals[kind.reals :],
+        x.bodies, x.loads[kind.values :], c.graph.inverse,
     )  # fmt: skip
     return off != 0
 
@@ -219,10 +213,7 @@ def _may_differ(c, t, limits):
         # sum_{k>0} |a_k| h^k < a_0 leaves a share of a_0: none of what the law divides by vanishes
         if kind.margin != 0:
             left[0] = 1.0
-            call_margin(
-                kind.margin, kind.count, kind.stride, kind.width, x.order.room, x.order.top, limits[LENGTH:],
-                x.loads[kind.values :], left,
-            )  # fmt: skip
+            call_margin(kind.margin, x.order.top, kind, limits[LENGTH:], x.loads[kind.values :], left)
             kind.near = 0 if left[0] > (STILL if is_short else 0.0) else 1
             if not left[0] >= c.trial.left:
                 c.trial.left = left[0]
@@ -290,7 +281,7 @@ def pass_singular(context, t, h):
 @kernel
 def is_singular(c, status):
     """Whether the state of `reach`, or the one that it failed to reach, is near a singular configuration."""
-    limit = NEXT_TO_SINGULAR * min(1.0, c.tangent.indicator.largest / UNEQUAL_PIVOTS)
+    limit = NEXT_TO_SINGULAR * min(1.0, c.tangent.indicator.largest * UNEQUAL_MASSES)
     return status == SINGULAR or (status == 0 and singularity_indicator(c.graph, c.tangent.rows) < limit)
 
 

@@ -7,6 +7,7 @@ from ..errors import Status
 from ..formulations.chart_validity import AT_START, BY_SERIES, extent
 from ..jit.kernels import entry, kernel, long_kernel
 from ..maths.dense_linalg import copy, is_finite
+from ..maths.tolerances import ROUNDING_AT_MOST, TINY
 from ..model.equations import remember, set_time
 from ..model.joint_turns import count_turns
 from ..motions.tolerances import SAMPLES
@@ -15,42 +16,16 @@ from ..runs.dense_output import head_block, is_wanted_before, record, record_end
 from ..runs.run_log import close_chart, is_full, no_log, note_accepted, note_try, open_chart
 from ..runs.step_control import gets_on, stretch
 from ..runs.stepper import amend, fixed_end, is_sampled, next_stop, take_pieces
-from ..runs.tolerances import AT_LONGEST, FROM_ZERO, SHORTEST, TRIES
+from ..runs.tolerances import AT_LONGEST, FROM_ZERO, HALVED, MOST_TURN, SHORTEST, TRIES
 from ..workspaces import B_DATA, load_run
 from .layout import load_series
 from .step_length import finite_top, is_near, longest, loosest, radius, step_length, weights
 from .step_parts import call_expand, call_laws, call_reach, hold_accelerations, is_singular, set_floor, state_within
-from .tolerances import (
-    AT_REST,
-    AVOID,
-    AVOIDING,
-    CLOSE,
-    CLOSER,
-    COARSE,
-    FASTER,
-    HALVED,
-    HOP,
-    HOP_APART,
-    LEAST_STEPS,
-    LOOSER,
-    MINUTE,
-    MISSED,
-    MOST_HOPS,
-    MOST_TURN,
-    NO_SPEED,
-    PASSED,
-    PLACES,
-    RATES,
-    SHARP_STEPS,
-    SMALL,
-    SMALL_STEPS,
-    SPARE,
-    STILL,
-    STILL_STEP,
-    TIGHTER,
-    TIGHTEST,
-    WARY,
-)
+
+from .tolerances import (  # isort: skip
+    AT_REST, AVOID, AVOIDING, CLOSE, CLOSER, FASTER, HOP, HOP_APART, LEAST_STEPS, LOOSER, MINUTE, MOST_HOPS, PASSED,
+    PLACES, RATES, SHARP_STEPS, SHARP_TOL, SMALL, SMALL_STEPS, SPARE, STILL, STILL_STEP, TIGHTER, TIGHTEST, WARY,
+)  # fmt: skip
 
 # Stops of a Taylor run: continuation after a step that ends at a stop.
 
@@ -150,7 +125,7 @@ def _propose(c, r, tol):
         s.h *= min(1.0, RATES * s.h / (order.top + 2)) ** (1.0 / (order.top + 2))
         s.limit = min(s.limit, (r.clock.t_end - r.clock.t_origin) / LEAST_STEPS)
     if c.system.memory.size > 0:  # what counts turns must see each of them
-        s.limit = min(s.limit, MOST_TURN / max(_fastest(c), NO_SPEED))
+        s.limit = min(s.limit, MOST_TURN / max(_fastest(c), TINY))
     if r.numbers.steps == 0 and r.clock.h > 0.0:
         s.limit = min(s.limit, r.clock.h)
     s.h = min(s.h, s.limit)
@@ -304,7 +279,7 @@ def make_step(context, c, r, log, stop):
         # Fixed steps end the run where the series leaves a law, adaptive ones are shortened
         note_try(r, log, r.clock.t, s.t1 - r.clock.t)
         if not adaptive and s.check != 0:
-            call_laws(s.check, context, r.clock.t, s.t1 - r.clock.t, COARSE, COARSE)
+            call_laws(s.check, context, r.clock.t, s.t1 - r.clock.t, SHARP_TOL, SHARP_TOL)
             if s.good < 1.0:
                 return SERIES_ENDED
         if adaptive and s.check != 0 and not _follows_laws(context, c, r):
@@ -323,7 +298,9 @@ def make_step(context, c, r, log, stop):
             _reject(r, log)
             continue
         # A projection that moves further than the tolerance corrects no truncation error: the radius was wrong
-        landed = status == 0 and (not adaptive or f.landing.residual <= MISSED * (s.tol + c.work.control.floor))
+        landed = status == 0 and (
+            not adaptive or f.landing.residual <= ROUNDING_AT_MOST * (s.tol + c.work.control.floor)
+        )
         if landed:
             f.indicator.end = singularity_indicator(c.graph, f.rows)
         if not adaptive:

@@ -10,21 +10,11 @@ STEP_COST = 3
 # Range of the coefficients of a step's last order: products of smaller ones lose digits, those of larger ones overflow.
 FAINT, VAST = 1e-280, 1e280
 
-# |Phi| at the end of a step, over tolerance and rounding: a larger residual is no truncation error, so the radius of
-# convergence was overestimated.
-MISSED = 100.0
-
-# rad of the fastest body in a step where joint angles are counted by forces: two steps a turn would do.
-MOST_TURN = 1.0
-
 # Parts of a step in which Euler parameters are followed, one for each radian, at most.
 MOST_PARTS = 100.0
 
 # d0^2 of the rotation of a step, above which p follows from its increment: 2 rad.
 WIDE = 0.3
-
-# Factor of a step whose end was not reached.
-HALVED = 0.5
 
 # Velocity error over position error, 1/s, up to which only the latter limits the steps of sharp forces. Such steps can
 # be very short, and the velocity error is the position error over the step.
@@ -37,16 +27,14 @@ STIFF_RATES = 1000.0
 # more (motions/tolerances.py, SAMPLES). Steps of a run at least, since a pulse between two places is missed.
 PLACES, LEAST_STEPS = 4, 8
 # atol and rtol of that comparison where steps are fixed and have no tolerance: above the errors of series in too long a
-# step, below those of series that have ended.
-COARSE = 1e-3
+# step, below those of series that have ended. Also the loosest tolerance of Radau where there are sharp forces: at
+# 0.005 a step flies over the place where a body breaks loose, whose error is a hundred times that at 0.001.
+SHARP_TOL = 1e-3
 
 # HOP: length of a step over a place where a law is not analytic, over the shortest step (runs/tolerances.py, SHORTEST):
 # forces are bounded there, so its error is rounding. Within HOP_APART lengths of the one before, such a step is
 # twice as long; after MOST_HOPS of them the run ends: the motion comes to rest there.
 HOP, MOST_HOPS, HOP_APART = 16.0, 8, 1e3
-
-# Angular velocity (rad/s) that counts as none.
-NO_SPEED = 1e-300
 
 # --- stiffness -------------------------------------------------------------------------------------------------------
 # rad, and part of the scene's size: after SMALL_STEPS successive steps in which no body rotates or moves by more, the
@@ -65,8 +53,7 @@ SHARP_STEPS, MINUTE, AT_REST = 400, 1e-6, 8
 # those of the series are used. Below GONE a row is omitted from a projection, which would amplify position errors
 # beyond the error of the series.
 NEXT_TO_SINGULAR, GONE = 1e-8, 1e-10
-# Largest pivot of a run below which masses are so unequal that no pivot is large: NEXT_TO_SINGULAR is relative to it.
-UNEQUAL_PIVOTS = 1e-4
+# Where masses are so unequal that no pivot of a run is above 1 / UNEQUAL_MASSES, NEXT_TO_SINGULAR is relative to it.
 
 # Indicator at the end of a step over that at its start, below which the step approaches a singular configuration; ends
 # too close to continue; ends too close even beyond it. Measured on rows of parallelograms
@@ -101,11 +88,5 @@ FAR = 1 << 15
 
 # Thresholds of lanes.
 
-# Size of a coefficient, over its weight, that counts as zero: it doesn't determine the radius of convergence.
-LEAST_SIZE = 1e-300
-# log2 of the size of the last coefficient below which it loses digits, as FAINT of taylor/tolerances.py.
-FAINT_LOGARITHM = -930.0
-# s: the length of a step without a radius of convergence, which ends the lane.
-NO_STEP = 0.0
 # Times that a step which has missed the manifold is halved before its case is left to be run alone.
 HALVINGS = 4

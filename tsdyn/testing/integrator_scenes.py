@@ -5,17 +5,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..benchmarking.tolerances import REFERENCE_TOLERANCES
 from ..constraints import Distance, PlaneContact, Spherical
 from ..integrators import DOP853, RK45
 from ..simulation.scene import Scene
 from ..simulation.simulate import simulate
-from .tolerances import BRIEF, TIGHT
+from .tolerances import BRIEF
 
 GRID = 16  # equal parts of the span, at whose ends fixed steps are compared
 INNER = np.sort(np.random.default_rng(1).uniform(0.01, 0.99, 40))  # fractions of the span, within the steps
 
 
-class Case(NamedTuple):
+class ReferenceScene(NamedTuple):
     """A scene and where it is at times t, by two methods that agree to `trusted`, relative to 1 + the size."""
 
     name: str
@@ -72,18 +73,19 @@ SCENES: dict[str, tuple[Callable[[], Scene], float]] = {
 
 
 def cases(kind, order=2):
-    """Yield a `Case` for each scene, for methods of an order; the reference is not by the method `kind`, the judged."""
+    """Yield a `ReferenceScene` for each scene, for methods of an order; its reference isn't by the judged `kind`."""
     first, second = (RK45, DOP853) if isinstance(kind, type) and issubclass(kind, DOP853) else (DOP853, RK45)
     for name, (build, end) in SCENES.items():
         end *= BRIEF if order == 1 else 1.0
         scene, grid, inner = build(), np.linspace(0.0, end, GRID + 1), end * INNER
         times = np.union1d(grid, inner)
+        tightest = REFERENCE_TOLERANCES[-1]
         best, other = (
-            simulate(scene, (0.0, end), integrator=method(TIGHT, TIGHT), t_eval=times).raise_if_failed()
+            simulate(scene, (0.0, end), integrator=method(tightest, tightest), t_eval=times).raise_if_failed()
             for method in (first, second)
         )
         at, within = np.searchsorted(times, grid), np.searchsorted(times, inner)
-        yield Case(
+        yield ReferenceScene(
             name, scene, end, grid, inner, best.q[at], best.qd[at], best.q[within], best.qd[within],
             max(distance(best.q, other.q), distance(best.qd, other.qd)),
         )  # fmt: skip

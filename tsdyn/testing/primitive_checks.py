@@ -13,11 +13,12 @@ from ..elements.primitive import Primitive
 from ..errors import CheckFailed, InvalidCall, TsdynError
 from ..jit.kernels import NumbaError, twin
 from ..maths.power_series import Jet
+from ..maths.tolerances import COMPLEX_STEP
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
 from .series_checks import check_constraint_series, instances, maker
-from .tolerances import COMPLEX_STEP, NOT_ANALYTIC, REAL_STEP, ROUNDED
+from .tolerances import NOT_ANALYTIC, REAL_STEP, ROUNDED
 
 if TYPE_CHECKING:
     from collections.abc import Callable

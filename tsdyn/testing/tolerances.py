@@ -1,13 +1,7 @@
 """Limits of the checks of plug-ins, as shares of the size of what is compared unless a unit is named."""
 
-import numpy as np
-
-EPS = float(np.finfo(float).eps)
-
 # Compiled values against the Python function, and derivatives by complex steps or truncated series: both round.
 ROUNDED = 1e-11
-# Complex steps cancel nothing; the square of the step stays above the least number there is.
-COMPLEX_STEP = 1e-40
 # A real difference quotient with this step, of x of size 1, shows a phi that isn't analytic: its truncation is 1e-10.
 REAL_STEP, NOT_ANALYTIC = 1e-5, 1e-4
 # Central differences of sixth order: the seventh root of the rounding error is their best step, and what they leave.
@@ -36,7 +30,3 @@ REPEATED, REJECTED, BOUNDED = 1e-4, 1e-6, 1e-3
 # Trace that a rejected step may leave in the next one: none but rounding; of implicit methods, this share of the
 # tolerance of an iteration.
 NO_TRACE, ITERATION_TRACE = 1e-12, 0.1
-# The last step may be stretched by a thousandth, to end on time.
-STRETCHED = 1.002
-# Agreement of the two references of a scene.
-TIGHT = 1e-13

@@ -12,20 +12,10 @@ from ..constraints import PlaneContact
 from ..errors import InvalidArgument, StepFailure
 from ..shapes import Mesh
 from ..validation import sequence, vector3
-from .symbols import (
-    UNIT,
-    Attached,
-    Part,
-    attached,
-    by_body,
-    derived,
-    drawn_solid,
-    given,
-    joint_points,
-    reaches,
-    rounded,
-    symbols,
-)
+
+from .symbols import (  # isort: skip
+    UNIT, Attached, Part, attached, by_body, derived, drawn_solid, given, joint_points, reaches, rounded, symbols,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from ..hints import Floats, Solution

@@ -45,7 +45,7 @@ class Part(NamedTuple):
         return data | {"contact": True} if self.contact else data
 
 
-class Link(NamedTuple):
+class Connector(NamedTuple):
     """A rod or a coil between a point of each of two bodies."""
 
     kind: str  # "cylinder", "coil"
@@ -276,7 +276,7 @@ SYMBOL = 0.08  # radius, per reach of the smaller body
 APART = 1e-6  # distance of the points of an element that has no symbol of its own, per reach, that is shown by a line
 
 
-def symbols(each: Attached, reach: Any, girth: Any, apart: float) -> list[Part | Link]:
+def symbols(each: Attached, reach: Any, girth: Any, apart: float) -> list[Part | Connector]:
     """Parts and links of a constraint or force, that show outside of its bodies.
 
     reach and girth (b,), m, are those of all bodies; apart is the distance of its two points at the start, m.
@@ -304,7 +304,7 @@ def _part(each, letter, kind, axis, size, colour=STEEL, shift=0.0):
 
 
 def _link(kind, each, radius, colour):
-    return Link(kind, each.a, each.point("a"), each.b, each.point("b"), radius, colour)
+    return Connector(kind, each.a, each.point("a"), each.b, each.point("b"), radius, colour)
 
 
 def _ball(each, r, letter="a"):

@@ -1,4 +1,4 @@
-"""Second derivatives of the constraints, for implicit methods: one loop over all instances of a kind of primitive.
+"""Second derivatives of the constraints, for implicit methods: loops over all instances of a kind of primitive.
 
     K  += (Phi_q^T lam)_q                          (n, n)
     G1  = (Phi_q qd)_q + Phi_qt                    (m, n)   derivative of Phi_q qd + Phi_t with respect to q
@@ -17,33 +17,24 @@ from ...maths.vectors import rotate_gradient
 from ..markers import PARAMETERS, chain_rule, rate
 from ..tolerances import CONSTRAINT_STEP
 from .coordinate_rows import INTS, ROW, STRIDE
-from .template import (
-    AT,
-    CODES,
-    DIMENSION,
-    MARKERS,
-    OWNERS,
-    ROWS,
-    SIZE,
-    STARTS,
-    differentiate,
-    kernel_gamma,
-    kernel_jacobian,
-    move_markers,
-)
 
-SIGNATURE = "iipppppdpppp"  # count, stride, table, reals, q, qd, qdd, t, lam, K, G1, G2
+from .template import (  # isort: skip
+    AT, CODES, DIMENSION, MARKERS, OWNERS, ROWS, SIZE, STARTS, differentiate, kernel_gamma, kernel_jacobian,
+    move_markers, place_markers,
+)  # fmt: skip
+
+STIFFNESS = "iipppdpp"  # count, stride, table, reals, q, t, lam, K
+SLOPES = "iipppppdpp"  # count, stride, table, reals, q, qd, qdd, t, G1, G2
 SPAN = 14  # coordinates of two bodies
 
 
 class Slopes(NamedTuple):
-    """Derivatives of one instance with respect to its markers."""
+    """Derivatives of one instance with respect to its markers, each (ROWS, SIZE)."""
 
-    J: np.ndarray  # (ROWS, SIZE)  Phi_x
-    a1: np.ndarray  # (ROWS, SIZE)  Phi_xx xd + Phi_xt
-    a2: np.ndarray  # (ROWS, SIZE)  Phi_xx xdd + gamma_x
-    g_xd: np.ndarray  # (ROWS, SIZE)  gamma_xd
-    H: np.ndarray  # (SIZE, SIZE)  (Phi_x^T lam)_x
+    J: np.ndarray  # Phi_x
+    a1: np.ndarray  # Phi_xx xd + Phi_xt
+    a2: np.ndarray  # Phi_xx xdd + gamma_x
+    g_xd: np.ndarray  # gamma_xd
 
 
 @kernel
@@ -68,36 +59,36 @@ def _accelerate_markers(q, qdd, own, real, xdd):
 
 
 @part
-def _derive(x, xd, xdd, par, t, lam, slopes):
-    """With respect to the markers, by complex steps along x_c and xd_c.
+def _slope_of_jacobian(z, x, c, par, t, zJ):
+    """Im zJ = h Phi_x,x_c by a step along x_c; z = x on entry, but for that step on exit."""
+    z[c] = complex(x[c], CONSTRAINT_STEP)
+    for r in range(ROWS):
+        for d in range(SIZE):
+            zJ[r, d] = 0.0
+    kernel_jacobian(z, par, t, zJ)
+
+
+@part
+def _derive_rates(x, xd, xdd, par, t, slopes):
+    """The `Slopes`, by complex steps along x_c and xd_c.
 
     gamma_xd = 2 (Phi_xx xd + Phi_xt), since gamma is quadratic in xd.
     """
-    J, a1, a2, g_xd, H = slopes
+    J, a1, a2, g_xd = slopes
     z, zd = complex_stack(SIZE), complex_stack(SIZE)
     zJ, zg = complex_stack2(ROWS, SIZE), complex_stack(ROWS)
-    # Complex copies of x and xd, and Phi_x
     for c in range(SIZE):
         z[c], zd[c] = x[c], xd[c]
-        for d in range(SIZE):
-            H[c, d] = 0.0
     differentiate(x, par, t, J)
     for c in range(SIZE):
-        # Along x_c: slopes of Phi_x and gamma
-        z[c] = complex(x[c], CONSTRAINT_STEP)
-        for r in range(ROWS):
-            for d in range(SIZE):
-                zJ[r, d] = 0.0
-        kernel_jacobian(z, par, t, zJ)
+        # Along x_c: a2 = Phi_xx xdd + gamma_x
+        _slope_of_jacobian(z, x, c, par, t, zJ)
         kernel_gamma(z, zd, par, t, zg)
         z[c] = x[c]
         for r in range(ROWS):
-            # a2 = Phi_xx xdd + gamma_x,  H = (Phi_x^T lam)_x
             total = zg[r].imag / CONSTRAINT_STEP
             for d in range(SIZE):
-                slope = zJ[r, d].imag / CONSTRAINT_STEP
-                total += slope * xdd[d]
-                H[d, c] += lam[r] * slope
+                total += zJ[r, d].imag / CONSTRAINT_STEP * xdd[d]
             a2[r, c] = total
         # Along xd_c: gamma_xd
         zd[c] = complex(xd[c], CONSTRAINT_STEP)
@@ -106,6 +97,23 @@ def _derive(x, xd, xdd, par, t, lam, slopes):
         for r in range(ROWS):
             g_xd[r, c] = zg[r].imag / CONSTRAINT_STEP
             a1[r, c] = 0.5 * g_xd[r, c]
+
+
+@part
+def _derive_reaction(x, par, t, lam, J, H):
+    """J = Phi_x and H (SIZE, SIZE) = (Phi_x^T lam)_x, by complex steps along x_c."""
+    z, zJ = complex_stack(SIZE), complex_stack2(ROWS, SIZE)
+    for c in range(SIZE):
+        z[c] = x[c]
+        for d in range(SIZE):
+            H[c, d] = 0.0
+    differentiate(x, par, t, J)
+    for c in range(SIZE):
+        _slope_of_jacobian(z, x, c, par, t, zJ)
+        z[c] = x[c]
+        for r in range(ROWS):
+            for d in range(SIZE):
+                H[d, c] += lam[r] * (zJ[r, d].imag / CONSTRAINT_STEP)
 
 
 @part
@@ -174,31 +182,16 @@ def _add_geometric(own, real, lam, J, XHX):
                     XHX[7 * k + 3 + b, 7 * k + 3 + d] += e[b]
 
 
-def loop(count, stride, table, reals, q, qd, qdd, t, lam, K, G1, G2):
-    """All instances: K +=, G1 =, G2 =; twelve arguments, as a callback is given each array by its address."""
-    table, reals, lam = integers(table, ANY), vector(reals, ANY), vector(lam, ANY)
-    q, qd, qdd = vector(q, ANY), vector(qd, ANY), vector(qdd, ANY)
-    K, G1, G2 = vector(K, ANY), vector(G1, ANY), vector(G2, ANY)
-    x, xd, xdd = stack(SIZE), stack(SIZE), stack(SIZE)
-    J, a1, a2, g_xd = stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE)
-    H, XHX = stack2(SIZE, SIZE), stack2(SPAN, SPAN)
-    slopes = Slopes(J, a1, a2, g_xd, H)
+def geometric_stiffness(count, stride, table, reals, q, t, lam, K):
+    """All instances: K += (Phi_q^T lam)_q."""
+    table, reals, q = integers(table, ANY), vector(reals, ANY), vector(q, ANY)
+    lam, K = vector(lam, ANY), vector(K, ANY)
+    x, J, H, XHX = stack(SIZE), stack2(ROWS, SIZE), stack2(SIZE, SIZE), stack2(SPAN, SPAN)
     for i in range(count):
-        # Markers at q and qd, and their accelerations with qdd
         own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
         own_lam, n = lam[own[ROW] :], own[STRIDE]
-        move_markers(q, qd, own, real, x, xd, xdd)
-        _accelerate_markers(q, qdd, own, real, xdd)
-        _derive(x, xd, xdd, real[3 * MARKERS :], t, own_lam, slopes)
-        for r in range(ROWS):
-            # Rows of G1 and G2
-            row = (own[ROW] + r) * n
-            _fill_row(q, qd, own, real, a1[r], J[r], G1[row:])
-            _fill_row(q, qd, own, real, a2[r], g_xd[r], G2[row:])
-            for j in range(MARKERS):
-                k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-                at = own[AT + k]
-                _chain_second(CODES[j], own[DIMENSION + k], at, qdd, s, J[r, c:], G2[row + at :])
+        place_markers(q, own, real, x)
+        _derive_reaction(x, real[3 * MARKERS :], t, own_lam, J, H)
         # K += x_q^T H x_q + f x_qq
         _pull_back(q, own, real, H, XHX)
         _add_geometric(own, real, own_lam, J, XHX)
@@ -207,4 +200,28 @@ def loop(count, stride, table, reals, q, qd, qdd, t, lam, K, G1, G2):
                 for e in range(own[DIMENSION + one]):
                     for d in range(own[DIMENSION + other]):
                         K[(own[AT + one] + e) * n + own[AT + other] + d] += XHX[7 * one + e, 7 * other + d]
+    return 0
+
+
+def rate_slopes(count, stride, table, reals, q, qd, qdd, t, G1, G2):
+    """All instances: their rows of G1 and G2."""
+    table, reals, qdd = integers(table, ANY), vector(reals, ANY), vector(qdd, ANY)
+    q, qd, G1, G2 = vector(q, ANY), vector(qd, ANY), vector(G1, ANY), vector(G2, ANY)
+    x, xd, xdd = stack(SIZE), stack(SIZE), stack(SIZE)
+    J, a1, a2, g_xd = stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE), stack2(ROWS, SIZE)
+    slopes = Slopes(J, a1, a2, g_xd)
+    for i in range(count):
+        # Markers at q and qd, and their accelerations with qdd
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        move_markers(q, qd, own, real, x, xd, xdd)
+        _accelerate_markers(q, qdd, own, real, xdd)
+        _derive_rates(x, xd, xdd, real[3 * MARKERS :], t, slopes)
+        for r in range(ROWS):
+            row = (own[ROW] + r) * own[STRIDE]
+            _fill_row(q, qd, own, real, a1[r], J[r], G1[row:])
+            _fill_row(q, qd, own, real, a2[r], g_xd[r], G2[row:])
+            for j in range(MARKERS):
+                k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
+                at = own[AT + k]
+                _chain_second(CODES[j], own[DIMENSION + k], at, qdd, s, J[r, c:], G2[row + at :])
     return 0

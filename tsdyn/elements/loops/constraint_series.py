@@ -26,25 +26,14 @@ from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part,
 from ...jit.simd import add, cross, fetch, fma, four, get, lanes, let, put, splat, times, total
 from ..markers import POINT
 from .constraint_rows import INTS, MASK, ROW, turned
-from .template import (
-    AHEAD,
-    CODES,
-    DRIVEN,
-    MARKERS,
-    OWNERS,
-    ROOM,
-    ROWS,
-    SIZE,
-    SLOTS,
-    STARTS,
-    kernel_series,
-    kernel_series_t,
-)
+
+from .template import (  # isort: skip
+    AHEAD, CODES, DRIVEN, MARKERS, OWNERS, ROOM, ROWS, SIZE, SLOTS, STARTS, extent, kernel_series, kernel_series_t,
+)  # fmt: skip
 
 # where the parts of a body's series begin, times the number of orders; floats of an order of all of them
 S_OMEGA, S_R, S_SPIN, BODY_ROW = 12, 16, 20, 24
-# mode, k, orders, count, reals and floats per instance, table, reals, bodies, series, b, Z
-SIGNATURE = "iiiiiipppppp"
+SIGNATURE = "iippppppp"  # mode, k, extent, table, reals, bodies, values, b, Z
 call_series = caller(SIGNATURE)
 ADVANCE, RESIDUAL = range(2)
 # bits of the mask: from 0 on the markers whose columns vary, from 16 on those that are on the ground, from 32 on those
@@ -228,13 +217,15 @@ def _residual(k, one, b, x):
         let(b, get(table, own + ROW) + r, (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift))
 
 
-def series(mode, k, orders, count, stride, size, table, reals, bodies, values, b, Z):
+def series(mode, k, kind, table, reals, bodies, values, b, Z):
     """ADVANCE: lam_{k-1} from b, x_{k+1}, (Phi_x)_{k+1}, and f_k, but for lam_k, onto the bodies' Z.
 
     RESIDUAL: b = (k + 1)(k + 2) Phi_{k+2} as the bodies' series have it.
     """
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
     values, b, Z = vector(values, ANY), vector(b, ANY), vector(Z, ANY)
+    kind = extent(kind)
+    count, stride, size, orders = kind.count, kind.stride, kind.width, kind.orders
     x, f, g = stack(ROOM), stack2(ROWS, SIZE), stack(ROWS)
     for i in range(count):
         own, real, at = i * INTS, i * stride, i * size

@@ -29,21 +29,11 @@ from ..markers import PARAMETERS, POINT, TURN
 from .constraint_rows import POSE, P, turned
 from .constraint_series import BODY_ROW, S_OMEGA, S_R, torque
 from .friction import FRICTION_ROWS, known_friction
-from .template import (
-    CODES,
-    DRIVEN,
-    FRICTIONAL,
-    MARKERS,
-    OWNERS,
-    ROOM,
-    SHARP,
-    SIZE,
-    SLOTS,
-    STARTS,
-    TRACED,
-    kernel_inputs,
+
+from .template import (  # isort: skip
+    CODES, DRIVEN, FRICTIONAL, MARKERS, OWNERS, ROOM, SHARP, SIZE, SLOTS, STARTS, TRACED, extent, kernel_inputs,
     kernel_series,
-)
+)  # fmt: skip
 
 BODY, MASK, INTS = 0, 2, 3  # of the table: the two bodies, and which of them are the ground
 
@@ -120,10 +110,12 @@ def run_traced(run, program, x, xd, par, k, rows, orders, scratch):
     call_order(run, program, scratch, rows, orders, k)
 
 
-def series(run, k, orders, count, stride, size, table, reals, bodies, values, poses, Z):
+def series(run, k, kind, table, reals, bodies, values, poses, Z):
     """Order k of the forces, onto the bodies' Z; p_0 from the poses."""
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
     values, poses, Z = vector(values, ANY), vector(poses, ANY), vector(Z, ANY)
+    kind = extent(kind)
+    count, stride, size, orders = kind.count, kind.stride, kind.width, kind.orders
     x, xd, f = stack(ROOM), stack(ROOM), stack(ROOM)
     wide, body_size = 4 * orders, BODY_ROW * orders
     own_scratch, rows = 2 * MARKERS * wide, scratch_rows(stride, values)

@@ -2,30 +2,16 @@
 
 import math
 
-from ...jit.kernels import ANY, complex_stack, integers, kernel, part, stack, stack2, vector
+from ...jit.kernels import ANY, Record, complex_stack, integers, kernel, part, record_at, stack, stack2, vector
+from ...maths.tolerances import COMPLEX_STEP
 from ...maths.vectors import matrix_a
 from ..markers import PARAMETERS
-from ..tolerances import FORCE_QUOTIENT, FORCE_STEP
-from .template import (
-    ALONG,
-    AT,
-    CODES,
-    DIMENSION,
-    KEPT,
-    MARKERS,
-    OWNERS,
-    SIZE,
-    STARTS,
-    MarkerDerivatives,
-    carry_back,
-    carry_back_derivative,
-    derivatives,
-    force_markers,
-    kernel_derivatives,
-    kernel_law,
-    kernel_remember,
-    state,
-)
+from ..tolerances import FORCE_QUOTIENT
+
+from .template import (  # isort: skip
+    ALONG, AT, CODES, DIMENSION, KEPT, MARKERS, OWNERS, SIZE, STARTS, MarkerDerivatives, carry_back,
+    carry_back_derivative, derivatives, force_markers, kernel_derivatives, kernel_law, kernel_remember, state,
+)  # fmt: skip
 
 # Corotated frames of forces: derivatives of a law that are kept from an earlier configuration stay accurate in them.
 #
@@ -106,7 +92,7 @@ def turn_block(code_row, code_column, r, kept, size, row, column, out):
 # central differences where it is not analytic. `force.callbacks` supplies the names in capitals and kernel_*.
 
 FORCE_INTS = 4  # of a kind's table for each instance: template.AT and DIMENSION
-JACOBIAN = "iippppdippip"  # count, reals per instance, table, reals, q, qd, t, n, Q_q, Q_qd, renew, kept
+JACOBIAN = "pppppdppip"  # extent, table, reals, q, qd, t, Q_q, Q_qd, renew, kept
 SPAN = 14  # coordinates of two bodies
 FRAME = 7  # floats of an instance's frame: Euler parameters of a body, or a direction
 
@@ -153,11 +139,11 @@ def _complex_slope(z, zd, along, c, par, t, g, slope):
         g[r] = 0.0
     # Im f(x + i h) / h = f' + O(h^2), without cancellation
     here = along[c]
-    along[c] = complex(here.real, FORCE_STEP)
+    along[c] = complex(here.real, COMPLEX_STEP)
     kernel_law(z, zd, par, t, g)
     along[c] = here
     for r in range(SIZE):
-        slope[r, c] = g[r].imag / FORCE_STEP
+        slope[r, c] = g[r].imag / COMPLEX_STEP
 
 
 def complex_steps(x, xd, par, t, fx, fxd):
@@ -281,15 +267,27 @@ def _add_products(own, fx, fxd, W, X, Y, n, Q_q, Q_qd):
                 Q_qd[place] += yd
 
 
-def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, renew, kept):
+class ForceExtent(Record):
+    """What the loop of Jacobians reads of all instances of a kind; the records of their kinds begin with it."""
+
+    count: int
+    stride: int  # reals of each
+    columns: int  # of Q_q and Q_qd
+
+
+force_extent = record_at(ForceExtent)
+
+
+def jacobian(kind, table, reals, q, qd, t, Q_q, Q_qd, renew, kept):
     """Q_q, Q_qd (n, n) += the Jacobians of all instances.
 
     With `renew` the derivatives of the law are evaluated and stored, (2 SIZE^2 + FRAME) floats an instance; otherwise
-    the stored ones are rotated with the force's frame. What follows from geometry is always exact. A callback is given
-    each array by its address, hence twelve arguments.
+    the stored ones are rotated with the force's frame. What follows from geometry is always exact.
     """
     kept, table, reals = vector(kept, ANY), integers(table, ANY), vector(reals, ANY)
     q, qd, Q_q, Q_qd = vector(q, ANY), vector(qd, ANY), vector(Q_q, ANY), vector(Q_qd, ANY)
+    kind = force_extent(kind)
+    count, stride, n = kind.count, kind.stride, kind.columns
     x, xd, f = stack(SIZE), stack(SIZE), stack(SIZE)
     fx, fxd = stack2(SIZE, SIZE), stack2(SIZE, SIZE)
     W, X, Y = stack2(SIZE, SPAN), stack2(SIZE, SPAN), stack2(SIZE, SPAN)

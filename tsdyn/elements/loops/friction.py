@@ -1,24 +1,14 @@
 """Kernels of one friction for the solver: force for unit normal load, normal load, their Taylor series."""
 
 from ...jit.kernels import ANY, caller, complex_stack, integers, kernel, part, stack, stack2, vector
+from ...maths.tolerances import COMPLEX_STEP
 from ...maths.vectors import matrix_a
 from ..markers import PARAMETERS
-from ..tolerances import FORCE_STEP
-from .template import (
-    AT,
-    CODES,
-    DIMENSION,
-    MARKERS,
-    OWNERS,
-    SIZE,
-    SLOTS,
-    STARTS,
-    carry_back,
-    force_markers,
-    kernel_law,
-    kernel_normal_load,
-    kernel_normal_series,
-)
+
+from .template import (  # isort: skip
+    AT, CODES, DIMENSION, MARKERS, OWNERS, SIZE, SLOTS, STARTS, carry_back, force_markers, kernel_law,
+    kernel_normal_load, kernel_normal_series,
+)  # fmt: skip
 
 # Taylor series of friction in proportion to a normal load, which follows from the reaction of its joint.
 #
@@ -171,9 +161,9 @@ def normal_load(stride, own, real, q, qd, t, side, derive, f, out):
         out[0] = kernel_normal_load(x, g, par)
         return 0
     for i in range(6):
-        z[i] = complex(g[i], FORCE_STEP)
+        z[i] = complex(g[i], COMPLEX_STEP)
         load = kernel_normal_load(x, z, par)
-        out[0], g[i] = load.real, load.imag / FORCE_STEP
+        out[0], g[i] = load.real, load.imag / COMPLEX_STEP
         z[i] = z[i].real
     _about_centroid(A, s, g, out[1:])
     return 0

@@ -18,34 +18,24 @@ none of them vanishes within the step, and nothing else is evaluated. Past a zer
 
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, vector
 from ...jit.simd import first, fma, four, get, let, put, second, splat, third, times
+from ...maths.tolerances import PIVOT_ROUNDING
 from ...motions.tracing import LENGTH as PROGRAM_LENGTH
 from ...motions.tracing import T
 from ..markers import PARAMETERS, POINT, TURN
-from ..tolerances import LAW_NOISE, LAW_TOLERANCE
+from ..tolerances import LAW_TOLERANCE
 from .constraint_series import BODY_ROW, S_OMEGA
 from .force_series import BODY, INTS, MASK, marker_coefficient, run_traced, scratch_rows
 from .friction import load_at
-from .template import (
-    CODES,
-    FRICTIONAL,
-    MARKERS,
-    OWNERS,
-    POSITIVE,
-    ROOM,
-    SHARP,
-    SIZE,
-    STARTS,
-    TRACED,
-    kernel_law,
-    kernel_series,
-)
 
-# what runs a program, count, reals and floats per instance, orders, how many are known, limits, table, reals, bodies,
-# values, inverse
-SIGNATURE = "iiiiiipppppp"
+from .template import (  # isort: skip
+    CODES, FRICTIONAL, MARKERS, OWNERS, POSITIVE, ROOM, SHARP, SIZE, STARTS, TRACED, extent, kernel_law, kernel_series,
+)  # fmt: skip
+
+# what runs a program, orders that are known, extent, limits, table, reals, bodies, values, inverse
+SIGNATURE = "iippppppp"
 # numbers of `limits`: place and length of the step, tolerances, velocity that f may be off by over them
 TAU, TIME, LENGTH, ATOL, RTOL, MOST, LIMITS = range(7)
-MARGIN = "iiiiippp"  # count, reals and floats per instance, orders, how many are known; h, values, least
+MARGIN = "ipppp"  # orders that are known, extent, h, values, least
 call_check, call_margin = caller(SIGNATURE), caller(MARGIN)
 
 
@@ -84,7 +74,7 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
         for k in range(known):
             terms = max(terms, abs(power * values[forces + 4 * k + i]))
             power *= tau
-    return not off <= max(LAW_NOISE, limits[ATOL] + limits[RTOL]) * terms
+    return not off <= max(PIVOT_ROUNDING, limits[ATOL] + limits[RTOL]) * terms
 
 
 @kernel
@@ -118,10 +108,12 @@ def _sum_markers(own, real, bodies, orders, known, tau, values, x, xd):
         put(xd, c, fd)
 
 
-def check(run, count, stride, size, orders, known, limits, table, reals, bodies, values, inverse):
+def check(run, known, kind, limits, table, reals, bodies, values, inverse):
     """1 if the series of an instance is not what its law is at a place of the step, else 0; time has been set."""
     table, reals, values = integers(table, ANY), vector(reals, ANY), vector(values, ANY)
     limits, bodies, inverse = vector(limits, LIMITS), vector(bodies, ANY), vector(inverse, ANY)
+    kind = extent(kind)
+    count, stride, size, orders = kind.count, kind.stride, kind.width, kind.orders
     x, xd, f, wide = stack(ROOM), stack(ROOM), stack(ROOM), 4 * orders
     rows, program = scratch_rows(stride, values), int(values[PROGRAM_LENGTH]) if TRACED else 0
     for i in range(count):
@@ -161,12 +153,13 @@ def check(run, count, stride, size, orders, known, limits, table, reals, bodies,
     return 0
 
 
-def margin(count, stride, size, orders, known, h, values, least):
+def margin(known, kind, h, values, least):
     """least = the minimum of itself and of the share 1 - sum_{k>0} |a_k| h^k / a_0 of each a; Eq. (1) is share > 0.
 
     NaN if a share is NaN.
     """
-    h, values, least = vector(h, 1), vector(values, ANY), vector(least, 1)
+    kind, h, values, least = extent(kind), vector(h, 1), vector(values, ANY), vector(least, 1)
+    count, stride, size, orders = kind.count, kind.stride, kind.width, kind.orders
     rows, left, step = scratch_rows(stride, values), get(least, 0), get(h, 0)
     square = step * step
     rest = 0.0 * step  # not a number where a share isn't: a minimum can lose that

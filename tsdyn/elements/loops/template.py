@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...jit.kernels import kernel, part, stack
+from ...jit.kernels import Record, kernel, part, record_at, stack
 from ...maths.vectors import rotate_gradient, rotate_rate
 from ..markers import PARAMETERS, POINT, TURN, chain_rule, motion, position, rate
 
@@ -137,7 +137,7 @@ def carry_back_derivative(code, dimension, at, s, f, n, Q_q):
 #
 # A loop is a template. `specialised` copies it, and the parts that it calls, for one kind of constraint or force, with
 # the names below replaced by the constants and kernels of that kind. Parts are inlined, so arguments cost nothing
-# there; a loop is given each array by its address, and may have up to twelve.
+# there; a loop is given each array by its address.
 
 ROWS = MARKERS = 1  # scalar constraints, and markers, of an instance
 SIZE = ROOM = 1  # length of x, the concatenated marker coordinates; and with room for a store of four at its end
@@ -159,6 +159,18 @@ kernel_normal_load = kernel_normal_series = None
 
 # what the table of a kind holds for each instance: where its two bodies' coordinates begin, and how many they are
 AT, DIMENSION = 0, 2
+
+
+class Extent(Record):
+    """What a loop of series reads of all instances of a kind; the records of their kinds begin with it."""
+
+    count: int
+    stride: int  # reals of each
+    width: int  # floats of each one's series
+    orders: int  # that there is room for
+
+
+extent = record_at(Extent)
 
 
 @part

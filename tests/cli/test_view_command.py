@@ -42,7 +42,7 @@ def test_a_scene_is_shown_without_a_run(folder, capsys):
 
 def test_a_start_that_is_not_assembled_is_drawn(folder, capsys):
     scene = four_bar.build()
-    scene["coupler"].position = scene["coupler"].position + (0, 0, 0.01)
+    scene["coupler"].position = scene["coupler"].position * 1.01
     scene.save("apart.toml")
     assert main(["view", "apart.toml", "--output", "apart.html"]) == 1
     said = capsys.readouterr().err

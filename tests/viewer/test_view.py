@@ -289,8 +289,8 @@ def test_a_page_is_fitted_to_the_mechanism_and_goes_with_it():
     far, near = decoded(view(truck(10.0))), decoded(view(truck(0.2)))
     centres = array(far.centres, "<f4").reshape(-1, 3) + far.origin
     np.testing.assert_allclose(centres, np.stack([10.0 * far.t, 0 * far.t + 1, 0 * far.t], axis=1), atol=1e-4)
-    assert (far.radius, far.follow) == (pytest.approx(3.5), -2)
-    assert (near.radius, near.follow) == (pytest.approx(3.5 + 1.0), -1)
+    assert (far.radius, far.follow) == (pytest.approx(1.1 * 3.5), -2)
+    assert (near.radius, near.follow) == (pytest.approx(1.1 * (3.5 + 1.0)), -1)
     np.testing.assert_allclose(array(near.centres, "<f4") + near.origin, (1, 1, 0), atol=1e-6)
 
 

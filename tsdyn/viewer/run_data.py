@@ -379,6 +379,7 @@ def _violated(packed, t, q, qd):
 # mass.
 
 FLAT = 0.05  # a motion within a layer is looked at from across it: thickness per extent
+MARGIN = 1.1  # of the picture, per radius of what is drawn: controls cover some of it
 TRAVELS = 3.0  # extent of the motion per extent of the mechanism, from which the camera goes with it
 
 
@@ -434,7 +435,7 @@ def _fit(packed, frames, bulk, links, origin, up, placed, follow):
     centre = 0.5 * (low + high)[None]
     if about(centre) > TRAVELS * about(mass) and any(body.dimension == 7 for body in packed.bodies):
         centre = mass
-    radius = about(centre)
+    radius = MARGIN * about(centre)
     lowest = min(np.dot(up, low), np.dot(up, high))
     level = 0.0 if 0.0 <= lowest < 2.0 * radius else lowest  # through the ground's origin, if that isn't far below
     return {

@@ -36,7 +36,7 @@ function home(body, frame) {
   } else {
     const fitted = run.radius / Math.sin((camera.fov * Math.PI) / 360) / Math.min(1, camera.aspect);
     orbit.target.copy(followed(body, frame) || centreAt(frame));
-    camera.position.copy(orbit.target).addScaledVector(new THREE.Vector3(...run.view).normalize(), 0.9 * fitted);
+    camera.position.copy(orbit.target).addScaledVector(new THREE.Vector3(...run.view).normalize(), fitted);
   }
   orbit.update();
 }

@@ -124,9 +124,10 @@ def test_the_camera_goes_with_what_it_follows(opened):
 
 
 def test_a_scene_is_a_still_page(opened):
-    from tests.viewer.test_view import sketch
-
-    page, reports = opened(sketch())
+    scene = ts.Scene()
+    bob = scene.add_point_mass(mass=1.0, position=(1.2, 0, 0))
+    scene.add(ts.constraints.Distance(bob, scene.ground, length=1.0))
+    page, reports = opened(scene)
     assert page.is_visible("#show-names")
     assert not page.is_visible("#play")
     assert not page.is_visible("#record")

@@ -17,12 +17,13 @@ BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 GREY = "#6b6b6b"
 
 
-def demand_matplotlib():
-    """Raise MissingDependency where matplotlib is not installed."""
+def demand_matplotlib(what: str = "the figure") -> None:
+    """Raise MissingDependency where matplotlib, or Pillow, is not installed; `what` needs it."""
     try:
         import matplotlib  # noqa: F401
+        import PIL  # noqa: F401
     except ImportError as error:
-        raise MissingDependency("the figure needs matplotlib: pip install 'tsdyn[plot]'") from error
+        raise MissingDependency(f"{what} needs matplotlib: pip install 'tsdyn[plot]'") from error
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """Mass and inertia of shapes, and shapes to draw: scene.add_body(**ts.shapes.box((1, 2, 3), density=7850)).
 
-`box`, `sphere`, `cylinder`, `rod` and `from_mesh` have mass and inertia; +, moved and rotated make one body of several.
-`Box`, `Sphere`, `Cylinder` and `Mesh` are geometry alone, for the viewer.
+`box`, `sphere`, `cylinder`, `capsule`, `rod` and `from_mesh` have mass and inertia; +, moved and rotated make one body
+of several. `Box`, `Sphere`, `Cylinder`, `Capsule` and `Mesh` are geometry alone, for the viewer.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 
     from .hints import ArrayLike, Axis, Floats, Place, Rotation
 
-__all__ = ["Box", "Cylinder", "Mesh", "Shape", "Sphere", "box", "cylinder", "from_mesh", "rod", "sphere"]
+__all__ = [
+    "Box", "Capsule", "Cylinder", "Mesh", "Shape", "Sphere", "box", "capsule", "cylinder", "from_mesh", "rod", "sphere",
+]  # fmt: skip
 
 
 def __dir__():
@@ -189,7 +191,7 @@ def _obj(data):
     return np.array(vertices).reshape(-1, 3), np.array(faces).reshape(-1, 3)
 
 
-# Shapes to draw: cuboid, ball, cylinder and triangle mesh, without mass, anywhere in the frame of a body.
+# Shapes to draw: cuboid, ball, cylinder, capsule and triangle mesh, without mass, anywhere in the frame of a body.
 
 AXES = {  # name -> frame whose third column is the axis
     "x": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
@@ -224,6 +226,9 @@ class Geometry:
         if str(self.colour) not in ("", *COLOURS) and not re.fullmatch("#[0-9a-fA-F]{6}", str(self.colour)):
             names = ", ".join(COLOURS)
             raise InvalidArgument(f"{what}: colour must be '#rrggbb' or one of {names}, got {self.colour!r}.")
+
+    def __deepcopy__(self, memo: Any) -> Self:
+        return self  # nothing changes it, and a mesh is large
 
     def _set(self, **values):
         for name, value in values.items():
@@ -315,10 +320,23 @@ class Cylinder(Geometry):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.axis, str) or self.axis not in AXES:
-            raise InvalidArgument(f"Cylinder: axis must be 'x', 'y' or 'z', got {self.axis!r}.")
-        self._set(radius=positive(self.radius, "Cylinder: radius (m)"))
-        self._set(length=positive(self.length, "Cylinder: length (m)"))
+        what = type(self).__name__
+        self._set(axis=_axis(what, self.axis), radius=positive(self.radius, f"{what}: radius (m)"))
+        self._set(length=positive(self.length, f"{what}: length (m)"))
+
+
+@fitting_constructor
+@dataclass(frozen=True, eq=False)
+class Capsule(Cylinder):
+    """A cylinder with a half ball on each end, to draw; length, m, is that of the cylinder. Otherwise as `Cylinder`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> shin = ts.shapes.Capsule(0.04, 0.3, axis="x")
+    >>> shin.radius, shin.length
+    (0.04, 0.3)
+    """
 
 
 @fitting_constructor
@@ -389,7 +407,7 @@ DRAWN_RADIUS = 0.02  # of a rod, which has none, per length
 @fitting_constructor
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Mass, centroid and inertia of a shape; unpacked by `**` it is the mass and inertia of `Scene.add_body`.
+    """Mass, centroid and inertia of a shape; unpacked by `**` it is mass, inertia and shape of `Scene.add_body`.
 
     Attributes
     ----------
@@ -419,12 +437,12 @@ class Shape:
     centroid: Floats
     pieces: tuple[Geometry, ...] = field(default=(), repr=False)
 
-    def keys(self) -> tuple[str, str]:
+    def keys(self) -> tuple[str, ...]:
         """What `add_body` is given."""
-        return ("mass", "inertia")
+        return ("mass", "inertia", "shape")
 
     def __getitem__(self, name: str) -> Any:
-        return {"mass": self.mass, "inertia": self.inertia}[name]
+        return {"mass": self.mass, "inertia": self.inertia, "shape": self}[name]
 
     def moved(self, by: ArrayLike) -> Shape:
         """The same shape elsewhere in its frame; by (3,), m."""
@@ -527,6 +545,31 @@ def cylinder(
 
 
 @fitting
+def capsule(
+    radius: float, length: float, *, axis: Axis = "z", mass: float | None = None, density: float | None = None
+) -> Shape:
+    """A cylinder with a half ball on each end, about its centre; length, m, is that of the cylinder.
+
+    Other arguments and errors as for `cylinder`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> print(ts.shapes.capsule(0.5, 1.0, mass=5.0).inertia.diagonal().round(6))
+    [1.5125 1.5125 0.575 ]
+    """
+    # of a half ball of mass h: its centroid is 3/8 r from its base, and the moment about that is 83/320 h r^2
+    r, length = positive(radius, "capsule: radius (m)"), positive(length, "capsule: length (m)")
+    axis, bar, cap = _axis("capsule", axis), math.pi * r * r * length, 2.0 / 3.0 * math.pi * r**3
+    m = _mass("capsule", bar + 2.0 * cap, mass, density)
+    bar, cap = m * bar / (bar + 2.0 * cap), m * cap / (bar + 2.0 * cap)
+    across = 83.0 / 320.0 * r * r + (0.5 * length + 0.375 * r) ** 2
+    inertia = np.full(3, bar * (3.0 * r * r + length**2) / 12.0 + 2.0 * cap * across)
+    inertia["xyz".index(axis)] = 0.5 * bar * r * r + 0.8 * cap * r * r
+    return _shape(m, inertia, Capsule(r, length, axis))
+
+
+@fitting
 def rod(length: float, *, axis: Axis = "z", mass: float) -> Shape:
     """A slender rod about its centre, along the axis "x", "y" or "z".
 
@@ -589,6 +632,27 @@ def from_mesh(
     m = _mass("from_mesh", volume, mass, density)
     second = (m / volume) * second
     return Shape(m, np.trace(second) * np.eye(3) - second, centroid, (Mesh((vertices, faces)),))
+
+
+def pieces_of(shapes: Any, what: str) -> tuple[Geometry, ...]:
+    """The geometry, in the frame of the body, of a shape or a list of them; `what` it is given as, in messages.
+
+    Raises
+    ------
+    InvalidArgument
+        If something is none of the shapes of this module.
+    """
+    pieces: list[Geometry] = []
+    for shape in shapes if isinstance(shapes, (tuple, list)) else [shapes]:
+        if isinstance(shape, Shape):
+            pieces += [piece.moved(-shape.centroid) for piece in shape.pieces]
+        elif isinstance(shape, Geometry):
+            pieces.append(shape)
+        else:
+            raise InvalidArgument(
+                f"{what} must be one of ts.shapes, such as ts.shapes.Box((1, 1, 1)), or a list of them, got {shape!r}."
+            )
+    return tuple(pieces)
 
 
 def _round(m, squares, drawn):

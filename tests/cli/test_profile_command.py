@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.helpers.processes import OF_CHECKOUT
 from tsdyn.cli.command import main
 
 
@@ -56,6 +57,7 @@ def test_command_says_what_is_wrong_with_a_file(name, content, words, capsys, tm
     assert words in err
 
 
+@OF_CHECKOUT
 def test_command_names_the_examples(capsys):
     assert main(["profile", "tpo"]) == 1
     assert "pendulum_chain" in capsys.readouterr().err

@@ -8,6 +8,7 @@ import pytest
 import tsdyn as ts
 from examples import four_bar
 from tests.helpers.commands import called
+from tests.helpers.processes import OF_CHECKOUT
 from tsdyn.simulation.run_options import OF_RUN
 
 FALL = 'version = 1\n[[body]]\nname = "stone"\ntype = "PointMass"\nmass = 1.0\nposition = [0, 0, 5]\n'
@@ -122,6 +123,7 @@ def test_new(folder, capsys):
     assert called(capsys, "new", "scene.txt")[0] == 1
 
 
+@OF_CHECKOUT
 def test_convert(folder, capsys):
     assert called(capsys, "convert", "four_bar", "again.toml")[0] == 0
     assert (folder / "again.toml").read_bytes() == (folder / "bars.toml").read_bytes()

@@ -33,6 +33,24 @@ def test_a_saved_solution_is_shown(folder):
     np.testing.assert_array_equal(saved.loads, run.loads)
 
 
+def test_a_scene_is_shown_without_a_run(folder, capsys):
+    assert main(["view", "bars.toml", "--no-run", "--follow", "crank", "--camera", "0", "1", "0", "--output", "a"]) == 0
+    assert capsys.readouterr().out == "Start: a.html\n"
+    data = decoded((folder / "a.html").read_text(encoding="utf-8"))
+    assert (data.frames, data.follow, data.view) == (1, 0, [0.0, 1.0, 0.0])
+
+
+def test_a_start_that_is_not_assembled_is_drawn(folder, capsys):
+    scene = four_bar.build()
+    scene["coupler"].position = scene["coupler"].position * 1.01
+    scene.save("apart.toml")
+    assert main(["view", "apart.toml", "--output", "apart.html"]) == 1
+    said = capsys.readouterr().err
+    assert "breaks" in said
+    assert "The start is drawn in apart.html" in said
+    assert any(label["violated"] for label in decoded((folder / "apart.html").read_text(encoding="utf-8")).labels)
+
+
 def test_what_cannot_be_shown_is_said(folder, capsys):
     assert main(["view", "bars.toml", "--to", "0.1", "--output", "nowhere/bars.html"]) == 1
     assert "there is no folder" in capsys.readouterr().err

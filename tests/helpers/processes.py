@@ -6,7 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
+OF_CHECKOUT = pytest.mark.skipif(not (ROOT / "tsdyn").is_dir(), reason="the installed tsdyn has no examples beside it")
 REPORT = """
 import json, tsdyn
 from tsdyn.jit import cache as _cache

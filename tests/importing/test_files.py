@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.helpers.pages import decoded
 from tests.helpers.tolerances import ALGEBRA, CLOSE, ROUNDING
 
 pytest.importorskip("lxml")
@@ -95,6 +96,33 @@ def test_the_viewer_draws_them(tmp_path):
     scene = load(MODELS / "arm.urdf")
     page = ts.simulate(scene, (0.0, 0.01)).view(tmp_path / "arm.html")
     assert "#3366cc" in page.read_text()
+
+
+LINK = """<link name="{}"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
+<inertia ixx=".2" iyy=".2" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial>{}</link>"""
+CROSS = f"""<robot name="arm"><link name="base"/><link name="cross"/>{LINK.format("lower", "")}
+{LINK.format("upper", '<visual><geometry><capsule radius="0.05" length="0.9"/></geometry></visual>')}
+<joint name="hip" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+<joint name="roll" type="continuous"><parent link="upper"/><child link="cross"/><origin xyz="0 0 -1"/></joint>
+<joint name="pitch" type="continuous"><parent link="cross"/><child link="lower"/><axis xyz="0 1 0"/></joint></robot>"""
+
+
+def test_helping_links_are_not_drawn(tmp_path):
+    """The cross of a universal joint has neither mass nor shape; a link with mass is drawn without a shape, too."""
+    scene = load(text(tmp_path, CROSS))
+    assert scene.shapes["cross"] == []
+    assert [type(shape).__name__ for shape in scene.shapes["upper"]] == ["Capsule"]
+    page = decoded(ts.simulate(scene, (0.0, 0.1)).view(tmp_path / "arm.html").read_text())
+    names = [body["name"] for body in page.bodies]
+    parts = [(names[part["body"]], part["kind"]) for part in page.parts if part["layer"] == "bodies"]
+    assert [part for part in parts if part[0] == "upper"] == [
+        ("upper", kind) for kind in ("cylinder", "sphere", "sphere")
+    ]
+    assert {name for name, _ in parts} == {"upper", "lower"}
+    assert {label["text"] for label in page.labels} == {"upper", "lower", "hip", "roll", "pitch"}
+    assert {names[trail["body"]] for trail in page.trails} == {"upper", "lower"}
+    pins = [np.linalg.norm(np.reshape(part["matrix"], (4, 3))[:1]) for part in page.parts if part["layer"] == "joints"]
+    np.testing.assert_allclose(pins, 0.04, rtol=0.05)  # of links of half a metre, not of the cross
 
 
 def test_meshes_are_found(tmp_path):

@@ -83,6 +83,58 @@ def test_controls_do_what_they_say(opened):
     assert reports == []
 
 
+def test_names_are_shown_on_demand(opened):
+    page, reports = opened(ts.simulate(four_bar.build(), (0.0, 0.5)))
+    drawn = "(draw(), pen.getImageData(0, 0, names.width, names.height).data.some((x) => x > 0))"
+    assert not page.evaluate(drawn)
+    page.click("#show-names")
+    assert page.evaluate(drawn)
+    assert reports == []
+
+
+def test_a_pass_is_recorded(opened, tmp_path):
+    """As WebM, whose files begin with the bytes 1A 45 DF A3."""
+    page, reports = opened(ts.simulate(four_bar.build(), (0.0, 2.0)))
+    with page.expect_download(timeout=WAIT) as download:
+        page.click("#record")
+        page.wait_for_function("recorder !== null", timeout=WAIT)
+    assert download.value.suggested_filename == "tsdyn.webm"
+    download.value.save_as(tmp_path / "film")
+    assert (tmp_path / "film").read_bytes()[:4] == bytes.fromhex("1A45DFA3")
+    assert page.evaluate("recorder === null && !document.querySelector('#record.on')")
+    assert reports == []
+
+
+def test_the_camera_goes_with_what_it_follows(opened):
+    """A block at 50 m/s: it stays in the middle, at the distance that its size asks for."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    scene.add_body(**ts.shapes.box((1.0, 1.0, 1.0), mass=1.0), velocity=(50, 0, 0), name="block")
+    solution = ts.simulate(scene, (0.0, 2.0))
+    middle = "(tsdyn.seek({}), draw(), new THREE.Vector3(...placed(0, [0, 0, 0], [0, 0, 0])).project(camera).toArray())"
+    for options in ({}, {"follow": "block"}, {"follow": "block", "camera": (1, 0, 0)}):
+        page, reports = opened(solution, **options)
+        for time in (0.0, 1.0, 2.0):
+            np.testing.assert_allclose(page.evaluate(middle.format(time))[:2], 0.0, atol=1e-3)
+        assert page.evaluate("camera.position.distanceTo(orbit.target)") < 10.0
+    page, reports = opened(solution, camera=[(0, -30, 0), (0, 0, 0)])
+    np.testing.assert_allclose(
+        page.evaluate("(tsdyn.seek(2), draw(), camera.position.toArray())"), (0, -30, 0), atol=1e-9
+    )
+    assert reports == []
+
+
+def test_a_scene_is_a_still_page(opened):
+    scene = ts.Scene()
+    bob = scene.add_point_mass(mass=1.0, position=(1.2, 0, 0))
+    scene.add(ts.constraints.Distance(bob, scene.ground, length=1.0))
+    page, reports = opened(scene)
+    assert page.is_visible("#show-names")
+    assert not page.is_visible("#play")
+    assert not page.is_visible("#record")
+    assert page.evaluate("pen.getImageData(0, 0, names.width, names.height).data.some((x) => x > 0)")  # violated rows
+    assert reports == []
+
+
 def test_a_trail_goes_through_its_point(opened):
     scene = four_bar.build()
     solution = ts.simulate(scene, (0.0, 1.0))

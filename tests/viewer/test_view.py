@@ -1,6 +1,8 @@
 """The page of an animation: its poses and loads are those of the run, and it needs nothing from outside."""
 
 import base64
+import re
+import shutil
 import subprocess
 import sys
 import webbrowser
@@ -171,6 +173,55 @@ def test_the_shape_of_a_free_body_follows_from_its_inertia(shape, kind, size):
         assert abs(columns[2, 0 if size[0] < 0.5 else 1]) == pytest.approx(size[2], rel=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("shape", "parts"),
+    [
+        (S.box((0.08, 0.06, 0.06), mass=1.0), [("box", (0.08, 0.06, 0.06))]),
+        (S.box((0.06, 0.06, 0.06), mass=1.0), [("box", (0.06, 0.06, 0.06))]),
+        (S.sphere(0.1, inner=0.09, mass=1.0), [("sphere", (0.1, 0.1, 0.1))]),
+        (S.cylinder(0.1, 0.5, inner=0.09, mass=1.0), [("cylinder", (0.1, 0.1, 0.5))]),
+        (S.capsule(0.1, 0.5, mass=1.0), [("cylinder", (0.1, 0.1, 0.5)), *[("sphere", (0.1, 0.1, 0.1))] * 2]),
+    ],
+    ids=["bar", "cube", "hollow ball", "tube", "capsule"],
+)
+def test_a_body_made_of_a_shape_has_that_shape(shape, parts):
+    """Inertia doesn't tell a bar of square section from a cylinder, nor a cube from a ball."""
+    scene = ts.Scene()
+    body = scene.add_body(**shape, name="body")
+    for each in (scene, scene.copy(), scene.with_parameters({"body.position": (1, 0, 0)})):
+        found = decoded(view(ts.simulate(each, (0.0, 0.1)))).parts
+        assert [part["kind"] for part in found] == [kind for kind, _ in parts]
+        for part, (_, size) in zip(found, parts, strict=True):
+            np.testing.assert_allclose(np.linalg.norm(np.reshape(part["matrix"], (4, 3))[:3], axis=1), size, rtol=1e-5)
+    body.name = "renamed"
+    assert [*scene.shapes] == ["renamed"]
+    body.shape = None
+    assert scene.shapes == {}
+    with pytest.raises(ts.InvalidArgument, match=r"renamed: shape must be one of ts\.shapes"):
+        body.shape = "box"
+
+
+def test_the_caps_of_a_capsule_are_at_its_ends():
+    scene = ts.Scene()
+    scene.add_body(mass=1.0, inertia=(1, 1, 1), shape=S.Capsule(0.1, 0.6, axis="y", position=(1, 0, 0)))
+    _, *caps = decoded(view(ts.simulate(scene, (0.0, 0.1)))).parts
+    np.testing.assert_allclose([cap["matrix"][9:] for cap in caps], [(1, -0.3, 0), (1, 0.3, 0)], atol=1e-6)
+
+
+def test_an_arm_without_mass_is_drawn_as_a_rod():
+    """From the centroid to a joint outside of the shape; a joint on its surface needs none."""
+    scene = ts.Scene()
+    bob = scene.add_body(**S.sphere(0.1, mass=1.0), position=(1, 0, 0))
+    tail = scene.add_body(**S.box((0.1, 0.1, 0.1), mass=1.0), position=(1.05, 0, 0))
+    scene.add(C.Revolute.at(scene.ground, bob, point=(0, 0, 0), axis=(0, 1, 0)))
+    scene.add(C.Fixed.at(bob, tail, point=(1.1, 0, 0)))
+    parts = decoded(view(ts.simulate(scene, (0.0, 0.1)))).parts
+    kinds = [[part["kind"] for part in parts if part["layer"] == "bodies" and part["body"] == i] for i in (0, 1)]
+    assert kinds == [["sphere", "cylinder"], ["box"]]
+    rod = next(part for part in parts if part["kind"] == "cylinder" and part["layer"] == "bodies")
+    np.testing.assert_allclose(rod["matrix"][6:], (-1, 0, 0, -0.5, 0, 0), atol=1e-6)
+
+
 def test_a_rod_in_any_direction_is_thin():
     turned = S.rod(2.0, axis="x", mass=3.0).rotated(Rotation.from_rotvec((0.3, 1.1, -0.7)))
     scene = ts.Scene(gravity=(0, 0, 0))
@@ -226,6 +277,159 @@ def test_up_is_against_gravity(gravity):
     assert np.dot(data.view, data.up) > 0.0
 
 
+def truck(speed):
+    """A block that slides without friction."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    scene.add_body(**S.box((3.0, 2.0, 6.0), mass=2.0), position=(0, 1, 0), velocity=(speed, 0, 0), name="truck")
+    return ts.simulate(scene, (0.0, 10.0))
+
+
+def test_a_page_is_fitted_to_the_mechanism_and_goes_with_it():
+    """A block of half diagonal 3.5 m; where it moves by less than its size, the camera stays."""
+    far, near = decoded(view(truck(10.0))), decoded(view(truck(0.2)))
+    centres = array(far.centres, "<f4").reshape(-1, 3) + far.origin
+    np.testing.assert_allclose(centres, np.stack([10.0 * far.t, 0 * far.t + 1, 0 * far.t], axis=1), atol=1e-4)
+    assert (far.radius, far.follow) == (pytest.approx(1.1 * 3.5), -2)
+    assert (near.radius, near.follow) == (pytest.approx(1.1 * (3.5 + 1.0)), -1)
+    np.testing.assert_allclose(array(near.centres, "<f4") + near.origin, (1, 1, 0), atol=1e-6)
+
+
+def test_a_swing_is_fitted_to_what_it_hangs_from():
+    scene = ts.Scene()
+    bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+    box = scene.add_body(**S.box((0.02, 0.02, 0.02), mass=1.0), position=(0, 1, 0))
+    for body in (bob, box):
+        scene.add(C.Distance(body, scene.ground))
+    assert decoded(view(ts.simulate(scene, (0.0, 3.0)))).follow == -1
+
+
+def test_camera_and_followed_body_are_chosen(run, tmp_path):
+    data = decoded(view(run, camera=(1, -2, 0.5), follow="coupler"))
+    assert (data.view, data.eye, data.follow) == ([1, -2, 0.5], None, 1)
+    data = decoded(view(run, camera=[(1, 2, 3), (0, 0, 1)], follow=run.scene.bodies[2]))
+    assert (data.view, data.eye, data.follow) == ([1, 2, 2], [[1, 2, 3], [0, 0, 1]], 2)
+    for wrong in ((0, 0, 0), (1, 2), "top", [(1, 2, 3), (1, 2, 3)], (np.nan, 0, 1)):
+        with pytest.raises(ts.InvalidArgument, match=r"camera must be a direction \(3,\)"):
+            run.view(tmp_path / "a", camera=wrong)
+    with pytest.raises(ts.InvalidBody, match="did you mean 'coupler'"):
+        run.view(tmp_path / "a", follow="coupla")
+
+
+def test_names_are_on_the_page(run, page):
+    labels = decoded(page).labels
+    assert [label["text"] for label in labels if label["layer"] == "bodies"] == [body.name for body in run.scene.bodies]
+    named = {label["text"]: label for label in labels if label["layer"] == "joints"}
+    assert named.keys() == {joint.name for joint in joints(run)}
+    data = decoded(page)
+    for joint in joints(run):
+        label = named[joint.name]
+        index = [*run.scene.bodies, run.scene.ground].index(joint.a) % 4
+        at = place(data, 0, index if index < 3 else -1, joint.point_a)
+        np.testing.assert_allclose(place(data, 0, label["body"], label["point"]), at, atol=SEEN)
+
+
+def sketch():
+    """Two rods, the second 0.3 m too high, and turned about x by an angle of sine 0.6."""
+    scene = ts.Scene()
+    rod, turn = S.rod(1.0, axis="x", mass=1.0), Rotation.from_rotvec((np.arcsin(0.6), 0, 0))
+    upper = scene.add_body(**rod, position=(0.5, 0, 0), name="upper")
+    lower = scene.add_body(**rod, position=(1.5, 0, 0.3), orientation=turn, name="lower")
+    axes = {"axis_a": (0, 1, 0), "axis_b": (0, 1, 0)}
+    scene.add(C.Revolute(scene.ground, upper, point_b=(-0.5, 0, 0), **axes, name="shoulder"))
+    scene.add(C.Revolute(upper, lower, point_a=(0.5, 0, 0), point_b=(-0.5, 0, 0), **axes, name="elbow"))
+    return scene
+
+
+def test_a_scene_that_is_not_assembled_is_shown(tmp_path):
+    scene = sketch()
+    data = decoded(scene.view(tmp_path / "sketch").read_text(encoding="utf-8"))
+    assert (data.frames, data.time, data.arrows, data.trails) == (1, [0.0, 0.0], [], [])
+    assert "2 constraint rows are violated" in data.note
+    (label,) = [label for label in data.labels if label["violated"]]
+    assert label["text"].startswith("Revolute 'elbow' point[2]: Phi = -0.3\nRevolute 'elbow' axis[")
+    assert label["text"].endswith("0.6")
+    red = [part for part in (*data.parts, *data.links) if part["colour"] == "#d33a2c"]
+    assert {part["body"] for part in red if "body" in part} == {0, 1}
+    (gap,) = [part for part in red if "body" not in part]
+    ends = [place(data, 0, gap[letter], gap[f"point_{letter}"]) for letter in "ab"]
+    np.testing.assert_allclose(ends, [(1, 0, 0), (1, 0, 0.3)], atol=1e-6)
+    scene.assemble()
+    data = decoded(scene.view(tmp_path / "sketch").read_text(encoding="utf-8"))
+    assert not data.note
+    assert not any(label["violated"] for label in data.labels)
+    assert not [part for part in (*data.parts, *data.links) if part["colour"] == "#d33a2c"]
+
+
+def test_violated_velocities_and_motions_are_named(tmp_path):
+    """A hinge that is torn apart at 2 m/s, and a rod whose length is 1 + t^2."""
+    scene = ts.Scene()
+    bar = scene.add_body(**S.box((1.0, 0.1, 0.1), mass=1.0), position=(0.5, 0, 0), velocity=(0, 0, 2))
+    scene.add(C.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    bob = scene.add_point_mass(mass=1.0, position=(0, 1, 0))
+    scene.add(C.Distance(bob, scene.ground, length=1 + ts.motions.time**2, name="rod"))
+    labels = decoded(scene.view(tmp_path / "a").read_text(encoding="utf-8")).labels
+    assert [label["text"] for label in labels if label["violated"]] == ["Revolute 'hinge' point[2]: dPhi/dt = -2"]
+    labels = decoded(scene.view(tmp_path / "a", t=2.0).read_text(encoding="utf-8")).labels
+    (rod,) = [label["text"] for label in labels if "rod" in label["text"]]
+    assert rod == "rod: Phi = -12"  # (d.d - L^2) / (2 L_0), of d = L_0 = 1 m and L = 5 m
+
+
+def test_scenes_that_cannot_be_shown_are_refused(tmp_path):
+    with pytest.raises(ts.InvalidBody, match="no bodies"):
+        ts.Scene().view(tmp_path / "a")
+    with pytest.raises(ts.InvalidArgument, match="t \\(s\\)"):
+        sketch().view(tmp_path / "a", t=np.nan)
+    with pytest.raises(ts.InvalidCall, match="follow"):
+        sketch().view(tmp_path / "a", folow="upper")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_gif_has_the_frames_of_the_run(tmp_path):
+    """A red ball that moves by 20 of its radii to the right, over a time of 2 s, seen from the front."""
+    image = pytest.importorskip("PIL.Image")
+    scene = ts.Scene(gravity=(0, 0, 0))
+    shape = S.Sphere(0.1, colour="red")
+    scene.add_body(mass=1.0, inertia=(1, 1, 1), shape=shape, velocity=(1.0, 0, 0), name="ball")
+    scene.add_body(mass=1.0, inertia=(1, 1, 1), shape=S.Box((2, 0.1, 0.1)), position=(1, 0, -1))
+    path = ts.simulate(scene, (0.0, 2.0)).view(tmp_path / "ball.gif", camera=(0, -1, 0))
+    with image.open(path) as gif:
+        assert (gif.n_frames, gif.info["duration"]) == (41, 50)
+        middles = []
+        for k in (0, 20, 40):
+            gif.seek(k)
+            rgb = np.asarray(gif.convert("RGB")).astype(int)
+            red = (rgb[..., 0] > 100) & (rgb[..., 1:].max(axis=-1) < 60)
+            rows, columns = np.nonzero(red)
+            middles.append((columns.mean(), rows.mean()))
+            wide = np.ptp(columns) + 1
+    middles = np.array(middles)
+    np.testing.assert_allclose(np.diff(middles[:, 0]), 5.0 * wide, rtol=0.05)  # 1 m, of a diameter of 0.2 m
+    np.testing.assert_allclose(middles[:, 1], middles[0, 1], atol=1.0)
+
+
+def test_a_gif_of_a_scene_is_one_picture(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    for camera in (None, (0, 0, 1)):
+        with image.open(sketch().view(tmp_path / "sketch.gif", camera=camera)) as gif:
+            assert (gif.n_frames, gif.size) == (1, (640, 480))
+
+
+def test_a_gif_needs_matplotlib(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(ts.MissingDependency, match=r"the GIF needs matplotlib: pip install 'tsdyn\[plot\]'"):
+        run.view(tmp_path / "a.gif")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_scripts_of_the_page_can_be_read(page, tmp_path):
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("no engine of JavaScript here")
+    *_, scripts = re.findall("<script>(.*?)</script>", page, re.DOTALL)
+    (tmp_path / "page.js").write_text(scripts, encoding="utf-8")
+    subprocess.run([node, "--check", tmp_path / "page.js"], check=True)
+
+
 def test_a_run_of_one_output_is_a_picture():
     solution = ts.simulate(chain(2), (0.0, 1.0))
     assert decoded(view(solution[:1])).frames == 1
@@ -266,7 +470,7 @@ def test_wrong_shapes_and_paths_are_refused(run, tmp_path):
     with pytest.raises(ts.InvalidArgument, match="can't be written"):
         run.view(tmp_path / "nowhere" / "a.html")
     for name in ("a.png", "a.html.gz"):
-        with pytest.raises(ts.InvalidArgument, match=r"must end in \.html, got"):
+        with pytest.raises(ts.InvalidArgument, match=r"must end in \.html or \.gif, got"):
             run.view(tmp_path / name)
     with pytest.raises(ts.InvalidCall, match="did you mean shapes"):
         run.view(shape={})

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InvalidArgument
+from ..errors import InconsistentState, InvalidArgument
 from ..files import run_tables, types
 from ..storage.formats import SUFFIXES as SOLUTIONS
 from ..viewer.view import page_path
@@ -254,7 +254,14 @@ def add_view_options(parser):
     """Add the options of `tsdyn view` to its parser."""
     add_scene(parser)
     add_method(parser)
-    parser.add_argument("--output", metavar="PATH", help="where to write the page (default: the browser opens it)")
+    parser.add_argument("--no-run", action="store_true", help="show the scene at its start, assembled or not")
+    parser.add_argument("--follow", metavar="BODY", help="the body that the camera goes with")
+    parser.add_argument(
+        "--camera", type=float, nargs=3, metavar=("X", "Y", "Z"), help="direction from the mechanism to the camera"
+    )
+    parser.add_argument(
+        "--output", metavar="PATH", help="where to write the page, or a .gif (default: the browser opens the page)"
+    )
     add_force(parser)
     add_json(parser)
 
@@ -262,23 +269,26 @@ def add_view_options(parser):
 def _view(parsed):
     """Show the run of a scene, or a saved solution, as an animation in the web browser.
 
-    A scene is run first, as `tsdyn run` does; a solution (.h5, .nc, .zarr) is shown as it is. The exit code is 0 only
-    if the run reached its end.
+    A scene is run first, as `tsdyn run` does; a solution (.h5, .nc, .zarr) is shown as it is. With --no-run, and where
+    the start violates constraints, the scene is shown at its start, with the violated rows. The exit code is 0 only if
+    the run reached its end.
     """
     if parsed.output is not None:
         demand_new(page_path(parsed.output), parsed.force)
-    solution = _solution(parsed)
-    path = solution.view(parsed.output)
+    shown = _shown(parsed)
+    path = shown.view(parsed.output, camera=parsed.camera, follow=parsed.follow)
+    success, message = getattr(shown, "success", True), getattr(shown, "message", "")
     if parsed.json:
-        print_json({"success": solution.success, "message": solution.message, "written": path})
+        print_json({"success": success, "message": message, "written": path})
     else:
-        print(f"Animation: {path}")
-    if not solution.success:
-        print(f"tsdyn: {solution.message}", file=sys.stderr)
-    return 0 if solution.success else 1
+        print(f"{'Animation' if hasattr(shown, 'success') else 'Start'}: {path}")
+    if not success:
+        print(f"tsdyn: {message}", file=sys.stderr)
+    return 0 if success else 1
 
 
-def _solution(parsed):
+def _shown(parsed):
+    """The solution or the scene to show."""
     if Path(parsed.scene).suffix.lower() in SOLUTIONS:
         from ..simulation.load import load
 
@@ -291,5 +301,11 @@ def _solution(parsed):
     from ..simulation.simulate import simulate
 
     scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
+    if parsed.no_run:
+        return scene
     span, options = options_of(parsed, given)
-    return simulate(scene, span, **options, dense_output=True)
+    try:
+        return simulate(scene, span, **options, dense_output=True)
+    except InconsistentState as error:
+        path = scene.view(parsed.output, camera=parsed.camera, follow=parsed.follow, t=span[0])
+        raise InconsistentState(f"{error}\nThe start is drawn in {path}, with the violated rows in red.") from error

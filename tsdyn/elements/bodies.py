@@ -9,6 +9,7 @@ import numpy as np
 from ..calls import fitting
 from ..errors import CONTROL, InvalidArgument, InvalidBody
 from ..maths.tolerances import NEGLIGIBLE, TINY, TYPED
+from ..shapes import pieces_of
 from ..validation import close, demand_known, floats, listed, positive, shown, vector3
 from .tolerances import SQUARABLE, UNIT_LENGTH
 
@@ -61,7 +62,25 @@ def new_name(value, thing, others, error):
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-class Ground:
+class Drawn:
+    """Mixed into bodies and the ground: what the viewer draws."""
+
+    _shape: Any = None  # geometry, or a function that makes it: files of meshes are read when they are drawn
+
+    @property
+    def shape(self) -> Any:
+        """What the viewer draws, a tuple of `ts.shapes` in the frame of the body; None: a solid of its inertia.
+
+        Set it to a shape, a list of shapes, or None; an empty list draws nothing.
+        """
+        return self._shape() if callable(self._shape) else self._shape
+
+    @shape.setter
+    def shape(self, value: Any) -> None:
+        self._shape = None if value is None else pieces_of(value, f"{self.name}: shape")  # type: ignore[attr-defined]
+
+
+class Ground(Drawn):
     """The inertial frame, as a body that constraints attach to."""
 
     dimension = 0
@@ -203,7 +222,7 @@ def _vector(what, unit):
     return lambda value, body: vector3(value, f"{body.name}: {what} ({unit})", InvalidBody)
 
 
-class PointMass:
+class PointMass(Drawn):
     """A particle: three coordinates, no orientation. Made by `Scene.add_point_mass`.
 
     Examples

@@ -193,9 +193,9 @@ def _decode_parts(value, names):
 
 # The types that a scene file may name, by the registries that plug-ins use; their arguments, by signature.
 
-BODIES, OWN = ("a", "b"), ("name", "self", "scene")
+BODIES, OWN = ("a", "b"), ("name", "self", "scene", "shape")
 BUILT_IN = ("tsdyn.constraints.", "tsdyn.forces.")
-SHAPES = {name: getattr(shapes, name) for name in ("box", "sphere", "cylinder", "rod", "from_mesh")}
+SHAPES = {name: getattr(shapes, name) for name in ("box", "sphere", "cylinder", "capsule", "rod", "from_mesh")}
 BODY_TYPES = {"Body": "add_body", "PointMass": "add_point_mass"}  # by the methods of a scene
 ENUMERATIONS = {  # by the aliases of hints.py
     "Frame": ("ground", "body"),

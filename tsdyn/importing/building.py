@@ -1,6 +1,7 @@
 """A scene of a description: bodies at their centroids in the axes of their links, joints, springs and couplings."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -193,15 +194,16 @@ def build(description, make, report):
         centroid = np.zeros(3) if owner == GROUND else description.links[owner].centroid
         report.frames[name] = FrameOn(body.name, at.p - centroid, at.R)
     scene.imported = report
-    vars(scene)["_drawn"] = {
-        bodies[name].name: (shapes, np.zeros(3) if name == GROUND else description.links[name].centroid)
-        for name, shapes in [
-            (GROUND, description.ground_shapes),
-            *((n, li.shapes) for n, li in description.links.items()),
-        ]
-        if shapes
-    }
+    scene.ground._shape = partial(_drawn, description.ground_shapes, np.zeros(3)) if description.ground_shapes else None
+    for name, link in description.links.items():
+        if link.shapes or link.helps:
+            bodies[name]._shape = partial(_drawn, link.shapes, link.centroid)
     return scene
+
+
+def _drawn(shapes, centroid):
+    """The shapes of a link in the frame of its body."""
+    return tuple(shape.make().moved(-centroid) for shape in shapes)
 
 
 def _add_body(scene, link, report):

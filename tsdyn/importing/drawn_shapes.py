@@ -11,7 +11,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from .. import shapes
-from .description import GROUND, HERE, Frame, posed, roll_pitch_yaw, shifted
+from .description import GROUND, HERE, Frame, posed, roll_pitch_yaw
 from .xml_file import OUTSIDE, exists
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ FOLDERS = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "GZ_SIM_RESOURCE_PATH", "GAZ
 class DrawnShape(NamedTuple):
     """A shape to draw, in the frame of its link."""
 
-    kind: str  # Box, Sphere, Cylinder or Mesh
+    kind: str  # Box, Sphere, Cylinder, Capsule or Mesh
     arguments: tuple
     frame: Frame = HERE
     colour: str = ""
@@ -161,7 +161,7 @@ def _primitive(shape, name, outside, report):
         kind, sizes = "Box", shape.attribute("size", 3, np.ones(3))
         arguments = (sizes,)
     elif shape.tag in ("cylinder", "capsule"):
-        kind, sizes = "Cylinder", np.array([shape.number("radius", 1.0), shape.number("length", 1.0)])
+        kind, sizes = shape.tag.capitalize(), np.array([shape.number("radius", 1.0), shape.number("length", 1.0)])
         arguments = tuple(sizes.tolist())
     elif shape.tag == "sphere":
         kind, sizes = "Sphere", np.array([shape.number("radius", 1.0)])
@@ -203,7 +203,7 @@ def _sdf_shape(node, name, frames, outside, report):
 
 
 def _sdf_primitive(shape, name, outside, report):
-    """Kind and arguments of a shape; capsules are drawn as cylinders."""
+    """Kind and arguments of a shape."""
     if shape.tag == "mesh":
         uri, scale = shape.one("uri"), shape.value("scale", 3, np.ones(3))
         return None if report is None or uri is None else mesh(uri.text, scale, outside, report, name)
@@ -221,7 +221,7 @@ def _sdf_primitive(shape, name, outside, report):
     found = sizes()
     if not all(np.all(size > 0.0) for size in found):
         return None
-    return {"box": "Box", "sphere": "Sphere"}.get(shape.tag, "Cylinder"), found
+    return shape.tag.capitalize(), found
 
 
 # Shapes to draw of MJCF: geoms of the groups that MuJoCo's viewer shows; contacts are listed.
@@ -272,31 +272,29 @@ def add_geoms(mujoco, model, found, names, report):
             report.leave("contact shape", body or "world", names.of("geom", i))
         if model.geom_group[i] >= SHOWN:
             continue
-        shapes = _shapes(model, i, kind)
-        if not shapes:
+        shape = _drawn_geom(model, i, kind)
+        if shape is None:
             report.leave(f"shape {kind}", body or "world", names.of("geom", i))
         elif body == GROUND:
-            found.ground_shapes += shapes
+            found.ground_shapes.append(shape)
         else:
-            found.links[body].shapes += shapes
+            found.links[body].shapes.append(shape)
 
 
-def _shapes(model, i, kind):
-    """`DrawnShape`s of a geom: a capsule is a cylinder and two spheres."""
+def _drawn_geom(model, i, kind):
+    """The `DrawnShape` of a geom, or None."""
     at, size = posed(model.geom_pos[i], model.geom_quat[i]), model.geom_size[i].tolist()
     rgba = model.mat_rgba[model.geom_matid[i]] if model.geom_matid[i] >= 0 else model.geom_rgba[i]
     colour = hexadecimal(rgba)
     if kind == "sphere":
-        return [DrawnShape("Sphere", (size[0],), at, colour)]
+        return DrawnShape("Sphere", (size[0],), at, colour)
     if kind == "box":
-        return [DrawnShape("Box", (2.0 * np.array(size),), at, colour)]
+        return DrawnShape("Box", (2.0 * np.array(size),), at, colour)
     if kind in ("cylinder", "capsule"):
-        ends = (-size[1], size[1]) if kind == "capsule" else ()
-        caps = [DrawnShape("Sphere", (size[0],), at @ shifted((0.0, 0.0, z)), colour) for z in ends]
-        return [DrawnShape("Cylinder", (size[0], 2.0 * size[1]), at, colour), *caps]
+        return DrawnShape(kind.capitalize(), (size[0], 2.0 * size[1]), at, colour)
     if kind == "mesh":
         m = int(model.geom_dataid[i])
         vertices = model.mesh_vert[model.mesh_vertadr[m] :][: model.mesh_vertnum[m]].astype(float)
         faces = model.mesh_face[model.mesh_faceadr[m] :][: model.mesh_facenum[m]].astype(int)
-        return [DrawnShape("Mesh", ((vertices, faces), 1.0), at, colour)]
-    return []
+        return DrawnShape("Mesh", ((vertices, faces), 1.0), at, colour)
+    return None

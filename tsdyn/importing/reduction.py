@@ -123,6 +123,8 @@ def complete(description, report):
         del description.links[link.name]
     usual = _usual_mass(description)
     all_poor = poor = [link for link in reversed(description.links.values()) if is_poor(link, SLIGHT * usual)]
+    for link in all_poor:
+        link.helps = link.mass <= SLIGHT * usual
     waiting = None
     while poor != waiting:  # one may have to wait for its neighbour
         waiting = poor

@@ -30,7 +30,7 @@ from ..model.packed import pack, user_functions
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..observables.evaluate import evaluate as _evaluate
-from ..validation import counted, demand_known, label, vector3
+from ..validation import counted, demand_known, finite, label, vector3
 from .analyses import equilibrium as _equilibrium
 from .analyses import linearise as _linearise
 from .given_motion import inverse_dynamics as _inverse_dynamics
@@ -44,7 +44,9 @@ from .variants import remove as _remove
 from .variants import with_parameters as _with_parameters
 
 if TYPE_CHECKING:
-    from ..hints import AnyBody, ArrayLike, Floats, ImportReport, Item, Orientation, Packed, Place, System
+    from collections.abc import Mapping
+
+    from ..hints import AnyBody, ArrayLike, BodyLike, Floats, ImportReport, Item, Orientation, Packed, Place, System
 
 
 # A scene in a line, and as a table for notebooks.
@@ -85,31 +87,6 @@ def _rows(lines):
         yield f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in line)}</tr>"
     if len(lines) > SHOWN:
         yield f"<tr><td>and {len(lines) - SHOWN} more</td><td></td><td></td></tr>"
-
-
-# `Scene.imported` and `Scene.shapes`: what a file of another program leaves behind.
-
-
-class OfFile:
-    """Mixed into `Scene`.
-
-    Attributes
-    ----------
-    imported : ImportReport or None
-        What was left out of an imported file, and where its frames are.
-    shapes : dict
-        Name of a body, or "ground" -> list of shapes that `solution.view` draws for it; from an imported file.
-    """
-
-    imported: ImportReport | None = None
-
-    @property
-    def shapes(self) -> dict[str, list[Any]]:
-        """Name of a body, or "ground" -> list of shapes, in the frame of the body; files of meshes are read now."""
-        return {
-            name: [shape.make().moved(-centroid) for shape in shapes]
-            for name, (shapes, centroid) in vars(self).get("_drawn", {}).items()
-        }
 
 
 # `Scene.save`.
@@ -175,7 +152,7 @@ def write_text(path: Place, text: str) -> Path:
 
 
 @fitting_methods
-class Scene(OfFile):
+class Scene:
     """Bodies, constraints, forces and gravity.
 
     Parameters
@@ -193,6 +170,8 @@ class Scene(OfFile):
         The primitives in the order of their rows, those of joints included.
     forces : tuple
         In the order added.
+    imported : ImportReport or None
+        What was left out of an imported file, and where its frames are.
 
     Notes
     -----
@@ -226,6 +205,7 @@ class Scene(OfFile):
         self.gravity = gravity
 
     ground: AnyBody
+    imported: ImportReport | None = None
     _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:
@@ -262,6 +242,11 @@ class Scene(OfFile):
         return (*self._added, *self._normalisations.values())
 
     @property
+    def shapes(self) -> dict[str, list[Any]]:
+        """Name of a body, or "ground" -> its shapes, in its frame, where it has any; files of meshes are read now."""
+        return {body.name: [*body.shape] for body in (self.ground, *self._bodies) if body._shape is not None}
+
+    @property
     def primitives(self) -> tuple[Primitive, ...]:
         """The primitives in the order of their rows, those of joints included."""
         return tuple(part for constraint in self.constraints for part in constraint.parts)
@@ -281,6 +266,7 @@ class Scene(OfFile):
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
         name: str = "",
+        shape: Any = None,
     ) -> Body:
         """Add a rigid body and return its handle.
 
@@ -299,6 +285,9 @@ class Scene(OfFile):
             Body frame.
         name : str, optional
             Name in messages and lookups; default "body1", "body2", ...
+        shape : shape of `ts.shapes`, or list of them; optional
+            What the viewer draws, in the frame of the body. `**ts.shapes.box(...)` gives it with mass and inertia. By
+            default the uniform solid with the mass and inertia.
 
         Returns
         -------
@@ -308,6 +297,8 @@ class Scene(OfFile):
         ------
         InvalidBody
             If a value is inadmissible, not finite or of a wrong shape, or the name is in use.
+        InvalidArgument
+            If shape is none.
 
         Examples
         --------
@@ -319,7 +310,7 @@ class Scene(OfFile):
         """
         values = {"mass": mass, "inertia": inertia, "position": position, "orientation": orientation}
         values |= {"velocity": velocity, "angular_velocity": angular_velocity}
-        body = self._admit(Body, name, values)
+        body = self._admit(Body, name, values | {"shape": shape})
         self._normalisations[body] = EulerNormalization(body, name=f"EulerNormalization({body.name})")
         stop_waiting(self._normalisations[body])
         return body
@@ -493,6 +484,65 @@ class Scene(OfFile):
             again = "" if seen[title] == 1 else f" #{seen[title]}"
             names += [f"{title}{again}{label}" for label in constraint.row_labels]
         return names
+
+    def view(
+        self,
+        path: str | Path | None = None,
+        *,
+        t: float = 0.0,
+        shapes: Mapping[Any, Any] | None = None,
+        camera: ArrayLike | None = None,
+        follow: BodyLike | None = None,
+    ) -> Any:
+        """Show the scene at its start, assembled or not, as an interactive page; nothing is run.
+
+        Violated rows of constraints are named in red, with their values, and the constraints drawn in red.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            The file to write, as for `Solution.view`.
+        t : float, s
+            Time at which rheonomic constraints are to hold.
+        shapes : dict, optional
+            Body, ground or name -> what to draw for it, as for `Solution.view`.
+        camera : array_like (3,) or (2, 3), optional
+            As for `Solution.view`.
+        follow : Body or str, optional
+            The body that the camera is near.
+
+        Returns
+        -------
+        Path, or View in a notebook
+
+        Raises
+        ------
+        InvalidArgument
+            If a shape or the camera is none, or the file can't be written.
+        InvalidBody
+            If the scene has no bodies, or not one of these.
+        MissingDependency
+            If matplotlib is not installed, which draws GIFs.
+
+        Examples
+        --------
+        A rod of 1 m between points that are 1.2 m apart:
+
+        >>> from pathlib import Path
+        >>> from tempfile import TemporaryDirectory
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene()
+        >>> bob = scene.add_point_mass(mass=1.0, position=(1.2, 0, 0), name="bob")
+        >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, length=1.0, name="rod"))
+        >>> with TemporaryDirectory() as folder:
+        ...     page = scene.view(Path(folder) / "sketch.html")
+        ...     print("rod: Phi = 0.22" in page.read_text())
+        True
+        """
+        from ..viewer.run_data import scene_data
+        from ..viewer.view import show
+
+        return show(scene_data(self, finite(t, "view: t (s)"), shapes=shapes, camera=camera, follow=follow), path)
 
     place = _place
     evaluate = _evaluate

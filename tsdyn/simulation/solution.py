@@ -44,21 +44,29 @@ class Showing:
         *,
         shapes: Mapping[Any, Any] | None = None,
         trails: Sequence[Any] | None = None,
+        camera: ArrayLike | None = None,
+        follow: BodyLike | None = None,
     ) -> Any:
-        """Show the run as an interactive 3-D animation: one HTML page, which works offline.
+        """Show the run as an interactive 3-D animation: one HTML page, which works offline; or as a GIF.
 
         Parameters
         ----------
         path : str or Path, optional
-            The file to write, of suffix .html if it has none. By default a notebook shows the page inline; elsewhere it
-            is written to a temporary file, which the web browser opens.
+            The file to write, of suffix .html if it has none; .gif writes a GIF. By default a notebook shows the page
+            inline; elsewhere it is written to a temporary file, which the web browser opens.
         shapes : dict, optional
-            Body, ground or name -> what to draw for it: one of `ts.shapes` (`Box`, `Sphere`, `Cylinder`, `Mesh`, or a
-            shape with mass) or a list of them, in the frame of the body. Other bodies are drawn as the uniform solid
-            with their inertia, and rods to their joints.
+            Body, ground or name -> what to draw for it: one of `ts.shapes` (`Box`, `Sphere`, `Cylinder`, `Capsule`,
+            `Mesh`, or a shape with mass) or a list of them, in the frame of the body; an empty list draws nothing.
+            Other bodies are drawn by `body.shape`, or as the uniform solid with their inertia, and rods to their
+            joints.
         trails : sequence, optional
             Whose ways are shown: bodies, for their centroids, or pairs (body, point), point (3,) in the body frame, m.
             By default the centroids of up to eight bodies.
+        camera : array_like (3,) or (2, 3), optional
+            Direction from the mechanism to the camera, ground frame; or the camera's place and the point that it looks
+            at, m. With a direction, the distance is fitted to the mechanism.
+        follow : Body or str, optional
+            The body that the camera goes with. By default it goes with the mechanism where that travels far.
 
         Returns
         -------
@@ -67,7 +75,9 @@ class Showing:
         Raises
         ------
         InvalidArgument
-            If there are no outputs, a shape or trail is none, or the file can't be written.
+            If there are no outputs, a shape, trail or camera is none, or the file can't be written.
+        MissingDependency
+            If matplotlib is not installed, which draws GIFs.
         InvalidBody
             If a key of shapes, or what should leave a trail, is not a body of this solution's scene.
 
@@ -84,9 +94,10 @@ class Showing:
         ...     print(page.name)
         pendulum.html
         """
+        from ..viewer.run_data import run_data
         from ..viewer.view import show
 
-        return show(self, path, shapes, trails)
+        return show(run_data(self, shapes=shapes, trails=trails, camera=camera, follow=follow), path)
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw constraint errors, energies, steps and charts over time.

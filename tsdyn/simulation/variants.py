@@ -262,7 +262,7 @@ def of_numbers(scene, family, changes, packed, start):
         _gravity=packed.system.gravity.copy(), _packed=packed, _start=start, _prepared=kept.like(packed),
         _users=scene._users, _functions=scene._functions, _waiting={}, _titles=None, _names=None, _twins=None,
         _aliases=None, _later=(family, changes),
-        **{name: vars(scene)[name] for name in ("imported", "_drawn") if name in vars(scene)},
+        imported=scene.imported,
     )  # fmt: skip
     other._gravity.setflags(write=False)
     return other

@@ -1,4 +1,4 @@
-"""The data of a page: poses, parts, contacts and loads of a run, as JSON with arrays in base64."""
+"""The data of a page: poses, parts, contacts and loads of a run, or of a scene, as JSON with arrays in base64."""
 
 from __future__ import annotations
 
@@ -9,16 +9,20 @@ import numpy as np
 
 from .._version import __version__
 from ..constraints import PlaneContact
+from ..elements.bodies import rotation_matrix
 from ..errors import InvalidArgument, StepFailure
+from ..model.handles import handles_of
+from ..observables.diagnostics import constraint_rows
 from ..shapes import Mesh
-from ..validation import sequence, vector3
+from ..validation import floats, sequence, vector3
 
 from .symbols import (  # isort: skip
-    UNIT, Attached, Part, attached, by_body, derived, drawn_solid, given, joint_points, reaches, rounded, symbols,
+    UNIT, Attached, Link, Part, attached, by_body, derived, drawn_solid, given, joint_points, reaches, rods, rounded,
+    symbols, violation,
 )  # fmt: skip
 
 if TYPE_CHECKING:
-    from ..hints import Floats, Solution
+    from ..hints import Floats, Scene, Solution
 
 
 # Frames of an animation: a run resampled at equal intervals of time.
@@ -30,7 +34,7 @@ OUTPUTS = 8000  # of a stored run, that are read at most
 
 
 class AnimationFrames(NamedTuple):
-    """The run at times (k,), equally spaced; poses of b bodies. `run`: outputs beside these times."""
+    """The run at times (k,), equally spaced; poses of b bodies. `run`: outputs beside these times; None of a scene."""
 
     times: Floats
     position: Floats  # (k, b, 3), m
@@ -51,19 +55,25 @@ def resample(solution: Solution, count: int) -> AnimationFrames:
     q = _dense(solution, times)
     if q is None:
         q = quintic(run, times)
-    bodies = [solution.handles.where(body) for body in solution.handles.bodies]
-    position = np.stack([q[:, at : at + 3] for at, _ in bodies], axis=1)
-    orientation = np.zeros((times.size, len(bodies), 4))
-    orientation[:, :, 0] = 1.0
-    for i, (at, dimension) in enumerate(bodies):
-        if dimension == 7:
-            p = q[:, at + 3 : at + 7]
-            orientation[:, i] = p / np.linalg.norm(p, axis=1, keepdims=True)
+    position, orientation = _poses(solution.packed, q)
     if not all(np.isfinite(array).all() for array in (position, orientation, run.qd, run.qdd)):
         raise InvalidArgument(
             "the outputs have numbers that aren't finite, which can't be drawn: view others, solution[a:b].view()."
         )
     return AnimationFrames(times, position, orientation, run)
+
+
+def _poses(packed, q):
+    """Positions (k, b, 3) and Euler parameters (k, b, 4) of coordinates (k, n)."""
+    bodies = packed.system.bodies.tolist()
+    position = np.stack([q[:, at : at + 3] for at, _ in bodies], axis=1)
+    orientation = np.zeros((len(q), len(bodies), 4))
+    orientation[:, :, 0] = 1.0
+    for i, (at, dimension) in enumerate(bodies):
+        if dimension == 7:
+            p = q[:, at + 3 : at + 7]
+            orientation[:, i] = p / np.linalg.norm(p, axis=1, keepdims=True)
+    return position, orientation
 
 
 def _dense(solution, times):
@@ -170,54 +180,39 @@ def size(one: Arrows) -> float:
 FRAMES, FEWEST = 1000, 200  # at most; and at least, however many bodies there are
 ROOM = 1_600_000  # bytes of arrays at most, if not more frames than FEWEST
 FULL = 32767  # of int16
-FLAT = 0.05  # a motion within a layer is looked at from across it: thickness per extent
 FAST = 1.5  # rotation between frames, rad, from which it is said that the animation leaves some out
 TRAILS = 8  # bodies at most whose trails are shown at first
 
 
-def run_data(solution: Any, shapes: Any = None, trails: Any = None) -> dict[str, Any]:
-    """All that a page shows of a solution, with the shapes (body -> shape or list) and trails that a user gives."""
+def run_data(solution: Any, **choices: Any) -> dict[str, Any]:
+    """All that a page shows of a solution; `choices` are the arguments of `Solution.view`."""
     if not solution.t.size:
         raise InvalidArgument("view: the solution has no outputs, so there is nothing to show.")
     packed = solution.packed
     constraints, forces = attached(packed)
-    user = by_body(solution.scene.shapes, solution.handles, solution.scene.ground)
-    user |= by_body({} if shapes is None else shapes, solution.handles, solution.scene.ground)
     per_frame = 20 * len(packed.bodies) + 6 * 2 * (len(constraints) + len(forces))
     frames = resample(solution, int(np.clip(ROOM // per_frame, FEWEST, FRAMES)))
-    points = joint_points([*constraints, *forces], len(packed.bodies))
-    reach = reaches(packed, points, frames.position)
-    meshes: list[Mesh] = []
-    parts: list[Any] = [part for i, shape in user.items() for part in given(i, shape, meshes, _name(packed, i))]
-    solids = [_solid(packed, i, points[i], reach[i]) for i in range(len(packed.bodies))]
-    for i, solid in enumerate(solids):
-        parts += [] if i in user else derived(i, solid, points[i], reach[i])
-    bulk = _bulk(parts, meshes, reach)
-    girth = np.array([0.0 if solid is None else solid.girth for solid in solids])
-    for each in (*constraints, *forces):
-        parts += symbols(each, reach, girth, _apart(frames, each))
-    origin = frames.position[0].mean(axis=0)
-    return {
-        "version": __version__,
-        "title": repr(solution.scene).strip("<>"),
-        "method": f"{solution.method}, formulation {solution.formulation}",
-        "note": _note(frames, solution),
-        "time": [float(frames.times[0]), float(frames.times[-1])],
-        "frames": len(frames.times),
-        "bodies": [{"name": body.name, "rigid": body.dimension == 7} for body in packed.bodies],
-        "reach": rounded(reach),
-        "bulk": rounded(bulk),
-        "trails": _trails(trails, solution.handles),
-        "origin": origin.tolist(),
-        "positions": encoded(frames.position - origin, "<f4"),
-        "rotations": encoded(np.rint(FULL * np.roll(frames.orientation, -1, axis=2)), "<i2"),
-        "parts": [part.data() for part in parts if isinstance(part, Part)],
-        "links": [link.data() for link in parts if not isinstance(link, Part)],
-        "meshes": [{"vertices": encoded(m.vertices, "<f4"), "faces": encoded(m.faces, "<u4")} for m in meshes],
-        "contacts": [encoded(states, "<u1") for states in contact_states(frames, constraints)],  # of such parts in turn
-        **_loads(frames, constraints, forces, float(np.median(reach))),
-        **_camera(packed, frames),
-    }
+    data = _drawn(solution.scene, packed, (constraints, forces), frames, {}, **choices)
+    data["method"] = f"{solution.method}, formulation {solution.formulation}"
+    data["note"] = _note(frames, solution)
+    data["contacts"] = [encoded(states, "<u1") for states in contact_states(frames, constraints)]  # of parts in turn
+    if not getattr(solution, "_lacks", ""):
+        data |= _loads(arrows(frames, constraints, forces, float(np.median(data["reach"]))), len(frames.times))
+    return data
+
+
+def scene_data(scene: Scene, t: float, **choices: Any) -> dict[str, Any]:
+    """All that a page shows of a scene at its start, with the rows that are violated at time t."""
+    packed, (q, qd) = scene.packed, scene.start
+    violated: dict[Any, list[str]] = {}
+    for constraint, said in _violated(packed, t, q, qd):
+        violated.setdefault(constraint, []).append(said)
+    frames = AnimationFrames(np.array([t]), *_poses(packed, q[None]), None)
+    data = _drawn(scene, packed, attached(packed), frames, violated, **choices)
+    count = sum(map(len, violated.values()))
+    rows = f"{count} constraint row{'s are' if count > 1 else ' is'} violated"
+    note = f"{rows}, named in red; scene.assemble() moves the bodies to where all rows hold." if count else ""
+    return data | {"method": f"start, t = {t:g} s", "note": note}
 
 
 def encoded(values: Any, kind: str) -> str:
@@ -225,11 +220,78 @@ def encoded(values: Any, kind: str) -> str:
     return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode("ascii")
 
 
-def _trails(trails, handles):
+def _drawn(scene, packed, attachments, frames, violated, *, shapes=None, trails=None, camera=None, follow=None):
+    """What a page shows of bodies, constraints and forces at the frames; violated: constraint -> what is said of it."""
+    constraints, forces = attachments
+    handles = handles_of(packed)
+    user = by_body({} if shapes is None else shapes, handles, scene.ground)
+    own = {i: body.shape for i, body in enumerate([*packed.bodies, scene.ground]) if body._shape is not None}
+    own[-1] = own.pop(len(packed.bodies), ())
+    hidden = [i for i, pieces in (own | user).items() if i >= 0 and not pieces]
+    points = joint_points([*constraints, *forces], len(packed.bodies))
+    reach = reaches(packed, points, frames.position, hidden)
+    meshes: list[Mesh] = []
+    parts: list[Any] = [part for i, pieces in (own | user).items() for part in given(i, pieces, meshes)]
+    solids = [_solid(packed, i, points[i], reach[i]) for i in range(len(packed.bodies))]
+    for i, body in enumerate(packed.bodies):
+        if i not in own and i not in user:
+            parts += derived(i, solids[i], points[i], reach[i])
+        elif i not in user and not callable(body._shape) and i not in hidden:  # in files arms have shapes of their own
+            mine = [part for part in parts if part.body == i]
+            parts += rods(i, [point for point in points[i] if not any(part.holds(point) for part in mine)], reach[i])
+    bulk = _bulk(parts, meshes, reach)
+    girth = np.array([0.0 if solid is None else solid.girth for solid in solids])
+    labels = [_label(body.name, "bodies", i, np.zeros(3)) for i, body in enumerate(packed.bodies) if i not in hidden]
+    for each in (*constraints, *forces):
+        apart = _apart(frames, each)
+        drawn = symbols(each, reach, girth, apart)
+        wrong = "\n".join(violated.get(each.item, ()))
+        if wrong:
+            drawn = violation(each, drawn, float(np.median(reach)), apart)
+        if drawn or wrong:
+            letter = "a" if each.a >= 0 else "b"
+            index = each.a if each.a >= 0 else each.b
+            labels.append(_label(each.item.name, "joints", index, each.point(letter), wrong))
+        parts += drawn
+    links = [link for link in parts if isinstance(link, Link)]
+    origin = frames.position[0].mean(axis=0)
+    follow = None if follow is None else handles.bodies.index(handles.body(follow))
+    return {
+        "version": __version__,
+        "title": repr(scene).strip("<>"),
+        "time": [float(frames.times[0]), float(frames.times[-1])],
+        "frames": len(frames.times),
+        "bodies": [
+            {"name": body.name, "rigid": body.dimension == 7, "hidden": i in hidden}
+            for i, body in enumerate(packed.bodies)
+        ],
+        "reach": rounded(reach),
+        "bulk": rounded(bulk),
+        "labels": labels,
+        "trails": _trails(trails, handles, hidden) if len(frames.times) > 1 else [],
+        "origin": origin.tolist(),
+        "positions": encoded(frames.position - origin, "<f4"),
+        "rotations": encoded(np.rint(FULL * np.roll(frames.orientation, -1, axis=2)), "<i2"),
+        "parts": [part.data() for part in parts if isinstance(part, Part)],
+        "links": [link.data() for link in links],
+        "meshes": [{"vertices": encoded(m.vertices, "<f4"), "faces": encoded(m.faces, "<u4")} for m in meshes],
+        "contacts": [],
+        **_loads([], 1),
+        **(seen := _camera(packed, frames, camera)),
+        **_fit(packed, frames, bulk, links, origin, seen["up"], seen["eye"] is not None, follow),
+    }
+
+
+def _label(text, layer, body, point, violated=""):
+    return {"text": violated or text, "layer": layer, "body": body, "point": rounded(point), "violated": bool(violated)}
+
+
+def _trails(trails, handles, hidden):
     """Points whose trails are shown at first: those that are asked for, or centroids of some bodies along the list."""
     if trails is None:
-        some = np.linspace(len(handles.bodies) - 1, 0, TRAILS).astype(int)
-        trails = [handles.bodies[i] for i in sorted({*some.tolist()})]
+        shown = [body for i, body in enumerate(handles.bodies) if i not in hidden] or handles.bodies
+        some = np.linspace(len(shown) - 1, 0, TRAILS).astype(int)
+        trails = [shown[i] for i in sorted({*some.tolist()})]
     found = []
     for each in sequence(
         trails, "view: trails must be a sequence of bodies, or of pairs (body, point)", InvalidArgument
@@ -239,10 +301,6 @@ def _trails(trails, handles):
         point = vector3(point, f"view: trail of {body.name!r}: point (m)", InvalidArgument)
         found.append({"body": handles.bodies.index(body), "point": rounded(point)})
     return found
-
-
-def _name(packed, index):
-    return "ground" if index < 0 else packed.bodies[index].name
 
 
 def _solid(packed, index, points, reach):
@@ -272,28 +330,70 @@ def _apart(frames, each):
 
 
 def _place(frames, index, point):
+    """Where a point of a body is at the start."""
     if index < 0:
         return point
-    e0, e = frames.orientation[0, index, 0], frames.orientation[0, index, 1:]
-    return frames.position[0, index] + point + 2.0 * np.cross(e, np.cross(e, point) + e0 * point)
+    return frames.position[0, index] + rotation_matrix(frames.orientation[0, index]) @ point
 
 
-def _loads(frames, constraints, forces, reach):
-    """Arrows, and the load, N or N m, that is their full scale."""
-    found = [] if getattr(frames.run, "_lacks", "") else arrows(frames, constraints, forces, reach)
+def _loads(found, count):
+    """Arrows at so many frames, and the load, N or N m, that is their full scale."""
     scales = {unit: max((size(one) for one in found if one.unit == unit), default=0.0) for unit in UNITS}
     values = [np.rint(one.values * (FULL / scales[one.unit])) for one in found]
     listed = [one._asdict() | {"values": None, "point": rounded(one.point)} for one in found]
     return {"arrows": listed, "loads": encoded(np.array(values), "<i2"), "scales": scales}
 
 
-def _camera(packed, frames):
-    """Upwards is against gravity, along the nearest axis; the view is across a flat motion."""
+# Rows of constraints that the start of a scene violates.
+
+ALLOWED = 1e-9  # of residuals, relative to 1 + max |q| or max |qd|: the default `initial_tol` of simulate
+
+
+def _violated(packed, t, q, qd):
+    """(constraint, row with its value) for each row that is violated."""
+    memory = packed.system.reals[packed.system.memory]
+    rows = constraint_rows(packed, np.array([t]), q[None], qd[None], np.zeros((1, q.size)), memory=memory[None])
+    (Phi,), (rate,), _ = rows
+    for constraint, _, _, where in packed.members:
+        for i, label in zip(range(where.start, where.stop), constraint.row_labels, strict=True):
+            for what, value, x in (("Phi", Phi[i], q), ("dPhi/dt", rate[i], qd)):
+                if not abs(value) <= ALLOWED * (1.0 + np.abs(x).max()):
+                    yield constraint, f"{constraint.title}{label}: {what} = {value:.3g}"
+                    break
+
+
+# Camera: upwards is against gravity, along the nearest axis; a flat motion is seen from across it. It is fitted to all
+# places of what moves, or, where that is much larger than the mechanism, to the mechanism, and goes with its centre of
+# mass.
+
+FLAT = 0.05  # a motion within a layer is looked at from across it: thickness per extent
+MARGIN = 1.1  # of the picture, per radius of what is drawn: controls cover some of it
+TRAVELS = 3.0  # extent of the motion per extent of the mechanism, from which the camera goes with it
+
+
+def _camera(packed, frames, camera):
+    """Directions upwards and to the camera; its place and what it looks at, where these are given."""
     gravity = packed.system.gravity
     up = np.eye(3)[2]
     if gravity.any():
         i = int(np.abs(gravity).argmax())
         up = -np.sign(gravity[i]) * np.eye(3)[i]
+    found = {"up": up.tolist(), "view": _across(up, frames), "eye": None}
+    if camera is None:
+        return found
+    given = floats(camera)
+    ends = given if given.shape == (2, 3) else np.array([given, np.zeros(3)]) if given.shape == (3,) else None
+    if ends is None or not np.isfinite(ends).all() or (ends[0] == ends[1]).all():
+        raise InvalidArgument(
+            "view: camera must be a direction (3,) from the mechanism to the camera, such as (1, -1, 0.5), or two "
+            f"different points, of the camera and of what it looks at, (2, 3), m; got {camera!r}."
+        )
+    found["view"] = (ends[0] - ends[1]).tolist()
+    return found | {"eye": ends.tolist() if given.shape == (2, 3) else None}
+
+
+def _across(up, frames):
+    """The direction to the camera by default."""
     level = [i for i in range(3) if not up[i]]
     extent = np.ptp(frames.position.reshape(-1, 3), axis=0)
     thin = [i for i in level if extent[i] < FLAT * extent.max()]
@@ -302,8 +402,44 @@ def _camera(packed, frames):
     raised, aside = (
         (0.25, 0.35) if len(thin) == 1 else (1.5, 0.3) if extent @ np.abs(up) < FLAT * extent.max() else (0.5, 0.7)
     )
-    view = np.cross(right, up) + aside * right + raised * up
-    return {"up": up.tolist(), "view": view.tolist()}
+    return (np.cross(right, up) + aside * right + raised * up).tolist()
+
+
+def _fit(packed, frames, bulk, links, origin, up, placed, follow):
+    """Where the camera looks at each frame, or at all, how far it sees there, m; the whole motion, and a grid below it.
+
+    Places are from the origin. placed: whether the camera's place is given, so that it stays there.
+    """
+    ends = [np.array(point) for link in links for index, point in link.ends if index < 0]  # of rods and coils
+    place = frames.position
+    low, high = ((place + sign * bulk[:, None]).reshape(-1, 3) for sign in (-1.0, 1.0))
+    low, high = np.min([low.min(axis=0), *ends], axis=0), np.max([high.max(axis=0), *ends], axis=0)
+    mass = np.einsum("b,kbi->ki", packed.system.mass / packed.system.mass.sum(), place)
+
+    def about(centre):
+        reach = (np.linalg.norm(place - centre[:, None], axis=2) + bulk).max()
+        return float(max([reach, *(np.linalg.norm(end - centre, axis=1).max() for end in ends)]))
+
+    centre = 0.5 * (low + high)[None]
+    if about(centre) > TRAVELS * about(mass) and any(body.dimension == 7 for body in packed.bodies):
+        centre = mass
+    radius = MARGIN * about(centre)
+    lowest = min(np.dot(up, low), np.dot(up, high))
+    level = 0.0 if 0.0 <= lowest < 2.0 * radius else lowest  # through the ground's origin, if that isn't far below
+    return {
+        "grid": {"step": _round_step(radius / 4.0), "level": float(level - np.dot(up, origin))},
+        "centres": encoded(centre - origin, "<f4"),
+        "radius": radius,
+        "low": (low - origin).tolist(),
+        "high": (high - origin).tolist(),
+        "follow": follow if follow is not None else -2 if len(centre) > 1 and not placed else -1,
+    }
+
+
+def _round_step(length):
+    """The largest of 1, 2 or 5 times a power of ten that is no longer."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(power * max(k for k in (1.0, 2.0, 5.0) if k == 1.0 or k * power <= length))
 
 
 def _note(frames, solution):

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..elements.joint import across
 from ..elements.markers import POINT
 from ..errors import InvalidArgument
-from ..shapes import AXES, Box, Cylinder, Geometry, Mesh, Shape, Sphere
+from ..shapes import AXES, Box, Capsule, Geometry, Mesh, Sphere, pieces_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 # What a page draws: parts that move with a body, and links that stretch between points of two bodies.
 
 UNIT = {"box": np.ones(3), "cylinder": np.array([2.0, 2.0, 1.0]), "sphere": np.full(3, 2.0)}  # dimensions, m
+OUTSIDE = 1.05  # of a half width: a joint beyond it is joined to the body by a rod
 DIGITS = 6  # of numbers that describe shapes
 
 
@@ -37,6 +41,13 @@ class Part(NamedTuple):
         """A distance from the centroid of the body beyond which there is nothing of it, m; of no mesh."""
         return float(np.linalg.norm(self.position) + np.linalg.norm(UNIT[self.kind] * self.size) / 2.0)
 
+    def holds(self, point: Any) -> bool:
+        """Whether a point of the body, (3,), is within the cuboid about it; true of a mesh."""
+        if self.kind not in UNIT:
+            return True
+        inside = np.abs(np.asarray(self.rotation).T @ (point - self.position))
+        return bool((inside <= OUTSIDE * UNIT[self.kind] * self.size / 2.0).all())
+
     def data(self) -> dict[str, Any]:
         """For the page: the columns of rotation times size, then position."""
         columns = (np.asarray(self.rotation) * np.asarray(self.size)).T
@@ -57,6 +68,11 @@ class Connector(NamedTuple):
     colour: str
     layer: str = "joints"
 
+    @property
+    def ends(self) -> tuple[tuple[int, Any], tuple[int, Any]]:
+        """Body and point of both ends."""
+        return (self.a, self.point_a), (self.b, self.point_b)
+
     def data(self) -> dict[str, Any]:
         """For the page."""
         points = {"point_a": rounded(self.point_a), "point_b": rounded(self.point_b)}
@@ -73,12 +89,13 @@ def rounded(values: Any) -> list[float]:
     return [float(f"{x:.{DIGITS}g}") for x in values]
 
 
-# Shapes of bodies: those that a user gives, or the solid of uniform density with the body's inertia, and rods.
+# Shapes of bodies: those that they have or are given, or the uniform solid with the body's inertia, and rods.
 #
 # Of principal inertia (A, B, C) and mass m: a cuboid with the edges a^2 = 6 (B + C - A) / m, ...; where two are equal,
 # a cylinder, r^2 = 2 C / m, h^2 = 6 (2 A - C) / m; where three are, a ball, r^2 = 5 A / (2 m). So these shapes are
 # exact. A solid that extends far beyond the joints of its body, or would hide them in a link of two joints, is drawn
-# smaller, in proportion. Rods join the centroid to the points of the joints.
+# smaller, in proportion. Rods join the centroid to the points of the joints, those outside of a shape that the body was
+# made of.
 
 COLOURS = ("#4c8bc9", "#e0893b", "#57a773", "#c96a9b", "#b9a23c", "#7d77c7", "#4fb0b5", "#c4605a")
 EQUAL = 1e-6  # relative difference of principal inertias
@@ -143,60 +160,57 @@ def derived(index: int, solid: Solid | None, points: Any, reach: float) -> list[
     colour, eye, centre = COLOURS[index % len(COLOURS)], np.eye(3), np.zeros(3)
     if solid is None:
         return [Part("bodies", "sphere", index, colour, centre, eye, np.full(3, POINT_MASS * reach))]
-    parts = [Part("bodies", solid.kind, index, colour, centre, solid.rotation, solid.size)]
-    for point in points:
-        length, radius = np.linalg.norm(point), ROD * reach
-        if length > radius:
-            parts.append(Part("bodies", "cylinder", index, colour, point / 2, along(point), (radius, radius, length)))
-    return parts
+    return [Part("bodies", solid.kind, index, colour, centre, solid.rotation, solid.size), *rods(index, points, reach)]
 
 
-def given(index: int, shapes: Any, meshes: list[Mesh], name: str) -> list[Part]:
-    """Parts of a body, or of the ground, with shapes of its user's; meshes are appended to `meshes`."""
+def rods(index: int, points: Any, reach: float) -> list[Part]:
+    """Rods from the centroid of a body to points (j, 3) away from it."""
+    colour, radius = COLOURS[index % len(COLOURS)], ROD * reach
+    long = [(point, length) for point in points if (length := np.linalg.norm(point)) > radius]
+    return [
+        Part("bodies", "cylinder", index, colour, point / 2, along(point), (radius, radius, length))
+        for point, length in long
+    ]
+
+
+def given(index: int, pieces: Sequence[Geometry], meshes: list[Mesh]) -> list[Part]:
+    """Parts of a body, or of the ground, with shapes of its own; meshes are appended to `meshes`."""
     parts = []
-    for piece in _pieces(shapes, name):
-        rotation = piece.rotation
-        if isinstance(piece, Box):
-            kind, size = "box", piece.size
-        elif isinstance(piece, Sphere):
-            kind, size = "sphere", np.full(3, piece.radius)
-        elif isinstance(piece, Cylinder):
-            kind, size = "cylinder", np.array([piece.radius, piece.radius, piece.length])
-            rotation = rotation @ AXES[piece.axis]
-        else:
-            kind, size = f"mesh{len(meshes)}", np.ones(3)
-            meshes.append(piece)
+    for piece in pieces:
         colour = piece.colour or (COLOURS[index % len(COLOURS)] if index >= 0 else "gray")
-        parts.append(Part("bodies", kind, index, colour, piece.position, rotation, size))
+        for kind, place, rotation, size in _units(piece):
+            if kind == "mesh":
+                kind = f"mesh{len(meshes)}"
+                meshes.append(piece)  # type: ignore[arg-type]
+            parts.append(Part("bodies", kind, index, colour, place, rotation, size))
     return parts
 
 
-def _pieces(shapes, name):
-    """The geometry, in the frame of the body, of a shape or a sequence of them."""
-    pieces = []
-    for shape in shapes if isinstance(shapes, (tuple, list)) else [shapes]:
-        if isinstance(shape, Shape):
-            pieces += [piece.moved(-shape.centroid) for piece in shape.pieces]
-        elif isinstance(shape, Geometry):
-            pieces.append(shape)
-        else:
-            raise InvalidArgument(
-                f"view: shapes[{name!r}] must be one of ts.shapes, such as ts.shapes.Box((1, 1, 1)), or a list of "
-                f"them, got {shape!r}."
-            )
-    return pieces
+def _units(piece):
+    """(kind, position, rotation, size) of the unit shapes that a shape is made of."""
+    place, rotation = piece.position, piece.rotation
+    if isinstance(piece, Box):
+        return [("box", place, rotation, piece.size)]
+    if isinstance(piece, Sphere):
+        return [("sphere", place, rotation, np.full(3, piece.radius))]
+    if isinstance(piece, Mesh):
+        return [("mesh", place, rotation, np.ones(3))]
+    rotation, r = rotation @ AXES[piece.axis], piece.radius
+    end = 0.5 * piece.length * rotation[:, 2] if isinstance(piece, Capsule) else None
+    caps = [] if end is None else [("sphere", place + side * end, rotation, np.full(3, r)) for side in (-1.0, 1.0)]
+    return [("cylinder", place, rotation, np.array([r, r, piece.length])), *caps]
 
 
-def by_body(shapes: Any, handles: Any, ground: Any) -> dict[int, Any]:
+def by_body(shapes: Any, handles: Any, ground: Any) -> dict[int, Sequence[Geometry]]:
     """What a user gave as shapes, by the index of the body, -1 for the ground."""
     if not isinstance(shapes, dict):
         raise InvalidArgument(f"view: shapes must be a dictionary, body -> shape, got {shapes!r}.")
     found = {}
     for key, value in shapes.items():
-        if key is ground or (isinstance(key, str) and key == "ground"):
-            found[-1] = value
-        else:
-            found[handles.bodies.index(handles.body(key))] = value
+        is_ground = key is ground or (isinstance(key, str) and key == "ground")
+        body = ground if is_ground else handles.body(key)
+        index = -1 if is_ground else handles.bodies.index(body)
+        found[index] = pieces_of(value, f"view: shapes[{body.name!r}]")
     return found
 
 
@@ -252,13 +266,15 @@ def _different(points):
     return kept
 
 
-def reaches(packed: Any, points: list[list[Any]], position: Any) -> Any:
+def reaches(packed: Any, points: list[list[Any]], position: Any, hidden: Sequence[int]) -> Any:
     """How far each body reaches from its centroid, m: to its farthest joint, or as its inertia does.
 
-    Of point masses, the median of the rigid bodies' reaches, or a part of the extent of the motion.
+    Of point masses and hidden bodies, the median of the other bodies' reaches, or a part of the extent of the motion.
     """
     reach = np.zeros(len(packed.bodies))
     for i, body in enumerate(packed.bodies):
+        if i in hidden:
+            continue
         reach[i] = max((float(np.linalg.norm(point)) for point in points[i]), default=0.0)
         if reach[i] == 0.0 and body.dimension == 7:
             reach[i] = solid_of(packed.system.mass[i], packed.system.inertia[i].reshape(3, 3)).extent
@@ -267,6 +283,22 @@ def reaches(packed: Any, points: list[list[Any]], position: Any) -> Any:
     else:
         rest = PER_MOTION * float(np.ptp(position.reshape(-1, 3), axis=0).max()) or 1.0
     return np.where(reach > 0.0, reach, rest)
+
+
+# Marks of a violated constraint: its symbols in red, on both of its bodies, and a line from point to point.
+
+VIOLATED = "#d33a2c"
+
+
+def violation(each: Attached, drawn: list[Part | Link], reach: float, apart: float) -> list[Part | Link]:
+    """Parts and links of a constraint that is violated, in place of those `drawn` of it; `reach` of a usual body, m."""
+    red = [part._replace(colour=VIOLATED) for part in drawn]
+    if not drawn or apart > APART * reach:
+        r = SYMBOL * reach
+        ends = [letter for letter in "ab" if letter in each.points]
+        red += [_ball(each, r, letter)._replace(colour=VIOLATED) for letter in ends]
+        red += [_link("cylinder", each, 0.3 * r, VIOLATED)] if len(ends) == 2 and apart > APART * reach else []
+    return red
 
 
 # Symbols of constraints and forces, by kind: a pin, a ball, a slider in its guide, a plane, a coil.

@@ -1,4 +1,4 @@
-"""`solution.view`: the animation of a run as one HTML page, in a notebook, in the browser, or in a file."""
+"""`solution.view` and `scene.view`: one HTML page, in a notebook, in the browser, or in a file; or a GIF."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InvalidArgument
-from .run_data import run_data
 
-SCRIPTS = ("poses.js", "instances.js", "stage.js", "player.js")
-SUFFIXES = (".html", ".htm")
+SCRIPTS = ("poses.js", "instances.js", "stage.js", "names.js", "player.js")
+PAGES, GIF = (".html", ".htm"), ".gif"
 HEIGHT = 520  # of the frame in a notebook, pixels
 
 
@@ -34,8 +33,8 @@ class View:
         self.html = page
 
     def save(self, path: str | Path) -> Path:
-        """Write the page to a file; return its path."""
-        return write(self.html, path)
+        """Write the page to a file, of suffix .html; return its path."""
+        return write(self.html.encode(), page_path(path, PAGES))
 
     def _repr_html_(self) -> str:
         """Return the page in a frame of its own."""
@@ -46,24 +45,28 @@ class View:
         return f"<View: an HTML page of {len(self.html) / 1e6:.2g} MB; .save(path) writes it>"
 
 
-def show(solution: Any, path: str | Path | None, shapes: Any, trails: Any) -> Path | View:
-    """What `Solution.view` does."""
+def show(data: dict[str, Any], path: str | Path | None) -> Path | View:
+    """Write a page or a GIF of `run_data` or `scene_data`, or show it in a notebook or the browser."""
     path = None if path is None else page_path(path)
-    page = page_of(run_data(solution, shapes, trails))
+    if path is not None and path.suffix.lower() == GIF:
+        from .painting import animation
+
+        return write(animation(data), path)
+    page = page_of(data)
     if path is not None:
-        return write(page, path)
+        return write(page.encode(), path)
     if in_notebook():
         return View(page)
     handle, name = tempfile.mkstemp(prefix="tsdyn-", suffix=".html")
     os.close(handle)
-    file = write(page, name)
+    file = write(page.encode(), Path(name))
     if not (has_display() and webbrowser.open(file.as_uri())):
-        print(f"The animation is in {file}; open it in a browser.")
+        print(f"The page is in {file}; open it in a browser.")
     return file
 
 
 def page_of(data: dict[str, Any]) -> str:
-    """The page of the data of a run."""
+    """The page of the data of a run or a scene."""
     run = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     parts = {
         "title": html.escape(data["title"]),
@@ -83,35 +86,28 @@ def source(name: str) -> str:
     return (resources.files(__package__) / "page" / name).read_text(encoding="utf-8")
 
 
-def write(page: str, path: str | Path) -> Path:
-    """Write a page to a file; return its path.
-
-    Raises
-    ------
-    InvalidArgument
-        If the file can't be written, or has another suffix than .html or .htm.
-    """
-    path = page_path(path)
+def write(content: bytes, path: Path) -> Path:
+    """Write a page or a GIF to a file; return its path; raises InvalidArgument if it can't be written."""
     try:
-        path.write_text(page, encoding="utf-8")
+        path.write_bytes(content)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InvalidArgument(f"view: the page can't be written to {path}: {reason}.") from error
+        raise InvalidArgument(f"view: {path} can't be written: {reason}.") from error
     return path
 
 
-def page_path(path: str | Path) -> Path:
-    """The path of a page, of suffix .html if it has none; raises InvalidArgument for another one than .html or .htm."""
+def page_path(path: str | Path, suffixes: tuple[str, ...] = (*PAGES, GIF)) -> Path:
+    """The path of an animation, of suffix .html if it has none; raises InvalidArgument for another one than these."""
     try:
         path = Path(path)
         path = path if path.suffix else path.with_suffix(".html")
     except (TypeError, ValueError) as error:
-        raise InvalidArgument(f"view: the page can't be written to {path}: {error}.") from error
-    if path.suffix.lower() not in SUFFIXES:
-        raise InvalidArgument(
-            f"view: the animation is an HTML page; its path must end in .html, got {str(path)!r}. solution.plot(path) "
-            "writes a figure."
+        raise InvalidArgument(f"view: {path} can't be written: {error}.") from error
+    if path.suffix.lower() not in suffixes:
+        kinds = (
+            "an HTML page or a GIF; its path must end in .html or .gif" if GIF in suffixes else "an HTML page (.html)"
         )
+        raise InvalidArgument(f"view: this is {kinds}, got {str(path)!r}. solution.plot(path) writes a figure.")
     return path
 
 

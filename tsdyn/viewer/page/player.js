@@ -25,10 +25,12 @@ const arrows = run.arrows.map((arrow, index) => {
 });
 instantiate([...parts, ...run.links, ...arrows.flatMap((arrow) => [arrow.shaft, arrow.head])]);
 
-const contacts = parts.filter((part) => part.contact).map((part, i) => ({ ...part, shown: -1, states: new Uint8Array(bytes(run.contacts[i])) }));
+const contacts = parts.filter((part) => part.contact && run.contacts.length).map((part, i) => ({ ...part, shown: -1, states: new Uint8Array(bytes(run.contacts[i])) }));
 const ofContact = ["#3f464e", "#d33a2c", "#2f9e44"].map((colour) => new THREE.Color(colour)); // open, holds back, pushes
 
 let frame = 0, playing = run.frames > 1, before = null, scriptTime = 0;
+let seen = null; // where what the camera follows was at the last frame
+const showNames = field("show-names");
 const p = [0, 0, 0], q = [0, 0, 0], load = [0, 0, 0];
 
 function drawArrow(arrow, longest) {
@@ -55,28 +57,31 @@ function draw() {
   contacts.forEach(drawContact);
   for (const part of parts) if (layers[part.layer].visible) follow(part);
   for (const link of run.links) stretch(link, placed(link.a, link.point_a, p), placed(link.b, link.point_b, q), link.radius);
-  const longest = 0.5 * extent.radius * 2 ** field("scale").value;
+  const longest = 0.5 * run.radius * 2 ** field("scale").value;
   for (const arrow of arrows) if (layers[arrow.layer].visible) drawArrow(arrow, longest);
   for (const layer of Object.values(layers)) for (const mesh of layer.children) mesh.instanceMatrix.needsUpdate = true;
   for (const line of trailOf.values()) line.geometry.setDrawRange(0, Math.floor(frame) + 1);
-  const body = Number(field("follow").value);
-  if (body >= 0) {
-    const moved = new THREE.Vector3(...placed(body, [0, 0, 0], p)).sub(orbit.target);
-    orbit.target.add(moved);
-    camera.position.add(moved);
-  }
+  const target = followed(Number(field("follow").value), frame);
+  if (target && seen) for (const point of [orbit.target, camera.position]) point.add(target).sub(seen);
+  seen = target;
   orbit.update();
   focus();
+  layGrid();
   sun.position.copy(camera.position);
   sun.target.position.copy(orbit.target);
   renderer.render(stage, camera);
+  drawNames(showNames.checked && layers.bodies.visible, showNames.checked && layers.joints.visible);
+  if (recorder) compose(true);
 }
 
 function tick(now) {
   const start = performance.now();
   if (playing && before !== null && duration > 0) {
     frame += ((now - before) / 1000) * Number(field("speed").value) * ((run.frames - 1) / duration);
-    if (frame > run.frames - 1) frame %= run.frames - 1;
+    if (frame > run.frames - 1) {
+      if (recorder) recorder.stop();
+      frame %= run.frames - 1;
+    }
   }
   before = now;
   draw();
@@ -105,7 +110,14 @@ function labels() {
     const rate = Number((factor * usual).toPrecision(2));
     field("speed").add(new Option(`${rate} ×`, rate, factor === 1, factor === 1));
   }
-  run.bodies.forEach((body, i) => field("follow").add(new Option(body.name, i)));
+  if (centres.length > 3) field("follow").add(new Option("the mechanism", -2));
+  run.bodies.forEach((body, i) => { if (!body.hidden) field("follow").add(new Option(body.name, i)); });
+}
+
+function reset() { // the camera to its first place
+  field("follow").value = run.follow;
+  home(run.follow, frame);
+  seen = followed(run.follow, frame);
 }
 
 function pick(event) { // a click on a body names it and toggles its trail
@@ -124,17 +136,31 @@ function pick(event) { // a click on a body names it and toggles its trail
 
 field("play").onclick = () => setPlaying(!playing);
 field("time").oninput = () => { setPlaying(false); frame = field("time").value * (run.frames - 1); };
-field("home").onclick = () => { field("follow").value = -1; home(); };
+field("home").onclick = reset;
 field("follow").onchange = () => { // from where a body that is small in the whole motion is seen
-  const body = Number(field("follow").value);
-  if (body < 0) return;
+  const body = Number(field("follow").value), target = followed(body, frame);
+  if (!target) return;
   const away = camera.position.clone().sub(orbit.target);
-  away.setLength(Math.min(away.length(), 12 * run.bulk[body]));
-  orbit.target.set(...placed(body, [0, 0, 0], p));
+  if (body >= 0) away.setLength(Math.min(away.length(), 12 * run.bulk[body]));
+  orbit.target.copy(target);
   camera.position.copy(orbit.target).add(away);
+  seen = target;
 };
 field("scale").parentElement.hidden = !arrows.length;
-field("picture").onclick = () => Object.assign(document.createElement("a"), { href: canvas.toDataURL(), download: "tsdyn.png" }).click();
+field("picture").onclick = () => save(compose(false).toDataURL(), "png");
+document.body.classList.toggle("still", run.frames < 2);
+field("record").hidden = !format;
+field("record").onclick = () => {
+  if (recorder) { recorder.stop(); return; }
+  frame = 0;
+  setPlaying(true);
+  draw();
+  startFilm((video) => {
+    field("record").classList.remove("on");
+    save(URL.createObjectURL(video), format.includes("mp4") ? "mp4" : "webm");
+  });
+  field("record").classList.add("on");
+};
 for (const [name, group] of Object.entries({ ...layers, trails, grid })) {
   const box = field(`show-${name}`);
   (box.onchange = () => { group.visible = box.checked; })();
@@ -156,6 +182,7 @@ labels();
 setPlaying(playing);
 new ResizeObserver(resize).observe(canvas);
 resize();
-home();
+pose(0);
+reset();
 requestAnimationFrame(tick);
 window.tsdyn = { seek: (time) => { setPlaying(false); frame = ((time - run.time[0]) / (duration || 1)) * (run.frames - 1); }, milliseconds: () => scriptTime };

@@ -1,17 +1,13 @@
 "use strict";
 // Camera, lights, grid and trails.
 
-const extent = (() => { // of the motion: centre and radius of a ball about it
-  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-  for (let k = 0; k < positions.length; k++) {
-    const reach = run.bulk[Math.floor(k / 3) % count];
-    low[k % 3] = Math.min(low[k % 3], positions[k] - reach);
-    high[k % 3] = Math.max(high[k % 3], positions[k] + reach);
-  }
-  const centre = new THREE.Vector3(...low.map((x, i) => 0.5 * (x + high[i])));
-  const size = high.map((x, i) => x - low[i]);
-  return { low, high, centre, radius: 0.5 * Math.hypot(...size) };
-})();
+const centres = new Float32Array(bytes(run.centres)); // places x 3: one for all frames, or one for each
+function centreAt(frame) {
+  const last = centres.length / 3 - 1, i = Math.min(Math.floor(frame), last);
+  const [here, next] = [i, Math.min(i + 1, last)].map((k) => new THREE.Vector3().fromArray(centres, 3 * k));
+  return here.lerp(next, frame - Math.floor(frame));
+}
+const whole = 0.5 * Math.hypot(...run.high.map((x, i) => x - run.low[i])); // radius of the motion
 const up = new THREE.Vector3(...run.up);
 
 const canvas = document.getElementById("canvas");
@@ -26,35 +22,37 @@ const orbit = new THREE.OrbitControls(camera, canvas);
 const sun = new THREE.DirectionalLight(0xffffff, 1.6);
 stage.add(new THREE.HemisphereLight(0xffffff, 0x8d8d99, 1.9), sun, sun.target, ...Object.values(layers));
 
-function home() {
-  orbit.target.copy(extent.centre);
-  const narrow = Math.min(1, camera.aspect);
-  const distance = extent.radius / Math.sin((camera.fov * Math.PI) / 360) / narrow;
-  camera.position.copy(extent.centre).addScaledVector(new THREE.Vector3(...run.view).normalize(), 0.9 * distance);
+// What the camera follows: a body, or the mechanism where it travels; null: nothing.
+function followed(body, frame) {
+  if (body >= 0) return new THREE.Vector3(...placed(body, [0, 0, 0], [0, 0, 0]));
+  return body === -2 ? centreAt(frame) : null;
+}
+
+function home(body, frame) {
+  if (run.eye) {
+    const [eye, target] = run.eye.map((point) => new THREE.Vector3(...point.map((x, i) => x - run.origin[i])));
+    camera.position.copy(eye);
+    orbit.target.copy(target);
+  } else {
+    const fitted = run.radius / Math.sin((camera.fov * Math.PI) / 360) / Math.min(1, camera.aspect);
+    orbit.target.copy(followed(body, frame) || centreAt(frame));
+    camera.position.copy(orbit.target).addScaledVector(new THREE.Vector3(...run.view).normalize(), fitted);
+  }
   orbit.update();
 }
 
-const step = (() => { // of the grid: 1, 2 or 5 times a power of ten
-  const wide = extent.radius / 4, power = 10 ** Math.floor(Math.log10(wide));
-  return power * (wide >= 5 * power ? 5 : wide >= 2 * power ? 2 : 1);
-})();
+const { step, level } = run.grid; // of its lines; height of its plane along `up`
 const grid = new THREE.GridHelper(24 * step, 24, 0x888888, 0x888888);
 grid.material.transparent = true;
 grid.material.opacity = 0.3;
 grid.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), up);
-{
-  // below the motion, or through the origin where that is not far below
-  const heights = extent.low.map((x, i) => (up.getComponent(i) > 0 ? x : -extent.high[i]) * Math.abs(up.getComponent(i)));
-  const lowest = heights.reduce((sum, x) => sum + x, 0);
-  const zero = -run.origin.reduce((sum, x, i) => sum + x * up.getComponent(i), 0);
-  const height = zero <= lowest && lowest - zero < 2 * extent.radius ? zero : lowest;
-  const level = extent.centre.clone().addScaledVector(up, height - extent.centre.dot(up));
-  for (let i = 0; i < 3; i++) { // lines at whole steps from the origin
+function layGrid() { // under what is looked at, lines at whole steps from the origin
+  grid.position.copy(orbit.target).addScaledVector(up, level - orbit.target.dot(up));
+  for (let i = 0; i < 3; i++) {
     if (Math.abs(up.getComponent(i)) > 0.5) continue;
-    const at = level.getComponent(i) + run.origin[i];
-    level.setComponent(i, step * Math.round(at / step) - run.origin[i]);
+    const at = grid.position.getComponent(i) + run.origin[i];
+    grid.position.setComponent(i, step * Math.round(at / step) - run.origin[i]);
   }
-  grid.position.copy(level);
 }
 stage.add(grid);
 
@@ -91,7 +89,7 @@ for (const { body, point } of run.trails) toggleTrail(body, point);
 function focus() {
   const distance = camera.position.distanceTo(orbit.target);
   camera.near = 0.01 * distance;
-  camera.far = 100 * distance + 10 * extent.radius;
+  camera.far = 100 * distance + 10 * whole;
   camera.updateProjectionMatrix();
 }
 
@@ -99,5 +97,6 @@ function resize() {
   const width = canvas.clientWidth, height = canvas.clientHeight;
   renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
   renderer.setSize(width, height, false);
+  Object.assign(names, { width: canvas.width, height: canvas.height });
   camera.aspect = width / Math.max(1, height);
 }

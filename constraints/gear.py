@@ -17,10 +17,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (  # isort: skip
-    PARALLEL, Point, Primitive, Vector, across, angle_near, beside, cross, dot, ground_point, kernel, number, quotient,
-    rotation_matrix, scaled, shown, square, vectors,
-)  # fmt: skip
+from ..plugins import (
+    PARALLEL,
+    Point,
+    Primitive,
+    Vector,
+    across,
+    angle_near,
+    beside,
+    cross,
+    dot,
+    ground_point,
+    kernel,
+    number,
+    quotient,
+    rotation_matrix,
+    scaled,
+    shown,
+    square,
+    vectors,
+)
 
 if TYPE_CHECKING:
     from ..hints import BodyLike

@@ -12,9 +12,18 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..plugins import (  # isort: skip
-    PARALLEL, Angle, FramedJoint, InvalidConstraint, Motion, across, angles, beside, fitting, turned_about,
-)  # fmt: skip
+from ..plugins import (
+    PARALLEL,
+    Angle,
+    FramedJoint,
+    InvalidConstraint,
+    Motion,
+    across,
+    angles,
+    beside,
+    fitting,
+    turned_about,
+)
 from .angle_driver import AngleDriver
 
 if TYPE_CHECKING:

@@ -19,10 +19,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (  # isort: skip
-    InvalidConstraint, Point, Primitive, Vector, dot, ground_point, kernel, number, product, rotation_matrix, scaled,
-    shown, sine_cosine,
-)  # fmt: skip
+from ..plugins import (
+    InvalidConstraint,
+    Point,
+    Primitive,
+    Vector,
+    dot,
+    ground_point,
+    kernel,
+    number,
+    product,
+    rotation_matrix,
+    scaled,
+    shown,
+    sine_cosine,
+)
 from .angle_driver import sine_cosine_rates
 
 if TYPE_CHECKING:

@@ -8,17 +8,39 @@ from .calls import Placing, fitting
 from .elements.bodies import Ground, PointMass, ground_point, rotation_matrix
 from .elements.element import Angle, Displacement, angles, displacements, in_frame
 from .elements.force import Force, load, vector_load
-
-from .elements.friction import (  # isort: skip
-    AXIS, BEARING_ROWS, BodyFriction, JointFriction, act, act_series, along_and_across, bearing_series, coefficient,
-    coefficient_series, direction_series, magnitude, optional, slip, slip_of, slip_series,
-)  # fmt: skip
+from .elements.friction import (
+    AXIS,
+    BEARING_ROWS,
+    BodyFriction,
+    JointFriction,
+    act,
+    act_series,
+    along_and_across,
+    bearing_series,
+    coefficient,
+    coefficient_series,
+    direction_series,
+    magnitude,
+    optional,
+    slip,
+    slip_of,
+    slip_series,
+)
 from .elements.joint import FramedJoint, Joint, across, beside, carried, turned_about
-
-from .elements.loads import (  # isort: skip
-    STATE, ByState, Given, GivenByState, GivenInBody, JointLoad, arguments_of, fill_state, fill_state_series,
-    given_series, load_at, state_load,
-)  # fmt: skip
+from .elements.loads import (
+    STATE,
+    ByState,
+    Given,
+    GivenByState,
+    GivenInBody,
+    JointLoad,
+    arguments_of,
+    fill_state,
+    fill_state_series,
+    given_series,
+    load_at,
+    state_load,
+)
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
 from .elements.tolerances import PARALLEL
@@ -26,20 +48,44 @@ from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
 from .jit.predicates import some
 from .maths import vectors
-
-from .maths.recurrences import (  # isort: skip
-    angle, angle_about, angle_near, angle_series, cross, dot, exponential, inverse_root, product, quotient, root,
-    rotated, rotated_back, rotation, scaled, sine_cosine, square,
-)  # fmt: skip
+from .maths.recurrences import (
+    angle,
+    angle_about,
+    angle_near,
+    angle_series,
+    cross,
+    dot,
+    exponential,
+    inverse_root,
+    product,
+    quotient,
+    root,
+    rotated,
+    rotated_back,
+    rotation,
+    scaled,
+    sine_cosine,
+    square,
+)
 from .methods.collocation import CollocationTableau
 from .methods.diagonally_implicit import trapezoid_error
-
-from .methods.explicit import (  # isort: skip
-    call_accelerate, call_place, embedded_error, error_kernel, second_embedded_error, step_kernel, vector,
-)  # fmt: skip
-from .methods.integrator import (  # isort: skip
-    Adaptive, Collocation, DiagonallyImplicit, ExplicitNystrom, ExplicitRungeKutta, Integrator,
-)  # fmt: skip
+from .methods.explicit import (
+    call_accelerate,
+    call_place,
+    embedded_error,
+    error_kernel,
+    second_embedded_error,
+    step_kernel,
+    vector,
+)
+from .methods.integrator import (
+    Adaptive,
+    Collocation,
+    DiagonallyImplicit,
+    ExplicitNystrom,
+    ExplicitRungeKutta,
+    Integrator,
+)
 from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
 from .methods.interpolants import linear_second
 from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau

@@ -19,11 +19,31 @@ from .moves import Moves
 from .nominal_motion import NominalMotion
 from .reduction import Reduced, eigenpairs, stiffnesses
 from .steady import SteadyRest, is_invariant
-
-from .tolerances import (  # isort: skip
-    ACCEPTED, AT_SADDLE, FARTHEST, FEW_NEGATIVE, FINAL, FIRST_MU, IN_VAIN, KICKS, LEAST_MU, MOST_NEWTON, MOST_SADDLES,
-    MOST_STEPS, MOST_TRIES, MOST_TURNED, ROUGH, SEARCH, SLIDING, SMALL, SOFT, SOFTER, STIFF, STIFFER, TOO_FAR,
-)  # fmt: skip
+from .tolerances import (
+    ACCEPTED,
+    AT_SADDLE,
+    FARTHEST,
+    FEW_NEGATIVE,
+    FINAL,
+    FIRST_MU,
+    IN_VAIN,
+    KICKS,
+    LEAST_MU,
+    MOST_NEWTON,
+    MOST_SADDLES,
+    MOST_STEPS,
+    MOST_TRIES,
+    MOST_TURNED,
+    ROUGH,
+    SEARCH,
+    SLIDING,
+    SMALL,
+    SOFT,
+    SOFTER,
+    STIFF,
+    STIFFER,
+    TOO_FAR,
+)
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Floats, ItemLike

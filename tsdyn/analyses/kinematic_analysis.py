@@ -7,10 +7,16 @@ import numpy as np
 
 from ..configuration.kinetic_metric import Metric, least_step
 from ..configuration.tolerances import MOST_ROTATION
-
-from ..elements.loops.constraint_rows import (  # isort: skip
-    OMEGA, POSE, RD, largest_coordinate, place_bodies, write_accelerations, write_positions, write_velocities,
-)  # fmt: skip
+from ..elements.loops.constraint_rows import (
+    OMEGA,
+    POSE,
+    RD,
+    largest_coordinate,
+    place_bodies,
+    write_accelerations,
+    write_positions,
+    write_velocities,
+)
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration, Status
 from ..formulations.projection import find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.compiled import clock
@@ -32,10 +38,18 @@ from ..workspaces import Work, parts, plain_context
 from .coordinates import Variations, chosen
 from .moves import update_memory
 from .nominal_motion import NominalMotion
-
-from .tolerances import (  # isort: skip
-    CLOSE, CONSISTENT, GROWTH, LARGEST_CHANGE, LEAST_STEPS, MOST_TRIES, NO_CHANGE, SEEN, SHORTEST, SLICE,
-)  # fmt: skip
+from .tolerances import (
+    CLOSE,
+    CONSISTENT,
+    GROWTH,
+    LARGEST_CHANGE,
+    LEAST_STEPS,
+    MOST_TRIES,
+    NO_CHANGE,
+    SEEN,
+    SHORTEST,
+    SLICE,
+)
 
 # What constraints leave free: the number of degrees of freedom, and their names.
 

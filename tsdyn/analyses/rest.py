@@ -11,10 +11,17 @@ from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, ROUNDING, TINY
 from ..model.equations import WIDTH, as_csr
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays
 from ..observables.generalised_forces import applied_loads
-
-from .tolerances import (  # isort: skip
-    ACCEPTED, CONSISTENT, MOST_SWEEPS, REGULARISED, REGULARISED_SWEEPS, SHIFTS, SLOWEST, STIFFNESS_ROUNDING, SWEEPS,
-)  # fmt: skip
+from .tolerances import (
+    ACCEPTED,
+    CONSISTENT,
+    MOST_SWEEPS,
+    REGULARISED,
+    REGULARISED_SWEEPS,
+    SHIFTS,
+    SLOWEST,
+    STIFFNESS_ROUNDING,
+    SWEEPS,
+)
 
 # Sparse matrices of one sparsity and many values: sums of blocks, whose places are found once.
 

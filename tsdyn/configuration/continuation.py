@@ -10,11 +10,22 @@ from ..errors import InconsistentState
 from ..maths.matrix_rank import row_lengths
 from ..maths.tolerances import NEGLIGIBLE, ROUNDING, TINY
 from .kinetic_metric import least_step, soft_step
-
-from .tolerances import (  # isort: skip
-    DECREASE, LAST_CONVERGED, MANY_COORDINATES, MOST_CLOSING, MOST_ROTATION, MOST_SETTLING, MOST_SLIDE, NAMED_SHARE,
-    NEAR_SKETCH, SETTLED, SHAKES, STAGE_CONVERGED, STAGES, STEEP,
-)  # fmt: skip
+from .tolerances import (
+    DECREASE,
+    LAST_CONVERGED,
+    MANY_COORDINATES,
+    MOST_CLOSING,
+    MOST_ROTATION,
+    MOST_SETTLING,
+    MOST_SLIDE,
+    NAMED_SHARE,
+    NEAR_SKETCH,
+    SETTLED,
+    SHAKES,
+    STAGE_CONVERGED,
+    STAGES,
+    STEEP,
+)
 
 # Continuation (homotopy) from a sketch to the nearest configuration that satisfies the constraints.
 #

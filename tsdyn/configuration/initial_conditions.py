@@ -14,23 +14,40 @@ from ..observables.evaluate import constraint_arrays
 from ..observables.tolerances import KEPT_FLOATS
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, by_lengths, coordinate_scales
 from ..rows.graph_builder import graph_of, set_redundant
-
-from ..rows.interface import (  # isort: skip
-    allocate_tangent, redundant_of, reset_selection, selection_parts, set_selection, with_reselection,
-)  # fmt: skip
+from ..rows.interface import (
+    allocate_tangent,
+    redundant_of,
+    reset_selection,
+    selection_parts,
+    set_selection,
+    with_reselection,
+)
 from ..rows.massless_axes import axis_of
 from ..workspaces import parts, words
 from .mobility import check_rank, mobility_at
 from .motor_starts import demand_finite, demand_small, refuse_masses, refuse_vanished
-
-from .start_kernels import (  # isort: skip
-    DOUBTFUL, HOLDS, NONE, StartParts, evaluate_start, failing_row, go_near_by, land_start, select_redundant,
+from .start_kernels import (
+    DOUBTFUL,
+    HOLDS,
+    NONE,
+    StartParts,
+    evaluate_start,
+    failing_row,
+    go_near_by,
+    land_start,
+    select_redundant,
     take_start,
-)  # fmt: skip
-from .tolerances import (  # isort: skip
-    DENSE_ENTRIES, LEAST_NEIGHBOURHOOD, LISTED_ENTRIES, MANY_ROWS, NEIGHBOURHOOD, REDUNDANT_SHARES, SHORTENING,
+)
+from .tolerances import (
+    DENSE_ENTRIES,
+    LEAST_NEIGHBOURHOOD,
+    LISTED_ENTRIES,
+    MANY_ROWS,
+    NEIGHBOURHOOD,
+    REDUNDANT_SHARES,
+    SHORTENING,
     SHORTEST_LEG,
-)  # fmt: skip
+)
 
 # The workspace in which a start is checked; one that is idle serves the next start of the scene.
 

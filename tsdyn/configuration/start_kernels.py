@@ -16,11 +16,18 @@ from ..maths.dense_linalg import copy, is_finite, largest
 from ..maths.tolerances import HALF_DIGITS, LAST_PLACE
 from ..model.equations import set_time
 from ..model.packed import POINT_SIZE
-
-from ..rows.interface import (  # isort: skip
-    DYNAMICS, METRIC, evaluate_rows, factorise_selected_rows, keep_every_row, multiply_rows, project, restore_selection,
-    select_rows, singularity_indicator,
-)  # fmt: skip
+from ..rows.interface import (
+    DYNAMICS,
+    METRIC,
+    evaluate_rows,
+    factorise_selected_rows,
+    keep_every_row,
+    multiply_rows,
+    project,
+    restore_selection,
+    select_rows,
+    singularity_indicator,
+)
 from ..workspaces import Parts, no_parts
 
 # In place of a row that depends on others: there is none; rounding may hide one.

@@ -9,10 +9,23 @@ from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R
 from ..errors import Status
 from ..jit.kernels import Record, entry, kernel, loader, long_kernel, resident, specialised, vector
 from ..rows.interface import has_redundant_rows, refinements, singularity_indicator
-
-from ..taylor.lane_memory import (  # isort: skip
-    BAD, FLOOR, INDICATOR, LOST, NEXT, RUNS, SIZE, SLOW, STEPS, T_NEXT, WAITS, H, LaneMemory, T, lane_loader,
-)  # fmt: skip
+from ..taylor.lane_memory import (
+    BAD,
+    FLOOR,
+    INDICATOR,
+    LOST,
+    NEXT,
+    RUNS,
+    SIZE,
+    SLOW,
+    STEPS,
+    T_NEXT,
+    WAITS,
+    H,
+    LaneMemory,
+    T,
+    lane_loader,
+)
 from ..taylor.lane_stepper import accept, reach, try_step
 from ..taylor.layout import load_series
 from ..taylor.step_parts import set_floor

@@ -18,9 +18,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (  # isort: skip
-    Force, Parameters, Point, Turn, cross, floats, kernel, rotated, rotated_back, rotation, shown, some,
-)  # fmt: skip
+from ..plugins import (
+    Force,
+    Parameters,
+    Point,
+    Turn,
+    cross,
+    floats,
+    kernel,
+    rotated,
+    rotated_back,
+    rotation,
+    shown,
+    some,
+)
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike

@@ -11,11 +11,22 @@ F is the force that the contact exerts; mu is given by friction_laws.coefficient
 import numpy as np
 
 from ..constraints.plane_contact import PlaneContact
-
-from ..plugins import (  # isort: skip
-    Force, JointFriction, Point, Turn, Vector, act, act_series, coefficient, coefficient_series, dot, magnitude, scaled,
-    slip, slip_series,
-)  # fmt: skip
+from ..plugins import (
+    Force,
+    JointFriction,
+    Point,
+    Turn,
+    Vector,
+    act,
+    act_series,
+    coefficient,
+    coefficient_series,
+    dot,
+    magnitude,
+    scaled,
+    slip,
+    slip_series,
+)
 
 
 class ContactFriction(JointFriction, Force):

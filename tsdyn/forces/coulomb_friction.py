@@ -15,10 +15,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (  # isort: skip
-    BodyFriction, Force, act, act_series, direction_series, not_negative, optional, positive, slip, slip_of,
+from ..plugins import (
+    BodyFriction,
+    Force,
+    act,
+    act_series,
+    direction_series,
+    not_negative,
+    optional,
+    positive,
+    slip,
+    slip_of,
     slip_series,
-)  # fmt: skip
+)
 
 if TYPE_CHECKING:
     from ..hints import BodyLike

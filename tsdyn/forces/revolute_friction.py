@@ -17,11 +17,23 @@ from typing import Any
 import numpy as np
 
 from ..constraints.revolute import Revolute
-
-from ..plugins import (  # isort: skip
-    AXIS, BEARING_ROWS, Force, JointFriction, along_and_across, bearing_series, coefficient, coefficient_series, dot,
-    not_negative, optional, positive, product, scaled, square,
-)  # fmt: skip
+from ..plugins import (
+    AXIS,
+    BEARING_ROWS,
+    Force,
+    JointFriction,
+    along_and_across,
+    bearing_series,
+    coefficient,
+    coefficient_series,
+    dot,
+    not_negative,
+    optional,
+    positive,
+    product,
+    scaled,
+    square,
+)
 
 
 class RevoluteFriction(JointFriction, Force):

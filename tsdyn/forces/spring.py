@@ -16,9 +16,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (  # isort: skip
-    Force, Point, Signal, dot, ground_point, inverse_root, kernel, load, not_negative, product, scaled, some, square,
-)  # fmt: skip
+from ..plugins import (
+    Force,
+    Point,
+    Signal,
+    dot,
+    ground_point,
+    inverse_root,
+    kernel,
+    load,
+    not_negative,
+    product,
+    scaled,
+    some,
+    square,
+)
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Load

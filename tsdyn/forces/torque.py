@@ -9,9 +9,18 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from ..plugins import (  # isort: skip
-    Force, Given, GivenByState, GivenInBody, Parameters, Point, Turn, given_series, state_load, vector_load,
-)  # fmt: skip
+from ..plugins import (
+    Force,
+    Given,
+    GivenByState,
+    GivenInBody,
+    Parameters,
+    Point,
+    Turn,
+    given_series,
+    state_load,
+    vector_load,
+)
 
 if TYPE_CHECKING:
     from ..hints import Body, Frame, VectorLoad

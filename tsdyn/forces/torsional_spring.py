@@ -17,10 +17,28 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..plugins import (  # isort: skip
-    PARALLEL, Angle, Force, InvalidForce, Placing, Signal, Turn, Vector, across, angle_about, angle_series, dot, finite,
-    in_frame, kernel, load, not_negative, rotation_matrix, scaled, vector3,
-)  # fmt: skip
+from ..plugins import (
+    PARALLEL,
+    Angle,
+    Force,
+    InvalidForce,
+    Placing,
+    Signal,
+    Turn,
+    Vector,
+    across,
+    angle_about,
+    angle_series,
+    dot,
+    finite,
+    in_frame,
+    kernel,
+    load,
+    not_negative,
+    rotation_matrix,
+    scaled,
+    vector3,
+)
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Floats, Load

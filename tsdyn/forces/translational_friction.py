@@ -18,11 +18,26 @@ from typing import Any
 import numpy as np
 
 from ..constraints.translational import Translational
-
-from ..plugins import (  # isort: skip
-    AXIS, BEARING_ROWS, Force, JointFriction, act, act_series, along_and_across, bearing_series, coefficient,
-    coefficient_series, dot, optional, positive, product, scaled, slip, slip_series, square,
-)  # fmt: skip
+from ..plugins import (
+    AXIS,
+    BEARING_ROWS,
+    Force,
+    JointFriction,
+    act,
+    act_series,
+    along_and_across,
+    bearing_series,
+    coefficient,
+    coefficient_series,
+    dot,
+    optional,
+    positive,
+    product,
+    scaled,
+    slip,
+    slip_series,
+    square,
+)
 
 
 class TranslationalFriction(JointFriction, Force):

@@ -15,10 +15,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (  # isort: skip
-    STATE, ByState, Force, Parameters, Point, Turn, arguments_of, cross, fill_state, fill_state_series, floats,
-    numbers_of, shown, stack,
-)  # fmt: skip
+from ..plugins import (
+    STATE,
+    ByState,
+    Force,
+    Parameters,
+    Point,
+    Turn,
+    arguments_of,
+    cross,
+    fill_state,
+    fill_state_series,
+    floats,
+    numbers_of,
+    shown,
+    stack,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

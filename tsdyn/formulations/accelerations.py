@@ -11,11 +11,21 @@ from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, 
 from ..maths.dense_linalg import copy, largest
 from ..maths.tolerances import LAST_PLACE
 from ..model.equations import applied_forces
-
-from ..rows.interface import (  # isort: skip
-    acceleration_residuals, add_axis_multipliers, apply_multipliers, clear_redundant, constrain,
-    constrain_accelerations, evaluate_bias, factorise_product, inner, note_loads, solve_product, weigh, weigh_bodies,
-)  # fmt: skip
+from ..rows.interface import (
+    acceleration_residuals,
+    add_axis_multipliers,
+    apply_multipliers,
+    clear_redundant,
+    constrain,
+    constrain_accelerations,
+    evaluate_bias,
+    factorise_product,
+    inner,
+    note_loads,
+    solve_product,
+    weigh,
+    weigh_bodies,
+)
 from ..workspaces import load
 from .tolerances import DAMPED, DAMPED_SHARE, EXACT, LOAD_SWEEPS, NEWTON_DONE, REFINEMENTS, SLOW_FACTORS
 

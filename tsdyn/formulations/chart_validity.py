@@ -14,11 +14,17 @@ from ..elements.loops.constraint_rows import POSE, P, R, place_bodies
 from ..jit.kernels import kernel
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import ROUNDING, TINY
-
-from ..rows.interface import (  # isort: skip
-    METRIC, accelerations_hold, evaluate_rows, factorise_rows, has_redundant_rows, pivot_loss, rates_hold,
-    redundant_rows_hold, selection_serves,
-)  # fmt: skip
+from ..rows.interface import (
+    METRIC,
+    accelerations_hold,
+    evaluate_rows,
+    factorise_rows,
+    has_redundant_rows,
+    pivot_loss,
+    rates_hold,
+    redundant_rows_hold,
+    selection_serves,
+)
 from .chart_coordinates import factorise_normal, turned_most
 from .tolerances import CONTRACTION_LIMIT, NO_SIZE, SAME, TURN_LIMIT, TURN_SHARE
 

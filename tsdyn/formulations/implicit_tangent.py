@@ -12,13 +12,27 @@ from ..maths.vectors import spin
 from ..methods.collocation import parts_of
 from ..methods.explicit import NORM
 from ..model.equations import is_rheonomic, set_time
-
-from ..rows.interface import (  # isort: skip
-    DYNAMICS, apply_multipliers, clear_redundant, evaluate_bias, evaluate_drift, evaluate_rows,
-    factorise_complex_saddle, factorise_saddle, factorise_selected_rows, multiply_rates, multiply_rows,
-    solve_complex_saddle, solve_product, solve_rows, solve_saddle, take_reactions, weigh, weigh_bodies,
+from ..rows.interface import (
+    DYNAMICS,
+    apply_multipliers,
+    clear_redundant,
+    evaluate_bias,
+    evaluate_drift,
+    evaluate_rows,
+    factorise_complex_saddle,
+    factorise_saddle,
+    factorise_selected_rows,
+    multiply_rates,
+    multiply_rows,
+    solve_complex_saddle,
+    solve_product,
+    solve_rows,
+    solve_saddle,
+    take_reactions,
+    weigh,
+    weigh_bodies,
     write_saddle_rows,
-)  # fmt: skip
+)
 from ..workspaces import load
 from .accelerations import body_forces
 from .chart_coordinates import displace, factorise_normal, to_bodies, turn_accelerations, turn_rates

@@ -13,10 +13,15 @@ derivatives of the force laws in corotated frames (forces.py). At the current co
 """
 
 from ..jit.kernels import callback, kernel, stack, stack2, vector
-
-from ..maths.dense_linalg import (  # isort: skip
-    add_product, add_transposed_product, clear_matrix, lu, lu_solve, multiply, transposed_times,
-)  # fmt: skip
+from ..maths.dense_linalg import (
+    add_product,
+    add_transposed_product,
+    clear_matrix,
+    lu,
+    lu_solve,
+    multiply,
+    transposed_times,
+)
 from ..maths.tolerances import TINY
 from ..maths.vectors import matrix_a, matrix_g
 from ..model.equations import applied_forces, constraint_curvature, force_jacobian

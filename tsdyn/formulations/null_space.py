@@ -12,16 +12,28 @@ from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import applied_forces, is_rheonomic, set_time
 from ..rows.interface import evaluate_bias, evaluate_drift, evaluate_rows, has_redundant_rows, redundant_rows_hold
 from ..workspaces import load
-
-from .accelerations import (  # isort: skip
-    SOLVE_FRICTION, body_of, call_friction, forget_loads, has_converged, normal_load, step_share, unit_friction,
-)  # fmt: skip
+from .accelerations import (
+    SOLVE_FRICTION,
+    body_of,
+    call_friction,
+    forget_loads,
+    has_converged,
+    normal_load,
+    step_share,
+    unit_friction,
+)
 from .chart_validity import every_level_holds, measure_turns, reason_to_leave
-
-from .null_space_chart import (  # isort: skip
-    NOT_FINITE, OK, correct, evaluate_dense_bias, evaluate_dense_drift, multiply_dense_row, new_chart, solve_positions,
+from .null_space_chart import (
+    NOT_FINITE,
+    OK,
+    correct,
+    evaluate_dense_bias,
+    evaluate_dense_drift,
+    multiply_dense_row,
+    new_chart,
+    solve_positions,
     tangent_map,
-)  # fmt: skip
+)
 from .tolerances import LOAD_SWEEPS
 
 # Coupled friction and reactions in the null-space form: accelerations and multipliers are linear in the normal loads.

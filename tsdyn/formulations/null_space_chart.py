@@ -4,10 +4,15 @@ import math
 
 from ..errors import Status
 from ..jit.kernels import kernel
-
-from ..maths.dense_linalg import (  # isort: skip
-    add_product, add_transposed_product, clear_matrix, invert, largest, multiply, null_space,
-)  # fmt: skip
+from ..maths.dense_linalg import (
+    add_product,
+    add_transposed_product,
+    clear_matrix,
+    invert,
+    largest,
+    multiply,
+    null_space,
+)
 from ..maths.tolerances import ROUNDING_AT_MOST, SUM_ROUNDING, TINY
 from ..model.equations import acceleration_bias, constraint_jacobian, constraints, time_derivative
 from ..rows.interface import list_redundant

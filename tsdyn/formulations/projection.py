@@ -12,11 +12,19 @@ from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import add, four, put
 from ..maths.dense_linalg import largest, largest_of
 from ..maths.tolerances import LAST_PLACE, ROUNDING, ROUNDING_AT_MOST
-
-from ..rows.interface import (  # isort: skip
-    DYNAMICS, constrain, evaluate_drift, evaluate_residuals, evaluate_rows, factorise_rows, find_correction,
-    is_near_singular, project, redundant_rows_hold, singularity_indicator,
-)  # fmt: skip
+from ..rows.interface import (
+    DYNAMICS,
+    constrain,
+    evaluate_drift,
+    evaluate_residuals,
+    evaluate_rows,
+    factorise_rows,
+    find_correction,
+    is_near_singular,
+    project,
+    redundant_rows_hold,
+    singularity_indicator,
+)
 from .chart_coordinates import largest_rates
 from .tolerances import LAND_SWEEPS, STALLED, WALK
 

@@ -8,18 +8,30 @@ from ..jit.simd import add, cross, fma, four, lanes, put, splat, sub
 from ..maths.dense_linalg import clear_matrix, copy
 from ..model.equations import applied_forces, call_jacobian, call_stiffness
 from ..rows.constraint_graph import W_MASS, W_ROTATION, WEIGHTS
-
-from ..rows.interface import (  # isort: skip
-    DYNAMICS, apply_multipliers, factorise_saddle, factorise_selected_rows, inner, more, multiply_rows, solve_product,
-    solve_saddle, weigh, write_saddle_rows,
-)  # fmt: skip
+from ..rows.interface import (
+    DYNAMICS,
+    apply_multipliers,
+    factorise_saddle,
+    factorise_selected_rows,
+    inner,
+    more,
+    multiply_rows,
+    solve_product,
+    solve_saddle,
+    weigh,
+    write_saddle_rows,
+)
 from ..rows.saddle_matrix import BLOCK, LOWER, OWN, UPPER
 from ..workspaces import load
 from .accelerations import body_of, solve_accelerations
-
-from .chart_coordinates import (  # isort: skip
-    acceleration_by_turn, add_gyroscopic, add_inertia, factorise_normal, rate_by_turn, to_bodies,
-)  # fmt: skip
+from .chart_coordinates import (
+    acceleration_by_turn,
+    add_gyroscopic,
+    add_inertia,
+    factorise_normal,
+    rate_by_turn,
+    to_bodies,
+)
 
 # Stiffness and damping blocks of bodies: exact derivatives of their loads by (r, pi') and (rd, omega').
 #

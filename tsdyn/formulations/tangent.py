@@ -10,17 +10,30 @@ from ..maths.tolerances import ROUNDING_AT_MOST
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
-
-from ..rows.interface import (  # isort: skip
-    DYNAMICS, apply_multipliers, evaluate_drift, evaluate_residuals, evaluate_rows, factorise_selected_rows, is_axis,
-    multiply_rates, multiply_rows, project, redundant_rows_hold, refinements, solve_product, solve_rows,
-)  # fmt: skip
+from ..rows.interface import (
+    DYNAMICS,
+    apply_multipliers,
+    evaluate_drift,
+    evaluate_residuals,
+    evaluate_rows,
+    factorise_selected_rows,
+    is_axis,
+    multiply_rates,
+    multiply_rows,
+    project,
+    redundant_rows_hold,
+    refinements,
+    solve_product,
+    solve_rows,
+)
 from ..workspaces import load
 from .accelerations import call_friction, refine_accelerations, solve_accelerations
-
-from .chart_coordinates import (  # isort: skip
-    displace, factorise_normal, turn_rates, write_back,
-)  # fmt: skip
+from .chart_coordinates import (
+    displace,
+    factorise_normal,
+    turn_rates,
+    write_back,
+)
 from .chart_validity import every_level_holds, reason_to_leave, set_base_point
 from .projection import largest_residual, velocity_floor
 from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, SLOW, SLOW_FACTORS, STALLED, SWEEPS

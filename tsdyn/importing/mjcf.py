@@ -7,10 +7,20 @@ import numpy as np
 
 from ..errors import MissingDependency
 from . import drawn_shapes
-
-from .description import (  # isort: skip
-    GROUND, Coupling, Description, JointItem, Link, Servo, SpringItem, fresh, of_body, of_quaternion, posed, shifted,
-)  # fmt: skip
+from .description import (
+    GROUND,
+    Coupling,
+    Description,
+    JointItem,
+    Link,
+    Servo,
+    SpringItem,
+    fresh,
+    of_body,
+    of_quaternion,
+    posed,
+    shifted,
+)
 from .mjcf_files import Sources, leave_unread
 
 # Actuators and tendons of MJCF: servos with the control that MuJoCo starts with, and springs between two sites.

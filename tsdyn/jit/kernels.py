@@ -16,11 +16,20 @@ from numba import NumbaError, types
 from numba.extending import intrinsic
 
 from ..errors import InvalidConstraint
-
-from .arrays import (  # isort: skip
-    ANY, HAS_CYCLES, complex_stack, complex_stack2, complex_vector, cycles, data_of, integers, matrix, stack, stack2,
+from .arrays import (
+    ANY,
+    HAS_CYCLES,
+    complex_stack,
+    complex_stack2,
+    complex_vector,
+    cycles,
+    data_of,
+    integers,
+    matrix,
+    stack,
+    stack2,
     vector,
-)  # fmt: skip
+)
 from .code_hash import is_ours
 from .compiled import DEBUG, OPTIONS, Callback, Callee, callback, entry, letters, table
 from .compilers import current

@@ -8,10 +8,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from .tolerances import (  # isort: skip
-    AT_ZERO, CLEAR, DEEPEST, EPS, EXTREME, MOST_SCALED, NEAR_ZERO, NEGLIGIBLE, NOISE_RATIO, REAL, ROUGH_SHARE, SAFE,
-    SHORTEST_INTERVAL, TIGHT, UNDERFLOWING, UNRESOLVED, WIDEST_NOISE,
-)  # fmt: skip
+from .tolerances import (
+    AT_ZERO,
+    CLEAR,
+    DEEPEST,
+    EPS,
+    EXTREME,
+    MOST_SCALED,
+    NEAR_ZERO,
+    NEGLIGIBLE,
+    NOISE_RATIO,
+    REAL,
+    ROUGH_SHARE,
+    SAFE,
+    SHORTEST_INTERVAL,
+    TIGHT,
+    UNDERFLOWING,
+    UNRESOLVED,
+    WIDEST_NOISE,
+)
 
 # Chebyshev interpolation on [-1, 1]; tables are made once for each degree.
 

@@ -23,11 +23,21 @@ from ..workspaces import load, load_run
 from .collocation import parts_of
 from .diagonally_implicit import call_linearise, call_reduce, call_residual
 from .explicit import STEP, call_norm, combine
-
-from .tolerances import (  # isort: skip
-    COUPLED_ITERATIONS, DIVERGING, FAR_STAGE, FIXED_ITERATIONS, KAPPA, KAPPA_COUPLED, MATRICES, RESIDUAL_FLOOR,
-    SAME_STEP, SAME_TIME, SLOW_COUPLED, STALLED_CORRECTION, TRUSTED,
-)  # fmt: skip
+from .tolerances import (
+    COUPLED_ITERATIONS,
+    DIVERGING,
+    FAR_STAGE,
+    FIXED_ITERATIONS,
+    KAPPA,
+    KAPPA_COUPLED,
+    MATRICES,
+    RESIDUAL_FLOOR,
+    SAME_STEP,
+    SAME_TIME,
+    SLOW_COUPLED,
+    STALLED_CORRECTION,
+    TRUSTED,
+)
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
 # start, step and chart of the last attempt; the step before, 0 if unknown; points of predictions; step of the matrices,

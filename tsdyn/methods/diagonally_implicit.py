@@ -8,12 +8,33 @@ from ..maths.dense_linalg import copy
 from ..maths.tolerances import ROUNDING_AT_MOST
 from ..workspaces import load, load_run
 from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combine
-
-from .tolerances import (  # isort: skip
-    AGEING, APART, APART_AT_LEAST, APART_SLIPPING, DIVERGING, EAGER_LOST, EAGER_SPARSE, EAGER_STAGES, FAR_STAGE,
-    FIXED_ITERATIONS, FORGET, GUESS, ITERATIONS, KAPPA, KAPPA_SPARSE, LEAST, LEAST_FIXED, LEAST_LEFT, MATRICES,
-    RESIDUAL_FLOOR, SAME_STEP, SAME_TIME, SLOW_DENSE, SLOW_SPARSE, WORSE_CONTRACTION,
-)  # fmt: skip
+from .tolerances import (
+    AGEING,
+    APART,
+    APART_AT_LEAST,
+    APART_SLIPPING,
+    DIVERGING,
+    EAGER_LOST,
+    EAGER_SPARSE,
+    EAGER_STAGES,
+    FAR_STAGE,
+    FIXED_ITERATIONS,
+    FORGET,
+    GUESS,
+    ITERATIONS,
+    KAPPA,
+    KAPPA_SPARSE,
+    LEAST,
+    LEAST_FIXED,
+    LEAST_LEFT,
+    MATRICES,
+    RESIDUAL_FLOOR,
+    SAME_STEP,
+    SAME_TIME,
+    SLOW_DENSE,
+    SLOW_SPARSE,
+    WORSE_CONTRACTION,
+)
 
 # First guesses of the stages of a step, k_i = vdd, on the polynomial through stages that are known already.
 #

@@ -24,11 +24,19 @@ from ..model.handles import handles_of
 from ..model.packed import classes, index_of, member_of
 from ..rows.constraint_graph import REDUCED
 from ..rows.graph_builder import graph_of
-
-from ..rows.interface import (  # isort: skip
-    METRIC, Rows, balance_loads, count_self_stresses, evaluate_every_row, evaluate_rows, factorise_rows, mark_redundant,
-    redundancy, self_stress, weigh_bodies,
-)  # fmt: skip
+from ..rows.interface import (
+    METRIC,
+    Rows,
+    balance_loads,
+    count_self_stresses,
+    evaluate_every_row,
+    evaluate_rows,
+    factorise_rows,
+    mark_redundant,
+    redundancy,
+    self_stress,
+    weigh_bodies,
+)
 from ..workspaces import arrays_of, load_parts, parts
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
 from .tolerances import KEPT_FLOATS

@@ -17,11 +17,23 @@ from ..integrators import SDIRK54, Taylor
 from ..simulation.scene_cache import prepared
 from ..taylor.layout import lacking, without_series
 from .phases import duration
-
-from .tolerances import (  # isort: skip
-    ALTERNATIVE, CAPPED, CHARTS, ERRORS, FORCE, LARGEST_GAP, LONGEST, LOOSER, LOOSEST, ONCE, OUTPUTS, PYTHON, QUICKER,
-    REJECTED, SHORT,
-)  # fmt: skip
+from .tolerances import (
+    ALTERNATIVE,
+    CAPPED,
+    CHARTS,
+    ERRORS,
+    FORCE,
+    LARGEST_GAP,
+    LONGEST,
+    LOOSER,
+    LOOSEST,
+    ONCE,
+    OUTPUTS,
+    PYTHON,
+    QUICKER,
+    REJECTED,
+    SHORT,
+)
 
 SHOWN = 3
 

@@ -12,10 +12,19 @@ from ..elements.loops.constraint_series import SIGNATURE as SERIES
 from ..elements.loops.constraint_series import call_series
 from ..elements.loops.coordinate_rows import SIGNATURE as LOOP
 from ..elements.loops.coordinate_rows import call_kind
-
-from ..jit.kernels import (  # isort: skip
-    ANY, HAS_CYCLES, Callback, caller, cycles, data_of, entry, integers, kernel, specialised, vector,
-)  # fmt: skip
+from ..jit.kernels import (
+    ANY,
+    HAS_CYCLES,
+    Callback,
+    caller,
+    cycles,
+    data_of,
+    entry,
+    integers,
+    kernel,
+    specialised,
+    vector,
+)
 from ..methods.collocation_step import call_balance, call_factorise, call_solve
 from ..methods.diagonally_implicit import call_correct, call_reduce, call_residual, call_soften
 from ..methods.explicit import ACCELERATE as ACCELERATE_SIGNATURE

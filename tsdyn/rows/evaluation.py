@@ -3,10 +3,14 @@
 from ..elements.loops.constraint_rows import call_body_loop
 from ..jit.kernels import kernel, long_kernel
 from .redundant_rows import clear_redundant, keep_every_row, keep_redundant, leave_redundant_rows, restore_selection
-
-from .schur_complement import (  # isort: skip
-    add_axis_multipliers, apply_columns, clear_axes, find_correction, gather_axes, solve_product,
-)  # fmt: skip
+from .schur_complement import (
+    add_axis_multipliers,
+    apply_columns,
+    clear_axes,
+    find_correction,
+    gather_axes,
+    solve_product,
+)
 
 # Row evaluation at the current poses: Phi, H, gamma or Phi_t, zero at redundant rows.
 

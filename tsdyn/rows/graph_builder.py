@@ -9,10 +9,19 @@ from ..elements.loops.constraint_rows import BODY, INTS, MASK, ROW, STILL
 from ..errors import InvalidConstraint
 from ..jit.kernels import records, row_of
 from ..model.packed import frictions_of, has_lengths, is_small
-
-from .constraint_graph import (  # isort: skip
-    DRIFT, ROWS, ROWS_WELD, W_MASS, WEIGHTS, WELD_ROWS, WELDS, ConstraintGraph, PartProduct, Product, RowKind,
-)  # fmt: skip
+from .constraint_graph import (
+    DRIFT,
+    ROWS,
+    ROWS_WELD,
+    W_MASS,
+    WEIGHTS,
+    WELD_ROWS,
+    WELDS,
+    ConstraintGraph,
+    PartProduct,
+    Product,
+    RowKind,
+)
 from .elimination import with_kernels
 from .massless_axes import Share, axes_of, inverses, lean_bodies
 from .symbolic import analyse

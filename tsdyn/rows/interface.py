@@ -6,31 +6,83 @@ from ..elements.loops.constraint_rows import POSE
 from ..jit.arrays import zeros
 from .elimination import KERNELS as ELIMINATION
 from .elimination import lu_factors
-
-from .evaluation import (  # isort: skip
-    evaluate_bias, evaluate_drift, evaluate_every_row, evaluate_residuals, evaluate_rows, evaluate_without_redundant,
-    solve_friction_series, solve_series,
-)  # fmt: skip
-from .redundant_rows import (  # isort: skip
-    clear_redundant, keep_every_row, list_redundant, mark_redundant, note_selection, restore_selection,
-    return_to_selection, save_selection, take_noted_selection,
-)  # fmt: skip
-from .row_selection import (  # isort: skip
-    accelerations_hold, count_self_stresses, doubt_selection, factorise_rows, has_redundant_rows, is_near_singular,
-    is_next_to_singular, is_singular_within_a_step, note_indicator, note_loads, rates_hold, redundant_rows_hold,
-    refinements, select_rows, selection_serves, self_stress, singularity_indicator, with_reselection,
-)  # fmt: skip
+from .evaluation import (
+    evaluate_bias,
+    evaluate_drift,
+    evaluate_every_row,
+    evaluate_residuals,
+    evaluate_rows,
+    evaluate_without_redundant,
+    solve_friction_series,
+    solve_series,
+)
+from .redundant_rows import (
+    clear_redundant,
+    keep_every_row,
+    list_redundant,
+    mark_redundant,
+    note_selection,
+    restore_selection,
+    return_to_selection,
+    save_selection,
+    take_noted_selection,
+)
+from .row_selection import (
+    accelerations_hold,
+    count_self_stresses,
+    doubt_selection,
+    factorise_rows,
+    has_redundant_rows,
+    is_near_singular,
+    is_next_to_singular,
+    is_singular_within_a_step,
+    note_indicator,
+    note_loads,
+    rates_hold,
+    redundant_rows_hold,
+    refinements,
+    select_rows,
+    selection_serves,
+    self_stress,
+    singularity_indicator,
+    with_reselection,
+)
 from .row_workspace import Friction, Indicator, Landing, RedundantRows, Rows, Selection, TangentWorkspace
-
-from .saddle_matrix import (  # isort: skip
-    factorise_complex_saddle, factorise_saddle, solve_complex_saddle, solve_saddle, write_saddle_rows,
-)  # fmt: skip
-from .schur_complement import (  # isort: skip
-    DYNAMICS, METRIC, acceleration_residuals, add_axis_multipliers, add_products, apply_multipliers, balance_loads,
-    constrain, constrain_accelerations, factorise_chart_matrix, factorise_product, factorise_selected_rows,
-    find_correction, inner, is_axis, more, multiply_rates, multiply_rows, pivot_loss, project, rotate_rate,
-    solve_product, solve_rows, take_reactions, weigh, weigh_bodies,
-)  # fmt: skip
+from .saddle_matrix import (
+    factorise_complex_saddle,
+    factorise_saddle,
+    solve_complex_saddle,
+    solve_saddle,
+    write_saddle_rows,
+)
+from .schur_complement import (
+    DYNAMICS,
+    METRIC,
+    acceleration_residuals,
+    add_axis_multipliers,
+    add_products,
+    apply_multipliers,
+    balance_loads,
+    constrain,
+    constrain_accelerations,
+    factorise_chart_matrix,
+    factorise_product,
+    factorise_selected_rows,
+    find_correction,
+    inner,
+    is_axis,
+    more,
+    multiply_rates,
+    multiply_rows,
+    pivot_loss,
+    project,
+    rotate_rate,
+    solve_product,
+    solve_rows,
+    take_reactions,
+    weigh,
+    weigh_bodies,
+)
 from .tolerances import ILL_CONDITIONED, MOST_ROWS
 
 # Allocation of the workspace of constraint rows.

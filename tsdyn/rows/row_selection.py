@@ -15,14 +15,31 @@ from .evaluation import evaluate_all, evaluate_every_row
 from .factorisation import keep_diagonal, update_later_blocks
 from .redundant_rows import keep_every_row, leave_redundant_rows, length, square
 from .row_workspace import Rows, TangentWorkspace, no_tangent_workspace
-
-from .schur_complement import (  # isort: skip
-    factorise_selected_rows, form_schur_complement, inner, leave_axes_out, multiply_rows, solve_rows, weigh, weigh_rows,
-)  # fmt: skip
-from .tolerances import (  # isort: skip
-    FEWER, FIRST_SHARE, HARDLY_CONDITIONED, HELD, ILL_CONDITIONED, LEAST_SHARE, NEAR, NEXT_TO, NO_RATE, ONE_DIGIT,
-    RESTING, WITHIN_A_STEP, WORST_CONDITIONED,
-)  # fmt: skip
+from .schur_complement import (
+    factorise_selected_rows,
+    form_schur_complement,
+    inner,
+    leave_axes_out,
+    multiply_rows,
+    solve_rows,
+    weigh,
+    weigh_rows,
+)
+from .tolerances import (
+    FEWER,
+    FIRST_SHARE,
+    HARDLY_CONDITIONED,
+    HELD,
+    ILL_CONDITIONED,
+    LEAST_SHARE,
+    NEAR,
+    NEXT_TO,
+    NO_RATE,
+    ONE_DIGIT,
+    RESTING,
+    WITHIN_A_STEP,
+    WORST_CONDITIONED,
+)
 
 # Selection of independent rows of H among redundant ones, by rank-revealing elimination of S.
 #

@@ -8,12 +8,34 @@ from ..methods.diagonally_implicit import call_soften
 from ..methods.explicit import call_error, call_norm
 from ..methods.tolerances import SAME_TIME
 from .dense_output import evaluate
-
-from .tolerances import (  # isort: skip
-    AT_LONGEST, FIRST_ERROR, FIRST_GROWTH, FIRST_LEAST, FIRST_PART, FIRST_SEEN, FROM_ZERO, GROW, HARDLY, LEAST_BEFORE,
-    LEAST_ERROR, MILD_STEPS, NO_SLOPE, PI_BEFORE, PI_ERROR, SAFETY, SAME_FROM, SAME_TO, SECOND_ESTIMATE, SHORTEST,
-    SHRINK, STIFF_STEPS, STILL_STEPS, STRETCH, TOO_SMALL, TRIAL,
-)  # fmt: skip
+from .tolerances import (
+    AT_LONGEST,
+    FIRST_ERROR,
+    FIRST_GROWTH,
+    FIRST_LEAST,
+    FIRST_PART,
+    FIRST_SEEN,
+    FROM_ZERO,
+    GROW,
+    HARDLY,
+    LEAST_BEFORE,
+    LEAST_ERROR,
+    MILD_STEPS,
+    NO_SLOPE,
+    PI_BEFORE,
+    PI_ERROR,
+    SAFETY,
+    SAME_FROM,
+    SAME_TO,
+    SECOND_ESTIMATE,
+    SHORTEST,
+    SHRINK,
+    STIFF_STEPS,
+    STILL_STEPS,
+    STRETCH,
+    TOO_SMALL,
+    TRIAL,
+)
 
 
 @kernel

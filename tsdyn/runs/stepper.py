@@ -13,23 +13,43 @@ from ..methods.explicit import call_step
 from ..model.equations import hold_pieces, is_rheonomic, remember, set_time
 from ..model.joint_turns import count_turns
 from ..motions.tolerances import TOGETHER
-
-from ..rows.interface import (  # isort: skip
-    doubt_selection, is_next_to_singular, is_singular_within_a_step, note_indicator, note_selection,
-)  # fmt: skip
+from ..rows.interface import (
+    doubt_selection,
+    is_next_to_singular,
+    is_singular_within_a_step,
+    note_indicator,
+    note_selection,
+)
 from ..workspaces import AGAIN, load, load_run
-
-from .dense_output import (  # isort: skip
-    bring_back, call_chart, call_complete, evaluate, keep, record, record_end, record_step, restore_now, store_now,
-)  # fmt: skip
+from .dense_output import (
+    bring_back,
+    call_chart,
+    call_complete,
+    evaluate,
+    keep,
+    record,
+    record_end,
+    record_step,
+    restore_now,
+    store_now,
+)
 from .path_loads import call_watch
 from .run_log import close_chart, is_full, no_log, note_accepted, note_try, open_chart
 from .step_control import accept, first_step, gets_on, stretch, watch_stiffness
-
-from .tolerances import (  # isort: skip
-    CUT_SHORT, HALVED, HARDLY_TURNED, LANDING, LITTLE, MOST_TURN, QUARTERED, SHRINK, SLIDES, SLIVER, TURN_GAIN,
+from .tolerances import (
+    CUT_SHORT,
+    HALVED,
+    HARDLY_TURNED,
+    LANDING,
+    LITTLE,
+    MOST_TURN,
+    QUARTERED,
+    SHRINK,
+    SLIDES,
+    SLIVER,
+    TURN_GAIN,
     TURNED_TOO_FAR,
-)  # fmt: skip
+)
 
 # Rotation limit of a step in driven scenes.
 #

@@ -26,9 +26,19 @@ from ..validation import one_of, positive, whole
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..hints import (  # isort: skip
-        ArrayLike, Event, Formulation, Function, Integrator, Method, Place, Progress, Redundancy, Span, State,
-    )  # fmt: skip
+    from ..hints import (
+        ArrayLike,
+        Event,
+        Formulation,
+        Function,
+        Integrator,
+        Method,
+        Place,
+        Progress,
+        Redundancy,
+        Span,
+        State,
+    )
 
 
 def _positive(value, name):

@@ -25,11 +25,23 @@ from ..taylor.tolerances import SHARP_TOL
 from ..validation import damaged, demand, demand_numbers, is_count
 from .local_origin import within_rounding
 from .progress import silent
-
-from .tolerances import (  # isort: skip
-    AGAIN, COST, FINEST, FIRST_WINDOW, GOT_ON, PASSES, PATIENCE, RESTING, RISKED, SERIES_COST, SETTLED, SHARP_COST,
-    STEP_EVALUATIONS, STIFF_SAFETY, TRIED,
-)  # fmt: skip
+from .tolerances import (
+    AGAIN,
+    COST,
+    FINEST,
+    FIRST_WINDOW,
+    GOT_ON,
+    PASSES,
+    PATIENCE,
+    RESTING,
+    RISKED,
+    SERIES_COST,
+    SETTLED,
+    SHARP_COST,
+    STEP_EVALUATIONS,
+    STIFF_SAFETY,
+    TRIED,
+)
 
 # Turns of the default method: from its explicit method to the implicit one where the motion is stiff, and back.
 #

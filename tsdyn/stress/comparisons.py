@@ -13,10 +13,16 @@ import numpy as np
 from ..errors import InvalidArgument
 from ..integrators import Nystrom4
 from ..maths.tolerances import EPS
-
-from .laws import (  # isort: skip
-    Finding, energy_left, is_near_singular, momentum_left, off_steps, prepared_twice, resumed_is_same, same_bits,
-)  # fmt: skip
+from .laws import (
+    Finding,
+    energy_left,
+    is_near_singular,
+    momentum_left,
+    off_steps,
+    prepared_twice,
+    resumed_is_same,
+    same_bits,
+)
 from .tolerances import FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, SHORTER, TIGHTER
 
 FEW = 20  # bodies

@@ -19,11 +19,19 @@ from ..simulation.prepared_run import Run
 from ..simulation.resume import resume
 from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
 from ..simulation.simulate import simulate
-
-from .tolerances import (  # isort: skip
-    BODIES, FLOOR, ILL_CONDITIONED, NEAR_SINGULAR, NEAR_SINGULAR_ENDS, OUTPUTS, ROUNDED, ROUNDED_ROWS, ROUNDINGS,
-    ROW_SHARE, SMALL_SCENE,
-)  # fmt: skip
+from .tolerances import (
+    BODIES,
+    FLOOR,
+    ILL_CONDITIONED,
+    NEAR_SINGULAR,
+    NEAR_SINGULAR_ENDS,
+    OUTPUTS,
+    ROUNDED,
+    ROUNDED_ROWS,
+    ROUNDINGS,
+    ROW_SHARE,
+    SMALL_SCENE,
+)
 
 # What a law of a run has found.
 

@@ -13,18 +13,29 @@ linear: Newton's method gives lam_0 (accelerations.py), and (2) what it lacks to
 from ..elements.loops.constraint_rows import turned, write_accelerations
 from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R
 from ..errors import Status
-
-from ..formulations.accelerations import (  # isort: skip
-    accelerate_with_friction, body_reaction, factorise_loads, find_reactions, load_slope, refine_accelerations,
-)  # fmt: skip
+from ..formulations.accelerations import (
+    accelerate_with_friction,
+    body_reaction,
+    factorise_loads,
+    find_reactions,
+    load_slope,
+    refine_accelerations,
+)
 from ..jit.kernels import callback, kernel, stack
 from ..jit.simd import add, cross, first, four, put, second, splat, third
 from ..maths.dense_linalg import copy
 from ..rows.interface import add_products, evaluate_bias, note_loads, solve_friction_series, weigh_bodies
-
-from .coefficients import (  # isort: skip
-    change, exact_product, inverses, put_product, run_forces, run_loops, spin, turn, turn_ahead,
-)  # fmt: skip
+from .coefficients import (
+    change,
+    exact_product,
+    inverses,
+    put_product,
+    run_forces,
+    run_loops,
+    spin,
+    turn,
+    turn_ahead,
+)
 from .layout import load_series
 from .step_parts import begin_orders, write_qdd
 

@@ -10,19 +10,40 @@ from ..jit.kernels import kernel, long_kernel, specialised
 from ..jit.lanes import any_of, below, binary_log, binary_power, both, choose, either, every, floor, opposite
 from ..jit.simd import add, first, fma, four, fourth, get, larger, let, put, second, splat, sub, third, times, total
 from ..maths.tolerances import ROUNDING, ROUNDING_AT_MOST, TINY
-
-from ..rows.interface import (  # isort: skip
-    DYNAMICS, ILL_CONDITIONED, evaluate_residuals, evaluate_without_redundant, factorise_selected_rows, find_correction,
-)  # fmt: skip
+from ..rows.interface import (
+    DYNAMICS,
+    ILL_CONDITIONED,
+    evaluate_residuals,
+    evaluate_without_redundant,
+    factorise_selected_rows,
+    find_correction,
+)
 from ..runs.step_control import stretch
 from ..runs.tolerances import FROM_ZERO, HALVED, SHORTEST
 from . import coefficients
 from .coefficients import put_sum
-
-from .lane_memory import (  # isort: skip
-    BAD, BEFORE, DONE, FLOOR, INDICATOR, LEFT, LOST, MOVED, NEXT, RESIDUAL, RUNS, SIZE, SLOW, STEPS, T_NEXT, TOP, H, T,
-    spin, turn_ahead,
-)  # fmt: skip
+from .lane_memory import (
+    BAD,
+    BEFORE,
+    DONE,
+    FLOOR,
+    INDICATOR,
+    LEFT,
+    LOST,
+    MOVED,
+    NEXT,
+    RESIDUAL,
+    RUNS,
+    SIZE,
+    SLOW,
+    STEPS,
+    T_NEXT,
+    TOP,
+    H,
+    T,
+    spin,
+    turn_ahead,
+)
 from .layout import L_OMEGA, L_P, L_R, L_RD, LOW
 from .step_end import keep_start, project_rates
 from .step_length import largest_of_three, size_of_order

@@ -16,15 +16,29 @@ from ..runs.dense_output import TrajectoryReading, put_state, recall
 from ..runs.run_memory import Memory
 from ..workspaces import B_DATA, B_START, lay_out, load_run, plain_work, words
 from .joint_friction import accelerate_with_friction_here, expand_friction_series
-
-from .layout import (  # isort: skip
-    SeriesContext, Trial, allocate_expansion, empty_series, is_far, kept_multipliers, load_series, masks, refusal, room,
-)  # fmt: skip
+from .layout import (
+    SeriesContext,
+    Trial,
+    allocate_expansion,
+    empty_series,
+    is_far,
+    kept_multipliers,
+    load_series,
+    masks,
+    refusal,
+    room,
+)
 from .step_end import keep_start
-
-from .step_parts import (  # isort: skip
-    accelerate_here, check_laws, expand_far_series, expand_series, pass_singular, reach, set_floor, state_within,
-)  # fmt: skip
+from .step_parts import (
+    accelerate_here,
+    check_laws,
+    expand_far_series,
+    expand_series,
+    pass_singular,
+    reach,
+    set_floor,
+    state_within,
+)
 from .stepper import advance_series
 from .tolerances import MANY_BODIES
 

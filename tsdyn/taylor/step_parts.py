@@ -15,11 +15,18 @@ from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import copy, is_finite
 from ..model.equations import set_time
 from ..motions.program import call_smooth
-
-from ..rows.interface import (  # isort: skip
-    accelerations_hold, evaluate_bias, has_redundant_rows, is_near_singular, rates_hold, refinements,
-    return_to_selection, save_selection, select_rows, singularity_indicator,
-)  # fmt: skip
+from ..rows.interface import (
+    accelerations_hold,
+    evaluate_bias,
+    has_redundant_rows,
+    is_near_singular,
+    rates_hold,
+    refinements,
+    return_to_selection,
+    save_selection,
+    select_rows,
+    singularity_indicator,
+)
 from ..rows.tolerances import UNEQUAL_MASSES
 from .coefficients import begin, expand
 from .layout import load_series

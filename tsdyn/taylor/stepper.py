@@ -21,11 +21,33 @@ from ..workspaces import B_DATA, load_run
 from .layout import load_series
 from .step_length import finite_top, is_near, longest, loosest, radius, step_length, weights
 from .step_parts import call_expand, call_laws, call_reach, hold_accelerations, is_singular, set_floor, state_within
-
-from .tolerances import (  # isort: skip
-    AT_REST, AVOID, AVOIDING, CLOSE, CLOSER, FASTER, HOP, HOP_APART, LEAST_STEPS, LOOSER, MINUTE, MOST_HOPS, PASSED,
-    PLACES, RATES, SHARP_STEPS, SHARP_TOL, SMALL, SMALL_STEPS, SPARE, STILL, STILL_STEP, TIGHTER, TIGHTEST, WARY,
-)  # fmt: skip
+from .tolerances import (
+    AT_REST,
+    AVOID,
+    AVOIDING,
+    CLOSE,
+    CLOSER,
+    FASTER,
+    HOP,
+    HOP_APART,
+    LEAST_STEPS,
+    LOOSER,
+    MINUTE,
+    MOST_HOPS,
+    PASSED,
+    PLACES,
+    RATES,
+    SHARP_STEPS,
+    SHARP_TOL,
+    SMALL,
+    SMALL_STEPS,
+    SPARE,
+    STILL,
+    STILL_STEP,
+    TIGHTER,
+    TIGHTEST,
+    WARY,
+)
 
 # Stops of a Taylor run: continuation after a step that ends at a stop.
 

@@ -17,11 +17,25 @@ from ..observables.generalised_forces import force_loads
 from ..observables.power import load_powers, marker_states
 from ..rows.graph_builder import build
 from ..taylor.layout import no_series
-
-from .series_checks import (  # isort: skip
-    along, begin_motions, carried_back, check_force_series, coefficients_of, compare, force_coefficients, instances,
-    labels_of, maker, objects, random_motion, random_time, run_truncated, series_context, write_bodies, zeros,
-)  # fmt: skip
+from .series_checks import (
+    along,
+    begin_motions,
+    carried_back,
+    check_force_series,
+    coefficients_of,
+    compare,
+    force_coefficients,
+    instances,
+    labels_of,
+    maker,
+    objects,
+    random_motion,
+    random_time,
+    run_truncated,
+    series_context,
+    write_bodies,
+    zeros,
+)
 from .tolerances import DRAWN, ORDER, QUOTIENT, ROUNDED, SHRINK, SPACING
 
 if TYPE_CHECKING:

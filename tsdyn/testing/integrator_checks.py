@@ -15,11 +15,28 @@ from ..runs.tolerances import STRETCH
 from ..simulation.simulate import simulate
 from .integrator_scenes import GRID, cases, distance, mean_distance
 from .series_checks import demand_kind
-
-from .tolerances import (  # isort: skip
-    BOUNDED, BY_ORDER, COARSEST, DENSE_TOLERANCE, FACTOR, FEWEST, FINEST, HIGH_ORDER, HIGH_TOLERANCE, ITERATION_TRACE,
-    LEVELS, MOST, NO_TRACE, ORDER_TOLERANCE, POINTS, RATIO, REJECTED, REPEATED, ROUNDING, SETTLED,
-)  # fmt: skip
+from .tolerances import (
+    BOUNDED,
+    BY_ORDER,
+    COARSEST,
+    DENSE_TOLERANCE,
+    FACTOR,
+    FEWEST,
+    FINEST,
+    HIGH_ORDER,
+    HIGH_TOLERANCE,
+    ITERATION_TRACE,
+    LEVELS,
+    MOST,
+    NO_TRACE,
+    ORDER_TOLERANCE,
+    POINTS,
+    RATIO,
+    REJECTED,
+    REPEATED,
+    ROUNDING,
+    SETTLED,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -15,11 +15,23 @@ from ..model.handles import handles_of
 from ..observables.diagnostics import constraint_rows
 from ..shapes import Mesh
 from ..validation import floats, sequence, vector3
-
-from .symbols import (  # isort: skip
-    UNIT, Attached, Link, Part, attached, by_body, derived, drawn_solid, given, joint_points, reaches, rods, rounded,
-    symbols, violation,
-)  # fmt: skip
+from .symbols import (
+    UNIT,
+    Attached,
+    Link,
+    Part,
+    attached,
+    by_body,
+    derived,
+    drawn_solid,
+    given,
+    joint_points,
+    reaches,
+    rods,
+    rounded,
+    symbols,
+    violation,
+)
 
 if TYPE_CHECKING:
     from ..hints import Floats, Scene, Solution

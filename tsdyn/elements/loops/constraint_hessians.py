@@ -17,11 +17,21 @@ from ...maths.vectors import rotate_gradient
 from ..markers import PARAMETERS, chain_rule, rate
 from ..tolerances import CONSTRAINT_STEP
 from .coordinate_rows import INTS, ROW, STRIDE
-
-from .template import (  # isort: skip
-    AT, CODES, DIMENSION, MARKERS, OWNERS, ROWS, SIZE, STARTS, differentiate, kernel_gamma, kernel_jacobian,
-    move_markers, place_markers,
-)  # fmt: skip
+from .template import (
+    AT,
+    CODES,
+    DIMENSION,
+    MARKERS,
+    OWNERS,
+    ROWS,
+    SIZE,
+    STARTS,
+    differentiate,
+    kernel_gamma,
+    kernel_jacobian,
+    move_markers,
+    place_markers,
+)
 
 STIFFNESS = "iipppdpp"  # count, stride, table, reals, q, t, lam, K
 SLOPES = "iipppppdpp"  # count, stride, table, reals, q, qd, qdd, t, G1, G2

@@ -3,10 +3,19 @@
 from ...jit.kernels import ANY, caller, integers, kernel, part, stack, stack2, vector
 from ...jit.simd import add, cross, fma, four, get, lanes, let, put, splat, times
 from ..markers import PARAMETERS, POINT
-
-from .template import (  # isort: skip
-    CODES, MARKERS, OWNERS, ROOM, ROWS, SIZE, STARTS, acceleration_bias, differentiate, kernel_phi, kernel_value,
-)  # fmt: skip
+from .template import (
+    CODES,
+    MARKERS,
+    OWNERS,
+    ROOM,
+    ROWS,
+    SIZE,
+    STARTS,
+    acceleration_bias,
+    differentiate,
+    kernel_phi,
+    kernel_value,
+)
 
 # Body poses of the basis-free form, one row of floats a body, and markers in terms of them.
 #

@@ -26,10 +26,21 @@ from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part,
 from ...jit.simd import add, cross, fetch, fma, four, get, lanes, let, put, splat, times, total
 from ..markers import POINT
 from .constraint_rows import INTS, MASK, ROW, turned
-
-from .template import (  # isort: skip
-    AHEAD, CODES, DRIVEN, MARKERS, OWNERS, ROOM, ROWS, SIZE, SLOTS, STARTS, extent, kernel_series, kernel_series_t,
-)  # fmt: skip
+from .template import (
+    AHEAD,
+    CODES,
+    DRIVEN,
+    MARKERS,
+    OWNERS,
+    ROOM,
+    ROWS,
+    SIZE,
+    SLOTS,
+    STARTS,
+    extent,
+    kernel_series,
+    kernel_series_t,
+)
 
 # where the parts of a body's series begin, times the number of orders; floats of an order of all of them
 S_OMEGA, S_R, S_SPIN, BODY_ROW = 12, 16, 20, 24

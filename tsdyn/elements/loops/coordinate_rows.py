@@ -6,11 +6,22 @@ gamma = gamma(x, xd) + Phi_x (x_q qd)_q qd (2), with qdd = 0 in xdd
 
 from ...jit.kernels import ANY, caller, integers, stack, stack2, vector
 from ..markers import chain_rule
-
-from .template import (  # isort: skip
-    AT, CODES, DIMENSION, FIRST, MARKERS, OWNERS, ROWS, SIZE, STARTS, acceleration_bias, differentiate, kernel_value,
-    move_markers, place_markers,
-)  # fmt: skip
+from .template import (
+    AT,
+    CODES,
+    DIMENSION,
+    FIRST,
+    MARKERS,
+    OWNERS,
+    ROWS,
+    SIZE,
+    STARTS,
+    acceleration_bias,
+    differentiate,
+    kernel_value,
+    move_markers,
+    place_markers,
+)
 
 # what the table of a kind holds for each instance behind AT and DIMENSION: where its parts of Phi_q begin, its first
 # row, the length of a row of Phi_q

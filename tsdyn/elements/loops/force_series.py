@@ -29,11 +29,22 @@ from ..markers import PARAMETERS, POINT, TURN
 from .constraint_rows import POSE, P, turned
 from .constraint_series import BODY_ROW, S_OMEGA, S_R, torque
 from .friction import FRICTION_ROWS, known_friction
-
-from .template import (  # isort: skip
-    CODES, DRIVEN, FRICTIONAL, MARKERS, OWNERS, ROOM, SHARP, SIZE, SLOTS, STARTS, TRACED, extent, kernel_inputs,
+from .template import (
+    CODES,
+    DRIVEN,
+    FRICTIONAL,
+    MARKERS,
+    OWNERS,
+    ROOM,
+    SHARP,
+    SIZE,
+    SLOTS,
+    STARTS,
+    TRACED,
+    extent,
+    kernel_inputs,
     kernel_series,
-)  # fmt: skip
+)
 
 BODY, MASK, INTS = 0, 2, 3  # of the table: the two bodies, and which of them are the ground
 

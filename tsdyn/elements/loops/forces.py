@@ -7,11 +7,26 @@ from ...maths.tolerances import COMPLEX_STEP
 from ...maths.vectors import matrix_a
 from ..markers import PARAMETERS
 from ..tolerances import FORCE_QUOTIENT
-
-from .template import (  # isort: skip
-    ALONG, AT, CODES, DIMENSION, KEPT, MARKERS, OWNERS, SIZE, STARTS, MarkerDerivatives, carry_back,
-    carry_back_derivative, derivatives, force_markers, kernel_derivatives, kernel_law, kernel_remember, state,
-)  # fmt: skip
+from .template import (
+    ALONG,
+    AT,
+    CODES,
+    DIMENSION,
+    KEPT,
+    MARKERS,
+    OWNERS,
+    SIZE,
+    STARTS,
+    MarkerDerivatives,
+    carry_back,
+    carry_back_derivative,
+    derivatives,
+    force_markers,
+    kernel_derivatives,
+    kernel_law,
+    kernel_remember,
+    state,
+)
 
 # Corotated frames of forces: derivatives of a law that are kept from an earlier configuration stay accurate in them.
 #

@@ -4,11 +4,21 @@ from ...jit.kernels import ANY, caller, complex_stack, integers, kernel, part, s
 from ...maths.tolerances import COMPLEX_STEP
 from ...maths.vectors import matrix_a
 from ..markers import PARAMETERS
-
-from .template import (  # isort: skip
-    AT, CODES, DIMENSION, MARKERS, OWNERS, SIZE, SLOTS, STARTS, carry_back, force_markers, kernel_law,
-    kernel_normal_load, kernel_normal_series,
-)  # fmt: skip
+from .template import (
+    AT,
+    CODES,
+    DIMENSION,
+    MARKERS,
+    OWNERS,
+    SIZE,
+    SLOTS,
+    STARTS,
+    carry_back,
+    force_markers,
+    kernel_law,
+    kernel_normal_load,
+    kernel_normal_series,
+)
 
 # Taylor series of friction in proportion to a normal load, which follows from the reaction of its joint.
 #

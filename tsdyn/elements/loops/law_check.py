@@ -26,10 +26,21 @@ from ..tolerances import LAW_TOLERANCE
 from .constraint_series import BODY_ROW, S_OMEGA
 from .force_series import BODY, INTS, MASK, marker_coefficient, run_traced, scratch_rows
 from .friction import load_at
-
-from .template import (  # isort: skip
-    CODES, FRICTIONAL, MARKERS, OWNERS, POSITIVE, ROOM, SHARP, SIZE, STARTS, TRACED, extent, kernel_law, kernel_series,
-)  # fmt: skip
+from .template import (
+    CODES,
+    FRICTIONAL,
+    MARKERS,
+    OWNERS,
+    POSITIVE,
+    ROOM,
+    SHARP,
+    SIZE,
+    STARTS,
+    TRACED,
+    extent,
+    kernel_law,
+    kernel_series,
+)
 
 # what runs a program, orders that are known, extent, limits, table, reals, bodies, values, inverse
 SIGNATURE = "iippppppp"

@@ -12,8 +12,8 @@ import numpy as np
 
 from .. import validation
 from ..errors import InvalidArgument, Status
-from ..validation import counted, unknown_parameter
-from .parser import print_json, text_cell
+from ..validation import counted, text_cell, unknown_parameter
+from .parser import print_json
 from .run import add_json, add_method, add_output, add_plot, add_scene, destinations, options_of, progress_of
 from .scene_file import load_document, robot_options
 
@@ -66,7 +66,7 @@ def _columns(where, head, fields):
 
 def _meant(where, word, fields):
     """The parameter that a column stands for, and the index of the component; None for a number."""
-    word = word if word in fields else word.removeprefix("'")  # as `output.text_cell` writes it
+    word = word if word in fields else word.removeprefix("'")  # as `text_cell` writes it
     match = None if word in fields else _INDEXED.fullmatch(word)
     name, index = match.groups() if match else (word, None)
     if not word:

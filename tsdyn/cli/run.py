@@ -1,6 +1,5 @@
 """The commands `tsdyn run` and `tsdyn view`: a run of a scene file, its summary, results in files, its animation."""
 
-import csv
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,7 +10,7 @@ from ..errors import InvalidArgument
 from ..files import run_tables, types
 from ..storage.formats import SUFFIXES as SOLUTIONS
 from ..viewer.view import page_path
-from .parser import print_json, text_cell
+from .parser import print_json
 from .scene_file import load_document, load_run, robot_options
 
 TABLES = (".csv",)
@@ -189,18 +188,7 @@ def write(solution, path):
     if Path(path).suffix.lower() in SOLUTIONS:
         solution.save(path)
         return path
-    from ..simulation.labelled import table_of
-
-    columns, units, array = table_of(solution)
-    try:
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            rows = csv.writer(file)
-            names = [f"{' '.join(filter(None, key))} ({units[key]})" for key in columns]
-            rows.writerow(["time (s)", *map(text_cell, names)])
-            rows.writerows([t, *row] for t, row in zip(solution.t.tolist(), array.tolist(), strict=True))
-    except OSError as error:
-        raise InvalidArgument(f"{path} can't be written: {error.strerror}.") from error
-    return path
+    return solution.to_csv(path)
 
 
 def _draw(solution, path):

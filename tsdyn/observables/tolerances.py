@@ -20,3 +20,11 @@ COMPLEX_STEP = 1e-40
 LEAST_DIVISOR = 1e-300
 # Floats of a workspace of rows up to which it is kept for the next call (1 MB): a hundred bodies or more.
 KEPT_FLOATS = 1 << 17
+# Of the range of an acceleration: how far that at an output may be from the one of the quartic with the position,
+# velocity and acceleration before, and the position and velocity there; (w h)^3 / 60 of a sinusoid of angular frequency
+# w over an interval h. Beyond, and beyond so many times the bend, how far the acceleration before is from the cubic's,
+# the acceleration jumps.
+JUMP = 0.1
+OTHERWISE = 2.0
+# Of the largest range: coordinates with a smaller one are judged by this, as theirs may be rounding.
+SMALL_RANGE = 1e-3

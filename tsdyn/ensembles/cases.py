@@ -62,32 +62,29 @@ class KeptChannels:
         Of each channel by name.
     """
 
-    def __init__(self, names, count, motion):
-        self.units = {channel.name: channel.unit for channel in channels_of(motion, names)}
+    def __init__(self, names, count, packed):
+        self.units = {channel.name: channel.unit for channel in channels_of(packed, names)}
         self.names, self.count = list(self.units), count
 
     def __call__(self, solution):
         """The values of each channel by name."""
         found = np.full((len(self.names), self.count or 1), np.nan)
         part = solution if self.count else solution[-1:]
-        found[:, : part.t.size] = values_of(part, channels_of(part, self.names)).T
+        found[:, : part.t.size] = values_of(part, channels_of(part.packed, self.names)).T
         return dict(zip(self.names, found if self.count else found[:, 0], strict=True))
 
     def __repr__(self):
         return f"<channels {self.names}>"
 
 
-def keep_of(keep, times, motion):
-    """What is kept: a word, or a function of the Solution, which names of channels are made; raises InvalidArgument.
-
-    motion: the packed scene and its handles.
-    """
+def keep_of(keep, times, packed):
+    """What is kept: a word, or a function of the Solution, as which names of channels are taken; InvalidArgument."""
     if keep == TIMES and isinstance(keep, str) and not times.size:
         raise InvalidArgument("keep='t_eval' keeps the states at the times of t_eval=; give them.")
     if callable(keep) or (isinstance(keep, str) and keep in (FINAL, TIMES)):
         return keep
     try:
-        return KeptChannels(keep, times.size, motion)
+        return KeptChannels(keep, times.size, packed)
     except InvalidArgument as error:
         raise InvalidArgument(
             f"keep must be 'final', 't_eval', names of channels or a function of the Solution: {error}"

@@ -202,7 +202,9 @@ class Ensemble:
     def kept(self) -> Any:
         """What a function `keep` returned: an array (cases, ...), or a dict of them; channels by name."""
         found = {name[5:]: array for name, array in self._results.arrays.items() if name.startswith("kept")}
-        lost = np.full((len(self), *(self.times.shape if self.times.size else ())), np.nan)  # where all cases have failed
+        lost = np.full(
+            (len(self), *(self.times.shape if self.times.size else ())), np.nan
+        )  # where all cases have failed
         found = {name: lost for name in self._channels} | found
         if not callable(self._study.keep):
             raise InvalidArgument("kept is what channels or a function keep= made of each solution; none was given.")

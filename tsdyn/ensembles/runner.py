@@ -1,7 +1,6 @@
 """Cases, run one after the other."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,8 +62,7 @@ class Study:
         default = options.rtol, options.atol, options.may_use_series
         prepare_first_run(scene, options.method, options.form, self.within, default)
         self.kept = scene._prepared
-        motion = SimpleNamespace(packed=self.kept.packed, handles=self.kept.handles, _lacks="")
-        self.keep = keep_of(keep, self.times, motion)
+        self.keep = keep_of(keep, self.times, self.kept.packed)
         self.method, self.n = first_method(options, self.kept), self.kept.n
         self.stops = self.kept.stops(*self.span, self.method.step is None)
         self.names = None if cases.names is None else {*self.changes, *cases.names}

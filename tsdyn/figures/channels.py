@@ -36,7 +36,7 @@ def time_histories(solution: Solution, names: str | Sequence[str], path: Any = N
     """What `Solution.plot` does with channels."""
     if not solution.t.size:
         raise InvalidArgument("plot: the solution has no outputs, so there is nothing to show.")
-    channels = channels_of(solution, names)
+    channels = channels_of(solution.packed, names, solution._lacks)
     states, lost = _within_steps(solution) or _between_outputs(solution)
     values = values_of(states, channels)
     values[np.isin(intervals(solution.t, states.t)[0], lost)] = np.nan
@@ -93,7 +93,12 @@ def _between_outputs(solution):
     lam = np.zeros((times.size, 0)) if solution._lacks else multipliers(solution.packed, times, q, qd, qdd, memory)
     anchor = Anchor(solution.anchor.angles[i], times - t[i], (levels[0][i], levels[1][i]))
     states = RememberingState.of(solution.packed, memory, anchor, times, q, qd, qdd, lam)
-    q, qd, qdd = levels
+    return states, _unresolved(t, *levels)
+
+
+def _unresolved(t, q, qd, qdd):
+    """Numbers of the intervals where cubic and quintic differ: by a 64th of the sum of these at half the interval."""
     h = np.diff(t)[:, None]
-    apart = np.abs(h * (qd[:-1] - qd[1:]) / 32.0 + h * h * (qdd[:-1] + qdd[1:]) / 64.0)
-    return states, np.flatnonzero((apart > RESOLVED * ranges(q)).any(axis=1))
+    d, v, w = np.diff(q, axis=0), h * qd[:-1], h * qd[1:]
+    ends = h * h * qdd[:-1] - 6.0 * d + 4.0 * v + 2.0 * w, h * h * qdd[1:] + 6.0 * d - 2.0 * v - 4.0 * w
+    return np.flatnonzero((np.maximum(*map(np.abs, ends)) > 32.0 * RESOLVED * ranges(q)).any(axis=1))

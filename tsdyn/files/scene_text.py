@@ -55,7 +55,7 @@ class Document(NamedTuple):
     scene: Any
     run: dict  # arguments of `simulate`
     ensemble: dict  # arguments of `ts.ensemble`
-    output: dict  # files, and where to draw
+    output: dict  # files, where to draw, and channels
 
 
 def read(text, name, make, simulate, allow_code=False):
@@ -82,7 +82,7 @@ def read_all(text, name, make, simulate, allow_code=False, study=None):
         if isinstance(table, dict):
             table = table | {key: value for key, value in (study or {}).items() if value is not None}
         cases = run_tables.ensemble(table, scene, mistakes, names)
-    output = run_tables.output(document.get("output", {}), mistakes)
+    output = run_tables.output(document.get("output", {}), scene, mistakes)
     mistakes.demand_none()
     return Document(scene, given, cases, output)
 
@@ -209,6 +209,7 @@ every = 0.01 # outputs; without it one a step
 # [output]
 # files = ["arm.h5", "arm.csv"]
 # plot = "arm.png"
+# channels = ["hinge", "arm.position", "spring.tension"] # of the CSV file and of the figure
 
 # Many runs, by `tsdyn ensemble`: what differs from case to case. `tsdyn info --parameters` lists them.
 # [ensemble]

@@ -18,13 +18,14 @@ from ..elements.force import Force
 from ..elements.loads import JointLoad
 from ..errors import InvalidArgument, StorageError
 from ..forces import Spring
+from ..model.handles import handles_of
 from ..validation import close, sequence, shown
 from .reactions import loads_of, member
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..hints import Floats
+    from ..hints import Floats, Packed
 
 AXES = (".x", ".y", ".z")
 PARAMETERS = (".e0", ".e1", ".e2", ".e3")
@@ -48,13 +49,16 @@ class Channel(NamedTuple):
         return f"{self.name} ({self.unit})"
 
 
-def channels_of(motion: Any, names: str | Sequence[str]) -> list[Channel]:
+def channels_of(packed: Packed, names: str | Sequence[str], lacks: str = "") -> list[Channel]:
     """Return the channels of some names, in their order, each once.
 
     Parameters
     ----------
-    motion : Solution
+    packed : Packed
+        The scene.
     names : str or sequence of str
+    lacks : str
+        Which parts of the scene aren't there.
 
     Raises
     ------
@@ -66,7 +70,7 @@ def channels_of(motion: Any, names: str | Sequence[str]) -> list[Channel]:
     wrong = [name for name in names if not isinstance(name, str)]
     if wrong or not names:
         raise InvalidArgument(f"{said}, got {shown(wrong[0] if wrong else names)}.")
-    known = Names(motion.packed, motion.handles, motion._lacks)
+    known = Names(packed, lacks)
     return list({channel.name: channel for name in names for channel in known.meant(name)}.values())
 
 
@@ -80,9 +84,9 @@ def values_of(motion: Any, channels: Sequence[Channel]) -> Floats:
 class Names:
     """The names of channels of a packed scene; `lacks` says which parts of the scene aren't there."""
 
-    def __init__(self, packed, handles, lacks=""):
-        self.packed, self.handles, self.lacks, self.things = packed, handles, lacks, {}
-        for thing in (*handles.bodies, *handles.items):
+    def __init__(self, packed, lacks):
+        self.packed, self.handles, self.lacks, self.things = packed, handles_of(packed), lacks, {}
+        for thing in (*self.handles.bodies, *self.handles.items):
             self.things.setdefault(thing.name, []).append(thing)
 
     def meant(self, name):

@@ -88,7 +88,7 @@ def to_dataframe(solution, channels):
     pandas = _library("pandas")
     index = pandas.Index(solution.t, name=HEAD)
     if channels is not None:
-        some = channels_of(solution, channels)
+        some = channels_of(solution.packed, channels, solution._lacks)
         frame = pandas.DataFrame(values_of(solution, some), index, [one.title for one in some])
         units = {one.title: one.unit for one in some}
     else:
@@ -102,7 +102,7 @@ def to_csv(solution, path, channels):
     """As of `Records.to_csv`."""
     demand_path(path, "path")
     if channels is not None:
-        some = channels_of(solution, channels)
+        some = channels_of(solution.packed, channels, solution._lacks)
         head, array = [one.title for one in some], values_of(solution, some)
     else:
         columns, units, array = table_of(solution)

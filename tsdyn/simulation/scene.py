@@ -36,6 +36,7 @@ from .analyses import linearise as _linearise
 from .given_motion import inverse_dynamics as _inverse_dynamics
 from .given_motion import kinematics as _kinematics
 from .scene_cache import preparing
+from .set_start import set_start as _set_start
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
 from .variants import copy as _copy
 from .variants import parameters as _parameters
@@ -505,6 +506,7 @@ class Scene(OfFile):
     parameters = _parameters
     with_parameters = _with_parameters
     set = set_joint
+    set_start = _set_start
     remove = _remove
     copy = _copy
     save = save

@@ -227,6 +227,7 @@ class Scene(OfFile):
         self.gravity = gravity
 
     ground: AnyBody
+    _named = None  # of a file with a table `parameters`: its `NamedNumbers`
     _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:

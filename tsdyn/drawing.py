@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,12 @@ if TYPE_CHECKING:
 # from the palette of Okabe and Ito, told apart whatever the colour vision
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 GREY = "#6b6b6b"
+PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".eps", ".ps", ".tif", ".tiff", ".webp", ".pgf")
+
+
+def is_picture(given: Any) -> bool:
+    """Whether an argument is the path of a picture, and no name."""
+    return isinstance(given, PathLike) or (isinstance(given, str) and given.lower().endswith(PICTURES))
 
 
 def demand_matplotlib(what: str = "the figure") -> None:

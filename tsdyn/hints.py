@@ -74,7 +74,7 @@ VectorLoad: TypeAlias = ArrayLike | Table | Callable[..., Any]  # a function of 
 JointLaw: TypeAlias = Callable[[float, float, float], float]
 Event: TypeAlias = Callable[[float, State], float]
 CaseTable: TypeAlias = Mapping[str, Any] | Callable[[int], Mapping[str, Any]] | Any  # or a DataFrame
-Keep: TypeAlias = str | Callable[[Solution], Any]
+Keep: TypeAlias = str | Sequence[str] | Callable[[Solution], Any]  # sequence: names of channels
 Progress: TypeAlias = bool | Callable[[float], object]
 
 Formulation: TypeAlias = Literal["tangent", "null-space", "maggi-kane"]

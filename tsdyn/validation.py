@@ -299,3 +299,11 @@ def demand_record(record, kinds):
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
             raise TypeError(f"{name} is {type(value).__name__}")
         demand(not isinstance(value, int) or _is_whole(int(value)), name)
+
+
+FORMULA = tuple("=+-@\t\r")  # what a spreadsheet takes a cell for that begins so
+
+
+def text_cell(text):
+    """Text for a cell of CSV: with a quote before what a spreadsheet would run as a formula."""
+    return f"'{text}" if text.startswith(FORMULA) else text

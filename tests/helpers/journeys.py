@@ -192,6 +192,12 @@ class Tour:
         axes = self.on.plot()
         assert axes.shape == (2, 2)
         pyplot.close(axes[0, 0].figure)
+        for ax in self.on.plot(self.names()):
+            assert ax.lines
+        pyplot.close(ax.figure)
+
+    def names(self):
+        return [thing.name for thing in (*self.scene.bodies, *self.items()) if not getattr(thing, "normalises", False)]
 
     def view(self):
         with TemporaryDirectory() as folder:
@@ -207,6 +213,14 @@ class Tour:
 
     def to_dataframe(self):
         assert len(self.on.to_dataframe()) == len(self.on.t)
+        self.shape(self.on.to_dataframe(self.names()).to_numpy().T[0])
+
+    def to_csv(self):
+        with TemporaryDirectory() as folder:
+            for names in (None, self.names()):
+                lines = self.on.to_csv(f"{folder}/run.csv", names).read_text().splitlines()
+                assert len(lines) == 1 + len(self.on.t)
+                assert lines[0].startswith("time (s),")
 
     def at(self):
         times = np.linspace(self.on.t[0], self.on.reached, 3)

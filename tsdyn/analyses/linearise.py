@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import html
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..calls import fitting_methods
-from ..elements.bodies import PointMass, named
+from ..elements.bodies import PointMass, named, rotation_matrix
 from ..elements.element import AngleGeometry
 from ..elements.force import Force
 from ..elements.loads import JointLoad
@@ -168,6 +169,20 @@ def _of(scene, variations, given, coordinates):
 # Modes of the linearised system: frequencies, damping ratios, and shapes as twists of bodies.
 
 
+HEADS = "frequency (Hz)", "damping ratio", "kinetic energy"
+DIRECTIONS = "x", "y", "z", "rotation x", "rotation y", "rotation z"
+NAMED, LEAST_SHARE = 3, 0.05  # directions of bodies that are named at most; share of the energy of all but the first
+
+
+class Moving(NamedTuple):
+    """Bodies, and what takes variations of the coordinates to their motion."""
+
+    bodies: tuple
+    twists: np.ndarray  # (b, 6, k)
+    mass: np.ndarray  # (b,)
+    inertia: np.ndarray  # (b, 3, 3), ground frame
+
+
 @fitting_methods
 class Modes:
     """Modes in order of |lambda|; a conjugate pair of eigenvalues is one mode, and a pair of zeros.
@@ -187,12 +202,12 @@ class Modes:
     coordinates : tuple of str
     """
 
-    def __init__(self, values: Any, shapes: Any, twists: Any, bodies: Any, coordinates: tuple[str, ...]) -> None:
+    def __init__(self, values: Any, shapes: Any, moving: Any, coordinates: tuple[str, ...]) -> None:
         size = np.abs(values)
         self.eigenvalues, self.shapes, self.coordinates = values, shapes, coordinates
         self.frequency, self.damped_frequency = size / (2.0 * np.pi), values.imag / (2.0 * np.pi)
         self.damping_ratio: Floats = np.where(size > 0.0, (0.0 - values.real) / np.where(size > 0.0, size, 1.0), np.nan)
-        self._twists, self._bodies = twists, bodies
+        self._moving = moving
 
     def __len__(self) -> int:
         return len(self.eigenvalues)
@@ -202,25 +217,88 @@ class Modes:
 
         Axes are those of the ground, or, in steady motion, turning with it. The rotation of a point mass is zero.
         """
+        return self.shapes @ self._moving.twists[self._index(body)].T
+
+    def participation(self, body: PointMass | str) -> Floats:
+        """Share of a body in the kinetic energy of each mode, (j, 6): displacements along, rotations about x, y and z.
+
+        Shares of all bodies together are 1. Axes as of `twist`.
+
+        Examples
+        --------
+        A rod that swings about its end: three quarters of the energy are of the centroid.
+
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene()
+        >>> rod = scene.add_body(**ts.shapes.rod(1.0, axis="z", mass=3.0), position=(0, 0, -0.5), name="rod")
+        >>> pin = ts.constraints.Revolute.at(scene.ground, rod, point=(0, 0, 0), axis=(0, 1, 0), name="pin")
+        >>> pin = scene.add(pin)
+        >>> modes = scene.linearise().modes()
+        >>> print(modes.participation("rod").round(6))
+        [[0.75 0.   0.   0.   0.25 0.  ]]
+        >>> print(modes)
+        Modes
+          frequency (Hz)  damping ratio  kinetic energy
+                0.610494              0  rod.x 75 %, rod.rotation y 25 %
+        """
+        return self._shares[:, self._index(body)]
+
+    def _index(self, body):
+        """The number of a body."""
+        bodies = self._moving.bodies
         if isinstance(body, str):
-            body = named(self._bodies, body, "body", InvalidBody)
-        if not any(body is one for one in self._bodies):
+            body = named(bodies, body, "body", InvalidBody)
+        if not any(body is one for one in bodies):
             raise InvalidBody(f"{body!r} is not a body of this scene.")
-        return self.shapes @ self._twists[[one is body for one in self._bodies].index(True)].T
+        return [one is body for one in bodies].index(True)
+
+    @cached_property
+    def _shares(self):
+        """Shares (j, b, 6) of the kinetic energy: m v^2 by components, and those of sqrt(J) omega, ground frame."""
+        _, twists, mass, inertia = self._moving
+        moves = np.einsum("bck,jk->jbc", twists, self.shapes)
+        sizes, axes = np.linalg.eigh(inertia)
+        root = np.einsum("bik,bk,bjk->bij", axes, np.sqrt(np.maximum(sizes, 0.0)), axes)
+        found = np.abs(moves) ** 2
+        found[:, :, :3] *= mass[:, None]
+        found[:, :, 3:] = np.abs(np.einsum("bik,jbk->jbi", root, moves[:, :, 3:])) ** 2
+        return found / found.sum(axis=(1, 2), keepdims=True)
+
+    @property
+    def motions(self) -> tuple[str, ...]:
+        """What each mode moves: up to three directions of bodies with most of its kinetic energy, "car.z 98 %"."""
+        return tuple(self._motion(shares.ravel()) for shares in self._shares)
+
+    def _motion(self, shares):
+        first = np.argsort(-shares, kind="stable")[:NAMED]
+        return ", ".join(
+            f"{self._moving.bodies[i // 6].name}.{DIRECTIONS[i % 6]} {100.0 * shares[i]:.0f} %"
+            for i in first
+            if i == first[0] or shares[i] >= LEAST_SHARE
+        )
+
+    def _rows(self):
+        """Frequency, damping ratio and motion of each mode."""
+        facts = zip(self.frequency, self.damping_ratio, self.motions, strict=True)
+        return [(f"{frequency:.6g}", f"{ratio:.6g}", motion) for frequency, ratio, motion in facts]
 
     def __repr__(self) -> str:
-        return f"<Modes: {len(self)} of {len(self.coordinates)} coordinates>"
+        return f"<Modes: {len(self)} of {len(self.coordinates)} coordinates>\n{self}"
 
     def __str__(self) -> str:
-        lines = ["Modes", "  frequency (Hz)  damping ratio  largest in"]
-        for one in range(len(self)):
-            name = self.coordinates[int(np.abs(self.shapes[one]).argmax())]
-            lines.append(f"  {self.frequency[one]:14.6g}  {self.damping_ratio[one]:13.6g}  {name}")
-        return "\n".join(lines)
+        rows = [HEADS, *self._rows()]
+        return "\n".join(["Modes", *(f"  {f:>14}  {ratio:>13}  {motion}" for f, ratio, motion in rows)])
+
+    def _repr_html_(self) -> str:
+        """Return a table, for notebooks."""
+        head = "".join(f"<th>{word}</th>" for word in HEADS)
+        rows = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in self._rows()]
+        body = "".join(f"<tr>{row}</tr>" for row in (head, *rows))
+        return f"<table><caption>Modes of {len(self.coordinates)} coordinates</caption>{body}</table>"
 
 
-def modes_of(pairs, twists, bodies, coordinates):
-    """The `Modes` of eigenpairs; twists (bodies, 6, k)."""
+def modes_of(pairs, moving, coordinates):
+    """The `Modes` of eigenpairs of bodies that are `Moving`."""
     if not len(coordinates):
         raise InvalidArgument("modes: the scene has no degrees of freedom.")
     first, zero = np.flatnonzero(pairs.values.imag >= 0.0), int((pairs.values == 0.0).sum())
@@ -228,7 +306,7 @@ def modes_of(pairs, twists, bodies, coordinates):
     first[: zero - zero // 2] = np.arange(zero - zero // 2)  # zeros are first, and a pair of them is one mode, too
     values, shapes = pairs.values[first], pairs.vectors[:, first].T
     lead = shapes[np.arange(len(first)), np.abs(shapes).argmax(axis=1)]
-    return Modes(values, shapes * (np.abs(lead) / lead)[:, None], twists, bodies, coordinates)
+    return Modes(values, shapes * (np.abs(lead) / lead)[:, None], moving, coordinates)
 
 
 class StateSpace(NamedTuple):
@@ -274,7 +352,7 @@ class Linearisation:
         self.coordinates: tuple[str, ...] = tuple(one.name for one in every)
         self.steady, self.rotation_rate = rate is not None, np.zeros(3) if rate is None else rate
         self.bodies, self._reduced = motion.packed.bodies, reduced
-        self._twists = _twists(motion, reduced)
+        self._moving = _moving(motion, reduced)
         inputs, self._outputs = ports
         self.inputs, self.outputs = tuple(one.name for one in inputs), self._outputs.names
         self.F: Floats = np.zeros((len(every), len(inputs)))
@@ -291,8 +369,8 @@ class Linearisation:
         return self._pairs.values.copy()
 
     def modes(self) -> Modes:
-        """Frequencies, damping ratios and shapes, a `Modes`."""
-        return modes_of(self._pairs, self._twists, self.bodies, self.coordinates)
+        """Frequencies, damping ratios, shapes, and what moves in each, a `Modes`."""
+        return modes_of(self._pairs, self._moving, self.coordinates)
 
     def state_space(self) -> StateSpace:
         """A, B, C, D and the names of states, inputs and outputs, a `StateSpace`."""
@@ -342,11 +420,13 @@ def linearise(scene, memory, state, inputs, outputs, report):
     return Linearisation(motion, every, reduced, ports, rate)
 
 
-def _twists(motion, reduced):
-    """Displacements and rotations of all bodies by the coordinates, (b, 6, k)."""
-    T, bodies = reduced.T, motion.system.bodies
-    found = np.zeros((len(bodies), 6, T.shape[1]))
-    found[:, :3] = T[bodies[:, :1] + np.arange(3)]
-    p = bodies[motion.rigid, :1] + np.arange(3, 7)
-    found[motion.rigid, 3:] = 2.0 * transform_e(motion.parameters(0)) @ T[p]
-    return found
+def _moving(motion, reduced):
+    """The `Moving` of all bodies by the coordinates."""
+    system, bodies = motion.system, motion.system.bodies
+    T, rigid, p = reduced.T, motion.rigid, motion.parameters(0)
+    twists = np.zeros((len(bodies), 6, T.shape[1]))
+    twists[:, :3] = T[bodies[:, :1] + np.arange(3)]
+    twists[rigid, 3:] = 2.0 * transform_e(p) @ T[bodies[rigid, :1] + np.arange(3, 7)]
+    A, inertia = rotation_matrix(p), np.zeros((len(bodies), 3, 3))
+    inertia[rigid] = A @ system.inertia[rigid].reshape(-1, 3, 3) @ A.swapaxes(1, 2)
+    return Moving(motion.packed.bodies, twists, system.mass.copy(), inertia)

@@ -12,9 +12,20 @@ import numpy as np
 
 from .. import validation
 from ..errors import InvalidArgument, Status
-from ..validation import counted, unknown_parameter
-from .parser import print_json, text_cell
-from .run import add_json, add_method, add_output, add_plot, add_scene, destinations, options_of, progress_of
+from ..validation import counted, text_cell, unknown_parameter
+from .parser import print_json
+from .run import (
+    add_channels,
+    add_json,
+    add_method,
+    add_output,
+    add_plot,
+    add_scene,
+    channels_asked,
+    destinations,
+    options_of,
+    progress_of,
+)
 from .scene_file import load_document, robot_options
 
 # The table of `tsdyn ensemble --parameters`: a CSV file with a row for each case, a column for each number.
@@ -66,7 +77,7 @@ def _columns(where, head, fields):
 
 def _meant(where, word, fields):
     """The parameter that a column stands for, and the index of the component; None for a number."""
-    word = word if word in fields else word.removeprefix("'")  # as `output.text_cell` writes it
+    word = word if word in fields else word.removeprefix("'")  # as `text_cell` writes it
     match = None if word in fields else _INDEXED.fullmatch(word)
     name, index = match.groups() if match else (word, None)
     if not word:
@@ -159,7 +170,8 @@ def add_ensemble_options(parser):
     parser.add_argument("--store", metavar="PATH", help="stream results to .zarr or .h5, in constant memory")
     parser.add_argument("--resume", action="store_true", help="go on with the cases that are missing in the store")
     add_output(parser)
-    add_plot(parser, "the first coordinate")
+    add_plot(parser, "the first channel or coordinate")
+    add_channels(parser)
     add_json(parser)
 
 
@@ -185,6 +197,8 @@ def _ensemble(parsed):
         )
     span, options = options_of(parsed, document.run)
     outputs, plot = destinations(parsed, document)
+    if channels_asked(parsed):
+        study["keep"] = channels_asked(parsed)
     if parsed.assemble:
         study["assemble"] = True
     began = time.perf_counter()
@@ -239,9 +253,12 @@ def facts(found):
 
 
 def _quantiles(found):
-    """Name, and quantiles over the cases, of each coordinate at its end."""
+    """Name, and quantiles over the cases at their end, of each channel that is kept, else of each coordinate."""
     last = found.q if found.q.ndim == 2 else found.q[:, -1]
-    for name, column in zip(found.coordinates, last.T, strict=True):
+    columns = dict(zip(found.coordinates, last.T, strict=True))
+    if found._channels:
+        columns = {f"{name} ({found.unit(name)})": x if x.ndim == 1 else x[:, -1] for name, x in found.kept.items()}
+    for name, column in columns.items():
         known = column[np.isfinite(column)]
         yield (name, *(np.quantile(known, (LOW, 0.5, HIGH)).tolist() if known.size else [np.nan] * 3))
 

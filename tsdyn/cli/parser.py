@@ -11,8 +11,6 @@ from ..validation import close
 
 # What commands give to machines: JSON, in which what is no finite number is null; text in cells of CSV.
 
-FORMULA = tuple("=+-@\t\r")  # what a spreadsheet takes a cell for that begins so
-
 
 def print_json(data):
     """Print data as JSON."""
@@ -32,11 +30,6 @@ def plain(value):
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if isinstance(value, (int, str, type(None))) else str(value)
-
-
-def text_cell(text):
-    """Text for a cell of CSV: with a quote before what a spreadsheet would run as a formula."""
-    return f"'{text}" if text.startswith(FORMULA) else text
 
 
 # A parser of arguments that answers a wrong word with the nearest right one.

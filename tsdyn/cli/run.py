@@ -1,6 +1,6 @@
 """The commands `tsdyn run` and `tsdyn view`: a run of a scene file, its summary, results in files, its animation."""
 
-import csv
+import re
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,9 +9,10 @@ import numpy as np
 
 from ..errors import InconsistentState, InvalidArgument
 from ..files import run_tables, types
+from ..observables.channels import channels_of
 from ..storage.formats import SUFFIXES as SOLUTIONS
 from ..viewer.view import page_path
-from .parser import print_json, text_cell
+from .parser import print_json
 from .scene_file import load_document, load_run, robot_options
 
 TABLES = (".csv",)
@@ -23,7 +24,8 @@ def add_run_options(parser):
     add_scene(parser)
     add_method(parser)
     add_output(parser)
-    add_plot(parser, "the constraint errors")
+    add_plot(parser, "the constraint errors, or the channels")
+    add_channels(parser)
     add_json(parser)
 
 
@@ -57,7 +59,22 @@ def add_output(parser):
         "--output", action="append", default=[], metavar="PATH",
         help="where to write results, again for more: .h5, .nc or .zarr (ts.load reads them), or .csv",
     )  # fmt: skip
+    parser.add_argument("--csv", metavar="PATH", help="where to write a table")
     add_force(parser)
+
+
+def add_channels(parser):
+    """Add which channels a table and a figure have."""
+    parser.add_argument(
+        "--channels", nargs="+", action="extend", default=[], metavar="NAME",
+        help="what tables and figures have, such as hinge.angle arm.position.z hinge.force; an object alone stands for "
+        "its natural set",
+    )  # fmt: skip
+
+
+def channels_asked(parsed):
+    """The names of channels, which may be apart by commas, too; a comma in brackets belongs to a name."""
+    return [name for word in parsed.channels for name in re.split(r",\s*(?![^(]*\))", word) if name]
 
 
 def add_force(parser):
@@ -100,12 +117,18 @@ def _run(parsed):
     document = load_document(parsed.scene, parsed.allow_code, robot=robot_options(parsed))
     scene, (span, options) = document.scene, options_of(parsed, document.run)
     outputs, plot = destinations(parsed, document)
+    names = channels_asked(parsed) or document.output["channels"] or None
+    if parsed.channels and plot is None and not any(Path(path).suffix.lower() in TABLES for path in outputs):
+        raise InvalidArgument("--channels are those of a table or a figure; give --csv PATH or --plot, too.")
+    if names is not None:
+        channels_of(scene.packed, names)
+        options["dense_output"] = options.get("dense_output", False) or plot is not None
     if not parsed.json:
         print(f"{parsed.scene}: {scene!r}", flush=True)
     solution = simulate(scene, span, progress=progress_of(parsed), **options)
-    written = [str(write(solution, path)) for path in outputs]
+    written = [str(write(solution, path, names)) for path in outputs]
     if plot is not None:
-        written.append(str(_draw(solution, plot)))
+        written.append(str(_draw(solution, plot, names)))
     if parsed.json:
         print_json({**summary(solution), "written": written})
     else:
@@ -141,10 +164,13 @@ def destinations(parsed, document):
 
     What the file itself names is written anew by each run of it.
     """
-    outputs, plot = parsed.output or document.output["files"], document.output["plot"]
+    if parsed.csv is not None and Path(parsed.csv).suffix.lower() not in TABLES:
+        raise InvalidArgument(f"--csv writes a file that ends in .csv, got {parsed.csv!r}.")
+    asked = parsed.output + [parsed.csv] * (parsed.csv is not None)
+    outputs, plot = asked or document.output["files"], document.output["plot"]
     for path in outputs:
         demand_format(path)
-        demand_new(path, parsed.force or not parsed.output)
+        demand_new(path, parsed.force or not asked)
     return outputs, plotted(parsed, Path(parsed.scene).stem, plot)
 
 
@@ -184,26 +210,22 @@ def demand_format(path):
         format_at(path)
 
 
-def write(solution, path):
-    """Write a solution to a file, in the format of its suffix; the path."""
+def write(solution, path, channels=None):
+    """Write a solution to a file, in the format of its suffix, a table with these channels; the path."""
     if Path(path).suffix.lower() in SOLUTIONS:
         solution.save(path)
         return path
-    from ..simulation.labelled import table_of
-
-    columns, units, array = table_of(solution)
-    try:
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            rows = csv.writer(file)
-            names = [f"{' '.join(filter(None, key))} ({units[key]})" for key in columns]
-            rows.writerow(["time (s)", *map(text_cell, names)])
-            rows.writerows([t, *row] for t, row in zip(solution.t.tolist(), array.tolist(), strict=True))
-    except OSError as error:
-        raise InvalidArgument(f"{path} can't be written: {error.strerror}.") from error
-    return path
+    return solution.to_csv(path, channels)
 
 
-def _draw(solution, path):
+def _draw(solution, path, channels):
+    if channels is not None:
+        from matplotlib import pyplot
+
+        pyplot.switch_backend("agg")
+        solution.plot(channels, path)
+        pyplot.close("all")
+        return path
     from matplotlib.figure import Figure
 
     from ..drawing import save

@@ -41,7 +41,7 @@ def load_document(where, allow_code=False, study=None, robot=MappingProxyType({}
 
         return document_of(where, allow_code, study)
     scene, given = load_run(where, allow_code, robot)
-    return Document(scene, given, {}, {"files": [], "plot": None})
+    return Document(scene, given, {}, {"files": [], "plot": None, "channels": []})
 
 
 def load_scene(where, allow_code=False, robot=MappingProxyType({})):

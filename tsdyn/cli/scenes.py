@@ -6,7 +6,17 @@ from pathlib import Path
 
 from ..errors import InvalidArgument, TsdynError
 from .parser import print_json
-from .run import SOLUTIONS, add_force, add_json, add_scene, demand_format, demand_new, write
+from .run import (
+    SOLUTIONS,
+    add_channels,
+    add_force,
+    add_json,
+    add_scene,
+    channels_asked,
+    demand_format,
+    demand_new,
+    write,
+)
 from .scene_file import load_document, load_run, load_scene, robot_options
 
 SCENES = (".toml",)
@@ -36,6 +46,7 @@ def add_convert_options(parser):
     """Add the options of `tsdyn convert`."""
     add_scene(parser, "FROM")
     parser.add_argument("target", metavar="TO", help="where to write; the suffix is the format")
+    add_channels(parser)
     add_force(parser)
     add_json(parser)
 
@@ -227,7 +238,10 @@ def _convert(parsed):
         demand_format(parsed.target)
         found = load(parsed.scene)
         _say_what_lacks(found)
-        written = (write_ensemble if isinstance(found, Ensemble) else write)(found, parsed.target)
+        if isinstance(found, Ensemble):
+            written = write_ensemble(found, parsed.target)
+        else:
+            written = write(found, parsed.target, channels_asked(parsed) or None)
     elif source in SCENES and target in SCENES:
         from ..simulation.load import text_of
         from ..simulation.scene import write_text

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..elements.bodies import Body, PointMass
 from ..errors import InvalidArgument, TsdynError
+from ..observables.channels import channels_of, values_of
 from ..runs.arguments import state_arrays
 from ..simulation.parameters import fields_of, unknown_field
 from ..simulation.variants import start_names, start_of
@@ -44,17 +45,50 @@ def called(function, what, argument):
         raise InvalidArgument(f"{what} raised {type(error).__name__}: {str(error).rstrip('.')}.") from error
 
 
-# What is kept of each run: its last state, the states at t_eval, or what a user's function makes of the solution.
+# What is kept of each run: its last state, the states at t_eval, channels, or what a user's function makes of it.
 
 FINAL, TIMES = "final", "t_eval"
 
 
-def demand_keep(keep, times):
-    """Raise InvalidArgument unless `keep` is one of the ways, and there are times for it."""
-    if not (callable(keep) or (isinstance(keep, str) and keep in (FINAL, TIMES))):
-        raise InvalidArgument(f"keep must be 'final', 't_eval' or a function of the Solution, got {keep!r}.")
-    if keep == TIMES and not times.size:
+class KeptChannels:
+    """A function `keep` of channels by name: series over t_eval, NaN after the end of a case; else the last values.
+
+    Attributes
+    ----------
+    names : list of str
+    count : int
+        Of the times of t_eval.
+    units : dict
+        Of each channel by name.
+    """
+
+    def __init__(self, names, count, packed):
+        self.units = {channel.name: channel.unit for channel in channels_of(packed, names)}
+        self.names, self.count = list(self.units), count
+
+    def __call__(self, solution):
+        """The values of each channel by name."""
+        found = np.full((len(self.names), self.count or 1), np.nan)
+        part = solution if self.count else solution[-1:]
+        found[:, : part.t.size] = values_of(part, channels_of(part.packed, self.names)).T
+        return dict(zip(self.names, found if self.count else found[:, 0], strict=True))
+
+    def __repr__(self):
+        return f"<channels {self.names}>"
+
+
+def keep_of(keep, times, packed):
+    """What is kept: a word, or a function of the Solution, as which names of channels are taken; InvalidArgument."""
+    if keep == TIMES and isinstance(keep, str) and not times.size:
         raise InvalidArgument("keep='t_eval' keeps the states at the times of t_eval=; give them.")
+    if callable(keep) or (isinstance(keep, str) and keep in (FINAL, TIMES)):
+        return keep
+    try:
+        return KeptChannels(keep, times.size, packed)
+    except InvalidArgument as error:
+        raise InvalidArgument(
+            f"keep must be 'final', 't_eval', names of channels or a function of the Solution: {error}"
+        ) from None
 
 
 def record_of(keep, outcome, n, times):

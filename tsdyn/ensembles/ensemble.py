@@ -93,9 +93,10 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
         Name -> array of which the first dimension is the case, or one value for all cases; names are those of
         `scene.parameters()`. Or a function of the case (0, 1, ...) that returns a mapping of names to values.
     t_span : (float, float), s
-    keep : {"final", "t_eval"} or callable
-        What is kept of each case: the last state; the states at the times of `t_eval`; or what a function returns for
-        the Solution: a number, an array, or a mapping of names to these.
+    keep : {"final", "t_eval"}, sequence of str, or callable
+        What is kept of each case: the last state; the states at the times of `t_eval`; channels by name, such as
+        ["hinge.angle", "arm.position.z"], as of `Solution.plot`: over `t_eval` if it is given, else at the end; or what
+        a function returns for the Solution: a number, an array, or a mapping of names to these.
     cases : int, optional
         The number of cases; needed for a function of the case.
     assemble : bool or sequence of str

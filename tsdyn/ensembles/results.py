@@ -63,6 +63,7 @@ def _content(ensemble):
         "is_single": callable(study.keep) and not isinstance(ensemble.kept, dict),
         "kept": list(reductions),
         "parameters": [[name, ensemble.unit(name)] for name in parameters],
+        "channels": ensemble._channels,
         "coordinates": ensemble.coordinates,
         "messages": {str(i): said for i, said in ensemble._results.messages.items()},
         "reason": ensemble._results.reason,
@@ -116,7 +117,8 @@ class Ensemble:
     q, qd : ndarray
         keep="t_eval": (cases, k, n), NaN after the end of a case; otherwise the last state (cases, n).
     kept : ndarray (cases, ...), or dict of these
-        What a function `keep` made of each solution.
+        What a function `keep` made of each solution; channels by name, (cases,) or over t_eval (cases, k), NaN after
+        the end of a case.
     status : ndarray of int (cases,)
         A `Status` each; CASE_FAILED where a case could not be run, NOT_RUN where none was made.
     success : ndarray of bool (cases,)
@@ -198,10 +200,14 @@ class Ensemble:
 
     @property
     def kept(self) -> Any:
-        """What a function `keep` returned: an array (cases, ...), or a dict of them."""
+        """What a function `keep` returned: an array (cases, ...), or a dict of them; channels by name."""
         found = {name[5:]: array for name, array in self._results.arrays.items() if name.startswith("kept")}
+        lost = np.full(
+            (len(self), *(self.times.shape if self.times.size else ())), np.nan
+        )  # where all cases have failed
+        found = {name: lost for name in self._channels} | found
         if not callable(self._study.keep):
-            raise InvalidArgument("kept is what a function keep= made of each solution; none was given.")
+            raise InvalidArgument("kept is what channels or a function keep= made of each solution; none was given.")
         return found[""] if found.keys() == {""} else found
 
     @property
@@ -215,16 +221,23 @@ class Ensemble:
         return self._study.times
 
     def reductions(self) -> dict[str, Floats]:
-        """What a function `keep` made of each solution, (cases, ...) by name; an array without a name as "kept"."""
+        """Channels, or what a function `keep` made of each solution, by name; an array without a name as "kept"."""
         if not callable(self._study.keep):
             return {}
         kept = self.kept
         return dict(kept) if isinstance(kept, Mapping) else {"kept": kept}
 
     def unit(self, name: str) -> str:
-        """The unit of a parameter; "" where the class of a plug-in doesn't describe it."""
+        """The unit of a kept channel or of a parameter; "" where the class of a plug-in doesn't describe it."""
+        if name in self._channels:
+            return self._channels[name]
         field = self._study.family.fields.get(name)
         return field.unit if field is not None else ""
+
+    @property
+    def _channels(self):
+        """Units of the kept channels by name."""
+        return getattr(self._study.keep, "units", {})
 
     def save(self, path: Place) -> Path:
         """Write parameters, results, options and the scene to a file, from which `ts.load` returns the ensemble.
@@ -340,38 +353,50 @@ class Ensemble:
         except ImportError as error:
             raise MissingDependency("to_xarray() needs xarray: pip install 'tsdyn[data]'.") from error
         grid = ("time",) if self._study.keep == TIMES else ()
+        series = ("time",) if self._is_series else ()
         found = {"status": ("case", self.status), "reached": ("case", self.reached, {"units": "s"})}
         for name, units in (("q", "m or 1"), ("qd", "m/s or 1/s")):
             found[name] = (("case", *grid, "coordinate"), getattr(self, name), {"units": units})
         for name, values in (*self.parameters.items(), *self.reductions().items()):
-            dimensions = ("case", *(f"axis {i} of {name}" for i in range(np.ndim(values) - 1)))
-            attributes = {"units": self.unit(name)} if name in self.parameters else {}
-            found[name] = (dimensions, np.asarray(values), attributes)
+            axes = tuple(f"axis {i} of {name}" for i in range(np.ndim(values) - 1))
+            attributes = {"units": self.unit(name)} if name in self.parameters or name in self._channels else {}
+            found[name] = (("case", *(series if name in self._channels else axes)), np.asarray(values), attributes)
         coordinates = {"case": np.arange(len(self)), "coordinate": self.coordinates}
-        coordinates |= {"time": ("time", self.t, {"units": "s"})} if grid else {}
+        coordinates |= {"time": ("time", self.times, {"units": "s"})} if grid or series else {}
         return xarray.Dataset(found, coordinates)
 
     def to_dataframe(self) -> Any:
-        """Return a pandas.DataFrame: a row for each case (for each case and time with keep="t_eval")."""
+        """Return a pandas.DataFrame: a row for each case, or for each case and time of series.
+
+        Series are the states of keep="t_eval", and channels over t_eval. Columns of channels have their units.
+        """
         try:
             import pandas
         except ImportError as error:
             raise MissingDependency("to_dataframe() needs pandas: pip install 'tsdyn[data]'.") from error
-        columns = {}
+        columns, series, names = {}, {}, self.coordinates
         for name, values in (*self.parameters.items(), *self.reductions().items()):
-            columns |= _flat(name, values)
+            if name in self._channels:
+                series[f"{name} ({self._channels[name]})"] = np.ravel(values)
+            else:
+                columns |= _flat(name, values)
         columns |= {"status": [str(Status(code)) for code in self.status.tolist()], "message": self.message}
         columns["reached"] = self.reached
-        names, n = self.coordinates, len(self.coordinates)
-        times = self.t.size if self._study.keep == TIMES else 1
-        columns = {name: np.repeat(np.asarray(values), times) for name, values in columns.items()}
-        for level in ("q", "qd"):
-            rows = np.asarray(getattr(self, level)).reshape(-1, n)
-            columns |= {f"{level} {name}": rows[:, j] for j, name in enumerate(names)}
+        for level in ("q", "qd") if not self._is_series or self._study.keep == TIMES else ():
+            rows = np.asarray(getattr(self, level)).reshape(-1, len(names))
+            series |= {f"{level} {name}": rows[:, j] for j, name in enumerate(names)}
+        times = self.times.size if self._is_series else 1
+        columns = {name: np.repeat(np.asarray(values), times) for name, values in columns.items()} | series
         index = np.repeat(np.arange(len(self)), times)
-        if self._study.keep == TIMES:
-            return pandas.DataFrame(columns, index=[index, np.tile(self.t, len(self))]).rename_axis(["case", "time"])
+        if self._is_series:
+            index, names = [index, np.tile(self.times, len(self))], ["case", "time"]
+            return pandas.DataFrame(columns, index=index).rename_axis(names)
         return pandas.DataFrame(columns, index=index).rename_axis("case")
+
+    @property
+    def _is_series(self):
+        """Whether states, or channels, are kept over t_eval."""
+        return self._study.keep == TIMES or bool(self._channels and self.times.size)
 
     def _facts(self):
         count = Counter(self.status.tolist())

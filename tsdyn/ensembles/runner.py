@@ -17,7 +17,7 @@ from ..simulation.solution import Solution
 from ..simulation.variants import family_of, of_numbers, packed_anew, start_names
 from .arena import Arena, serves
 from .case_loop import Finished
-from .cases import demand_keep, record_of, reduced, started
+from .cases import keep_of, record_of, reduced, started
 from .tolerances import MOST_KEPT
 
 PLAIN = Status.SUCCESS.sentence
@@ -40,7 +40,7 @@ class Study:
     cases : Cases or CalledCases
     options : RunOptions
     call : RunCall
-    keep : str or callable
+    keep : str, sequence of str or callable
     free : sequence of str, optional
         Names of the bodies by which each start is made consistent; None takes starts as they are.
     lanes : int
@@ -53,16 +53,16 @@ class Study:
     """
 
     def __init__(self, scene, cases, options, call, keep, free=None, lanes=1):
-        self.scene, self.cases, self.keep, self.options, self.call = scene, cases, keep, options, call
+        self.scene, self.cases, self.options, self.call = scene, cases, options, call
         self.free, self.lanes = free, lanes
         self.span = interval(call.t_span)
         self.times, self.events = output_times(call.t_eval, *self.span), prepare(options.events)
         self.within = options.dense_output or self.events is not None or between(self.times, self.span)
-        demand_keep(keep, self.times)
         self.family, self.changes = family_of(scene)
         default = options.rtol, options.atol, options.may_use_series
         prepare_first_run(scene, options.method, options.form, self.within, default)
         self.kept = scene._prepared
+        self.keep = keep_of(keep, self.times, self.kept.packed)
         self.method, self.n = first_method(options, self.kept), self.kept.n
         self.stops = self.kept.stops(*self.span, self.method.step is None)
         self.names = None if cases.names is None else {*self.changes, *cases.names}

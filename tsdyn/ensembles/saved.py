@@ -43,7 +43,7 @@ class SavedEnsemble(Ensemble):
         names = [name for name, _ in record["parameters"]]
         columns = {name: arrays[f"parameter_{i}"] for i, name in enumerate(names)}
         kept = {name: arrays[f"kept_{i}"] for i, name in enumerate(record["kept"])}
-        self._path, self._record, self._units = path, record, dict(record["parameters"])
+        self._path, self._record = path, record
         study = SimpleNamespace(
             cases=Cases(columns, {}, record["count"]), keep=_lost if record["keep"] == REDUCED else record["keep"],
             times=arrays["times"].astype(float), free=record["free"], given=_options(record), scene=None,
@@ -67,7 +67,12 @@ class SavedEnsemble(Ensemble):
 
     def unit(self, name: str) -> str:
         """As of `Ensemble`."""
-        return self._units.get(name, "")
+        return (dict(self._record["parameters"]) | self._channels).get(name, "")
+
+    @property
+    def _channels(self):
+        """As of `Ensemble`; files of earlier versions have none."""
+        return self._record.get("channels", {})
 
     def _scene(self):
         """The scene of the cases."""
@@ -124,8 +129,9 @@ def _demand_whole(record, arrays):
     demand_record(record, RECORD)
     count, names = record["count"], record["coordinates"]
     pairs, messages = record["parameters"], record["messages"]
+    demand(isinstance(record.get("channels", {}), dict), "channels")
     words = [*names, *record["kept"], *messages.values(), *record["lacking"]]
-    words += [word for pair in pairs for word in pair]
+    words += [word for pair in (*pairs, *record.get("channels", {}).items()) for word in pair]
     words += [*(record["free"] or ()), *([] if "scene" in arrays else [record["lacks"]])]
     demand(all(isinstance(word, str) for word in words), "words")
     times = arrays["times"]
@@ -136,6 +142,9 @@ def _demand_whole(record, arrays):
         demand(arrays[name].shape == (count, *grid, len(names)), name)
     demand(arrays["status"].shape == arrays["reached"].shape == (count,), "status")
     demand(set(arrays["status"].tolist()) <= {*map(int, Status)}, "status")
+    for i, name in enumerate(record["kept"]):
+        series = (count, *(times.shape if times.size else ()))
+        demand(name not in record.get("channels", {}) or arrays[f"kept_{i}"].shape == series, name)
     for kind, known in (("parameter", pairs), ("kept", record["kept"])):
         for i in range(len(known)):
             demand(arrays[f"{kind}_{i}"].shape[:1] == (count,), f"{kind}_{i}")

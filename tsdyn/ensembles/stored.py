@@ -230,7 +230,8 @@ def table_of(study, parameters, kept):
         columns.append(Column(name, (*grid, "coordinate"), _said(name, units)))
     others = [(_column(name), array, study.family.fields[name].unit) for name, array in parameters.items()
               if np.asarray(array).dtype.kind in "iuf"]  # fmt: skip
-    others += [(name, array, "") for name, array in kept.items() if _is_kept(name)]
+    own = getattr(study.keep, "units", {})
+    others += [(name, array, own.get(name.removeprefix("kept "), "")) for name, array in kept.items() if _is_kept(name)]
     for name, array, units in others:
         dimensions = tuple(f"axis {i} of {name}" for i in range(np.ndim(array) - 1))
         labels |= {each: [str(i) for i in range(size)] for each, size in zip(dimensions, array.shape[1:], strict=True)}
@@ -277,11 +278,10 @@ def digest_of(study):
             digest.update(f"{name} {array.shape}".encode() + (array.tobytes() if array.dtype.kind in "iuf" else b""))
     events = given["events"]
     functions = [] if events is None else [events] if callable(events) else list(events)
-    functions += [study.keep] if callable(study.keep) else []
+    named = study.keep if isinstance(study.keep, str) else repr(study.keep) if hasattr(study.keep, "units") else ""
+    functions += [] if named else [study.keep]
     plain = {name: repr(value) for name, value in given.items() if name not in ("scene", "events", "t_eval", "state")}
-    digest.update(
-        repr((sorted(plain.items()), sources_of(functions), study.keep if not callable(study.keep) else "")).encode()
-    )
+    digest.update(repr((sorted(plain.items()), sources_of(functions), named)).encode())
     digest.update(study.times.tobytes() + (f"{study.lanes} lanes".encode() if study.lanes > 1 else b""))
     digest.update(b"" if study.free is None else repr(study.free).encode())
     state = given["state"]

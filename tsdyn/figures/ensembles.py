@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..drawing import BLUE, save
+from ..drawing import BLUE, is_picture, save
 from ..errors import InvalidArgument
 from ..validation import nearest
 from .axes import axes_of, bare, figure_of
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from ..hints import Ensemble
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".eps", ".ps", ".tif", ".tiff", ".webp", ".pgf")
 PLANE = 2  # parameters of a map at most
 DARKEST = 0.45  # opacity of all bands together
 
@@ -35,8 +33,8 @@ def quantile_bands(
     ensemble : Ensemble
         With `t_eval`.
     what : str
-        A coordinate of keep="t_eval", such as "bob.x", its rate as "bob.x rate"; or the name of a series (k,) that a
-        function `keep` returned, "kept" if it returned nothing else.
+        A coordinate of keep="t_eval", such as "bob.x", its rate as "bob.x rate"; a channel kept over t_eval; or the
+        name of a series (k,) that a function `keep` returned, "kept" if it returned nothing else.
     ax : matplotlib Axes, optional
         Where to draw; default new axes of pyplot's.
     quantiles : sequence of float
@@ -103,8 +101,8 @@ def final_map(
     ----------
     ensemble : Ensemble
     what : str
-        A coordinate of the last state, such as "bob.x", its rate as "bob.x rate"; "reached", the time reached; or the
-        name of a number that a function `keep` returned, "kept" if it returned nothing else.
+        A coordinate of the last state, such as "bob.x", its rate as "bob.x rate"; "reached", the time reached; a kept
+        channel; or the name of a number that a function `keep` returned, "kept" if it returned nothing else.
     over : str, or two of them
         Parameters of the ensemble; "bob.velocity[0]" is a component. Two that form a grid give an image, others points.
     ax : matplotlib Axes, optional
@@ -160,7 +158,7 @@ def final_map(
 
 def overview(ensemble: Ensemble, what: str | None, path: str | Path | None) -> Any:
     """What `Ensemble.plot` draws: bands of a series, else a map over the first one or two parameters that vary."""
-    if _is_picture(what) and what not in ensemble.reductions():
+    if is_picture(what) and what not in ensemble.reductions():
         raise InvalidArgument(
             f"plot: what must be a value of the ensemble, got the path {str(what)!r}. To write the figure to it: "
             f"ensemble.plot(path={str(what)!r})."
@@ -178,14 +176,9 @@ def overview(ensemble: Ensemble, what: str | None, path: str | Path | None) -> A
     return ax
 
 
-def _is_picture(what):
-    """Whether a value is a path, and no name."""
-    return isinstance(what, os.PathLike) or (isinstance(what, str) and what.lower().endswith(PICTURES))
-
-
 def value_of(ensemble, what, last=False):
     """Values (cases, ...) by name, and their unit; of a series, `last`: at its end."""
-    known = {name: (values, "") for name, values in ensemble.reductions().items()} | {
+    known = {name: (values, ensemble._channels.get(name, "")) for name, values in ensemble.reductions().items()} | {
         "reached": (ensemble.reached, "s")
     }
     if what in known:

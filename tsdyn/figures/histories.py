@@ -40,7 +40,7 @@ def energy(solution: Solution, ax: Any = None) -> Any:
         ("total", solution.energy, "black"),
     ):
         ax.plot(solution.t, values, color=colour, linewidth=1.3, label=name)
-    return _finished(ax, "energy (J)")
+    return finished(ax, "energy (J)")
 
 
 @figure_of("reaction")
@@ -81,7 +81,7 @@ def reaction(solution: Solution, item: ItemLike, axes: Any = None) -> Any:
         for i, component in enumerate("xyz"):
             ax.plot(solution.t, values[:, i], color=COLOURS[i], linewidth=1.3, label=component)
         ax.plot(solution.t, np.linalg.norm(values, axis=1), color="black", linewidth=1.0, label="norm")
-        _finished(ax, label)
+        finished(ax, label)
     axes[0].set_title(f"{getattr(item, 'name', item)}, on one body, ground frame", loc="left", fontsize=11)
     return axes
 
@@ -111,7 +111,7 @@ def steps(solution: Solution, ax: Any = None) -> Any:
     if not taken.all():
         ax.plot(history.t[~taken], history.h[~taken], "x", color=VERMILION, markersize=5, label="rejected")
     ax.set_yscale("log")
-    return _finished(ax, "step (s)")
+    return finished(ax, "step (s)")
 
 
 @figure_of("steps", "charts")
@@ -135,10 +135,11 @@ def charts(solution: Solution, ax: Any = None) -> Any:
         ax.plot(history.t[at], history.condition[at], linestyle="", markersize=3, label=f"{reason}: {at.sum()}", **look)
     if (np.nan_to_num(history.condition) > 0.0).any():
         ax.set_yscale("log")
-    return _finished(ax, "condition of the chart (1)")
+    return finished(ax, "condition of the chart (1)")
 
 
-def _finished(ax, label):
+def finished(ax: Any, label: str) -> Any:
+    """Label the axes of a quantity over time."""
     ax.set_xlabel("time (s)")
     ax.set_ylabel(label)
     bare(ax)

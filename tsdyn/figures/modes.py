@@ -73,7 +73,7 @@ def mode_shapes(linearisation: Linearisation, count: int = 4) -> Any:
         for at, move in zip(rest, moves, strict=True):
             _draw(ax, at, GREY)
             _draw(ax, at + scale * move, VERMILION)
-        _label(ax, modes.eigenvalues[j])
+        _label(ax, modes.eigenvalues[j], modes.motions[j])
     return axes
 
 
@@ -100,8 +100,8 @@ def _draw(ax, points, colour):
         ax.plot(*np.array([points[0], point]).T, color=colour, linewidth=1.8)
 
 
-def _label(ax, value):
+def _label(ax, value, motion):
     frequency, ratio = abs(value) / (2.0 * np.pi), -value.real / abs(value) if value else 0.0
-    ax.set_title(f"{frequency:.4g} Hz, damping ratio {ratio:.3g}", fontsize=10)
+    ax.set_title(f"{frequency:.4g} Hz, damping ratio {ratio:.3g}\n{motion}", fontsize=10)
     ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
     ax.set_aspect("equal", adjustable="datalim")

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import InvalidArgument, TsdynError
 from ..methods.integrator import registered
+from ..observables.channels import channels_of
 from ..validation import close, unknown_parameter
 from . import types
 from .expressions import Misread
@@ -95,7 +96,7 @@ KEYS = ("parameters", "cases", "seed", "grid", "keep", "assemble")
 KEEPS = ("final", "t_eval")
 MOST_CASES = 1_000_000  # cases
 LEAST = {"cases": 1, "seed": 0}
-OUTPUT = ("files", "plot")
+OUTPUT = ("files", "plot", "channels")
 HINT = (
     "a value, a list with one for each case, { uniform = [low, high] }, { normal = [mean, deviation] } or "
     "{ linspace = [first, last] }"
@@ -146,17 +147,32 @@ def _choices(table, scene, mistakes):
     """The values of grid, keep and assemble."""
     grid, keep, assemble = table.get("grid", False), table.get("keep", KEEPS[0]), table.get("assemble", False)
     bodies = [] if scene is None else [body.name for body in scene.bodies]
-    listed = isinstance(assemble, list) and all(isinstance(name, str) for name in assemble)
+    listed = _is_names(assemble)
     known = isinstance(assemble, bool) or (listed and (scene is None or all(name in bodies for name in assemble)))
+    if _is_names(keep):
+        _demand_channels(("ensemble", "keep"), keep, scene, mistakes)
     example = f'["{bodies[0] if bodies else "crank"}"]'
     for key, value, right, reason in (
         ("grid", grid, isinstance(grid, bool), "it must be true or false."),
-        ("keep", keep, keep in KEEPS, "it must be 'final' or 't_eval'."),
+        ("keep", keep, _is_names(keep) or keep in KEEPS, "it must be 'final', 't_eval' or names of channels."),
         ("assemble", assemble, known, f"it must be true, false or names of bodies such as {example}."),
     ):
         if not right:
             mistakes.add_value(("ensemble", key), f"ensemble: {key}", value, reason)
     return grid, keep, assemble
+
+
+def _is_names(value):
+    return isinstance(value, list) and bool(value) and all(isinstance(name, str) for name in value)
+
+
+def _demand_channels(path, names, scene, mistakes):
+    """Add a mistake where a name stands for no channel of the scene; without mistakes in the scene."""
+    if scene is not None:
+        try:
+            channels_of(scene.packed, names)
+        except TsdynError as error:
+            mistakes.add_value(path, ": ".join(path), names, str(error))
 
 
 class _Cases:
@@ -252,9 +268,9 @@ def _grid(columns):
     return {name: column[at.ravel()] for (name, column), at in zip(columns.items(), places, strict=True)}
 
 
-def output(table, mistakes):
-    """Where results go: {"files": list of paths, "plot": path or None}; beside the working folder, not above it."""
-    path, found = ("output",), {"files": [], "plot": None}
+def output(table, scene, mistakes):
+    """Where results go, by key: paths of files and of a plot, None without, below the working folder; channels."""
+    path, found = ("output",), {"files": [], "plot": None, "channels": []}
     if not isinstance(table, dict):
         mistakes.add_value(path, "output", table, "it must be a table: [output].")
         return found
@@ -268,7 +284,13 @@ def output(table, mistakes):
             if not isinstance(value, str) or not value or "\0" in value or _leaves(value):
                 reason = "it must be a path below the working folder, such as 'results/run.h5'."
                 mistakes.add_value((*path, key), f"output: {key}", value, reason)
-    return {"files": files, "plot": table.get("plot")}
+    channels = table.get("channels", [])
+    if _is_names(channels):
+        _demand_channels((*path, "channels"), channels, scene, mistakes)
+    elif channels != []:
+        reason = 'it must be a list of names such as ["hinge.angle"].'
+        mistakes.add_value((*path, "channels"), "output: channels", channels, reason)
+    return {"files": files, "plot": table.get("plot"), "channels": channels}
 
 
 def _leaves(path):

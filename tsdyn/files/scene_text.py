@@ -11,6 +11,7 @@ from ..errors import InvalidArgument, InvalidFile
 from . import run_tables, toml_text
 from .build import build
 from .describe import describe, outline
+from .named_numbers import NamedNumbers
 from .reading import Mistakes
 from .toml_text import Places
 from .types import encode
@@ -29,13 +30,18 @@ def write(scene, make):
     InvalidArgument
         If the scene has what a file can't hold, or the text would not give the same scene to the bit.
     """
-    text = toml_text.write(describe(scene))
+    text = scene._named.text() if is_of_file(scene) else toml_text.write(describe(scene))
     try:
         twin, _ = read(text, "the scene", make, None)
     except InvalidFile as error:
         raise InvalidArgument(f"the scene can't be written: read again, {error} {KEEP}") from error
     _demand_same(scene, twin)
     return text
+
+
+def is_of_file(scene):
+    """Whether a scene is as a file with a table `parameters` says."""
+    return scene._named is not None and _changed(scene, scene._named.made(type(scene), {})) == []
 
 
 def write_outline(scene, make):
@@ -55,7 +61,7 @@ class Document(NamedTuple):
     scene: Any
     run: dict  # arguments of `simulate`
     ensemble: dict  # arguments of `ts.ensemble`
-    output: dict  # files, and where to draw
+    output: dict  # files, where to draw, and channels
 
 
 def read(text, name, make, simulate, allow_code=False):
@@ -75,6 +81,8 @@ def read_all(text, name, make, simulate, allow_code=False, study=None):
     """
     document, mistakes = parsed(text, name)
     scene, names = build(document, make, mistakes, allow_code)
+    if scene is not None and names:
+        scene._named = NamedNumbers(document, mistakes, allow_code, names)
     given = run_tables.options(document["run"], simulate, mistakes, names) if "run" in document else {}
     cases = {}
     if "ensemble" in document and study is not False:
@@ -82,7 +90,7 @@ def read_all(text, name, make, simulate, allow_code=False, study=None):
         if isinstance(table, dict):
             table = table | {key: value for key, value in (study or {}).items() if value is not None}
         cases = run_tables.ensemble(table, scene, mistakes, names)
-    output = run_tables.output(document.get("output", {}), mistakes)
+    output = run_tables.output(document.get("output", {}), scene, mistakes)
     mistakes.demand_none()
     return Document(scene, given, cases, output)
 
@@ -137,11 +145,18 @@ def _marks_of(part):
 
 def _demand_same(scene, twin):
     """Refuse a scene that comes back as another one."""
+    changed = _changed(scene, twin)
+    if changed:
+        raise InvalidArgument(
+            f"the scene can't be written: {', '.join(changed[:5])} would not come back to the bit. {KEEP}"
+        )
+
+
+def _changed(scene, twin):
+    """Names of the parts in which two scenes differ."""
     one, other = marks(scene), marks(twin)
-    changed = [name for name in one if name not in other or one[name] != other[name]]
-    if changed or list(one) != list(other):
-        which = ", ".join(changed[:5]) or "the names"
-        raise InvalidArgument(f"the scene can't be written: {which} would not come back to the bit. {KEEP}")
+    found = [name for name in one if name not in other or one[name] != other[name]]
+    return found if found or list(one) == list(other) else ["the names"]
 
 
 # The scene file that `tsdyn new` writes.
@@ -209,6 +224,7 @@ every = 0.01 # outputs; without it one a step
 # [output]
 # files = ["arm.h5", "arm.csv"]
 # plot = "arm.png"
+# channels = ["hinge", "arm.position", "spring.tension"] # of the CSV file and of the figure
 
 # Many runs, by `tsdyn ensemble`: what differs from case to case. `tsdyn info --parameters` lists them.
 # [ensemble]

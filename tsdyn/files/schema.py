@@ -10,6 +10,7 @@ from .describe import BUILT, VERSION
 
 ID = "tsdyn scene"
 NUMBER = {"$ref": "#/$defs/number"}
+NAMES = {"type": "array", "items": {"type": "string"}}
 VECTOR = {"$ref": "#/$defs/vector"}
 DEFINITIONS = {
     "number": {"description": "a number, or an expression of parameters", "type": ["number", "string"]},
@@ -47,7 +48,7 @@ BY_KIND = {
     types.MOTION_TYPE: {"$ref": "#/$defs/motion"},
     types.VECTOR: {"$ref": "#/$defs/vector motion"},
     types.REFERENCE: {"description": "the name of a constraint", "type": "string"},
-    types.NAMES: {"type": "array", "items": {"type": "string"}},
+    types.NAMES: NAMES,
     types.ANY: {},
 }
 
@@ -68,7 +69,7 @@ def schema(scene, simulate):
         "start": _start(scene),
         "run": {"type": "object", "additionalProperties": False, "properties": {**own, **run}},
         "ensemble": _ensemble(),
-        "output": _closed({"files": {"type": "array", "items": {"type": "string"}}, "plot": {"type": "string"}}),
+        "output": _closed({"files": NAMES, "plot": {"type": "string"}, "channels": NAMES}),
     }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -90,9 +91,8 @@ def _ensemble():
     spread = {kind: {**pair, "maxItems": most} for kind, most in run_tables.SPREADS.items()}
     value = {"anyOf": [{"$ref": "#/$defs/array"}, {**_closed(spread), "minProperties": 1, "maxProperties": 1}]}
     whole = {key: {"type": "integer", "minimum": least} for key, least in run_tables.LEAST.items()}
-    names = {"type": "array", "items": {"type": "string"}}
-    others = {"grid": {"type": "boolean"}, "keep": {"enum": list(run_tables.KEEPS)}}
-    others |= {"assemble": {"anyOf": [{"type": "boolean"}, names]}}
+    keep = {"anyOf": [{"enum": list(run_tables.KEEPS)}, {**NAMES, "minItems": 1}]}
+    others = {"grid": {"type": "boolean"}, "keep": keep, "assemble": {"anyOf": [{"type": "boolean"}, NAMES]}}
     parameters = {"type": "object", "additionalProperties": value, "minProperties": 1}
     return {**_closed({"parameters": parameters, **whole, **others}), "required": ["parameters"]}
 

@@ -1,14 +1,20 @@
 """Outputs of a run as labelled arrays and data frames, with the names and units of stores."""
 
+import csv
+from pathlib import Path
+
 import numpy as np
 
-from ..errors import MissingDependency
+from ..errors import MissingDependency, StorageError
+from ..observables.channels import channels_of, values_of
 from ..storage.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
+from ..validation import text_cell
 from .saved_solutions import labelled_rows, provenance
+from .stored_runs import demand_path
 
 ERRORS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 ENERGIES = ("kinetic_energy", "potential_energy", "energy")
-INDEX = "time"
+INDEX, HEAD = "time", "time (s)"
 
 
 def _columns(solution):
@@ -77,11 +83,35 @@ def table_of(solution):
     return columns, units, np.concatenate(arrays, axis=1)
 
 
-def to_dataframe(solution):
+def to_dataframe(solution, channels):
     """As of `Records.to_dataframe`."""
     pandas = _library("pandas")
-    columns, units, array = table_of(solution)
-    index = pandas.Index(solution.t, name=f"{INDEX} (s)")
-    frame = pandas.DataFrame(array, index, pandas.MultiIndex.from_tuples(columns))
+    index = pandas.Index(solution.t, name=HEAD)
+    if channels is not None:
+        some = channels_of(solution.packed, channels, solution._lacks)
+        frame = pandas.DataFrame(values_of(solution, some), index, [one.title for one in some])
+        units = {one.title: one.unit for one in some}
+    else:
+        columns, units, array = table_of(solution)
+        frame = pandas.DataFrame(array, index, pandas.MultiIndex.from_tuples(columns))
     frame.attrs = {"units": units, **provenance(solution)}
     return frame
+
+
+def to_csv(solution, path, channels):
+    """As of `Records.to_csv`."""
+    demand_path(path, "path")
+    if channels is not None:
+        some = channels_of(solution.packed, channels, solution._lacks)
+        head, array = [one.title for one in some], values_of(solution, some)
+    else:
+        columns, units, array = table_of(solution)
+        head = [f"{' '.join(filter(None, key))} ({units[key]})" for key in columns]
+    try:
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            rows = csv.writer(file)
+            rows.writerow([HEAD, *map(text_cell, head)])
+            rows.writerows([t, *row] for t, row in zip(solution.t.tolist(), array.tolist(), strict=True))
+    except OSError as error:
+        raise StorageError(f"{path} can't be written: {error.strerror}.") from error
+    return Path(path)

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from ..elements.bodies import Attribute, PointMass
 from ..elements.element import checked_parameters
 from ..elements.joint import Joint
 from ..errors import InvalidArgument, UnknownParameter
+from ..files.named_numbers import Numbers
+from ..files.types import Unwritable, encode
 from ..jit.code_hash import is_ours
 from ..model.handles import handles_of
 from ..model.packed import Derived, checked_motions, classes, reaches_of, size_of_reaches
@@ -111,8 +114,13 @@ class Field(NamedTuple):
 
 
 def fields_of(scene):
-    """The `Field`s of a scene by name, "object.attribute"; names that stand for several are left out."""
-    found, several = {GRAVITY: Field(scene, GRAVITY, "m/s^2")}, set()
+    """The `Field`s of a scene by name, "object.attribute"; names that stand for several are left out.
+
+    Numbers of the table `parameters` of its file are first.
+    """
+    numbers = scene._named.values if scene._named is not None else None
+    found, several = {name: Field(numbers, name, "") for name in vars(numbers or Numbers())}, set()
+    found[GRAVITY] = Field(scene, GRAVITY, "m/s^2")
     for owner in (*scene.bodies, *scene._added, *scene._forces):
         units = units_of(type(owner))
         for attribute in attributes_of(type(owner)):
@@ -277,6 +285,8 @@ class Edit:
 
     def enter(self, owner, changes):
         """Enter checked values of one owner, by attribute; False if numbers can't express them."""
+        if isinstance(owner, Numbers):
+            return False
         if owner is self.family.template:
             self._array("gravity")[:] = with_gravity(owner, changes)
             return True
@@ -439,6 +449,45 @@ def with_gravity(scene, changes):
     return type(scene)(changes["gravity"]).gravity
 
 
+# A scene of a file with other numbers of its table `parameters`: made of the file again, then edited as the scene was.
+
+
+def of_file(template, numbers):
+    """Return the scene, in which the handles of the template have counterparts, `twin[handle]`.
+
+    Raises
+    ------
+    InvalidArgument
+        If the file has mistakes with these numbers, or the template has other parts than the file.
+    """
+    base, twin = (template._named.made(type(template), changes) for changes in ({}, numbers))
+    parts, own, as_read = ([scene.ground, *_parts(scene)] for scene in (template, twin, base))
+    if [(type(one), one.name) for one in parts] != [(type(one), one.name) for one in as_read]:
+        raise InvalidArgument(
+            f"{', '.join(numbers)}: the scene has other parts than its file, so [parameters] of the file can't be set "
+            "any more; set attributes of bodies, constraints and forces, or edit the file."
+        )
+    twin._twins = WeakKeyDictionary(zip(parts, own, strict=True))
+    before = fields_of(base)
+    for name, field in fields_of(template).items():
+        if not isinstance(field.owner, Numbers) and not field.keyword and not _equal(field.value, before[name].value):
+            owner = twin if field.owner is template else twin[field.owner]
+            setattr(owner, field.attribute, field.value)
+    return twin
+
+
+def _parts(scene):
+    return (*scene.bodies, *scene.constraints, *scene.forces)
+
+
+def _equal(one, other):
+    """Whether values of an attribute are the same; functions of time by what a file has of them."""
+    try:
+        return one is other or repr(encode(one)) == repr(encode(other))
+    except Unwritable:
+        return False
+
+
 # Scenes that differ in numbers: one analysis, one packing, and the numbers of each.
 #
 # A value that only enters numbers of the packed arrays (mass, inertia, gravity, a start, what a force or a primitive
@@ -509,6 +558,12 @@ class Family:
     def own_body(self, body):
         """The body of the packed scene that one of the template stands for."""
         return self._bodies.get(id(body), body)
+
+    def copied(self, values):
+        """A copy of the template with those of some values, by name, that are numbers of its file; and the others."""
+        numbers = {name: value for name, value in values.items() if isinstance(self.field(name).owner, Numbers)}
+        others = {name: value for name, value in values.items() if name not in numbers}
+        return (of_file(self.template, numbers) if numbers else self.template.copy()), others
 
     def numbers(self, values):
         """The `Packed` and the start of a scene with other values, by name; None if it must be packed anew.

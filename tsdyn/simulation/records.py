@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..calls import fitting_methods
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
     from ..hints import Place
 
 
@@ -91,24 +93,78 @@ class Records:
 
         return to_xarray(self)
 
-    def to_dataframe(self) -> Any:
+    def to_dataframe(self, channels: str | Sequence[str] | None = None) -> Any:
         """Return the outputs as a pandas.DataFrame (needs `tsdyn[data]`).
+
+        Parameters
+        ----------
+        channels : str or sequence of str, optional
+            Names of channels, such as "hinge.angle" or "arm.position.z", as of `plot`; by default all outputs.
 
         Returns
         -------
         pandas.DataFrame
-            Rows by time, s; columns by quantity and component, such as ("q", "crank.x"), ("multipliers", "rod") and
-            ("energy", ""): the same quantities as of `to_xarray`. `frame.attrs["units"]` has the unit of each
-            column.
+            Rows by time, s. Of channels a column each, "hinge.angle (rad)". Of all outputs columns by quantity and
+            component, such as ("q", "crank.x"), ("multipliers", "rod") and ("energy", ""): the same quantities as of
+            `to_xarray`. `frame.attrs["units"]` has the unit of each column.
+
+        Raises
+        ------
+        MissingDependency
+            If pandas is not installed.
+        InvalidArgument
+            If a name is that of no channel.
+        StorageError
+            If a channel needs parts of the scene that the solution of a file lacks.
 
         Examples
         --------
         >>> import tsdyn as ts
         >>> stone = (scene := ts.Scene(gravity=(0, 0, -10))).add_point_mass(mass=1.0, name="stone")
-        >>> frame = ts.simulate(scene, (0, 1), t_eval=[0.0, 1.0]).to_dataframe()
+        >>> solution = ts.simulate(scene, (0, 1), t_eval=[0.0, 1.0])
+        >>> frame = solution.to_dataframe()
         >>> print(frame["q"]["stone.z"].to_numpy(), frame.attrs["units"]["q", "stone.z"])
         [ 0. -5.] m
+        >>> solution.to_dataframe("stone.velocity.z")["stone.velocity.z (m/s)"].to_list()
+        [0.0, -10.0]
         """
         from .labelled import to_dataframe
 
-        return to_dataframe(self)
+        return to_dataframe(self, channels)
+
+    def to_csv(self, path: Place, channels: str | Sequence[str] | None = None) -> Path:
+        """Write the outputs to a CSV file: a row of heads with units, then one for each output.
+
+        Parameters
+        ----------
+        path : str or PathLike
+            A file that is there is replaced.
+        channels : str or sequence of str, optional
+            Names of channels, such as "hinge.angle" or "arm.position.z", as of `plot`; by default all outputs.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        InvalidArgument
+            If a name is that of no channel.
+        StorageError
+            If the file can't be written, or a channel needs parts of the scene that the solution of a file lacks.
+
+        Examples
+        --------
+        >>> from tempfile import mkdtemp
+        >>> import tsdyn as ts
+        >>> stone = (scene := ts.Scene(gravity=(0, 0, -10))).add_point_mass(mass=1.0, name="stone")
+        >>> solution = ts.simulate(scene, (0, 1), t_eval=[0.0, 1.0])
+        >>> path = solution.to_csv(mkdtemp() + "/fall.csv", ["stone.position.z", "stone.velocity.z"])
+        >>> print(path.read_text().strip())
+        time (s),stone.position.z (m),stone.velocity.z (m/s)
+        0.0,0.0,0.0
+        1.0,-5.0,-10.0
+        """
+        from .labelled import to_csv
+
+        return to_csv(self, path, channels)

@@ -36,6 +36,7 @@ from .analyses import linearise as _linearise
 from .given_motion import inverse_dynamics as _inverse_dynamics
 from .given_motion import kinematics as _kinematics
 from .scene_cache import preparing
+from .set_start import set_start as _set_start
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
 from .variants import copy as _copy
 from .variants import parameters as _parameters
@@ -206,6 +207,7 @@ class Scene:
 
     ground: AnyBody
     imported: ImportReport | None = None
+    _named = None  # of a file with a table `parameters`: its `NamedNumbers`
     _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:
@@ -555,6 +557,7 @@ class Scene:
     parameters = _parameters
     with_parameters = _with_parameters
     set = set_joint
+    set_start = _set_start
     remove = _remove
     copy = _copy
     save = save

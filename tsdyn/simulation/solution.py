@@ -99,40 +99,74 @@ class Showing:
 
         return show(run_data(self, shapes=shapes, trails=trails, camera=camera, follow=follow), path)
 
-    def plot(self, path: str | Path | None = None) -> Any:
-        """Draw constraint errors, energies, steps and charts over time.
-
-        `ts.plots` has these and other figures by themselves.
+    def plot(self, channels: str | Sequence[str] | Path | None = None, path: str | Path | None = None) -> Any:
+        """Draw time histories of channels, such as "hinge.angle"; without any, an overview of the run.
 
         Parameters
         ----------
+        channels : str or sequence of str, optional
+            Names of channels, see below. By default constraint errors, energies, steps and charts are drawn.
         path : str or Path, optional
-            A file to write the figure to, in the format of its suffix.
+            A file to write the figure to, in the format of its suffix. A lone text that ends like a file of a picture,
+            such as "run.png", is a path.
 
         Returns
         -------
-        ndarray (2, 2) of matplotlib Axes
+        ndarray (panels,) of matplotlib Axes
+            A panel for each unit; of the overview (2, 2).
 
         Raises
         ------
         MissingDependency
             If matplotlib is not installed.
         InvalidArgument
-            If the file can't be written.
+            If a name is that of no channel, or the file can't be written.
+        StorageError
+            If a channel needs parts of the scene that the solution of a file lacks.
+
+        Notes
+        -----
+        A channel is a quantity of an object, and of a vector a component, after dots:
+
+        - body: position, velocity, acceleration (ground frame), angular_velocity, angular_acceleration (body frame),
+          each with x, y, z; orientation, with e0 to e3;
+        - joint, motor, spring of a joint: angle or displacement, rate, acceleration; of a joint with both, angle_rate
+          and so on; of several angles "angle 1" and "angle 2";
+        - constraint, joint, force: force and torque, each with x, y, z, as of `reaction`; where there is one joint
+          coordinate, torque.axis or force.axis, which is the load along it, on b from a;
+        - Spring, Distance: length and tension, positive where it pulls.
+
+        A vector without component stands for all of them. An object alone stands for position, velocity and angular
+        velocity of a body, coordinates with rates, force and torque of a joint, length and tension of a spring.
+
+        Curves are smooth within steps: from dense output, where the run kept it, else from the quintic through
+        positions, velocities and accelerations of the outputs, which is not exact, and rounds off jumps of loads.
+        Outputs that are too far apart for it are drawn as dots.
 
         Examples
         --------
         >>> import matplotlib
         >>> import tsdyn as ts
         >>> matplotlib.use("agg")
-        >>> stone = (scene := ts.Scene()).add_point_mass(mass=1.0)
-        >>> axes = ts.simulate(scene, (0, 1)).plot()
-        >>> axes[0, 1].get_ylabel()
-        'energy (J)'
+        >>> scene = ts.Scene()
+        >>> bar = scene.add_body(**ts.shapes.rod(1.0, axis="x", mass=3.0), position=(0.5, 0, 0), name="bar")
+        >>> hinge = ts.constraints.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge")
+        >>> hinge = scene.add(hinge)
+        >>> axes = ts.simulate(scene, (0, 1), dense_output=True).plot(["hinge.angle", "bar.position.z"])
+        >>> [ax.get_ylabel() for ax in axes]
+        ['angle (rad)', 'position (m)']
         """
-        from ..figures.histories import overview
+        from ..drawing import is_picture
 
-        return overview(self, path)
+        if path is None and is_picture(channels):
+            channels, path = None, channels
+        if channels is None:
+            from ..figures.histories import overview
+
+            return overview(self, path)
+        from ..figures.channels import time_histories
+
+        return time_histories(self, channels, path)
 
 
 # Energy error of an undriven and undamped run near singular configurations.

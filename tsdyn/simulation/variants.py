@@ -262,7 +262,7 @@ def of_numbers(scene, family, changes, packed, start):
         _gravity=packed.system.gravity.copy(), _packed=packed, _start=start, _prepared=kept.like(packed),
         _users=scene._users, _functions=scene._functions, _waiting={}, _titles=None, _names=None, _twins=None,
         _aliases=None, _later=(family, changes),
-        imported=scene.imported,
+        **{name: vars(scene)[name] for name in ("imported", "_drawn", "_named") if name in vars(scene)},
     )  # fmt: skip
     other._gravity.setflags(write=False)
     return other
@@ -335,8 +335,8 @@ def make_handles(scene):
 def _made(family, changes):
     """Return a copy of the template with other values; pairs of each handle of the original and its counterpart."""
     template, packed = family.template, family.packed
-    twin = template.copy()
-    for name, value in changes.items():
+    twin, others = family.copied(changes)
+    for name, value in others.items():
         field = family.field(name)
         owner = twin if field.owner is template else twin[field.owner]
         setattr(owner, field.attribute, field.entered(value, getattr(owner, field.attribute)))

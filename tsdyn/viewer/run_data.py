@@ -13,12 +13,13 @@ from ..elements.bodies import rotation_matrix
 from ..errors import InvalidArgument, StepFailure
 from ..model.handles import handles_of
 from ..observables.diagnostics import constraint_rows
+from ..observables.quintic import intervals, quintic
 from ..shapes import Mesh
 from ..validation import floats, sequence, vector3
 from .symbols import (
     UNIT,
     Attached,
-    Link,
+    Connector,
     Part,
     attached,
     by_body,
@@ -55,7 +56,7 @@ class AnimationFrames(NamedTuple):
 
     def interpolated(self, values: Floats) -> Floats:
         """Values (outputs of `run`, ...) at the times of the frames, linear between outputs."""
-        i, s, _ = _intervals(self.run.t, self.times)
+        i, s, _ = intervals(self.run.t, self.times)
         s = s.reshape(-1, *[1] * (values.ndim - 1))
         return values[i] + s * (values[np.minimum(i + 1, len(values) - 1)] - values[i])
 
@@ -66,7 +67,7 @@ def resample(solution: Solution, count: int) -> AnimationFrames:
     run = _beside(solution, times)
     q = _dense(solution, times)
     if q is None:
-        q = quintic(run, times)
+        q = quintic(run.t, (run.q, run.qd, run.qdd), times)[0]
     position, orientation = _poses(solution.packed, q)
     if not all(np.isfinite(array).all() for array in (position, orientation, run.qd, run.qdd)):
         raise InvalidArgument(
@@ -102,26 +103,6 @@ def _beside(solution, times):
         return solution[:: max(1, solution.t.size // OUTPUTS)]
     after = np.clip(np.searchsorted(solution.t, times, side="right"), 1, solution.t.size - 1)
     return solution._picked(np.union1d(after - 1, after) if solution.t.size > 1 else np.arange(1))
-
-
-def quintic(run: Solution, times: Floats) -> Floats:
-    """Coordinates (k, n) at times (k,), from those at the outputs with their rates and accelerations."""
-    i, s, h = _intervals(run.t, times)
-    j, s, h = np.minimum(i + 1, run.t.size - 1), s[:, None], h[:, None]
-    q, d = run.q[i], run.q[j] - run.q[i]
-    v, a, w, b = h * run.qd[i], h * h * run.qdd[i], h * run.qd[j], h * h * run.qdd[j]
-    c3 = 10.0 * d - 6.0 * v - 4.0 * w - 1.5 * a + 0.5 * b
-    c4 = -15.0 * d + 8.0 * v + 7.0 * w + 1.5 * a - b
-    c5 = 6.0 * d - 3.0 * (v + w) - 0.5 * (a - b)
-    return q + s * (v + s * (0.5 * a + s * (c3 + s * (c4 + s * c5))))
-
-
-def _intervals(t, times):
-    """For each time the output before it, and where it is in the interval from there, 0 to 1, of length h, s."""
-    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, max(t.size - 2, 0))
-    h = t[np.minimum(i + 1, t.size - 1)] - t[i]
-    s = np.divide(times - t[i], h, out=np.zeros_like(times), where=h > 0.0)
-    return i, np.clip(s, 0.0, 1.0), h
 
 
 # States of contacts: whether a plane pushes on its point, or holds it back, where a one-sided contact would open.
@@ -265,7 +246,7 @@ def _drawn(scene, packed, attachments, frames, violated, *, shapes=None, trails=
             index = each.a if each.a >= 0 else each.b
             labels.append(_label(each.item.name, "joints", index, each.point(letter), wrong))
         parts += drawn
-    links = [link for link in parts if isinstance(link, Link)]
+    links = [link for link in parts if isinstance(link, Connector)]
     origin = frames.position[0].mean(axis=0)
     follow = None if follow is None else handles.bodies.index(handles.body(follow))
     return {

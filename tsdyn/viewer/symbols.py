@@ -290,7 +290,7 @@ def reaches(packed: Any, points: list[list[Any]], position: Any, hidden: Sequenc
 VIOLATED = "#d33a2c"
 
 
-def violation(each: Attached, drawn: list[Part | Link], reach: float, apart: float) -> list[Part | Link]:
+def violation(each: Attached, drawn: list[Part | Connector], reach: float, apart: float) -> list[Part | Connector]:
     """Parts and links of a constraint that is violated, in place of those `drawn` of it; `reach` of a usual body, m."""
     red = [part._replace(colour=VIOLATED) for part in drawn]
     if not drawn or apart > APART * reach:

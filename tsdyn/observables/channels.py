@@ -1,0 +1,245 @@
+"""Channels: quantities of bodies, joints and forces over time, by name and with units.
+
+A name is that of an object, of a quantity of it, and of a component: "arm.position.z". Without the component it stands
+for all of them, without the quantity for the natural set of the object.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..constraints import Distance
+from ..elements.bodies import PointMass
+from ..elements.element import AngleGeometry
+from ..elements.force import Force
+from ..elements.loads import JointLoad
+from ..errors import InvalidArgument, StorageError
+from ..forces import Spring
+from ..model.handles import handles_of
+from ..validation import close, sequence, shown
+from .reactions import loads_of, member
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from ..hints import Floats, Packed
+
+AXES = (".x", ".y", ".z")
+PARAMETERS = (".e0", ".e1", ".e2", ".e3")
+KINDS = {"angle": ("rad", "rad/s", "rad/s^2"), "displacement": ("m", "m/s", "m/s^2")}
+LISTED = 12  # names in a message
+
+
+class Channel(NamedTuple):
+    """One number over time."""
+
+    name: str
+    unit: str
+    ask: Callable[[Any], Any]  # of a motion: a `Solution`, or states at k times; shared by the channels of one result
+    pick: Callable[[Any], Floats]  # of what `ask` gives: (k,)
+
+    quantity: str  # "angle", "angular velocity": what the axis of a figure is called
+
+    @property
+    def title(self) -> str:
+        """Name and unit."""
+        return f"{self.name} ({self.unit})"
+
+
+def channels_of(packed: Packed, names: str | Sequence[str], lacks: str = "") -> list[Channel]:
+    """Return the channels of some names, in their order, each once.
+
+    Parameters
+    ----------
+    packed : Packed
+        The scene.
+    names : str or sequence of str
+    lacks : str
+        Which parts of the scene aren't there.
+
+    Raises
+    ------
+    InvalidArgument
+        If a name stands for no channel, or for those of several objects.
+    """
+    said = 'channels must be a name such as "hinge.angle", or a sequence of names'
+    names = [names] if isinstance(names, str) else list(sequence(names, said, InvalidArgument))
+    wrong = [name for name in names if not isinstance(name, str)]
+    if wrong or not names:
+        raise InvalidArgument(f"{said}, got {shown(wrong[0] if wrong else names)}.")
+    known = Names(packed, lacks)
+    return list({channel.name: channel for name in names for channel in known.meant(name)}.values())
+
+
+def values_of(motion: Any, channels: Sequence[Channel]) -> Floats:
+    """Return the values (k, channels) of channels along a motion."""
+    asked = {channel.ask: None for channel in channels}
+    asked = {ask: ask(motion) for ask in asked}
+    return np.stack([channel.pick(asked[channel.ask]) for channel in channels], axis=1)
+
+
+class Names:
+    """The names of channels of a packed scene; `lacks` says which parts of the scene aren't there."""
+
+    def __init__(self, packed, lacks):
+        self.packed, self.handles, self.lacks, self.things = packed, handles_of(packed), lacks, {}
+        for thing in (*self.handles.bodies, *self.handles.items):
+            self.things.setdefault(thing.name, []).append(thing)
+
+    def meant(self, name):
+        """The channels of a name."""
+        titles = [title for title in _heads(name) if title in self.things]
+        found = [told[name] for title in titles for told in map(self._told, self.things[title]) if name in told]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise InvalidArgument(f"{name!r} is a channel of {len(found)} objects; give each a name of its own.")
+        raise self._unknown(name, titles[0] if titles else "")
+
+    def _unknown(self, name, title):
+        """The error of a name that stands for no channel; `title` is that of the object which it begins with."""
+        own = {each: None for thing in self.things.get(title, ()) for each in self._told(thing) if each != title}
+        near = close(name, own or self.things) or close(name.partition(".")[0], self.things)
+        said = [f"did you mean {' or '.join(map(repr, near))}?"] if near else []
+        if own or not near:
+            listed = [each for each in own if each.rpartition(".")[0] not in own] or list(self.things)
+            more = f" and {len(listed) - LISTED} more" if len(listed) > LISTED else ""
+            said.append(f"{'There' if said else 'there'} are {', '.join(listed[:LISTED])}{more}.")
+        return InvalidArgument(" ".join([f"no channel is named {name!r};", *said, self.lacks]).rstrip())
+
+    def _told(self, thing):
+        """The channels of an object, by each name that stands for some."""
+        quantities, natural = _of_body(thing) if isinstance(thing, PointMass) else self._of_item(thing)
+        found = {}
+        for key, (unit, parts, ask, pick) in quantities.items():
+            name, quantity = f"{thing.name}.{key}", key.partition(".")[0].replace("_", " ")
+            if parts:
+                picks = [partial(_component, pick, i) for i in range(len(parts))]
+                several = [
+                    Channel(name + part, unit, ask, one, quantity) for part, one in zip(parts, picks, strict=True)
+                ]
+                found |= {name: several, **{one.name: [one] for one in several}}
+            else:
+                found[name] = [Channel(name, unit, ask, pick, quantity)]
+        return {thing.name: [one for key in natural for one in found[f"{thing.name}.{key}"]], **found}
+
+    def _of_item(self, item):
+        """Quantities of a constraint or force, and the natural ones; loads are those on `item.on`, ground frame."""
+        found, kinds = self._coordinates(item)
+        natural = [name for kind in kinds for name in (kind, "rate" if len(kinds) == 1 else f"{kind}_rate")]
+        exerted = partial(_refused, item, self.lacks) if self.lacks else partial(_asked, "reaction", item)
+        loads = {name: (unit, AXES, exerted, partial(_at, i)) for i, (name, unit) in enumerate(LOADS)}
+        geometry = self._geometry(item)
+        if geometry is not None:
+            i = int(isinstance(geometry, AngleGeometry))
+            name, unit = LOADS[i]
+            loads[f"{name}.axis"] = unit, (), partial(_along, item, geometry, i, exerted), _whole
+        if isinstance(item, (Spring, Distance)):
+            load = loads_of(self.packed).get(id(item)) or member(self.packed, item)
+            ends = list(zip((item.a, item.b), load.coordinates, strict=True))
+            found["length"] = "m", (), partial(_length, ends), _whole
+            loads["tension"] = "N", (), partial(_tension, item, ends, exerted), _whole
+            natural, heard = ["length"], ["tension"]
+        elif geometry is not None and (item.drives or isinstance(item, Force)):
+            heard = [f"{name}.axis"]
+        else:
+            heard = [name for name, _ in LOADS]
+        natural += [] if self.lacks and natural else heard
+        return found | loads, natural
+
+    def _coordinates(self, item):
+        """Quantities of the coordinates of a joint, and their kinds."""
+        row = next((row for row in self.handles.rows if row.item is item), None)
+        counts = {kind: len(getattr(row, f"{kind}s")) for kind in KINDS} if row is not None else {}
+        kinds, found = [kind for kind, count in counts.items() if count], {}
+        for kind in kinds:
+            parts = tuple(f" {i + 1}" for i in range(counts[kind])) if counts[kind] > 1 else ()
+            for level, unit in zip(("", "_rate", "_acceleration"), KINDS[kind], strict=True):
+                found[kind + level] = told = unit, parts, partial(_asked, kind + level, item), _whole
+                if level and len(kinds) == 1:
+                    found[level[1:]] = told
+        return found, kinds
+
+    def _geometry(self, item):
+        """Where the only coordinate is measured of a joint, a motor, or a load along it; None without one."""
+        if isinstance(item, JointLoad):
+            return item.geometry
+        row = next((row for row in self.handles.rows if row.item is item), None)
+        every = () if row is None else (*row.angles, *row.displacements)
+        return every[0] if len(every) == 1 else None
+
+
+LOADS = ("force", "N"), ("torque", "N m")
+
+
+def _heads(name):
+    """What a name begins with, up to each dot, the longest first."""
+    words = name.split(".")
+    return [".".join(words[:i]) for i in range(len(words), 0, -1)]
+
+
+def _of_body(body):
+    """Quantities of a body, and the natural ones."""
+    units = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+    natural = ["position", "velocity"]
+    if body.dimension == 7:
+        units |= {"angular_velocity": "rad/s", "angular_acceleration": "rad/s^2"}
+        natural.append("angular_velocity")
+    found = {name: (unit, AXES, partial(_asked, name, body), _whole) for name, unit in units.items()}
+    if body.dimension == 7:
+        found["orientation"] = "1", PARAMETERS, partial(_asked, "orientation", body), _whole
+    return found, natural
+
+
+# Values along a motion.
+
+
+def _asked(name, thing, motion):
+    return getattr(motion, name)(thing)
+
+
+def _refused(item, lacks, motion):
+    raise StorageError(f"what {item.name} exerts needs the scene as it was run. {lacks}")
+
+
+def _whole(result):
+    return result
+
+
+def _at(i, result):
+    return result[i]
+
+
+def _component(pick, i, result):
+    return pick(result)[:, i]
+
+
+def _apart(ends, motion):
+    """The vector (k, 3) from the first end to the second, ground frame."""
+    x_a, x_b = (
+        motion.position(body, s if body.dimension == 7 else None) if body.dimension else np.asarray(s)
+        for body, s in ends
+    )
+    return x_b - x_a
+
+
+def _length(ends, motion):
+    return np.linalg.norm(_apart(ends, motion), axis=1)
+
+
+def _tension(item, ends, exerted, motion):
+    """The force (k,) on a towards b, positive where it pulls."""
+    d, force = _apart(ends, motion), exerted(motion)[0]
+    return np.einsum("ki,ki->k", force, d if item.on is item.a else -d) / np.linalg.norm(d, axis=1)
+
+
+def _along(item, geometry, i, exerted, motion):
+    """The force (0) or torque (1) along the coordinate, on its other body."""
+    axis = np.cross(geometry.f, geometry.g) if i else np.array(geometry.e)
+    if geometry.own.dimension == 7:
+        axis = motion.rotation(geometry.own) @ axis
+    along = (exerted(motion)[i] * axis).sum(axis=1)
+    return along if item.on is geometry.other else -along

@@ -76,9 +76,6 @@ LAST_CONVERGED, STAGE_CONVERGED = 1e-6, 0.03
 SETTLED, DECREASE = 1e-11, 0.9
 # Residual, as a share of the largest, above which a row whose derivative vanishes is named.
 STUCK = 1e-6
-# Shares of the scene's size, and rad, by which a sketch is shaken where the way from it ends elsewhere; two for scenes
-# of more coordinates than MANY_COORDINATES.
-SHAKES, MANY_COORDINATES = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0), 200
 # Softness of the springs that keep a fold, from try to try.
 STIFFER = (0.1, 0.01, 0.001)
 
@@ -91,6 +88,11 @@ UNFOLDED = SHOWN / 4.0
 FLAT_FOLD, POINT_LIKE = 0.1, 1e-9
 # Share of the largest |Phi| below which a row takes no part in a conflict.
 LEFT_OVER = 1e-4
+# Excess of a length (share of the largest, m) or an angle (rad) that proves a conflict: ten times the rounding of
+# arccos near one, 1e-9 times the steps of a way; and points or directions up to which ways are compared, for memory.
+PROVED, MOST_NODES = 1e-7, 600
+# Constraints that a message lists.
+SHOWN_CONSTRAINTS = 8
 # Share of the scene's size, and rad: how far away the rank is compared. Singular positions are isolated, and no closer.
 ASIDE = 0.02
 # Relative steps of difference quotients of phi, and their error: a wrong entry is further off by orders of magnitude.
@@ -119,3 +121,19 @@ ELSEWHERE = 1e-9
 
 # |Phi| relative to 1 + max |q| that `assemble` leaves by default: rounding of Phi along closed loops, two digits more.
 ASSEMBLED = 1e-12
+
+# --- joint coordinates ---
+# Share of unit rows below which a twist is free; joints that are open by more than its square are closed first.
+TREE_RANK = 1e-6
+# Damping of the first step, of rows at unit length; the least, above rounding of dependent rows; and that from which on
+# steps are too short to help.
+DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-10, 1e8
+# Steps at most from a start; decreases in a row above which share end it: at a minimum that closes nothing.
+MOST_STEPS, STALLED = 80, (6, 0.99)
+# rad: the largest component of the rotation of a joint in a step.
+MOST_TURN = 1.0
+# Residuals of loops at unit length from which on Gauss-Newton steps of all coordinates go on.
+CLOSED_LOOPS = 1e-10
+# Displacements of joints at random, rad and shares of the scene's size, from start to start; starts beyond the first
+# that closes in which one is sought that keeps within the limits.
+SPREADS, HINTED = (0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 2.5, 3.0, 3.0, 3.0, 3.0, 3.0), 6

@@ -48,6 +48,7 @@ BY_KIND = {
     types.VECTOR: {"$ref": "#/$defs/vector motion"},
     types.REFERENCE: {"description": "the name of a constraint", "type": "string"},
     types.NAMES: {"type": "array", "items": {"type": "string"}},
+    types.VALUES: {"type": "object", "additionalProperties": {"$ref": "#/$defs/array"}},
     types.ANY: {},
 }
 

@@ -357,15 +357,15 @@ def assemble(
     numbers, t, driven = _fixed(scene, fixed, free), float(t), has_motors(scene)
     values, cut, sketch = _joint_values(scene, joints), _cut(scene, loops), scene.start
 
-    def assembled():
-        return assembled_nearby(scene, numbers, t, tol, folds, cut)
+    def assembled(far=False):
+        return assembled_nearby(scene, numbers, t, tol, folds, cut, far)
 
     try:
         if values:
             _set_out(scene, numbers, t, tol, values, cut)
         if driven:
             approach(scene, t, numbers, assembled)
-        report = assembled()
+        report = assembled(far=True)
     except BaseException:
         if not np.array_equal(scene.start[0], sketch[0]):
             scene.place(*sketch)
@@ -431,20 +431,17 @@ def _released(scene, values):
     return tuple(found)
 
 
-def assembled_nearby(scene, fixed, t, tol=ASSEMBLED, folds="free", cut=()):
-    """Assemble without a way to the angles of motors; return the `AssemblyReport`."""
+def assembled_nearby(scene, fixed, t, tol=ASSEMBLED, folds="free", cut=(), far=False):
+    """Assemble without a way to the angles of motors, from a near or a far sketch; return the `AssemblyReport`."""
     packed, (sketch, qd) = scene.packed, scene.start
     metric = whole = Metric(packed, None, t)
     if fixed:
         metric = Metric(packed, _held(packed, fixed), t)
     demand_finite(scene, *metric.arrays(sketch))
-    found, near = nearest(metric, sketch, tol), True
-    if not found.met or not are_aligned(packed, found.q, t):
-        closed = _close_loops(scene, metric, sketch, found, tol, fixed, cut)
-        found, near = closed or found, closed is None
+    found, near = _search(scene, metric, sketch, tol, fixed, cut, far)
     links = Folds(packed) if _largest_turn(metric, sketch, found.q) > UNFOLDED else None
     if near and links is not None and folds == "keep":
-        found = _unfolded(metric, sketch, found, links, tol)
+        found = _unfolded(metric, sketch, found, links, tol, scene.imported is None)
     q = found.q
     Phi, Phi_q, Phi_t = whole.arrays(q)
     A = whole.reduced(q, Phi_q[whole.own])
@@ -501,8 +498,8 @@ def _largest_turn(metric, sketch, q):
     return np.linalg.norm(rotation_vectors(sketch[metric.p], q[metric.p]), axis=1).max(initial=0.0)
 
 
-def _unfolded(metric, sketch, found, links, tol):
-    """Return the configuration found, or a nearby one whose links fold as in the sketch."""
+def _unfolded(metric, sketch, found, links, tol, is_drawn):
+    """Return the configuration found, or a nearby one whose links fold as in a sketch; a drawn one has to be met."""
     drawn = links.drawn(metric, sketch)
     turned = links.turned(metric, found.q, drawn)
     kept, total, first = set(), found.iterations, turned
@@ -525,6 +522,8 @@ def _unfolded(metric, sketch, found, links, tol):
             if fits and not links.turned(metric, freed, drawn).size:
                 q, Phi = freed, Phi_freed
             return Found(q, Phi, total, True)
+    if not is_drawn:
+        return found
     stories = [
         f"  {links.folds[k].title}: {np.degrees(links.angle(metric, sketch, k)):.0f} degrees from straight in the "
         f"sketch, {np.degrees(links.angle(metric, found.q, k)):.0f} when assembled"
@@ -558,21 +557,34 @@ def _velocities(metric, q, sketch, A, Phi_q, Phi_t):
     return given, fitted
 
 
-def _close_loops(scene, metric, sketch, found, tol, fixed, cut):
-    """Return what is found in joint coordinates, or refuse what isn't assembled; None where it is mirrored only."""
-    conflict = None
-    if not found.met:
-        _demand_direction(scene, metric, found)
-        conflict = proved(metric, sketch)
-    closed = None if conflict else Loops(metric, sketch, limits=_limits(scene), cut=cut).close(tol)
+def _search(scene, metric, sketch, tol, fixed, cut, far):
+    """Return what is found, and whether by continuation from the sketch; refuse what isn't assembled.
+
+    A sketch outside the limits of its file is no drawing: joint coordinates come first.
+    """
+    limits, found, loops, closed, conflict = _limits(scene) if far else {}, None, None, None, None
+    if limits and np.abs(metric.linear(sketch)[0]).max(initial=0.0) > tol * (1.0 + np.abs(sketch).max()):
+        loops = Loops(metric, sketch, limits=limits, cut=cut)
+        closed = loops.close(tol) if loops.beyond(sketch).any() else None
+    if closed is None or not closed.met:
+        found = nearest(metric, sketch, tol)
+        if found.met and (are_aligned(metric.packed, found.q, metric.t) or not far):
+            return found, True
+        if not found.met:
+            _demand_direction(scene, metric, found)
+            conflict = proved(metric, sketch)
+        if far and not conflict and closed is None:
+            loops = loops or Loops(metric, sketch, limits=limits, cut=cut)
+            closed = loops.close(tol)
     if closed and closed.met:
-        start = Found(closed.q, metric.linear(closed.q)[0], found.iterations + closed.steps, True)
-        return approached(metric, sketch, start, tol)
+        start = Found(closed.q, closed.Phi, closed.steps, True)
+        near = start if found is None else approached(metric, sketch, start, tol)
+        return start if loops.beyond(near.q).any() else near, False
     if found.met:
-        return None
+        return found, True
     if closed and np.linalg.norm(closed.Phi) < np.linalg.norm(found.Phi):
         found = found._replace(q=closed.q, Phi=closed.Phi)
-    refuse(scene, metric, found, conflict, closed and closed.starts, [scene.bodies[i] for i in fixed])
+    refuse(scene, metric, found, conflict, closed.starts if closed else 1, [scene.bodies[i] for i in fixed])
 
 
 def _limits(scene):

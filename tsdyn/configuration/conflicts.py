@@ -176,7 +176,7 @@ def refuse(scene, metric, found, conflict, starts, held=()):
         remedy = "Change a length, point or axis of one of them, or remove one"
     else:
         story = (
-            f"not assembled from {starts} start{'s' if starts > 1 else ''}{where}: the sketch, and displacements of its "
+            f"not assembled from {starts} start{'s' if starts > 1 else ''}{where}: the sketch and displacements of its "
             "joints. No conflict is proved; the smallest residuals found are"
         )
         remedy = "Improve the sketch of the bodies, or give values of joints from which to start, joints={name: value}"

@@ -50,9 +50,9 @@ class Kept(NamedTuple):
 
 
 def nearest(metric, sketch, tol):
-    """Return the configuration nearest to a sketch (n,) that satisfies all rows to tol (1 + max |q|), or the best found.
+    """Return the configuration nearest to a sketch (n,) that satisfies the rows, or the best found.
 
-    Gauss-Newton steps from the sketch are tried where continuation fails.
+    Rows hold to tol (1 + max |q|). Gauss-Newton steps from the sketch are tried where continuation fails.
     """
     Phi = metric.linear(sketch)[0]
     if np.abs(Phi).max(initial=0.0) <= CLOSED * (1.0 + np.abs(sketch).max()):

@@ -25,6 +25,7 @@ from .tolerances import (
     CLOSED_LOOPS,
     DAMPING,
     ELSEWHERE,
+    HINT,
     HINTED,
     LEAST_DAMPING,
     LEAST_DIVISOR,
@@ -79,12 +80,11 @@ class Loops:
         self.cut, self.handles = [edge.constraint for edge in self.tree.loops], handles_of(metric.packed)
         self.rows = {id(row.item): row for row in self.handles.rows}
         self.aims = [aim for joint, given in values.items() for aim in self._aims(joint, given)]
-        self.limits = [
-            (aim, 0.5 * (upper - lower))  # middle and half width
-            for joint, (lower, upper) in (limits or {}).items()
-            for aim in self._aims(joint, (0.5 * (lower + upper),))
-            if joint not in values
-        ]
+        self.limits, self.half = [], np.zeros(0)  # middles, and half widths
+        for joint, (lower, upper) in (limits or {}).items():
+            found = [] if joint in values else self._aims(joint, (0.5 * (lower + upper),))
+            self.limits += found
+            self.half = np.append(self.half, [0.5 * (upper - lower)] * len(found))
 
     def _aims(self, joint, values):
         """The `Aim`s of a joint; none where it is no joint of the tree."""
@@ -119,16 +119,18 @@ class Loops:
             turn, shift = np.cross(np.array(other.point(g.s_other, 0)) - q[child], shift), self.tree.reach * shift
         return aim.sense * np.concatenate((shift, turn))
 
-    def outside(self, q):
-        """How far coordinates are beyond their limits, rad or m, in all."""
-        return sum(max(0.0, abs(self.away(q, aim)) - half) for aim, half in self.limits)
+    def beyond(self, q):
+        """How far coordinates are beyond their limits, rad or m, with sign."""
+        away = np.array([self.away(q, aim) for aim in self.limits])
+        return np.sign(away) * np.maximum(np.abs(away) - self.half, 0.0)
 
     # Steps.
 
-    def _state(self, q):
-        r = self.tree.residuals(q)
-        used = r[np.concatenate((self.tree.loop_rows, self.tree.joint_rows))]
-        return r, float(used @ used) if np.isfinite(used).all() else np.inf
+    def _state(self, q, limited):
+        """Residuals of the constraints, those of limits, and the sum of their squares."""
+        r, beyond = self.tree.residuals(q), HINT * self.beyond(q) if limited else np.zeros(0)
+        used = np.concatenate((r[self.tree.loop_rows], r[self.tree.joint_rows], beyond))
+        return r, beyond, float(used @ used) if np.isfinite(used).all() else np.inf
 
     def _twists(self, q, r, aims):
         """Of each joint: the free twists S (places, 6, 6), which of them there are, and that which closes it."""
@@ -165,10 +167,17 @@ class Loops:
     def _centre(self, q):
         return q[self.metric.r].mean(axis=0)
 
-    def _linearised(self, q, r, aims):
-        """Twists of Eq. (1) about the centre, J of Eq. (2) by their thetas, and the residuals that closing leaves."""
+    def _linearised(self, q, r, aims, beyond=()):
+        """Twists of Eq. (1) about the centre, J of Eq. (2) by their thetas, and the residuals that closing leaves.
+
+        Limits that are passed are rows of J as well.
+        """
         tree = self.tree
         A, S, free, closing = self._twists(q, r, aims)
+        place, passed = free.nonzero()[0], np.flatnonzero(beyond)
+        hints = np.zeros((passed.size, place.size))
+        for row, aim in enumerate(self.limits[k] for k in passed):
+            hints[row, place == aim.place] = HINT * S[aim.place, free[aim.place]] @ self._slope(q, aim)
         S, closing = (self._about_centre(q, each) for each in (S, closing))
         loops = A[tree.loop_rows].toarray().reshape(len(tree.loop_rows), -1, 6)
         d = (q[self.metric.r[tree.bodies]] - self._centre(q)) / tree.reach
@@ -176,9 +185,10 @@ class Loops:
         for rows, (one, other) in tree.between:  # seen from one of two bodies: what moves both changes nothing
             loops[rows, one] = -loops[rows, other]
         total = np.concatenate((np.zeros_like(loops[:, :1]), np.cumsum(loops, axis=1)), axis=1)
-        beyond = total[:, tree.ends] - total[:, np.arange(len(tree.joints))]
-        J = np.einsum("rei,eji->rej", beyond, S)[:, free]
-        return S, free, closing, J, r[tree.loop_rows] + np.einsum("rei,ei->r", beyond, closing)
+        carried = total[:, tree.ends] - total[:, :-1]
+        J = np.concatenate((np.einsum("rki,ki->rk", carried[:, place], S[free]), hints))
+        left = r[tree.loop_rows] + np.einsum("rei,ei->r", carried, closing)
+        return S, free, closing, J, np.concatenate((left, np.asarray(beyond)[passed]))
 
     def _step(self, linearised, damping):
         """The twists (places, 6) of a step."""
@@ -213,23 +223,22 @@ class Loops:
         q[at] = p / np.linalg.norm(p, axis=1, keepdims=True)
         return q
 
-    def _descend(self, q):
+    def _descend(self, q, limited):
         """Levenberg and Marquardt from q. Return the configuration where it ends, and the number of steps."""
-        (r, size), damping, steps, slow = self._state(q), DAMPING, 0, 0
-        linearised = None
+        (r, beyond, size), damping, steps, slow, linearised = self._state(q, limited), DAMPING, 0, 0, None
         while steps < MOST_STEPS and damping < MOST_DAMPING and slow < STALLED[0]:
             aimed = self._aimed(q)
             if size <= CLOSED_LOOPS**2 and aimed:
                 break
             steps += 1
-            linearised = linearised or self._linearised(q, r, self.aims)
+            linearised = linearised or self._linearised(q, r, self.aims, beyond)
             trial = self._moved(q, self._step(linearised, damping))
-            r_trial, size_trial = self._state(trial)
-            if aimed and not size_trial < size:
+            state = self._state(trial, limited)
+            if aimed and not state[-1] < size:
                 damping *= 8.0
                 continue
-            slow = slow + 1 if size_trial > STALLED[1] * size else 0
-            q, r, size, damping, linearised = trial, r_trial, size_trial, max(0.1 * damping, LEAST_DAMPING), None
+            slow = slow + 1 if state[-1] > STALLED[1] * size else 0
+            q, (r, beyond, size), damping, linearised = trial, state, max(0.1 * damping, LEAST_DAMPING), None
         return q, steps
 
     def close(self, tol):
@@ -237,12 +246,15 @@ class Loops:
         rng, best, total, after = np.random.default_rng(0), None, 0, 0
         spreads = (None,) * bool(self.limits) + SPREADS
         for start in range(1 + len(spreads)):
-            q, steps = self._descend(self._start(rng, spreads[start - 1]) if start else self.sketch)
+            q = self._start(rng, spreads[start - 1]) if start else self.sketch
+            for limited in (True, False) if self.limits else (False,):
+                q, steps = self._descend(q, limited)
+                total += steps
             q, Phi, more = close(self.metric, q)
-            total += steps + more
+            total += more
             met = np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max())
             met = bool(met and are_aligned(self.metric.packed, q, self.metric.t) and self._aimed(q))
-            rank = not met, self.outside(q) if met else float(np.linalg.norm(Phi))
+            rank = not met, float(np.abs(self.beyond(q)).sum()) if met else float(np.linalg.norm(Phi))
             if best is None or rank < best[0]:
                 best = rank, q, Phi
             after += not best[0][0]
@@ -266,9 +278,8 @@ class Loops:
     def _start(self, rng, spread):
         """The sketch with joints displaced at random, limited ones within their limits; None: these at the middle."""
         shares = rng.uniform(-1.0, 1.0, len(self.limits)) * (spread is not None)
-        within = [
-            aim._replace(value=aim.value + share * half) for (aim, half), share in zip(self.limits, shares, strict=True)
-        ]
+        moves = (shares * self.half).tolist()
+        within = [aim._replace(value=aim.value + move) for aim, move in zip(self.limits, moves, strict=True)]
         q = self.sketch
         S, free, closing, J, _ = self._linearised(q, self.tree.residuals(q), [*self.aims, *within])
         theta = rng.uniform(-1.0, 1.0, J.shape[1]) * (spread or 0.0)

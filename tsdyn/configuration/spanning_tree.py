@@ -103,13 +103,14 @@ class Tree:
                 self.ends[self.parents[i]] = max(self.ends[self.parents[i]], self.ends[i])
         self.levels = [np.flatnonzero(depth == k) for k in range(depth.max(initial=-1) + 1)]
         self.rows = self.of_Phi = last[0].rows.stop if last else 0
-        self.pairs, found = [], {}
+        pairs, found = [], {}
         for edge in (*self.loops, *filter(None, self.joints)):
             rows = found[id(edge)] = list(edge.rows)
             for pair in getattr(edge.constraint, "opposed", ()):
                 rows += range(self.rows, self.rows + 3)
                 self.rows += 3
-                self.pairs.append(pair)
+                pairs.append(pair)
+        self._lay_out_pairs(pairs)
         of_loops = [found[id(edge)] for edge in self.loops]
         self.loop_rows = np.array([row for rows in of_loops for row in rows], int)
         ends = np.cumsum([0, *map(len, of_loops)])
@@ -123,6 +124,23 @@ class Tree:
         self.joint_rows = np.array([row for rows in of_joints for row in rows], int)
         self.joint_of = np.repeat(np.arange(count), [len(rows) for rows in of_joints])
         self.slots = np.array([slot for rows in of_joints for slot in range(len(rows))], int)
+
+    def _lay_out_pairs(self, pairs):
+        """Bodies, directions and places of the directions that are to be aligned, (2, pairs, ...)."""
+        sides, index = list(zip(*pairs, strict=True)) or [(), ()], {id(b): i for i, b in enumerate(self.packed.bodies)}
+        self.owners = np.array([[index.get(id(body), -1) for body, _ in side] for side in sides], int)
+        self.directions, self.moving = np.zeros((*self.owners.shape, 3)), []
+        for side, each in enumerate(sides):
+            for k, (_, direction) in enumerate(each):
+                if callable(direction):
+                    self.moving.append((side, k, direction))
+                else:
+                    self.directions[side, k] = direction
+        places = np.array([self.place[self.of(body)] for side in sides for body, _ in side], int)
+        self.turning = np.flatnonzero(places >= 0)  # of both sides, one after the other
+        rows = 3 * (self.turning % max(len(pairs), 1))[:, None] + np.array([0, 0, 1, 1, 2, 2])
+        columns = 6 * places[self.turning, None] + np.array([4, 5, 3, 5, 3, 4])
+        self.turning_at = rows.ravel(), columns.ravel()
 
     def residuals(self, q):
         """Weighed (rows,)."""
@@ -144,21 +162,13 @@ class Tree:
         places = [np.concatenate((a, b.ravel())) for a, b in zip(shifts, (i, j), strict=True)]
         values = np.concatenate((np.full(3 * count, self.reach), turns.ravel()))
         Phi_x = Phi_q @ coo_array((values, tuple(places)), (self.metric.n, 6 * count)).tocsr()
-        (u, v), rows, columns, values = self._directions(q), [], [], []
-        for k, ((one, _), (other, _)) in enumerate(self.pairs):
-            for place, w in ((self.place[self.of(one)], u[k]), (self.place[self.of(other)], -v[k])):
-                if place >= 0:  # omega x w
-                    rows += (3 * k + np.array([0, 0, 1, 1, 2, 2])).tolist()
-                    columns += (6 * place + np.array([4, 5, 3, 5, 3, 4])).tolist()
-                    values += [w[2], -w[1], -w[2], w[0], w[1], -w[0]]
-        aligned = coo_array((values, (np.array(rows, int), np.array(columns, int))), (3 * len(self.pairs), 6 * count))
+        w = np.concatenate(self._directions(q) * np.array((1.0, -1.0))[:, None, None])[self.turning]
+        values = w[:, (2, 1, 2, 0, 1, 0)] * np.array((1.0, -1.0, -1.0, 1.0, 1.0, -1.0))  # omega x w
+        aligned = coo_array((values.ravel(), self.turning_at), (self.rows - self.of_Phi, 6 * count))
         return (diags_array(self.weights) @ vstack((Phi_x, aligned))).tocsr()
 
     def _directions(self, q):
-        """Both directions of the pairs, (pairs, 3) each, ground frame."""
-        R, index = self.metric.rotations(q), {id(body): i for i, body in enumerate(self.packed.bodies)}
-        found = [
-            [R[index.get(id(body), -1)] @ np.asarray(w(self.metric.t) if callable(w) else w) for body, w in pair]
-            for pair in self.pairs
-        ]
-        return np.array(found).reshape(-1, 2, 3).swapaxes(0, 1)
+        """Both directions of the pairs, (2, pairs, 3), ground frame."""
+        for side, k, direction in self.moving:
+            self.directions[side, k] = direction(self.metric.t)
+        return np.einsum("skij,skj->ski", self.metric.rotations(q)[self.owners], self.directions)

@@ -136,4 +136,5 @@ MOST_TURN = 1.0
 CLOSED_LOOPS = 1e-10
 # Displacements of joints at random, rad and shares of the scene's size, from start to start; starts beyond the first
 # that closes in which one is sought that keeps within the limits.
+HINT = 0.3  # weight of a limit that is passed, rad or m, beside rows at unit length
 SPREADS, HINTED = (0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 2.5, 3.0, 3.0, 3.0, 3.0, 3.0), 6

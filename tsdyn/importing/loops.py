@@ -39,8 +39,8 @@ def add_given(found, loops):
         parts = sequence(loop, f"loops: each is such as {EXAMPLE}; got {loop!r}", InvalidArgument)
         if not (len(parts) == 3 or (len(parts) == 4 and parts[2] == "hinge")) or parts[2] not in KINDS:
             raise InvalidArgument(
-                f"loops: each is such as {EXAMPLE}; a hinge turns about the z axes of its frames, or about the axis of a "
-                f"fourth entry, such as (0, 1, 0). Got {loop!r}."
+                f"loops: each is such as {EXAMPLE}; a hinge turns about the z axes of its frames, or about the axis in "
+                f"a fourth entry, such as (0, 1, 0). Got {loop!r}."
             )
         turn = _towards(np.asarray(parts[3], float)) if len(parts) == 4 else HERE
         (one, at), (other, there) = (_frame(found, name) for name in parts[:2])

@@ -43,8 +43,7 @@ class ImportReport:
         Name of a link, site or frame of the file -> (body, position, rotation) in the scene; so links that were merged
         into another one are found again.
     limits : dict
-        Name of a joint with limits in the file -> (lower, upper), rad or m: where `scene.assemble` looks for closed loops
-        first.
+        Name of a joint with limits in the file -> (lower, upper), rad or m; hints of `scene.assemble`.
 
     Examples
     --------

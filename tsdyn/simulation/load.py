@@ -56,9 +56,10 @@ def load(
         Whether a URDF, MJCF or SDF file may name files outside its folder, such as meshes in a folder beside it, or
         files to include. Otherwise only those in its folder and in folders below are read; links are followed first.
     loops : sequence of (frame_a, frame_b, kind); optional
-        Loops that a URDF, MJCF or SDF file leaves open: names of two of its links, frames, sites or joints, and how they
-        are held together. "weld": they coincide; "ball": their origins do; "hinge": their origins and their z axes do, or
-        an axis in both frames that a fourth entry gives, such as (0, 1, 0). The scene is assembled, see `scene.imported`.
+        Loops that a URDF, MJCF or SDF file leaves open: names of two of its links, frames, sites or joints, and how
+        they are held together. "weld": they coincide; "ball": their origins do; "hinge": their origins and z axes do,
+        or an axis in both frames that a fourth entry gives, such as (0, 1, 0). The scene is assembled;
+        `scene.imported` says so where it can't be.
 
     Returns
     -------

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..calls import fitting
 from ..elements.bodies import named
+from ..elements.force import Force
 from ..errors import InconsistentState, InvalidArgument, InvalidBody
 from ..jit.interrupts import CollectionsDeferred
 from ..maths.matrix_rank import row_lengths
 from ..maths.tolerances import LAST_PLACE, NEGLIGIBLE
-from ..validation import number, one_of, positive, sequence
-from .continuation import ContinuationEnd, Kept, approach_sketch, close, nearest, refuse, relax, stuck
+from ..model.handles import handles_of
+from ..validation import floats, number, one_of, positive, sequence
+from .conflicts import proved, refuse
+from .continuation import ContinuationEnd, Kept, approach_sketch, approached, close, nearest, relax, stuck
+from .joint_space import Loops, coordinate_from
 from .kinetic_metric import Metric, least_energy, least_step, rotation_vectors
-from .motor_starts import approach, demand_aligned, demand_finite, has_motors, refuse_vanished
+from .motor_starts import approach, are_aligned, demand_aligned, demand_finite, has_motors, refuse_vanished
 from .tolerances import CLEAR_FOLD, FLAT_FOLD, INITIAL_TOL, POINT_LIKE, SHOWN, STAGES, STIFFER
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..hints import PointMass, Scene
+    from ..hints import ArrayLike, ItemLike, PointMass, Scene
 
 
 # Assembly modes of closed loops: the folds of the links in a sketch, which an assembly has to keep.
@@ -244,7 +250,9 @@ class AssemblyReport:
     iterations : int
     folded : tuple of str
         Joints of closed loops whose links are folded to the other side than in the sketch, by 0.1 rad or more: the
-        sketch was ambiguous (see `folds` of `assemble`), or `folds="free"` was given.
+        sketch was ambiguous (see `folds` of `assemble`) or far from it, or `folds="free"` was given.
+    released : tuple of str
+        Joints that have other values than `joints` gave: their loops don't close with these.
     """
 
     moved: float
@@ -253,6 +261,7 @@ class AssemblyReport:
     velocity_residual: float
     iterations: int
     folded: tuple = ()
+    released: tuple = ()
 
 
 @fitting
@@ -264,6 +273,8 @@ def assemble(
     t: float = 0.0,
     folds: Folds = "keep",
     free: Sequence[PointMass | str] | None = None,
+    joints: Mapping[ItemLike, ArrayLike] = MappingProxyType({}),
+    loops: Sequence[ItemLike] = (),
 ) -> AssemblyReport:
     """Move the bodies to the nearest consistent positions, then to the nearest consistent velocities.
 
@@ -281,6 +292,12 @@ def assemble(
         on any branch. The report lists links that fold over.
     free : sequence of Body, or names; optional
         The bodies that may move, in place of `fixed`: the pose of all others stays as it is.
+    joints : dict of joints, or names; optional
+        Values of joints, rad and m: of the angles of each, then of its displacements. They are kept where the loops
+        close with them. Where they don't, the joints start there, and the report lists those that move on.
+    loops : sequence of joints, or names; optional
+        Joints that close loops: in joint coordinates the scene is cut there. By default the joints that don't hold in
+        the sketch, those with fewest rows first.
 
     Returns
     -------
@@ -290,8 +307,9 @@ def assemble(
     Raises
     ------
     InconsistentState
-        If the constraints can't be satisfied (the error names a smallest set in conflict, `.constraints`), or only by
-        a mirrored joint or on another branch than the sketch's. The bodies are unchanged.
+        If no configuration is found; the error says whether a conflict is proved, and names the smallest set that it
+        is proved of, or else the constraints that were left open, `.constraints`. Or if one is found only with a
+        mirrored joint or on another branch than the sketch's. The bodies are unchanged.
     SingularConfiguration
         If a row of Phi_q vanishes at the configuration found.
 
@@ -304,6 +322,11 @@ def assemble(
     whose stiffness increases until they hold. Gauss-Newton steps follow. Redundant rows are allowed. For the positions
     a mass counts as 1e-8 of the largest at least, a moment of inertia also as 1e-6 of the body's mean. The velocity
     correction has the least kinetic energy, with masses as they are; above 200 coordinates with those of the positions.
+
+    Where this leads nowhere, or to mirrored joints, the loops are closed in the coordinates of the joints of a spanning
+    tree, by Levenberg and Marquardt: from the sketch, then from displacements of the joints in loops, the same ones in
+    each call. Limits of joints in an imported file are hints of where. Folds of so distant a sketch are not kept, but
+    reported.
 
     Examples
     --------
@@ -321,36 +344,93 @@ def assemble(
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     one_of(folds, ("keep", "free"), "folds")
     numbers, t, driven = _fixed(scene, fixed, free), float(t), has_motors(scene)
-    sketch = scene.start
+    values, cut, sketch = _joint_values(scene, joints), _cut(scene, loops), scene.start
 
-    def assembled():
-        return assembled_nearby(scene, numbers, t, tol, folds)
+    def assembled(far=False):
+        return assembled_nearby(scene, numbers, t, tol, folds, cut, far)
 
     try:
+        if values:
+            _set_out(scene, numbers, t, tol, values, cut)
         if driven:
             approach(scene, t, numbers, assembled)
-        report = assembled()
+        report = assembled(far=True)
     except BaseException:
         if not np.array_equal(scene.start[0], sketch[0]):
             scene.place(*sketch)
         raise
-    return replace(report, moved=float(np.abs(scene.start[0] - sketch[0]).max()))
+    released = _released(scene, values)
+    return replace(report, moved=float(np.abs(scene.start[0] - sketch[0]).max()), released=released)
 
 
-def assembled_nearby(scene, fixed, t, tol=NEGLIGIBLE, folds="free"):
-    """Assemble without a way to the angles of motors; return the `AssemblyReport`."""
+def _joint_values(scene, joints):
+    """Values of joints, (count,) each, by joint."""
+    if not isinstance(joints, Mapping):
+        raise InvalidArgument(f"assemble: joints must be values by joint, such as {{'hip': 0.3}}, got {joints!r}.")
+    handles, found = handles_of(scene.packed), {}
+    for key, given in joints.items():
+        joint, numbers = handles.item(key), np.atleast_1d(floats(given))
+        row = next((row for row in handles.rows if row.item is joint), None)
+        most = 0 if row is None or isinstance(joint, Force) else len(row.angles) + len(row.displacements)
+        if not most:
+            raise InvalidArgument(f"assemble: {joint!r} has no joint coordinate to be given in joints.")
+        if numbers.ndim != 1 or not 0 < numbers.size <= most or not np.isfinite(numbers).all():
+            many = "a finite number" if most == 1 else f"up to {most} finite numbers, angles first"
+            raise InvalidArgument(f"assemble: the value of {joint!r} in joints must be {many}, got {given!r}.")
+        found[joint] = numbers
+    return found
+
+
+def _cut(scene, loops):
+    """The joints that close loops."""
+    handles = handles_of(scene.packed)
+    given = sequence(loops, "assemble: loops must be a sequence of joints or names, such as (joint,)", InvalidArgument)
+    found = [handles.item(it) for it in given]
+    for joint in found:
+        if not any(joint is member.constraint for member in scene.packed.members):
+            raise InvalidArgument(f"assemble: {joint!r} in loops is no constraint of this scene.")
+    return found
+
+
+def _set_out(scene, fixed, t, tol, values, cut):
+    """Place the scene with values of joints, its loops closed if they close; from these values on, if not with them."""
+    (q, qd), limits = scene.start, _limits(scene)
+    metric = Metric(scene.packed, _held(scene.packed, fixed) if fixed else None, t)
+    demand_finite(scene, *metric.arrays(q))
+    loops = Loops(metric, q, values, limits, cut)
+    closed = loops.close(tol)
+    if not closed.met:
+        q = loops.set_out()
+        closed = Loops(metric, q, limits=limits, cut=[*cut, *loops.cut]).close(tol)
+    scene.place(closed.q if closed.met else q, qd)
+
+
+def _released(scene, values):
+    """Names of the joints that don't have the values given; of the others, turns are counted from these."""
+    handles, q, found = handles_of(scene.packed), scene.start[0], []
+    for joint, given in values.items():
+        row = next(row for row in handles.rows if row.item is joint)
+        away = [
+            coordinate_from(handles, q, *pair) for pair in zip((*row.angles, *row.displacements), given, strict=False)
+        ]
+        if np.abs(away).max() > INITIAL_TOL:
+            found.append(joint.name)
+        elif given.size >= len(row.angles) > 0:
+            joint.__dict__["angle_near"] = tuple(given[: len(row.angles)].tolist())
+    return tuple(found)
+
+
+def assembled_nearby(scene, fixed, t, tol=NEGLIGIBLE, folds="free", cut=(), far=False):
+    """Assemble without a way to the angles of motors, from a near or a far sketch; return the `AssemblyReport`."""
     packed, (sketch, qd) = scene.packed, scene.start
     metric = whole = Metric(packed, None, t)
     if fixed:
         metric = Metric(packed, _held(packed, fixed), t)
     demand_finite(scene, *metric.arrays(sketch))
-    found = nearest(metric, sketch, tol)
-    if not found.met:
-        _demand_direction(scene, metric, found)
-        refuse(scene, metric, sketch, found, tol, [scene.bodies[i] for i in fixed])
+    found, near = _search(scene, metric, sketch, tol, fixed, cut, far)
     links = Folds(packed) if _largest_turn(metric, sketch, found.q) > SHOWN / 4.0 else None
-    if links is not None and folds == "keep":
-        found = _unfolded(metric, sketch, found, links, tol)
+    if near and links is not None and folds == "keep":
+        found = _unfolded(metric, sketch, found, links, tol, scene.imported is None)
     q = found.q
     Phi, Phi_q, Phi_t = whole.arrays(q)
     A = whole.reduced(q, Phi_q[whole.own])
@@ -407,8 +487,8 @@ def _largest_turn(metric, sketch, q):
     return np.linalg.norm(rotation_vectors(sketch[metric.p], q[metric.p]), axis=1).max(initial=0.0)
 
 
-def _unfolded(metric, sketch, found, links, tol):
-    """Return the configuration found, or a nearby one whose links fold as in the sketch."""
+def _unfolded(metric, sketch, found, links, tol, is_drawn):
+    """Return the configuration found, or a nearby one whose links fold as in a sketch; a drawn one has to be met."""
     drawn = links.drawn(metric, sketch)
     turned = links.turned(metric, found.q, drawn)
     kept, total, first = set(), found.iterations, turned
@@ -431,6 +511,8 @@ def _unfolded(metric, sketch, found, links, tol):
             if fits and not links.turned(metric, freed, drawn).size:
                 q, Phi = freed, Phi_freed
             return ContinuationEnd(q, Phi, total, True)
+    if not is_drawn:
+        return found
     stories = [
         f"  {links.folds[k].title}: {np.degrees(links.angle(metric, sketch, k)):.0f} degrees from straight in the "
         f"sketch, {np.degrees(links.angle(metric, found.q, k)):.0f} when assembled"
@@ -464,9 +546,52 @@ def _velocities(metric, q, sketch, A, Phi_q, Phi_t):
     return given, fitted
 
 
+def _search(scene, metric, sketch, tol, fixed, cut, far):
+    """Return what is found, and whether by continuation from the sketch; refuse what isn't assembled.
+
+    A sketch outside the limits of its file is no drawing: joint coordinates come first.
+    """
+    limits, found, loops, closed, conflict = _limits(scene) if far else {}, None, None, None, None
+    if limits and np.abs(metric.linear(sketch)[0]).max(initial=0.0) > tol * (1.0 + np.abs(sketch).max()):
+        loops = Loops(metric, sketch, limits=limits, cut=cut)
+        closed = loops.close(tol) if loops.beyond(sketch).any() else None
+    if closed is None or not closed.met:
+        found = nearest(metric, sketch, tol)
+        if found.met and (are_aligned(metric.packed, found.q, metric.t) or not far):
+            return found, True
+        if not found.met:
+            _demand_direction(scene, metric, found)
+            conflict = proved(metric, sketch)
+        if far and not conflict and closed is None:
+            loops = loops or Loops(metric, sketch, limits=limits, cut=cut)
+            closed = loops.close(tol)
+    if closed and closed.met:
+        start = ContinuationEnd(closed.q, closed.Phi, closed.steps, True)
+        near = start if found is None else approached(metric, sketch, start, tol)
+        return start if loops.beyond(near.q).any() else near, False
+    if found.met:
+        return found, True
+    if closed and np.linalg.norm(closed.Phi) < np.linalg.norm(found.Phi):
+        found = found._replace(q=closed.q, Phi=closed.Phi)
+    refuse(scene, metric, found, conflict, closed.starts if closed else 1, [scene.bodies[i] for i in fixed])
+
+
+def _limits(scene):
+    """Limits of joints in the file of a scene, by joint: hints of where a loop closes."""
+    named = scene.imported.limits if scene.imported else {}
+    return {joint: named[joint.name] for joint in scene.constraints if joint.name in named}
+
+
 def _demand_direction(scene, metric, found):
-    """Refuse a violated constraint whose derivative vanishes: the correction is undetermined."""
+    """Refuse a violated constraint whose derivative vanishes, so that the correction is undetermined.
+
+    Joint coordinates know it where the constraint aligns directions.
+    """
     still = stuck(metric, found.q, found.Phi)
+    aligned = np.zeros(len(metric.packed.system.segments), bool)
+    for member in metric.packed.members:
+        aligned[member.rows] = bool(getattr(member.constraint, "opposed", ()))
+    still = still[~aligned[metric.own[still]]]
     if still.size and metric.columns.size == metric.size:
         name = scene.row_names()[metric.own[still[0]]]
         raise InconsistentState(

@@ -57,7 +57,7 @@ class Metric:
             free[self.move[held[self.r[:, 0]]]] = False
             free[self.turn[held[self.p[:, 0]]]] = False
         self.columns = np.flatnonzero(free)
-        self._last = None, None, None  # q and rows of the last `linear`, and what it returned
+        self._last = None, None  # q of the last `linear`, and what it returned
 
     def arrays(self, q):
         """Phi (m,), Phi_q (m, n), Phi_t (m,), all rows."""
@@ -66,15 +66,15 @@ class Metric:
         )
         return Phi, as_csr(self.packed, rows) if self.sparse else rows, Phi_t
 
-    def linear(self, q, rows=None):
-        """Phi (m',) and A (m', free columns) of some rows; None takes all but normalisations."""
-        rows, (known, among, found) = self.own if rows is None else rows, self._last
-        if known is q and among is rows:
+    def linear(self, q):
+        """Phi (m',) and A (m', free columns), without normalisations."""
+        known, found = self._last
+        if known is q:
             return found
         Phi, Phi_q, _ = self.arrays(q)
-        A = self.reduced(q, Phi_q[rows])
-        found = Phi[rows], A if self.columns.size == self.size else A[:, self.columns]
-        self._last = q, rows, found
+        A = self.reduced(q, Phi_q[self.own])
+        found = Phi[self.own], A if self.columns.size == self.size else A[:, self.columns]
+        self._last = q, found
         return found
 
     def reduced(self, q, Phi_q):
@@ -152,11 +152,6 @@ class Metric:
         """The largest displacement, m, and turn, rad, of a change (size,) of all coordinates."""
         moved = np.linalg.norm(x[self.move] / self.root, axis=1).max(initial=0.0)
         return float(moved), self.largest_turn(x[self.columns])
-
-    def shaken(self, q, rng, size):
-        """The configuration with its free bodies moved by `size` of the scene's and turned by `size` rad, at random."""
-        x = self.speeds(self.reach(q) * rng.normal(size=self.r.shape), rng.normal(size=(len(self.p), 3)))
-        return self.moved(q, size * x[self.columns])
 
     def rotations(self, q):
         """Rotation matrices of all bodies and, last, of the ground, (bodies + 1, 3, 3)."""

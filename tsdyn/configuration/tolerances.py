@@ -61,9 +61,6 @@ MOST_CLOSING, MOST_SETTLING = 60, 60
 LAST_CONVERGED, STAGE_CONVERGED = 1e-6, 0.03
 # What is left of the slope, as a share of the distance, when the descent ends; and the least decrease of a step.
 SETTLED, DECREASE = 1e-11, 0.9
-# Shares of the scene's size, and rad, by which a sketch is shaken where the way from it ends elsewhere; two for scenes
-# of more coordinates than MANY_COORDINATES.
-SHAKES, MANY_COORDINATES = (0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.0, 1.0), 200
 # Softness of the springs that keep a fold, from try to try.
 STIFFER = (0.1, 0.01, 0.001)
 
@@ -73,6 +70,11 @@ CLEAR_FOLD, SHOWN = 0.2, 0.1
 # Rotations of the three directions of a fold, each by a quarter of SHOWN, reverse none of it: sin(0.1) > 3 * 0.025.
 # Share of a slide's direction across the axis beside it below which the two make no fold; m, of a link without length.
 FLAT_FOLD, POINT_LIKE = 0.1, 1e-9
+# Excess of a length (share of the largest, m) or an angle (rad) that proves a conflict: ten times the rounding of
+# arccos near one, 1e-9 times the steps of a way; and points or directions up to which ways are compared, for memory.
+PROVED, MOST_NODES = 1e-7, 600
+# Constraints that a message lists.
+SHOWN_CONSTRAINTS = 8
 # Relative steps of difference quotients of phi.
 PHI_STEPS = (1e-2, 1e-4, 1e-6)
 # The least x that such a step is relative to, m.
@@ -84,3 +86,20 @@ DRIVE_TURN, DRIVE_SHARE, DRIVE_LEAST = 0.25, 0.05, 2.0**-8
 # a = |v|, rad, below which (1 - a/2 cot(a/2)) / a^2 is its limit 1/12: the next term is a^2 / 720; the formula loses
 # eps / a^2 by cancellation.
 SMALL_ANGLE = 1e-3
+
+# --- joint coordinates ---
+# Share of unit rows below which a twist is free; joints that are open by more than its square are closed first.
+TREE_RANK = 1e-6
+# Damping of the first step, of rows at unit length; the least, above rounding of dependent rows; and that from which on
+# steps are too short to help.
+DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-10, 1e8
+# Steps at most from a start; decreases in a row above which share end it: at a minimum that closes nothing.
+MOST_STEPS, STALLED = 80, (6, 0.99)
+# rad: the largest component of the rotation of a joint in a step.
+MOST_TURN = 1.0
+# Residuals of loops at unit length from which on Gauss-Newton steps of all coordinates go on.
+CLOSED_LOOPS = 1e-10
+# Displacements of joints at random, rad and shares of the scene's size, from start to start; starts beyond the first
+# that closes in which one is sought that keeps within the limits.
+HINT = 0.3  # weight of a limit that is passed, rad or m, beside rows at unit length
+SPREADS, HINTED = (0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 2.5, 3.0, 3.0, 3.0, 3.0, 3.0), 6

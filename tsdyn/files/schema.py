@@ -49,6 +49,7 @@ BY_KIND = {
     types.VECTOR: {"$ref": "#/$defs/vector motion"},
     types.REFERENCE: {"description": "the name of a constraint", "type": "string"},
     types.NAMES: NAMES,
+    types.VALUES: {"type": "object", "additionalProperties": {"$ref": "#/$defs/array"}},
     types.ANY: {},
 }
 

@@ -205,8 +205,9 @@ ENUMERATIONS = {  # by the aliases of hints.py
     "Redundancy": ("drop", "refuse"),
 }
 
-NUMBER, WHOLE, FLAG, TEXT, ARRAY, MOTION_TYPE, VECTOR, FUNCTION, REFERENCE, NAMES, ANY = (
-    "number", "integer", "boolean", "text", "array", "motion", "vector", "function", "reference", "names", "any",
+NUMBER, WHOLE, FLAG, TEXT, ARRAY, MOTION_TYPE, VECTOR, FUNCTION, REFERENCE, NAMES, VALUES, ANY = (
+    "number", "integer", "boolean", "text", "array", "motion", "vector", "function", "reference", "names", "values",
+    "any",
 )  # fmt: skip
 KINDS = {
     "float": NUMBER,
@@ -264,6 +265,8 @@ def _kind_of(parameter):
         return FUNCTION, ()
     if word.startswith("Sequence"):
         return NAMES, ()
+    if word.startswith("Mapping"):
+        return VALUES, ()
     if parameter.kind is not parameter.KEYWORD_ONLY:
         return REFERENCE, ()
     return TEXT if isinstance(parameter.default, str) else ANY, ()
@@ -375,6 +378,12 @@ def _names(value, names, argument):
     raise Misread('it must be a list of names such as ["crank"].')
 
 
+def _values(value, names, argument):
+    if isinstance(value, dict):
+        return {key: decode_array(part, names) for key, part in value.items()}
+    raise Misread("it must be a table of numbers by name, such as { hip = 0.3 }.")
+
+
 def _function(value, names, argument):
     raise Misread("it is a function, and a file holds no code; build such a scene in Python.")
 
@@ -400,6 +409,7 @@ _DECODERS = {
     TEXT: _text,
     REFERENCE: _text,
     NAMES: _names,
+    VALUES: _values,
     FUNCTION: _function,
     ANY: _any,
 }

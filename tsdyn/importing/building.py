@@ -239,7 +239,11 @@ def _add_joint(scene, joint, bodies):
     """Add the constraints of a joint; a force or another constraint may have its name."""
     a, b = bodies[joint.a], bodies[joint.b]
     name = joint.name = unused(scene, joint.name)
-    if joint.kind in ONE_AXIS:
+    if joint.kind == "revolute" and joint.frame_b is not None:
+        one, other = joint.frame_a, joint.frame_b
+        axes = {"axis_a": one.R[:, 2], "axis_b": other.R[:, 2]}
+        scene.add(Revolute.at(a, b, point_a=one.p, point_b=other.p, **axes, name=name))
+    elif joint.kind in ONE_AXIS:
         made = scene.add(ONE_AXIS[joint.kind].at(a, b, point=joint.point, axis=joint.axis, name=name))
         if joint.start and joint.kind == "revolute":
             made.__dict__["angle_near"] = (joint.start,)  # near which turns are counted

@@ -186,7 +186,8 @@ def _leave_limits(model, j, joint, report):
     dof = int(model.jnt_dofadr[j])
     if model.jnt_limited[j]:
         low, high = model.jnt_range[j]
-        report.leave("limits of a joint", joint.name, f"[{low:g}, {high:g}]")
+        zero = model.qpos0[int(model.jnt_qposadr[j])] if joint.kind in ("revolute", "prismatic") else np.inf
+        report.leave_limits(joint.name, low - zero, high - zero, f"[{low:g}, {high:g}]")
     if friction := float(model.dof_frictionloss[dof]):
         report.leave("friction of a joint", joint.name, f"{friction:g}")
     if armature := float(model.dof_armature[dof]):

@@ -10,7 +10,7 @@ import numpy as np
 from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InvalidArgument, TsdynError
 from ..observables.diagnostics import constraint_error
-from . import mjcf, sdf, urdf
+from . import loops, mjcf, sdf, urdf
 from .building import build
 from .reduction import complete, gather, merge
 from .report import ImportReport
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FORMATS = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF", "gazebo": "SDF"}
 
 
-def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool) -> Scene:
+def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool, given: Any = ()) -> Scene:
     """The scene of a URDF, MJCF or SDF file; arguments and errors as of `ts.load`.
 
     Parameters
@@ -35,6 +35,8 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool
         Whether the root link of a URDF is free.
     outside : bool
         Whether files outside the folder of this one may be read.
+    given : sequence of (frame_a, frame_b, kind)
+        Loops to be closed.
     """
     root, mistakes = read(path)
     kind, path = FORMATS.get(root.tag), Path(path)
@@ -65,6 +67,7 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool
         if not np.abs((joint.start, *(() if joint.point is None else joint.point))).max() < HUGE:
             mistakes.add((1, 1), f"joint {joint.name!r}: its place or its offset is beyond {HUGE:g}.")
     mistakes.demand_none()
+    loops.add_given(description, given)
     return _scene(description, make, report, mistakes)
 
 

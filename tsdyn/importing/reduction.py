@@ -171,6 +171,8 @@ def _endow(description, joints, link, usual):
     """Move mass to a link from its neighbours at its joints; whether it has enough then."""
     least = SLIGHT * usual
     for joint in joints:
+        if joint.loop:
+            continue  # its sides may be apart
         name = joint.a if joint.b == link.name else joint.b
         donor = None if name == GROUND else description.links[name]
         if donor is not None and is_poor(donor, least):
@@ -347,7 +349,9 @@ def _free(description, joints, joint, report):
     while chain[-1].b != GROUND and sum(3 if one.kind == "spherical" else 1 for one in chain[1:]) < 3:
         link = description.links[chain[-1].b]
         following = [one for one in joints[link.name] if one.a == link.name]
-        if not is_poor(link) or len(following) != 1 or following[0].kind not in ("revolute", "spherical"):
+        if not is_poor(link) or len(following) != 1 or following[0].loop:
+            return
+        if following[0].kind not in ("revolute", "spherical"):
             return
         chain.append(following[0])
     axes = [one.axis for one in chain[1:] if one.kind == "revolute"]

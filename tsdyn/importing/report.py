@@ -42,6 +42,8 @@ class ImportReport:
     frames : dict
         Name of a link, site or frame of the file -> (body, position, rotation) in the scene; so links that were merged
         into another one are found again.
+    limits : dict
+        Name of a joint with limits in the file -> (lower, upper), rad or m; hints of `scene.assemble`.
 
     Examples
     --------
@@ -55,6 +57,7 @@ class ImportReport:
         self._left: dict[LeftOut, None] = {}  # once each, in order
         self._notes: dict[str, None] = {}
         self.frames: dict[str, FrameOn] = {}
+        self.limits: dict[str, tuple[float, float]] = {}
 
     @property
     def left_out(self) -> tuple[LeftOut, ...]:
@@ -69,6 +72,12 @@ class ImportReport:
     def leave(self, what: str, where: str, detail: str = "") -> None:
         """Note what is left out, once."""
         self._left[LeftOut(what, where, detail)] = None
+
+    def leave_limits(self, joint: str, lower: float, upper: float, shown: str = "") -> None:
+        """Note the limits of a joint, hints of an assembly."""
+        if lower < upper:
+            self.limits[joint] = lower, upper
+        self.leave("limits of a joint", joint, shown or f"[{lower:g}, {upper:g}]")
 
     def note(self, text: str) -> None:
         """Note what is carried over in another way, once."""

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..maths.tolerances import TYPED
+from . import loops
 from .description import GROUND, HERE, Description, Frame, JointItem, Link, fresh, of_quaternion, roll_pitch_yaw
 from .drawn_shapes import add_sdf_shapes
 
@@ -217,7 +218,8 @@ def _dynamics(axis, joint, tag, report):
         for what in ("stiffness", "dissipation"):
             limit.all(what)
         if found:
-            report.leave("limits of a joint", joint.name, f"[{', '.join(found)}]")
+            lower, upper = (given[what] if tag == "axis" else 0.0 for what in ("lower", "upper"))
+            report.leave_limits(joint.name, lower, upper, f"[{', '.join(found)}]")
 
 
 def _lead(node):
@@ -277,6 +279,7 @@ def _add_model(found, model, outer, prefix, outside, report):
         if owner in names and name not in found.links:
             found.frames[prefix + name] = names[owner], found.links[names[owner]].frame.inverse @ frames.resolve(name)
     add_joints(found, model, frames, names, prefix, report)
+    loops.read(found, model, names)
     if static:
         found.joints += [JointItem(f"{name} static", "fixed", GROUND, name) for name in names.values()]
     return names

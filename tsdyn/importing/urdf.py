@@ -6,6 +6,7 @@ https://wiki.ros.org/urdf/XML.
 
 import numpy as np
 
+from . import loops
 from .description import GROUND, HERE, Coupling, Description, JointItem, Link, shifted, turned
 from .drawn_shapes import add_visuals, colours, placed
 
@@ -47,6 +48,7 @@ def describe(root, outside, report, free_base):
     base = [name for name in found.links if name not in children]
     if base and (not free_base or base[0] == WORLD):
         found.joints.insert(0, JointItem("base", "fixed", GROUND, base[0]))
+    loops.read(found, root, {name: name for name in found.links})
     report.leave_unread(root)
     return found
 
@@ -140,7 +142,7 @@ def _dynamics(node, joint, kind, report):
     if limit is not None:
         lower, upper = limit.number("lower"), limit.number("upper")
         if kind in ("revolute", "prismatic"):
-            report.leave("limits of a joint", joint.name, f"[{lower:g}, {upper:g}]")
+            report.leave_limits(joint.name, lower, upper)
         for what in ("effort", "velocity"):
             if largest := limit.number(what):
                 report.leave(f"limit of {what}", joint.name, f"{largest:g}")

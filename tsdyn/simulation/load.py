@@ -16,7 +16,7 @@ from .solution import Solution
 from .stored_runs import demand_path
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from ..hints import Place
 
@@ -33,6 +33,7 @@ def load(
     allow_code: bool = False,
     free_base: bool = False,
     outside: bool = False,
+    loops: Sequence[Sequence[Any]] = (),
 ) -> Any:
     """Return the scene, solution or ensemble of a file; nothing in it is executed.
 
@@ -54,6 +55,11 @@ def load(
     outside : bool
         Whether a URDF, MJCF or SDF file may name files outside its folder, such as meshes in a folder beside it, or
         files to include. Otherwise only those in its folder and in folders below are read; links are followed first.
+    loops : sequence of (frame_a, frame_b, kind); optional
+        Loops that a URDF, MJCF or SDF file leaves open: names of two of its links, frames, sites or joints, and how
+        they are held together. "weld": they coincide; "ball": their origins do; "hinge": their origins and z axes do,
+        or an axis in both frames that a fourth entry gives, such as (0, 1, 0). The scene is assembled;
+        `scene.imported` says so where it can't be.
 
     Returns
     -------
@@ -94,8 +100,8 @@ def load(
     if suffix in SCENES:
         if scene is not None:
             raise InvalidArgument("scene= is for solutions; a scene file holds its own.")
-        return scene_file(path, allow_code, free_base, outside)[0]
-    _demand_robot(free_base, outside)
+        return scene_file(path, allow_code, free_base, outside, loops)[0]
+    _demand_robot(free_base, outside, loops)
     if suffix == ".xacro":
         raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
     from ..storage.formats import SUFFIXES
@@ -114,23 +120,25 @@ def load(
 
 
 def scene_file(
-    path: Place, allow_code: bool = False, free_base: bool = False, outside: bool = False
+    path: Place, allow_code: bool = False, free_base: bool = False, outside: bool = False, loops: Any = ()
 ) -> tuple[Scene, dict[str, Any]]:
     """Return the scene of a file, and the arguments of `simulate` that the table `run` of a TOML file asks for."""
     if Path(path).suffix.lower() != ".toml":
         from ..importing.reading import load as imported
 
-        return imported(path, Scene, free_base, outside), {}
-    _demand_robot(free_base, outside)
+        return imported(path, Scene, free_base, outside, loops), {}
+    _demand_robot(free_base, outside, loops)
     return document_of(path, allow_code)[:2]
 
 
-def _demand_robot(free_base, outside):
+def _demand_robot(free_base, outside, loops):
     """Refuse options of the files of other programs."""
     if free_base:
         raise InvalidArgument("free_base= is for URDF files.")
     if outside:
         raise InvalidArgument("outside= is for URDF, MJCF and SDF files.")
+    if len(loops):
+        raise InvalidArgument("loops= is for URDF, MJCF and SDF files; other scenes close loops by scene.add.")
 
 
 def document_of(path: Place, allow_code: bool = False, study: Mapping[str, Any] | bool | None = None) -> Any:

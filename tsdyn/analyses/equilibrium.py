@@ -9,9 +9,10 @@ import numpy as np
 from ..calls import fitting_methods
 from ..errors import InconsistentState, InvalidForce, NoEquilibrium
 from ..jit.interrupts import interruptible
+from ..model.kinematics import Anchor
 from ..observables import reactions
 from ..observables.generalised_forces import force_loads, velocity_forces
-from ..observables.state import Anchor, RememberingState
+from ..observables.state import RememberingState
 from .coordinates import Variations, chosen
 from .moves import Moves
 from .nominal_motion import NominalMotion

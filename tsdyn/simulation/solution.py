@@ -14,10 +14,11 @@ from ..calls import fitting, fitting_methods
 from ..errors import InvalidArgument, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
+from ..model.kinematics import Anchor, Kinematics
 from ..observables import diagnostics, power, reactions
 from ..observables.power import driving_power, force_powers, power_of
 from ..observables.reactions import acted, exerted, member, multipliers, with_normal_loads
-from ..observables.state import Anchor, Kinematics, RememberingState
+from ..observables.state import RememberingState
 from ..validation import counted, floats
 from .records import Records
 from .stored_runs import Outputs

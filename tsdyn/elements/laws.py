@@ -72,9 +72,8 @@ class SceneLaw:
     def kernels(self) -> Any:
         """The callbacks of the present function, whatever its numbers."""
         function = getattr(self, self.given)
-        code = getattr(getattr(function, "py_func", function), "__code__", function)
-        if self.__dict__.get("_of") is not code:
-            self.__dict__.update(_kernels=LawKernels(), _of=code)
+        if _code(self.__dict__.get("_of")) is not _code(function):
+            self.__dict__.update(_kernels=LawKernels(), _of=function)
         return self.__dict__["_kernels"]
 
     @property
@@ -104,6 +103,11 @@ class SceneLaw:
     def results(self, function: Any, t: Any, state: Any, numbers: Any) -> list[Any]:
         """What a function makes of its arguments; numbers: of its keyword arguments, in their order."""
         return listed(function(t, state, **dict(zip(numbers_of(getattr(self, self.given)), numbers, strict=True))))
+
+
+def _code(function):
+    """What is the same for a function with other numbers; an object to be called is that itself."""
+    return getattr(getattr(function, "py_func", function), "__code__", function)
 
 
 def listed(given):

@@ -249,6 +249,13 @@ class Law:
         self.rows, self.program = writer.rows, writer.numbers()
 
     @property
+    def said(self):
+        """How its function is called."""
+        if self.held:
+            return f"is called in Python every {self.force.period:g} s"
+        return f"is called in Python at each evaluation: {self.why}" if self.why else "is traced and runs compiled"
+
+    @property
     def no_series(self):
         """Why it has no Taylor series; "" where it has them."""
         if self.why:
@@ -369,7 +376,7 @@ def seen_by(function, known=()):
         return ()
     cells = [cell.cell_contents for cell in plain.__closure__ or ()]
     values = [*cells, *(plain.__globals__[name] for name in names_of(plain.__code__) if name in plain.__globals__)]
-    return plain.__code__, *(_seen(value, (*known, plain)) for value in values)
+    return plain.__code__.co_code, str(plain.__code__.co_consts), *(_seen(value, (*known, plain)) for value in values)
 
 
 def _seen(value, known):

@@ -24,12 +24,13 @@ from .ensembles.results import Ensemble
 from .errors import TsdynError
 from .methods.integrator import Integrator
 from .model.handles import Handles
+from .model.kinematics import Kinematics
 from .model.packed import Packed, System
 from .motions.prescribed import Motion
 from .motions.tables import Table
 from .observables.diagnostics import ConstraintError
 from .observables.evaluate import Evaluation
-from .observables.state import Kinematics, RememberingState, State
+from .observables.state import RememberingState, State
 from .profiling.phases import Phase
 from .profiling.report import Profile
 from .simulation.given_motion import InverseDynamics, KinematicAnalysis
@@ -72,6 +73,8 @@ GivenMotions: TypeAlias = Mapping[Any, Prescribed | Path] | Solution | State  # 
 Load: TypeAlias = float | Table | Callable[[Any], Any]
 VectorLoad: TypeAlias = ArrayLike | Table | Callable[..., Any]  # a function of t, or of t and state
 JointLaw: TypeAlias = Callable[[float, float, float], float]
+ControlLaw: TypeAlias = Callable[..., Any]  # of t and state
+Actuators: TypeAlias = Sequence[Any]
 Event: TypeAlias = Callable[[float, State], float]
 CaseTable: TypeAlias = Mapping[str, Any] | Callable[[int], Mapping[str, Any]] | Any  # or a DataFrame
 Keep: TypeAlias = str | Sequence[str] | Callable[[Solution], Any]  # sequence: names of channels
@@ -133,6 +136,7 @@ Class = TypeVar("Class", bound=type)
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 __all__ = [
+    "Actuators",
     "AnyBody",
     "ArrayLike",
     "AssemblyReport",
@@ -148,6 +152,7 @@ __all__ = [
     "Charts",
     "Class",
     "ConstraintError",
+    "ControlLaw",
     "Data",
     "Ensemble",
     "Equilibrium",

@@ -5,8 +5,8 @@ integrators/ import from here, too. docs/plug-ins.md shows how.
 """
 
 from .calls import Placing, fitting
-from .elements.bodies import Ground, PointMass, ground_point, rotation_matrix
-from .elements.element import Angle, Displacement, angles, displacements, in_frame
+from .elements.bodies import Ground, PointMass, ground_point, named, rotation_matrix
+from .elements.element import Angle, Displacement, angles, displacements, in_frame, stop_waiting
 from .elements.force import Force, load, vector_load
 from .elements.friction import (
     AXIS,
@@ -27,19 +27,22 @@ from .elements.friction import (
     slip_series,
 )
 from .elements.joint import FramedJoint, Joint, across, beside, carried, turned_about
+from .elements.laws import Action, SceneLaw, arguments_of, instants, listed, scene_law
 from .elements.loads import (
     STATE,
     ByState,
     Given,
+    GivenByScene,
     GivenByState,
     GivenInBody,
     JointLoad,
-    arguments_of,
     fill_state,
     fill_state_series,
     given_series,
     load_at,
+    scene_load,
     state_load,
+    variant,
 )
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
@@ -93,7 +96,7 @@ from .motions.expressions import Smooth
 from .motions.prescribed import Motion
 from .motions.signals import Signal, numbers_of
 from .motions.tables import is_data
-from .validation import finite, floats, not_negative, number, positive, shown, vector3, whole
+from .validation import finite, floats, label, not_negative, number, positive, shown, vector3, whole
 
 __all__ = [
     "AXIS",
@@ -101,6 +104,7 @@ __all__ = [
     "DOP853_INTERPOLANT",
     "PARALLEL",
     "STATE",
+    "Action",
     "Adaptive",
     "Angle",
     "BodyFriction",
@@ -114,6 +118,7 @@ __all__ = [
     "Force",
     "FramedJoint",
     "Given",
+    "GivenByScene",
     "GivenByState",
     "GivenInBody",
     "Ground",
@@ -133,6 +138,7 @@ __all__ = [
     "PointMass",
     "Primitive",
     "RungeKuttaTableau",
+    "SceneLaw",
     "Signal",
     "Smooth",
     "Turn",
@@ -169,13 +175,17 @@ __all__ = [
     "given_series",
     "ground_point",
     "in_frame",
+    "instants",
     "inverse_root",
     "is_data",
     "kernel",
+    "label",
     "linear_second",
+    "listed",
     "load",
     "load_at",
     "magnitude",
+    "named",
     "not_negative",
     "number",
     "numbers_of",
@@ -189,6 +199,8 @@ __all__ = [
     "rotation",
     "rotation_matrix",
     "scaled",
+    "scene_law",
+    "scene_load",
     "second_embedded_error",
     "shown",
     "sine_cosine",
@@ -201,8 +213,10 @@ __all__ = [
     "stack",
     "state_load",
     "step_kernel",
+    "stop_waiting",
     "trapezoid_error",
     "turned_about",
+    "variant",
     "vector",
     "vector3",
     "vector_load",

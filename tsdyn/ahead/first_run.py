@@ -1,6 +1,7 @@
 """Which kernels a run needs, so that a first one can have them compiled at the same time."""
 
 from ..configuration import start_kernels
+from ..elements.laws import SceneLaw
 from ..formulations import accelerations, null_space
 from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853, Taylor
@@ -66,7 +67,7 @@ def of_scene(scene, method, form, far, rough):
     for force in scene.forces:
         signals = [value for value in vars(force).values() if isinstance(value, Signal)]
         yield from of_force(force.kernels, series, implicit, form, "driven_" * bool(signals))
-        if series and hasattr(force.kernels, "program"):
+        if series and (hasattr(force.kernels, "program") or isinstance(force, SceneLaw)):
             yield tracing.run_order
         if signals and (series or any(signal.motions for signal in signals)):
             yield program.run_program

@@ -11,9 +11,10 @@ from ..configuration.tolerances import MOST_ROTATION
 from ..errors import InconsistentState, InvalidForce, NoEquilibrium
 from ..jit.interrupts import interruptible
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, PIVOT_ROUNDING, ROUNDING, SUM_ROUNDING, TINY
+from ..model.kinematics import Anchor
 from ..observables import reactions
 from ..observables.generalised_forces import force_loads, velocity_forces
-from ..observables.state import Anchor, RememberingState
+from ..observables.state import RememberingState
 from .coordinates import Variations, chosen
 from .moves import Moves
 from .nominal_motion import NominalMotion

@@ -15,7 +15,15 @@ from ..formulations.tolerances import REFINEMENTS
 from ..jit.kernels import entry
 from ..maths.matrix_rank import dependent, sparse_lu
 from ..maths.tolerances import PIVOT_ROUNDING, ROUNDING, TINY
-from ..model.equations import WIDTH, as_csr, call_jacobian, constraint_curvature, set_time, with_short_rows
+from ..model.equations import (
+    WIDTH,
+    applied_forces,
+    as_csr,
+    call_jacobian,
+    constraint_curvature,
+    set_time,
+    with_short_rows,
+)
 from ..model.packed import with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
@@ -54,6 +62,13 @@ def fill_blocks(s, x, lam, rows, Q_q, Q_qd, kept):
         kind = s.forces[i]
         table, reals, own = s.table[kind.table :], s.reals[kind.reals :], kept[kind.kept :]
         call_jacobian(kind.jacobian, kind, table, reals, x[0], x[1], t, Q_q, Q_qd, 1, own)
+
+
+@entry
+def see_state(s, q, qd, t, Q):
+    """Let laws of the whole scene see a state, at which their derivatives are then taken; Q (n,): zeros."""
+    set_time(s, t)
+    applied_forces(s, q, qd, t, Q)
 
 
 class Pairs:
@@ -95,6 +110,10 @@ class Pairs:
         rows = np.zeros((3, max(STEP * nc, WIDTH * (len(lam) + nc))))
         Q = np.zeros((2, STEP * (nc + nf)))
         system = self._system._replace(reals=motion.system.reals.copy())
+        if any(load.law is not None for load in self.packed.loads):
+            see_state(
+                motion.system._replace(reals=system.reals), motion.q, motion.qd, motion.t, np.zeros(motion.q.size)
+            )
         fill_blocks(system, x, lam, rows, *Q, np.zeros(self._size))
         return _whole(rows[0, : STEP * nc]), rows[1:], *(_whole(one[STEP * nc :]) for one in Q)
 

@@ -436,6 +436,9 @@ class Attachment:
     def demand_effect(self) -> None:
         """Raise an error where one that is made would do nothing, as if an argument had been forgotten."""
 
+    def place_in(self, scene: Scene) -> None:
+        """Find by name what it refers to in the scene that it is added to."""
+
     def check(self) -> None:
         """Raise an error where an attribute has an impossible value; asked again when one is set."""
 

@@ -161,6 +161,11 @@ class Force(Attachment):
         return self.own_kernels
 
     @property
+    def bodies(self) -> tuple[Any, ...]:
+        """The bodies that it acts on; the ground, and None, may be among them."""
+        return self.a, self.b
+
+    @property
     def is_idle(self) -> bool:
         """Whether all of its sources are zero at all times."""
         return bool(self.sources) and all(Signal.is_zero(getattr(self, name)) for name in self.sources)

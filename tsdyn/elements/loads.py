@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from types import FunctionType, MappingProxyType
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
@@ -17,8 +17,9 @@ from ..maths.recurrences import rotated, rotation
 from ..maths.vectors import rotate
 from ..motions.signals import Signal, numbers_of, positional, starred
 from ..motions.tracing import Untraceable, Writer, demand_same, retold, traced
-from ..validation import label, one_of, positive
+from ..validation import label, one_of
 from .force import callbacks
+from .laws import Action, SceneLaw, arguments_of, instants, sees_scene
 from .markers import TURN
 
 if TYPE_CHECKING:
@@ -122,16 +123,6 @@ def _with_numbers(kind, plain, count):
     return kernel(call, allocates=True)
 
 
-def arguments_of(function):
-    """The number of arguments of a plain Python function, but for numbers by keyword; 0 for anything else."""
-    plain = getattr(function, "py_func", function)
-    if not isinstance(plain, FunctionType) or starred(function):
-        return 0
-    if plain.__code__.co_kwonlyargcount != len(numbers_of(function)):
-        return 0
-    return plain.__code__.co_argcount
-
-
 @kernel
 def fill_state_series(x, xd, first, k, row, s):
     """Coefficient k of `fill_state`, into rows from `row` on."""
@@ -153,10 +144,20 @@ def fill_state(x, xd, first, out):
 
 
 def state_load(value, what, error):
-    """A plain function of (t, state)."""
-    if arguments_of(value) != 2:
+    """A plain function of (t, state), of the array of its body."""
+    return _two_arguments(value, what, error, "the array of its body", False)
+
+
+def scene_load(value, what, error):
+    """A plain function of (t, state), of the state of the scene."""
+    return _two_arguments(value, what, error, "the state of the scene", True)
+
+
+def _two_arguments(value, what, error, state, whole):
+    if arguments_of(value) != 2 or sees_scene(value) != whole:
         raise error(
-            f"{what} must stay a plain Python function of two arguments (t, state), got {value!r}{starred(value)}."
+            f"{what} must stay a plain Python function of two arguments (t, state) of {state}, got "
+            f"{value!r}{starred(value)}."
         )
     return value
 
@@ -264,7 +265,7 @@ class Given:
     def __new__(cls, *others: Any, frame: str = "ground", **more: Any) -> Self:
         """Choose the kernel by frame and by the sort of the vector."""
         if arguments_of(more.get(cls.given)) == 2:
-            cls = variant(cls, GivenByState)
+            cls = variant(cls, GivenByScene if sees_scene(more[cls.given]) else GivenByState)
         elif isinstance(frame, str) and frame == "body":
             cls = variant(cls, GivenInBody)
         return super().__new__(cls)
@@ -378,6 +379,22 @@ class GivenByState(ByState):
         return specialised(_law, name, owner, function=inner, FIRST=cls.first, **others)
 
 
+class GivenByScene(SceneLaw):
+    """Mixed in before `Given`: a function of time and of the state of the scene."""
+
+    turns = False
+
+    def parameters(self):
+        """The numbers of the function."""
+        return SceneLaw.parameters(self)
+
+    def actions(self):
+        """One for each component."""
+        point = () if self.turns else (tuple(self.coordinates[0].tolist()),)
+        frame = self.a if self.frame == "body" else None
+        return [Action(self.turns, self.a, None, frame, tuple(e), *point) for e in np.eye(3).tolist()]
+
+
 def _law(x, xd, par, t, out):
     state, given = stack(13), stack(3)
     fill_state(x, xd, 0, state)
@@ -396,11 +413,6 @@ def _law(x, xd, par, t, out):
 
 
 # Base of JointTorque and JointForce: a function of time, joint coordinate and rate, continuous or sampled.
-
-
-def instants(value, what, error):
-    """A period, s, or None."""
-    return None if value is None else positive(value, f"{what} (s)", error)
 
 
 def law_of_joint(value, what, error):

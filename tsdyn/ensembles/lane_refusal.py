@@ -78,7 +78,7 @@ def _of_scene(arena):
         force = force_load.force
         if any(isinstance(value, Signal) for value in force_load.parameters):
             found.append(f"{force.name} is a function of time")
-        elif hasattr(force.kernels, "program"):
+        elif hasattr(force.kernels, "program") or force_load.law is not None:
             found.append(f"{force.name} is a function of the state")
         elif force_load.normal >= 0:
             found.append(f"{force.name} follows from a reaction")

@@ -4,7 +4,7 @@ from typing import Any, Self
 
 from .. import JointFriction
 from ..constraints import Revolute, Translational
-from ..hints import ArrayLike, Attachment, Attribute, Axes, Body, BodyLike, Floats, Force, Frame, JointLaw, JointLoads, Load, PointMass, Points, References, VectorLoad
+from ..hints import Actuators, ArrayLike, Attachment, Attribute, Axes, Body, BodyLike, ControlLaw, Floats, Force, Frame, JointLaw, JointLoads, Load, PointMass, Points, References, VectorLoad
 
 class Bushing(Points, Force):
     stiffness: Attribute[ArrayLike, Floats]
@@ -44,6 +44,19 @@ class ContactFriction(JointFriction, Force):
     def __init__(self, joint: Attachment, *, kinetic: float, static: float | None = ..., slip_velocity: float | None = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, joint: Attachment, *, kinetic: float, static: float | None = ..., slip_velocity: float | None = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
+
+class Control(Force):
+    function: ControlLaw
+    actuators: Actuators
+    period: float | None
+    def __init__(self, function: ControlLaw, actuators: Actuators = ..., *, period: float | None = ..., name: str = ...) -> None: ...
+    def actions(self) -> list[Action]: ...
+    @classmethod
+    def at(cls, function: ControlLaw, actuators: Actuators = ..., *, period: float | None = ..., name: str = ...) -> Self: ...
+    def forget(self) -> None: ...
+    @property
+    def function_of_state(self) -> Any: ...
+    def results(self, function: Any, t: Any, state: Any, numbers: Any) -> list[Any]: ...
 
 class CoulombFriction(Force):
     force: float

@@ -9,7 +9,19 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import Force, Given, GivenByState, GivenInBody, Parameters, Point, Turn, state_load, vector_load
+from ..plugins import (
+    Force,
+    Given,
+    GivenByScene,
+    GivenByState,
+    GivenInBody,
+    Parameters,
+    Point,
+    Turn,
+    scene_load,
+    state_load,
+    vector_load,
+)
 
 if TYPE_CHECKING:
     from ..hints import Frame, PointMass, VectorLoad
@@ -23,8 +35,9 @@ class PointForce(Given, Force):
     a : Body
         A rigid body or a point mass.
     force : array_like (3,), ts.Table, or function of t or of (t, state); N
-        A function returns a tuple of three; state (13,) is the position of the point (m), Euler parameters, velocity of
-        the point (m/s) and angular velocity (rad/s), ground frame.
+        A function returns a tuple of three. If it calls methods of its argument state, such as `state.angle("hinge")`,
+        state is that of the scene, as for `Control`. Otherwise state is an array (13,): position of the point (m),
+        Euler parameters, velocity of the point (m/s) and angular velocity (rad/s), ground frame.
 
     Notes
     -----
@@ -71,3 +84,9 @@ class _StatePointForce(GivenByState, PointForce):
     markers = (Point("a"), Parameters("a"), Turn("a"))
     particles = True
     quantities = MappingProxyType({"force": state_load})
+
+
+class _ScenePointForce(GivenByScene, PointForce):
+    """A function of time and of the state of the scene."""
+
+    quantities = MappingProxyType({"force": scene_load})

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING
 from ..plugins import (
     Force,
     Given,
+    GivenByScene,
     GivenByState,
     GivenInBody,
     Parameters,
     Point,
     Turn,
     given_series,
+    scene_load,
     state_load,
     vector_load,
 )
@@ -32,8 +34,8 @@ class Torque(Given, Force):
     Parameters
     ----------
     torque : array_like (3,), ts.Table, or function of t or of (t, state); N m
-        A function returns a tuple of three; state (13,) is the position of the centroid (m), Euler parameters, velocity
-        (m/s) and angular velocity (rad/s), ground frame.
+        A function returns a tuple of three; state is as for PointForce, the array (13,) with the position (m) and
+        velocity (m/s) of the centroid.
 
     Notes
     -----
@@ -85,3 +87,10 @@ class _StateTorque(GivenByState, Torque):
         out[7], out[8], out[9] = given_series(x, par, k, s)
 
     quantities = MappingProxyType({"torque": state_load})
+
+
+class _SceneTorque(GivenByScene, Torque):
+    """A function of time and of the state of the scene."""
+
+    turns = True
+    quantities = MappingProxyType({"torque": scene_load})

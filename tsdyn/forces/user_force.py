@@ -11,16 +11,18 @@ from __future__ import annotations
 
 import math
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from ..plugins import (
     STATE,
+    Action,
     ByState,
     Force,
     Parameters,
     Point,
+    SceneLaw,
     Turn,
     arguments_of,
     cross,
@@ -30,6 +32,7 @@ from ..plugins import (
     numbers_of,
     shown,
     stack,
+    variant,
 )
 
 if TYPE_CHECKING:
@@ -75,8 +78,9 @@ class UserForce(ByState, Force):
     a : Body
     b : Body or ground, optional
         Default: the ground.
-    function : callable (t, a, b, par, out)
-        A plain Python function that Numba can compile. a and b are arrays (13,): position of the point (m), Euler
+    function : callable (t, a, b, par, out), or (t, state, par, out)
+        A plain Python function. The one of four arguments gets the state of the scene, as for `Control`. The one of
+        five is compiled by Numba: a and b are arrays (13,): position of the point (m), Euler
         parameters, velocity of the point (m/s), angular velocity (rad/s), all in the ground frame; those of the ground
         are point_b, (1, 0, 0, 0) and zeros. It writes out (6,): force on a at point_a (N), torque on a (N m), ground
         frame. It may compare and allocate; an exception or a NaN ends the run.
@@ -86,7 +90,7 @@ class UserForce(ByState, Force):
     Raises
     ------
     InvalidForce
-        If the function is no plain function of five arguments, or a number is not finite.
+        If the function is no plain function of four or five arguments, or a number is not finite.
 
     Notes
     -----
@@ -114,10 +118,14 @@ class UserForce(ByState, Force):
     markers = (Point("a"), Parameters("a"), Turn("a"), Point("b"), Parameters("b"), Turn("b"))
     particles = True
     loads = ("function",)
-    given = "function"
+    given, count = "function", 5
     template = staticmethod(_law)
     arguments, has_numbers, given_numbers, slots = (1, STATE, STATE), True, 6, 9
     quantities = MappingProxyType({"values": _numbers})
+
+    def __new__(cls, *bodies: Any, function: Any = None, **others: Any) -> Self:
+        """Choose the kernel by the arguments of the function."""
+        return super().__new__(variant(cls, SceneLaw) if arguments_of(function) == 4 else cls)
 
     def __init__(
         self,
@@ -137,10 +145,11 @@ class UserForce(ByState, Force):
 
     def check(self):
         """Refuse all but plain functions of five arguments."""
-        if arguments_of(self.function) != 5 or numbers_of(self.function):
+        if arguments_of(self.function) != self.count or numbers_of(self.function):
             raise self.error(
-                f"{self.name}: function must be a plain Python function of five arguments (t, a, b, par, out), got "
-                f"{self.function!r}; numbers that vary are parameters=, which it gets as par."
+                f"{self.name}: function must be a plain Python function of five arguments (t, a, b, par, out), or one "
+                f"of four (t, state, par, out), got {self.function!r}. Numbers that vary are parameters=, which it "
+                "gets as par; make a new force to change between the two."
             )
 
     def parameters(self):
@@ -176,6 +185,24 @@ class UserForce(ByState, Force):
     def example(cls, rng, a, b):
         """A drag that depends on all arguments."""
         return cls(a, b, function=_example, point_a=rng.normal(size=3), point_b=rng.normal(size=3), parameters=(0.7,))
+
+
+class _SceneUserForce(SceneLaw, UserForce):
+    """By a function of the state of the scene."""
+
+    count = 4
+    check, parameters = UserForce.check, UserForce.parameters
+
+    def results(self, function, t, state, numbers):
+        """Six numbers."""
+        out = np.zeros(6, object)
+        function(t, state, np.asarray(numbers), out)
+        return list(out)
+
+    def actions(self):
+        """Three components of the force, and of the torque."""
+        point, axes = tuple(self.point_a.tolist()), [tuple(e) for e in np.eye(3).tolist()]
+        return [Action(turns, self.a, self.b, None, e, point) for turns in (False, True) for e in axes]
 
 
 def _example(t, a, b, par, out):

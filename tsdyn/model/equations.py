@@ -7,6 +7,7 @@ import numpy as np
 
 from ..elements.element import address, checked_parameters
 from ..elements.force import Force
+from ..elements.laws import SceneLaw
 from ..elements.loops.constraint_hessians import SLOPES, STIFFNESS
 from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE, call_kind
 from ..elements.loops.forces import FORCE_INTS
@@ -18,6 +19,8 @@ from ..motions.prescribed import Motion, call_motion
 from ..motions.program import HOLD, call_smooth
 from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
+from .handles import handles_of
+from .laws import demand_callable
 
 call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
 call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
@@ -222,6 +225,8 @@ def is_of_user(item):
 def changes_with_state(load):
     """Whether the law of a `Load` is a user's, and may change within any part of a step."""
     force = load.force
+    if load.law is not None:
+        return load.law.changes
     if not is_of_user(force) or "normal_load" in force.kernels:
         return False
     try:
@@ -233,7 +238,9 @@ def changes_with_state(load):
 def depends_on_time(force):
     """Whether what a user has written for a force reads the time."""
     function, place = (force.function_of_state, 0) if hasattr(force, "function_of_state") else (type(force).law, 3)
-    code = getattr(function, "py_func", function).__code__
+    code = getattr(getattr(function, "py_func", function), "__code__", None)
+    if code is None:  # an object to be called
+        return True
     t = code.co_varnames[place]
     read = [each.argval for each in dis.get_instructions(code) if "LOAD" in each.opname]  # pairs in some versions
     return any(t == name or (isinstance(name, tuple) and t in name) for name in read)
@@ -246,8 +253,8 @@ def user_kinds(packed):
 
 def _first(packed):
     """A `Load` of each row of System.forces."""
-    first = {(one.force, one.stride): load for load in reversed(packed.loads) for one in load.alone}
-    return [first[row.force, row.stride] for row in packed.system.forces]
+    first = {int(load.alone[0].reals): load for load in packed.loads}
+    return [first[int(row.reals)] for row in packed.system.forces]
 
 
 def _spans(system, row):
@@ -308,5 +315,11 @@ def demand_compilable(item):
     for value in checked_parameters(item, Signal, "loads"):
         if isinstance(value, Signal) and value.is_function:
             value.address  # noqa: B018
+    if isinstance(item, SceneLaw):
+        if item.period is None:
+            packed = item.scene.packed
+            handles, start = handles_of(packed), item.scene.start
+            demand_callable(item, handles, 0.0, *start, handles.angles_at_start(0.0, start[0]))
+        return
     if item.kernels is not item.own_kernels or not is_ours(type(item).__module__):
         address(item.kernels, "force", item.name, item.error)

@@ -170,12 +170,11 @@ class Handles:
     driven : list of Driven
     """
 
-    def __init__(self, packed):
-        places = packed.system.bodies.tolist()
-        self.bodies = packed.bodies
-        constraints = [member.constraint for member in packed.members]
+    def __init__(self, bodies, places, members, forces):
+        self.bodies = bodies
+        constraints = [member.constraint for member in members]
         constraints = [each for each in constraints if not getattr(each, "normalises", False)]
-        self.items = (*constraints, *(load.force for load in packed.loads))
+        self.items = (*constraints, *forces)
         self._where = {body: tuple(place) for body, place in zip(self.bodies, places, strict=True)}
         self._by_item, self._aliases = None, WeakKeyDictionary()
         rows, joints, frames = [], [], []
@@ -297,5 +296,6 @@ def _begins(item):
 def handles_of(packed):
     """The `Handles` of a packed scene, made once."""
     if packed.derived.handles is None:
-        packed.derived.handles = Handles(packed)
+        forces = [load.force for load in packed.loads]
+        packed.derived.handles = Handles(packed.bodies, packed.system.bodies.tolist(), packed.members, forces)
     return packed.derived.handles

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.element import address, checked_parameters
+from ..elements.laws import SceneLaw
 from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE
 from ..elements.loops.forces import FORCE_INTS, kept_size
 from ..elements.loops.template import AT, DIMENSION
@@ -17,6 +18,8 @@ from ..jit.kernels import Record, records, row_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tracing import Untraceable
+from .handles import Handles
+from .laws import Law
 
 # Rows of the tables of a packed system, each a record: what runs over the instances of a kind, and where they are.
 #
@@ -179,10 +182,13 @@ class Load(NamedTuple):
     slot: int  # of System.memory; -1 for none
     normal: int  # of System.normals; -1 for none
     programs: tuple  # for each number of par: where in System.reals the program of its series begins; -1 for none
+    law: object = None  # a `laws.Law` of a function that sees the whole scene
 
 
-def pack_forces(forces, where, table, reals):
+def pack_forces(forces, where, table, reals, handles):
     """Append the instances to `table` and `reals`; return rows of System.forces, .signals, .memory, .normals, Loads.
+
+    handles: of the scene, where there are laws of its state.
 
     Raises
     ------
@@ -199,6 +205,16 @@ def pack_forces(forces, where, table, reals):
         force_address = _force_address(members[0], "force")
         remember = _force_address(members[0], "remember") if "remember" in kernels else 0
         first, stride = (len(table), len(reals)), None
+        if isinstance(members[0], SceneLaw):
+            (force,), slot = members, len(memory)
+            law = Law(force, handles)
+            count, stride = law.pack(table, reals, memory)
+            row = [force_address, 0, remember, count, stride, *first, 0]
+            rows.append(row)
+            slot = slot if len(memory) > slot else -1
+            alone = records(ForceKind, [row])
+            loads[id(force)] = Load(force, force.parameters(), force.coordinates, alone, slot, -1, (), law)
+            continue
         for force in members:
             begin = len(table), len(reals)
             parameters = checked_parameters(force, Signal, "loads")
@@ -280,6 +296,8 @@ def find_forces(system, loads):
             for name in ("force", "jacobian", "remember"):
                 alone[name] = row[name]
             rows[id(load)] = load._replace(alone=alone)
+            if load.law is not None and load.law.address >= 0:
+                system.reals[load.law.address] = load.law.callback
             for value in load.parameters:
                 for _ in range(max(len(value.motions), 1) if isinstance(value, Signal) else 0):
                     next(signals).address = value.address
@@ -288,7 +306,8 @@ def find_forces(system, loads):
 
 def members_of(row, loads):
     """The loads that a row of System.forces runs."""
-    return [load for load in loads if (load.alone[0].force, load.alone[0].stride) == (row.force, row.stride)]
+    end = row.reals + row.count * row.stride
+    return [load for load in loads if row.reals <= load.alone[0].reals < end]
 
 
 def _force_address(force, name):
@@ -456,7 +475,11 @@ def pack(scene):
     parameters = {constraint: checked_motions(constraint) for constraint in primitives}
     table, reals = [], []
     kinds, motions, kept = _pack_constraints(parameters, int(starts[-1]), where, table, reals)
-    forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals)
+    members, derived = tuple(_members(scene.constraints)), Derived()
+    if any(isinstance(force, SceneLaw) for force in scene.forces):
+        derived.handles = Handles(scene.bodies, list(where.values()), members, scene.forces)
+        derived.handles.add_aliases((scene._aliases or {}).items())
+    forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals, derived.handles)
     _append_programs(motions, reals)
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
@@ -477,11 +500,10 @@ def pack(scene):
     )
     coordinates = tuple(constraint.coordinates for constraint in primitives)
     size = size_of(primitives, coordinates)
-    members = tuple(_members(scene.constraints))
     order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
     slots = tuple(order.get(constraint, -1) for constraint in primitives)
     given = tuple(parameters.values())
-    return Packed(system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, Derived())
+    return Packed(system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, derived)
 
 
 def _segments(primitives, where):
@@ -598,8 +620,15 @@ def user_functions(packed):
         for value in load.parameters:
             if isinstance(value, Signal) and value.is_function:
                 yield value, (value.source,)
-        if hasattr(load.force, "function_of_state"):
+        if hasattr(load.force, "function_of_state") and (load.law is None or load.law.traced):
             yield load.force, (load.force.function_of_state,)
+
+
+def called_functions(packed):
+    """The functions that Python calls during a run: of sampled loads, and laws of the scene that aren't traced."""
+    forces = [load.force for load in packed.loads if load.law is not None and not load.law.traced]
+    sampled = [load.force for load in packed.loads if getattr(load.force, "period", None) is not None]
+    return [getattr(force, force.given) for force in dict.fromkeys((*forces, *sampled))]
 
 
 def second_derivatives(basis_free):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..jit.kernels import ANY, callback, caller, matrix, vector
+from ..jit.kernels import ANY, callback, caller, kernel, matrix, vector
 from ..maths.recurrences import square
 from .elementary import time
 from .expressions import FUNCTIONS, OPERATIONS, Smooth, constant, evaluate, ordered
@@ -112,10 +112,10 @@ def of_time(function: Any, width: int) -> tuple[Smooth, ...]:
     twin, plain = retold(function), getattr(function, "py_func", function)
     found = traced(lambda: np.reshape(np.array(twin(Symbol(time)), object), width), (), width)
     for t in TIMES:
-        expected = _tried(plain, t)
+        expected = tried(plain, t)
         if expected is not None:
             with np.errstate(all="ignore"):
-                _demand_near([motion(t) for motion in found], np.reshape(expected, width))
+                demand_near([motion(t) for motion in found], np.reshape(expected, width))
     return tuple(found)
 
 
@@ -144,13 +144,13 @@ def demand_same(results: list[Smooth], call: Any, counts: tuple[int, ...]) -> No
     rng = np.random.default_rng(0)
     for _ in range(2):
         given = [rng.uniform(0.5, 1.5, n) for n in counts]
-        expected = _tried(call, *given)
+        expected = tried(call, *given)
         if expected is not None:
             with np.errstate(all="ignore"):
-                _demand_near(evaluate(results, np.concatenate(given)), expected)
+                demand_near(evaluate(results, np.concatenate(given)), expected)
 
 
-def _tried(call, *arguments):
+def tried(call: Any, *arguments: Any) -> np.ndarray | None:
     """The values of a user's function, an array; None where it raises."""
     try:
         with np.errstate(all="ignore"):
@@ -159,7 +159,8 @@ def _tried(call, *arguments):
         return None
 
 
-def _demand_near(values, expected):
+def demand_near(values: Any, expected: Any) -> None:
+    """Refuse values that are not those expected."""
     for one, other in zip(values, expected, strict=True):
         if math.isfinite(other) and not abs(one - other) <= SAME_VALUE * (1.0 + abs(other)):
             raise Untraceable("it depends on more than its arguments")
@@ -173,7 +174,7 @@ def retold(function: Any, known: dict[int, Any] | None = None) -> Any:
     plain, known = getattr(function, "py_func", function), {} if known is None else known
     if id(plain) in known:
         return known[id(plain)]
-    names = _names(plain.__code__)
+    names = names_of(plain.__code__)
     own = dict(plain.__globals__)
     copy = FunctionType(plain.__code__, own, plain.__name__, plain.__defaults__, _cells(plain, known))
     copy.__kwdefaults__ = plain.__kwdefaults__
@@ -187,9 +188,9 @@ def _cells(plain, known):
     return None if closure is None else tuple(CellType(_replaced(cell.cell_contents, known)) for cell in closure)
 
 
-def _names(code):
+def names_of(code: CodeType) -> set[str]:
     """The names that a function and those inside it look up."""
-    inner = (_names(constant) for constant in code.co_consts if isinstance(constant, CodeType))
+    inner = (names_of(constant) for constant in code.co_consts if isinstance(constant, CodeType))
     return set(code.co_names).union(*inner)
 
 
@@ -268,10 +269,9 @@ SIGNATURE = "ppiii"  # program, rows, how many, coefficients of a row, k
 call_order = caller(SIGNATURE)
 
 
-@callback(SIGNATURE)
-def run_order(program, rows, count, orders, k):
-    """Order k of the rows after the inputs, then of the results, in rows from `place` on."""
-    p, s = vector(program, ANY), matrix(rows, count, orders)
+@kernel
+def run_rows(p, s, k):
+    """Order k of the rows after the inputs, then of the results, in rows from `place` on; p is the program."""
     constants, results, place = int(p[CONSTANTS]), int(p[RESULTS]), int(p[PLACE])
     for i in range(0 if k == 0 else int(p[FIXED]), int(p[COUNT])):
         at = HEAD + STEP * i
@@ -286,6 +286,12 @@ def run_order(program, rows, count, orders, k):
             operate(p, at, constants, s, p[T], k)
     for i in range(int(p[GIVEN])):
         s[place + i, k] = s[int(p[results + i]), k]
+
+
+@callback(SIGNATURE)
+def run_order(program, rows, count, orders, k):
+    """The same of rows (count, orders), all given by address."""
+    run_rows(vector(program, ANY), matrix(rows, count, orders), k)
     return 0
 
 

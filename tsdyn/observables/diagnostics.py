@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
+from ..elements.bodies import IDENTITY, rotation_matrix
 from ..elements.markers import PARAMETERS, POINT, TURN
 from ..jit.kernels import twin
 from ..maths.power_series import Jet
+from ..model.kinematics import angular_velocity
 from ..motions.prescribed import Motion
 
 if TYPE_CHECKING:
@@ -173,11 +174,6 @@ def body_motions(system, q, qd):
                 omega = angular_velocity(p, pd)
             r, rd = (x[:, at + np.arange(3)] for x in (q, qd))
             yield Motions(system.mass[some], system.inertia[some].reshape(-1, 3, 3), r, rd, p, omega)
-
-
-def angular_velocity(p, pd):
-    """omega' = 2 G(p) pd, shapes (..., 4) -> (..., 3); of pdd it gives the angular acceleration, as 2 Gd pd = 0."""
-    return 2.0 * np.einsum("...ij,...j->...i", transform_g(p), pd)
 
 
 def kinetic_energy(system, q, qd):

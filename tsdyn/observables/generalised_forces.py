@@ -6,6 +6,7 @@ import numpy as np
 
 from ..elements.bodies import transform_g
 from ..elements.element import AngleGeometry
+from ..elements.laws import SceneLaw
 from ..elements.loads import STATE, ByState
 from ..jit.kernels import entry
 from ..maths.vectors import to_ground
@@ -77,11 +78,23 @@ def _turned(p, system, x):
     return np.einsum("kbji,kbj->kbi", G, np.einsum("bij,kbj->kbi", J, y))
 
 
+def law_values(solution, load):
+    """The values (k, values) that the function of a law of the whole scene has given."""
+    law = load.law
+    if law.held:
+        return solution._memory[:, load.slot : load.slot + law.values].copy()
+    rows = zip(solution.t.tolist(), solution.q, solution.qd, solution.angles, strict=True)
+    found = [law.evaluate(t, q.copy(), qd.copy(), angles, load.parameters) for t, q, qd, angles in rows]
+    return np.reshape(found, (solution.t.size, law.values))
+
+
 # What a user's function of a force raises at a state: kernels make nan of it, plain Python says which exception.
 
 
 def raised(packed, force, t, q, qd):
     """The exception that a function of a force raises at a state; None where it raises none."""
+    if isinstance(force, SceneLaw):
+        return _raised_by_law(packed, force, t, q, qd)
     for name in type(force).loads:
         given, arguments = getattr(force, name, None), (float(t),)
         if isinstance(given, Signal) and given.is_function:
@@ -97,6 +110,16 @@ def raised(packed, force, t, q, qd):
             return ZeroDivisionError(str(error)).with_traceback(error.__traceback__)
         except Exception as error:
             return error
+    return None
+
+
+def _raised_by_law(packed, force, t, q, qd):
+    handles, law = handles_of(packed), next(load.law for load in packed.loads if load.force is force)
+    try:
+        with np.errstate(all="ignore"):
+            law.evaluate(float(t), q, qd, handles.angles_at_start(t, q), force.parameters())
+    except Exception as error:
+        return error
     return None
 
 
@@ -179,6 +202,6 @@ def _struck(packed, Q):
 
 def _strikes(packed, load, struck, state):
     """Whether a force is not finite; forces on other bodies than those struck aren't evaluated."""
-    if not struck & {id(load.force.a), id(load.force.b)}:
+    if not struck.intersection(map(id, load.force.bodies)):
         return False
     return not np.isfinite(force_loads(packed.system._replace(forces=load.alone), *state)).all()

@@ -133,8 +133,16 @@ class Slices:
         else:
             status, self.reason = self.watch.advance(self.memory, log, rows)
         seconds = time.perf_counter() - started
+        self._note_interrupts()
         self._end_slice(status)
         return seconds
+
+    def _note_interrupts(self):
+        """A Ctrl-C that came while Python called a law."""
+        for load in self.task.prepared.packed.loads:
+            if load.law is not None and load.law.interrupted:
+                load.law.interrupted = False
+                raise KeyboardInterrupt
 
     def _go_on(self, first):
         """From the end of a first slice."""
@@ -324,28 +332,38 @@ class Sampling:
             force = load.force
             if t > self.last[i] and (not self.begun or is_due(t, force.period)):
                 angles, self.last[i] = memory.run.remembered[: self.handles.count], t
-                value = self._value(force, t, (q, qd), angles)
-                memory.context.system.reals[self.packed.system.memory[load.slot]] = value
-                memory.run.remembered[self.handles.count + load.slot] = value
+                values = self._values(load, t, (q, qd), angles)
+                slots = np.arange(load.slot, load.slot + len(values))
+                memory.context.system.reals[self.packed.system.memory[slots]] = values
+                memory.run.remembered[self.handles.count + slots] = values
         self.begun = True
 
-    def _value(self, force, t, levels, angles):
-        """Value of a force's function; angles are the approximate ones that the run has counted."""
+    def _values(self, load, t, levels, angles):
+        """Values of a force's function; angles are the approximate ones that the run has counted."""
+        force, law = load.force, load.law
+        try:
+            if law is None:
+                given = [force.function(t, *self._coordinate(force, levels, angles))]
+            else:
+                given = law.evaluate(t, *levels, angles.copy(), load.parameters)
+        except Exception as error:
+            raise Failed(
+                f"{force.name}: its function raised {type(error).__name__} at t = {t:.9g} s: {str(error).rstrip('.')}."
+            ) from error
+        values = [number(value) for value in given]
+        if not all(map(math.isfinite, values)):
+            shown = given[0] if law is None else given
+            raise Failed(f"{force.name}: its function must return a finite number; at t = {t:.9g} s it gave {shown!r}.")
+        return values
+
+    def _coordinate(self, force, levels, angles):
+        """The coordinate of a force's joint, and its rate."""
         row = self.handles.row(force.joint, force.coordinate)
         evaluate, geometry = getattr(handles, force.coordinate), force.geometry
         x, rate = (float(evaluate(geometry, *self.handles.motions(geometry, levels), level)) for level in (0, 1))
         if force.coordinate == "angle":
             x = float(handles.counted(x, angles[row.first + force.which]))
-        try:
-            given = force.function(t, x, rate)
-        except Exception as error:
-            raise Failed(
-                f"{force.name}: its function raised {type(error).__name__} at t = {t:.9g} s: {str(error).rstrip('.')}."
-            ) from error
-        value = number(given)
-        if not math.isfinite(value):
-            raise Failed(f"{force.name}: its function must return a finite number; at t = {t:.9g} s it gave {given!r}.")
-        return value
+        return x, rate
 
 
 class Sampled:

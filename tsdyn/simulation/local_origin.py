@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from ..elements.bodies import Ground
+from ..elements.laws import LawKernels
 from ..elements.loads import FunctionKernels
 from ..elements.markers import POINT
 from ..jit.code_hash import is_ours
@@ -98,7 +99,7 @@ def _sees_differences(packed):
     items = [*packed.constraints, *(load.force for load in packed.loads)]
     joined = packed.loads or not all(constraint.normalises for constraint in packed.constraints)
     own = joined and all(is_ours(type(item).__module__) for item in items)
-    return own and not any(isinstance(load.force.kernels, FunctionKernels) for load in packed.loads)
+    return own and not any(isinstance(load.force.kernels, (FunctionKernels, LawKernels)) for load in packed.loads)
 
 
 def run_near(driver, task, scene, origin, tol):

@@ -18,6 +18,7 @@ from ..docstrings import SECTION
 from ..elements.bodies import Attribute, PointMass
 from ..elements.element import checked_parameters
 from ..elements.joint import Joint
+from ..elements.laws import SceneLaw
 from ..errors import InvalidArgument, UnknownParameter
 from ..files.named_numbers import Numbers
 from ..files.types import Unwritable, encode
@@ -515,7 +516,7 @@ class Family:
         bodies = zip((template.ground, *template.bodies), (packed.bodies[0].scene.ground, *packed.bodies), strict=True)
         self._bodies = {id(body): own for body, own in bodies}
         self.loads = {id(force): i for i, force in enumerate(template._forces)}
-        self._structural = {}
+        self._structural, self._has_laws = {}, any(load.law is not None for load in packed.loads)
         self.begins = self._find_begins()
         self.reaches = [reaches_of(*pair) for pair in zip(packed.constraints, packed.coordinates, strict=True)]
 
@@ -549,9 +550,12 @@ class Family:
                 getattr(owner, "period", None) is not None
                 or (isinstance(owner, Joint) and not is_ours(type(owner).__module__))
                 or any(value is owner for item in items for value in vars(item).values())
+                or (self._has_laws and bool(owner.joint_coordinates))
             )
         if isinstance(owner, Joint):
             return known
+        if isinstance(owner, SceneLaw) and set(attributes) != {owner.given}:
+            return True
         places = [marker.argument for marker in owner.markers] if owner.joint_coordinates else []
         return known or hasattr(owner, "opposed") or any(name in places for name in attributes)
 

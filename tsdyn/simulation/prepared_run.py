@@ -367,12 +367,15 @@ class Run:
                 f"atol={atol:.2g} (safety factor {method.rtol / rtol:.3g})"
             )
         kernels = kernels_of(self.scene, method, self._form, True in self._compiled)
+        laws = {load.force.name: load.law for load in self._prepared.packed.loads if load.law is not None}
+        said = [f"{name} {law.said}" for name, law in laws.items()]
         return {
             "method": f"{method!r}: {why}",
             "steps": tolerances,
             "form": f"{options.formulation}; |Phi| to {options.constraint_tol:g} m, starts to {options.initial_tol:g}",
             "options": repr(options),
             "kernels": f"{len(kernels)}: {_listed(kernels)}",
+            **({"laws": "; ".join(said)} if said else {}),
         }
 
     def __str__(self) -> str:

@@ -21,11 +21,13 @@ from ..elements.bodies import IDENTITY, Body, Ground, PointMass, named
 from ..elements.element import admit, stop_waiting
 from ..elements.force import Force
 from ..elements.joint import Joint
+from ..elements.laws import SceneLaw
 from ..elements.primitive import Primitive
 from ..errors import InvalidArgument, InvalidBody, InvalidConstraint, StorageError
 from ..jit.code_hash import deep_hash
 from ..model.equations import demand_compilable
 from ..model.handles import handles_of
+from ..model.laws import seen_by
 from ..model.packed import pack, user_functions
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
@@ -373,6 +375,7 @@ class Scene:
                 "ts.forces.Spring(...)."
             )
         word, members = ("force", self._forces) if isinstance(item, Force) else ("constraint", self._added)
+        item.place_in(self)
         if not hasattr(item, "coordinates"):
             raise item.error(f"{type(item).__name__}: its __init__ must call super().__init__(...).")
         if item.scene is not self:
@@ -573,4 +576,8 @@ class Scene:
 
 def _marks(users):
     """Return the dependences of compiled user functions."""
-    return [deep_hash(function) for _, functions in users for function in functions]
+    return [
+        (seen_by if isinstance(owner, SceneLaw) else deep_hash)(function)
+        for owner, functions in users
+        for function in functions
+    ]

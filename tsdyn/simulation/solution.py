@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from ..calls import fitting, fitting_methods
-from ..errors import InvalidArgument, Status, StepFailure
+from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
+from ..model.kinematics import Anchor, Kinematics
 from ..observables import diagnostics, power, reactions
+from ..observables.generalised_forces import law_values
 from ..observables.power import driving_power, force_powers, power_of
 from ..observables.reactions import acted, exerted, member, multipliers, with_normal_loads
-from ..observables.state import Anchor, Kinematics, RememberingState
+from ..observables.state import RememberingState
 from ..validation import counted, floats
 from .records import Records
 from .stored_runs import RunOutputs
@@ -586,6 +588,23 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def constraint_error(self) -> ConstraintError:
         """Maximum norms of Eqs. 1-3 at every output, recomputed independently of the solver."""
         return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
+
+    def actuation(self, control: ItemLike) -> Floats:
+        """The values (k, actuators) of the function of a Control at the outputs; those held if it has a period.
+
+        Of a PointForce, Torque or UserForce by a function of the scene's state its components. Units are those of the
+        actuators: N, N m.
+
+        Raises
+        ------
+        InvalidForce
+            If it is none of these.
+        """
+        item = self.handles.item(control)
+        load = reactions.loads_of(self.packed).get(id(item))
+        if load is None or load.law is None:
+            raise InvalidForce(f"actuation: {control!r} is no Control of this scene, nor a load by the scene's state.")
+        return law_values(self, load)
 
     def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
         """Force (N) and torque (N m) that a constraint, a joint as a whole, or a force exerts: (k, 3) each.

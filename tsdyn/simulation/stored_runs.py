@@ -20,8 +20,9 @@ from ..errors import InvalidArgument, Status, StorageError
 from ..jit.cache import machine
 from ..jit.code_hash import is_ours, platform_hash
 from ..methods.integrator import is_own, registered
-from ..model.packed import user_functions
-from ..observables.state import Anchor, RememberingState, State, remembered
+from ..model.kinematics import Anchor
+from ..model.packed import called_functions, user_functions
+from ..observables.state import RememberingState, State, remembered
 from ..runs import run_log
 from ..runs.arguments import state_arrays
 from ..runs.run_log import RunEnd
@@ -441,7 +442,7 @@ def _facts(given, kept):
     events = given["events"]
     events = [] if events is None else [events] if callable(events) else list(events)
     functions = [function for _, several in user_functions(kept.packed) for function in several]
-    functions += [load.force.function for load in kept.packed.loads if getattr(load.force, "period", None) is not None]
+    functions += called_functions(kept.packed)
     return {
         **_here(),
         "scene": hash_of(kept.packed),
@@ -454,7 +455,9 @@ def _facts(given, kept):
 def hash_of(packed):
     """SHA-256 of the packed numbers, to the bit; without addresses."""
     digest = hashlib.sha256(repr([(body.name, body.dimension) for body in packed.bodies]).encode())
-    for name, array in packed.system._asdict().items():
+    reals = packed.system.reals.copy()
+    reals[[load.law.address for load in packed.loads if load.law is not None and load.law.address >= 0]] = 0.0
+    for name, array in packed.system._replace(reals=reals)._asdict().items():
         if not array.dtype.names:
             digest.update(f"{name} {array.shape} {array.dtype}".encode())
             digest.update(np.ascontiguousarray(array).tobytes())

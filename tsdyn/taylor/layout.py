@@ -221,6 +221,12 @@ def lay_out_forces(packed, orders):
             # Instances that run the same loop in one go
             members = list(group)
             force = members[0].force
+            if members[0].law is not None:
+                row, width = _lay_out_law(members[0], row, total, table, orders)
+                rows.append(row)
+                written.append((total, members[0].law.program))
+                total += width
+                continue
             kind = _kind(members)
             found = (address(force.kernels, name, force.name, InvalidForce) if name else 0 for name in kind.names)
             loop, check, margin = found
@@ -243,6 +249,15 @@ def lay_out_forces(packed, orders):
     for at, numbers in written:
         loads[at : at + len(numbers)] = numbers
     return ForceLayout(records(ForceSeries, rows), np.array(table, np.int64), loads, records(MotionSeries, drives))
+
+
+def _lay_out_law(load, kind, values, table, orders):
+    """The row of Expansion.forces of a law of the whole scene, and its floats: program, rows, Euler parameters."""
+    law, loop = load.law, address(load.force.kernels, "series", load.force.name, InvalidForce)
+    width = len(law.program) + -(-law.rows * orders // 4) * 4 + 4 * (orders + 1) * len(law.bodies)
+    row = [loop, values, width, 1, kind.stride, len(table), kind.reals, 0, 0, 0, 0, run_order.address, 0]
+    table += law.bodies
+    return row, width
 
 
 def _is_driven(load):
@@ -384,7 +399,7 @@ def lacking(packed):
         elif "series" not in constraint.kernels:
             found.append((constraint, f"{constraint._kind()} has no kernel `series`"))
     for load in packed.loads:
-        why = no_series(load.force, load.parameters)
+        why = no_series(load.force, load.parameters) if load.law is None else load.law.no_series
         if why:
             found.append((load.force, why))
     return found

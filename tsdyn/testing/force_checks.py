@@ -10,7 +10,7 @@ from ..elements.force import Force
 from ..errors import CheckFailed, InvalidForce
 from ..jit.kernels import entry, twin
 from ..maths.power_series import Truncated
-from ..model.equations import force_jacobian, set_time
+from ..model.equations import applied_forces, force_jacobian, set_time
 from ..model.packed import with_force_jacobians
 from ..motions.signals import Signal
 from ..observables.generalised_forces import force_loads
@@ -121,6 +121,7 @@ def _check_load(kind, name, x, reaction, par):
 def evaluate_force_jacobian(s, q, qd, t, Q_q, Q_qd, renew, kept):
     """Q_q, Q_qd (n, n) += the Jacobians of the forces; s is from `with_force_jacobians`."""
     set_time(s, t)
+    applied_forces(s, q, qd, t, kept)  # laws of the whole scene have derivatives where they were evaluated last
     force_jacobian(s, q, qd, t, Q_q, Q_qd, renew, kept)
 
 
@@ -131,7 +132,7 @@ def jacobians(packed, q, qd, t):
     Q_q, Q_qd = np.zeros((2, q.size, q.size))
     system.reals[system.normals] = 1.0
     if len(system.forces):
-        evaluate_force_jacobian(system, q, qd, float(t), Q_q, Q_qd, 1, np.zeros(size))
+        evaluate_force_jacobian(system, q, qd, float(t), Q_q, Q_qd, 1, np.zeros(max(size, q.size)))
     return Q_q, Q_qd
 
 

@@ -197,7 +197,7 @@ def check_force_series(scene, force, name, rng):
     """Check a force's `series`, if it has one that a run would use."""
     packed = scene.packed
     (load,), kind = packed.loads, type(force)
-    if no_series(force, load.parameters):
+    if load.law is not None or no_series(force, load.parameters):
         return
     q, t = random_motion(scene, rng), random_time(rng, 0.8)
     x, xd = along(scene, force, load.coordinates, q)

@@ -74,7 +74,7 @@ def marker_coefficient(code, bodies, at, orders, k, s):
 
 
 @kernel
-def _parameters_rate(bodies, omega, k, values, p, out, c):
+def parameters_rate(bodies, omega, k, values, p, out, c):
     """out[c : c + 4] = order k of pd, Eq. (1); p_0 is at values[p], omega'_0 at bodies[omega]."""
     d0, d1, d2, d3 = 0.0, 0.0, 0.0, 0.0
     for j in range(k + 1):
@@ -141,7 +141,7 @@ def series(run, k, kind, table, reals, bodies, values, poses, Z):
                 p = first + j * wide
                 if k == 0:
                     put(values, p, four(poses, own[OWNERS[j]] * POSE + P))
-                _parameters_rate(bodies, at + S_OMEGA * orders, k, values, p, xd, c)
+                parameters_rate(bodies, at + S_OMEGA * orders, k, values, p, xd, c)
                 put(values, p + 4 * k + 4, times(four(xd, c), splat(1.0 / (k + 1))))
                 put(x, c, four(values, p + 4 * k))
             elif CODES[j] == TURN:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.bodies import rotation_matrix, transform_g
-from .tolerances import CONSISTENT, TREE_RANK
+from .tolerances import INITIAL_TOL, TREE_RANK
 
 
 class Edge(NamedTuple):
@@ -47,7 +47,7 @@ class Tree:
             edge = Edge(constraint, tuple(ends), range(member.rows.start, member.rows.stop))
             whole = len(ends) == 2 and not any(constraint is each for each in cut)
             (edges if whole else self.loops).append(edge)
-        Phi, least = np.abs(metric.arrays(q)[0]), CONSISTENT * (1.0 + np.abs(q).max())
+        Phi, least = np.abs(metric.arrays(q)[0]), INITIAL_TOL * (1.0 + np.abs(q).max())
 
         def rank(edge):
             preferred = any(edge.constraint is each for each in first)

@@ -13,10 +13,10 @@ import numpy as np
 
 from ..drawing import save
 from ..errors import InvalidArgument, StepFailure
+from ..model.kinematics import Anchor, RememberingState
 from ..observables.channels import channels_of, values_of
 from ..observables.quintic import intervals, quintic, ranges
 from ..observables.reactions import multipliers
-from ..observables.state import Anchor, RememberingState
 from .axes import axes_of
 from .histories import finished
 from .tolerances import NO_TORQUE, RESOLVED

@@ -13,10 +13,11 @@ import numpy as np
 
 from ..drawing import save
 from ..errors import InvalidArgument, StepFailure
-from ..model.kinematics import Anchor, RememberingState
+from ..model.kinematics import Anchor
 from ..observables.channels import channels_of, values_of
 from ..observables.quintic import intervals, quintic, ranges
 from ..observables.reactions import multipliers
+from ..observables.state import RememberingState
 from .axes import axes_of
 from .histories import finished
 from .tolerances import NO_TORQUE, RESOLVED

@@ -209,7 +209,7 @@ def pack_forces(forces, where, table, reals, handles):
             (force,), slot = members, len(memory)
             law = Law(force, handles)
             count, stride = law.pack(table, reals, memory)
-            row = [force_address, 0, remember, count, stride, *first, 0]
+            row = [count, stride, 0, force_address, 0, remember, *first, 0]
             rows.append(row)
             slot = slot if len(memory) > slot else -1
             alone = records(ForceKind, [row])

@@ -25,8 +25,8 @@ from ..tolerances import FORCE_QUOTIENT
 from .constraint_rows import POSE, P
 from .constraint_series import BODY_ROW, S_OMEGA, S_R
 from .force_series import parameters_rate
-from .forces import FORCE_INTS
-from .template import AT, DIMENSION
+from .forces import FORCE_INTS, force_extent
+from .template import AT, DIMENSION, extent
 
 PAIR = 6  # floats at the end of the reals of an instance:
 # distance to the head; the two bodies, -1 for none; whether they have blocks with themselves; whether it is the first
@@ -232,13 +232,14 @@ def _first_row(head):
     return 1 + int(head[VALUES]) + own
 
 
-def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, renew, kept):
+def jacobian(kind, table, reals, q, qd, t, Q_q, Q_qd, renew, kept):
     """Q_q, Q_qd (n, n) += the blocks of some pairs, Eq. (2), at the state of the last evaluation of the forces.
 
     With `renew` the first pair evaluates u_x.
     """
     table, reals = integers(table, ANY), vector(reals, ANY)
-    Q_q, Q_qd = vector(Q_q, ANY), vector(Q_qd, ANY)
+    Q_q, Q_qd, kind = vector(Q_q, ANY), vector(Q_qd, ANY), force_extent(kind)
+    count, stride, n = kind.count, kind.stride, kind.columns
     for i in range(count):
         own, real = table[i * FORCE_INTS : (i + 1) * FORCE_INTS], reals[i * stride : (i + 1) * stride]
         head = reals[i * stride + int(real[stride + FORWARD]) :]
@@ -263,10 +264,11 @@ def jacobian(count, stride, table, reals, q, qd, t, n, Q_q, Q_qd, renew, kept):
     return 0
 
 
-def series(run, k, orders, count, stride, size, table, reals, bodies, values, poses, Z):
+def series(run, k, kind, table, reals, bodies, values, poses, Z):
     """Order k of the forces of a traced or sampled law, onto the bodies' Z; p_0 from the poses."""
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
     values, poses, Z = vector(values, ANY), vector(poses, ANY), vector(Z, ANY)
+    stride, orders = extent(kind).stride, extent(kind).orders
     head = reals[int(reals[stride + FORWARD]) :]
     rows, nb, n = int(head[ROW_COUNT]), int(head[BODIES]), int(head[COORDINATES])
     first, program = int(head[RESULTS]), int(values[LENGTH])

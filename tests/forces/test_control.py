@@ -1,4 +1,4 @@
-"""Laws that see the whole scene: Control, point loads and user forces of the scene's state, traced, called and sampled."""
+"""Laws that see the whole scene: Control, point loads and user forces by its state; traced, called, sampled."""
 
 import pickle
 
@@ -76,8 +76,11 @@ def test_cost_of_the_regulator_is_that_of_the_riccati_equation():
     assert abs(cost / (x[0] @ P @ x[0]) - 1.0) < LOOSE
 
 
+EXAMPLES = swing_up, computed_torque, active_suspension
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("example", [swing_up, computed_torque, active_suspension], ids=lambda each: each.__name__)
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda each: each.__name__)
 def test_examples(example, capsys):
     example.main()
     assert capsys.readouterr().out
@@ -101,7 +104,7 @@ def test_a_joint_and_a_point_are_pushed_alike():
 
 
 def test_every_actuator_is_the_force_that_it_is_named_after():
-    """All of them by a Control, against JointForce, JointTorque, Spring, PointForce and Torque with the same numbers."""
+    """By a Control, against JointForce, JointTorque, Spring, PointForce and Torque with the same numbers."""
 
     def scene_of(controlled):
         scene = cart(angle=0.3)

@@ -65,6 +65,7 @@ class SceneLaw:
     period: float | None = None
     given: str
     positive = ()
+    no_series = "its function can't be traced"
 
     @staticmethod
     def law(x, xd, par, t, out):

@@ -221,6 +221,8 @@ KINDS = {
     "VectorLoad": VECTOR,
     "Path": VECTOR,
     "JointLaw": FUNCTION,
+    "ControlLaw": FUNCTION,
+    "Actuators": NAMES,
 }
 
 

@@ -153,6 +153,11 @@ class Control(SceneLaw, Force):
             raise self.error(f"{self.name}: the actuator {item.name!r} {several}; {HOW}.")
         return item, *wanted[0]
 
+    @property
+    def referred(self) -> tuple[Any, ...]:
+        """Its actuators, and their bodies."""
+        return *super().referred, *(item for item, *_ in self._found), *self.bodies
+
     def actions(self) -> list[Action]:
         """What each value acts as."""
         return [_action(*actuator) for actuator in self._found]

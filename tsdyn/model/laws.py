@@ -338,13 +338,22 @@ class Law:
         except Exception:
             out[:] = math.nan
         except KeyboardInterrupt:
-            out[:], self.interrupted = math.nan, True
+            out[:] = math.nan
+            interrupts.append(self)
         return 0
-
-    interrupted = False  # by Ctrl-C, while the function was called
 
     def __getstate__(self):
         return {**self.__dict__, "_callback": None}
+
+
+interrupts = []  # laws whose functions were interrupted by Ctrl-C: kernels that call them pass no exception on
+
+
+def answer_interrupts():
+    """Raise KeyboardInterrupt where Ctrl-C came while a kernel called a law."""
+    if interrupts:
+        interrupts.clear()
+        raise KeyboardInterrupt
 
 
 def _view(given, count):

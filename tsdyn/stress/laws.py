@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..elements.bodies import rotation_matrix
+from ..elements.force import Force
 from ..elements.markers import POINT
 from ..model.equations import WIDTH, places, with_short_rows
 from ..observables.diagnostics import constraint_rows
@@ -277,7 +278,8 @@ def _neighbours(scene):
     """Constraints and forces of each body, by its id."""
     around = {id(body): [] for body in scene.bodies}
     for item in (*scene.constraints, *scene.forces):
-        for body in {id(body): body for body in (item.a, item.b)}.values():
+        bodies = item.bodies if isinstance(item, Force) else (item.a, item.b)
+        for body in {id(body): body for body in bodies}.values():
             around.get(id(body), []).append(item)
     return around
 

@@ -140,6 +140,33 @@ SECTIONS = {
         Entry("screw_press", "Screw press", 1.5, "platen (m)", lambda m, s: s.position("platen")[:, 2]),
         Entry("stick_slip", "Stick-slip", 2.0, "slide (m)", lambda m, s: s.position("slide")[:, 0]),
     ),
+    "Control": (
+        Entry(
+            "swing_up",
+            "Swing-up of a double pendulum on a cart",
+            12.0,
+            "hip, knee (rad)",
+            lambda m, s: np.stack([s.angle("hip"), s.angle("knee")], axis=1),
+            (0.0, 0.62, 1.0),
+            build="controlled",
+        ),
+        Entry(
+            "computed_torque",
+            "Computed torque of a five-bar robot",
+            1.6,
+            "beside the path, x and z (m)",
+            lambda m, s: m.error(s)[0][:, [0, 2]],
+            (0.0, 0.4),
+            build="controlled",
+        ),
+        Entry(
+            "active_suspension",
+            "Active suspension of a quarter car",
+            6.0,
+            "body, wheel (m)",
+            lambda m, s: np.stack([s.displacement("body guide"), s.displacement("wheel guide")], axis=1),
+        ),
+    ),
     "Plug-ins and studies": (
         Entry("bead_on_surface", "A constraint of your own", 5.0, "bead (m)", lambda m, s: s.position("bead")),
         Entry(

@@ -23,7 +23,7 @@ from tsdyn.stress.random_scenes import generate
 
 ROOT = Path(__file__).parents[2]
 MODULES = [importlib.import_module(f"examples.{module.name}") for module in pkgutil.iter_modules(examples.__path__)]
-FUNCTIONS = {"drive_train": "torque"}  # of users: what is a function in build()
+FUNCTIONS = {"drive_train": "torque", "active_suspension": "force"}  # of users: what is a function in build()
 SCENES = {module.__name__.partition(".")[2]: module.build for module in MODULES if hasattr(module, "build")}
 SCENES = {name: build for name, build in SCENES.items() if name not in FUNCTIONS}
 GALLERY = {case.name: case.build for case in CASES if "500" not in case.name}

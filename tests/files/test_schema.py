@@ -19,7 +19,7 @@ def test_every_class_of_data_is_in_it():
     kinds = [found[key]["items"]["oneOf"][:-1] for key in ("constraint", "force")]  # the last one is that of plug-ins
     names = {kind["properties"]["type"]["const"] for several in kinds for kind in several}
     known = {kind.__name__ for kind in (*PRIMITIVES, *JOINTS, *FORCES)}
-    assert known - names == {"EulerNormalization", "JointTorque", "JointForce", "UserForce"}
+    assert known - names == {"EulerNormalization", "JointTorque", "JointForce", "UserForce", "Control"}
 
 
 def test_a_plain_run_imports_nothing_of_it():

@@ -78,7 +78,7 @@ CASES = {
     ),
     "nothing in Coulomb friction": (lambda w: F.CoulombFriction(w.a, w.b), "force or torque"),
     "slip velocity of zero": (lambda w: F.CoulombFriction(w.a, w.b, force=1, slip_velocity=0), "slip_velocity must be"),
-    "user function of four": (lambda w: F.UserForce(w.a, function=lambda t, a, b, out: None), "five arguments"),
+    "user function of three": (lambda w: F.UserForce(w.a, function=lambda t, a, out: None), "five arguments"),
     "user parameters of text": (lambda w: F.UserForce(w.a, function=five, parameters="x"), "finite numbers"),
     "force of nothing": (lambda w: ts.Force(w.a), "base of forces"),
     "user force on nothing": (lambda w: F.UserForce(None, function=five), "is not a body"),

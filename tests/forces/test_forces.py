@@ -265,7 +265,7 @@ def test_one_function_is_compiled_once(rng):
     assert len(scene.system.forces) == 1
 
 
-INTERNAL = [kind for kind in FORCES if kind not in (F.PointForce, F.Torque)]
+INTERNAL = [kind for kind in FORCES if kind not in (F.PointForce, F.Torque, F.Control)]
 
 
 @pytest.mark.slow_for("UserForce", "*Friction")

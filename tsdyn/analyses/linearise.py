@@ -103,7 +103,8 @@ def _loads_of(variations, item):
             Input(item.name + axis, *variations.load(item.a, point, e, item.frame))
             for axis, e in zip(AXES, np.eye(3), strict=True)
         ]
-    rows = [row for row in variations.handles.rows if row.item is item and not isinstance(item, Force)]
+    own = variations.handles.own(item)  # of the scene whose numbers vary
+    rows = [row for row in variations.handles.rows if row.item is own and not isinstance(item, Force)]
     found = [Input(one.name, one.columns, one.jet[0]) for row in rows for one in variations.of_row(row)]
     if not found:
         raise InvalidArgument(
@@ -158,7 +159,8 @@ def _of(scene, variations, given, coordinates):
     if isinstance(item, PointMass):
         found = variations.of_body(item)[:3]
     else:
-        found = [one for row in variations.handles.rows if row.item is item for one in variations.of_row(row)]
+        own = variations.handles.own(item)
+        found = [one for row in variations.handles.rows if row.item is own for one in variations.of_row(row)]
     if not found:
         raise InvalidArgument(
             f"{item.name} has no coordinate: give a joint with an angle or a displacement, or a body."

@@ -443,6 +443,11 @@ class Attachment:
         """Raise an error where an attribute has an impossible value; asked again when one is set."""
 
     @property
+    def referred(self) -> tuple[Any, ...]:
+        """What it refers to, among other things: its bodies, a joint."""
+        return tuple(vars(self).values())
+
+    @property
     def scene(self) -> Scene:
         """The scene of its bodies."""
         return self.a.scene

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dis
 from types import FunctionType, MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..jit.kernels import Callback
 from ..motions.signals import numbers_of, starred
+from ..motions.tracing import names_of
 from ..validation import positive
 from .loops import laws as loops
 from .loops.constraint_series import SIGNATURE as SERIES
@@ -63,6 +65,7 @@ class SceneLaw:
     period: float | None = None
     given: str
     positive = ()
+    no_series = "its function can't be traced"
 
     @staticmethod
     def law(x, xd, par, t, out):
@@ -139,21 +142,32 @@ def instants(value: Any, what: str, error: Any) -> float | None:
     return None if value is None else positive(value, f"{what} (s)", error)
 
 
-def sees_scene(function: Function) -> bool:
-    """Whether a function of (t, state) asks its second argument for a method or an attribute, as state.angle(...).
+def sees_scene(function: Function, known: tuple[Any, ...] = ()) -> bool:
+    """Whether a function, or one that it calls by name, asks an argument for a method of a state: state.angle(...).
 
     It then gets the state of the scene; one that doesn't gets the array of its own body.
     """
-    code = getattr(function, "py_func", function).__code__
-    if code.co_argcount < 2:
+    plain, before = getattr(function, "py_func", function), None
+    if not isinstance(plain, FunctionType) or plain in known:
         return False
-    state, before = code.co_varnames[1], None
+    code = plain.__code__
     for each in dis.get_instructions(code):
-        if each.opname in ("LOAD_ATTR", "LOAD_METHOD") and before == state and each.argval in METHODS:
+        asks = each.opname in ("LOAD_ATTR", "LOAD_METHOD") and each.argval in METHODS
+        if asks and before in code.co_varnames[: code.co_argcount]:
             return True
         loads = each.opname.startswith(("LOAD_FAST", "LOAD_DEREF"))
         before = (each.argval[-1] if isinstance(each.argval, tuple) else each.argval) if loads else None
-    return False
+    return any(sees_scene(each, (*known, plain)) for each in captured(plain))
+
+
+def captured(plain: FunctionType) -> list[Any]:
+    """The values that a plain function looks up beyond its arguments: of its closure, and globals by name."""
+    found = []
+    for cell in plain.__closure__ or ():
+        with contextlib.suppress(ValueError):  # an empty cell
+            found.append(cell.cell_contents)
+    names = names_of(plain.__code__)
+    return found + [plain.__globals__[name] for name in sorted(names) if name in plain.__globals__]
 
 
 METHODS = frozenset(

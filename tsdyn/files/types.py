@@ -222,6 +222,8 @@ KINDS = {
     "VectorLoad": VECTOR,
     "Path": VECTOR,
     "JointLaw": FUNCTION,
+    "ControlLaw": FUNCTION,
+    "Actuators": NAMES,
 }
 
 

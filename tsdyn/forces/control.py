@@ -107,21 +107,21 @@ class Control(SceneLaw, Force):
         if isinstance(actuators, str) or not isinstance(actuators, (list, tuple)) or not actuators:
             raise self.error(f"{self.name}: actuators must be a list of one or more, got {actuators!r}; {HOW}.")
         self.function, self.period = function, period
-        self.__dict__.update(_given=tuple(actuators), _name=given)
+        self.__dict__.update(actuators=tuple(actuators), _name=given)
         known = [scene for one in actuators if (scene := getattr(_item(one), "scene", None)) is not None]
         if known:
             self.place_in(known[0])
 
     def place_in(self, scene: Any) -> None:
         """Find the actuators in their scene."""
-        if "actuators" in self.__dict__:
+        if "_found" in self.__dict__:
             return
-        self.__dict__["actuators"] = tuple(self._actuator(scene, given) for given in self._given)
+        self.__dict__["_found"] = tuple(self._actuator(scene, given) for given in self.actuators)
         (first, *_), name = self.bodies or (None,), self._name
         super().__init__(first, None, name=name)
 
     def _untitled(self, bodies):
-        return f"Control({', '.join(item.name for item, *_ in self.actuators)})"
+        return f"Control({', '.join(item.name for item, *_ in self._found)})"
 
     def _actuator(self, scene, given):
         """(item, kind of coordinate, which); of a Spring, a PointForce or a Torque the item alone."""
@@ -153,9 +153,14 @@ class Control(SceneLaw, Force):
             raise self.error(f"{self.name}: the actuator {item.name!r} {several}; {HOW}.")
         return item, *wanted[0]
 
+    @property
+    def referred(self) -> tuple[Any, ...]:
+        """Its actuators, and their bodies."""
+        return *super().referred, *(item for item, *_ in self._found), *self.bodies
+
     def actions(self) -> list[Action]:
         """What each value acts as."""
-        return [_action(*actuator) for actuator in self.actuators]
+        return [_action(*actuator) for actuator in self._found]
 
     @classmethod
     def example(cls, rng, a, b):

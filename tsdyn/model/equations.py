@@ -20,7 +20,7 @@ from ..motions.program import HOLD, call_smooth
 from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
 from .handles import handles_of
-from .laws import demand_callable
+from .laws import answer_interrupts, demand_callable
 
 call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
 call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
@@ -292,6 +292,7 @@ def sampled_loads(packed, kinds, t):
             _sample(own, q + move, qd + move, t, at, np.zeros(q.size), out)
             if move is not near or np.isfinite(out).all():
                 found.append((force.title, out))
+    answer_interrupts()
     return found
 
 

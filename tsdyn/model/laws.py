@@ -11,6 +11,7 @@ import numpy as np
 
 from ..elements.bodies import Ground, PointMass
 from ..elements.element import Attachment
+from ..elements.laws import captured
 from ..elements.loops import laws as loops
 from ..errors import InvalidArgument, TsdynError
 from ..jit.from_kernels import PythonCallback
@@ -23,7 +24,6 @@ from ..motions.tracing import (
     Writer,
     demand_near,
     may_change,
-    names_of,
     nodes,
     retold,
     traced,
@@ -338,13 +338,22 @@ class Law:
         except Exception:
             out[:] = math.nan
         except KeyboardInterrupt:
-            out[:], self.interrupted = math.nan, True
+            out[:] = math.nan
+            interrupts.append(self)
         return 0
-
-    interrupted = False  # by Ctrl-C, while the function was called
 
     def __getstate__(self):
         return {**self.__dict__, "_callback": None}
+
+
+interrupts = []  # laws whose functions were interrupted by Ctrl-C: kernels that call them pass no exception on
+
+
+def answer_interrupts():
+    """Raise KeyboardInterrupt where Ctrl-C came while a kernel called a law."""
+    if interrupts:
+        interrupts.clear()
+        raise KeyboardInterrupt
 
 
 def _view(given, count):
@@ -374,9 +383,8 @@ def seen_by(function, known=()):
     plain = getattr(function, "py_func", function)
     if plain in known:
         return ()
-    cells = [cell.cell_contents for cell in plain.__closure__ or ()]
-    values = [*cells, *(plain.__globals__[name] for name in names_of(plain.__code__) if name in plain.__globals__)]
-    return plain.__code__.co_code, str(plain.__code__.co_consts), *(_seen(value, (*known, plain)) for value in values)
+    seen = (_seen(value, (*known, plain)) for value in captured(plain))
+    return plain.__code__.co_code, str(plain.__code__.co_consts), *seen
 
 
 def _seen(value, known):

@@ -296,8 +296,6 @@ def find_forces(system, loads):
             for name in ("force", "jacobian", "remember"):
                 alone[name] = row[name]
             rows[id(load)] = load._replace(alone=alone)
-            if load.law is not None and load.law.address >= 0:
-                system.reals[load.law.address] = load.law.callback
             for value in load.parameters:
                 for _ in range(max(len(value.motions), 1) if isinstance(value, Signal) else 0):
                     next(signals).address = value.address
@@ -439,6 +437,9 @@ class Packed(NamedTuple):
 def _found_again(process, *parts):
     """A `Packed` from a pickle, its addresses those of this process."""
     packed = Packed(*parts)
+    for load in packed.loads:
+        if load.law is not None and load.law.address >= 0:
+            packed.system.reals[load.law.address] = load.law.callback
     if process == os.getpid():
         return packed
     system = packed.system

@@ -248,7 +248,7 @@ class Signal:
         try:
             return [f(t) for f in self.smooth if f.may_change]
         except Untraceable:
-            out = np.empty((t.size, self.width))
+            out = np.full((t.size, self.width), math.nan)  # a function that raises sets the first value alone
             sample_signal(self.address, t, out)
             return [*out.T]
 

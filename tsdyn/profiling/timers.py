@@ -278,7 +278,8 @@ def _body_loop(count, stride, table, reals, poses, unused, t, out, H):
 def _series(mode, k, kind, table, reals, bodies, values, b, Z):
     header = integers(table - 8 * HEADER, HEADER)
     notes = integers(header[T_NOTES], ANY)
-    _enter(notes, header[T_SLOT] + (IN_ORDERS + mode) * ROLES, ROWS)
+    part = mode if mode < LOOPS - IN_ORDERS else 0  # of a force it is the address of what runs its program
+    _enter(notes, header[T_SLOT] + (IN_ORDERS + part) * ROLES, ROWS)
     status = call_series(header[T_LOOPS + IN_ORDERS], mode, k, kind, table, reals, bodies, values, b, Z)
     _leave(notes)
     return status

@@ -133,16 +133,8 @@ class Slices:
         else:
             status, self.reason = self.watch.advance(self.memory, log, rows)
         seconds = time.perf_counter() - started
-        self._note_interrupts()
         self._end_slice(status)
         return seconds
-
-    def _note_interrupts(self):
-        """A Ctrl-C that came while Python called a law."""
-        for load in self.task.prepared.packed.loads:
-            if load.law is not None and load.law.interrupted:
-                load.law.interrupted = False
-                raise KeyboardInterrupt
 
     def _go_on(self, first):
         """From the end of a first slice."""

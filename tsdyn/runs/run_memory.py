@@ -8,6 +8,7 @@ from ..errors import Status
 from ..jit.interrupts import interruptible
 from ..jit.kernels import callback, resident
 from ..methods.explicit import ACCELERATE, PLACE
+from ..model.laws import answer_interrupts
 from ..rows.interface import reset_selection, selection_parts
 from ..workspaces import FILLED, STORED, divided, enter_joints, hold, words
 from .arguments import step_count
@@ -265,7 +266,9 @@ class Memory:
         arguments = self._context, self._run, log, most
         # Short steps: Ctrl-C waits for the end of a slice
         if self.weight < LONG_STEPS:
-            return STATUSES[self.advance_kernel(*arguments)]
+            status = STATUSES[self.advance_kernel(*arguments)]
+            answer_interrupts()
+            return status
         if not self.run.numbers.begun and most > 0:
             status = self.advance(log, -1)
             if not self.run.numbers.begun:

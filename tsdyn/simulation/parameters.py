@@ -549,7 +549,7 @@ class Family:
             known = self._structural[id(owner)] = (
                 getattr(owner, "period", None) is not None
                 or (isinstance(owner, Joint) and not is_ours(type(owner).__module__))
-                or any(value is owner for item in items for value in vars(item).values())
+                or any(value is owner for item in items for value in item.referred)
                 or (self._has_laws and bool(owner.joint_coordinates))
             )
         if isinstance(owner, Joint):

@@ -109,7 +109,7 @@ def _users(scene, item):
     return [
         other
         for other in (*scene._added, *scene._forces)
-        if other is not item and any(value is item for value in vars(other).values())
+        if other is not item and any(value is item for value in other.referred)
     ]
 
 

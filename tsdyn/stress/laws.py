@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..elements.bodies import rotation_matrix
+from ..elements.force import Force
 from ..elements.markers import POINT
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, ROUNDING_AT_MOST, SUM_ROUNDING
 from ..model.equations import WIDTH, places, with_short_rows
@@ -273,7 +274,8 @@ def _neighbours(scene):
     """Constraints and forces of each body, by its id."""
     around = {id(body): [] for body in scene.bodies}
     for item in (*scene.constraints, *scene.forces):
-        for body in {id(body): body for body in (item.a, item.b)}.values():
+        bodies = item.bodies if isinstance(item, Force) else (item.a, item.b)
+        for body in {id(body): body for body in bodies}.values():
             around.get(id(body), []).append(item)
     return around
 

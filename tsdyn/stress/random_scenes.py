@@ -480,7 +480,24 @@ def turns(rng, scene):
         scene.add(forces.TorsionalSpring.at(scene.ground, body, axis=axis, stiffness=rng.uniform(0.1, 3.0)))
 
 
-PASSAGES = anchors, anchors, anchors, pendulum, loads, loads, of_time, friction, turns
+def control(rng, scene):
+    """A double pendulum; torque at one joint and force on a point, each by both joints and the height of the tip."""
+    lower = scene.add_body(1.0, (0.1, 0.12, 0.15), (0.5, 0.0, 0.0), name="lower")
+    upper = scene.add_body(0.7, (0.1, 0.12, 0.15), (1.5, 0.0, 0.0), name="upper")
+    scene.add(joints.Revolute.at(scene.ground, lower, point=(0, 0, 0), axis=(0, 1, 0), name="hip"))
+    scene.add(joints.Universal.at(lower, upper, point=(1, 0, 0), axis_a=(0, 1, 0), axis_b=(0, 0, 1), name="knee"))
+    gains = rng.normal(size=(2, 5))
+
+    def law(t, state):
+        angles, rates = state.angle("knee"), state.angle_rate("knee")
+        height = state.position("upper", (0.5, 0.0, 0.0))[2]
+        return gains @ np.array([state.angle("hip"), angles[0], rates[1], height, np.sin(t)])
+
+    push = forces.PointForce(upper, point_a=rng.normal(size=3), force=_unit(rng), frame="body")
+    scene.add(forces.Control(law, ["hip", push], period=rng.choice((None, 0.05))))
+
+
+PASSAGES = anchors, anchors, anchors, pendulum, loads, loads, of_time, friction, turns, control
 
 
 def draw(seed):

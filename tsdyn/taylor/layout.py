@@ -255,8 +255,9 @@ def _lay_out_law(load, kind, values, table, orders):
     """The row of Expansion.forces of a law of the whole scene, and its floats: program, rows, Euler parameters."""
     law, loop = load.law, address(load.force.kernels, "series", load.force.name, InvalidForce)
     width = len(law.program) + -(-law.rows * orders // 4) * 4 + 4 * (orders + 1) * len(law.bodies)
-    row = [loop, values, width, 1, kind.stride, len(table), kind.reals, 0, 0, 0, 0, run_order.address, 0]
-    table += law.bodies
+    count = -(-len(law.bodies) // force_series.INTS)  # entries of the table that its bodies fill
+    row = [loop, values, width, count, kind.stride, len(table), kind.reals, 0, 0, 0, 0, run_order.address, 0]
+    table += [*law.bodies, *[0] * (count * force_series.INTS - len(law.bodies))]
     return row, width
 
 

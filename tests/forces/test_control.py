@@ -1,0 +1,370 @@
+"""Laws that see the whole scene: Control, point loads and user forces by its state; traced, called, sampled."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_continuous_are
+
+import tsdyn as ts
+from examples import active_suspension, computed_torque, swing_up
+from tests.helpers.methods import one_of_each
+from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, LOOSE, NEAR, ROUGH, TIGHT
+
+C, F = ts.constraints, ts.forces
+K = np.array([2.0, 60.0, 4.0, 8.0])
+METHODS = one_of_each(tol=1e-10, step=0.002)
+
+
+def cart(force=None, angle=0.1):
+    """A rod on a cart; force: a function of the scene that makes one."""
+    scene = ts.Scene()
+    body = scene.add_body(**ts.shapes.box((0.4, 0.2, 0.1), mass=2.0), name="cart")
+    rod = scene.add_body(**ts.shapes.rod(0.5, axis="z", mass=0.3), position=(0, 0, 0.25), name="rod")
+    scene.add(C.Translational.at(scene.ground, body, point=(0, 0, 0), axis=(1, 0, 0), name="rail"))
+    scene.add(C.Revolute.at(body, rod, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    if force is not None:
+        scene.add(force(scene))
+    scene.set("hinge", angle=angle)
+    return scene
+
+
+def seen(state):
+    x, angle = state.displacement("rail"), state.angle("hinge")
+    return np.array([x, angle, state.displacement_rate("rail"), state.angle_rate("hinge")])
+
+
+def balance(t, state, *, gain=1.0):
+    return gain * (K @ seen(state))
+
+
+def clipped(t, state, *, gain=1.0):
+    return np.clip(gain * (K @ seen(state)), -1e3, 1e3)
+
+
+def on_rail(function, **options):
+    return lambda scene: F.Control(function, ["rail"], name="control", **options)
+
+
+# Against what is known
+
+
+@pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
+def test_poles_of_the_closed_loop_are_those_of_A_and_B_K(function):
+    A, B = cart(angle=0.0).linearise(inputs=["rail"]).state_space()[:2]
+    poles = cart(on_rail(function), angle=0.0).linearise().eigenvalues()
+    expected = np.linalg.eigvals(A + np.outer(B, K))
+    assert np.abs(np.sort_complex(poles) - np.sort_complex(expected)).max() < FINE
+
+
+def test_cost_of_the_regulator_is_that_of_the_riccati_equation():
+    A, B = swing_up.build().linearise(inputs=["rail"]).state_space()[:2]
+    Q, R = swing_up.COST, swing_up.EFFORT
+    P = solve_continuous_are(A, B, Q, R)
+    gains = np.linalg.solve(R, B.T @ P)
+    scene = swing_up.build()
+    scene.add(F.Control(lambda t, state: -gains @ swing_up.seen(state), ["rail"], name="regulator"))
+    scene.set("hip", angle=2e-5)
+    scene.set("knee", angle=-1e-5)
+    t = np.linspace(0.0, 20.0, 4001)
+    run = ts.simulate(scene, (0, 20), t_eval=t, rtol=1e-10, atol=1e-14)
+    states = [run.displacement("rail"), *map(run.angle, swing_up.JOINTS)]
+    x = np.column_stack([*states, run.displacement_rate("rail"), *map(run.angle_rate, swing_up.JOINTS)])
+    u = run.actuation("regulator")
+    rates = np.einsum("ki,ij,kj->k", x, Q, x) + np.einsum("ki,ij,kj->k", u, R, u)
+    cost = np.trapezoid(rates, t) if hasattr(np, "trapezoid") else np.trapz(rates, t)
+    assert abs(cost / (x[0] @ P @ x[0]) - 1.0) < LOOSE
+
+
+EXAMPLES = swing_up, computed_torque, active_suspension
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda each: each.__name__)
+def test_examples(example, capsys):
+    example.main()
+    assert capsys.readouterr().out
+
+
+def test_a_suspension_with_another_law_fails_the_check():
+    with pytest.raises(AssertionError):
+        active_suspension.check(active_suspension.run(1.01 * active_suspension.SKYHOOK))
+
+
+def test_a_joint_and_a_point_are_pushed_alike():
+    def push(t, state):
+        return balance(t, state), 0.0, 0.0
+
+    runs = [
+        ts.simulate(cart(make), (0, 1)) for make in (on_rail(balance), lambda s: F.PointForce(s["cart"], force=push))
+    ]
+    assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() < ALGEBRA
+    (joint, point) = (run.power for run in runs)
+    assert np.abs(joint - point).max() < NEAR * np.abs(joint).max()
+
+
+def test_every_actuator_is_the_force_that_it_is_named_after():
+    """By a Control, against JointForce, JointTorque, Spring, PointForce and Torque with the same numbers."""
+
+    def scene_of(controlled):
+        scene = cart(angle=0.3)
+        dot = scene.add_point_mass(mass=1.0, position=(0.5, 0.4, 0.8), name="dot")
+        spring = scene.add(F.Spring(scene["rod"], dot, point_a=(0, 0, 0.1), stiffness=20.0, name="spring"))
+        push = F.PointForce(scene["rod"], force=(1, 2, 3), point_a=(0.1, 0.2, 0.3), frame="body", name="push")
+        turn = F.Torque(scene["cart"], torque=(0.3, 0.1, 0.2), name="turn")
+        if controlled:
+            actuators = ["rail", scene["hinge"], ("hinge", "angle"), spring, push, turn]
+            scene.add(F.Control(lambda t, state: [1.0, 2.0, 0.5, 3.0, 4.0, 5.0], actuators))
+            return scene
+        spring.actuator = 3.0
+        scene.add(F.JointForce(scene["rail"], function=lambda t, x, v: 1.0))
+        scene.add(F.JointTorque(scene["hinge"], function=lambda t, x, v: 2.5))
+        push.force, turn.torque = 4.0 * push.force, 5.0 * turn.torque
+        scene.add(push)
+        scene.add(turn)
+        return scene
+
+    controlled, alone = (scene_of(controlled).evaluate().qdd for controlled in (True, False))
+    assert np.abs(controlled - alone).max() < HELD * np.abs(alone).max()
+
+
+def test_user_force_of_the_scene_acts_and_reacts():
+    def pull(t, state, par, out):
+        d = state.position("b") - state.position("a", (0.1, 0, 0))
+        out[:3] = par[0] * d
+        out[3:] = -0.1 * state.velocity("b")
+
+    def pull_by_arrays(t, a, b, par, out):
+        for i in range(3):
+            out[i] = par[0] * (b[i] - a[i])
+            out[3 + i] = -0.1 * b[7 + i]
+
+    found = []
+    for function in (pull, pull_by_arrays):
+        scene = ts.Scene()
+        a = scene.add_body(1.0, (1, 2, 2.5), angular_velocity=(1, 2, 3), name="a")
+        b = scene.add_body(2.0, (1, 1, 1), position=(1, 2, 3), velocity=(1, 0, 2), name="b")
+        scene.add(F.UserForce(a, b, function=function, point_a=(0.1, 0, 0), parameters=(2.0,)))
+        found.append(scene.evaluate().qdd)
+    assert np.abs(found[0] - found[1]).max() < ALGEBRA * np.abs(found[0]).max()
+
+
+# All methods and forms
+
+
+@pytest.mark.slow_but("dop853-balance")
+@pytest.mark.parametrize("function", [balance, clipped])
+@pytest.mark.parametrize("method", METHODS, ids=lambda each: type(each).__name__.lower())
+def test_methods_agree(method, function):
+    reference = ts.simulate(cart(on_rail(balance)), (0, 1), rtol=1e-12, atol=1e-12)
+    if function is clipped and isinstance(method, ts.integrators.Taylor):
+        with pytest.raises(ts.TsdynError, match="can't be traced, it compares"):
+            ts.simulate(cart(on_rail(function)), (0, 1), integrator=method)
+        return
+    run = ts.simulate(cart(on_rail(function)), (0, 1), integrator=method).raise_if_failed()
+    assert np.abs(run.q[-1] - reference.q[-1]).max() < ROUGH
+    assert max(error.max() for error in run.constraint_error) < HELD
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["null-space", "maggi-kane"])
+def test_formulations_agree(form):
+    reference = ts.simulate(cart(on_rail(balance)), (0, 1), rtol=1e-12, atol=1e-12)
+    for method in ("dop853", "sdirk54"):
+        if (form, method) != ("maggi-kane", "sdirk54"):
+            run = ts.simulate(cart(on_rail(balance)), (0, 1), integrator=method, formulation=form)
+            assert np.abs(run.q[-1] - reference.q[-1]).max() < ROUGH
+
+
+@pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
+def test_power_is_the_gain_in_energy(function):
+    run = ts.simulate(cart(on_rail(function)), (0, 1), t_eval=np.linspace(0, 1, 401), rtol=1e-10, atol=1e-10)
+    rate = np.gradient(run.energy, run.t, edge_order=2)
+    assert np.abs(rate - run.power)[2:-2].max() < 1e-3 * np.abs(run.power).max()
+    assert np.abs(run.power - run.actuation("control")[:, 0] * run.displacement_rate("rail")).max() < HELD
+
+
+def test_angles_count_turns():
+    def wind(t, state):
+        return 1.0 - 0.1 * state.angle("hinge")  # N m
+
+    scene = ts.Scene(gravity=(0, 0, 0))
+    wheel = scene.add_body(1.0, (1, 1, 1), name="wheel")
+    scene.add(C.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1), name="hinge"))
+    scene.add(F.Control(wind, ["hinge"]))
+    scene.set("hinge", angle=-30.0)
+    run = ts.simulate(scene, (0, 20), t_eval=np.linspace(0, 20, 101))
+    assert np.abs(run.angle("hinge") - (10.0 - 40.0 * np.cos(np.sqrt(0.1) * run.t))).max() < ROUGH
+    half = ts.simulate(scene, (0, 7))
+    rest = ts.simulate(scene, (7, 20), state=half.state)
+    assert abs(rest.angle("hinge")[-1] - run.angle("hinge")[-1]) < ROUGH
+
+
+# Sample and hold
+
+
+def test_values_are_held_between_samples():
+    times = []
+
+    def sampled(t, state):
+        times.append(t)
+        return balance(t, state)
+
+    scene = cart(on_rail(sampled, period=0.01))
+    run = ts.simulate(scene, (0, 0.2))
+    assert np.abs(np.array(times) - 0.01 * np.arange(len(times))).max() < 4 * EPS and len(times) == 20
+    u = run.actuation("control")[:, 0]
+    inside = np.unique(u[np.floor(run.t / 0.01 + 1e-9) == 7])
+    assert inside.size == 1
+    half = ts.simulate(scene, (0, 0.1))
+    assert np.abs(ts.simulate(scene, (0.1, 0.2), state=half.state).q[-1] - run.q[-1]).max() < HELD
+
+
+# Bits
+
+
+@pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
+def test_ensembles_have_the_bits_of_runs_alone(function):
+    scene, gains = cart(on_rail(function)), np.linspace(0.8, 1.4, 4)
+    ensemble = ts.ensemble(scene, {"control.function.gain": gains}, (0, 0.5), integrator="dop853", threads=2)
+    for gain, q in zip(gains, ensemble.q, strict=True):
+        alone = scene.with_parameters({"control.function.gain": gain})
+        assert (ts.simulate(alone, (0, 0.5), integrator="dop853").q[-1] == q).all()
+    assert np.ptp(ensemble.q, axis=0).max() > LOOSE
+
+
+def test_a_joint_that_is_moved_by_a_parameter_moves_in_the_law():
+    def watch(t, state):
+        return state.displacement("rail")
+
+    scene = cart(lambda s: F.Control(watch, ["hinge"], name="control"))
+    moved = scene.with_parameters({"rail.point_b": (-0.5, 0, 0)})
+    for each in (scene, moved):
+        run = ts.simulate(each, (0, 0.1), initial_tol=1.0)
+        assert np.abs(run.actuation("control")[:, 0] - run.displacement("rail")).max() < TIGHT
+        forces = each.evaluate(run.q[-1], run.qd[-1]).Q_A
+        assert abs(forces @ run.qd[-1] - run.power[-1] - 0.0) < CLOSE + abs(9.81 * 2.3 * np.abs(run.qd[-1]).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("options", [{}, {"period": 0.01}], ids=["continuous", "sampled"])
+@pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
+def test_checkpoints_pickles_and_files(function, options, tmp_path):
+    scene = cart(on_rail(function, **options))
+    run = ts.simulate(scene, (0, 0.5), integrator="dop853")
+    ts.simulate(scene, (0, 0.5), integrator="dop853", store=tmp_path / "run.zarr", checkpoint=1e-4)
+    assert (ts.resume(tmp_path / "run.zarr", scene=scene).q[-1] == run.q[-1]).all()
+    assert (ts.simulate(pickle.loads(pickle.dumps(scene)), (0, 0.5), integrator="dop853").q[-1] == run.q[-1]).all()
+    assert (ts.simulate(scene.copy(), (0, 0.5), integrator="dop853").q[-1] == run.q[-1]).all()
+    run.save(tmp_path / "solution.zarr")
+    assert (ts.load(tmp_path / "solution.zarr").energy == run.energy).all()
+    with pytest.raises(ts.TsdynError, match="holds data and no code"):
+        scene.save(tmp_path / "scene.toml")
+
+
+def test_a_run_says_how_the_law_is_called():
+    said = [
+        str(ts.prepare(cart(on_rail(f, **o)))) for f, o in ((balance, {}), (clipped, {}), (clipped, {"period": 0.1}))
+    ]
+    assert "control is traced and runs compiled" in said[0]
+    assert "control is called in Python at each evaluation: it compares values" in said[1]
+    assert "control is called in Python every 0.1 s" in said[2]
+
+
+GAIN = 1.0
+
+
+def test_a_law_follows_what_it_reads(monkeypatch):
+    """A global that is changed, an array that is written to, an object that may change."""
+    rows = np.array([1.0])
+    box = {"gain": 1.0}
+    scenes = [
+        cart(on_rail(function), angle=0.0)
+        for function in (lambda t, state: GAIN, lambda t, state: rows[0], lambda t, state: box["gain"])
+    ]
+    first = [ts.simulate(scene, (0, 0.1)).displacement("rail")[-1] for scene in scenes]
+    monkeypatch.setitem(globals(), "GAIN", 3.0)
+    rows[0] = box["gain"] = 3.0
+    for before, scene in zip(first, scenes, strict=True):
+        assert abs(ts.simulate(scene, (0, 0.1)).displacement("rail")[-1] - 3.0 * before) < ROUGH
+
+
+# Wrong laws
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda t, state: (1.0, 2.0), "must give 1 number, one for each actuator; it gave 2"),
+        (lambda t, state: state.angle("hing"), "did you mean 'hinge'"),
+        (lambda t, state: state.angle("rail"), "has no angle"),
+        (lambda t, state: state.position("card")[0], "no body is named 'card'; did you mean 'cart'"),
+        (lambda t, state: state.acceleration("cart")[0], "accelerations and reactions follow from forces"),
+        (lambda t, state: state.reaction("hinge")[0][0], "accelerations and reactions follow from forces"),
+        (lambda t, state: state[0], "that of the scene and has no numbers by index"),
+        (lambda t, state: state.angel("hinge"), "angel"),
+        (lambda t, state: undefined_name, "NameError"),  # noqa: F821
+        (lambda t: 0.0, r"function of two arguments \(t, state\)"),
+        (3.0, r"function of \(t, state\)"),
+    ],
+)
+def test_wrong_functions_are_refused_where_they_are_added(function, said):
+    with pytest.raises(ts.TsdynError, match=said):
+        cart(on_rail(function))
+
+
+def _others(scene):
+    return cart()["rail"]
+
+
+@pytest.mark.parametrize(
+    ("actuators", "said"),
+    [
+        (lambda s: [], "actuators must be a list of one or more"),
+        (lambda s: "rail", "actuators must be a list of one or more"),
+        (lambda s: ["rial"], "no joint or spring is named 'rial'; did you mean 'rail'"),
+        (lambda s: [s["rail"], _others(s)], "belongs to another scene"),
+        (lambda s: [_others(s)], "belong to another scene|belongs to another scene"),
+        (lambda s: [("rail", "angle")], "has the coordinates"),
+        (lambda s: [7], "is none"),
+        (lambda s: [C.Revolute(s["cart"], s["rod"], axis_a=(0, 1, 0), axis_b=(0, 1, 0))], "add its actuator"),
+        (lambda s: [s.add(F.PointForce(s["cart"], force=(1, 0, 0)))], "must not be added itself"),
+        (lambda s: [F.Torque(s["cart"], torque=lambda t: (t, 0, 0))], "must have a constant vector"),
+    ],
+)
+def test_wrong_actuators_are_refused(actuators, said):
+    with pytest.raises(ts.TsdynError, match=said):
+        cart(lambda s: F.Control(lambda t, state: [0.0] * max(len(actuators(s)), 1), actuators(s)))
+
+
+@pytest.mark.parametrize("period", [None, 0.05])
+def test_what_a_law_raises_ends_the_run(period):
+    def breaks(t, state):
+        return 1.0 / (0.0 if t > 0.3 else 1.0)
+
+    run = ts.simulate(cart(on_rail(breaks, period=period)), (0, 1))
+    assert not run.success and 0.0 < run.t[-1] < 0.4
+    assert "control" in run.message and "ZeroDivisionError" in run.message
+
+
+def test_a_value_that_is_not_finite_is_named():
+    run = ts.simulate(cart(on_rail(lambda t, state: np.sqrt(0.3 - t))), (0, 1), integrator="dop853")
+    assert not run.success and "'control' is inf or nan" in run.message
+
+
+def test_arrays_stay_for_functions_that_ask_no_method():
+    def array(t, state):
+        return -state[7], 0.0, 0.0
+
+    def whole(t, state):
+        return -state.velocity("cart")[0], 0.0, 0.0
+
+    def helped(t, state):
+        return whole(t, state)
+
+    scenes = [cart(lambda s, f=f: F.PointForce(s["cart"], force=f, name="drag")) for f in (array, whole, helped)]
+    first, *others = (ts.simulate(scene, (0, 1)) for scene in scenes)
+    assert all(np.abs(first.q[-1] - other.q[-1]).max() < NEAR for other in others)
+    scene = cart(lambda s: F.PointForce(s["cart"], force=whole, name="drag"))
+    with pytest.raises(ts.TsdynError, match="of the state of the scene"):
+        scene["drag"].force = array

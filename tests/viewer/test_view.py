@@ -201,6 +201,29 @@ def test_a_body_made_of_a_shape_has_that_shape(shape, parts):
         body.shape = "box"
 
 
+def test_files_keep_shapes(tmp_path):
+    """Scene files and saved solutions; meshes are left out, and a hidden body stays hidden."""
+    pytest.importorskip("zarr")
+    scene = ts.Scene(gravity=(0, 0, 0))
+    hammer = S.cylinder(0.02, 0.3, axis="y", density=700) + S.box((0.1, 0.03, 0.03), density=7850).moved((0, 0.15, 0))
+    scene.add_body(**hammer.rotated(Rotation.from_rotvec((0.1, 0.2, 0.3))), name="hammer")
+    scene.add_body(mass=1.0, inertia=(1, 1, 1), shape=S.Capsule(0.1, 0.5, axis="x", colour="red"), name="leg")
+    scene.add_body(mass=1.0, inertia=(1, 1, 1), shape=[], name="hidden")
+    scene.add_point_mass(mass=1.0, name="bob").shape = S.Sphere(0.2)
+    solution = ts.simulate(scene, (0.0, 0.1))
+    pages = [decoded(view(solution))]
+    for kept in (
+        ts.simulate(ts.load(scene.save(tmp_path / "a.toml")), (0.0, 0.1)),
+        ts.load(solution.save(tmp_path / "a.zarr")),
+    ):
+        pages.append(decoded(view(kept)))
+    assert [part["kind"] for part in pages[0].parts] == ["cylinder", "box", "cylinder", "sphere", "sphere", "sphere"]
+    assert pages[1].parts == pages[2].parts == pages[0].parts
+    mesh = S.Mesh((((0, 0, 0), (1, 0, 0), (0, 1, 0)), ((0, 1, 2),)))
+    scene["leg"].shape = mesh
+    assert ts.load(scene.save(tmp_path / "a.toml"))["leg"].shape is None
+
+
 def test_the_caps_of_a_capsule_are_at_its_ends():
     scene = ts.Scene()
     scene.add_body(mass=1.0, inertia=(1, 1, 1), shape=S.Capsule(0.1, 0.6, axis="y", position=(1, 0, 0)))

@@ -72,3 +72,6 @@ function startFilm(finished) {
   };
   recorder.start();
 }
+function stopFilm() { // it ends a moment later
+  if (recorder && recorder.state === "recording") recorder.stop();
+}

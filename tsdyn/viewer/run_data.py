@@ -34,6 +34,8 @@ from .symbols import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..hints import Floats, Scene, Solution
 
 
@@ -213,8 +215,8 @@ def run_data(solution: Any, **choices: Any) -> dict[str, Any]:
     return data
 
 
-def scene_data(scene: Scene, t: float, **choices: Any) -> dict[str, Any]:
-    """All that a page shows of a scene at its start, with the rows that are violated at time t."""
+def scene_data(scene: Scene, t: float, notes: Sequence[str] = (), **choices: Any) -> dict[str, Any]:
+    """All that a page shows of a scene at its start, with the rows that are violated at time t; notes: said, too."""
     packed, (q, qd) = scene.packed, scene.start
     violated: dict[Any, list[str]] = {}
     for constraint, said in _violated(packed, t, q, qd):
@@ -224,7 +226,7 @@ def scene_data(scene: Scene, t: float, **choices: Any) -> dict[str, Any]:
     count = sum(map(len, violated.values()))
     rows = f"{count} constraint row{'s are' if count > 1 else ' is'} violated"
     note = f"{rows}, named in red; scene.assemble() moves the bodies to where all rows hold." if count else ""
-    return data | {"method": f"start, t = {t:g} s", "note": note}
+    return data | {"method": f"start, t = {t:g} s", "note": "\n".join(filter(None, [note, *notes]))}
 
 
 def encoded(values: Any, kind: str) -> str:
@@ -237,8 +239,10 @@ def _contents(scene, packed, attachments, frames, violated, *, shapes=None, trai
     constraints, forces = attachments
     handles = handles_of(packed)
     user = by_body({} if shapes is None else shapes, handles, scene.ground)
-    own = {i: body.shape for i, body in enumerate([*packed.bodies, scene.ground]) if body._shape is not None}
-    own[-1] = own.pop(len(packed.bodies), ())
+    named = {body.name: body for body in scene.bodies}  # of a scene with other parameters they aren't those of `packed`
+    bodies = [named.get(body.name, body) for body in packed.bodies]
+    own = {i: body.shape for i, body in enumerate(bodies) if body._shape is not None}
+    own[-1] = scene.ground.shape or ()
     hidden = {i for i, pieces in (own | user).items() if i >= 0 and not pieces}
     points = joint_points([*constraints, *forces], len(packed.bodies))
     reach = reaches(packed, points, frames.position, hidden)
@@ -248,7 +252,7 @@ def _contents(scene, packed, attachments, frames, violated, *, shapes=None, trai
     made: list[list[Part]] = [[] for _ in range(len(packed.bodies) + 1)]  # by body, that of the ground last
     for part in parts:
         made[part.body].append(part)
-    for i, body in enumerate(packed.bodies):
+    for i, body in enumerate(bodies):
         if i not in own and i not in user:
             parts += derived(i, solids[i], points[i], reach[i])
         elif i not in user and not callable(body._shape) and i not in hidden:  # in files arms have shapes of their own

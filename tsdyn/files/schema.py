@@ -77,7 +77,7 @@ def schema(scene, simulate):
         "required": ["version"],
         "additionalProperties": False,
         "properties": {key: properties[key] for key in KEYS},
-        "$defs": DEFINITIONS,
+        "$defs": DEFINITIONS | {"drawn": {"oneOf": [_shape(*pair) for pair in types.DRAWN.items()]}},
     }
 
 
@@ -105,7 +105,7 @@ def _property(argument):
 def _body(name, method):
     known = types.of_body(method)
     properties = {key: _property(argument) for key, argument in known.items()}
-    drawn = {"type": "array", "items": {"oneOf": [_shape(*pair) for pair in types.DRAWN.items()]}}
+    drawn = {"type": "array", "items": {"$ref": "#/$defs/drawn"}}
     kind, required = (
         {"type": {"const": name}, "drawn": drawn},
         [argument.name for argument in known.values() if argument.required],

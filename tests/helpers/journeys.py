@@ -202,6 +202,7 @@ class Tour:
     def view(self):
         with TemporaryDirectory() as folder:
             assert self.on.view(f"{folder}/run.html").stat().st_size > 0
+            assert self.scene.view(f"{folder}/start.html").stat().st_size > 0
 
     def save(self):
         with TemporaryDirectory() as folder:

@@ -193,12 +193,39 @@ def test_a_body_made_of_a_shape_has_that_shape(shape, parts):
         assert [part["kind"] for part in found] == [kind for kind, _ in parts]
         for part, (_, size) in zip(found, parts, strict=True):
             np.testing.assert_allclose(np.linalg.norm(np.reshape(part["matrix"], (4, 3))[:3], axis=1), size, rtol=1e-5)
+    other = scene.with_parameters({"body.position": (1, 0, 0)})
+    other["body"].shape = []
+    assert decoded(view(ts.simulate(other, (0.0, 0.1)))).parts == []
+    assert len(decoded(view(ts.simulate(scene, (0.0, 0.1)))).parts) == len(parts)
     body.name = "renamed"
     assert [*scene.shapes] == ["renamed"]
     body.shape = None
     assert scene.shapes == {}
     with pytest.raises(ts.InvalidArgument, match=r"renamed: shape must be one of ts\.shapes"):
         body.shape = "box"
+
+
+def test_files_keep_shapes(tmp_path):
+    """Scene files and saved solutions; meshes are left out, and a hidden body stays hidden."""
+    pytest.importorskip("zarr")
+    scene = ts.Scene(gravity=(0, 0, 0))
+    hammer = S.cylinder(0.02, 0.3, axis="y", density=700) + S.box((0.1, 0.03, 0.03), density=7850).moved((0, 0.15, 0))
+    scene.add_body(**hammer.rotated(Rotation.from_rotvec((0.1, 0.2, 0.3))), name="hammer")
+    scene.add_body(mass=1.0, inertia=(1, 1, 1), shape=S.Capsule(0.1, 0.5, axis="x", colour="red"), name="leg")
+    scene.add_body(mass=1.0, inertia=(1, 1, 1), shape=[], name="hidden")
+    scene.add_point_mass(mass=1.0, name="bob").shape = S.Sphere(0.2)
+    solution = ts.simulate(scene, (0.0, 0.1))
+    pages = [decoded(view(solution))]
+    for kept in (
+        ts.simulate(ts.load(scene.save(tmp_path / "a.toml")), (0.0, 0.1)),
+        ts.load(solution.save(tmp_path / "a.zarr")),
+    ):
+        pages.append(decoded(view(kept)))
+    assert [part["kind"] for part in pages[0].parts] == ["cylinder", "box", "cylinder", "sphere", "sphere", "sphere"]
+    assert pages[1].parts == pages[2].parts == pages[0].parts
+    mesh = S.Mesh((((0, 0, 0), (1, 0, 0), (0, 1, 0)), ((0, 1, 2),)))
+    scene["leg"].shape = mesh
+    assert ts.load(scene.save(tmp_path / "a.toml"))["leg"].shape is None
 
 
 def test_the_caps_of_a_capsule_are_at_its_ends():
@@ -372,6 +399,24 @@ def test_violated_velocities_and_motions_are_named(tmp_path):
     labels = decoded(scene.view(tmp_path / "a", t=2.0).read_text(encoding="utf-8")).labels
     (rod,) = [label["text"] for label in labels if "rod" in label["text"]]
     assert rod == "rod: Phi = -12"  # (d.d - L^2) / (2 L_0), of d = L_0 = 1 m and L = 5 m
+
+
+def test_a_start_on_another_branch_is_told(tmp_path):
+    """All rows hold half a turn away from a motor's angle, and where the axes of a hinge are opposed."""
+    scene = ts.Scene()
+    wheel = scene.add_body(**S.cylinder(0.1, 0.1, mass=1.0), name="wheel")
+    hinge = scene.add(C.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1), name="hinge"))
+    motor = scene.add(C.RotationMotor.of(hinge, angle=np.pi, name="motor"))
+    note = decoded(scene.view(tmp_path / "a").read_text(encoding="utf-8")).note
+    assert "motor" in note
+    assert "3.14159265" in note
+    scene.remove(motor)
+    wheel.orientation = (0, 1, 0, 0)
+    page = decoded(scene.view(tmp_path / "a").read_text(encoding="utf-8"))
+    assert "hinge" in page.note
+    assert not any(label["violated"] for label in page.labels)
+    with pytest.raises(ts.InconsistentState):
+        ts.simulate(scene, (0.0, 1.0))
 
 
 def test_scenes_that_cannot_be_shown_are_refused(tmp_path):

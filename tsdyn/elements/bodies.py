@@ -62,7 +62,7 @@ def new_name(value, thing, others, error):
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-class Drawn:
+class Shaped:
     """Mixed into bodies and the ground: what the viewer draws."""
 
     _shape: Any = None  # geometry, or a function that makes it: files of meshes are read when they are drawn
@@ -80,7 +80,7 @@ class Drawn:
         self._shape = None if value is None else pieces_of(value, f"{self.name}: shape")  # type: ignore[attr-defined]
 
 
-class Ground(Drawn):
+class Ground(Shaped):
     """The inertial frame, as a body that constraints attach to."""
 
     dimension = 0
@@ -222,7 +222,7 @@ def _vector(what, unit):
     return lambda value, body: vector3(value, f"{body.name}: {what} ({unit})", InvalidBody)
 
 
-class PointMass(Drawn):
+class PointMass(Shaped):
     """A particle: three coordinates, no orientation. Made by `Scene.add_point_mass`.
 
     Examples

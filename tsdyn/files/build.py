@@ -282,36 +282,53 @@ def _add_body(reading, scene, path, table):
     name = name_of(reading, path, table, what, reading.bodies)
     known = types.of_body(method.__func__)
     solid = "inertia" in known
-    known_keys(path, table, ("type", "name", *(["shape"] if solid else []), *known), reading.mistakes)
+    known_keys(path, table, ("type", "name", "drawn", *(["shape"] if solid else []), *known), reading.mistakes)
     given = arguments_in(reading, path, table, known, what)
     if solid and "shape" in table:
         known = {key: argument for key, argument in known.items() if key not in SHAPED}
         given |= _shaped(reading, path, table, what)
     for missing in [argument.name for argument in known.values() if argument.required and argument.name not in table]:
         reading.mistakes.add(path, f"{what} lacks {missing}.")
+    drawn = _drawn(reading, path, table, what)
     body = None
     if len(reading.mistakes.found) == before:
         body = made(reading, path, what, method, given={**given, "name": name})
+    if body is not None and drawn is not None:
+        body.shape = drawn
     if isinstance(body, Body) and "orientation" in given:
         keep_bits(body.values, "orientation", given["orientation"])
     reading.bodies[body.name if body is not None else name] = body
 
 
 def _shaped(reading, path, table, what):
-    """Mass and inertia of the table `shape` of a body."""
-    shape, where, mistakes = table["shape"], (*path, "shape"), reading.mistakes
+    """Mass, inertia and shape of the table `shape` of a body."""
     for key in SHAPED:
         if key in table:
-            mistakes.add((*path, key), f"{what}: {key} beside shape, which gives it; leave one of them out.")
+            reading.mistakes.add((*path, key), f"{what}: {key} beside shape, which gives it; leave one of them out.")
+    found = _shape(reading, (*path, "shape"), table["shape"], types.SHAPES, what)
+    return {} if found is None else dict(found)
+
+
+def _drawn(reading, path, table, what):
+    """The shapes to draw of a body; None where there are none."""
+    given, where = table.get("drawn"), (*path, "drawn")
+    if given is None or isinstance(given, list):
+        return given and [_shape(reading, (*where, i), one, types.DRAWN, what) for i, one in enumerate(given)]
+    reading.mistakes.add_value(where, f"{what}: drawn", given, "write a list of tables, each a shape.")
+    return None
+
+
+def _shape(reading, where, shape, kinds, what):
+    """What a table makes that names one of some kinds of shapes, with its arguments; None, with mistakes, if wrong."""
+    mistakes, said = reading.mistakes, "drawn" if kinds is types.DRAWN else "shape"
     kind = shape.get("type") if isinstance(shape, dict) else shape
-    if not isinstance(shape, dict) or not isinstance(kind, str) or kind not in types.SHAPES:
-        hint = " or ".join(close(str(kind), types.SHAPES) or types.SHAPES)
-        mistakes.add_value(where, f"{what}: shape", kind, f"write a table with the type {hint} and its arguments.")
-        return {}
-    known, before = types.of_body(types.SHAPES[kind]), len(mistakes.found)
+    if not isinstance(shape, dict) or not isinstance(kind, str) or kind not in kinds:
+        hint = " or ".join(close(str(kind), kinds) or kinds)
+        mistakes.add_value(where, f"{what}: {said}", kind, f"write a table with the type {hint} and its arguments.")
+        return None
+    known, before = types.of_shape(kinds[kind]), len(mistakes.found)
     known_keys(where, shape, ("type", *known), mistakes)
     given = arguments_in(reading, where, shape, known, what)
     for missing in [argument.name for argument in known.values() if argument.required and argument.name not in shape]:
         mistakes.add(where, f"{what}: the {kind} lacks {missing}.")
-    found = made(reading, where, what, types.SHAPES[kind], given=given) if len(mistakes.found) == before else None
-    return {} if found is None else dict(found)
+    return made(reading, where, what, kinds[kind], given=given) if len(mistakes.found) == before else None

@@ -75,7 +75,16 @@ def _body(body):
         value = encode(value)
         if not _is_plain_zero(value) and not (name == "orientation" and repr(value) == repr(IDENTITY.tolist())):
             found[name] = value
-    return found
+    pieces = None if callable(body._shape) else body._shape  # those of an imported file may be meshes
+    drawn = [_piece(piece) for piece in pieces or () if type(piece) in types.DRAWN.values()]
+    return found | ({"drawn": drawn} if drawn or pieces == () else {})
+
+
+def _piece(piece):
+    """The pairs of a shape to draw."""
+    found = {name: encode(getattr(piece, name)) for name in types.of_shape(type(piece))}
+    plain = {"position": [0.0] * 3, "rotation": np.eye(3).tolist(), "colour": "", "axis": "z"}
+    return {"type": type(piece).__name__} | {name: value for name, value in found.items() if value != plain.get(name)}
 
 
 def _is_diagonal(matrix):

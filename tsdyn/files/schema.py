@@ -79,7 +79,7 @@ def schema(scene, simulate):
         "required": ["version"],
         "additionalProperties": False,
         "properties": {key: properties[key] for key in KEYS},
-        "$defs": DEFINITIONS,
+        "$defs": DEFINITIONS | {"drawn": {"oneOf": [_shape(*pair) for pair in types.DRAWN.items()]}},
     }
 
 
@@ -106,7 +106,11 @@ def _property(argument):
 def _body(name, method):
     known = types.of_body(method)
     properties = {key: _property(argument) for key, argument in known.items()}
-    kind, required = {"type": {"const": name}}, [argument.name for argument in known.values() if argument.required]
+    drawn = {"type": "array", "items": {"$ref": "#/$defs/drawn"}}
+    kind, required = (
+        {"type": {"const": name}, "drawn": drawn},
+        [argument.name for argument in known.values() if argument.required],
+    )
     if "inertia" in known:
         kind["shape"] = {"oneOf": [_shape(*pair) for pair in types.SHAPES.items()]}
         given = {"anyOf": [{"required": required}, {"required": ["shape"]}]}
@@ -121,8 +125,8 @@ def _body(name, method):
 
 
 def _shape(name, function):
-    """The schema of a shape that gives mass and inertia."""
-    known = types.of_body(function)
+    """The schema of a shape that gives mass and inertia, or is drawn."""
+    known = types.of_shape(function)
     return {
         "type": "object",
         "required": ["type", *(argument.name for argument in known.values() if argument.required)],

@@ -196,6 +196,7 @@ def _decode_parts(value, names):
 BODIES, OWN = ("a", "b"), ("name", "self", "scene", "shape")
 BUILT_IN = ("tsdyn.constraints.", "tsdyn.forces.")
 SHAPES = {name: getattr(shapes, name) for name in ("box", "sphere", "cylinder", "capsule", "rod", "from_mesh")}
+DRAWN = {cls.__name__: cls for cls in (shapes.Box, shapes.Sphere, shapes.Cylinder, shapes.Capsule)}
 BODY_TYPES = {"Body": "add_body", "PointMass": "add_point_mass"}  # by the methods of a scene
 ENUMERATIONS = {  # by the aliases of hints.py
     "Frame": ("ground", "body"),
@@ -283,6 +284,14 @@ def of_class(cls):
 def of_body(cls):
     """The arguments of a body."""
     return arguments_of(cls)
+
+
+@cache
+def of_shape(cls):
+    """The arguments of a shape to draw."""
+    return {
+        name: one._replace(kind=ARRAY) if one.kind in (ANY, REFERENCE) else one for name, one in of_body(cls).items()
+    }
 
 
 @cache

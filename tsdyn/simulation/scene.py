@@ -15,6 +15,7 @@ import numpy as np
 from ..calls import fitting, fitting_methods, lacking
 from ..configuration.assemble import assemble as _assemble
 from ..configuration.mobility import mobility as _mobility
+from ..configuration.motor_starts import demand_aligned, elsewhere
 from ..configuration.set_joint_coordinates import set_joint
 from ..constraints.euler_normalization import EulerNormalization
 from ..elements.bodies import IDENTITY, Body, Ground, PointMass, named
@@ -23,7 +24,7 @@ from ..elements.force import Force
 from ..elements.joint import Joint
 from ..elements.laws import SceneLaw
 from ..elements.primitive import Primitive
-from ..errors import InvalidArgument, InvalidBody, InvalidConstraint, StorageError
+from ..errors import InconsistentState, InvalidArgument, InvalidBody, InvalidConstraint, StorageError
 from ..jit.code_hash import deep_hash
 from ..model.equations import demand_compilable
 from ..model.handles import handles_of
@@ -501,7 +502,8 @@ class Scene:
     ) -> Any:
         """Show the scene at its start, assembled or not, as an interactive page; nothing is run.
 
-        Violated rows of constraints are named in red, with their values, and the constraints drawn in red.
+        Violated rows of constraints are named in red, with their values, and the constraints drawn in red. The page
+        also says where a motor's joint stands elsewhere, and which joints are mirrored.
 
         Parameters
         ----------
@@ -547,7 +549,13 @@ class Scene:
         from ..viewer.run_data import scene_data
         from ..viewer.view import show
 
-        return show(scene_data(self, finite(t, "view: t (s)"), shapes=shapes, camera=camera, follow=follow), path)
+        t, packed, (q, qd) = finite(t, "view: t (s)"), self.packed, self.start
+        try:
+            demand_aligned(packed, q, t)  # rows hold on the mirrored branch, too
+            said = elsewhere(packed, t, q, qd)
+        except InconsistentState as error:
+            said = [str(error)]
+        return show(scene_data(self, t, said, shapes=shapes, camera=camera, follow=follow), path)
 
     place = _place
     evaluate = _evaluate

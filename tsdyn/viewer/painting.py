@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from ..drawing import GREY, demand_matplotlib
 from ..elements.bodies import rotation_matrix
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
 SIDES, BANDS, TURNS = 20, 10, 6  # of cylinders and balls; of coils
 LIGHT = np.array([0.35, 0.25, 0.9]) / np.linalg.norm([0.35, 0.25, 0.9])  # in the camera's frame
-FINE = 2000  # triangles of a mesh above which its convex hull is painted
+FINE, CELLS = 2000, 12  # triangles of a mesh above which it is painted coarsely, by so many cells along its extent
 FLAT_FACE = 1e-9  # of a face's area, seen by the camera: below it is seen from its edge
 
 
@@ -66,16 +65,14 @@ def _coil():
 
 
 def _mesh(data):
-    """The triangles of a mesh, or of its convex hull, if it is fine."""
+    """The triangles of a mesh, from both sides as on the page; of a fine one, vertices within a cell become one."""
     vertices, faces = _array(data["vertices"], "<f4").reshape(-1, 3), _array(data["faces"], "<u4").reshape(-1, 3)
-    if len(faces) > FINE and np.linalg.matrix_rank(np.ptp(vertices, axis=0) * np.eye(3)) == 3:
-        hull = ConvexHull(vertices)
-        corners = vertices[hull.simplices]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        inward = (normals * hull.equations[:, :3]).sum(axis=1) < 0.0
-        corners[inward] = corners[inward][:, ::-1]
-        return [corners]
-    return [vertices[faces], vertices[faces][:, ::-1]]  # as the page, it shows both sides
+    if len(faces) > FINE:
+        cells = np.rint(CELLS / np.ptp(vertices, axis=0).max() * vertices)
+        _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        vertices, faces = vertices[first], np.unique(cell[faces], axis=0)
+        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    return [vertices[faces], vertices[faces][:, ::-1]]
 
 
 def _array(text, kind):
@@ -165,7 +162,7 @@ SIZE = 6.4, 4.8  # inches, at DPI
 DPI = 100
 RATE = 20  # frames/s
 SHORT, LONG = 1.5, 10.0  # s: runs of a duration between them are shown as fast as they are, others within LONG
-COLOURS = 128  # of the palette of a frame
+PALETTE = 128  # of the palette of a frame
 LINES = 24  # of the grid, each way
 HALF_ANGLE = np.tan(np.radians(17.5))  # of the page's camera, above the line of sight
 
@@ -216,7 +213,7 @@ def animation(data: dict[str, Any]) -> bytes:
             axes.set(xlim=(x - wide, x + wide), ylim=(y - radius, y + radius))
             canvas.draw()
             picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
-            images.append(picture.quantize(COLOURS, Image.Quantize.FASTOCTREE))
+            images.append(picture.quantize(PALETTE, Image.Quantize.FASTOCTREE))
     file = io.BytesIO()
     images[0].save(file, "GIF", save_all=True, append_images=images[1:], duration=1000 // RATE, loop=0)
     return file.getvalue()

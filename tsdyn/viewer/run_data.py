@@ -35,6 +35,8 @@ from .symbols import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..hints import Floats, Scene, Solution
 
 
@@ -185,27 +187,27 @@ def run_data(solution: Any, **choices: Any) -> dict[str, Any]:
     constraints, forces = attached(packed)
     per_frame = 20 * len(packed.bodies) + 6 * 2 * (len(constraints) + len(forces))
     frames = resample(solution, int(np.clip(ROOM // per_frame, FEWEST, FRAMES)))
-    data = _drawn(solution.scene, packed, (constraints, forces), frames, {}, **choices)
+    data = _contents(solution.scene, packed, (constraints, forces), frames, {}, **choices)
     data["method"] = f"{solution.method}, formulation {solution.formulation}"
     data["note"] = _note(frames, solution)
     data["contacts"] = [encoded(states, "<u1") for states in contact_states(frames, constraints)]  # of parts in turn
     if not getattr(solution, "_lacks", ""):
-        data |= _loads(arrows(frames, constraints, forces, float(np.median(data["reach"]))), len(frames.times))
+        data |= _loads(arrows(frames, constraints, forces, float(np.median(data["reach"]))))
     return data
 
 
-def scene_data(scene: Scene, t: float, **choices: Any) -> dict[str, Any]:
-    """All that a page shows of a scene at its start, with the rows that are violated at time t."""
+def scene_data(scene: Scene, t: float, notes: Sequence[str] = (), **choices: Any) -> dict[str, Any]:
+    """All that a page shows of a scene at its start, with the rows that are violated at time t; notes: said, too."""
     packed, (q, qd) = scene.packed, scene.start
     violated: dict[Any, list[str]] = {}
     for constraint, said in _violated(packed, t, q, qd):
         violated.setdefault(constraint, []).append(said)
     frames = AnimationFrames(np.array([t]), *_poses(packed, q[None]), None)
-    data = _drawn(scene, packed, attached(packed), frames, violated, **choices)
+    data = _contents(scene, packed, attached(packed), frames, violated, trails=(), **choices)
     count = sum(map(len, violated.values()))
     rows = f"{count} constraint row{'s are' if count > 1 else ' is'} violated"
     note = f"{rows}, named in red; scene.assemble() moves the bodies to where all rows hold." if count else ""
-    return data | {"method": f"start, t = {t:g} s", "note": note}
+    return data | {"method": f"start, t = {t:g} s", "note": "\n".join(filter(None, [note, *notes]))}
 
 
 def encoded(values: Any, kind: str) -> str:
@@ -213,25 +215,29 @@ def encoded(values: Any, kind: str) -> str:
     return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode("ascii")
 
 
-def _drawn(scene, packed, attachments, frames, violated, *, shapes=None, trails=None, camera=None, follow=None):
+def _contents(scene, packed, attachments, frames, violated, *, shapes=None, trails=None, camera=None, follow=None):
     """What a page shows of bodies, constraints and forces at the frames; violated: constraint -> what is said of it."""
     constraints, forces = attachments
     handles = handles_of(packed)
     user = by_body({} if shapes is None else shapes, handles, scene.ground)
-    own = {i: body.shape for i, body in enumerate([*packed.bodies, scene.ground]) if body._shape is not None}
-    own[-1] = own.pop(len(packed.bodies), ())
-    hidden = [i for i, pieces in (own | user).items() if i >= 0 and not pieces]
+    named = {body.name: body for body in scene.bodies}  # of a scene with other parameters they aren't those of `packed`
+    bodies = [named.get(body.name, body) for body in packed.bodies]
+    own = {i: body.shape for i, body in enumerate(bodies) if body._shape is not None}
+    own[-1] = scene.ground.shape or ()
+    hidden = {i for i, pieces in (own | user).items() if i >= 0 and not pieces}
     points = joint_points([*constraints, *forces], len(packed.bodies))
     reach = reaches(packed, points, frames.position, hidden)
     meshes: list[Mesh] = []
     parts: list[Any] = [part for i, pieces in (own | user).items() for part in given(i, pieces, meshes)]
     solids = [_solid(packed, i, points[i], reach[i]) for i in range(len(packed.bodies))]
-    for i, body in enumerate(packed.bodies):
+    made: list[list[Part]] = [[] for _ in range(len(packed.bodies) + 1)]  # by body, that of the ground last
+    for part in parts:
+        made[part.body].append(part)
+    for i, body in enumerate(bodies):
         if i not in own and i not in user:
             parts += derived(i, solids[i], points[i], reach[i])
         elif i not in user and not callable(body._shape) and i not in hidden:  # in files arms have shapes of their own
-            mine = [part for part in parts if part.body == i]
-            parts += rods(i, [point for point in points[i] if not any(part.holds(point) for part in mine)], reach[i])
+            parts += rods(i, [x for x in points[i] if not any(part.holds(x) for part in made[i])], reach[i])
     bulk = _bulk(parts, meshes, reach)
     girth = np.array([0.0 if solid is None else solid.girth for solid in solids])
     labels = [_label(body.name, "bodies", i, np.zeros(3)) for i, body in enumerate(packed.bodies) if i not in hidden]
@@ -249,6 +255,7 @@ def _drawn(scene, packed, attachments, frames, violated, *, shapes=None, trails=
     links = [link for link in parts if isinstance(link, Connector)]
     origin = frames.position[0].mean(axis=0)
     follow = None if follow is None else handles.bodies.index(handles.body(follow))
+    seen = _camera(packed, frames, camera)
     return {
         "version": __version__,
         "title": repr(scene).strip("<>"),
@@ -261,7 +268,7 @@ def _drawn(scene, packed, attachments, frames, violated, *, shapes=None, trails=
         "reach": rounded(reach),
         "bulk": rounded(bulk),
         "labels": labels,
-        "trails": _trails(trails, handles, hidden) if len(frames.times) > 1 else [],
+        "trails": _trails(trails, handles, hidden),
         "origin": origin.tolist(),
         "positions": encoded(frames.position - origin, "<f4"),
         "rotations": encoded(np.rint(FULL * np.roll(frames.orientation, -1, axis=2)), "<i2"),
@@ -269,8 +276,8 @@ def _drawn(scene, packed, attachments, frames, violated, *, shapes=None, trails=
         "links": [link.data() for link in links],
         "meshes": [{"vertices": encoded(m.vertices, "<f4"), "faces": encoded(m.faces, "<u4")} for m in meshes],
         "contacts": [],
-        **_loads([], 1),
-        **(seen := _camera(packed, frames, camera)),
+        **_loads([]),
+        **seen,
         **_fit(packed, frames, bulk, links, origin, seen["up"], seen["eye"] is not None, follow),
     }
 
@@ -329,8 +336,8 @@ def _place(frames, index, point):
     return frames.position[0, index] + rotation_matrix(frames.orientation[0, index]) @ point
 
 
-def _loads(found, count):
-    """Arrows at so many frames, and the load, N or N m, that is their full scale."""
+def _loads(found):
+    """Arrows, and the load, N or N m, that is their full scale."""
     scales = {unit: max((size(one) for one in found if one.unit == unit), default=0.0) for unit in UNITS}
     values = [np.rint(one.values * (FULL / scales[one.unit])) for one in found]
     listed = [one._asdict() | {"values": None, "point": rounded(one.point)} for one in found]
@@ -399,7 +406,7 @@ def _across(up, frames):
 
 
 def _fit(packed, frames, bulk, links, origin, up, placed, follow):
-    """Where the camera looks at each frame, or at all, how far it sees there, m; the whole motion, and a grid below it.
+    """Where the camera looks at each frame, or at all, and how far it sees, m; radius of the motion; a grid below.
 
     Places are from the origin. placed: whether the camera's place is given, so that it stays there.
     """
@@ -423,8 +430,7 @@ def _fit(packed, frames, bulk, links, origin, up, placed, follow):
         "grid": {"step": _round_step(radius / 4.0), "level": float(level - np.dot(up, origin))},
         "centres": encoded(centre - origin, "<f4"),
         "radius": radius,
-        "low": (low - origin).tolist(),
-        "high": (high - origin).tolist(),
+        "whole": 0.5 * float(np.linalg.norm(high - low)),
         "follow": follow if follow is not None else -2 if len(centre) > 1 and not placed else -1,
     }
 

@@ -266,7 +266,7 @@ def _different(points):
     return kept
 
 
-def reaches(packed: Any, points: list[list[Any]], position: Any, hidden: Sequence[int]) -> Any:
+def reaches(packed: Any, points: list[list[Any]], position: Any, hidden: set[int]) -> Any:
     """How far each body reaches from its centroid, m: to its farthest joint, or as its inertia does.
 
     Of point masses and hidden bodies, the median of the other bodies' reaches, or a part of the extent of the motion.

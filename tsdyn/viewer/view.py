@@ -51,6 +51,8 @@ def show(data: dict[str, Any], path: str | Path | None) -> Path | View:
     if path is not None and path.suffix.lower() == GIF:
         from .painting import animation
 
+        if not path.resolve().parent.is_dir():  # painting takes seconds
+            raise InvalidArgument(f"view: {path} can't be written: there is no such folder.")
         return write(animation(data), path)
     page = page_of(data)
     if path is not None:

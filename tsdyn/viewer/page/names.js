@@ -3,6 +3,7 @@
 
 const names = document.getElementById("names"), pen = names.getContext("2d");
 const lineHeight = 1.3; // of a line of text, per size of its letters
+const crowd = 300; // names, above which they may cover each other
 
 function drawNames(bodies, joints) {
   const ratio = renderer.getPixelRatio(), letters = 12 * ratio, x = [0, 0, 0];
@@ -11,20 +12,30 @@ function drawNames(bodies, joints) {
   pen.textAlign = "center";
   pen.lineWidth = 3 * ratio;
   pen.lineJoin = "round";
-  const { color, backgroundColor } = getComputedStyle(document.body);
+  const { color, backgroundColor } = getComputedStyle(document.body), line = lineHeight * letters;
+  const taken = []; // [left, right, height] of lines that are there
+  const below = (left, right, y) => { // the first free place under that of a line
+    const other = taken.find((one) => left < one[1] && right > one[0] && Math.abs(y - one[2]) < 0.99 * line);
+    return other ? below(left, right, other[2] + line) : y;
+  };
   for (const { text, layer, body, point, violated } of run.labels) {
     if (!violated && !(layer === "bodies" ? bodies : joints)) continue;
     const at = new THREE.Vector3(...placed(body, point, x)).project(camera);
     if (Math.abs(at.z) > 1) continue; // behind the camera
-    text.split("\n").forEach((line, i) => {
-      const place = [0.5 * (1 + at.x) * names.width, 0.5 * (1 - at.y) * names.height + i * lineHeight * letters];
-      pen.strokeStyle = backgroundColor;
-      pen.strokeText(line, ...place);
-      pen.fillStyle = violated ? "#d33a2c" : color;
+    pen.strokeStyle = backgroundColor;
+    pen.fillStyle = violated ? "#d33a2c" : color;
+    const middle = 0.5 * (1 + at.x) * names.width;
+    let y = 0.5 * (1 - at.y) * names.height;
+    for (const words of text.split("\n")) {
+      const half = 0.5 * pen.measureText(words).width;
+      if (run.labels.length < crowd) y = below(middle - half, middle + half, y);
+      taken.push([middle - half, middle + half, y]);
+      pen.strokeText(words, middle, y);
       pen.globalAlpha = layer === "bodies" || violated ? 1 : 0.7;
-      pen.fillText(line, ...place);
+      pen.fillText(words, middle, y);
       pen.globalAlpha = 1;
-    });
+      y += line;
+    }
   }
 }
 
@@ -60,4 +71,7 @@ function startFilm(finished) {
     finished(new Blob(parts, { type: format }));
   };
   recorder.start();
+}
+function stopFilm() { // it ends a moment later
+  if (recorder && recorder.state === "recording") recorder.stop();
 }

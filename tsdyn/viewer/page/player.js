@@ -79,7 +79,7 @@ function tick(now) {
   if (playing && before !== null && duration > 0) {
     frame += ((now - before) / 1000) * Number(field("speed").value) * ((run.frames - 1) / duration);
     if (frame > run.frames - 1) {
-      if (recorder) recorder.stop();
+      stopFilm();
       frame %= run.frames - 1;
     }
   }
@@ -151,7 +151,7 @@ field("picture").onclick = () => save(compose(false).toDataURL(), "png");
 document.body.classList.toggle("still", run.frames < 2);
 field("record").hidden = !format;
 field("record").onclick = () => {
-  if (recorder) { recorder.stop(); return; }
+  if (recorder) { stopFilm(); return; }
   frame = 0;
   setPlaying(true);
   draw();

@@ -7,7 +7,6 @@ function centreAt(frame) {
   const [here, next] = [i, Math.min(i + 1, last)].map((k) => new THREE.Vector3().fromArray(centres, 3 * k));
   return here.lerp(next, frame - Math.floor(frame));
 }
-const whole = 0.5 * Math.hypot(...run.high.map((x, i) => x - run.low[i])); // radius of the motion
 const up = new THREE.Vector3(...run.up);
 
 const canvas = document.getElementById("canvas");
@@ -89,7 +88,7 @@ for (const { body, point } of run.trails) toggleTrail(body, point);
 function focus() {
   const distance = camera.position.distanceTo(orbit.target);
   camera.near = 0.01 * distance;
-  camera.far = 100 * distance + 10 * whole;
+  camera.far = 100 * distance + 10 * run.whole;
   camera.updateProjectionMatrix();
 }
 

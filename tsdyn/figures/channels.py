@@ -41,7 +41,7 @@ def time_histories(solution: Solution, names: str | Sequence[str], path: Any = N
     values = values_of(states, channels)
     values[np.isin(intervals(solution.t, states.t)[0], lost)] = np.nan
     dots = np.unique([lost, lost + 1]) if solution.t.size > 1 else np.zeros(1, int)
-    ends = values_of(solution, channels)[dots]
+    ends = values_of(solution._picked(dots), channels) if dots.size else None
     panels = {}
     for i, channel in enumerate(channels):
         panels.setdefault(channel.unit, []).append(i)
@@ -50,7 +50,7 @@ def time_histories(solution: Solution, names: str | Sequence[str], path: Any = N
     for ax, (unit, some) in zip(axes, panels.items(), strict=True):
         for i in some:
             (line,) = ax.plot(states.t, values[:, i], linewidth=1.3, label=channels[i].name)
-            if dots.size:
+            if ends is not None:
                 ax.plot(solution.t[dots], ends[:, i], ".", color=line.get_color(), markersize=4)
         finished(ax, f"{', '.join(dict.fromkeys(channels[i].quantity for i in some))} ({unit})")
         if unit == "N m":

@@ -114,6 +114,13 @@ def test_changes_one_after_the_other(tmp_path):
     assert ts.simulate(other, (0, 0.1)).position(handle).shape[1] == 3
 
 
+def test_a_body_and_a_joint_of_one_name(tmp_path):
+    scene = read(tmp_path, TEXT.replace('"hinge"', '"bar"', 1).replace('joint = "hinge"', 'joint = "bar"'))
+    scene.body("bar").mass = 9.0
+    other = scene.with_parameters({"length": 2.0})
+    assert (other.body("bar").mass, other.body("bar").inertia[1, 1]) == (9.0, pytest.approx(4.0 * 4.0 / 12))
+
+
 def test_ensembles_sweep_numbers_of_the_file(tmp_path):
     scene, lengths = read(tmp_path), [1.0, 1.5, 2.5]
     found = ts.ensemble(scene, {"length": lengths, "bar.mass": [1.0, 2.0, 3.0]}, (0, 1), keep=["hinge.angle"])
@@ -156,6 +163,10 @@ def test_a_saved_scene_keeps_its_numbers_while_it_is_as_its_file_says(tmp_path):
     again = ts.load(scene.save(tmp_path / "a.toml"))
     demand_same(again, scene)
     demand_same(again.with_parameters({"tilt": 0.1}), edited(tmp_path, length=2.0, tilt=0.1))
+    scene.add(ts.forces.PointForce(scene["bar"], force=lambda t: (0.0, 0.0, t), name="gust"))
+    with pytest.raises(ts.InvalidArgument, match=r"gust.*function"):
+        scene.save(tmp_path / "b.toml")
+    scene.remove("gust")
     scene["bar"].mass = 3.0
     bare = ts.load(scene.save(tmp_path / "b.toml"))
     assert "length" not in bare.parameters()

@@ -256,7 +256,7 @@ class Modes:
     def _shares(self):
         """Shares (j, b, 6) of the kinetic energy: m v^2 by components, and those of sqrt(J) omega, ground frame."""
         _, twists, mass, inertia = self._moving
-        moves = np.einsum("bck,jk->jbc", twists, self.shapes)
+        moves = (self.shapes @ twists.reshape(-1, twists.shape[2]).T).reshape(len(self), -1, 6)
         sizes, axes = np.linalg.eigh(inertia)
         root = np.einsum("bik,bk,bjk->bij", axes, np.sqrt(np.maximum(sizes, 0.0)), axes)
         found = np.abs(moves) ** 2

@@ -171,7 +171,7 @@ def _of(scene, variations, given, coordinates):
 
 HEADS = "frequency (Hz)", "damping ratio", "kinetic energy"
 DIRECTIONS = "x", "y", "z", "rotation x", "rotation y", "rotation z"
-NAMED, LEAST_SHARE = 3, 0.05  # directions of bodies that are named at most; share of the energy of all but the first
+NAMED, LEAST_SHARE = 4, 0.05  # directions of bodies that are named at most; share of the energy of all but the first
 
 
 class Moving(NamedTuple):
@@ -266,7 +266,7 @@ class Modes:
 
     @property
     def motions(self) -> tuple[str, ...]:
-        """What each mode moves: up to three directions of bodies with most of its kinetic energy, "car.z 98 %"."""
+        """What each mode moves: up to four directions of bodies with most of its kinetic energy, "car.z 98 %"."""
         return tuple(self._motion(shares.ravel()) for shares in self._shares)
 
     def _motion(self, shares):

@@ -15,8 +15,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..docstrings import SECTION
-from ..elements.bodies import Attribute, PointMass
-from ..elements.element import checked_parameters
+from ..elements.bodies import Attribute, Ground, PointMass
+from ..elements.element import Attachment, checked_parameters
 from ..elements.joint import Joint
 from ..errors import InvalidArgument, UnknownParameter
 from ..files.named_numbers import Numbers
@@ -485,11 +485,18 @@ def _parts(scene):
 
 
 def _equal(one, other):
-    """Whether values of an attribute are the same; functions of time by what a file has of them."""
+    """Whether values of an attribute are the same in two scenes; functions of time by what a file has of them."""
     try:
-        return one is other or repr(encode(one)) == repr(encode(other))
+        return one is other or repr(_plain(one)) == repr(_plain(other))
     except Unwritable:
         return False
+
+
+def _plain(value):
+    """What a file has of a value; of a body or joint its name."""
+    if isinstance(value, (Attachment, PointMass, Ground)):
+        return value.name
+    return [_plain(part) for part in value] if isinstance(value, (tuple, list)) else encode(value)
 
 
 # Scenes that differ in numbers: one analysis, one packing, and the numbers of each.

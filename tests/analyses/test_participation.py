@@ -51,7 +51,7 @@ def test_shares_of_a_rod_turned_in_space():
     expected = [[0.375, 0.375, 0, 0.125, 0.125, 0]]
     for asked in (rod, "rod"):
         np.testing.assert_allclose(modes.participation(asked), expected, atol=100 * HELD)
-    assert [part.split()[-2] for part in modes.motions[0].split(", ")] == ["38", "38", "12"]
+    assert [part.split()[-2] for part in modes.motions[0].split(", ")] == ["38", "38", "12", "12"]
 
 
 def test_shares_of_two_masses():

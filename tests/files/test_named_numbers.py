@@ -3,6 +3,7 @@
 import copy
 import json
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -114,6 +115,13 @@ def test_changes_one_after_the_other(tmp_path):
     assert ts.simulate(other, (0, 0.1)).position(handle).shape[1] == 3
 
 
+def test_a_body_and_a_joint_of_one_name(tmp_path):
+    scene = read(tmp_path, TEXT.replace('"hinge"', '"bar"', 1).replace('joint = "hinge"', 'joint = "bar"'))
+    scene.body("bar").mass = 9.0
+    other = scene.with_parameters({"length": 2.0})
+    assert (other.body("bar").mass, other.body("bar").inertia[1, 1]) == (9.0, pytest.approx(4.0 * 4.0 / 12))
+
+
 def test_ensembles_sweep_numbers_of_the_file(tmp_path):
     scene, lengths = read(tmp_path), [1.0, 1.5, 2.5]
     found = ts.ensemble(scene, {"length": lengths, "bar.mass": [1.0, 2.0, 3.0]}, (0, 1), keep=["hinge.angle"])
@@ -130,6 +138,23 @@ def test_ensembles_sweep_numbers_of_the_file(tmp_path):
     np.testing.assert_array_equal(by_case.q[2], ts.simulate(edited(tmp_path, length=2.5), (0, 1)).q[-1])
     stored = ts.ensemble(scene, {"length": lengths}, (0, 1), store=tmp_path / "a.zarr", threads=2)
     np.testing.assert_array_equal(stored.q[2], by_case.q[2])
+
+
+def test_one_length_of_a_closed_loop():
+    """A driven four-bar that its file assembles, with friction of a joint: its links have the lengths of the case."""
+    path = Path(__file__).parents[2] / "examples" / "four_bar.toml"
+    scene = ts.load(path)
+    found = ts.ensemble(scene, {"crank": [0.25, 0.3]}, (0, 0.2), keep=["rocker.position", "bearing.angle"])
+    assert found.success.all(), found.message
+    alone = ts.simulate(scene, (0, 0.2))
+    assert found.kept["rocker.position.x"][1] == alone.position("rocker")[-1, 0]
+    np.testing.assert_allclose(
+        found.kept["bearing.angle"], alone.angle("bearing")[-1], atol=HELD
+    )  # as the motor drives
+    short = scene.with_parameters({"crank": 0.25})
+    pins = [ts.simulate(short, (0, 0.2)).position("coupler", point=(sign * 0.45, 0, 0)) for sign in (-1, 1)]
+    np.testing.assert_allclose(np.linalg.norm(pins[0], axis=1), 0.25, atol=HELD)  # of the crank
+    np.testing.assert_allclose(np.linalg.norm(pins[1] - [0.8, 0, 0], axis=1), 0.7, atol=HELD)  # of the rocker
 
 
 def test_runs_that_are_prepared(tmp_path):
@@ -156,6 +181,10 @@ def test_a_saved_scene_keeps_its_numbers_while_it_is_as_its_file_says(tmp_path):
     again = ts.load(scene.save(tmp_path / "a.toml"))
     demand_same(again, scene)
     demand_same(again.with_parameters({"tilt": 0.1}), edited(tmp_path, length=2.0, tilt=0.1))
+    scene.add(ts.forces.PointForce(scene["bar"], force=lambda t: (0.0, 0.0, t), name="gust"))
+    with pytest.raises(ts.InvalidArgument, match=r"gust.*function"):
+        scene.save(tmp_path / "b.toml")
+    scene.remove("gust")
     scene["bar"].mass = 3.0
     bare = ts.load(scene.save(tmp_path / "b.toml"))
     assert "length" not in bare.parameters()

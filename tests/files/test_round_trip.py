@@ -17,6 +17,7 @@ from tests.helpers.plug_ins import Rod
 from tests.helpers.scene_marks import outcome, there_and_back
 from tests.helpers.sketched_mechanisms import MECHANISMS
 from tsdyn.files import types
+from tsdyn.files.scene_text import marks
 from tsdyn.simulation.load import scene_file
 from tsdyn.stress.gallery.cases import CASES
 from tsdyn.stress.random_scenes import generate
@@ -57,6 +58,24 @@ MOTIONS = {
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes_of_examples_and_gallery(name, tmp_path):
     there_and_back(SCENES[name](), tmp_path / "scene.toml")
+
+
+@pytest.mark.slow_for(*GALLERY)
+@pytest.mark.parametrize("name", SCENES)
+def test_a_number_that_nothing_uses_changes_nothing(name, tmp_path):
+    """Of the table parameters: all else is as the file says, joints of forces and what has been set included."""
+    path = SCENES[name]().save(tmp_path / "scene.toml")
+    with open(path, "a") as file:
+        file.write("\n[parameters]\nspare = 1.0\n")
+    scene = ts.load(path)
+    other = scene.with_parameters({"spare": 2.0})
+    assert (scene.parameters()["spare"], other.parameters()["spare"]) == (1.0, 2.0)
+    assert marks(other) == marks(scene)
+    assert "spare = 2.0" in other.save(tmp_path / "other.toml").read_text()
+    scene.gravity = (0.0, 0.1, 0.2)
+    scene.bodies[0].mass = 1.25
+    other = scene.with_parameters({"spare": 3.0})
+    assert marks(other) == marks(scene)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -170,6 +170,18 @@ def test_outputs_too_few_for_a_curve_are_dots():
     np.testing.assert_allclose(dots.get_ydata(), RATE * np.array([0.0, 4.5, 9.0]), atol=1e-9)
 
 
+def test_a_scene_at_rest_is_drawn_as_curves():
+    """What moves it is noise of the run, which says nothing of how far outputs may be apart."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    block = scene.add_body(mass=2.0, inertia=(1, 1, 1), position=(0, 0, 1.0), name="block")
+    for i in range(3):
+        at = np.array([np.cos(2.1 * i), np.sin(2.1 * i), 0.0])
+        scene.add(ts.forces.Spring(block, scene.ground, point_a=at, point_b=at, stiffness=2e3, damping=20.0))
+    scene.set_start(scene.equilibrium())
+    _, height = curve(ts.simulate(scene, (0.0, 2.0)).plot("block.position.z"), "block.position.z")
+    np.testing.assert_allclose(height, scene["block"].position[2], atol=1e-5)
+
+
 def test_paths_names_and_the_overview(tmp_path):
     solution = fall()
     assert solution.plot().shape == (2, 2)

@@ -122,6 +122,28 @@ def test_what_a_scene_tells(scene):
         assert scene[thing.name] is thing
 
 
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_scene_starts_where_a_run_has_ended(scene):
+    scene = SCENES[scene]()
+    run = ts.simulate(scene, (0.0, 0.01), initial_tol=1e-6)
+    scene.set_start(run)
+    np.testing.assert_allclose(scene.start, (run.state.q, run.state.qd), atol=HELD)
+    ts.simulate(scene, (0.01, 0.02)).raise_if_failed()
+
+
+def test_what_modes_and_ensembles_tell():
+    scene = bobs()
+    modes = scene.linearise(scene.equilibrium().state).modes()
+    displayed(modes)
+    assert len(modes.motions) == len(modes)
+    for body in scene.bodies:
+        assert np.isfinite(modes.participation(body)).all()
+    names = [thing.name for thing in (*scene.bodies, *scene.constraints, *scene.forces)]
+    found = ts.ensemble(scene, {"a.mass": [1.0, 2.0]}, (0.0, 0.01), keep=names)
+    displayed(found)
+    assert len(found.to_dataframe()) == 2
+
+
 def test_a_run_that_fails_tells_as_much():
     scene = top.build()
     ended = ts.simulate(scene, (0.0, 1.0), max_steps=3, dense_output=True)

@@ -173,7 +173,7 @@ def _of(scene, variations, given, coordinates):
 
 HEADS = "frequency (Hz)", "damping ratio", "kinetic energy"
 DIRECTIONS = "x", "y", "z", "rotation x", "rotation y", "rotation z"
-NAMED, LEAST_SHARE = 3, 0.05  # directions of bodies that are named at most; share of the energy of all but the first
+NAMED, LEAST_SHARE = 4, 0.05  # directions of bodies that are named at most; share of the energy of all but the first
 
 
 class Moving(NamedTuple):
@@ -258,7 +258,7 @@ class Modes:
     def _shares(self):
         """Shares (j, b, 6) of the kinetic energy: m v^2 by components, and those of sqrt(J) omega, ground frame."""
         _, twists, mass, inertia = self._moving
-        moves = np.einsum("bck,jk->jbc", twists, self.shapes)
+        moves = (self.shapes @ twists.reshape(-1, twists.shape[2]).T).reshape(len(self), -1, 6)
         sizes, axes = np.linalg.eigh(inertia)
         root = np.einsum("bik,bk,bjk->bij", axes, np.sqrt(np.maximum(sizes, 0.0)), axes)
         found = np.abs(moves) ** 2
@@ -268,7 +268,7 @@ class Modes:
 
     @property
     def motions(self) -> tuple[str, ...]:
-        """What each mode moves: up to three directions of bodies with most of its kinetic energy, "car.z 98 %"."""
+        """What each mode moves: up to four directions of bodies with most of its kinetic energy, "car.z 98 %"."""
         return tuple(self._motion(shares.ravel()) for shares in self._shares)
 
     def _motion(self, shares):

@@ -87,7 +87,7 @@ def keep_of(keep, times, packed):
         return KeptChannels(keep, times.size, packed)
     except InvalidArgument as error:
         raise InvalidArgument(
-            f"keep must be 'final', 't_eval', names of channels or a function of the Solution: {error}"
+            f"keep must be 'final', 't_eval' or a function of the Solution, or names of channels: {error}"
         ) from None
 
 

@@ -52,7 +52,7 @@ def _of_options(study):
     if study.method.step is not None:
         return "a fixed step= has no lanes"
     asked = [name for name in ("events", "dense_output", "max_steps") if given[name] not in (None, False)]
-    asked += ["keep= of channels or of a function"] * callable(study.keep) + ["assemble="] * (study.free is not None)
+    asked += ["channels or a function keep="] * callable(study.keep) + ["assemble="] * (study.free is not None)
     asked += ["parameters that are a function of the case"] * (study.names is None)
     if asked:
         return f"{' and '.join(asked)} can't be served in lanes"

@@ -202,12 +202,10 @@ class Ensemble:
     def kept(self) -> Any:
         """What a function `keep` returned: an array (cases, ...), or a dict of them; channels by name."""
         found = {name[5:]: array for name, array in self._results.arrays.items() if name.startswith("kept")}
-        lost = np.full(
-            (len(self), *(self.times.shape if self.times.size else ())), np.nan
-        )  # where all cases have failed
-        found = {name: lost for name in self._channels} | found
         if not callable(self._study.keep):
             raise InvalidArgument("kept is what channels or a function keep= made of each solution; none was given.")
+        if not found:  # all cases have failed
+            found = {name: np.full((len(self), *self.times.shape * self._is_series), np.nan) for name in self._channels}
         return found[""] if found.keys() == {""} else found
 
     @property
@@ -360,7 +358,8 @@ class Ensemble:
         for name, values in (*self.parameters.items(), *self.reductions().items()):
             axes = tuple(f"axis {i} of {name}" for i in range(np.ndim(values) - 1))
             attributes = {"units": self.unit(name)} if name in self.parameters or name in self._channels else {}
-            found[name] = (("case", *(series if name in self._channels else axes)), np.asarray(values), attributes)
+            dimensions = "case", *(series if name in self._channels else axes)
+            found[name if name not in found else f"kept {name}"] = dimensions, np.asarray(values), attributes
         coordinates = {"case": np.arange(len(self)), "coordinate": self.coordinates}
         coordinates |= {"time": ("time", self.times, {"units": "s"})} if grid or series else {}
         return xarray.Dataset(found, coordinates)
@@ -374,7 +373,7 @@ class Ensemble:
             import pandas
         except ImportError as error:
             raise MissingDependency("to_dataframe() needs pandas: pip install 'tsdyn[data]'.") from error
-        columns, series, names = {}, {}, self.coordinates
+        columns, series = {}, {}
         for name, values in (*self.parameters.items(), *self.reductions().items()):
             if name in self._channels:
                 series[f"{name} ({self._channels[name]})"] = np.ravel(values)
@@ -383,14 +382,14 @@ class Ensemble:
         columns |= {"status": [str(Status(code)) for code in self.status.tolist()], "message": self.message}
         columns["reached"] = self.reached
         for level in ("q", "qd") if not self._is_series or self._study.keep == TIMES else ():
-            rows = np.asarray(getattr(self, level)).reshape(-1, len(names))
-            series |= {f"{level} {name}": rows[:, j] for j, name in enumerate(names)}
+            rows = np.asarray(getattr(self, level)).reshape(-1, len(self.coordinates))
+            series |= {f"{level} {name}": rows[:, j] for j, name in enumerate(self.coordinates)}
         times = self.times.size if self._is_series else 1
         columns = {name: np.repeat(np.asarray(values), times) for name, values in columns.items()} | series
         index = np.repeat(np.arange(len(self)), times)
         if self._is_series:
-            index, names = [index, np.tile(self.times, len(self))], ["case", "time"]
-            return pandas.DataFrame(columns, index=index).rename_axis(names)
+            index = [index, np.tile(self.times, len(self))]
+            return pandas.DataFrame(columns, index=index).rename_axis(["case", "time"])
         return pandas.DataFrame(columns, index=index).rename_axis("case")
 
     @property

@@ -7,6 +7,7 @@ curve; they are dots.
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,14 +21,14 @@ from ..observables.reactions import multipliers
 from ..observables.state import RememberingState
 from .axes import axes_of
 from .histories import finished
-from .tolerances import NO_TORQUE, RESOLVED
+from .tolerances import AT_REST, NO_TORQUE, RESOLVED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..hints import Solution
 
-WIDTH, HEIGHT = 8.0, 2.2  # inches; of a panel
+WIDTH, HEIGHT, LABEL = 8.0, 2.2, 26  # of a panel, inches; characters of a line of its label
 POINTS, FEWEST = 2000, 3  # of a curve at least, and of each step
 MOST = 20_000  # steps that are drawn
 INSIDE = 1e-9  # of a step: so near its ends are its first and last points, so that jumps between steps are upright
@@ -42,7 +43,7 @@ def time_histories(solution: Solution, names: str | Sequence[str], path: Any = N
     values = values_of(states, channels)
     values[np.isin(intervals(solution.t, states.t)[0], lost)] = np.nan
     dots = np.unique([lost, lost + 1]) if solution.t.size > 1 else np.zeros(1, int)
-    ends = values_of(solution, channels)[dots]
+    ends = values_of(solution._picked(dots), channels) if dots.size else None
     panels = {}
     for i, channel in enumerate(channels):
         panels.setdefault(channel.unit, []).append(i)
@@ -51,9 +52,10 @@ def time_histories(solution: Solution, names: str | Sequence[str], path: Any = N
     for ax, (unit, some) in zip(axes, panels.items(), strict=True):
         for i in some:
             (line,) = ax.plot(states.t, values[:, i], linewidth=1.3, label=channels[i].name)
-            if dots.size:
+            if ends is not None:
                 ax.plot(solution.t[dots], ends[:, i], ".", color=line.get_color(), markersize=4)
-        finished(ax, f"{', '.join(dict.fromkeys(channels[i].quantity for i in some))} ({unit})")
+        quantities = ", ".join(dict.fromkeys(channels[i].quantity for i in some))
+        finished(ax, fill(f"{quantities} ({unit})", LABEL))
         if unit == "N m":
             force = np.nanmax(np.abs(values[:, panels.get("N", [])]), initial=0.0)
             low, high, least = *ax.get_ylim(), NO_TORQUE * force * solution.packed.size
@@ -102,4 +104,5 @@ def _unresolved(t, q, qd, qdd):
     h = np.diff(t)[:, None]
     d, v, w = np.diff(q, axis=0), h * qd[:-1], h * qd[1:]
     ends = h * h * qdd[:-1] - 6.0 * d + 4.0 * v + 2.0 * w, h * h * qdd[1:] + 6.0 * d - 2.0 * v - 4.0 * w
-    return np.flatnonzero((np.maximum(*map(np.abs, ends)) > 32.0 * RESOLVED * ranges(q)).any(axis=1))
+    size = np.maximum(ranges(q), AT_REST * np.abs(q).max(initial=0.0))
+    return np.flatnonzero((np.maximum(*map(np.abs, ends)) > 32.0 * RESOLVED * size).any(axis=1))

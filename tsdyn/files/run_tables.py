@@ -147,7 +147,7 @@ def _choices(table, scene, mistakes):
     """The values of grid, keep and assemble."""
     grid, keep, assemble = table.get("grid", False), table.get("keep", KEEPS[0]), table.get("assemble", False)
     bodies = [] if scene is None else [body.name for body in scene.bodies]
-    listed = _is_names(assemble)
+    listed = assemble == [] or _is_names(assemble)
     known = isinstance(assemble, bool) or (listed and (scene is None or all(name in bodies for name in assemble)))
     if _is_names(keep):
         _demand_channels(("ensemble", "keep"), keep, scene, mistakes)

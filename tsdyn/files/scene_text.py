@@ -14,7 +14,7 @@ from .describe import describe, outline
 from .named_numbers import NamedNumbers
 from .reading import Mistakes
 from .toml_text import Places
-from .types import encode
+from .types import Unwritable, encode
 
 KEEP = "A class of your own must keep each argument of its __init__ as an attribute of the same name."
 LARGEST = 1 << 26  # bytes of a file that is read: what Python makes of it takes some thirty times as many
@@ -41,7 +41,10 @@ def write(scene, make):
 
 def is_of_file(scene):
     """Whether a scene is as a file with a table `parameters` says."""
-    return scene._named is not None and _changed(scene, scene._named.made(type(scene), {})) == []
+    try:
+        return scene._named is not None and not _changed(scene, scene._named.made(type(scene), {}))
+    except Unwritable:  # a function, which has been added
+        return False
 
 
 def write_outline(scene, make):

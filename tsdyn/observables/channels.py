@@ -85,8 +85,9 @@ class Names:
     """The names of channels of a packed scene; `lacks` says which parts of the scene aren't there."""
 
     def __init__(self, packed, lacks):
-        self.packed, self.handles, self.lacks, self.things = packed, handles_of(packed), lacks, {}
-        for thing in (*self.handles.bodies, *self.handles.items):
+        self.packed, self.lacks, self.things, handles = packed, lacks, {}, handles_of(packed)
+        self.rows, self.told = {id(row.item): row for row in handles.rows}, {}
+        for thing in (*handles.bodies, *handles.items):
             self.things.setdefault(thing.name, []).append(thing)
 
     def meant(self, name):
@@ -111,65 +112,45 @@ class Names:
         return InvalidArgument(" ".join([f"no channel is named {name!r};", *said, self.lacks]).rstrip())
 
     def _told(self, thing):
-        """The channels of an object, by each name that stands for some."""
+        """The channels of an object, by each name that stands for some; found once: they share what is asked."""
+        if id(thing) in self.told:
+            return self.told[id(thing)]
         quantities, natural = _of_body(thing) if isinstance(thing, PointMass) else self._of_item(thing)
         found = {}
         for key, (unit, parts, ask, pick) in quantities.items():
             name, quantity = f"{thing.name}.{key}", key.partition(".")[0].replace("_", " ")
-            if parts:
-                picks = [partial(_component, pick, i) for i in range(len(parts))]
-                several = [
-                    Channel(name + part, unit, ask, one, quantity) for part, one in zip(parts, picks, strict=True)
-                ]
-                found |= {name: several, **{one.name: [one] for one in several}}
-            else:
-                found[name] = [Channel(name, unit, ask, pick, quantity)]
-        return {thing.name: [one for key in natural for one in found[f"{thing.name}.{key}"]], **found}
+            picks = {part: partial(_component, pick, i) for i, part in enumerate(parts)} or {"": pick}
+            found[name] = [Channel(name + part, unit, ask, one, quantity) for part, one in picks.items()]
+            found |= {one.name: [one] for one in found[name]} if parts else {}
+        found[thing.name] = [one for key in natural for one in found[f"{thing.name}.{key}"]]
+        self.told[id(thing)] = found
+        return found
 
     def _of_item(self, item):
         """Quantities of a constraint or force, and the natural ones; loads are those on `item.on`, ground frame."""
-        found, kinds = self._coordinates(item)
-        natural = [name for kind in kinds for name in (kind, "rate" if len(kinds) == 1 else f"{kind}_rate")]
+        row = self.rows.get(id(item))
+        geometries = {} if row is None else {"angle": row.angles, "displacement": row.displacements}
+        counts = {kind: len(found) for kind, found in geometries.items() if found}
+        found, rate = _coordinates(item, counts), "rate" if len(counts) == 1 else "{}_rate"
+        natural = [name for kind in counts for name in (kind, rate.format(kind))]
         exerted = partial(_refused, item, self.lacks) if self.lacks else partial(_asked, "reaction", item)
         loads = {name: (unit, AXES, exerted, partial(_at, i)) for i, (name, unit) in enumerate(LOADS)}
-        geometry = self._geometry(item)
-        if geometry is not None:
-            i = int(isinstance(geometry, AngleGeometry))
+        heard = list(loads)
+        every = [one for found in geometries.values() for one in found]
+        own = item.geometry if isinstance(item, JointLoad) else every[0] if len(every) == 1 else None
+        if own is not None:
+            i = int(isinstance(own, AngleGeometry))
             name, unit = LOADS[i]
-            loads[f"{name}.axis"] = unit, (), partial(_along, item, geometry, i, exerted), _whole
+            loads[f"{name}.axis"] = unit, (), partial(_along, item, own, i, exerted), _whole
+            if item.drives or isinstance(item, Force):
+                heard = [f"{name}.axis"]
         if isinstance(item, (Spring, Distance)):
             load = loads_of(self.packed).get(id(item)) or member(self.packed, item)
             ends = list(zip((item.a, item.b), load.coordinates, strict=True))
             found["length"] = "m", (), partial(_length, ends), _whole
             loads["tension"] = "N", (), partial(_tension, item, ends, exerted), _whole
             natural, heard = ["length"], ["tension"]
-        elif geometry is not None and (item.drives or isinstance(item, Force)):
-            heard = [f"{name}.axis"]
-        else:
-            heard = [name for name, _ in LOADS]
-        natural += [] if self.lacks and natural else heard
-        return found | loads, natural
-
-    def _coordinates(self, item):
-        """Quantities of the coordinates of a joint, and their kinds."""
-        row = next((row for row in self.handles.rows if row.item is item), None)
-        counts = {kind: len(getattr(row, f"{kind}s")) for kind in KINDS} if row is not None else {}
-        kinds, found = [kind for kind, count in counts.items() if count], {}
-        for kind in kinds:
-            parts = tuple(f" {i + 1}" for i in range(counts[kind])) if counts[kind] > 1 else ()
-            for level, unit in zip(("", "_rate", "_acceleration"), KINDS[kind], strict=True):
-                found[kind + level] = told = unit, parts, partial(_asked, kind + level, item), _whole
-                if level and len(kinds) == 1:
-                    found[level[1:]] = told
-        return found, kinds
-
-    def _geometry(self, item):
-        """Where the only coordinate is measured of a joint, a motor, or a load along it; None without one."""
-        if isinstance(item, JointLoad):
-            return item.geometry
-        row = next((row for row in self.handles.rows if row.item is item), None)
-        every = () if row is None else (*row.angles, *row.displacements)
-        return every[0] if len(every) == 1 else None
+        return found | loads, natural if self.lacks and natural else natural + heard
 
 
 LOADS = ("force", "N"), ("torque", "N m")
@@ -179,6 +160,18 @@ def _heads(name):
     """What a name begins with, up to each dot, the longest first."""
     words = name.split(".")
     return [".".join(words[:i]) for i in range(len(words), 0, -1)]
+
+
+def _coordinates(item, counts):
+    """Quantities of the coordinates of a joint, so many of each kind."""
+    found = {}
+    for kind, count in counts.items():
+        parts = tuple(f" {i + 1}" for i in range(count)) if count > 1 else ()
+        for level, unit in zip(("", "_rate", "_acceleration"), KINDS[kind], strict=True):
+            found[kind + level] = told = unit, parts, partial(_asked, kind + level, item), _whole
+            if level and len(counts) == 1:
+                found[level[1:]] = told
+    return found
 
 
 def _of_body(body):

@@ -7,7 +7,7 @@ import inspect
 import math
 import re
 from collections.abc import Iterator, Mapping
-from functools import cache
+from functools import cache, cached_property
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, NamedTuple
 from weakref import WeakKeyDictionary
@@ -15,8 +15,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..docstrings import SECTION
-from ..elements.bodies import Attribute, PointMass
-from ..elements.element import checked_parameters
+from ..elements.bodies import Attribute, Ground, PointMass
+from ..elements.element import Attachment, checked_parameters
 from ..elements.joint import Joint
 from ..elements.laws import SceneLaw
 from ..errors import InvalidArgument, UnknownParameter
@@ -119,8 +119,8 @@ def fields_of(scene):
 
     Numbers of the table `parameters` of its file are first.
     """
-    numbers = scene._named.values if scene._named is not None else None
-    found, several = {name: Field(numbers, name, "") for name in vars(numbers or Numbers())}, set()
+    numbers = Numbers() if scene._named is None else scene._named.values
+    found, several = {name: Field(numbers, name, "") for name in vars(numbers)}, set()
     found[GRAVITY] = Field(scene, GRAVITY, "m/s^2")
     for owner in (*scene.bodies, *scene._added, *scene._forces):
         units = units_of(type(owner))
@@ -453,40 +453,51 @@ def with_gravity(scene, changes):
 # A scene of a file with other numbers of its table `parameters`: made of the file again, then edited as the scene was.
 
 
-def of_file(template, numbers):
-    """Return the scene, in which the handles of the template have counterparts, `twin[handle]`.
+def edits_of(scene):
+    """What has been set since a scene was made of its file: owner, attribute and value; None if it has other parts."""
+    base = scene._named.made(type(scene), {})
+    if [(type(one), one.name) for one in _parts(scene)] != [(type(one), one.name) for one in _parts(base)]:
+        return None
+    before = fields_of(base)
+    return [
+        (field.owner, field.attribute, field.value)
+        for name, field in fields_of(scene).items()
+        if not isinstance(field.owner, Numbers) and not field.keyword
+        if name not in before or not _equal(field.value, before[name].value)
+    ]
 
-    Raises
-    ------
-    InvalidArgument
-        If the file has mistakes with these numbers, or the template has other parts than the file.
-    """
-    base, twin = (template._named.made(type(template), changes) for changes in ({}, numbers))
-    parts, own, as_read = ([scene.ground, *_parts(scene)] for scene in (template, twin, base))
-    if [(type(one), one.name) for one in parts] != [(type(one), one.name) for one in as_read]:
+
+def of_file(scene, numbers, edits):
+    """Return the scene with other numbers of its file, in which its handles have counterparts, `twin[handle]`."""
+    if edits is None:
         raise InvalidArgument(
             f"{', '.join(numbers)}: the scene has other parts than its file, so [parameters] of the file can't be set "
             "any more; set attributes of bodies, constraints and forces, or edit the file."
         )
-    twin._twins = WeakKeyDictionary(zip(parts, own, strict=True))
-    before = fields_of(base)
-    for name, field in fields_of(template).items():
-        if not isinstance(field.owner, Numbers) and not field.keyword and not _equal(field.value, before[name].value):
-            owner = twin if field.owner is template else twin[field.owner]
-            setattr(owner, field.attribute, field.value)
+    twin = scene._named.made(type(scene), numbers)
+    twin._twins = WeakKeyDictionary(zip(_parts(scene), _parts(twin), strict=True))
+    for owner, attribute, value in edits:
+        setattr(twin if owner is scene else twin[owner], attribute, value)
     return twin
 
 
 def _parts(scene):
-    return (*scene.bodies, *scene.constraints, *scene.forces)
+    return (scene.ground, *scene.bodies, *scene.constraints, *scene.forces)
 
 
 def _equal(one, other):
-    """Whether values of an attribute are the same; functions of time by what a file has of them."""
+    """Whether values of an attribute are the same in two scenes; functions of time by what a file has of them."""
     try:
-        return one is other or repr(encode(one)) == repr(encode(other))
+        return one is other or repr(_plain(one)) == repr(_plain(other))
     except Unwritable:
         return False
+
+
+def _plain(value):
+    """What a file has of a value; of a body or joint its name."""
+    if isinstance(value, (Attachment, PointMass, Ground)):
+        return value.name
+    return [_plain(part) for part in value] if isinstance(value, (tuple, list)) else encode(value)
 
 
 # Scenes that differ in numbers: one analysis, one packing, and the numbers of each.
@@ -563,11 +574,17 @@ class Family:
         """The body of the packed scene that one of the template stands for."""
         return self._bodies.get(id(body), body)
 
+    @cached_property
+    def _edits(self):
+        return edits_of(self.template)
+
     def copied(self, values):
         """A copy of the template with those of some values, by name, that are numbers of its file; and the others."""
         numbers = {name: value for name, value in values.items() if isinstance(self.field(name).owner, Numbers)}
+        if not numbers:
+            return self.template.copy(), values
         others = {name: value for name, value in values.items() if name not in numbers}
-        return (of_file(self.template, numbers) if numbers else self.template.copy()), others
+        return of_file(self.template, numbers, self._edits), others
 
     def numbers(self, values):
         """The `Packed` and the start of a scene with other values, by name; None if it must be packed anew.

@@ -168,7 +168,8 @@ def parameters(scene: Scene) -> ParameterList:
     -------
     ParameterList
         A mapping of names, "object.attribute", to values; `.units` has their units. Masses, inertias, points, axes,
-        lengths, stiffnesses, loads, starts and so on, those of plug-ins included, and "gravity".
+        lengths, stiffnesses, loads, starts and so on, those of plug-ins included, and "gravity". Of a scene of a TOML
+        file first the numbers of its table `parameters`, by their own names, of which other values follow.
 
     Notes
     -----
@@ -198,7 +199,9 @@ def with_parameters(scene: Scene, values: Mapping[str, Any]) -> Scene:
     ----------
     values : mapping
         Values by name, as `parameters()` lists them; checked as the attributes are when they are set. Values that were
-        derived from others when the scene was built, such as the free length of a spring, remain as they are.
+        derived from others when the scene was built, such as the free length of a spring, remain as they are. With a
+        number of the table `parameters` of a file the scene is as if the file had been edited: all that follows from
+        the number changes; what has been set after the file was read is set again.
 
     Returns
     -------
@@ -209,7 +212,8 @@ def with_parameters(scene: Scene, values: Mapping[str, Any]) -> Scene:
     Raises
     ------
     InvalidArgument
-        If there is no such parameter.
+        If there is no such parameter; for a number of a file, if the scene has other parts than the file, or the file
+        has mistakes with it.
     TsdynError
         If a value is inadmissible.
 
@@ -217,7 +221,8 @@ def with_parameters(scene: Scene, values: Mapping[str, Any]) -> Scene:
     -----
     The constraint graph and the packed arrays are shared: masses, inertias, starts, gravity, and the numbers of forces
     and of constraints such as Distance take tens of microseconds, the geometry of a joint some hundreds. Functions of
-    time, sampling periods, and joints that a force refers to take milliseconds: the scene is packed anew.
+    time, sampling periods, joints that a force refers to, and numbers of a file take milliseconds: the scene is packed
+    anew.
 
     Examples
     --------

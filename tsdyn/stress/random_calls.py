@@ -133,6 +133,7 @@ def right(name, rng, w):
         ("a", "on", "body"): lambda: w.bodies[rng.integers(3)],
         ("b",): lambda: bodies[rng.integers(4)],
         ("joint", "item", "constraint"): lambda: (w.joint, w.spring)[rng.integers(2)],
+        ("channels", "keep"): lambda: ("pivot", ["pivot.angle", "band"], ["arm.position.x", "bead"])[rng.integers(3)],
         ("name",): lambda: f"name {rng.integers(10**6)}",
         ("frame",): lambda: ("ground", "body")[rng.integers(2)],
         ("t_span",): lambda: (0.0, float(rng.uniform(0.01, 0.05))),
@@ -203,7 +204,7 @@ PATIENCE = 120.0  # s a call may take, compiling included
 RUNS = 0.1  # of the calls are of `simulate`
 KINDS = (Primitive, Joint, Force, Integrator, motions.Smooth)
 INNER = ("place", "touch", "refresh", "motions", "row_names")
-WRITE = ("save", "view", "plot")  # files, and windows of a browser
+WRITE = ("save", "view", "plot", "to_csv")  # files, and windows of a browser
 SPACES = (constraints, forces, integrators, motions)
 
 

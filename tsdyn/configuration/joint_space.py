@@ -241,8 +241,11 @@ class Loops:
             q, (r, beyond, size), damping, linearised = trial, state, max(0.1 * damping, LEAST_DAMPING), None
         return q, steps
 
-    def close(self, tol):
-        """Return the `Closed` of the first start from which the loops close; within the limits, if one of a few is."""
+    def close(self, tol, excess=lambda q: 0.0):
+        """Return the `Closed` of the first start from which the loops close.
+
+        Of a few, that with the least sum of excess(q) and of what coordinates are beyond their limits.
+        """
         rng, best, total, after = np.random.default_rng(0), None, 0, 0
         spreads = (None,) * bool(self.limits) + SPREADS
         for start in range(1 + len(spreads)):
@@ -254,7 +257,7 @@ class Loops:
             total += more
             met = np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max())
             met = bool(met and are_aligned(self.metric.packed, q, self.metric.t) and self._aimed(q))
-            rank = not met, float(np.abs(self.beyond(q)).sum()) if met else float(np.linalg.norm(Phi))
+            rank = not met, float(excess(q) + np.abs(self.beyond(q)).sum() if met else np.linalg.norm(Phi))
             if best is None or rank < best[0]:
                 best = rank, q, Phi
             after += not best[0][0]

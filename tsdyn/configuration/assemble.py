@@ -437,6 +437,7 @@ def _released(scene, values):
             found.append(joint.name)
         elif given.size >= len(row.angles) > 0:
             joint.__dict__["angle_near"] = tuple(given[: len(row.angles)].tolist())
+            scene.touch()
     return tuple(found)
 
 
@@ -606,7 +607,8 @@ def _search(scene, metric, sketch, tol, fixed, cut, far):
 def _limits(scene):
     """Limits of joints in the file of a scene, by joint: hints of where a loop closes."""
     named = scene.imported.limits if scene.imported else {}
-    return {joint: named[joint.name] for joint in scene.constraints if joint.name in named}
+    joints = (member.constraint for member in scene.packed.members) if named else ()
+    return {joint: named[joint.name] for joint in joints if joint.name in named}
 
 
 def _demand_direction(scene, metric, found):

@@ -22,9 +22,9 @@ from .continuation import close
 from .motor_starts import are_aligned
 from .spanning_tree import Tree
 from .tolerances import (
+    AIMED,
     CLOSED_LOOPS,
     DAMPING,
-    ELSEWHERE,
     HINT,
     HINTED,
     LEAST_DAMPING,
@@ -179,7 +179,7 @@ class Loops:
         for row, aim in enumerate(self.limits[k] for k in passed):
             hints[row, place == aim.place] = HINT * S[aim.place, free[aim.place]] @ self._slope(q, aim)
         S, closing = (self._about_centre(q, each) for each in (S, closing))
-        loops = A[tree.loop_rows].toarray().reshape(len(tree.loop_rows), -1, 6)
+        loops = A[tree.loop_rows].toarray().reshape(-1, len(tree.joints), 6)
         d = (q[self.metric.r[tree.bodies]] - self._centre(q)) / tree.reach
         loops[..., 3:] += np.cross(d, loops[..., :3])
         for rows, (one, other) in tree.between:  # seen from one of two bodies: what moves both changes nothing
@@ -266,7 +266,7 @@ class Loops:
         return Closed(*best[1:], not best[0][0], total, start + 1)
 
     def _aimed(self, q):
-        return all(abs(self.away(q, aim)) <= ELSEWHERE for aim in self.aims)
+        return all(abs(self.away(q, aim)) <= AIMED for aim in self.aims)
 
     def set_out(self):
         """Return the sketch with the joints at their values, or as near as they come; loops may be open."""

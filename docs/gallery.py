@@ -109,6 +109,15 @@ SECTIONS = {
             "andrews_squeezer", "Andrews' squeezer", 0.03, "beta (rad)", lambda m, s: s.angle(s.scene.constraints[0])
         ),
         Entry("stewart_platform", "Stewart platform", 2.09, "forces of legs (N)", lambda m, s: m.forces(s), (0.0, 0.5)),
+        Entry("delta_robot", "Delta robot from URDF", 1.0, "torques (N m)", lambda m, s: m.torques(s), (0.0, 0.3)),
+        Entry(
+            "leg_with_rods",
+            "Leg with rods from URDF",
+            1.0,
+            "knee, ankle (rad)",
+            lambda m, s: np.stack([s.angle(name) for name in ("knee", "ankle pitch", "ankle roll")], 1),
+            (0.0, 0.25),
+        ),
         Entry(
             "suspension", "Double-wishbone suspension", 2.0, "ride (m)", lambda m, s: s.displacement("ride"), shapes=CAR
         ),

@@ -13,9 +13,11 @@ from examples import (
     bricard,
     cardan_shaft,
     chebyshev_linkage,
+    delta_robot,
     double_pendulum,
     flyball_governor,
     gyroscope,
+    leg_with_rods,
     peaucellier,
     planetary_gear,
     scotch_yoke,
@@ -33,7 +35,9 @@ ROUGH = {  # an end that shows what a run at 1e-3 does wrong
     planetary_gear: 0.5,
     scotch_yoke: 1.0,
 }
-FURTHER = (cardan_shaft, chebyshev_linkage, flyball_governor, stewart_platform, suspension)
+FURTHER = (
+    cardan_shaft, chebyshev_linkage, delta_robot, flyball_governor, leg_with_rods, stewart_platform, suspension,
+)  # fmt: skip
 
 
 def test_every_example_is_in_the_gallery():
@@ -51,7 +55,9 @@ def test_pictures_are_small(entry):
     assert f"]({entry.name}.md)" in index()
 
 
-@pytest.mark.slow_but("examples.chebyshev_linkage", "examples.double_pendulum", "examples.peaucellier")
+@pytest.mark.slow_but(
+    "examples.chebyshev_linkage", "examples.delta_robot", "examples.double_pendulum", "examples.peaucellier"
+)
 @pytest.mark.parametrize("module", [*ROUGH, *FURTHER], ids=lambda each: each.__name__)
 def test_examples_check_themselves(module, capsys):
     module.main()
@@ -81,7 +87,10 @@ def test_forces_of_another_plate_fail_the_check(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("module", "name"), [(cardan_shaft, "BEND"), (suspension, "LOWER_OUT")])
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [(cardan_shaft, "BEND"), (suspension, "LOWER_OUT"), (delta_robot, "ARM"), (leg_with_rods, "BACK")],
+)
 def test_another_geometry_fails_the_check(module, name, monkeypatch):
     times = np.linspace(0.0, 2.0, 401)
     solution = ts.simulate(module.build(), (0.0, 2.0), t_eval=times)

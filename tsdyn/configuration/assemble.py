@@ -51,6 +51,7 @@ class Fold(NamedTuple):
     v: np.ndarray
     axis: tuple  # body number, direction (3,)
     places: tuple  # the joints before, at and after: (body, point) of both sides; None for a slide
+    rows: tuple  # of Phi, of the joints of its loop
 
 
 class Folds:
@@ -77,6 +78,11 @@ class Folds:
         if not drawn.any():
             return np.zeros(0, int)
         return np.flatnonzero(self._angles(metric, q, False) * drawn < 0.0)
+
+    def closed(self, metric, q, which):
+        """Whether a loop of some folds is closed."""
+        Phi, most = np.abs(metric.arrays(q)[0]), INITIAL_TOL * (1.0 + np.abs(q).max())
+        return any(Phi[list(self.folds[k].rows)].max() <= most for k in which)
 
     def angle(self, metric, q, k):
         """Of one fold, rad."""
@@ -114,6 +120,7 @@ class _Edge(NamedTuple):
     axis: dict  # body number -> the direction about which it turns, for a joint with one
     slide: dict  # body number -> the direction of a slide
     meets: bool  # whether its points coincide
+    rows: slice
 
 
 def _edges(packed):
@@ -136,7 +143,7 @@ def _edges(packed):
         directions = [{number.get(id(body), ground): u for body, u in pair} for pair in pairs]
         axis = directions[0] if len(directions) == 1 else {}
         slide = directions[0] if len(directions) > 1 and not held else {}
-        yield _Edge(constraint.title, ends, points, axis, slide, "Distance" not in kinds)
+        yield _Edge(constraint.title, ends, points, axis, slide, "Distance" not in kinds, member.rows)
 
 
 def _loops(edges, count):
@@ -183,6 +190,7 @@ def _folds(packed):
     seen = set()
     for joints in _loops(edges, len(packed.bodies) + 1):
         ring = [edges[j] for j in joints]
+        rows = tuple(i for edge in ring for i in range(edge.rows.start, edge.rows.stop))
         for k, edge in enumerate(ring):
             before, after = ring[k - 1], ring[(k + 1) % len(ring)]
             a, b = _shared(before, edge), _shared(edge, after)
@@ -195,7 +203,7 @@ def _folds(packed):
                     continue
                 seen.add(key)
                 places = tuple(_sides(e, body) for e, body in ((before, a), (edge, None), (after, b)))
-                yield Fold(edge.title, (a, b), u, v, axis, places)
+                yield Fold(edge.title, (a, b), u, v, axis, places, rows)
 
 
 def _shared(one, other):
@@ -417,6 +425,7 @@ def _released(scene, values):
             found.append(joint.name)
         elif given.size >= len(row.angles) > 0:
             joint.__dict__["angle_near"] = tuple(given[: len(row.angles)].tolist())
+            scene.touch()
     return tuple(found)
 
 
@@ -430,7 +439,7 @@ def assembled_nearby(scene, fixed, t, tol=NEGLIGIBLE, folds="free", cut=(), far=
     found, near = _search(scene, metric, sketch, tol, fixed, cut, far)
     links = Folds(packed) if _largest_turn(metric, sketch, found.q) > SHOWN / 4.0 else None
     if near and links is not None and folds == "keep":
-        found = _unfolded(metric, sketch, found, links, tol, scene.imported is None)
+        found = _unfolded(metric, sketch, found, links, tol, cut if far else None)
     q = found.q
     Phi, Phi_q, Phi_t = whole.arrays(q)
     A = whole.reduced(q, Phi_q[whole.own])
@@ -487,8 +496,12 @@ def _largest_turn(metric, sketch, q):
     return np.linalg.norm(rotation_vectors(sketch[metric.p], q[metric.p]), axis=1).max(initial=0.0)
 
 
-def _unfolded(metric, sketch, found, links, tol, is_drawn):
-    """Return the configuration found, or a nearby one whose links fold as in a sketch; a drawn one has to be met."""
+def _unfolded(metric, sketch, found, links, tol, cut):
+    """Return the configuration found, or a nearby one whose links fold as in the sketch.
+
+    Where the joints of a tree hold in the sketch, folds of loops that are open there follow from coordinates of joints:
+    as many are kept as can be. Others are drawn, and have to be kept.
+    """
     drawn = links.drawn(metric, sketch)
     turned = links.turned(metric, found.q, drawn)
     kept, total, first = set(), found.iterations, turned
@@ -511,8 +524,11 @@ def _unfolded(metric, sketch, found, links, tol, is_drawn):
             if fits and not links.turned(metric, freed, drawn).size:
                 q, Phi = freed, Phi_freed
             return ContinuationEnd(q, Phi, total, True)
-    if not is_drawn:
-        return found
+    loops = None if cut is None else Loops(metric, sketch, cut=cut)
+    if loops and loops.tree.holds(sketch) and not links.closed(metric, sketch, first):
+        closed = loops.close(tol, lambda q: links.turned(metric, q, drawn).size)
+        fewer = closed.met and links.turned(metric, closed.q, drawn).size < first.size
+        return ContinuationEnd(closed.q, closed.Phi, total + closed.steps, True) if fewer else found
     stories = [
         f"  {links.folds[k].title}: {np.degrees(links.angle(metric, sketch, k)):.0f} degrees from straight in the "
         f"sketch, {np.degrees(links.angle(metric, found.q, k)):.0f} when assembled"
@@ -579,7 +595,8 @@ def _search(scene, metric, sketch, tol, fixed, cut, far):
 def _limits(scene):
     """Limits of joints in the file of a scene, by joint: hints of where a loop closes."""
     named = scene.imported.limits if scene.imported else {}
-    return {joint: named[joint.name] for joint in scene.constraints if joint.name in named}
+    joints = (member.constraint for member in scene.packed.members) if named else ()
+    return {joint: named[joint.name] for joint in joints if joint.name in named}
 
 
 def _demand_direction(scene, metric, found):

@@ -25,8 +25,8 @@ from .tolerances import MOST_NODES, NAMED_SHARE, PROVED, SHOWN_CONSTRAINTS
 class Bounds:
     """Nodes (points, or directions) on bodies, and bounds of their distances from each other."""
 
-    def __init__(self, distance):
-        self.distance, self.edges = distance, []
+    def __init__(self, distance, most=np.inf):
+        self.distance, self.most, self.edges = distance, most, []
         self.nodes = {}  # number by (body, *coordinates in its frame)
 
     def node(self, owner, place):
@@ -47,7 +47,7 @@ class Bounds:
         groups = [np.flatnonzero(owners == owner) for owner in np.unique(owners)]
         for group in groups:
             inner[np.ix_(group, group)] = self.distance(places[group][:, None], places[group][None])
-        known = np.where(np.isfinite(inner), inner, 0.0)  # at least
+        known = np.where(inner < self.most, inner, 0.0)  # at least; opposite directions are those of other edges, too
         allowed = PROVED * max(1.0, float(known.max()))
         ways = [inner]  # of up to so many constraints
         while True:
@@ -94,7 +94,7 @@ def proved(metric, q):
     """(members, sentence) of a conflict that no configuration can avoid; None where none is proved."""
     packed, held = metric.packed, ~np.isin(metric.move[:, 0], metric.columns)
     index, starts = {id(body): i for i, body in enumerate(packed.bodies)}, metric.at
-    points, directions = Bounds(_distance), Bounds(_angle)
+    points, directions = Bounds(_distance), Bounds(_angle, np.pi - PROVED)
 
     def node(bounds, body, place, turns):
         """On a body; of one that is held, and of the ground, in the ground frame."""

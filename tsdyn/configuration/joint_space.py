@@ -23,11 +23,11 @@ from .continuation import close
 from .motor_starts import are_aligned
 from .spanning_tree import Tree
 from .tolerances import (
+    AIMED,
     CLOSED_LOOPS,
     DAMPING,
     HINT,
     HINTED,
-    INITIAL_TOL,
     LEAST_DAMPING,
     MOST_DAMPING,
     MOST_STEPS,
@@ -179,7 +179,7 @@ class Loops:
         for row, aim in enumerate(self.limits[k] for k in passed):
             hints[row, place == aim.place] = HINT * S[aim.place, free[aim.place]] @ self._slope(q, aim)
         S, closing = (self._about_centre(q, each) for each in (S, closing))
-        loops = A[tree.loop_rows].toarray().reshape(len(tree.loop_rows), -1, 6)
+        loops = A[tree.loop_rows].toarray().reshape(-1, len(tree.joints), 6)
         d = (q[self.metric.r[tree.bodies]] - self._centre(q)) / tree.reach
         loops[..., 3:] += np.cross(d, loops[..., :3])
         for rows, (one, other) in tree.between:  # seen from one of two bodies: what moves both changes nothing
@@ -241,8 +241,11 @@ class Loops:
             q, (r, beyond, size), damping, linearised = trial, state, max(0.1 * damping, LEAST_DAMPING), None
         return q, steps
 
-    def close(self, tol):
-        """Return the `Closed` of the first start from which the loops close; within the limits, if one of a few is."""
+    def close(self, tol, excess=lambda q: 0.0):
+        """Return the `Closed` of the first start from which the loops close.
+
+        Of a few, that with the least sum of excess(q) and of what coordinates are beyond their limits.
+        """
         rng, best, total, after = np.random.default_rng(0), None, 0, 0
         spreads = (None,) * bool(self.limits) + SPREADS
         for start in range(1 + len(spreads)):
@@ -254,7 +257,7 @@ class Loops:
             total += more
             met = np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max())
             met = bool(met and are_aligned(self.metric.packed, q, self.metric.t) and self._aimed(q))
-            rank = not met, float(np.abs(self.beyond(q)).sum()) if met else float(np.linalg.norm(Phi))
+            rank = not met, float(excess(q) + np.abs(self.beyond(q)).sum() if met else np.linalg.norm(Phi))
             if best is None or rank < best[0]:
                 best = rank, q, Phi
             after += not best[0][0]
@@ -263,7 +266,7 @@ class Loops:
         return Closed(*best[1:], not best[0][0], total, start + 1)
 
     def _aimed(self, q):
-        return all(abs(self.away(q, aim)) <= INITIAL_TOL for aim in self.aims)
+        return all(abs(self.away(q, aim)) <= AIMED for aim in self.aims)
 
     def set_out(self):
         """Return the sketch with the joints at their values, or as near as they come; loops may be open."""

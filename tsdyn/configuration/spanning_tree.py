@@ -147,6 +147,10 @@ class Tree:
         u, v = self._directions(q)
         return self.weights * np.concatenate((self.metric.arrays(q)[0][: self.of_Phi], (u - v).ravel()))
 
+    def holds(self, q):
+        """Whether all joints of the tree hold."""
+        return bool(np.abs(self.residuals(q)[self.joint_rows]).max(initial=0.0) <= INITIAL_TOL)
+
     def slopes(self, q):
         """Derivatives of the residuals by the twists of the bodies, (rows, 6 places), sparse."""
         from scipy.sparse import coo_array, csr_array, diags_array, vstack

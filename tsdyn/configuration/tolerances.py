@@ -97,8 +97,9 @@ DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-10, 1e8
 MOST_STEPS, STALLED = 80, (6, 0.99)
 # rad: the largest component of the rotation of a joint in a step.
 MOST_TURN = 1.0
-# Residuals of loops at unit length from which on Gauss-Newton steps of all coordinates go on.
-CLOSED_LOOPS = 1e-10
+# Residuals of loops at unit length from which on Gauss-Newton steps of all coordinates go on, which don't know what is
+# held; and how far coordinates of joints are from the values given, rad or m. Both are some tens of roundings.
+CLOSED_LOOPS, AIMED = 1e-14, 1e-12
 # Displacements of joints at random, rad and shares of the scene's size, from start to start; starts beyond the first
 # that closes in which one is sought that keeps within the limits.
 HINT = 0.3  # weight of a limit that is passed, rad or m, beside rows at unit length

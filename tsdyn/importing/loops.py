@@ -8,7 +8,7 @@ hinge    so do their z axes, or a given axis    Revolute
 import numpy as np
 
 from ..errors import InvalidArgument
-from ..validation import nearest, sequence
+from ..validation import floats, nearest, sequence
 from .description import GROUND, HERE, Frame, JointItem, fresh, turned
 from .drawn_shapes import placed
 
@@ -42,7 +42,7 @@ def add_given(found, loops):
                 f"loops: each is such as {EXAMPLE}; a hinge turns about the z axes of its frames, or about the axis in "
                 f"a fourth entry, such as (0, 1, 0). Got {loop!r}."
             )
-        turn = _towards(np.asarray(parts[3], float)) if len(parts) == 4 else HERE
+        turn = _towards(floats(parts[3])) if len(parts) == 4 else HERE
         (one, at), (other, there) = (_frame(found, name) for name in parts[:2])
         if one == other:
             raise InvalidArgument(f"loops: {parts[0]!r} and {parts[1]!r} are on the same link, {one or 'the ground'}.")

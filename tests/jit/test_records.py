@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from tsdyn.jit.code_hash import deep_hash
-from tsdyn.jit.kernels import Record, entry, kernel, loader, records, resident, row_of
+
+from tsdyn.jit.kernels import (  # isort: skip
+    Record, callback, caller, entry, kernel, loader, record_at, records, resident, row_of,
+)  # fmt: skip
 
 
 class Counts(Record):
@@ -111,3 +114,45 @@ def test_an_array_of_records():
         return result
 
     assert total(table) == 7
+
+
+class Short(Record):
+    """Of a row."""
+
+    length: float
+    steps: int
+
+
+class Longer(Record):
+    """It begins as a `Short`."""
+
+    length: float
+    steps: int
+    more: int
+
+
+short_at, call_grow = record_at(Short), caller("pi")
+
+
+@callback("pi")
+def grow(row, k):
+    """Called by address, it is given a record by its address."""
+    row = short_at(row)
+    row.steps += k
+    row.length += 0.5 * k
+    return row.steps
+
+
+@entry
+def grow_all(address, rows, k):
+    """The sum of what `grow` returns."""
+    total = 0
+    for i in range(rows.size):
+        total += call_grow(address, rows[i], k)
+    return total
+
+
+def test_a_record_is_passed_by_its_address_and_may_be_longer_than_it_is_read():
+    rows = records(Longer, [(1.0, 2, 7), (3.0, 4, 8)])
+    assert grow_all(grow.address, rows, 3) == 5 + 7
+    assert [list(row) for row in rows] == [[2.5, 5, 7], [4.5, 7, 8]]

@@ -13,7 +13,7 @@ PARALLEL = 1e-6
 # axes, below which they are opposed, and the least turn from one to the other is not unique.
 UNDIRECTED = 1e-9
 
-# Complex step of constraints, whose products of steps are of second order at most; of forces, COMPLEX_STEP of maths.
+# Complex step of constraints, in which no squares of small numbers count; of forces it is COMPLEX_STEP of maths.
 CONSTRAINT_STEP = 1e-100
 # Of central differences of fourth order, relative to x: the fifth root of the rounding error, their optimum.
 FORCE_QUOTIENT = 7e-4

@@ -32,9 +32,9 @@ RESTING, NO_RATE = 1e-9, 1e-20
 MOST_ROWS = 1500
 
 # Singularity indicator over its largest value in the run, dimensionless; it falls as the square of the distance.
-NEAR = (
-    0.02  # below, at 0.14 of the distance: multipliers are refined at each order, Taylor steps tightened; regular above
-)
+# NEAR, at 0.14 of the distance: below it multipliers are refined at each order and Taylor steps tightened; above it the
+# configuration is regular again, for other methods and for Taylor alike.
+NEAR = 0.02
 NEXT_TO = 1e-3  # below, at 0.03: a step method hands over to series
 WITHIN_A_STEP = 0.2  # below, at 0.45: so does a fixed step that fails
 

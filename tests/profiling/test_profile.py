@@ -1,5 +1,7 @@
 """Where a scene's time goes: phases against counts, what is said to change."""
 
+import math
+import re
 import sys
 
 import numpy as np
@@ -81,8 +83,9 @@ def test_calls_of_steps_are_those_counted(by_steps):
     assert calls(by_steps, "steps", "force: shaft") == stats.steps + 1  # which remembers its turns
     assert calls(by_steps, "outputs", "every step") == stats.steps + 1
     kinds = {"Spherical", "Dot1"}
-    rows = calls(by_steps, "positions", "constraint rows") - len(kinds) * stats.placements
-    assert rows >= len(kinds) * (stats.newton_iterations - stats.checks_skipped)
+    sweeps = stats.placements + stats.newton_iterations
+    assert calls(by_steps, "positions", "constraint rows") == len(kinds) * sweeps
+    assert calls(by_steps, "accelerations", "constraint rows") == len(kinds) * stats.evaluations
 
 
 @pytest.mark.slow
@@ -94,6 +97,7 @@ def test_calls_of_a_series_are_those_counted(by_series):
     assert calls(by_series, "landing", "factors") == stats.factorizations
     assert by_series.orders[0][0] == orders
     assert sum(count for count, _ in by_series.orders) == calls(by_series, "coefficients", "bodies and solves")
+    assert sum(seconds for _, seconds in by_series.orders) == pytest.approx(by_series.groups()["coefficients"])
 
 
 @pytest.mark.slow
@@ -232,6 +236,23 @@ def test_a_costly_form():
 def test_a_stiff_motion_by_an_explicit_method():
     said = advice(stiff.hung(), (0.0, 2.0), integrator=I.DOP853(1e-4, 1e-4))
     assert "The motion is stiff: SDIRK54(rtol=0.0001, atol=0.0001) is" in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("method", "formulation"), [("dop853", "tangent"), ("dop853", "null-space"), ("sdirk54", "tangent")]
+)
+def test_a_costly_force(method, formulation):
+    def slow(t, a, b, par, out):
+        for i in range(1, 3000):
+            out[0] += 1e-3 * math.sin(i * t) / i
+
+    scene = two_body_pendulum.build()
+    scene.add(ts.forces.UserForce(scene.bodies[0], function=slow, name="wind"))
+    found = ts.profile(scene, (0.0, 0.05), integrator=method, formulation=formulation)
+    phases = [phase for phase in found.phases if phase.part == "force: wind"]
+    assert {phase.group for phase in phases} >= {"accelerations", *(["stage equations"] if method == "sdirk54" else [])}
+    assert any(re.match(r"wind takes \d+ % of the call", said) for said in found.advice)
 
 
 @pytest.mark.slow

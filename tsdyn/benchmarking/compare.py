@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from dataclasses import dataclass
 from importlib import import_module
 from time import perf_counter
@@ -13,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..calls import fitting
-from ..drawing import BLUE, VERMILION, Drawn, new_figure
+from ..drawing import BLUE, VERMILION, Tabulated, new_figure
 from ..elements.bodies import transform_g
 from ..errors import InvalidArgument, MissingDependency, StepFailure
 from ..observables import diagnostics, power
@@ -39,7 +38,7 @@ class Levels(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Drawn):
+class Comparison(Tabulated):
     """The result of `ts.compare`.
 
     Attributes
@@ -72,6 +71,7 @@ class Comparison(Drawn):
     seconds: float
     reference_seconds: float
     reached: bool
+    _left = (0, 1, 2)
 
     @property
     def error(self) -> Floats:
@@ -95,22 +95,13 @@ class Comparison(Drawn):
             ("time of the run (s)", f"{self.seconds:.3g}", f"{self.reference_seconds:.3g}"),
         ]
 
-    def __str__(self) -> str:
-        heads = f"{self.engine}, {self.method}, step {self.step:g} s", "tsdyn at 1e-12"
-        rows = [("", *heads), *self.rows()]
-        widths = [max(len(row[i]) for row in rows) for i in range(3)]
-        lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-        if not self.reached:
-            lines.append(f"The engine's run is not finite after t = {self.t[-1]:g} s.")
-        return "\n".join(lines)
+    def _shown(self):
+        heads = "", f"{self.engine}, {self.method}, step {self.step:g} s", "tsdyn at 1e-12"
+        said = [] if self.reached else [f"The engine's run is not finite after t = {self.t[-1]:g} s."]
+        return [], [heads, *self.rows()], said
 
     def __repr__(self) -> str:
         return f"<Comparison with {self.engine}: error {self.error.max():.2e} m after {self.t[-1] - self.t[0]:g} s>"
-
-    def _repr_html_(self) -> str:
-        heads = f"<tr><th></th><th>{html.escape(f'{self.engine}, {self.method}')}</th><th>tsdyn at 1e-12</th></tr>"
-        rows = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in self.rows())
-        return f"<table>{heads}{rows}</table>"
 
     def figure(self) -> Any:
         """The matplotlib Figure: error, constraint violation and energy against time, and cost."""

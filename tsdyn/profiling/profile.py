@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..calls import fitting, unknown_argument
-from ..errors import InvalidArgument, Status
+from ..errors import InvalidArgument
 from ..jit.cache import statistics
 from ..jit.kernels import DEBUG
 from ..observables.state import remembered
@@ -21,12 +21,10 @@ from ..simulation.run_options import OPTIONS, from_names
 from ..simulation.scene import Scene
 from ..simulation.scene_cache import prepared
 from ..simulation.segments import implicit
-from ..simulation.simulate import simulate
-from .advice import advise
-from .instrumentation import Stopwatch, Timekeeper, prices
-from .phases import Phase, of_series, of_steps, orders
+from .advice import advise, timed
+from .phases import Phase, phases
 from .report import Profile
-from .timers import own_cost
+from .timers import Watch, calibrate
 from .tolerances import FEWEST, LONG, MOST, RESOLUTION, SAMPLE
 
 if TYPE_CHECKING:
@@ -40,8 +38,8 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     """Measure the run time of `simulate(scene, t_span, **options)` by phases; the scene is not changed.
 
     The call is repeated unchanged, and with its two ends as the only output; once more with a stopwatch around the
-    compiled driver, and once with timers in place of the addresses that the driver calls. Other runs pay nothing, and
-    the sum of the phases is compared with the time of the unchanged call.
+    compiled driver, and once with timers in place of the kernels that the driver calls. Parts of these kernels, such as
+    constraint rows and each force, are timed by repetition at the final state, and counted. Other runs pay nothing.
 
     Parameters
     ----------
@@ -82,59 +80,34 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     if not isinstance(advice, (bool, np.bool_)):
         raise InvalidArgument(f"advice must be True or False, got {advice!r}.")
     before = dict(statistics)
-    solution, seconds = _timed(scene, t_span, options)
+    solution, seconds = timed(scene, t_span, options)
     loaded = {name: statistics[name] - before.get(name, 0) for name in ("hits", "misses", "seconds")}
     if solution.stats.seconds["run"] < LONG:  # the first call may have loaded or compiled kernels
-        solution, seconds = _timed(scene, t_span, options)
+        solution, seconds = timed(scene, t_span, options)
     start, end = interval(t_span)[0], solution.reached
     if not end > start:
         solution.raise_if_failed()
     wanted, call = from_names({"t_span": t_span, **options})
     method = _method(scene, solution, wanted)
-    plain = {name: value for name, value in options.items() if name not in (*OUTPUTS, "integrator", "rtol", "atol")}
-    plain["t_eval"] = (start, end)
-
     asked = {name: options[name] for name in OUTPUTS if not (options.get(name) is None or options[name] is False)}
-    sorts = {"asked": (t_span, options), "plain": ((start, end), {**plain, "integrator": method})}
+    plain = {name: value for name, value in options.items() if name not in (*OUTPUTS, "integrator", "rtol", "atol")}
+    plain |= {"t_eval": (start, end), "integrator": method}
+    calls = {"asked": (t_span, options), "plain": ((start, end), plain)}
     if options.get("integrator") is None and (solution.stats.stiff or method.implicit):
-        sorts["chosen"] = t_span, {**_without(options), "integrator": method}
+        given = {name: value for name, value in options.items() if name not in ("rtol", "atol")}
+        calls["chosen"] = t_span, {**given, "integrator": method}
     if len(asked) > 1:
-        sorts |= {name: ((start, end), {**plain, name: value, "integrator": method}) for name, value in asked.items()}
-    least, watch, keeper, run = _rounds(scene, method, (start, end), plain, sorts, seconds)
-
-    entries = keeper.entries(own_cost())
-    series = method.driver == "series"
-    found = (of_series if series else of_steps)(entries, keeper.kinds, prices(watch.memory), run.stats)
+        calls |= {name: ((start, end), {**plain, name: value}) for name, value in asked.items()}
+    least, driver, found, orders = _rounds(scene, calls, seconds)
     chosen = least.get("chosen", least["asked"])
-    outside = [Phase("Python", "arguments, slices, the solution", 1, max(least["plain"] - least["driver"], 0.0))]
-    outside += _outputs(asked, least, chosen, solution)
+    found.append(Phase("Python", "arguments, slices, the solution", 1, max(least["plain"] - driver, 0.0)))
+    found += _outputs(asked, least, chosen, solution)
     if "chosen" in least:
-        outside.append(Phase("choice of the method", "steps by the other one", 1, max(least["asked"] - chosen, 0.0)))
+        found.append(Phase("choice of the method", "steps by the other one", 1, max(least["asked"] - chosen, 0.0)))
     once = _once(scene.copy(), method, wanted, call.state, start)
-    result = Profile(
-        scene, solution, method, (start, end), least["asked"], least["driver"], (*found, *outside), once, loaded,
-        orders(entries) if series else (),
-    )  # fmt: skip
-    if advice:
-        try:
-            result.advice = advise(result, simulate, plain, options)
-        except KeyboardInterrupt:
-            result.advice = ("Interrupted before all alternatives were tried: there may be more to say.",)
+    result = Profile(scene, solution, method, (start, end), least["asked"], driver, tuple(found), orders, once, loaded)
+    result.advice = advise(result, plain, options) if advice else ()
     return result
-
-
-def _timed(scene, t_span, options):
-    """Return a solution and the seconds of its call; Ctrl-C ends the profile."""
-    began = time.perf_counter()
-    solution = simulate(scene, t_span, **options)
-    seconds = time.perf_counter() - began
-    if solution.status == Status.INTERRUPTED:
-        raise KeyboardInterrupt
-    return solution, seconds
-
-
-def _without(options):
-    return {name: value for name, value in options.items() if name not in ("rtol", "atol")}
 
 
 def _method(scene, solution, options):
@@ -145,29 +118,28 @@ def _method(scene, solution, options):
     return implicit(method, prepared(scene), options.form)
 
 
-def _observed(method, observer):
-    """Return the method with a driver that passes its memory to an observer."""
-    method = copy.copy(method)
-    method.driver = partial(DRIVERS[method.driver], observe=observer.observe)
-    return method
+def _rounds(scene, calls, seconds):
+    """Least seconds of each call and of the plain one's driver; phases of that, and calls and seconds of each order."""
+    (span, plain), (unit, half) = calls["plain"], calibrate()
 
-
-def _rounds(scene, method, span, plain, sorts, seconds):
-    """Return the least seconds of each kind of call, the last stopwatch, the fastest timekeeper and its solution."""
-    least, keeper, run = {}, None, None
-    _timed(scene, span, {**plain, "integrator": _observed(method, Timekeeper()), "max_steps": 1})  # loads the timers
-    for _ in range(int(np.clip(SAMPLE / seconds, FEWEST if seconds < LONG else 1, MOST))):
-        watch, timed = Stopwatch(), Timekeeper()
-        _timed(scene, span, {**plain, "integrator": _observed(method, watch)})
-        solution, _ = _timed(scene, span, {**plain, "integrator": _observed(method, timed)})
+    def watched(watch, **more):
+        method = copy.copy(plain["integrator"])
+        method.driver = partial(DRIVERS[method.driver], observe=watch.observe)
+        solution, _ = timed(scene, span, {**plain, **more, "integrator": method})
         watch.release()
-        timed.release()
-        if keeper is None or timed.seconds < keeper.seconds:
-            keeper, run = timed, solution
-        times = {"driver": watch.seconds}
-        times |= {name: _timed(scene, *arguments)[1] for name, arguments in sorts.items()}
-        least = {name: min(value, least.get(name, np.inf)) for name, value in times.items()}
-    return least, watch, keeper, run
+        return watch, solution.stats
+
+    watched(Watch(half), max_steps=1)  # loads the timers
+    least, driver, best, began, rounds = {}, np.inf, None, time.perf_counter(), 0
+    most = SAMPLE * (2 + len(calls))
+    while rounds < (FEWEST if seconds < LONG else 1) or (rounds < MOST and time.perf_counter() - began < most):
+        outside, _ = watched(Watch())
+        inside = watched(Watch(half))
+        driver, rounds = min(driver, outside.seconds), rounds + 1
+        best = inside if best is None or inside[0].seconds < best[0].seconds else best
+        least |= {name: min(timed(scene, *call)[1], least.get(name, np.inf)) for name, call in calls.items()}
+    times = best[0].times(unit)
+    return least, driver, phases(outside.memory, times, best[1]), tuple(times["orders"])
 
 
 def _outputs(asked, least, chosen, solution):
@@ -175,33 +147,27 @@ def _outputs(asked, least, chosen, solution):
     total = max(chosen - least["plain"], 0.0)
     if not asked:
         return [Phase("outputs", "every step", solution.t.size, total)]
-    more = (
-        {name: max(least[name] - least["plain"], RESOLUTION) for name in asked}
-        if len(asked) > 1
-        else dict.fromkeys(asked, 1)
-    )
-    calls = {"t_eval": solution.t.size, "dense_output": solution.stats.steps, "events": solution.stats.steps}
+    more = {name: max(least.get(name, chosen) - least["plain"], RESOLUTION) for name in asked}
     share = total / sum(more.values())
-    return [Phase("outputs", OUTPUTS[name], calls[name], value * share) for name, value in more.items()]
+    each = solution.t.size, solution.stats.steps, solution.stats.steps
+    return [Phase("outputs", part, calls, share * more[name])
+            for (name, part), calls in zip(OUTPUTS.items(), each, strict=True) if name in more]  # fmt: skip
 
 
 def _once(scene, method, options, state, start):
     """Return seconds of work that only the first call of a scene does; of a scene that hasn't been packed."""
-    seconds, clock = {}, time.perf_counter
-    began = clock()
+    times = [time.perf_counter()]
     scene.packed  # noqa: B018
-    seconds["packing"] = clock() - began
-    began, kept = clock(), prepared(scene)
+    times.append(time.perf_counter())
+    kept = prepared(scene)
     if method.driver == "series":
         kept.series  # noqa: B018
     else:
-        form = options.form.serving(method)
-        form.graph(kept.packed)
+        options.form.serving(method).graph(kept.packed)
         kept.system(method.implicit)
-    seconds["order of elimination"] = clock() - began
+    times.append(time.perf_counter())
     given = scene.start if state is None else state_arrays(state, kept.n)
-    began = clock()
     memory = remembered(state, kept, start, given[0])
     kept.start(scene, given, start, options.initial_tol, memory, options.redundancy == "drop")
-    seconds["check of the start"] = clock() - began
-    return seconds
+    times.append(time.perf_counter())
+    return dict(zip(("packing", "order of elimination", "check of the start"), np.diff(times).tolist(), strict=True))

@@ -63,7 +63,24 @@ def needle():
     return scene
 
 
-@pytest.mark.parametrize("build", [pendulum, four_bar, beads, joints, needle])
+def planes():
+    """A top on a table, a slab on a fixed point, and a bead on the tilted side of a slab."""
+    scene = ts.Scene()
+    table = scene.add_body(mass=5.0, inertia=(1.0, 1.0, 1.5), position=(0, 0, -0.1), name="table")
+    scene.add(C.Revolute.at(scene.ground, table, point=(0.2, 0, 0), axis=(0.1, 0, 1), name="post"))
+    spun = {"velocity": (0.1, 0, 0), "angular_velocity": (0.5, 0, 12)}
+    top = scene.add_body(mass=3.0, inertia=(0.9, 0.9, 0.3), position=(0.5, 0, 1), **spun, name="top")
+    scene.add(C.PlaneContact(top, table, point_a=(0, 0, -1), point_b=(0, 0, 0.1), normal_b=(0, 0, 1), name="tip"))
+    moving = {"velocity": (0.2, 0.1, 0), "angular_velocity": (0, 0, 3)}
+    slab = scene.add_body(mass=2.0, inertia=(0.3, 0.2, 0.4), position=(3, 0, 0.1), **moving, name="slab")
+    scene.add(C.PlaneContact(scene.ground, slab, point_a=(3.1, 0.2, 0), point_b=(0, 0, -0.1), normal_b=(0, 0, 1)))
+    bead = scene.add_point_mass(mass=1.0, position=(3, 0, 0.2), velocity=(0, 0.1, 0), name="bead")
+    scene.add(C.PlaneContact(bead, slab, point_b=(0, 0, 0.1), normal_b=(0, 0, 1)))
+    scene.assemble()
+    return scene
+
+
+@pytest.mark.parametrize("build", [pendulum, four_bar, beads, joints, needle, planes])
 def test_mujoco_with_small_steps_agrees(build):
     pytest.importorskip("mujoco")
     found = ts.compare(build(), (0.0, 0.2), with_="mujoco", step=2e-4, method="rk4", outputs=20)
@@ -101,6 +118,13 @@ def test_exudyn_with_small_steps_agrees(build):
     found = ts.compare(build(), (0.0, 0.2), with_="exudyn", step=1e-4, outputs=20)
     assert found.error.max() < 1e-6
     assert found.ours.position.max() < HELD
+
+
+@pytest.mark.slow
+def test_exudyn_has_no_plane_for_a_point_mass():
+    pytest.importorskip("exudyn")
+    with pytest.raises(ts.InvalidArgument, match="Exudyn can't have this scene:\n  .*: PlaneContact of a point mass"):
+        ts.compare(planes(), with_="exudyn")
 
 
 def test_scenes_that_an_engine_cannot_have():

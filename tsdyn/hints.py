@@ -31,7 +31,7 @@ from .observables.diagnostics import ConstraintError
 from .observables.evaluate import Evaluation
 from .observables.state import Kinematics, RememberingState, State
 from .profiling.phases import Phase
-from .profiling.report import Profile
+from .profiling.profile import Profile
 from .simulation.given_motion import InverseDynamics, KinematicAnalysis
 from .simulation.parameters import ParameterList
 from .simulation.scene import Scene

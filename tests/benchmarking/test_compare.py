@@ -123,7 +123,7 @@ def test_exudyn_with_small_steps_agrees(build):
 @pytest.mark.slow
 def test_exudyn_has_no_plane_for_a_point_mass():
     pytest.importorskip("exudyn")
-    with pytest.raises(ts.InvalidArgument, match="Exudyn can't have this scene:\n  .*: PlaneContact of a point mass"):
+    with pytest.raises(ts.InvalidArgument, match="PlaneContact of a point mass has no counterpart"):
         ts.compare(planes(), with_="exudyn")
 
 

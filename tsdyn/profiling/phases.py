@@ -112,10 +112,10 @@ def _price(function, context, run, what):
         function(context, run, what, count)
         return (time.perf_counter() - began) / count
 
-    count, least = 1, seconds(1)
+    count, least = 1, seconds(1)  # which loads
     while (least := seconds(count)) * count < BRIEF and count < 1 << 20:
         count *= 4
-    return min([least, *(seconds(count) for _ in range(ROUNDS if least < 0.1 else 0))])
+    return min(least, *(seconds(count) for _ in range(ROUNDS)))
 
 
 class _Run:
@@ -159,7 +159,7 @@ class _Run:
 def _shared(parts, seconds, *rest):
     """The parts of some seconds, at most all of them, and the rest, a `Phase` without them."""
     for part in parts:
-        spent = min(part.seconds, seconds)
+        spent = min(part.seconds, max(seconds, 0.0))
         seconds -= spent
         yield part._replace(seconds=spent)
     yield Phase(*rest, seconds)
@@ -170,7 +170,10 @@ def phases(memory, times, stats):
     run = _Run(memory, times, stats)
     found = [*(_of_series if run.series else _of_steps)(run)]
     groups = list(dict.fromkeys(phase.group for phase in found))
-    return sorted((phase for phase in found if phase.calls), key=lambda phase: groups.index(phase.group))
+    kept = [
+        phase._replace(seconds=max(phase.seconds, 0.0)) for phase in found if phase.calls
+    ]  # less than a timer's own
+    return sorted(kept, key=lambda phase: groups.index(phase.group))
 
 
 def _of_steps(run):

@@ -155,13 +155,15 @@ def calibrate(count=20000, rounds=15):
     """The unit of the clock, s, and half the time of a timer, in units: the least with it, less that without."""
     notes, name = new_notes(), "kernels.check"
     notes[RECORDS + WIDTH * list(TIMED).index(name)] = _nothing.address
-    context, least, began, first = np.array([notes.ctypes.data, 0]), [np.inf, np.inf], time.perf_counter(), read(notes)
-    for _ in range(1 + rounds):  # the first loads
+    context, times = np.array([notes.ctypes.data, 0]), np.empty((1 + rounds, 2))
+    began, first = time.perf_counter(), read(notes)
+    for row in times:  # the first loads
         for i, address in enumerate((_nothing.address, TIMERS[name].address)):
             now = read(notes)
             _call_often(address, context.ctypes.data + 8, count)
-            least[i] = min(least[i], (read(notes) - now) / count)
-    return (time.perf_counter() - began) / (read(notes) - first), round(0.5 * max(least[1] - least[0], 0.0))
+            row[i] = (read(notes) - now) / count
+    without, with_timer = times.min(axis=0)
+    return (time.perf_counter() - began) / (read(notes) - first), round(0.5 * max(with_timer - without, 0.0))
 
 
 class Watch:
@@ -202,9 +204,8 @@ class Watch:
 
     def times(self, unit):
         """Calls and seconds of the kernels by their names, of the "driver", and of "orders" a list, an order each."""
-        ends = self.notes[RECORDS:ORDERS_AT], self.notes[ORDERS_AT:]
-        rows = [row[1:] for row in np.append(ends[0], (0, 0)).reshape(-1, WIDTH).tolist()]
-        orders = [(calls, units * unit) for calls, units in ends[1].reshape(-1, 2).tolist() if calls]
-        found = {name: (calls, units * unit) for name, (calls, units) in zip(TIMED, rows, strict=True)}
-        found |= {SERIES: tuple(map(sum, zip(*orders, strict=True))) or (0, 0.0), "orders": orders}
+        kernels, orders = self.notes[RECORDS : ORDERS_AT - 1].reshape(-1, WIDTH), self.notes[ORDERS_AT:].reshape(-1, 2)
+        found = {name: (calls, units * unit) for name, (_, calls, units) in zip(TIMED, kernels.tolist(), strict=False)}
+        found["orders"] = [(calls, units * unit) for calls, units in orders.tolist() if calls]
+        found[SERIES] = int(orders[:, 0].sum()), float(orders[:, 1].sum()) * unit
         return found | {"driver": (1, (self.units - int(self.notes[SPENT])) * unit)}

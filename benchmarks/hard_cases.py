@@ -10,11 +10,11 @@ Run it: python -m benchmarks.hard_cases [case ...] [--step 1e-3] [--seconds 10]
 """
 
 import argparse
-import time
 
 import numpy as np
 
 import tsdyn as ts
+from benchmarks.contender import timed
 from tsdyn.benchmarking.engines import OUTPUTS, Exudyn
 from tsdyn.stress.gallery.cases import CASES
 
@@ -50,9 +50,8 @@ def figures(scene, r, A, v, omega):
 def ours(scene, end):
     """The figures of the default method, and seconds."""
     ts.simulate(scene, (0.0, end / 100))
-    begun = time.perf_counter()
-    solution = ts.simulate(scene, (0.0, end), t_eval=np.linspace(0.0, end, OUTPUTS + 1)).raise_if_failed()
-    seconds = time.perf_counter() - begun
+    seconds, solution = timed(ts.simulate, scene, (0.0, end), t_eval=np.linspace(0.0, end, OUTPUTS + 1))
+    solution.raise_if_failed()
     each = (solution.position, solution.rotation, solution.velocity, solution.angular_velocity)
     return *figures(scene, *(np.stack([get(body) for body in scene.bodies], axis=1) for get in each)), seconds
 

@@ -10,7 +10,6 @@ Run it: python -m benchmarks.stiff_peers [--scenes chain net] [--budget 20] [--f
 """
 
 import argparse
-import time
 from functools import partial
 from typing import NamedTuple
 
@@ -18,6 +17,7 @@ import numpy as np
 
 import tsdyn as ts
 from benchmarks import stiff
+from benchmarks.contender import timed
 from benchmarks.peers import dae_chain, stiff_odes
 from benchmarks.stiff_chain import chain
 from tsdyn.benchmarking.engines import Exudyn, MuJoCo
@@ -77,9 +77,8 @@ def run_tsdyn(case, **options):
     """A warm run: kernels are loaded, those of the method to which the default one turns, too."""
     scene = case.build()
     for share in (1e-3 if "integrator" in options else 1.0, 1.0):
-        begun = time.perf_counter()
-        solution = ts.simulate(scene, (0.0, share * case.end), t_eval=share * case.times, **options).raise_if_failed()
-    return _places(solution), time.perf_counter() - begun
+        seconds, solution = timed(ts.simulate, scene, (0.0, share * case.end), t_eval=share * case.times, **options)
+    return _places(solution.raise_if_failed()), seconds
 
 
 def _places(solution):

@@ -5,18 +5,14 @@ import numpy as np
 from tsdyn.benchmarking import engines
 
 from .. import contender
-from .tree import is_tree, tree
+from .tree import OnTrees, tree
 
 
-class ExudynTree(contender.Contender):
+class ExudynTree(OnTrees):
     """Hinges and slides one after another; a ball is three of them."""
 
     name, package, get = "Exudyn, tree", "exudyn", "pip install exudyn"
     values = tuple(10.0**-k for k in range(2, 12))  # below, its steps collapse
-
-    def serves(self, scene):
-        """Trees."""
-        return is_tree(scene) and scene.size <= 64
 
     def prepare(self, scene):
         """Build the system."""
@@ -36,7 +32,7 @@ class ExudynTree(contender.Contender):
             times.absoluteTolerance = times.relativeTolerance = tol
             times.minimumStepSize = 1e-12
             solver = exu.DynamicSolverType.DOPRI5
-            seconds, reached = contender.timed(lambda: mbs.SolveDynamic(settings, solverType=solver))
+            seconds, reached = contender.timed(mbs.SolveDynamic, settings, solverType=solver)
             if not reached:
                 raise RuntimeError("the solver didn't reach the end")
             r, A = (np.array([mbs.GetSensorValues(sensor) for sensor in row]) for row in zip(*sensors, strict=True))

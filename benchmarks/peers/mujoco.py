@@ -3,19 +3,15 @@
 from tsdyn.benchmarking import engines
 
 from .. import contender
-from .tree import is_tree
+from .tree import OnTrees
 
 
-class MuJoCoTree(contender.Contender):
+class MuJoCoTree(OnTrees):
     """Trees of hinges, slides and balls."""
 
     name, package, get = "MuJoCo, tree", "mujoco", "pip install mujoco"
     setting, values = "step", tuple(10.0 ** (-k / 2) for k in range(4, 11))
     joints, softness = (*engines.TREE, "Distance"), {}
-
-    def serves(self, scene):
-        """Trees."""
-        return is_tree(scene) and scene.size <= 64
 
     def prepare(self, scene):
         """Compile the model."""

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from ..elements.bodies import rotation_matrix
 from ..elements.element import angles
-from ..elements.joint import across
+from ..elements.joint import across, beside
 from ..errors import InvalidArgument, MissingDependency, StepFailure
 
 OUTPUTS = 200
@@ -128,12 +128,10 @@ TAKEN = (
 MANY = 100  # bodies from which on the sparse solver is the faster one
 
 
-def frame(z, x=None):
-    """A rotation matrix with columns x, z x x, z; any x across z where it isn't given."""
-    z = np.asarray(z, float) / np.linalg.norm(z)
-    x = np.cross(np.eye(3)[np.abs(z).argmin()], z) if x is None else np.asarray(x, float)
-    x = x / np.linalg.norm(x)
-    return np.stack((x, np.cross(z, x), z), axis=1)
+def _frame(z, x=None):
+    """A rotation matrix with columns x, z x x, z, all unit; any x across z where it isn't given."""
+    z = z / np.linalg.norm(z)
+    return np.stack((*(across(z) if x is None else beside(z, x)), z), axis=1)
 
 
 class Exudyn(Engine):
@@ -209,7 +207,7 @@ class Exudyn(Engine):
     def _joint(self, joint):
         """Planes are normal to the second axis, which the others share."""
         point_a, point_b, *axes = joint.coordinates
-        turns = [frame(axes[-1])] * 2 if len(axes) == 1 else [frame(z, *x) for z, *x in (axes[::2], axes[1::2])]
+        turns = [_frame(axes[-1])] * 2 if len(axes) == 1 else [_frame(z, *x) for z, *x in (axes[::2], axes[1::2])]
         pair = [self._marker(joint.a, point_a, turns[0]), self._marker(joint.b, point_b, turns[1])]
         if type(joint).__name__ == "PlaneContact":
             pair = pair[::-1]  # the plane is of the first
@@ -236,7 +234,7 @@ class Exudyn(Engine):
     def _torsionalspring(self, spring):
         axis, *references = spring.coordinates[:3]
         A, B = _turn(spring.a), _turn(spring.b)
-        turns = [frame(z, x) for z, x in zip((axis, B.T @ A @ axis), references, strict=True)]
+        turns = [_frame(z, x) for z, x in zip((axis, B.T @ A @ axis), references, strict=True)]
         pair = [self._marker(b, (0.0, 0.0, 0.0), A) for b, A in zip((spring.a, spring.b), turns, strict=True)]
         self.mbs.AddObject(
             self.ex.ObjectConnectorTorsionalSpringDamper(

@@ -160,3 +160,23 @@ def test_unknown_methods_and_options():
         ts.compare(pendulum(), with_="mujoco", method="eulr")
     with pytest.raises(ts.InvalidArgument, match="no option 'solreff'"):
         ts.compare(pendulum(), with_="mujoco", options={"solreff": (0.01, 1)})
+    for wrong in ("x", (), (0.01, float("nan")), (1, 2, 3)):
+        with pytest.raises(ts.InvalidArgument, match="solref of MuJoCo must be a list of up to 2 numbers"):
+            ts.compare(four_bar(), with_="mujoco", options={"solref": wrong})
+
+
+def test_softness_of_loops():
+    """Stiffer equality constraints, smaller violation."""
+    pytest.importorskip("mujoco")
+    found = [
+        ts.compare(four_bar(), (0.0, 0.2), with_="mujoco", options={"solref": (tau, 1.0)}, outputs=20)
+        for tau in (0.05, 0.005)
+    ]
+    assert found[1].theirs.position.max() < 0.1 * found[0].theirs.position.max()
+
+
+@pytest.mark.slow
+def test_exudyn_says_why_it_gives_up():
+    pytest.importorskip("exudyn")
+    with pytest.raises(ts.StepFailure, match=r"gave up with RK44 and the step 0.1 s: .*another method"):
+        ts.compare(pendulum(), (0, 1), with_="exudyn", step=0.1, method="RK44")

@@ -17,6 +17,7 @@ from ..elements.bodies import rotation_matrix
 from ..elements.element import angles
 from ..elements.joint import across, beside
 from ..errors import InvalidArgument, MissingDependency, StepFailure
+from ..validation import floats
 
 OUTPUTS = 200
 
@@ -278,12 +279,11 @@ class Exudyn(Engine):
         try:
             done = self.mbs.SolveDynamic(settings, solverType=getattr(exu.DynamicSolverType, method))
         except (ValueError, RuntimeError) as error:
-            done, reason = False, f" ({str(error).splitlines()[0]})"
+            done, reason = False, f": {str(error).partition(' [Python file')[0]}"
         seconds = clock() - begun
         if not done:
-            raise StepFailure(
-                f"{self.title} gave up with {method} and the step {step:g} s{reason}; take a smaller one."
-            )
+            said = f"compare: {self.title} gave up with {method} and the step {step:g} s{reason}."
+            raise StepFailure(f"{said} Take a smaller step or another method.")
         t = np.asarray(self.mbs.GetSensorStoredData(self.sensors[0][0]))[:, 0]
         shape, bodies = (len(t), len(self.scene.bodies)), self.scene.bodies
         A, omega = np.tile(np.eye(3), (*shape, 1, 1)), np.zeros((*shape, 3))
@@ -304,6 +304,7 @@ TREE = ("Revolute", "Translational", "Cylindrical", "Spherical", "Universal", "P
 ALONG = 1e-9  # sine between the axis of a spring and that of its joint
 LEAST = 1e-9  # of the largest principal moment of inertia: MuJoCo takes none that is zero, as that of a slender rod
 PARTICLE = 1e-12  # kg m^2, of a particle, which turns with what it hangs from: MuJoCo takes no smaller than 1e-15
+SOFTNESS = {"solref": 2, "solimp": 5}  # how many numbers they are
 INTEGRATORS = {"euler": "EULER", "rk4": "RK4", "implicit": "IMPLICIT", "implicitfast": "IMPLICITFAST"}
 
 
@@ -394,7 +395,7 @@ class MuJoCo(Engine):
         Of the equality constraints that close loops.
     """
 
-    title, package, methods, options = "MuJoCo", "mujoco", tuple(INTEGRATORS), ("solref", "solimp")
+    title, package, methods, options = "MuJoCo", "mujoco", tuple(INTEGRATORS), tuple(SOFTNESS)
 
     @staticmethod
     def refused(scene):
@@ -414,7 +415,8 @@ class MuJoCo(Engine):
     def __init__(self, scene, joints=TREE, **softness):
         import mujoco
 
-        self.mj, self.scene, self.softness = mujoco, scene, softness
+        self.mj, self.scene = mujoco, scene
+        self.softness = {name: _numbers(values, name, SOFTNESS[name]) for name, values in softness.items()}
         self.spec = mujoco.MjSpec()
         self.spec.compiler.degree = False
         self.spec.option.gravity = scene.gravity
@@ -561,6 +563,13 @@ class MuJoCo(Engine):
                 A[k] = data.xmat[i].reshape(3, 3)
                 omega[k] = A[k].T @ found[:3]
         return data.xpos[self.ids].copy(), A, v, omega
+
+
+def _numbers(values, name, most):
+    found = floats(values)
+    if found.ndim != 1 or not 1 <= found.size <= most or not np.isfinite(found).all():
+        raise InvalidArgument(f"compare: {name} of MuJoCo must be a list of up to {most} numbers, got {values!r}.")
+    return found
 
 
 def _quaternion(A):

@@ -196,6 +196,20 @@ report(timers="tsdyn.profiling.timers" in sys.modules)
     assert run(code, {})[0]["timers"] is False
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="its clock doesn't count nanoseconds")
+def test_the_unit_of_the_clock_in_a_process_that_has_loaded_nothing():
+    code = (
+        REPORT
+        + """
+import tsdyn.profiling.timers as timers
+timers.HAS_CYCLES = False
+report(unit=timers.calibrate()[0])
+"""
+    )
+    assert run(code, {})[0]["unit"] == pytest.approx(1e-9, rel=0.01)
+
+
 # what to change
 
 

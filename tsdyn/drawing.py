@@ -66,7 +66,8 @@ def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> list[s
     """Lines of a table whose columns are aligned, those in `left` to the left."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     pads = [str.ljust if i in left else str.rjust for i in range(len(widths))]
-    return ["  ".join(map(lambda cell, width, pad: pad(cell, width), row, widths, pads)).rstrip() for row in rows]
+    cells = [[pad(cell, width) for pad, cell, width in zip(pads, row, widths, strict=True)] for row in rows]
+    return ["  ".join(line).rstrip() for line in cells]
 
 
 class Tabulated(Drawn):
@@ -84,10 +85,9 @@ class Tabulated(Drawn):
     def _repr_html_(self) -> str:
         """The table in a notebook."""
         above, rows, below = self._shown()
-        parts = ["th"] + ["td"] * (len(rows) - 1)
         body = "".join(
             f"<tr>{''.join(f'<{tag}>{_escaped(cell)}</{tag}>' for cell in row)}</tr>"
-            for tag, row in zip(parts, rows, strict=True)
+            for tag, row in zip(["th", *["td"] * len(rows)], rows, strict=False)
         )
         caption, notes = ("<br>".join(map(_escaped, filter(None, lines))) for lines in (above, below))
         return f"<table>{caption and f'<caption>{caption}</caption>'}{body}</table>{notes and f'<p>{notes}</p>'}"

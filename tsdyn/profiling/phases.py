@@ -170,10 +170,8 @@ def phases(memory, times, stats):
     run = _Run(memory, times, stats)
     found = [*(_of_series if run.series else _of_steps)(run)]
     groups = list(dict.fromkeys(phase.group for phase in found))
-    kept = [
-        phase._replace(seconds=max(phase.seconds, 0.0)) for phase in found if phase.calls
-    ]  # less than a timer's own
-    return sorted(kept, key=lambda phase: groups.index(phase.group))
+    ran = [phase._replace(seconds=max(phase.seconds, 0.0)) for phase in found if phase.calls]  # timers' own taken off
+    return sorted(ran, key=lambda phase: groups.index(phase.group))
 
 
 def _of_steps(run):

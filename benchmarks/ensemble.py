@@ -15,6 +15,7 @@ import numpy as np
 
 import tsdyn as ts
 from benchmarks.call_overhead import Clocked
+from benchmarks.contender import timed
 from benchmarks.scenes import SCENES
 from tsdyn.ensembles import case_loop
 
@@ -30,9 +31,7 @@ def table(scene, count):
 
 def seconds(call, count):
     """Seconds a case of a call that runs so many."""
-    began = time.perf_counter()
-    call()
-    return (time.perf_counter() - began) / count
+    return timed(call)[0] / count
 
 
 def overhead(scene, span, count):

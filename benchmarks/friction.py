@@ -5,11 +5,10 @@ DOP853, rough over smooth; then a second of a rough chain by Taylor and by DOP85
 against DOP853 at 1e-13. Run it: python -m benchmarks.friction
 """
 
-import time
-
 import numpy as np
 
 import tsdyn as ts
+from benchmarks.contender import timed
 
 SIZES, ROUNDS, STEPS = (1, 4, 16, 64, 256), 7, 40
 CHAINS = (1, 0.05), (4, 0.05), (4, 1e-2), (4, 1e-3), (16, 0.05), (16, 1e-3), (64, 0.05)  # links, slip velocity in m/s
@@ -31,18 +30,15 @@ def build(count, rough, slip=0.05):
 
 def cost(scene):
     """Microseconds an evaluation, of a run of so many steps."""
-    began = time.perf_counter()
-    solution = ts.simulate(
-        scene, (0.0, 1.0), integrator=ts.integrators.DOP853(1e-8, 1e-8), max_steps=STEPS, t_eval=[0.0]
-    )
-    return 1e6 * (time.perf_counter() - began) / solution.stats.evaluations
+    options = {"integrator": ts.integrators.DOP853(1e-8, 1e-8), "max_steps": STEPS, "t_eval": [0.0]}
+    taken, solution = timed(ts.simulate, scene, (0.0, 1.0), **options)
+    return 1e6 * taken / solution.stats.evaluations
 
 
 def seconds(scene, kind, tol):
     """Seconds of a run of one second, and its end."""
-    began = time.perf_counter()
-    solution = ts.simulate(scene, (0.0, 1.0), integrator=kind(rtol=tol, atol=tol), t_eval=[1.0])
-    return time.perf_counter() - began, solution.q[-1]
+    taken, solution = timed(ts.simulate, scene, (0.0, 1.0), integrator=kind(rtol=tol, atol=tol), t_eval=[1.0])
+    return taken, solution.q[-1]
 
 
 def compare(count, slip):

@@ -4,12 +4,11 @@ Runs of both are interleaved in one process; quote the ratio. `ts.profile` then 
 and for a chain. Run it: python -m benchmarks.step_cost
 """
 
-import time
-
 import numpy as np
 
 import tsdyn as ts
 from benchmarks.by_hand import nystrom_top
+from benchmarks.contender import timed
 from examples import pendulum_chain, top
 
 END, ROUNDS = 10.0, 9
@@ -17,13 +16,6 @@ PHASES = {
     "sliding top": (top.build, END, ts.integrators.Nystrom4(step=1e-3)),
     "chain of 16": (lambda: pendulum_chain.build(16), 1.0, ts.integrators.DOP853(1e-8, 1e-8)),
 }
-
-
-def timed(run):
-    """Seconds that a call takes."""
-    started = time.perf_counter()
-    run()
-    return time.perf_counter() - started
 
 
 def contenders(steps, interval):
@@ -57,7 +49,7 @@ def main():
         seconds = {name: [] for name in runs}
         for _ in range(ROUNDS):
             for name, run in runs.items():
-                seconds[name].append(timed(run))
+                seconds[name].append(timed(run)[0])
         first = np.array(next(iter(seconds.values())))
         print(f"sliding top, {END:g} s, {steps} steps")
         for name, values in seconds.items():

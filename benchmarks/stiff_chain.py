@@ -12,11 +12,11 @@ Run it: python -m benchmarks.stiff_chain [--method Radau] [--links N ...] [--tol
 
 import argparse
 import resource
-import time
 
 import numpy as np
 
 import tsdyn as ts
+from benchmarks.contender import timed
 
 Y, X = (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 LENGTH, MASS, GRAVITY = 0.1, 1.0, 9.81  # m, kg, m/s^2
@@ -69,9 +69,7 @@ def measure(links, tolerances, kind):
     for tol in tolerances:
         method = kind(tol, tol)
         _run(scene, 0.01 * end, method)
-        began = time.perf_counter()
-        solution = _run(scene, end, method)
-        seconds = time.perf_counter() - began
+        seconds, solution = timed(_run, scene, end, method)
         yield tol, len(method.tableau.c) - 1, solution.stats, seconds, np.abs(_positions(solution) - reference).max()
 
 

@@ -10,7 +10,6 @@ Run it: python -m benchmarks.stiff_peers [--scenes chain net] [--budget 20] [--f
 """
 
 import argparse
-import time
 from functools import partial
 from typing import NamedTuple
 
@@ -18,8 +17,10 @@ import numpy as np
 
 import tsdyn as ts
 from benchmarks import stiff
+from benchmarks.contender import timed
 from benchmarks.peers import dae_chain, stiff_odes
-from benchmarks.stiff_chain import GRAVITY, INERTIA, LENGTH, MASS, chain, spring
+from benchmarks.stiff_chain import chain
+from tsdyn.benchmarking.engines import Exudyn, MuJoCo
 from tsdyn.stress.gallery.governor import governor
 
 OUTPUTS = 50
@@ -76,53 +77,18 @@ def run_tsdyn(case, **options):
     """A warm run: kernels are loaded, those of the method to which the default one turns, too."""
     scene = case.build()
     for share in (1e-3 if "integrator" in options else 1.0, 1.0):
-        begun = time.perf_counter()
-        solution = ts.simulate(scene, (0.0, share * case.end), t_eval=share * case.times, **options).raise_if_failed()
-    return _places(solution), time.perf_counter() - begun
+        seconds, solution = timed(ts.simulate, scene, (0.0, share * case.end), t_eval=share * case.times, **options)
+    return _places(solution.raise_if_failed()), seconds
 
 
 def _places(solution):
     return np.stack([solution.position(body) for body in solution.scene.bodies], axis=1)
 
 
-def run_exudyn(case, divisions, solver="GeneralizedAlpha"):
-    """All coordinates, with multipliers."""
-    from tsdyn.benchmarking.exudyn_scene import ExudynScene
-
-    step = case.end / OUTPUTS / divisions
-    found = ExudynScene(case.build()).run(case.end, step, OUTPUTS, solver=solver)
-    return (None, np.inf) if found is None else (found[0][0], found[1])
-
-
-def run_trapezoid(case, divisions):
-    """The same with the trapezoid of index 2."""
-    return run_exudyn(case, divisions, "TrapezoidalIndex2")
-
-
-def run_mujoco(case, divisions):
-    """Hinges with stiffness and damping in a tree."""
-    import mujoco
-
-    body, (stiffness, damping) = "", spring(case.links)
-    for i in reversed(range(case.links)):
-        body = (
-            f"<body pos='{LENGTH if i else 0.0} 0 0'>"
-            f"<joint type='hinge' axis='0 1 0' stiffness='{stiffness}' damping='{damping}'/>"
-            f"<inertial pos='{LENGTH / 2} 0 0' mass='{MASS}' diaginertia='1e-4 {INERTIA} {INERTIA}'/>{body}</body>"
-        )
-    model = mujoco.MjModel.from_xml_string(
-        f"<mujoco><option gravity='0 0 {-GRAVITY}' integrator='implicitfast' "
-        f"timestep='{case.end / OUTPUTS / divisions}'/>"
-        f"<worldbody>{body}</worldbody></mujoco>"
-    )
-    data, seconds, places = mujoco.MjData(model), 0.0, []
-    for i in range(OUTPUTS + 1):
-        begun = time.perf_counter()
-        mujoco.mj_step(model, data, divisions if i else 0)
-        seconds += time.perf_counter() - begun
-        mujoco.mj_kinematics(model, data)
-        places.append(data.xipos[1:].copy())
-    return np.array(places), seconds
+def run_engine(engine, method, case, divisions):
+    """Another engine with steps of one size."""
+    found = engine(case.build()).run(case.end, case.end / OUTPUTS / divisions, OUTPUTS, method)
+    return found.r, found.seconds
 
 
 def by(solver):
@@ -144,14 +110,14 @@ OURS = {
     "tsdyn, SDIRK54": (run_sdirk, LOOSE),
 }
 EXUDYN = {
-    "Exudyn, generalised-alpha": (run_exudyn, DIVISIONS),
-    "Exudyn, trapezoid": (run_trapezoid, DIVISIONS),
+    "Exudyn, generalised-alpha": (partial(run_engine, Exudyn, "GeneralizedAlpha"), DIVISIONS),
+    "Exudyn, trapezoid": (partial(run_engine, Exudyn, "TrapezoidalIndex2"), DIVISIONS),
 }
 PEERS = {  # of each kind of scene
     "any": EXUDYN,
     "chain": {
         **EXUDYN,
-        "MuJoCo, implicitfast": (run_mujoco, DIVISIONS),
+        "MuJoCo, implicitfast": (partial(run_engine, MuJoCo, "implicitfast"), DIVISIONS),
         "SciPy, Radau": (by(stiff_odes.chain), TOLERANCES),
         "scipy_dae, Radau": (by(dae_chain.run_radau), TOLERANCES),
         "SUNDIALS IDA": (by(dae_chain.run_ida), TOLERANCES),

@@ -3,11 +3,10 @@
 Quote the ratio. Run it: python -m benchmarks.still
 """
 
-import time
-
 import numpy as np
 
 import tsdyn as ts
+from benchmarks.contender import timed
 from tsdyn.formulations.locked_orientations import keep_turning
 
 C, F = ts.constraints, ts.forces
@@ -75,11 +74,11 @@ SCENES = {
 }
 
 
-def timed(scene, method):
-    """Seconds of a call."""
-    started = time.perf_counter()
-    ts.simulate(scene, (0.0, END), integrator=method, t_eval=(0.0, END)).raise_if_failed()
-    return time.perf_counter() - started
+def seconds(scene, method):
+    """Of a call."""
+    taken, solution = timed(ts.simulate, scene, (0.0, END), integrator=method, t_eval=(0.0, END))
+    solution.raise_if_failed()
+    return taken
 
 
 def main():
@@ -89,9 +88,9 @@ def main():
         for label, method in METHODS.items():
             scenes = [build(), build()]
             keep_turning(scenes[0].packed, range(len(scenes[0].bodies)))
-            least = [min(timed(scene, method) for _ in range(2)) for scene in scenes]
+            least = [min(seconds(scene, method) for _ in range(2)) for scene in scenes]
             for _ in range(ROUNDS if max(least) < 0.5 else 2):
-                least = [min(best, timed(scene, method)) for best, scene in zip(least, scenes, strict=True)]
+                least = [min(best, seconds(scene, method)) for best, scene in zip(least, scenes, strict=True)]
             whole, fewer = (1e3 * best for best in least)
             print(f"{name + ', ' + label:42} {whole:14.2f} {fewer:16.2f} {whole / fewer:6.2f}")
 

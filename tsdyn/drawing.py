@@ -1,7 +1,8 @@
-"""What figures share: colours, whether matplotlib is there, and how a figure is written to a file."""
+"""How results show themselves: tables as text and in notebooks; colours and files of figures."""
 
 from __future__ import annotations
 
+import html
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
@@ -11,7 +12,7 @@ from .calls import fitting
 from .errors import InvalidArgument, MissingDependency
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
 # from the palette of Okabe and Ito, told apart whatever the colour vision
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
@@ -67,6 +68,41 @@ class Drawn:
         if path is not None:
             save(drawn, path)
         return drawn
+
+
+def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> list[str]:
+    """Lines of a table whose columns are aligned, those in `left` to the left."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    pads = [str.ljust if i in left else str.rjust for i in range(len(widths))]
+    cells = [[pad(cell, width) for pad, cell, width in zip(pads, row, widths, strict=True)] for row in rows]
+    return ["  ".join(line).rstrip() for line in cells]
+
+
+class Tabulated(Drawn):
+    """Base of results that are a table: `_shown()` gives lines above it, its rows, the first of heads, lines below."""
+
+    _left: tuple[int, ...] = (0,)  # columns that are aligned to the left
+
+    def _shown(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        above, rows, below = self._shown()
+        return "\n".join([*above, *aligned(rows, self._left), *below])
+
+    def _repr_html_(self) -> str:
+        """The table in a notebook."""
+        above, rows, below = self._shown()
+        body = "".join(
+            f"<tr>{''.join(f'<{tag}>{_escaped(cell)}</{tag}>' for cell in row)}</tr>"
+            for tag, row in zip(["th", *["td"] * len(rows)], rows, strict=False)
+        )
+        caption, notes = ("<br>".join(map(_escaped, filter(None, lines))) for lines in (above, below))
+        return f"<table>{caption and f'<caption>{caption}</caption>'}{body}</table>{notes and f'<p>{notes}</p>'}"
+
+
+def _escaped(text):
+    return html.escape(text).replace("  ", "&emsp;")
 
 
 @fitting

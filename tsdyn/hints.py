@@ -32,7 +32,7 @@ from .observables.diagnostics import ConstraintError
 from .observables.evaluate import Evaluation
 from .observables.state import RememberingState, State
 from .profiling.phases import Phase
-from .profiling.report import Profile
+from .profiling.profile import Profile
 from .simulation.given_motion import InverseDynamics, KinematicAnalysis
 from .simulation.parameters import ParameterList
 from .simulation.scene import Scene

@@ -6,11 +6,10 @@ Of each link (x, z, angle), (vx, vz, rate), lam, mu, one after the other, so tha
 compiled.
 """
 
-import time
-
 import numba
 import numpy as np
 
+from benchmarks.contender import timed
 from benchmarks.stiff_chain import GRAVITY, INERTIA, LENGTH, MASS, reach, spring
 
 LINK = 10  # unknowns of a link
@@ -70,9 +69,7 @@ def run_ida(links, times, tol):
         max_num_steps=10_000_000,
     )  # fmt: skip
     solver.solve(times[:2], y, yd)  # the first call of a process compiles, and loads
-    begun = time.perf_counter()
-    found = solver.solve(times, y, yd)
-    seconds = time.perf_counter() - begun
+    seconds, found = timed(solver.solve, times, y, yd)
     if not found.success:
         raise RuntimeError(str(found.message))
     return _places(found.y), seconds
@@ -93,12 +90,8 @@ def run_radau(links, times, tol):
     near = sum(eye_array(y.size, k=k) for k in range(-BAND, BAND + 1)) if links > 4 else None
     sparsity = {} if near is None else {"jac_sparsity": (near.tocsc(), eye_array(y.size).tocsc())}
     g(0.0, y, yd)  # the first call of a process compiles
-    begun = time.perf_counter()
-    found = solve_dae(
-        g, (0.0, times[-1]), y, yd, method="Radau", rtol=max(tol, 1e-13), atol=atol, t_eval=times, first_step=1e-7,
-        **sparsity,
-    )  # fmt: skip
-    seconds = time.perf_counter() - begun
+    options = {"rtol": max(tol, 1e-13), "atol": atol, "t_eval": times, "first_step": 1e-7, **sparsity}
+    seconds, found = timed(solve_dae, g, (0.0, times[-1]), y, yd, method="Radau", **options)
     if not found.success:
         raise RuntimeError(str(found.message))
     return _places(found.y.T), seconds

@@ -5,14 +5,14 @@ A ball is three hinges, about y, x and z: Drake's ball joint is singular where a
 
 import numpy as np
 
-from ..contender import Contender, Outcome, timed
-from .tree import is_tree, tree
+from ..contender import Outcome, timed
+from .tree import OnTrees, tree
 
 SCHEME = "runge_kutta5"
 LONGEST = 0.1  # s, its own default for steps
 
 
-class DrakeTree(Contender):
+class DrakeTree(OnTrees):
     """Trees of hinges and slides."""
 
     name = f"Drake, {SCHEME}"
@@ -27,10 +27,6 @@ class DrakeTree(Contender):
         import pydrake.multibody.plant  # noqa: F401
 
         return f"Drake {version('drake')}"
-
-    def serves(self, scene):
-        """Trees."""
-        return is_tree(scene) and scene.size <= 64
 
     def prepare(self, scene):
         """Build the plant."""

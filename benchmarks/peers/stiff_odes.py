@@ -4,13 +4,12 @@ chain    angles of the links from the horizontal, as of stiff_chain.py
 row      places of the blocks of `stiff.pushed`; the rates are compiled
 """
 
-import time
-
 import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from benchmarks import stiff
+from benchmarks.contender import timed
 from benchmarks.stiff_chain import GRAVITY, INERTIA, LENGTH, MASS, reach, spring
 
 
@@ -49,9 +48,7 @@ def row_by_cvode(times, tol, blocks=8):
 
     solver = CVODE(f, rtol=tol, atol=tol, method="BDF", max_num_steps=10_000_000)
     solver.solve(times[:2], _at_rest(blocks))  # the first call of a process compiles, and loads
-    begun = time.perf_counter()
-    found = solver.solve(times, _at_rest(blocks))
-    seconds = time.perf_counter() - begun
+    seconds, found = timed(solver.solve, times, _at_rest(blocks))
     if not found.success:
         raise RuntimeError(str(found.message))
     return _in_space(found.y[:, :blocks]), seconds
@@ -78,9 +75,8 @@ def _row_rates(t, y, stiffness, damping, friction, slip, push, rate):
 
 def _by_scipy(rates, y, times, tol):
     rates(0.0, y)  # the first call of a process compiles
-    begun = time.perf_counter()
-    found = solve_ivp(rates, (0.0, times[-1]), y, "Radau", t_eval=times, rtol=max(tol, 1e-13), atol=tol)
-    seconds = time.perf_counter() - begun
+    options = {"t_eval": times, "rtol": max(tol, 1e-13), "atol": tol}
+    seconds, found = timed(solve_ivp, rates, (0.0, times[-1]), y, "Radau", **options)
     if not found.success:
         raise RuntimeError(found.message)
     return found.y.T, seconds

@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..contender import rotation
+from tsdyn.elements.joint import across
+
+from ..contender import Contender, rotation
 
 
 class Move(NamedTuple):
@@ -106,6 +108,14 @@ def is_tree(scene):
         return False
 
 
+class OnTrees(Contender):
+    """An engine in minimal coordinates."""
+
+    def serves(self, scene):
+        """Trees of 64 bodies at most."""
+        return is_tree(scene) and scene.size <= 64
+
+
 class Joint(NamedTuple):
     """A joint at zero, about or along the z axis of its own frame, or a ball; what it carries is in that frame."""
 
@@ -153,9 +163,7 @@ def tree(definition, balls=True):
 
 def axes(z):
     """A right-handed frame, by columns, with a given z axis (unit)."""
-    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z], axis=1)
+    return np.stack([*across(z), z], axis=1)
 
 
 def _hinges(link):

@@ -132,6 +132,7 @@ def test_interrupt_before_there_is_a_reference(monkeypatch):
     found = ts.benchmark(sliding_top(), ["rk45"], (1e-4,), SPAN)
     assert (found.rows, found.interrupted, found.reference_digits) == ((), True, 0.0)
     assert "interrupted" in str(found)
+    assert "interrupted" in found._repr_html_()
 
 
 def test_text_and_notebook(small):

@@ -63,7 +63,24 @@ def needle():
     return scene
 
 
-@pytest.mark.parametrize("build", [pendulum, four_bar, beads, joints, needle])
+def planes():
+    """A top on a table, a slab on a fixed point, and a bead on the tilted side of a slab."""
+    scene = ts.Scene()
+    table = scene.add_body(mass=5.0, inertia=(1.0, 1.0, 1.5), position=(0, 0, -0.1), name="table")
+    scene.add(C.Revolute.at(scene.ground, table, point=(0.2, 0, 0), axis=(0.1, 0, 1), name="post"))
+    spun = {"velocity": (0.1, 0, 0), "angular_velocity": (0.5, 0, 12)}
+    top = scene.add_body(mass=3.0, inertia=(0.9, 0.9, 0.3), position=(0.5, 0, 1), **spun, name="top")
+    scene.add(C.PlaneContact(top, table, point_a=(0, 0, -1), point_b=(0, 0, 0.1), normal_b=(0, 0, 1), name="tip"))
+    moving = {"velocity": (0.2, 0.1, 0), "angular_velocity": (0, 0, 3)}
+    slab = scene.add_body(mass=2.0, inertia=(0.3, 0.2, 0.4), position=(3, 0, 0.1), **moving, name="slab")
+    scene.add(C.PlaneContact(scene.ground, slab, point_a=(3.1, 0.2, 0), point_b=(0, 0, -0.1), normal_b=(0, 0, 1)))
+    bead = scene.add_point_mass(mass=1.0, position=(3, 0, 0.2), velocity=(0, 0.1, 0), name="bead")
+    scene.add(C.PlaneContact(bead, slab, point_b=(0, 0, 0.1), normal_b=(0, 0, 1)))
+    scene.assemble()
+    return scene
+
+
+@pytest.mark.parametrize("build", [pendulum, four_bar, beads, joints, needle, planes])
 def test_mujoco_with_small_steps_agrees(build):
     pytest.importorskip("mujoco")
     found = ts.compare(build(), (0.0, 0.2), with_="mujoco", step=2e-4, method="rk4", outputs=20)
@@ -103,6 +120,13 @@ def test_exudyn_with_small_steps_agrees(build):
     assert found.ours.position.max() < HELD
 
 
+@pytest.mark.slow
+def test_exudyn_has_no_plane_for_a_point_mass():
+    pytest.importorskip("exudyn")
+    with pytest.raises(ts.InvalidArgument, match="PlaneContact of a point mass has no counterpart"):
+        ts.compare(planes(), with_="exudyn")
+
+
 def test_scenes_that_an_engine_cannot_have():
     pytest.importorskip("mujoco")
     scene = pendulum()
@@ -136,3 +160,23 @@ def test_unknown_methods_and_options():
         ts.compare(pendulum(), with_="mujoco", method="eulr")
     with pytest.raises(ts.InvalidArgument, match="no option 'solreff'"):
         ts.compare(pendulum(), with_="mujoco", options={"solreff": (0.01, 1)})
+    for wrong in ("x", (), (0.01, float("nan")), (1, 2, 3)):
+        with pytest.raises(ts.InvalidArgument, match="solref of MuJoCo must be a list of up to 2 numbers"):
+            ts.compare(four_bar(), with_="mujoco", options={"solref": wrong})
+
+
+def test_softness_of_loops():
+    """Stiffer equality constraints, smaller violation."""
+    pytest.importorskip("mujoco")
+    found = [
+        ts.compare(four_bar(), (0.0, 0.2), with_="mujoco", options={"solref": (tau, 1.0)}, outputs=20)
+        for tau in (0.05, 0.005)
+    ]
+    assert found[1].theirs.position.max() < 0.1 * found[0].theirs.position.max()
+
+
+@pytest.mark.slow
+def test_exudyn_says_why_it_gives_up():
+    pytest.importorskip("exudyn")
+    with pytest.raises(ts.StepFailure, match=r"gave up with RK44 and the step 0.1 s: .*another method"):
+        ts.compare(pendulum(), (0, 1), with_="exudyn", step=0.1, method="RK44")

@@ -81,8 +81,9 @@ def test_calls_of_steps_are_those_counted(by_steps):
     assert calls(by_steps, "steps", "force: shaft") == stats.steps + 1  # which remembers its turns
     assert calls(by_steps, "outputs", "every step") == stats.steps + 1
     kinds = {"Spherical", "Dot1"}
-    rows = calls(by_steps, "positions", "constraint rows") - len(kinds) * stats.placements
-    assert rows >= len(kinds) * (stats.newton_iterations - stats.checks_skipped)
+    sweeps = stats.placements + stats.newton_iterations
+    assert calls(by_steps, "positions", "constraint rows") == len(kinds) * sweeps
+    assert calls(by_steps, "accelerations", "constraint rows") == len(kinds) * stats.evaluations
 
 
 @pytest.mark.slow
@@ -94,6 +95,7 @@ def test_calls_of_a_series_are_those_counted(by_series):
     assert calls(by_series, "landing", "factors") == stats.factorizations
     assert by_series.orders[0][0] == orders
     assert sum(count for count, _ in by_series.orders) == calls(by_series, "coefficients", "bodies and solves")
+    assert sum(seconds for _, seconds in by_series.orders) == pytest.approx(by_series.groups()["coefficients"])
 
 
 @pytest.mark.slow
@@ -113,6 +115,20 @@ def test_other_forms(formulation):
     assert calls(found, "positions", "corrections, B and D") == stats.placements
     assert calls(found, "velocities", "qd = D vd") == stats.evaluations
     assert found.solution.formulation == formulation
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("method", "formulation"), [("dop853", "tangent"), ("dop853", "null-space"), ("sdirk54", "tangent")]
+)
+def test_a_force_in_every_form(method, formulation):
+    scene = two_body_pendulum.build()
+    scene.add(ts.forces.Spring(*scene.bodies, point_a=(0, 0, 1), stiffness=30.0, damping=1.0, name="spring"))
+    found = ts.profile(scene, (0.0, 0.5), integrator=method, formulation=formulation, advice=False)
+    phases = [phase for phase in found.phases if phase.part == "force: spring"]
+    assert {phase.group for phase in phases} == {"accelerations", *(["stage equations"] * (method == "sdirk54"))}
+    assert sum(phase.calls for phase in phases) == found.solution.stats.evaluations
+    assert all(phase.seconds > 0.0 for phase in phases)
 
 
 @pytest.mark.slow
@@ -178,6 +194,20 @@ report(timers="tsdyn.profiling.timers" in sys.modules)
 """
     )
     assert run(code, {})[0]["timers"] is False
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="its clock doesn't count nanoseconds")
+def test_the_unit_of_the_clock_in_a_process_that_has_loaded_nothing():
+    code = (
+        REPORT
+        + """
+import tsdyn.profiling.timers as timers
+timers.HAS_CYCLES = False
+report(unit=timers.calibrate()[0])
+"""
+    )
+    assert run(code, {})[0]["unit"] == pytest.approx(1e-9, rel=0.01)
 
 
 # what to change

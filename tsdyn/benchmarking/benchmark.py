@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-import html
 import math
 import platform
 import signal
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..calls import fitting
-from ..drawing import BLUE, GREEN, GREY, VERMILION, Drawn, new_figure
+from ..drawing import BLUE, GREEN, GREY, VERMILION, Tabulated, new_figure
 from ..errors import InvalidArgument, Status
 from ..formulations.registry import formulation as find_formulation
 from ..integrators import DOP853, RK45, SDIRK54
@@ -222,7 +221,10 @@ class Row(NamedTuple):
         )
 
 
-class Benchmark(Drawn):
+_HEAD = ("method", "tol or step", "error r (m)", "error A", "", "time (ms)", *HEADS, "status")
+
+
+class Benchmark(Tabulated):
     """Run time against error of methods on one scene.
 
     Attributes
@@ -236,6 +238,8 @@ class Benchmark(Drawn):
     machine : str
         Processor, versions and date.
     """
+
+    _left = (0, 4, len(_HEAD) - 1)
 
     def __init__(
         self,
@@ -256,61 +260,31 @@ class Benchmark(Drawn):
 
     def table(self) -> str:
         """The rows as text, with where the errors come from and the machine."""
+        return str(self)
+
+    def _shown(self):
         if self.reference is None:
-            return "Benchmark, interrupted before there was a reference."
-        head = [
+            return ["Benchmark, interrupted before there was a reference."], [], []
+        marked = any(not row.trusted and not row.message for row in self.rows)
+        above = [
             f"Run time against error, {self.span[0]:g} to {self.span[1]:g} s, formulation {self.formulation!r}.",
             f"Errors are the largest over all bodies and {self.reference.t.size} outputs; run times are medians of "
             f"{self.repeats} interleaved runs, without compilation and preparation.",
             f"Reference: {self.reference.source}; {self.reference_digits:.1f} digits are trusted.",
-            *(["* below what the reference is trusted to."] if self._marked() else []),
+            *(["* below what the reference is trusted to."] if marked else []),
             *(["Interrupted: what there was so far."] if self.interrupted else []),
             self.machine,
             "",
         ]
-        cells = [_HEAD, *(_cells(row) for row in self.rows)]
-        widths = [max(len(line[i]) for line in cells) for i in range(len(_HEAD))]
-        lines = [
-            "  ".join(
-                cell.ljust(w) if i in _LEFT else cell.rjust(w)
-                for i, (cell, w) in enumerate(zip(line, widths, strict=True))
-            )
-            for line in cells
-        ]
-        return "\n".join([*head, *(line.rstrip() for line in lines), *self._messages()])
-
-    def _marked(self):
-        return any(not row.trusted and not row.message for row in self.rows)
-
-    def _messages(self):
-        return [f"{row.method}, {row.setting} {row.value:g}: {row.message}" for row in self.rows if row.message]
-
-    __str__ = table
+        said = [f"{row.method}, {row.setting} {row.value:g}: {row.message}" for row in self.rows if row.message]
+        return above, [_HEAD, *map(_cells, self.rows)], said
 
     def __repr__(self) -> str:
         return f"<Benchmark: {len(self.rows)} runs, reference trusted to {self.reference_digits:.1f} digits>"
 
-    def _repr_html_(self) -> str:
-        """The table in a notebook."""
-        lines = [f"<th>{html.escape(cell)}</th>" for cell in _HEAD]
-        rows = [
-            "".join(lines),
-            *("".join(f"<td>{html.escape(cell)}</td>" for cell in _cells(row)) for row in self.rows),
-        ]
-        notes = "<br>".join(html.escape(text) for text in (*self._messages(), self.machine))
-        body = "".join(f"<tr>{row}</tr>" for row in rows)
-        return (
-            f"<table><caption>Run time against error; {self.reference_digits:.1f} digits of the reference are trusted"
-            f"</caption>{body}</table><p>{notes}</p>"
-        )
-
     def figure(self) -> Any:
         """Draw it; return the matplotlib Figure."""
         return figure({"": self})
-
-
-_HEAD = ("method", "tol or step", "error r (m)", "error A", "", "time (ms)", *HEADS, "status")
-_LEFT = (0, 4, len(_HEAD) - 1)
 
 
 def _cells(row):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import html
 from dataclasses import dataclass
-from importlib import import_module
 from time import perf_counter
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,13 +11,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..calls import fitting
-from ..drawing import BLUE, VERMILION, Drawn, new_figure
+from ..drawing import BLUE, VERMILION, Tabulated, new_figure
 from ..elements.bodies import transform_g
-from ..errors import InvalidArgument, MissingDependency, StepFailure
+from ..errors import InvalidArgument
 from ..observables import diagnostics, power
 from ..runs.arguments import interval
 from ..simulation.simulate import simulate
 from ..validation import nearest, positive, whole
+from .benchmark import poses
+from .engines import ENGINES
 
 if TYPE_CHECKING:
     from ..hints import Floats, Scene
@@ -39,7 +39,7 @@ class Levels(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Drawn):
+class Comparison(Tabulated):
     """The result of `ts.compare`.
 
     Attributes
@@ -72,6 +72,7 @@ class Comparison(Drawn):
     seconds: float
     reference_seconds: float
     reached: bool
+    _left = (0, 1, 2)
 
     @property
     def error(self) -> Floats:
@@ -95,22 +96,13 @@ class Comparison(Drawn):
             ("time of the run (s)", f"{self.seconds:.3g}", f"{self.reference_seconds:.3g}"),
         ]
 
-    def __str__(self) -> str:
-        heads = f"{self.engine}, {self.method}, step {self.step:g} s", "tsdyn at 1e-12"
-        rows = [("", *heads), *self.rows()]
-        widths = [max(len(row[i]) for row in rows) for i in range(3)]
-        lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-        if not self.reached:
-            lines.append(f"The engine's run is not finite after t = {self.t[-1]:g} s.")
-        return "\n".join(lines)
+    def _shown(self):
+        heads = "", f"{self.engine}, {self.method}, step {self.step:g} s", "tsdyn at 1e-12"
+        said = [] if self.reached else [f"The engine's run is not finite after t = {self.t[-1]:g} s."]
+        return [], [heads, *self.rows()], said
 
     def __repr__(self) -> str:
         return f"<Comparison with {self.engine}: error {self.error.max():.2e} m after {self.t[-1] - self.t[0]:g} s>"
-
-    def _repr_html_(self) -> str:
-        heads = f"<tr><th></th><th>{html.escape(f'{self.engine}, {self.method}')}</th><th>tsdyn at 1e-12</th></tr>"
-        rows = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in self.rows())
-        return f"<table>{heads}{rows}</table>"
 
     def figure(self) -> Any:
         """The matplotlib Figure: error, constraint violation and energy against time, and cost."""
@@ -134,119 +126,6 @@ class Comparison(Drawn):
             for axes in (error, violation, energy):
                 axes.legend(fontsize=8)
         return figure
-
-
-# The other engines: how a scene gets there, and what of it can't.
-
-
-class EngineRun(NamedTuple):
-    """A run of another engine, in the coordinates of the scene."""
-
-    name: str  # with version
-    method: str
-    t: Floats
-    q: Floats
-    qd: Floats
-    seconds: float
-
-
-def run(
-    scene: Scene, engine: str, end: float, step: float, outputs: int, method: str | None, options: Any
-) -> EngineRun:
-    """The run of a scene by an engine; raises InvalidArgument where it can't have the scene."""
-    version = _version(engine)
-    methods = METHODS[engine]
-    method = methods[0] if method is None else method
-    if method not in methods:
-        raise InvalidArgument(
-            f"compare: {engine} has no method {method!r}{nearest(method, methods)} It has {', '.join(methods)}."
-        )
-    return RUNS[engine](scene, version, end, step, outputs, method, options)
-
-
-def _version(engine):
-    """The name of an engine with its version; raises MissingDependency where it isn't installed."""
-    if not isinstance(engine, str) or engine not in METHODS:
-        known = ", ".join(METHODS)
-        raise InvalidArgument(
-            f"compare: with_={engine!r} is no engine that is known{nearest(str(engine), METHODS)} There are {known}."
-        )
-    try:
-        return f"{TITLES[engine]} {import_module(engine).__version__}"
-    except ImportError as error:
-        raise MissingDependency(f"compare(with_={engine!r}) needs {TITLES[engine]}: pip install {engine}.") from error
-
-
-def _demand_none(engine, found):
-    """Refuse a scene with parts that an engine can't have."""
-    if found:
-        lines = "\n".join(f"  {item.name}: {reason}" for item, reason in found[:10])
-        more = f"\n  and {len(found) - 10} more" if len(found) > 10 else ""
-        raise InvalidArgument(f"compare: {TITLES[engine]} can't have this scene:\n{lines}{more}")
-
-
-def _time_dependent(scene):
-    """Constraints that depend on time, or on functions of the user's."""
-    return [
-        (item, "it depends on time")
-        for item in scene.constraints
-        if any(not isinstance(value, (int, float)) for part in item.parts for value in part.parameters())
-    ]
-
-
-def _exudyn(scene, version, end, step, outputs, method, options):
-    from . import exudyn_scene
-
-    _demand_none("exudyn", [*exudyn_scene.refused(scene), *_time_dependent(scene)])
-    _demand_known("exudyn", options, ())
-    made = exudyn_scene.ExudynScene(scene)
-    found = made.run(end, step, outputs, dependent=bool(scene.mobility().redundant), solver=method)
-    if found is None:
-        raise StepFailure(f"compare: {version} gave up with {method} and the step {step:g} s; take a smaller one.")
-    (r, A, v, omega), seconds = found
-    p = np.roll(Rotation.from_matrix(A.reshape(-1, 3, 3)).as_quat(), 1, axis=1).reshape(*A.shape[:2], 4)
-    return EngineRun(version, method, made.times, *coordinates(scene, r, p, v, omega), seconds)
-
-
-def _mujoco(scene, version, end, step, outputs, method, options):
-    from . import mujoco_scene
-    from .mujoco_scene import MujocoScene
-
-    found = [*mujoco_scene.refused_joints(scene), *_time_dependent(scene)]
-    _demand_none("mujoco", found or mujoco_scene.refused_forces(scene, mujoco_scene.spanning_tree(scene)[0]))
-    _demand_known("mujoco", options, ("solref", "solimp"))
-    (t, r, p, v, omega), seconds = MujocoScene(scene, **options).run(end, step, outputs, method)
-    rigid = [i for i, body in enumerate(scene.bodies) if body.dimension == 7]
-    return EngineRun(version, method, t, *coordinates(scene, r, p[:, rigid], v, omega[:, rigid]), seconds)
-
-
-def _demand_known(engine, options, known):
-    for name in options:
-        if name not in known:
-            words = f"It has {', '.join(known)}." if known else "It has none."
-            raise InvalidArgument(f"compare: {engine} has no option {name!r}. {words}")
-
-
-def coordinates(scene, r, p, v, omega):
-    """(q, qd), shapes (k, n), of positions and velocities (k, b, 3), p and omega of rigid bodies alone."""
-    q, qd, rigid = [], [], 0
-    for i, body in enumerate(scene.bodies):
-        q.append(r[:, i])
-        qd.append(v[:, i])
-        if body.dimension == 7:
-            unit = p[:, rigid] / np.linalg.norm(p[:, rigid], axis=1, keepdims=True)
-            q.append(unit)
-            qd.append(0.5 * np.einsum("kij,ki->kj", transform_g(unit), omega[:, rigid]))
-            rigid += 1
-    return np.concatenate(q, axis=1), np.concatenate(qd, axis=1)
-
-
-TITLES = {"mujoco": "MuJoCo", "exudyn": "Exudyn"}
-METHODS = {
-    "mujoco": ("euler", "rk4", "implicit", "implicitfast"),
-    "exudyn": ("GeneralizedAlpha", "TrapezoidalIndex2", "RK44", "RK67", "ODE23", "DOPRI5"),
-}
-RUNS = {"mujoco": _mujoco, "exudyn": _exudyn}
 
 
 TOLERANCE = 1e-12  # of the reference
@@ -318,45 +197,54 @@ def compare(
     if options is not None and not isinstance(options, dict):
         raise InvalidArgument(f"compare: options must be a dictionary, got {options!r}.")
     _ = scene.packed  # refuses a scene without bodies
-    found = run(scene, with_, end - start, min(step, end - start), outputs, method, options or {})
-    finite = np.isfinite(found.q).all(axis=1) & np.isfinite(found.qd).all(axis=1)
+    engine = _engine(with_)
+    if method is not None and method not in engine.methods:
+        known = f"{nearest(method, engine.methods)} It has {', '.join(engine.methods)}."
+        raise InvalidArgument(f"compare: {with_} has no method {method!r}{known}")
+    version, method, options = engine.version(), method or engine.methods[0], options or {}
+    engine.demand(scene)
+    for name in options:
+        if name not in engine.options:
+            known = f"It has {', '.join(engine.options)}." if engine.options else "It has none."
+            raise InvalidArgument(f"compare: {with_} has no option {name!r}. {known}")
+    found = engine(scene, **options).run(end - start, min(step, end - start), outputs, method)
+    finite = np.isfinite([np.abs(part).reshape(len(found.t), -1).max(axis=1) for part in found[1:5]]).all(axis=0)
     kept = len(finite) if finite.all() else int(finite.argmin())
-    t, q, qd = start + found.t[:kept], found.q[:kept], found.qd[:kept]
+    t, r, A, v, omega = (part[:kept] for part in found[:5])
+    t = start + t
+    q, qd = _coordinates(scene, r, A, v, omega)
     tight = {"rtol": TOLERANCE, "atol": TOLERANCE, "constraint_tol": 1e-13}
     simulate(scene, (start, start + SHORT * (end - start)), **tight)  # loads kernels
     begun = perf_counter()
     ours = simulate(scene, (start, end), t_eval=np.minimum(t, end), **tight).raise_if_failed()
     seconds = perf_counter() - begun
+    r_ours, A_ours = poses(ours)
+    half_chord = np.linalg.norm(A - A_ours, axis=(2, 3)) / np.sqrt(8.0)  # |A - B| = sqrt(8) sin(angle / 2)
     return Comparison(
-        engine=found.name, method=found.method, step=step, t=t, names=tuple(body.name for body in scene.bodies),
-        position_error=_apart(scene, q, ours.q), rotation_error=_turned(scene, q, ours.q),
+        engine=version, method=method, step=step, t=t, names=tuple(body.name for body in scene.bodies),
+        position_error=np.linalg.norm(r - r_ours, axis=2), rotation_error=2.0 * np.arcsin(np.minimum(half_chord, 1.0)),
         theirs=_levels(ours, t, q, qd), ours=_levels(ours, t, ours.q, ours.qd), seconds=found.seconds,
-        reference_seconds=seconds,
-        reached=bool(kept == len(finite)),
+        reference_seconds=seconds, reached=bool(kept == len(finite)),
     )  # fmt: skip
 
 
-def _columns(scene):
-    """Where the coordinates of each body begin."""
-    return scene.system.bodies[:, 0].tolist()
+def _engine(name):
+    if not isinstance(name, str) or name not in ENGINES:
+        known = f"{nearest(str(name), ENGINES)} There are {', '.join(ENGINES)}."
+        raise InvalidArgument(f"compare: with_={name!r} is no engine that is known{known}")
+    return ENGINES[name]
 
 
-def _apart(scene, q, reference):
-    """Distances of the centroids (k, b), m."""
-    return np.stack(
-        [np.linalg.norm(q[:, at : at + 3] - reference[:, at : at + 3], axis=1) for at in _columns(scene)], axis=1
-    )
-
-
-def _turned(scene, q, reference):
-    """Angles between the orientations (k, b), rad; zero of point masses."""
-    found = np.zeros((len(q), len(scene.bodies)))
-    for i, (body, at) in enumerate(zip(scene.bodies, _columns(scene), strict=True)):
+def _coordinates(scene, r, A, v, omega):
+    """(q, qd), shapes (k, n), of the bodies' positions, rotation matrices and velocities."""
+    q, qd = [], []
+    for i, body in enumerate(scene.bodies):
+        q.append(r[:, i])
+        qd.append(v[:, i])
         if body.dimension == 7:
-            p, other = q[:, at + 3 : at + 7], reference[:, at + 3 : at + 7]
-            near = np.where((p * other).sum(axis=1, keepdims=True) < 0.0, -other, other)
-            found[:, i] = 4.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(p - near, axis=1), 1.0))
-    return found
+            q.append(np.roll(Rotation.from_matrix(A[:, i]).as_quat(), 1, axis=1))
+            qd.append(0.5 * np.einsum("kij,ki->kj", transform_g(q[-1]), omega[:, i]))
+    return np.concatenate(q, axis=1), np.concatenate(qd, axis=1)
 
 
 def _levels(ours, t, q, qd):

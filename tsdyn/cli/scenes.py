@@ -4,6 +4,7 @@ import sys
 import textwrap
 from pathlib import Path
 
+from ..drawing import aligned
 from ..errors import InvalidArgument, TsdynError
 from .parser import print_json
 from .run import (
@@ -121,10 +122,7 @@ def _info(parsed):
 def _print_table(title, rows):
     if not rows:
         return
-    print(f"{title}:")
-    widths = [max(len(row[i]) for row in rows) for i in range(3)]
-    for row in rows:
-        print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    print(textwrap.indent("\n".join([f"{title}:", *aligned(rows, range(3))]), "  ")[2:])
 
 
 def _facts(scene, mobility, why, given):

@@ -1,5 +1,5 @@
 """`ts.profile`: run time of a call by phases, with advice.
 
-Imports benchmarking, simulation and below. Begin with profile.py; instrumentation.py installs timers (timers.py) in the
-workspace of a run, phases.py collects their readings, advice.py draws conclusions.
+Imports benchmarking, simulation and below. Begin with profile.py; timers.py times kernels in a run, phases.py shares
+these times among their parts, advice.py draws conclusions.
 """

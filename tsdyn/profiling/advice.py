@@ -6,7 +6,6 @@ the difference between the two final states is reported with it.
 
 import copy
 import time
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,27 +14,12 @@ from ..benchmarking.benchmark import poses
 from ..errors import Status, TsdynError
 from ..integrators import SDIRK54, Taylor
 from ..simulation.scene_cache import prepared
+from ..simulation.simulate import simulate
 from ..taylor.layout import lacking, without_series
+from . import tolerances as limits
 from .phases import duration
-from .tolerances import (
-    ALTERNATIVE,
-    CAPPED,
-    CHARTS,
-    ERRORS,
-    FORCE,
-    LARGEST_GAP,
-    LONGEST,
-    LOOSER,
-    LOOSEST,
-    ONCE,
-    OUTPUTS,
-    PYTHON,
-    QUICKER,
-    REJECTED,
-    SHORT,
-)
 
-SHOWN = 3
+SHOWN = 3  # parts without series, by name
 
 
 class Alternative(NamedTuple):
@@ -46,77 +30,76 @@ class Alternative(NamedTuple):
     method: str
 
 
-def advise(profile, simulate, plain, options):
-    """Return advice, a tuple of sentences.
+def timed(scene, t_span, options):
+    """A solution, and the seconds of its call; Ctrl-C ends the profile."""
+    began = time.perf_counter()
+    solution = simulate(scene, t_span, **options)
+    seconds = time.perf_counter() - began
+    if solution.status == Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    return solution, seconds
 
-    Parameters
-    ----------
-    profile : Profile
-    simulate : callable
-    plain, options : dict
-        Options of the call with two outputs, and of the call as it is.
-    """
-    said = [*_outputs(profile), *_around(profile), *_forces(profile), *_steps(profile)]
+
+def advise(profile, plain, options):
+    """Advice, a tuple of sentences; plain, options: those of the call with two outputs, and of the call as it is."""
+    said = [*_outputs(profile), *_parts(profile), *_steps(profile)]
     if not profile.solution.success:
         return (f"The run ended early: {profile.solution.message}", *said)
-    limit = profile.seconds * (1.0 - profile.share("outputs"))
-    said += _series(profile, plain, limit, simulate)
-    if profile.seconds > LONGEST:
-        return (*said, f"Other methods and tolerances were not tried: a call takes {duration(profile.seconds)}.")
-    run = partial(simulate, profile.scene, profile.span)
-    return (*said, *_alternatives(profile, run, plain, options, limit))
+    try:
+        limit = profile.seconds * (1.0 - profile.share("outputs"))
+        said += _series(profile, plain, limit)
+        if profile.seconds > limits.LONGEST:
+            took = duration(profile.seconds)
+            said.append(f"Other methods and tolerances were not tried: a call takes {took}.")
+        else:
+            said += _alternatives(profile, plain, options, limit)
+    except KeyboardInterrupt:
+        said = ["Interrupted before all alternatives were tried: there may be more to say."]
+    return tuple(said)
 
 
 def _outputs(profile):
     for phase in profile.phases:
-        if phase.group == "outputs" and phase.seconds >= OUTPUTS * profile.total:
+        if phase.group == "outputs" and phase.seconds >= limits.OUTPUTS * profile.total:
             share, each = _percent(phase.seconds / profile.total), duration(phase.each)
-            if phase.part.startswith("times"):
-                yield f"t_eval with {phase.calls} outputs costs {share} of the call, {each} each: ask for fewer."
-            elif phase.part == "every step":
+            if phase.part == "every step":
                 yield (
                     f"Output of every step costs {share} of the call: t_eval with the times that are wanted costs "
                     "only those."
                 )
+            elif phase.part.startswith("times"):
+                yield f"t_eval with {phase.calls} outputs costs {share} of the call, {each} each: ask for fewer."
             else:
                 name = {"dense output": "dense_output=True", "events": "events"}[phase.part]
                 yield f"{name} costs {share} of the call, {each} a step: leave it out where nothing asks for it."
 
 
-def _around(profile):
-    outside = sum(p.seconds for p in profile.phases if p.group == "Python")
-    if outside >= PYTHON * profile.total:
+def _parts(profile):
+    outside, once = profile.share("Python"), sum(profile.once.values())
+    if outside >= limits.PYTHON:
         yield (
-            f"Python's part of each call is {duration(outside)}, {_percent(outside / profile.total)}: one call over "
+            f"Python's part of each call is {duration(outside * profile.total)}, {_percent(outside)}: one call over "
             "a longer interval has it once."
         )
-    once = sum(profile.once.values())
-    if once >= ONCE * profile.seconds:
+    if once >= limits.ONCE * profile.seconds:
         yield (
             f"A scene's first call takes {duration(once)} more than others: keep the scene, and change its bodies' "
             "numbers or pass state= rather than build it anew."
         )
-
-
-def _forces(profile):
-    parts = {}
-    for phase in profile.phases:
-        if phase.part.startswith("force: "):
-            parts[phase.part[7:]] = parts.get(phase.part[7:], 0.0) + phase.seconds
-    for name, seconds in parts.items():
-        if seconds >= FORCE * profile.total:
-            yield f"{name} takes {_percent(seconds / profile.total)} of the call: a cheaper law would pay."
+    for part in dict.fromkeys(phase.part for phase in profile.phases if phase.part.startswith("force: ")):
+        share = sum(phase.seconds for phase in profile.phases if phase.part == part) / profile.total
+        if share >= limits.FORCE:
+            yield f"{part[7:]} takes {_percent(share)} of the call: a cheaper law would pay."
 
 
 def _steps(profile):
-    stats, steps = profile.solution.stats, profile.solution.steps
-    charts = profile.share("charts")
-    if charts >= CHARTS:
+    stats, steps, charts = profile.solution.stats, profile.solution.steps, profile.share("charts")
+    if charts >= limits.CHARTS:
         reasons = profile.solution.charts.reason[1:]
         counted = ", ".join(f"{reasons.count(name)} for {name}" for name in dict.fromkeys(reasons)) or "at the start"
         yield f"Charts take {_percent(charts)} of the call: {stats.charts} in {stats.steps} steps, {counted}."
     tried = stats.steps + stats.rejected
-    if stats.rejected >= REJECTED * tried:
+    if stats.rejected >= limits.REJECTED * tried:
         low, high = np.quantile(steps.t[~steps.accepted], (0.25, 0.75))
         yield (
             f"{stats.rejected} of {tried} steps were rejected, half of them between t = {low:.3g} and {high:.3g} s: "
@@ -124,51 +107,20 @@ def _steps(profile):
         )
 
 
-def _alternatives(profile, run, plain, options, limit):
-    """Return the alternatives that are faster than the limit, s."""
-    method, solution = profile.method, profile.solution
-    astray = []
-
-    def attempt(**changes):
-        found = _attempt(run, {**plain, "integrator": method, **changes}, limit, solution)
-        if found and found.gap > _allowed(changes.get("integrator"), method):
+def _alternatives(profile, plain, options, limit):
+    """The alternatives that are faster than the limit, s."""
+    method, solution, astray = profile.method, profile.solution, []
+    for said, changes in _changes(profile, plain, options):
+        found = _attempt(profile.scene, profile.span, {**plain, **changes}, limit, solution)
+        if found is None or (changes.get("integrator", method) is None and found.method == solution.method):
+            continue
+        if found.gap > _allowed(changes.get("integrator"), method):
             astray.append(found.gap)
-            return None
-        return found
-
-    adaptive = method.step is None
-    tolerances = {"rtol": method.rtol, "atol": method.atol} if adaptive else {}
-    given = "the same tolerances" if adaptive else "tolerances of 1e-8"
-    if options.get("integrator") is not None:
-        found = attempt(integrator=None, **tolerances)
-        if found and found.method != solution.method:
-            yield f"The default method, {found.method} at {given}, is {_quicker(found, limit)}."
-    if solution.stats.stiff and not method.implicit and adaptive:
-        found = attempt(integrator=SDIRK54(method.rtol, method.atol))
-        if found:
-            yield f"The motion is stiff: {found.method} is {_quicker(found, limit)}."
-    if adaptive:
-        looser = copy.copy(method)
-        looser.rtol, looser.atol = LOOSER * method.rtol, LOOSER * method.atol
-        found = attempt(integrator=looser) if max(looser.rtol, looser.atol) <= LOOSEST else None
-        if found:
-            values = f"rtol={looser.rtol:g} and atol={looser.atol:g}"
-            yield f"With tolerances {LOOSER:g} times looser, {values}, it is {_quicker(found, limit)}."
-    if method.max_step is not None and adaptive:
-        h = solution.steps.h[solution.steps.accepted]
-        free = copy.copy(method)
-        free.max_step = None
-        found = attempt(integrator=free) if np.mean(h > 0.999 * method.max_step) > CAPPED else None
-        if found:
-            yield f"Without max_step, which sets most of the steps, it is {_quicker(found, limit)}."
-    if plain.get("formulation", "tangent") != "tangent":
-        found = attempt(formulation="tangent")
-        if found:
-            yield f"formulation='tangent' is {_quicker(found, limit)}."
-    if plain.get("chart_interval") is not None:
-        found = attempt(chart_interval=None)
-        if found:
-            yield f"Without chart_interval, which forces charts, it is {_quicker(found, limit)}."
+            continue
+        yield (
+            f"{said.format(found.method)} {limit / found.seconds:.2g} times as quick, {duration(found.seconds)} (the "
+            f"ends differ by {found.gap:.1e}, m or of a rotation matrix)."
+        )
     if astray:
         yield (
             f"Faster alternatives end elsewhere, by up to {max(astray):.1e} (m, or of a rotation matrix): the final "
@@ -177,75 +129,79 @@ def _alternatives(profile, run, plain, options, limit):
         )
 
 
+def _changes(profile, plain, options):
+    """What to try: the beginning of the sentence, with a place for the method's name, and the changed options."""
+    method, solution = profile.method, profile.solution
+    if options.get("integrator") is not None:
+        given = "the same tolerances" if method.step is None else "tolerances of 1e-8"
+        same = {} if method.step is not None else {"rtol": method.rtol, "atol": method.atol}
+        yield f"The default method, {{}} at {given}, is", {"integrator": None, **same}
+    if method.step is None:
+        if solution.stats.stiff and not method.implicit:
+            yield "The motion is stiff: {} is", {"integrator": SDIRK54(method.rtol, method.atol)}
+        looser = copy.copy(method)
+        looser.rtol, looser.atol = limits.LOOSER * method.rtol, limits.LOOSER * method.atol
+        if max(looser.rtol, looser.atol) <= limits.LOOSEST:
+            values = f"rtol={looser.rtol:g} and atol={looser.atol:g}"
+            yield f"With tolerances {limits.LOOSER:g} times looser, {values}, it is", {"integrator": looser}
+        if method.max_step is not None:
+            h, free = solution.steps.h[solution.steps.accepted], copy.copy(method)
+            free.max_step = None
+            if np.mean(h > 0.999 * method.max_step) > limits.CAPPED:
+                yield "Without max_step, which sets most of the steps, it is", {"integrator": free}
+    if plain.get("formulation", "tangent") != "tangent":
+        yield "formulation='tangent' is", {"formulation": "tangent"}
+    if plain.get("chart_interval") is not None:
+        yield "Without chart_interval, which forces charts, it is", {"chart_interval": None}
+
+
 def _allowed(integrator, method):
-    """Return the largest admissible difference of the final states."""
+    """The largest admissible difference of the final states."""
     tolerances = [tol for each in (integrator, method) if each is not None for tol in (each.rtol, each.atol) if tol]
-    return min(ERRORS * max(tolerances), LARGEST_GAP) if tolerances else LARGEST_GAP
+    return min(limits.ERRORS * max(tolerances), limits.LARGEST_GAP) if tolerances else limits.LARGEST_GAP
 
 
-def _series(profile, plain, limit, simulate):
-    """Return the reason why the scene has no Taylor series, and the time of a run without the forces at fault."""
+def _series(profile, plain, limit):
+    """The reason why the scene has no Taylor series, and the time of a run without the forces at fault."""
     scene, method = profile.scene, profile.method
     packed = prepared(scene).packed
-    found = lacking(packed)
+    found, names = lacking(packed), without_series(packed)
     if method.driver == "series" or not found:
         return
-    said = f"Taylor series can't run this scene: {_names(without_series(packed))}."
+    shown = names[:SHOWN] + [f"{len(names) - SHOWN} more"] * (len(names) > SHOWN)
+    said = f"Taylor series can't run this scene: {'; '.join(shown)}."
     forces = {id(load.force) for load in packed.loads} & {id(item) for item, _ in found}
-    if len(forces) < len(found) or profile.seconds > LONGEST:
-        yield said
-        return
-    bare = copy.copy(scene)
-    bare._forces = [twin for twin, force in zip(bare.forces, scene.forces, strict=True) if id(force) not in forces]
-    bare.touch()
-    tolerances = {"rtol": method.rtol or 1e-8, "atol": method.atol or 1e-8}
-    series = _attempt(partial(simulate, bare, profile.span), {**plain, "integrator": Taylor(**tolerances)}, limit, None)
-    them = "them" if len(forces) > 1 else "it"
-    yield said if series is None else f"{said} Without {them} they take {duration(series.seconds)}."
+    if len(forces) == len(found) and profile.seconds <= limits.LONGEST:
+        bare = copy.copy(scene)
+        bare._forces = [twin for twin, force in zip(bare.forces, scene.forces, strict=True) if id(force) not in forces]
+        bare.touch()
+        taylor = Taylor(rtol=method.rtol or 1e-8, atol=method.atol or 1e-8)
+        series = _attempt(bare, profile.span, {**plain, "integrator": taylor}, limit)
+        if series is not None:
+            said += f" Without {'them' if len(forces) > 1 else 'it'} they take {duration(series.seconds)}."
+    yield said
 
 
-def _attempt(run, options, limit, solution):
-    """Return an `Alternative` that is faster by QUICKER, or None."""
+def _attempt(scene, span, options, limit, solution=None):
+    """An `Alternative` that is faster by QUICKER, or None."""
     try:
-        run(**{**options, "max_steps": 1})  # loads the kernels
-        began = time.perf_counter()
-        some = run(**{**options, "max_steps": SHORT})
-        seconds, (start, end) = time.perf_counter() - began, some.span
-        if seconds * (end - start) > 5.0 * limit * (some.state.t - start):
+        timed(scene, span, {**options, "max_steps": 1})  # loads the kernels
+        some, seconds = timed(scene, span, {**options, "max_steps": limits.SHORT})
+        if seconds * (some.span[1] - some.span[0]) > 5.0 * limit * (some.state.t - some.span[0]):
             return None
         seconds, spent = np.inf, 0.0
-        while spent < ALTERNATIVE:
-            began = time.perf_counter()
-            found = run(**options)
-            taken = time.perf_counter() - began
+        while spent < limits.ALTERNATIVE:
+            found, taken = timed(scene, span, options)
             seconds, spent = min(seconds, taken), spent + taken
             if not found.success or taken > 2.0 * limit:
                 break
     except TsdynError:
         return None
-    if Status.INTERRUPTED in (some.status, found.status):
-        raise KeyboardInterrupt
-    if not found.success or QUICKER * seconds > limit:
+    if not found.success or limits.QUICKER * seconds > limit:
         return None
-    if solution is None:
-        return Alternative(seconds, np.nan, found.method)
-    gap = max(
-        float(np.abs(one[-1] - other[-1]).max()) for one, other in zip(poses(found), poses(solution), strict=True)
-    )
-    return Alternative(seconds, gap, found.method)
-
-
-def _quicker(found, limit):
-    return (
-        f"{limit / found.seconds:.2g} times as quick, {duration(found.seconds)} (the ends differ by {found.gap:.1e}, m "
-        "or of a rotation matrix)"
-    )
+    pairs = () if solution is None else zip(poses(found), poses(solution), strict=True)
+    return Alternative(seconds, max((np.abs(a[-1] - b[-1]).max() for a, b in pairs), default=np.nan), found.method)
 
 
 def _percent(share):
     return f"{100.0 * share:.0f} %"
-
-
-def _names(found):
-    shown = found[:SHOWN] + ([f"{len(found) - SHOWN} more"] if len(found) > SHOWN else [])
-    return "; ".join(shown)

@@ -14,7 +14,7 @@ from ..formulations.dependent_rows import dependent_rows
 from ..jit.kernels import entry
 from ..maths.matrix_rank import dependent, sparse_lu
 from ..model.equations import WIDTH, as_csr, call_jacobian, constraint_curvature, set_time, with_short_rows
-from ..model.packed import with_curvatures, with_force_jacobians
+from ..model.packed import no_system, with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..rows.constraint_graph import REDUCED, are_unequal, coordinate_scales
@@ -39,7 +39,7 @@ class Derivatives(NamedTuple):
     Q_qd: object
 
 
-@entry
+@entry(no_system(), "mvmvvv")
 def fill_blocks(s, x, lam, rows, Q_q, Q_qd, kept):
     """Blocks of all instances: s has the table of `_separate`; x (4, 14 instances) q, qd, qdd and, first of all, t.
 

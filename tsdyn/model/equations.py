@@ -18,6 +18,7 @@ from ..motions.prescribed import Motion, call_motion
 from ..motions.program import HOLD, call_smooth
 from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
+from .packed import no_system
 
 call_curvature = caller(CURVATURE_SIGNATURE)
 
@@ -143,7 +144,7 @@ def is_rheonomic(s):
     return s.rheonomic[0] != 0
 
 
-@entry
+@entry(no_system(), "vvdvmvv")
 def evaluate_constraints(s, q, qd, t, Phi, Phi_q, Phi_t, gamma):
     """Fill Phi (m,), Phi_q (m, n), Phi_t (m,) and gamma (m,); the last three are zero on entry."""
     set_time(s, t)
@@ -196,7 +197,7 @@ def as_csr(packed, rows):
 # Samples of forces that depend on time by a function or a law of the user's, at states that stay the same.
 
 
-@entry
+@entry(no_system(), "vvvwvv")
 def _sample(s, q, qd, t, at, Q, out):
     """out (k,): sums of all forces on the coordinates `at`, at times t (k,); Q (n,): zeros.
 

@@ -1,5 +1,6 @@
 """Run where a platform wheel is installed: every method and form, and a Numba that ends the process if it compiles."""
 
+import contextlib
 import json
 import sys
 import time
@@ -62,7 +63,8 @@ def everything():
     ends = {}
     for kind in ts.integrators.registered():
         for form in ("tangent", "null-space", "maggi-kane"):
-            ends[f"{kind.__name__} {form}"] = first_run(kind.__name__.lower(), form).tobytes().hex()
+            with contextlib.suppress(ts.InvalidArgument):  # a method that doesn't serve the form
+                ends[f"{kind.__name__} {form}"] = first_run(kind.__name__.lower(), form).tobytes().hex()
     for count in (40, 300):  # sparse rows; series that exceed the caches near by
         for method in (None, "dop853", "radau"):
             ts.simulate(chain(count), (0.0, 0.001), integrator=method).raise_if_failed()

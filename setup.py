@@ -12,9 +12,17 @@ import sys
 import tomllib
 from pathlib import Path
 
-from setuptools import setup
+from setuptools import Distribution, setup
 from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
+
+
+class PlatformDistribution(Distribution):
+    """A package that isn't pure Python, though it has no extension modules."""
+
+    def has_ext_modules(self):
+        """Yes."""
+        return True
 
 
 class BuildWithKernels(build_py):
@@ -32,11 +40,6 @@ class BuildWithKernels(build_py):
 class PlatformWheel(bdist_wheel):
     """A wheel for this Python on this system; the kernels need nothing of a C library but its mathematics."""
 
-    def finalize_options(self):
-        """Not pure."""
-        super().finalize_options()
-        self.root_is_pure = False
-
     def get_tag(self):
         """The oldest manylinux that has a name."""
         python, abi, system = super().get_tag()
@@ -48,6 +51,7 @@ if os.environ.get("TSDYN_SHIP_KERNELS", "") in ("", "0"):
 else:
     project = tomllib.loads(Path(__file__).with_name("pyproject.toml").read_text(encoding="utf-8"))["project"]
     setup(
+        distclass=PlatformDistribution,
         cmdclass={"build_py": BuildWithKernels, "bdist_wheel": PlatformWheel},
         setup_requires=project["dependencies"],  # which compile the kernels
     )

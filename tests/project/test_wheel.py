@@ -83,7 +83,7 @@ def test_nothing_is_compiled_by_any_method_and_form(installed, tmp_path):
     assert Path(found["home"]).is_relative_to(installed.parents[1])
     assert Path(found["shipped"]).name == target.portable()
     assert found.get("misses", 0) == 0
-    assert len(found["ends"]) >= 17  # of seven methods
+    assert len(found["ends"]) >= 15  # of seven methods; implicit ones and Taylor serve fewer forms
     assert errors == ""
     own, _ = answers(sys.executable, tmp_path, "dop853", "tangent", TSDYN_CACHE_DIR="", PYTHONPATH=str(ROOT))
     assert own["end"] == found["ends"]["DOP853 tangent"]

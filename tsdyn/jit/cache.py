@@ -163,9 +163,9 @@ def key_of(signature, target):
 def load(name, rebuild, ours=None):
     """What `rebuild` makes of the content of a kernel's file; None where there is none, or none that can be loaded.
 
-    ours: a folder to look in first, that is only read.
+    ours: a folder to look in last, that is only read.
     """
-    for file in (path / name for path in (ours, *folders()) if path):
+    for file in (path / name for path in (*folders(), ours) if path):
         if not os.path.lexists(file):
             continue
         try:

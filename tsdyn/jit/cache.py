@@ -174,10 +174,8 @@ def load(name, rebuild, ours=None):
             if os.path.lexists(file):  # another process may just have deleted it
                 report(file, error, file.parent != ours)
             continue
-        if file.parent == ours:
-            return found
         with contextlib.suppress(OSError):
-            if time.time() - file.stat().st_mtime > _DAY:
+            if file.parent != ours and time.time() - file.stat().st_mtime > _DAY:
                 os.utime(file)
         return found
     return None

@@ -69,4 +69,5 @@ def chosen():
 
 def _libraries():
     """Intel's mathematical functions of registers, which Numba uses where they are installed."""
-    return ["SVML"] if numba.config.USING_SVML else []
+    config = numba.config  # no variable of the environment
+    return ["SVML"] if config.USING_SVML else []

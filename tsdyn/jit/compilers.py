@@ -50,7 +50,7 @@ def described():
 
 def machine():
     """The processor as machine code is made for it, and what has made it where that isn't the Numba that is here."""
-    return [platform.machine(), *current().target(), *(made_by() or ())]
+    return [platform.machine(), *current().target(), *made_by()]
 
 
 def shipped():
@@ -60,9 +60,9 @@ def shipped():
 
 @cache
 def made_by():
-    """Names and versions of what has compiled the shipped kernels; None for what is here, or where there are none."""
+    """Names and versions of what has compiled the shipped kernels; none where that is here, or nothing is shipped."""
     made = shipped() and json.loads((shipped() / current().MADE).read_text(encoding="utf-8"))
-    return [f"{name} {number}" for name, number in made.items()] if made and made != versions() else None
+    return [f"{name} {number}" for name, number in made.items()] if made and made != versions() else []
 
 
 def attempt(function, own, plain):

@@ -12,7 +12,7 @@ from numba.extending import intrinsic
 
 import tsdyn as ts
 from tests.helpers.processes import REPORT, ROOT, SMALL, TINY, command, edit, run
-from tsdyn.jit import backend, cache, compilers, stock
+from tsdyn.jit import backend, cache, compilers, stock, target
 from tsdyn.jit.arrays import stack, zeros
 
 VERSIONS = f"Numba {numba.__version__}; it was seen in {' to '.join(backend.SEEN)}"
@@ -68,12 +68,11 @@ def test_stored_machine_code_has_the_shape_that_is_taken_apart(monkeypatch):
     assert [type(part) for part in found[2]] == [bytes, bytes]
 
 
-@pytest.mark.skipif(compilers.current() is stock, reason="nothing private is used")
-def test_the_processor_is_the_one_that_numba_compiles_for():
+def test_the_native_processor_is_the_one_that_numba_compiles_for():
     from numba.core.registry import cpu_target
 
     found = cpu_target.target_context.codegen().magic_tuple()
-    assert cache.machine()[1:] == list(found), f"tsdyn counts on Numba compiling for LLVM's host processor: {VERSIONS}"
+    assert target.of_numba() == found, f"tsdyn counts on Numba compiling for LLVM's host processor: {VERSIONS}"
 
 
 GONE = {

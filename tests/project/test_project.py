@@ -128,7 +128,7 @@ def prose(source):
 def test_files_that_docstrings_and_comments_name_exist():
     """A path, or the end of one, of a file of the project; `file.py` is one of the reader's."""
     modules = [file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py")]
-    files = [*modules, *ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "file.py"]
+    files = [*modules, *ROOT.glob("*.md"), ROOT / "setup.py", *(ROOT / "docs").rglob("*.md"), ROOT / "file.py"]
     paths = [file.relative_to(ROOT).parts for file in files]
     ends = {"/".join(parts[i:]) for parts in paths for i in range(len(parts))}
     for module in modules:

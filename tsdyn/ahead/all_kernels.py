@@ -1,6 +1,9 @@
 """The kernels that `tsdyn compile` compiles: all that a first run may need, or all that there are."""
 
+import contextlib
 import sys
+from importlib import import_module
+from pathlib import Path
 
 from ..elements import force, primitive
 from ..formulations.registry import FORMULATIONS
@@ -20,12 +23,17 @@ def compile_kernels(everything=False):
     """
     if DEBUG:
         return 0, None, {"everything": "TSDYN_DEBUG is set, so nothing is compiled"}
-    names = {name: kernel for kernel in (_all() if everything else _default()) if (name := name_of(kernel))}
+    names = named(everything)
     if cache.folder() is None:
         return len(names), None, {"everything": "no folder can be written to; set TSDYN_CACHE_DIR to one"}
     failed = compile_ahead(names.values(), asked=True)
     absent = {name: "the file could not be written" for name, kernel in names.items() if not is_stored(kernel)}
     return len(names), cache.folder(), absent | failed
+
+
+def named(everything):
+    """The kernels, by the names that other processes know them by."""
+    return {name: kernel for kernel in (_all() if everything else _default()) if (name := name_of(kernel))}
 
 
 def _default():
@@ -41,6 +49,11 @@ def _default():
 
 
 def _all():
+    home = Path(__file__).parents[1]
+    for file in home.rglob("*.py"):  # modules that are imported when they are needed have kernels, too
+        if not file.stem.startswith("__"):
+            with contextlib.suppress(ModuleNotFoundError):  # an optional package's
+                import_module(".".join((home.name, *file.relative_to(home).with_suffix("").parts)))
     for kind in _built_in({**primitive.registered(), **force.registered()}):
         yield from getattr(kind, "own_kernels", kind.kernels).values()
     for module in [value for name, value in sys.modules.items() if is_ours(name)]:

@@ -13,6 +13,7 @@ from ..maths.matrix_rank import dependent
 from ..maths.tolerances import PIVOT_ROUNDING, TINY
 from ..model.equations import WIDTH, places, remember, set_time, with_short_rows
 from ..model.handles import all_angles, counted
+from ..model.packed import no_system
 from ..rows.constraint_graph import REDUCED
 from ..rows.graph_builder import graph_of, redundant_rows
 from .nominal_motion import NominalMotion, Pairs
@@ -145,7 +146,7 @@ class SceneStructure:
 # The work along an increment is that of the trapezoidal rule, so no load needs a potential.
 
 
-@entry
+@entry(no_system(), "vvdv")
 def update_memory(s, q, qd, t, out):
     """Let forces and constraints remember a configuration; out (slots,)."""
     set_time(s, t)

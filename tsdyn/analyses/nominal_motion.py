@@ -24,7 +24,7 @@ from ..model.equations import (
     set_time,
     with_short_rows,
 )
-from ..model.packed import with_curvatures, with_force_jacobians
+from ..model.packed import no_system, with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..rows.constraint_graph import REDUCED, are_unequal, coordinate_scales
@@ -49,7 +49,7 @@ class Derivatives(NamedTuple):
     Q_qd: object
 
 
-@entry
+@entry(no_system(), "mvmvvv")
 def fill_blocks(s, x, lam, rows, Q_q, Q_qd, kept):
     """Blocks of all instances: s has the table of `_separate`; x (4, 14 instances) q, qd, qdd and, first of all, t.
 
@@ -64,7 +64,7 @@ def fill_blocks(s, x, lam, rows, Q_q, Q_qd, kept):
         call_jacobian(kind.jacobian, kind, table, reals, x[0], x[1], t, Q_q, Q_qd, 1, own)
 
 
-@entry
+@entry(no_system(), "vvdv")
 def see_state(s, q, qd, t, Q):
     """Let laws of the whole scene see a state, at which their derivatives are then taken; Q (n,): zeros."""
     set_time(s, t)

@@ -178,13 +178,16 @@ def _say_what_lacks(found):
 def _cache_info(parsed):
     """Print what is in the folder of compiled kernels."""
     from ..jit import cache
-    from ..jit.compilers import described
+    from ..jit.compilers import described, machine, shipped
 
-    found = {"compiler": described(), **cache.contents()}
+    came = shipped()
+    found = {"compiler": described(), "target": machine(), **cache.contents(), "shipped": came and str(came)}
     if parsed.json:
         print_json(found)
         return 0
-    print(f"Kernels are compiled by {found['compiler']}.")
+    print(f"Kernels are compiled by {found['compiler']}, for {found['target'][2]}.")
+    if came:
+        print(f"Those of tsdyn's own came with it, compiled, in {came}")
     if found["folder"] is None:
         print("No folder can be written to, so every process compiles its kernels; set TSDYN_CACHE_DIR to one.")
         return 0

@@ -12,28 +12,36 @@ there. Where it isn't, or fails, stock.py takes its place (compilers.py).
 import ctypes
 import importlib
 import inspect
+import json
 import pickle
 import time
-from functools import cache, cached_property
+import warnings
+from functools import cache, cached_property, partial
+from typing import NamedTuple
 
 import llvmlite.binding as llvm
 import numba
+import numpy as np
 from numba import types
 from numba.core import typed_passes, untyped_passes
 from numba.core.caching import _Cache
 from numba.core.ccallback import CFunc
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, RuntimeLinker
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
-from numba.core.registry import CPUDispatcher
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_getattr_generic, models, register_model
 
+from ..errors import CompilerWarning
 from . import cache as files
-from .code_hash import is_ours
+from .code_hash import is_ours, versions
+from .target import chosen as target
+from .target import portable
 
+MADE = "versions.json"  # in a folder of kernels that came with tsdyn: the versions that compiled them
 CALLBACK_FRAMES = "_raw_object_cache"  # of llvmlite.binding.executionengine: how its callbacks' names begin
 SEEN = "0.63.1", "0.68.1"  # the oldest and the newest Numba that all of these were seen in, with llvmlite 0.46 to 0.50
 PRIVATE = """
@@ -55,6 +63,7 @@ compiler.DefaultPassBuilder.define_nopython_pipeline(state, name)
 compiler.CompileResult._reduce(self)
 compiler.CompileResult._rebuild:unserialize_library
 compiler.CompileResult._replace
+compiler.CompileResult._find_referenced_environments(self)
 compiler.CompileResult.lifted
 compiler.CompileResult.library
 compiler_machinery.PassManager.add_pass(self, pss, description)
@@ -70,17 +79,30 @@ typing.templates.AttributeTemplate.resolve(self, value, attr)
 typing.templates.AttributeTemplate.generic_resolve
 base.BaseContext.insert_user_function(self, func, fndesc, libs)
 base.BaseContext.refresh(self)
+base.BaseContext.subtarget(self, kws)
+base.BaseContext.subtarget:cached_internal_func
 cpu.CPUContext.codegen(self)
+cpu.CPUContext.init:_internal_codegen
 codegen.CodeLibrary._raise_if_finalized(self)
 codegen.CodeLibrary.__init__:_reload_init
 codegen.CodeLibrary.finalize(self)
+codegen.CodeLibrary._ensure_finalized(self)
 codegen.CodeLibrary.has_dynamic_globals
 codegen.CPUCodeLibrary.__init__(self, codegen, name)
 codegen.CPUCodeLibrary.__init__:_linking_libraries
 codegen.CPUCodeLibrary.__init__:_final_module
 codegen.CPUCodeLibrary._get_module_for_linking(self)
 codegen.CPUCodeLibrary._finalize_final_module:_finalized
+codegen.JITCPUCodegen.set_env(self, env_name, env)
+codegen.CPUCodegen._scan_and_fix_unresolved_refs(self, module)
+codegen.CPUCodegen.__init__:_rtlinker
+codegen.RuntimeLinker.PREFIX
+codegen.RuntimeLinker.__init__:_unresolved
+codegen.JitEngine.is_symbol_defined(self, name)
+codegen.JITCPUCodegen._customize_tm_options:_get_host_cpu_name
+codegen.JITCPUCodegen._customize_tm_features:_get_host_cpu_features
 codegen.JITCodeLibrary.serialize_using_object_code(self)
+registry.cpu_target
 registry.CPUDispatcher.__init__(self, py_func, locals, targetoptions, pipeline_class)
 registry.CPUDispatcher.__init__:_cache
 registry.CPUDispatcher.__init__:targetoptions
@@ -160,14 +182,42 @@ def _remembering(context):
     return Remembering()
 
 
+class _Codegen(JITCPUCodegen):
+    """Machine code for the portable target, beside Numba's own, which users' functions have."""
+
+    def __init__(self, beside):
+        super().__init__("tsdyn")
+        self._beside = beside
+
+    def _get_host_cpu_name(self):
+        return portable()
+
+    def _get_host_cpu_features(self):
+        return ""
+
+    def _scan_and_fix_unresolved_refs(self, module):
+        """Users' functions that call themselves in a ring are called where Numba has compiled them."""
+        super()._scan_and_fix_unresolved_refs(module)
+        engine = self._beside._engine
+        for name, pointer in self._rtlinker._unresolved.items():
+            if engine.is_symbol_defined(name):
+                pointer.value = engine.get_function_address(name)
+
+
+@cache
+def _for_target(context):
+    """A target context that shares all with Numba's, but for the processor."""
+    return context.subtarget(_internal_codegen=_Codegen(context.codegen())) if portable() else context
+
+
 class Compiler(CompilerBase):
     """The passes over a kernel."""
 
     lowering = typed_passes.NativeLowering
 
-    def __init__(self, typingctx, *others):
+    def __init__(self, typingctx, targetctx, *others):
         typingctx = _remembering(typingctx)
-        super().__init__(typingctx, *others)
+        super().__init__(typingctx, _for_target(targetctx), *others)
         self.state.targetctx.typing_context = typingctx  # of a copy, which has the error model of the options
 
     def define_pipelines(self):
@@ -294,6 +344,75 @@ _PROBE_TYPE = types.int64(types.int64)
 _untested = [True]
 
 
+# Kernels that came with tsdyn, compiled by a Numba that may be another one.
+#
+# Machine code needs nothing of Numba but addresses of its helpers; wrappers for Python the layout of what they pass.
+
+
+_foreign = [False]  # whether another Numba has compiled them
+
+
+class _Pair(NamedTuple):
+    whole: np.ndarray
+    number: float
+
+
+def _probe_arguments(values, pair, i):
+    """Arrays, a named tuple and a number, to and fro."""
+    pair.whole[i] += 1
+    return values[i, 1] * pair.number + pair.whole[i]
+
+
+def compile_probes():
+    """Compile, and store, the kernels of the self-tests."""
+    callback(_probe, _PROBE_TYPE, {"error_model": "numpy"}, False, "probe")
+    entry(_probe_arguments, {"nogil": True, "error_model": "numpy"}, lambda compile_for: compile_for).compile(_kinds())
+
+
+def probe_files():
+    """Where they are stored."""
+    return stored_file(_probe, _PROBE_TYPE, "probe"), stored_file(_probe_arguments, _kinds())
+
+
+def _kinds():
+    return types.float64[:, ::1], numba.typeof(_Pair(np.zeros(1, np.int64), 1.0)), types.int64
+
+
+def _try_out(folder):
+    """Raise an error unless Python and the kernel of the self-test in this folder understand each other."""
+    context, name = cpu_target.target_context, KernelCache(_probe_arguments).file(_kinds())
+    rtsys.initialize(context)
+    kernel = _rebuilt(files.opened(name, (folder / name).read_bytes()), context).entry_point
+    whole = np.array([3])
+    found = kernel(np.array([[1.0, 2.5]]), _Pair(whole, 2.0), 0), whole[0]
+    if found != (9.0, 4):
+        raise ImportError(f"the kernel of the self-test gives {found}, not (9.0, 4)")
+
+
+@cache
+def shipped():
+    """The folder of kernels that came with tsdyn, if they serve here; one warning where another Numba refuses them."""
+    path = files.shipped(portable()) if portable() else None
+    if path is None:
+        return None
+    made = {}
+    try:
+        made = json.loads((path / MADE).read_text(encoding="utf-8"))
+        if made != versions():
+            _foreign[0] = True
+            _try_out(path)
+    except Exception as error:  # whatever another Numba makes of them
+        cause = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        warnings.warn(
+            f"kernels that came with tsdyn were compiled by Numba {made.get('numba')} and are compiled anew, since "
+            f"Numba {numba.__version__} can't use them ({cause}).",
+            CompilerWarning,
+            stacklevel=2,
+        )
+        return None
+    return path
+
+
 def entry(function, options, around):
     """What compiles a kernel that Python calls; `around` decorates what compiles it."""
     dispatcher = numba.njit(pipeline_class=Compiler, _nrt=False, **options)(function)
@@ -322,10 +441,15 @@ def callback(function, signature, options, allocates, suffix="kernel"):
     return made
 
 
-def is_stored(function, signature, suffix="kernel"):
-    """Whether the cache on disk has the machine code."""
+def stored_file(function, signature, suffix="kernel"):
+    """The file that has the machine code; None where there is none."""
     name = KernelCache(function, suffix).file(signature)
-    return any((path / name).exists() for path in files.folders())
+    return next((path / name for path in (shipped(), *files.folders()) if path and (path / name).exists()), None)
+
+
+def is_stored(function, signature, suffix="kernel"):
+    """Whether there is such a file."""
+    return stored_file(function, signature, suffix) is not None
 
 
 def attributes(kind, resolve, lower):
@@ -368,7 +492,7 @@ class KernelCache(_Cache):
 
     def file(self, signature):
         """The name of the file for a signature."""
-        return f"{self._name}-{files.key_of(signature)}.{self._suffix}"
+        return f"{self._name}-{files.key_of(signature, target())}.{self._suffix}"
 
     def load_overload(self, sig, target_context):
         """Return the compiled function, or None; a miss takes the lock that save_overload gives back."""
@@ -377,12 +501,8 @@ class KernelCache(_Cache):
             rtsys.initialize(target_context)
         else:  # libraries that a user's kernel calls, such as LAPACK, are found by what Numba imports here
             target_context.refresh()
-        file = self.file(sig)
-
-        def rebuild(payload):
-            return CompileResult._rebuild(target_context, *pickle.loads(payload))
-
-        found = files.load(file, rebuild)
+        file, rebuild = self.file(sig), partial(_rebuilt, context=target_context)
+        found = files.load(file, rebuild, shipped())
         if found is None:
             self.release()  # of a compilation that was interrupted
             self._lock = files.acquire(file)
@@ -399,12 +519,15 @@ class KernelCache(_Cache):
 
     def save_overload(self, sig, data):
         """Store the compiled function and let waiting processes read it."""
+        data.library._ensure_finalized()
+        for environment in data._find_referenced_environments():  # of a user's functions, which Numba has compiled
+            data.library.codegen.set_env(environment.env_name, environment)
         try:
-            if not data.lifted and not data.library.has_dynamic_globals and files.folder() is not None:
+            if files.folder() is not None and not data.lifted and not _depends_on_process(data.library):
                 plain = data._replace(type_annotation="")  # the source's text, which generated functions don't have
                 (name, kind, (code, bitcode)), *others = plain._reduce()
-                payload = dumps(((name, kind, (code, _without_bodies(bitcode))), *others))
-                files.save(self.file(sig), payload)
+                reduced = (name, kind, (code, _without_bodies(bitcode))), *others
+                files.save(self.file(sig), dumps((_symbols(data.library), reduced)))
         except OSError as error:
             files.warn_unwritable(error)
         finally:
@@ -415,6 +538,28 @@ class KernelCache(_Cache):
         if self._lock is not None:
             self._lock.close()
             self._lock = None
+
+
+def _rebuilt(payload, context):
+    """The compiled function of a stored one."""
+    symbols, reduced = pickle.loads(payload)
+    absent = [name for name in symbols if llvm.address_of_symbol(name) is None] if _foreign[0] else ()
+    if absent:  # LLVM would end the process
+        raise ImportError(f"Numba {numba.__version__} has no {', '.join(absent)}")
+    return CompileResult._rebuild(_for_target(context), *reduced)
+
+
+def _symbols(library):
+    """Names of what the code is linked to when it is loaded."""
+    module = library._final_module
+    names = [one.name for kind in (module.functions, module.global_variables) for one in kind if one.is_declaration]
+    return [name for name in names if not name.startswith("llvm.")]
+
+
+def _depends_on_process(library):
+    """Whether the code has addresses of this process, or is linked to functions that call each other in a ring."""
+    names = (one.name for one in library._final_module.global_variables)
+    return library.has_dynamic_globals or any(name.startswith(RuntimeLinker.PREFIX) for name in names)
 
 
 def _without_bodies(bitcode):

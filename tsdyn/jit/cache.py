@@ -10,7 +10,6 @@ root can write to are refused.
 import contextlib
 import hashlib
 import os
-import platform
 import shutil
 import stat
 import sys
@@ -22,7 +21,6 @@ from collections import Counter
 from functools import cache
 from pathlib import Path
 
-import llvmlite.binding as llvm
 import numba
 
 from .. import validation
@@ -35,7 +33,7 @@ _DAY = 86400.0
 _KEEP = 30 * _DAY  # files that nothing has read for so long are deleted
 _told = []
 _CHECKSUM = hashlib.sha256().digest_size
-FORMAT = 2  # of the files
+FORMAT = 3  # of the files
 
 
 def _bases():
@@ -57,6 +55,16 @@ def _bases():
 
 def _within(base):
     return base / f"{platform_hash()}-{FORMAT}"
+
+
+SHIPPED = Path(__file__).parents[1] / "kernels"  # of platform wheels: a folder for each target
+
+
+@cache
+def shipped(target):
+    """The folder of kernels that came with tsdyn for a target; None where there is none, or others can write to it."""
+    path = SHIPPED / target
+    return path if path.is_dir() and not _stranger(path) else None
 
 
 @cache
@@ -140,17 +148,6 @@ def _prune_files():
                 file.unlink()
 
 
-@cache
-def machine():
-    """The processor as machine code is made for it."""
-    processor, features = numba.config.CPU_NAME, numba.config.CPU_FEATURES
-    if features is None:
-        with contextlib.suppress(RuntimeError):  # a processor that LLVM doesn't know
-            features = llvm.get_host_cpu_features().flatten()
-    found = llvm.get_process_triple(), processor or llvm.get_host_cpu_name(), features or ""
-    return [platform.machine(), *found, *["no AVX"][bool(numba.config.ENABLE_AVX) :]]
-
-
 def name_of(function):
     """The name of a kernel's file: its own, and the hash of all code that it depends on."""
     home = Path(function.__code__.co_filename).stem
@@ -158,24 +155,27 @@ def name_of(function):
     return f"{label[:100]}-{deep_hash(function)}"
 
 
-def key_of(signature):
+def key_of(signature, target):
     """What tells a signature, and the processor, in the name of a kernel's file."""
-    return hashlib.sha256(repr((signature, machine())).encode()).hexdigest()[:12]
+    return hashlib.sha256(repr((signature, target)).encode()).hexdigest()[:12]
 
 
-def load(name, rebuild):
-    """What `rebuild` makes of the content of a kernel's file; None where there is none, or none that can be loaded."""
-    for file in (path / name for path in folders()):
+def load(name, rebuild, ours=None):
+    """What `rebuild` makes of the content of a kernel's file; None where there is none, or none that can be loaded.
+
+    ours: a folder to look in last, that is only read.
+    """
+    for file in (path / name for path in (*folders(), ours) if path):
         if not os.path.lexists(file):
             continue
         try:
-            found = rebuild(_opened(name, validation.read(file, flags=validation.NO_LINKS)))
+            found = rebuild(opened(name, validation.read(file, flags=validation.NO_LINKS)))
         except Exception as error:  # whatever a damaged file makes of the loader
             if os.path.lexists(file):  # another process may just have deleted it
-                report(file, error)
+                report(file, error, file.parent != ours)
             continue
         with contextlib.suppress(OSError):
-            if time.time() - file.stat().st_mtime > _DAY:
+            if file.parent != ours and time.time() - file.stat().st_mtime > _DAY:
                 os.utime(file)
         return found
     return None
@@ -187,21 +187,22 @@ def save(name, payload):
     _prune_files()
 
 
-def _opened(name, content):
+def opened(name, content):
     """The content of a kernel's file without its checksum."""
     if _seal(name, content[_CHECKSUM:]) != content[:_CHECKSUM]:
         raise ValueError("the checksum is wrong: the file is damaged, or under the name of another")
     return content[_CHECKSUM:]
 
 
-def report(file, error):
-    """Count a kernel that can't be loaded, note it in its folder, delete it; warn once a process."""
+def report(file, error, delete=True):
+    """Count a kernel that can't be loaded, note it in the folder of kernels, delete it; warn once a process."""
     statistics["damaged"] += 1
     cause = " ".join(f"{type(error).__name__}: {error}".split())
     with contextlib.suppress(OSError, TypeError), open(folder() / FAILURES, "a", encoding="utf-8") as log:  # no folder
         log.write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {file.name} {cause[:200]}\n")
-    with contextlib.suppress(OSError):
-        file.unlink()
+    if delete:
+        with contextlib.suppress(OSError):
+            file.unlink()
     if statistics["damaged"] == 1:
         warnings.warn(
             f"a stored kernel can't be loaded, and is compiled again: {file} ({cause}). `tsdyn info --cache` counts "
@@ -221,7 +222,7 @@ def contents():
     for file in sorted(path.glob("*.kernel")) if path else ():
         try:
             content = validation.read(file, flags=validation.NO_LINKS)
-            _opened(file.name, content)
+            opened(file.name, content)
             sizes.append(len(content))
         except (OSError, ValueError) as error:
             damaged.append((file.name, f"{type(error).__name__}: {error}"))

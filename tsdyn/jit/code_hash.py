@@ -10,6 +10,7 @@ import contextlib
 import enum
 import hashlib
 import pickle
+import platform
 import sys
 import types
 from functools import cache
@@ -19,23 +20,37 @@ from pathlib import Path
 import numba
 from llvmlite import ir
 
-_LIBRARIES = ("numpy", "numba", "math", "cmath", "scipy")  # their versions say all about them
+_COMPILERS = ("numba", "llvmlite", "numpy")  # their versions name the folder of kernels
+_LIBRARIES = (*_COMPILERS, "math", "cmath", "scipy")  # nothing of them is followed
 _PACKAGE = __name__.partition(".")[0]
 _known = {}  # function: hash; the function is kept alive, so that the key stays its own
 
 
 @cache
+def versions():
+    """The versions of all that compiles."""
+    found = {"Python": platform.python_version().rpartition(".")[0]}
+    for name in _COMPILERS:
+        with contextlib.suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
+
+
+@cache
 def platform_hash():
     """Hash the versions of all that compiles, and the package's own code generation."""
-    digest = hashlib.sha256(repr(sys.version_info[:2]).encode())
-    for name in ("numba", "llvmlite", "numpy"):
-        with contextlib.suppress(PackageNotFoundError):
-            digest.update(f"{name} {version(name)}\0".encode())
+    return hashlib.sha256(f"{versions()}{_generator_hash()}".encode()).hexdigest()[:16]
+
+
+@cache
+def _generator_hash():
+    """Hash the package's own code generation."""
+    digest = hashlib.sha256(repr(sys.version_info[:2]).encode())  # of byte code
     for file in sorted(Path(__file__).parent.glob("*.py")):  # code that no function names: types and their lowering
         content = file.read_bytes()
         if b"from numba.extending import" in content:
             digest.update(content)
-    return digest.hexdigest()[:16]
+    return digest.hexdigest()
 
 
 def is_ours(module):
@@ -44,8 +59,11 @@ def is_ours(module):
 
 
 def deep_hash(function):
-    """Hash a function with all the code, constants and modules that its compiled form depends on."""
-    digest = hashlib.sha256(platform_hash().encode())
+    """Hash a function with all the code, constants and modules that its compiled form depends on.
+
+    Versions of what compiles are left out: kernels that came with tsdyn may serve with other ones.
+    """
+    digest = hashlib.sha256(_generator_hash().encode())
     digest.update(_function_hash(_plain(function), ()))
     return digest.hexdigest()[:24]
 
@@ -140,9 +158,11 @@ def _add(digest, value, above):
 
 
 def _add_module(digest, module):
-    digest.update(f"{module.__name__} {getattr(module, '__version__', '')}\0".encode())
+    home = module.__name__.partition(".")[0]
+    known = "" if home in _COMPILERS else getattr(module, "__version__", "")
+    digest.update(f"{module.__name__} {known}\0".encode())
     file = getattr(module, "__file__", None) or ""
-    if file.endswith(".py") and module.__name__.partition(".")[0] not in (*_LIBRARIES, _PACKAGE):
+    if file.endswith(".py") and home not in (*_LIBRARIES, _PACKAGE):
         with contextlib.suppress(OSError):
             digest.update(Path(file).read_bytes())
 

@@ -38,7 +38,7 @@ DEBUG = os.environ.get("TSDYN_DEBUG", "") not in ("", "0")
 _lock, _within = threading.RLock(), threading.local()
 table = [None]  # debug mode: what an address stands for; zero is no address
 letters = {"i": numba.types.int64, "d": numba.types.float64, "p": numba.types.int64}
-_letters = {**letters, "v": numba.types.float64[::1], "w": numba.types.int64[::1]}
+_letters = {**letters, "v": numba.types.float64[::1], "m": numba.types.float64[:, ::1], "w": numba.types.int64[::1]}
 _entries = {}  # of functions: what their signatures are made of
 
 
@@ -65,7 +65,7 @@ def entry(*arguments):
     """Decorate a function that Python calls with arrays: cached, and run without the GIL.
 
     With arguments it can be compiled ahead of its first call. They are strings of letters (those of a `Callback`, v and
-    w vectors of floats and of integers) and values of the types of further arguments.
+    m vectors and matrices of floats, w vectors of integers) and values of the types of further arguments.
     """
     if len(arguments) == 1 and callable(arguments[0]):
         return _entry(arguments[0])
@@ -183,8 +183,13 @@ def is_loaded(kernel):
 
 
 def is_stored(kernel):
-    """Whether the cache on disk has the machine code."""
-    return current().is_stored(kernel.py_func, kernel.type() if isinstance(kernel, Callback) else _types(kernel))
+    """Whether the machine code is on disk."""
+    return current().is_stored(kernel.py_func, signature_of(kernel))
+
+
+def signature_of(kernel):
+    """Numba's signature of a declared kernel, or the types of its arguments."""
+    return kernel.type() if isinstance(kernel, Callback) else _types(kernel)
 
 
 def load(kernel):

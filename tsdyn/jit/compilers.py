@@ -4,15 +4,18 @@ The own way takes half the time, and needs parts of Numba that may change. Where
 TSDYN_JIT=stock asks for it, kernels are compiled by Numba's public interface: with the same results to the bit.
 """
 
+import json
 import os
+import platform
 import warnings
+from functools import cache
 
 import numba
 from numba import NumbaError
 
 from ..errors import CompilerWarning
 from . import stock
-from .code_hash import is_ours
+from .code_hash import is_ours, versions
 
 CHOICE = os.environ.get("TSDYN_JIT", "")
 _chosen = []
@@ -43,6 +46,23 @@ def described():
     """Which way kernels are compiled, in words."""
     way = "its public interface alone" if current() is stock else "tsdyn's own passes"
     return f"Numba {numba.__version__}, {way}"
+
+
+def machine():
+    """The processor as machine code is made for it, and what has made it where that isn't the Numba that is here."""
+    return [platform.machine(), *current().target(), *made_by()]
+
+
+def shipped():
+    """The folder of kernels that came with tsdyn, where they serve; None otherwise."""
+    return None if current() is stock else current().shipped()
+
+
+@cache
+def made_by():
+    """Names and versions of what has compiled the shipped kernels; none where that is here, or nothing is shipped."""
+    made = shipped() and json.loads((shipped() / current().MADE).read_text(encoding="utf-8"))
+    return [f"{name} {number}" for name, number in made.items()] if made and made != versions() else []
 
 
 def attempt(function, own, plain):

@@ -13,6 +13,7 @@ from numba import NumbaError
 from numba.extending import intrinsic, overload_attribute
 
 from . import cache
+from .target import of_numba as target
 
 
 def options(allocates):
@@ -152,7 +153,7 @@ def _loaded(function, compile_now):
 
 def _marker(folder, function, signature):
     """The file that says that a kernel is stored."""
-    return folder / f"{cache.name_of(function)}-{cache.key_of(signature)}.stored"
+    return folder / f"{cache.name_of(function)}-{cache.key_of(signature, target())}.stored"
 
 
 def _counting(function, signature):

@@ -21,6 +21,7 @@ from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
 from .handles import handles_of
 from .laws import answer_interrupts, demand_callable
+from .packed import no_system
 
 call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
 call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
@@ -146,7 +147,7 @@ def is_rheonomic(s):
     return s.rheonomic[0] != 0
 
 
-@entry
+@entry(no_system(), "vvdvmvv")
 def evaluate_constraints(s, q, qd, t, Phi, Phi_q, Phi_t, gamma):
     """Fill Phi (m,), Phi_q (m, n), Phi_t (m,) and gamma (m,); the last three are zero on entry."""
     set_time(s, t)
@@ -199,7 +200,7 @@ def as_csr(packed, rows):
 # Samples of forces that depend on time by a function or a law of the user's, at states that stay the same.
 
 
-@entry
+@entry(no_system(), "vvvwvv")
 def _sample(s, q, qd, t, at, Q, out):
     """out (k,): sums of all forces on the coordinates `at`, at times t (k,); Q (n,): zeros.
 

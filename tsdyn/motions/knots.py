@@ -158,7 +158,7 @@ def _before(d, i, finest):
     return largest
 
 
-@entry
+@entry("vwv", np.zeros((0, 0), np.int8))
 def mark_changes(values, strides, d, marks):
     """Mark the samples, each `stride`-th of values (k,), at which an interval with a change ends; d: scratch.
 

@@ -32,7 +32,7 @@ UNNAMED = "motion"
 call_motion = caller(SIGNATURE, "d")
 
 
-@entry
+@entry("ivv")
 def sample_motion(address, t, out):
     """The values (k,) of a compiled function at times t (k,)."""
     for i in range(t.size):

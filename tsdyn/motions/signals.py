@@ -90,7 +90,7 @@ SIGNATURE = "dp"  # t, where the values go
 call_signal = caller(SIGNATURE)
 
 
-@entry
+@entry("ivm")
 def sample_signal(address, t, out):
     """The values (k, width) of a compiled function at times t (k,)."""
     for i in range(t.size):

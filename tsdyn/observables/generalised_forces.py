@@ -12,13 +12,14 @@ from ..jit.kernels import entry
 from ..maths.vectors import to_ground
 from ..model.equations import applied_forces, set_time
 from ..model.handles import BodyMotion, angle, displacement, handles_of
+from ..model.packed import no_system
 from ..motions.signals import Signal
 from ..validation import counted
 
 # Generalised forces along a trajectory, (k, n): applied forces Q_A, velocity forces Q_v, and M qdd.
 
 
-@entry
+@entry(no_system(), "vmmmm")
 def sum_forces(s, t, q, qd, memory, out):
     """out (k, n) += all forces but gravity; memory (k, ...): of forces at each output, then normal loads."""
     for row in range(t.size):

@@ -22,7 +22,7 @@ from ..maths.dense_linalg import copy
 from ..maths.tolerances import RANK_TOL, TINY
 from ..model.equations import WIDTH, constraint_jacobian, set_time, with_short_rows
 from ..model.handles import handles_of
-from ..model.packed import classes, index_of, member_of
+from ..model.packed import classes, index_of, member_of, no_system
 from ..rows.constraint_graph import REDUCED
 from ..rows.graph_builder import graph_of
 from ..rows.interface import (
@@ -113,7 +113,7 @@ def factorise_at(graph, s, f, t, q):
 # Normal loads of joint friction, from positions, velocities and accelerations.
 
 
-@entry
+@entry("pvmmmm")
 def _solve(context, t, q, qd, r, out):
     """out (k, frictions): normal loads with Phi_q^T lam - sum_i g_i N_i = r (k, n); NaN if there are none.
 
@@ -150,10 +150,7 @@ def with_normal_loads(packed, t, q, qd, qdd, memory):
     return np.hstack((memory, loads))
 
 
-MATRIX = np.zeros((0, 0))  # its type
-
-
-@entry("pv", MATRIX, MATRIX, MATRIX, MATRIX)
+@entry("pvmmmm")
 def solve_multipliers(context, t, q, r, rows, out):
     """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + Q_v - M qdd. NaN where Phi_q is singular.
 
@@ -284,7 +281,7 @@ def at_first_point(solution, body, load, item, coordinates):
     return force, torque
 
 
-@entry
+@entry(no_system(), "vmmiwmm")
 def constraint_loads(s, t, q, lam, first, halves, rows, out):
     """out (k, 7 or 3) = -Phi_q^T lam of one body; lam (k, rows of the constraint), which begin at first.
 
@@ -314,7 +311,7 @@ def find_rows(graph, s, f, q, t, whole):
     return regular
 
 
-@entry
+@entry("pvmwwvv")
 def free_loads(context, t, q, rows, sides, whole, out):
     """out (k,): the largest load on a body by these rows in a unit self-stress, relative to their size."""
     c = load_parts(context)
@@ -351,7 +348,7 @@ def unique(solution, rows, body):
 # Refusal of joint friction that depends on a reaction which redundant constraints leave undetermined.
 
 
-@entry
+@entry("pdvvv")
 def _free_loads(context, t, q, whole, out):
     """out (frictions,): the largest normal load in a unit self-stress."""
     c = load_parts(context)

@@ -189,7 +189,10 @@ def put_state(w, out):
     copy(w.qdd, out[2])
 
 
-@entry
+READ = "ppvwmmm", np.zeros((0, 0, 0))  # types of the arguments of readers
+
+
+@entry(*READ)
 def read(context, run, t, rows, blocks, charts, points, out):
     """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows]. Status.
 

@@ -17,8 +17,8 @@ import numpy as np
 from .._version import __version__
 from ..calls import lacking
 from ..errors import InvalidArgument, Status, StorageError
-from ..jit.cache import machine
 from ..jit.code_hash import is_ours, platform_hash
+from ..jit.compilers import machine
 from ..methods.integrator import is_own, registered
 from ..model.kinematics import Anchor
 from ..model.packed import called_functions, user_functions

@@ -12,7 +12,7 @@ from ..model.packed import System
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal
 from ..rows.graph_builder import with_loops
 from ..rows.interface import allocate_tangent
-from ..runs.dense_output import TrajectoryReading, put_state, recall
+from ..runs.dense_output import READ, TrajectoryReading, put_state, recall
 from ..runs.run_memory import Memory
 from ..workspaces import B_DATA, B_START, lay_out, load_run, plain_work, words
 from .joint_friction import accelerate_with_friction_here, expand_friction_series
@@ -45,7 +45,7 @@ from .tolerances import MANY_BODIES
 # Dense output of a Taylor run: the series of a step, evaluated and projected onto the manifold.
 
 
-@entry
+@entry(*READ)
 def read_series(context, run, t, rows, blocks, charts, points, out):
     """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows]; as runs.dense_output.read. Status."""
     c, r = load_series(context), load_run(run)

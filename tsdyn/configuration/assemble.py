@@ -392,8 +392,8 @@ def _joint_values(scene, joints):
         handles = handles_of(scene.packed)
         joint, numbers = handles.item(key), np.atleast_1d(floats(given))
         row = next((row for row in handles.rows if row.item is joint), None)
-        most = 0 if row is None or isinstance(joint, Force) or joint.drives else len(row.angles) + len(row.displacements)
-        if not most:
+        most = 0 if row is None else len(row.angles) + len(row.displacements)
+        if not most or joint.drives or isinstance(joint, Force):
             raise InvalidArgument(f"assemble: {joint!r} has no joint coordinate to be given in joints.")
         if numbers.ndim != 1 or not 0 < numbers.size <= most or not np.isfinite(numbers).all():
             many = "a finite number" if most == 1 else f"up to {most} finite numbers, angles first"

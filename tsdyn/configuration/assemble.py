@@ -375,12 +375,13 @@ def _joint_values(scene, joints):
     """Values of joints, (count,) each, by joint."""
     if not isinstance(joints, Mapping):
         raise InvalidArgument(f"assemble: joints must be values by joint, such as {{'hip': 0.3}}, got {joints!r}.")
-    handles, found = handles_of(scene.packed), {}
+    found = {}
     for key, given in joints.items():
+        handles = handles_of(scene.packed)
         joint, numbers = handles.item(key), np.atleast_1d(floats(given))
         row = next((row for row in handles.rows if row.item is joint), None)
-        most = 0 if row is None or isinstance(joint, Force) else len(row.angles) + len(row.displacements)
-        if not most:
+        most = 0 if row is None else len(row.angles) + len(row.displacements)
+        if not most or joint.drives or isinstance(joint, Force):
             raise InvalidArgument(f"assemble: {joint!r} has no joint coordinate to be given in joints.")
         if numbers.ndim != 1 or not 0 < numbers.size <= most or not np.isfinite(numbers).all():
             many = "a finite number" if most == 1 else f"up to {most} finite numbers, angles first"
@@ -391,9 +392,8 @@ def _joint_values(scene, joints):
 
 def _cut(scene, loops):
     """The joints that close loops."""
-    handles = handles_of(scene.packed)
     given = sequence(loops, "assemble: loops must be a sequence of joints or names, such as (joint,)", InvalidArgument)
-    found = [handles.item(it) for it in given]
+    found = [handles_of(scene.packed).item(it) for it in given]
     for joint in found:
         if not any(joint is member.constraint for member in scene.packed.members):
             raise InvalidArgument(f"assemble: {joint!r} in loops is no constraint of this scene.")
@@ -415,8 +415,9 @@ def _set_out(scene, fixed, t, tol, values, cut):
 
 def _released(scene, values):
     """Names of the joints that don't have the values given; of the others, turns are counted from these."""
-    handles, q, found = handles_of(scene.packed), scene.start[0], []
+    q, found = scene.start[0], []
     for joint, given in values.items():
+        handles = handles_of(scene.packed)
         row = next(row for row in handles.rows if row.item is joint)
         away = [
             coordinate_from(handles, q, *pair) for pair in zip((*row.angles, *row.displacements), given, strict=False)

@@ -175,10 +175,12 @@ def refuse(scene, metric, found, conflict, starts, held=()):
         story = f"no configuration satisfies all constraints{where}. {alone}: {reason}"
         remedy = "Change a length, point or axis of one of them, or remove one"
     else:
-        story = (
-            f"not assembled from {starts} start{'s' if starts > 1 else ''}{where}: the sketch and displacements of its "
-            "joints. No conflict is proved; the smallest residuals found are"
+        tried = (
+            f"{starts} starts{where}, the sketch and displacements of its joints"
+            if starts > 1
+            else f"the sketch{where}"
         )
+        story = f"not assembled from {tried}. No conflict is proved; the smallest residuals found are"
         remedy = "Improve the sketch of the bodies, or give values of joints from which to start, joints={name: value}"
     names, lines = scene.row_names(), []
     for member in sorted(chosen, key=lambda member: -left[member.rows].max())[:SHOWN_CONSTRAINTS]:

@@ -30,6 +30,7 @@ from .tolerances import (
     HINTED,
     LEAST_DAMPING,
     MOST_DAMPING,
+    MOST_ENTRIES,
     MOST_STEPS,
     MOST_TURN,
     SMALL_ANGLE,
@@ -244,9 +245,12 @@ class Loops:
     def close(self, tol, excess=lambda q: 0.0):
         """Return the `Closed` of the first start from which the loops close.
 
-        Of a few, that with the least sum of excess(q) and of what coordinates are beyond their limits.
+        Of a few, that with the least sum of excess(q) and of what coordinates are beyond their limits. Loops of which
+        Eq. (2) needs too much memory are left as they are.
         """
         rng, best, total, after = np.random.default_rng(0), None, 0, 0
+        if self.tree.loop_rows.size * 6 * len(self.tree.joints) > MOST_ENTRIES:
+            return Closed(self.sketch, self.metric.linear(self.sketch)[0], False, 0, 1)
         spreads = (None,) * bool(self.limits) + SPREADS
         for start in range(1 + len(spreads)):
             q = self._start(rng, spreads[start - 1]) if start else self.sketch

@@ -97,6 +97,8 @@ DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-10, 1e8
 MOST_STEPS, STALLED = 80, (6, 0.99)
 # rad: the largest component of the rotation of a joint in a step.
 MOST_TURN = 1.0
+# Floats of the derivatives of loops by twists (32 MB): forty loops of 500 bodies. Steps take a second beyond.
+MOST_ENTRIES = 1 << 22
 # Residuals of loops at unit length from which on Gauss-Newton steps of all coordinates go on, which don't know what is
 # held; and how far coordinates of joints are from the values given, rad or m. Both are some tens of roundings.
 CLOSED_LOOPS, AIMED = 1e-14, 1e-12

@@ -35,7 +35,7 @@ def close(found, name, kind, ends, frames):
 
 def add_given(found, loops):
     """Add the loops (frame_a, frame_b, kind) of `ts.load`; hinges may name their axis, in both frames."""
-    for loop in sequence(loops, f"loops must be a sequence such as [{EXAMPLE}]", InvalidArgument):
+    for loop in loops:
         parts = sequence(loop, f"loops: each is such as {EXAMPLE}; got {loop!r}", InvalidArgument)
         if not (len(parts) == 3 or (len(parts) == 4 and parts[2] == "hinge")) or parts[2] not in KINDS:
             raise InvalidArgument(

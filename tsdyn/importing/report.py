@@ -10,6 +10,7 @@ from ..errors import ImportLosses
 from ..validation import counted
 
 SHOWN = 8  # names of a group in a text
+UNBOUNDED = 1e3  # rad or m: a range from which on limits say nothing on where a loop closes
 
 
 class LeftOut(NamedTuple):
@@ -75,7 +76,7 @@ class ImportReport:
 
     def leave_limits(self, joint: str, lower: float, upper: float, shown: str = "") -> None:
         """Note the limits of a joint, hints of an assembly."""
-        if lower < upper:
+        if 0.0 < upper - lower < UNBOUNDED:
             self.limits[joint] = lower, upper
         self.leave("limits of a joint", joint, shown or f"[{lower:g}, {upper:g}]")
 

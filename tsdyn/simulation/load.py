@@ -96,6 +96,9 @@ def load(
         raise InvalidArgument(f"free_base must be True or False, got {free_base!r}.")
     if not isinstance(outside, bool):
         raise InvalidArgument(f"outside must be True or False, got {outside!r}.")
+    loops = validation.sequence(
+        loops, 'loops must be a sequence such as [("link_a", "link_b", "weld")]', InvalidArgument
+    )
     suffix = Path(path).suffix.lower()
     if suffix in SCENES:
         if scene is not None:
@@ -137,7 +140,7 @@ def _demand_robot(free_base, outside, loops):
         raise InvalidArgument("free_base= is for URDF files.")
     if outside:
         raise InvalidArgument("outside= is for URDF, MJCF and SDF files.")
-    if len(loops):
+    if loops:
         raise InvalidArgument("loops= is for URDF, MJCF and SDF files; other scenes close loops by scene.add.")
 
 

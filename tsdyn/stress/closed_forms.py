@@ -158,6 +158,26 @@ def _stiff():
     return found[0].stats.steps / found[1].stats.steps
 
 
+def _open_loop():
+    """The rocker of a four-bar by the law of cosines: drawn along one line, the loop open, its crank set to 1.1 rad."""
+    crank, coupler, rocker, base, angle = 0.3, 0.9, 0.7, 0.8, 1.1
+    scene, R = Scene(), constraints.Revolute
+    links = [
+        scene.add_body(1.0, (0.01, 0.1, 0.1), position=(start + length / 2, 0, 0))
+        for start, length in ((0.0, crank), (crank, coupler), (base, rocker))
+    ]
+    bearing = scene.add(R.at(scene.ground, links[0], point=(0, 0, 0), axis=(0, 0, 1)))
+    scene.add(R.at(links[0], links[1], point=(crank, 0, 0), axis=(0, 0, 1)))
+    far = scene.add(R.at(scene.ground, links[2], point=(base, 0, 0), axis=(0, 0, 1)))
+    ends = {"point_a": (coupler / 2, 0, 0), "point_b": (rocker / 2, 0, 0)}
+    scene.add(R(links[1], links[2], **ends, axis_a=(0, 0, 1), axis_b=(0, 0, 1)))
+    scene.assemble(joints={bearing: angle})
+    x, y = crank * math.cos(angle) - base, crank * math.sin(angle)
+    bent = math.acos((rocker**2 + x * x + y * y - coupler**2) / (2.0 * rocker * math.hypot(x, y)))
+    found = simulate(scene, (0.0, 1e-9)).angle(far)[0]
+    return min(abs(math.remainder(found - math.atan2(y, x) - side * bent, 2.0 * math.pi)) for side in (1, -1))
+
+
 CLOSED_FORMS = (
     ClosedForm("through the anchor of a spring (m)", _through_the_anchor, 1e-6),
     ClosedForm("torsion of a wire, relative", _wire, 1e-9),
@@ -168,6 +188,7 @@ CLOSED_FORMS = (
     ClosedForm("a pulse of a thousandth of the run (m/s)", _pulse, 1e-6),
     ClosedForm("past a bump of a thousandth of the way (m/s)", _bump, 1e-6),
     ClosedForm("a block at rest on a slope, 100 s (m)", _block, 1e-6),
+    ClosedForm("a four-bar that was drawn along one line (rad)", _open_loop, 1e-12),
     ClosedForm("steps on a bushing of 1e12 N/m, over those of Radau", _stiff, 3.0),
 )
 

@@ -9,7 +9,7 @@ from scipy.linalg import solve_continuous_are
 import tsdyn as ts
 from examples import active_suspension, computed_torque, swing_up
 from tests.helpers.methods import one_of_each
-from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, LOOSE, NEAR, ROUGH, TIGHT
+from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, LOOSE, NEAR, ROUGH, ROUNDING, TIGHT
 
 C, F = ts.constraints, ts.forces
 K = np.array([2.0, 60.0, 4.0, 8.0])
@@ -149,6 +149,37 @@ def test_user_force_of_the_scene_acts_and_reacts():
     assert np.abs(found[0] - found[1]).max() < ALGEBRA * np.abs(found[0]).max()
 
 
+def test_loads_of_the_scene_are_those_of_arrays(rng):
+    """Random laws of point loads in both frames, on a rigid body and on a point mass."""
+    w = rng.normal(size=13)
+
+    def by_array(t, x):
+        return w[0] * x[0] + w[4] * x[4] + w[8] * x[8], w[1] * x[1] * x[12], w[3] * x[3] + t * w[9] * x[9]
+
+    def of(name, point):
+        def by_state(t, state):
+            rigid = name == "a"
+            p = state.orientation(name) if rigid else np.array([1.0, 0.0, 0.0, 0.0])
+            omega = state.rotation(name) @ state.angular_velocity(name) if rigid else np.zeros(3)
+            x = np.concatenate([state.position(name, point), p, state.velocity(name, point), omega])
+            return by_array(t, x)
+
+        return by_state
+
+    point, frames, found = rng.normal(size=3), ("ground", "body"), []
+    q = rng.normal(size=4)
+    for whole in (False, True):
+        scene = ts.Scene()
+        a = scene.add_body(1.0, (1, 1.1, 1.2), (1, 2, 3), q / np.linalg.norm(q), (3, 2, 1), (1, 2, 3), name="a")
+        dot = scene.add_point_mass(1.0, (3, 1, 2), (1, 0, 1), name="dot")
+        for frame in frames:
+            scene.add(F.PointForce(a, force=of("a", point) if whole else by_array, point_a=point, frame=frame))
+            scene.add(F.Torque(a, torque=of("a", (0, 0, 0)) if whole else by_array, frame=frame))
+        scene.add(F.PointForce(dot, force=of("dot", (0, 0, 0)) if whole else by_array))
+        found.append(scene.evaluate(t=0.3).qdd)
+    assert np.abs(found[0] - found[1]).max() < ALGEBRA * np.abs(found[0]).max()
+
+
 # All methods and forms
 
 
@@ -233,6 +264,12 @@ def test_ensembles_have_the_bits_of_runs_alone(function):
     assert np.ptp(ensemble.q, axis=0).max() > LOOSE
 
 
+def test_an_input_is_found_in_a_scene_with_other_numbers():
+    B = [cart().with_parameters({"cart.mass": mass}).linearise(inputs=["rail"]).state_space()[1] for mass in (2.0, 4.0)]
+    assert np.abs(B[0] - cart().linearise(inputs=["rail"]).state_space()[1]).max() < ROUNDING
+    assert np.abs(B[0] - B[1]).max() > 0.1
+
+
 def test_a_joint_that_is_moved_by_a_parameter_moves_in_the_law():
     def watch(t, state):
         return state.displacement("rail")
@@ -260,6 +297,16 @@ def test_checkpoints_pickles_and_files(function, options, tmp_path):
     assert (ts.load(tmp_path / "solution.zarr").energy == run.energy).all()
     with pytest.raises(ts.TsdynError, match="holds data and no code"):
         scene.save(tmp_path / "scene.toml")
+
+
+def test_a_function_may_hold_handles_in_a_copy():
+    scene = cart()
+    rail, body = scene["rail"], scene["cart"]
+    scene.add(F.Control(lambda t, state: -3.0 * state.displacement(rail) + state.position(body)[0], [rail]))
+    runs = [
+        ts.simulate(each, (0, 0.2)).q[-1] for each in (scene, scene.copy(), scene.with_parameters({"rod.mass": 0.3}))
+    ]
+    assert (runs[0] == runs[1]).all() and (runs[0] == runs[2]).all()
 
 
 def test_a_run_says_how_the_law_is_called():

@@ -428,7 +428,7 @@ class JointLoad:
     With a period the load is held between instants and is what such a force remembers: see runs/driver.py.
     """
 
-    loads = ("function",)
+    loads, given = ("function",), "function"
     permanent = ("joint", "which")
     memory, positive = 1, ()
     quantities = MappingProxyType({"function": law_of_joint, "period": instants})

@@ -207,6 +207,22 @@ def test_formulations_agree(form):
             assert np.abs(run.q[-1] - reference.q[-1]).max() < ROUGH
 
 
+def test_a_tension_through_zero_length_has_no_series():
+    """A ball flies through the anchor of its actuator, where the direction turns at once."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    ball = scene.add_point_mass(mass=2.0, position=(1, 0, 0), velocity=(-1, 0, 0), name="ball")
+    scene.add(F.Spring(ball, scene.ground, stiffness=1.0, free_length=0.0, name="cord"))
+    scene.add(F.Control(lambda t, state: 0.6, ["cord"]))
+    with pytest.raises(ts.TsdynError, match="may change within any part of a step"):
+        ts.simulate(scene, (0, 1), integrator="taylor")
+    # 2 x'' = -x - 0.6 before zero, from where on the tension pulls back: + 0.6
+    run, w = ts.simulate(scene, (0, 1.6), rtol=1e-9, atol=1e-9), np.sqrt(0.5)
+    t = (np.arccos(0.6 / np.hypot(1.6, 1.0 / w)) - np.arctan2(1.0 / w, 1.6)) / w
+    speed = -1.6 * w * np.sin(w * t) - np.cos(w * t)
+    expected = 0.6 - 0.6 * np.cos(w * (1.6 - t)) + speed / w * np.sin(w * (1.6 - t))
+    assert abs(run.position("ball")[-1, 0] - expected) < ROUGH
+
+
 @pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
 def test_power_is_the_gain_in_energy(function):
     run = ts.simulate(cart(on_rail(function)), (0, 1), t_eval=np.linspace(0, 1, 401), rtol=1e-10, atol=1e-10)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..elements.bodies import Ground, PointMass
 from ..elements.element import Attachment
+from ..elements.force import Force
 from ..elements.laws import captured
 from ..elements.loops import laws as loops
 from ..errors import InvalidArgument, TsdynError
@@ -221,6 +222,10 @@ class Law:
         turning = [j for j in range(self.handles.count) if angle + j in used]
         geometries = [geometry for row in self.handles.rows for geometry in row.angles]
         self._geometries = [geometries[j] for j in turning]
+        # Directions between points, and angles of forces, which no joint keeps, turn at once where their lengths vanish
+        loose = [row for row in self.handles.rows if isinstance(row.item, Force)]
+        loose = {row.first + i for row in loose for i in range(len(row.angles))}
+        self.changes |= not all(action.direction for action in self.actions) or not loose.isdisjoint(turning)
         if self.traced:
             results += nodes([_rate(state, geometry) for geometry in self._geometries])
             used |= {int(node._numbers[0]) for node in ordered(results) if node._operation == "input"}

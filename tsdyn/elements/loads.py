@@ -384,10 +384,6 @@ class GivenByScene(SceneLaw):
 
     turns = False
 
-    def parameters(self):
-        """The numbers of the function."""
-        return SceneLaw.parameters(self)
-
     def actions(self):
         """One for each component."""
         point = () if self.turns else (tuple(self.coordinates[0].tolist()),)

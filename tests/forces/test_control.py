@@ -13,7 +13,7 @@ from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, LOOSE, NEA
 
 C, F = ts.constraints, ts.forces
 K = np.array([2.0, 60.0, 4.0, 8.0])
-METHODS = one_of_each(tol=1e-10, step=0.002)
+METHODS = one_of_each(tol=1e-10, step=0.002) | {"radau": {"integrator": ts.integrators.Radau(1e-9, 1e-9)}}
 
 
 def cart(force=None, angle=0.1):
@@ -57,6 +57,7 @@ def test_poles_of_the_closed_loop_are_those_of_A_and_B_K(function):
     assert np.abs(np.sort_complex(poles) - np.sort_complex(expected)).max() < FINE
 
 
+@pytest.mark.slow
 def test_cost_of_the_regulator_is_that_of_the_riccati_equation():
     A, B = swing_up.build().linearise(inputs=["rail"]).state_space()[:2]
     Q, R = swing_up.COST, swing_up.EFFORT
@@ -183,16 +184,16 @@ def test_loads_of_the_scene_are_those_of_arrays(rng):
 # All methods and forms
 
 
-@pytest.mark.slow_but("dop853-balance")
-@pytest.mark.parametrize("function", [balance, clipped])
-@pytest.mark.parametrize("method", METHODS, ids=lambda each: type(each).__name__.lower())
-def test_methods_agree(method, function):
+@pytest.mark.slow_but("traced-dop853", "called-dop853", "traced-taylor")
+@pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
+def test_methods_agree(function, options):
     reference = ts.simulate(cart(on_rail(balance)), (0, 1), rtol=1e-12, atol=1e-12)
-    if function is clipped and isinstance(method, ts.integrators.Taylor):
+    if function is clipped and options is METHODS["taylor"]:
         with pytest.raises(ts.TsdynError, match="can't be traced, it compares"):
-            ts.simulate(cart(on_rail(function)), (0, 1), integrator=method)
+            ts.simulate(cart(on_rail(function)), (0, 1), **options)
         return
-    run = ts.simulate(cart(on_rail(function)), (0, 1), integrator=method).raise_if_failed()
+    run = ts.simulate(cart(on_rail(function)), (0, 1), **options).raise_if_failed()
     assert np.abs(run.q[-1] - reference.q[-1]).max() < ROUGH
     assert max(error.max() for error in run.constraint_error) < HELD
 
@@ -270,6 +271,7 @@ def test_values_are_held_between_samples():
 # Bits
 
 
+@pytest.mark.slow_for("called")
 @pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
 def test_ensembles_have_the_bits_of_runs_alone(function):
     scene, gains = cart(on_rail(function)), np.linspace(0.8, 1.4, 4)

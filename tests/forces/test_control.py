@@ -9,11 +9,11 @@ from scipy.linalg import solve_continuous_are
 import tsdyn as ts
 from examples import active_suspension, computed_torque, swing_up
 from tests.helpers.methods import one_of_each
-from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, LOOSE, NEAR, ROUGH, TIGHT
+from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, LOOSE, NEAR, ROUGH, ROUNDING, TIGHT
 
 C, F = ts.constraints, ts.forces
 K = np.array([2.0, 60.0, 4.0, 8.0])
-METHODS = one_of_each(tol=1e-10, step=0.002)
+METHODS = one_of_each(tol=1e-10, step=0.002) | {"radau": {"integrator": ts.integrators.Radau(1e-9, 1e-9)}}
 
 
 def cart(force=None, angle=0.1):
@@ -57,6 +57,7 @@ def test_poles_of_the_closed_loop_are_those_of_A_and_B_K(function):
     assert np.abs(np.sort_complex(poles) - np.sort_complex(expected)).max() < FINE
 
 
+@pytest.mark.slow
 def test_cost_of_the_regulator_is_that_of_the_riccati_equation():
     A, B = swing_up.build().linearise(inputs=["rail"]).state_space()[:2]
     Q, R = swing_up.COST, swing_up.EFFORT
@@ -149,19 +150,50 @@ def test_user_force_of_the_scene_acts_and_reacts():
     assert np.abs(found[0] - found[1]).max() < ALGEBRA * np.abs(found[0]).max()
 
 
+def test_loads_of_the_scene_are_those_of_arrays(rng):
+    """Random laws of point loads in both frames, on a rigid body and on a point mass."""
+    w = rng.normal(size=13)
+
+    def by_array(t, x):
+        return w[0] * x[0] + w[4] * x[4] + w[8] * x[8], w[1] * x[1] * x[12], w[3] * x[3] + t * w[9] * x[9]
+
+    def of(name, point):
+        def by_state(t, state):
+            rigid = name == "a"
+            p = state.orientation(name) if rigid else np.array([1.0, 0.0, 0.0, 0.0])
+            omega = state.rotation(name) @ state.angular_velocity(name) if rigid else np.zeros(3)
+            x = np.concatenate([state.position(name, point), p, state.velocity(name, point), omega])
+            return by_array(t, x)
+
+        return by_state
+
+    point, frames, found = rng.normal(size=3), ("ground", "body"), []
+    q = rng.normal(size=4)
+    for whole in (False, True):
+        scene = ts.Scene()
+        a = scene.add_body(1.0, (1, 1.1, 1.2), (1, 2, 3), q / np.linalg.norm(q), (3, 2, 1), (1, 2, 3), name="a")
+        dot = scene.add_point_mass(1.0, (3, 1, 2), (1, 0, 1), name="dot")
+        for frame in frames:
+            scene.add(F.PointForce(a, force=of("a", point) if whole else by_array, point_a=point, frame=frame))
+            scene.add(F.Torque(a, torque=of("a", (0, 0, 0)) if whole else by_array, frame=frame))
+        scene.add(F.PointForce(dot, force=of("dot", (0, 0, 0)) if whole else by_array))
+        found.append(scene.evaluate(t=0.3).qdd)
+    assert np.abs(found[0] - found[1]).max() < ALGEBRA * np.abs(found[0]).max()
+
+
 # All methods and forms
 
 
-@pytest.mark.slow_but("dop853-balance")
-@pytest.mark.parametrize("function", [balance, clipped])
-@pytest.mark.parametrize("method", METHODS, ids=lambda each: type(each).__name__.lower())
-def test_methods_agree(method, function):
+@pytest.mark.slow_but("traced-dop853", "called-dop853", "traced-taylor")
+@pytest.mark.parametrize("options", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
+def test_methods_agree(function, options):
     reference = ts.simulate(cart(on_rail(balance)), (0, 1), rtol=1e-12, atol=1e-12)
-    if function is clipped and isinstance(method, ts.integrators.Taylor):
+    if function is clipped and options is METHODS["taylor"]:
         with pytest.raises(ts.TsdynError, match="can't be traced, it compares"):
-            ts.simulate(cart(on_rail(function)), (0, 1), integrator=method)
+            ts.simulate(cart(on_rail(function)), (0, 1), **options)
         return
-    run = ts.simulate(cart(on_rail(function)), (0, 1), integrator=method).raise_if_failed()
+    run = ts.simulate(cart(on_rail(function)), (0, 1), **options).raise_if_failed()
     assert np.abs(run.q[-1] - reference.q[-1]).max() < ROUGH
     assert max(error.max() for error in run.constraint_error) < HELD
 
@@ -174,6 +206,22 @@ def test_formulations_agree(form):
         if (form, method) != ("maggi-kane", "sdirk54"):
             run = ts.simulate(cart(on_rail(balance)), (0, 1), integrator=method, formulation=form)
             assert np.abs(run.q[-1] - reference.q[-1]).max() < ROUGH
+
+
+def test_a_tension_through_zero_length_has_no_series():
+    """A ball flies through the anchor of its actuator, where the direction turns at once."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    ball = scene.add_point_mass(mass=2.0, position=(1, 0, 0), velocity=(-1, 0, 0), name="ball")
+    scene.add(F.Spring(ball, scene.ground, stiffness=1.0, free_length=0.0, name="cord"))
+    scene.add(F.Control(lambda t, state: 0.6, ["cord"]))
+    with pytest.raises(ts.TsdynError, match="may change within any part of a step"):
+        ts.simulate(scene, (0, 1), integrator="taylor")
+    # 2 x'' = -x - 0.6 before zero, from where on the tension pulls back: + 0.6
+    run, w = ts.simulate(scene, (0, 1.6), rtol=1e-9, atol=1e-9), np.sqrt(0.5)
+    t = (np.arccos(0.6 / np.hypot(1.6, 1.0 / w)) - np.arctan2(1.0 / w, 1.6)) / w
+    speed = -1.6 * w * np.sin(w * t) - np.cos(w * t)
+    expected = 0.6 - 0.6 * np.cos(w * (1.6 - t)) + speed / w * np.sin(w * (1.6 - t))
+    assert abs(run.position("ball")[-1, 0] - expected) < ROUGH
 
 
 @pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
@@ -223,6 +271,7 @@ def test_values_are_held_between_samples():
 # Bits
 
 
+@pytest.mark.slow_for("called")
 @pytest.mark.parametrize("function", [balance, clipped], ids=["traced", "called"])
 def test_ensembles_have_the_bits_of_runs_alone(function):
     scene, gains = cart(on_rail(function)), np.linspace(0.8, 1.4, 4)
@@ -231,6 +280,12 @@ def test_ensembles_have_the_bits_of_runs_alone(function):
         alone = scene.with_parameters({"control.function.gain": gain})
         assert (ts.simulate(alone, (0, 0.5), integrator="dop853").q[-1] == q).all()
     assert np.ptp(ensemble.q, axis=0).max() > LOOSE
+
+
+def test_an_input_is_found_in_a_scene_with_other_numbers():
+    B = [cart().with_parameters({"cart.mass": mass}).linearise(inputs=["rail"]).state_space()[1] for mass in (2.0, 4.0)]
+    assert np.abs(B[0] - cart().linearise(inputs=["rail"]).state_space()[1]).max() < ROUNDING
+    assert np.abs(B[0] - B[1]).max() > 0.1
 
 
 def test_a_joint_that_is_moved_by_a_parameter_moves_in_the_law():
@@ -260,6 +315,16 @@ def test_checkpoints_pickles_and_files(function, options, tmp_path):
     assert (ts.load(tmp_path / "solution.zarr").energy == run.energy).all()
     with pytest.raises(ts.TsdynError, match="holds data and no code"):
         scene.save(tmp_path / "scene.toml")
+
+
+def test_a_function_may_hold_handles_in_a_copy():
+    scene = cart()
+    rail, body = scene["rail"], scene["cart"]
+    scene.add(F.Control(lambda t, state: -3.0 * state.displacement(rail) + state.position(body)[0], [rail]))
+    runs = [
+        ts.simulate(each, (0, 0.2)).q[-1] for each in (scene, scene.copy(), scene.with_parameters({"rod.mass": 0.3}))
+    ]
+    assert (runs[0] == runs[1]).all() and (runs[0] == runs[2]).all()
 
 
 def test_a_run_says_how_the_law_is_called():

@@ -142,6 +142,19 @@ def test_scenes_without_constraints_or_of_point_masses():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("law", ["of a joint", "of the scene"])
+def test_series_of_traced_functions(law):
+    scene = ts.Scene()
+    rod = scene.add_body(**ts.shapes.rod(1.0, axis="x", mass=1.0), position=(0.5, 0, 0))
+    joint = scene.add(ts.constraints.Revolute.at(scene.ground, rod, point=(0, 0, 0), axis=(0, 1, 0)))
+    if law == "of a joint":
+        scene.add(ts.forces.JointTorque(joint, function=lambda t, angle, rate: -0.1 * angle * rate))
+    else:
+        scene.add(ts.forces.Control(lambda t, state: -0.1 * state.angle(joint), [joint]))
+    found = ts.profile(scene, (0.0, 0.2), integrator="taylor", advice=False)
+    assert calls(found, "coefficients", f"force: {scene.forces[0].name}") > 0
+
+
 def test_what_is_asked_for_besides_is_told_apart():
     times = np.linspace(0.0, 1.0, 300)
     found = ts.profile(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tsdyn.motions.signals import Signal
 
 
 def pushed(force):
@@ -90,6 +91,15 @@ def test_exceptions_of_functions_are_told(made):
         solution.raise_if_failed()
     assert isinstance(caught.value.__cause__, ValueError)
     assert np.isfinite(solution.q).all()
+
+
+def test_samples_of_a_function_that_raises_are_not_numbers():
+    """All three of them: what is left of other arrays in memory is no load."""
+    for _ in range(20):
+        junk = np.full((2049, 3), 1e300)
+        del junk
+        found = Signal(late, 3, "force", ts.InvalidForce).sampled(np.linspace(0.0, 1.0, 2049))
+        assert all(np.isnan(each[-1]) for each in found)
 
 
 def quotient(t, state):

@@ -21,6 +21,11 @@ from .loops.forces import JACOBIAN
 if TYPE_CHECKING:
     from ..hints import Function
 
+METHODS = frozenset((  # of a state, and its attributes
+    "t", "q", "qd", "qdd", "position", "velocity", "acceleration", "orientation", "rotation", "angular_velocity",
+    "angular_acceleration", "angle", "angle_rate", "angle_acceleration", "displacement", "displacement_rate",
+    "displacement_acceleration", "reaction", "multipliers",
+))  # fmt: skip
 KERNELS = MappingProxyType(
     {
         "force": Callback(loops.forces, SIGNATURE),
@@ -168,28 +173,3 @@ def captured(plain: FunctionType) -> list[Any]:
             found.append(cell.cell_contents)
     names = names_of(plain.__code__)
     return found + [plain.__globals__[name] for name in sorted(names) if name in plain.__globals__]
-
-
-METHODS = frozenset(
-    [
-        "t",
-        "q",
-        "qd",
-        "position",
-        "velocity",
-        "orientation",
-        "rotation",
-        "angular_velocity",
-        "angle",
-        "angle_rate",
-        "displacement",
-        "displacement_rate",
-        "acceleration",
-        "angular_acceleration",
-        "angle_acceleration",
-        "displacement_acceleration",
-        "reaction",
-        "multipliers",
-        "qdd",
-    ]
-)

@@ -384,10 +384,6 @@ class GivenByScene(SceneLaw):
 
     turns = False
 
-    def parameters(self):
-        """The numbers of the function."""
-        return SceneLaw.parameters(self)
-
     def actions(self):
         """One for each component."""
         point = () if self.turns else (tuple(self.coordinates[0].tolist()),)
@@ -428,7 +424,7 @@ class JointLoad:
     With a period the load is held between instants and is what such a force remembers: see runs/driver.py.
     """
 
-    loads = ("function",)
+    loads, given = ("function",), "function"
     permanent = ("joint", "which")
     memory, positive = 1, ()
     quantities = MappingProxyType({"function": law_of_joint, "period": instants})

@@ -51,9 +51,9 @@ class Control(SceneLaw, Force):
         joints by name or handle, and `state.t`, `state.q`, `state.qd`. It has no accelerations and reactions: these
         follow from the forces. Without a period the function depends on its arguments alone. If it is arithmetic and
         functions of NumPy, without branches, it runs compiled; else Python calls it at each evaluation, which takes
-        some 10 us. `print(ts.prepare(scene))` says which. Keyword arguments with defaults, `def law(t, state, *,
-        gain=2.0)`, are parameters of the scene. With a period, any callable that is called at the sampling times only,
-        in their order, as for JointTorque.
+        tens of microseconds. `print(ts.prepare(scene))` says which. Keyword arguments with defaults are parameters of
+        the scene: `def law(t, state, *, gain=2.0)`. With a period, any callable; it is called at the sampling times
+        only, in their order, as for JointTorque.
     actuators : sequence
         What the numbers act as. A joint, by handle or name: its torque (N m) or force (N), as of JointTorque and
         JointForce; of a joint with several coordinates (joint, "angle"), (joint, "displacement") or (joint, "angle",
@@ -66,8 +66,10 @@ class Control(SceneLaw, Force):
     Raises
     ------
     InvalidForce
-        If there is no actuator, one is of another scene, isn't added or has several coordinates; if the function gives
-        another number of values; when it is added, if the function raises or asks for what the scene hasn't.
+        If there is no actuator, one is of another scene, isn't added or has several coordinates. When it is added: if
+        the function gives another number of values, or raises what no other state mends.
+    InvalidBody, InvalidConstraint
+        When it is added: if the function asks for a body or a joint that the scene hasn't.
 
     Notes
     -----

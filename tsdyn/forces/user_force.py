@@ -191,7 +191,7 @@ class _SceneUserForce(SceneLaw, UserForce):
     """By a function of the state of the scene."""
 
     count = 4
-    check, parameters = UserForce.check, UserForce.parameters
+    parameters = UserForce.parameters
 
     def results(self, function, t, state, numbers):
         """Six numbers."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..elements.bodies import Ground, PointMass
 from ..elements.element import Attachment
+from ..elements.force import Force
 from ..elements.laws import captured
 from ..elements.loops import laws as loops
 from ..errors import InvalidArgument, TsdynError
@@ -221,6 +222,10 @@ class Law:
         turning = [j for j in range(self.handles.count) if angle + j in used]
         geometries = [geometry for row in self.handles.rows for geometry in row.angles]
         self._geometries = [geometries[j] for j in turning]
+        # Directions between points, and angles of forces, which no joint keeps, turn at once where their lengths vanish
+        loose = [row for row in self.handles.rows if isinstance(row.item, Force)]
+        loose = {row.first + i for row in loose for i in range(len(row.angles))}
+        self.changes |= not all(action.direction for action in self.actions) or not loose.isdisjoint(turning)
         if self.traced:
             results += nodes([_rate(state, geometry) for geometry in self._geometries])
             used |= {int(node._numbers[0]) for node in ordered(results) if node._operation == "input"}
@@ -268,13 +273,9 @@ class Law:
         """Append the instances, one for each pair of bodies, and the head; their number and the reals of each."""
         force, at, count = self.force, len(reals), len(self.numbers)
         own = np.concatenate(force.coordinates).tolist()
-        par, kept = len(own), len(own) + count
-        remembered = self.values if self.held else len(self.counted)
-        memory += range(at + kept, at + kept + remembered)
-        stride = kept + remembered + loops.PAIR
-        pairs = list(self._pairs())
+        stride, pairs = len(own) + count + loops.PAIR, self._pairs()
         block, seen = np.zeros((len(pairs), stride)), set()
-        block[0, :kept] = [*own, *force.parameters()]
+        block[0, : stride - loops.PAIR] = [*own, *force.parameters()]
         for row, (i, j) in zip(block, pairs, strict=True):
             (a, m), (b, n) = self.places[i], self.places[j] if j >= 0 else (0, 0)
             table += [a, b, m, n]
@@ -283,8 +284,11 @@ class Law:
             seen |= {i, j}
         block[:, loops.FORWARD] = stride * np.arange(len(pairs), 0, -1)
         block[0, loops.LEADS] = 1.0
+        head = self._head(len(own))
+        first = at + block.size + int(head[loops.MEMORY])
+        memory += range(first, first + (self.values if self.held else len(self.counted)))
         reals += block.ravel().tolist()
-        reals += self._head(par, kept)
+        reals += head
         if not (self.traced or self.held):
             self.address = at + block.size + loops.FUNCTION
             reals[self.address] = self.callback
@@ -296,15 +300,17 @@ class Law:
             return [(0, -1)]
         return [(i, j) for i, j in combinations(range(len(self.bodies)), 2) if max(self.acted[i], self.acted[j]) >= 0]
 
-    def _head(self, par, kept):
+    def _head(self, par):
         """The numbers of the head and what it refers to."""
         bodies = [x for place, acted in zip(self.places, self.acted, strict=True) for x in (*place, acted)]
         angles = [x for geometry in self._geometries for x in self._angle(geometry)]
         rows = loops.ORDERS * self.rows
         slopes = self.values * (1 + 2 * self.coordinates)
         values = 0 if self.traced else self.values
-        sizes = [len(bodies), len(angles), len(self.program), rows, 2 * self.coordinates, slopes, len(self.counted)]
-        body_at, angle_at, program, row_at, state, slope_at, theta, end = loops.HEAD + np.cumsum([0, *sizes])
+        turns = len(self.counted)
+        sizes = [len(bodies), len(angles), len(self.program), rows, 2 * self.coordinates, slopes, turns]
+        sizes += [self.values if self.held else turns]
+        body_at, angle_at, program, row_at, state, slope_at, theta, kept, end = loops.HEAD + np.cumsum([0, *sizes])
         acted = sum(place >= 0 for place in self.acted)
         head = [
             len(self.bodies), body_at, self.coordinates, values, 0, len(self.numbers), par, kept, len(self.counted),

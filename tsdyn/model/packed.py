@@ -479,7 +479,8 @@ def pack(scene):
     members, derived = tuple(_members(scene.constraints)), Derived()
     if any(isinstance(force, SceneLaw) for force in scene.forces):
         derived.handles = Handles(scene.bodies, list(where.values()), members, scene.forces)
-        derived.handles.add_aliases((scene._aliases or {}).items())
+        for pairs in (scene._twins, scene._aliases):  # functions may hold handles of the scene that this is a copy of
+            derived.handles.add_aliases((pairs or {}).items())
     forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals, derived.handles)
     _append_programs(motions, reals)
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]

@@ -12,7 +12,7 @@ A law gives values u_i(t, q, qd); each acts as a force or a torque on one or two
 u_x is zero for sampled values, and central differences of fourth order for a function called in Python.
 
 An instance is a pair of bodies, one of which the law acts on: implicit methods and linearisation keep derivatives by
-pairs. The first instance has the law's numbers and its memory; (2) is at the state of the last evaluation of (1), so a
+pairs. The first instance has the law's numbers; (2) is at the state of the last evaluation of (1), so a
 pair needs no coordinates of other bodies.
 """
 
@@ -32,7 +32,7 @@ PAIR = 6  # floats at the end of the reals of an instance:
 # distance to the head; the two bodies, -1 for none; whether they have blocks with themselves; whether it is the first
 FORWARD, FIRST_OF_PAIR, SECOND_OF_PAIR, FIRST_OWN, SECOND_OWN, LEADS = range(-PAIR, 0)
 
-# the head: counts, and where in it (of PAR and MEMORY: in the first instance) other numbers begin
+# the head: counts, and where in it (of PAR: in the first instance) other numbers begin
 (
     BODIES,  # that the program reads or acts on
     BODY_LIST,
@@ -89,7 +89,7 @@ def forces(count, stride, table, reals, q, qd, t, out):
     reals, q, qd, out = vector(reals, ANY), vector(q, ANY), vector(qd, ANY), vector(out, ANY)
     head = reals[int(reals[stride + FORWARD]) :]
     s, row = matrix(data_of(head[int(head[ROWS]) :]), int(head[ROW_COUNT]), ORDERS), 1
-    memory, par = reals[int(head[MEMORY]) :], reals[int(head[PAR]) :]
+    memory, par = head[int(head[MEMORY]) :], reals[int(head[PAR]) :]
     values, nb = int(head[VALUES]), int(head[BODIES])
     # Inputs: t, values that are given, numbers and angles, q and qd of the bodies
     s[0, 0] = t
@@ -144,7 +144,7 @@ def remembers(count, stride, table, reals, q, qd, t, out):
     """Follow the angles."""
     reals, q = vector(reals, ANY), vector(q, ANY)
     head = reals[int(reals[stride + FORWARD]) :]
-    memory = reals[int(head[MEMORY]) :]
+    memory = head[int(head[MEMORY]) :]
     for j in range(int(head[ANGLES])):
         memory[j] = _counted(head, j, q, memory[j])
     return 0
@@ -246,7 +246,7 @@ def jacobian(kind, table, reals, q, qd, t, Q_q, Q_qd, renew, kept):
         s, first = matrix(data_of(head[int(head[ROWS]) :]), int(head[ROW_COUNT]), ORDERS), _first_row(head)
         pair = int(real[stride + FIRST_OF_PAIR]), int(real[stride + SECOND_OF_PAIR])
         if renew != 0 and head[FUNCTION] != 0.0 and real[stride + LEADS] != 0.0:
-            _difference(head, real[int(head[MEMORY]) :], real[int(head[PAR]) :], t)
+            _difference(head, head[int(head[MEMORY]) :], real[int(head[PAR]) :], t)
         for side in range(2):
             of = pair[0] if side == 0 else pair[1]
             # By each coordinate of a body of the pair, rates first
@@ -274,7 +274,7 @@ def series(run, k, kind, table, reals, bodies, values, poses, Z):
     first, program = int(head[RESULTS]), int(values[LENGTH])
     scratch, all_p = values[program:], program + (rows * orders + 3) // 4 * 4
     s, xd = matrix(data_of(scratch), rows, orders), stack(4)
-    memory, par, row = reals[int(head[MEMORY]) :], reals[int(head[PAR]) :], 1
+    memory, par, row = head[int(head[MEMORY]) :], reals[int(head[PAR]) :], 1
     s[0, k] = values[T] if k == 0 else (1.0 if k == 1 else 0.0)
     for i in range(int(head[VALUES])):
         s[row, k] = memory[i] if k == 0 else 0.0

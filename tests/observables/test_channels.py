@@ -182,6 +182,15 @@ def test_a_scene_at_rest_is_drawn_as_curves():
     np.testing.assert_allclose(height, scene["block"].position[2], atol=1e-5)
 
 
+@pytest.mark.parametrize("dense", [True, False])
+def test_a_run_that_ended_early_is_drawn_to_its_end(dense):
+    solution = ts.simulate(bar_and_bob(), (0.0, 1.0), max_steps=4, dense_output=dense)
+    assert not solution.success
+    t, angle = curve(solution.plot("hinge"), "hinge.angle")
+    np.testing.assert_allclose(angle, fall().at(t).angle("hinge"), atol=1e-3)
+    assert solution.reached - t[-1] < 1e-6
+
+
 def test_paths_names_and_the_overview(tmp_path):
     solution = fall()
     assert solution.plot().shape == (2, 2)
@@ -194,6 +203,10 @@ def test_paths_names_and_the_overview(tmp_path):
     part = solution[2:6]
     t, _ = curve(part.plot("hinge.angle"), "hinge.angle")
     assert part.t[0] <= t.min() < t.max() <= part.t[-1]
+    (ax,) = solution[3:4].plot("hinge.angle")
+    assert [line.get_ydata().tolist() for line in ax.lines if line.get_marker() == "."] == [
+        [solution.angle("hinge")[3]]
+    ]
     with pytest.raises(ts.InvalidArgument, match="no outputs"):
         solution[0:0].plot("hinge")
 

@@ -219,21 +219,16 @@ def write(solution, path, channels=None):
 
 
 def _draw(solution, path, channels):
-    if channels is not None:
-        from matplotlib import pyplot
-
-        pyplot.switch_backend("agg")
-        solution.plot(channels, path)
-        pyplot.close("all")
-        return path
-    from matplotlib.figure import Figure
+    from matplotlib import pyplot
 
     from ..drawing import save
     from ..plots import constraint_error
 
-    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
-    constraint_error(solution, figure.subplots())
-    return save(figure, path)
+    pyplot.switch_backend("agg")
+    axes = constraint_error(solution) if channels is None else solution.plot(channels)[0]
+    written = save(axes.figure, path)
+    pyplot.close("all")
+    return written
 
 
 def summary(solution):

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 WIDTH, HEIGHT, LABEL = 8.0, 2.2, 26  # of a panel, inches; characters of a line of its label
 POINTS, FEWEST = 2000, 3  # of a curve at least, and of each step
 MOST = 20_000  # steps that are drawn
+AT_ONCE = 1 << 19  # coordinates of states that are evaluated together
 INSIDE = 1e-9  # of a step: so near its ends are its first and last points, so that jumps between steps are upright
 
 
@@ -39,9 +40,8 @@ def time_histories(solution: Solution, names: str | Sequence[str], path: Any = N
     if not solution.t.size:
         raise InvalidArgument("plot: the solution has no outputs, so there is nothing to show.")
     channels = channels_of(solution.packed, names, solution._lacks)
-    states, lost = _within_steps(solution) or _between_outputs(solution)
-    values = values_of(states, channels)
-    values[np.isin(intervals(solution.t, states.t)[0], lost)] = np.nan
+    times, values, lost = _within_steps(solution, channels) or _between_outputs(solution, channels)
+    values[np.isin(intervals(solution.t, times)[0], lost)] = np.nan
     dots = np.unique([lost, lost + 1]) if solution.t.size > 1 else np.zeros(1, int)
     ends = values_of(solution._picked(dots), channels) if dots.size else None
     panels = {}
@@ -51,7 +51,7 @@ def time_histories(solution: Solution, names: str | Sequence[str], path: Any = N
     axes = axes_of(None, len(panels), 1, figsize=size, sharex=True, squeeze=False)[:, 0]
     for ax, (unit, some) in zip(axes, panels.items(), strict=True):
         for i in some:
-            (line,) = ax.plot(states.t, values[:, i], linewidth=1.3, label=channels[i].name)
+            (line,) = ax.plot(times, values[:, i], linewidth=1.3, label=channels[i].name)
             if ends is not None:
                 ax.plot(solution.t[dots], ends[:, i], ".", color=line.get_color(), markersize=4)
         quantities = ", ".join(dict.fromkeys(channels[i].quantity for i in some))
@@ -74,29 +74,39 @@ def _times(edges):
     return (steps[:, :1] + (steps[:, 1:] - steps[:, :1]) * share).ravel()
 
 
-def _within_steps(solution):
-    """States of the dense output, and no interval without; None where there is no dense output."""
+def _values(ask, times, channels, n):
+    """Values (k, channels) at times, of the states that `ask` gives, of n coordinates, some at once."""
+    parts = np.array_split(times, max(times.size * n // AT_ONCE, 1))
+    return np.concatenate([values_of(ask(part), channels) for part in parts])
+
+
+def _within_steps(solution, channels):
+    """Times and values of the dense output, and no interval without; None where there is no dense output."""
     if solution._trajectory is None or solution.t.size == 1:
         return None
     start, end = solution.t[[0, -1]]
     edges = solution._trajectory.edges
+    times = _times(np.unique([start, *edges[(start < edges) & (edges < end)], end]))
     try:
-        return solution.at(_times(np.unique([start, *edges[(start < edges) & (edges < end)], end]))), np.zeros(0, int)
+        return times, _values(solution.at, times, channels, solution.q.shape[1]), np.zeros(0, int)
     except StepFailure:  # of a run that ended early, close to its end
         return None
 
 
-def _between_outputs(solution):
-    """States of the quintic, and the intervals between outputs that are too long for it."""
+def _between_outputs(solution, channels):
+    """Times and values of the quintic, and the intervals between outputs that are too long for it."""
     t, levels = solution.t, (solution.q, solution.qd, solution.qdd)
+
+    def state(times):
+        i, _, _ = intervals(t, times)
+        q, qd, qdd = quintic(t, levels, times)
+        memory = solution._remembers[i]
+        lam = np.zeros((times.size, 0)) if solution._lacks else multipliers(solution.packed, times, q, qd, qdd, memory)
+        anchor = Anchor(solution.anchor.angles[i], times - t[i], (levels[0][i], levels[1][i]))
+        return RememberingState.of(solution.packed, memory, anchor, times, q, qd, qdd, lam)
+
     times = _times(np.unique(t))
-    i, _, _ = intervals(t, times)
-    q, qd, qdd = quintic(t, levels, times)
-    memory = solution._remembers[i]
-    lam = np.zeros((times.size, 0)) if solution._lacks else multipliers(solution.packed, times, q, qd, qdd, memory)
-    anchor = Anchor(solution.anchor.angles[i], times - t[i], (levels[0][i], levels[1][i]))
-    states = RememberingState.of(solution.packed, memory, anchor, times, q, qd, qdd, lam)
-    return states, _unresolved(t, *levels)
+    return times, _values(state, times, channels, levels[0].shape[1]), _unresolved(t, *levels)
 
 
 def _unresolved(t, q, qd, qdd):

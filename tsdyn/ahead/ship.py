@@ -23,7 +23,8 @@ def ship(folder):
     """Fill the folder with the kernels of this process's target."""
     if compilers.CHOICE or not portable():
         raise TsdynError(
-            "Kernels are shipped for a portable target: unset TSDYN_JIT and NUMBA_CPU_NAME, and try again."
+            f"Kernels are shipped for a portable target, of which this processor has {available() or 'none'}: unset "
+            "TSDYN_JIT and NUMBA_CPU_NAME, and give such a target, or nothing, as TSDYN_TARGET."
         )
     _, _, failed = compile_kernels(everything=True)
     if failed:
@@ -40,7 +41,7 @@ def ship(folder):
 
 def main(folder):
     """Ship the kernels of every target, each from a process of its own."""
-    if "TSDYN_TARGET" in os.environ:
+    if "TSDYN_TARGET" in os.environ or not available():
         return ship(folder)
     for name in available():
         environment = {**os.environ, "TSDYN_TARGET": name}

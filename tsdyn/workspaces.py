@@ -382,7 +382,7 @@ load_run = loader(lay_out(1, 1, 1, 1, 1))
 # The workspace of a run: all arrays are laid out once, before the first step.
 
 
-class Control(Record):
+class LevelControl(Record):
     """Tolerances, and criteria of the present chart."""
 
     u_tol: float  # |Phi| of the position solve, Eq. 29
@@ -443,7 +443,7 @@ class Work(NamedTuple):
     Q: np.ndarray  # (n,)    applied forces without gravity; null_space.reduced_acceleration
     h: np.ndarray  # (n,)    -U B gamma; null_space.reduced_acceleration
     householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; dense_linalg.null_space
-    control: Control
+    control: LevelControl
     counters: Counters
     redundant: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; dense_rows.take_selection
 
@@ -525,7 +525,7 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "E": (3 * bodies, k),
         "A": (k, k),
     }
-    work = Work(**carve(shapes, control=Control, counters=Counters), redundant=np.zeros(redundant + 1, np.int64))
+    work = Work(**carve(shapes, control=LevelControl, counters=Counters), redundant=np.zeros(redundant + 1, np.int64))
     hold(work.control, constraint_tol, size, joint_rows is not None)
     return work
 
@@ -586,7 +586,7 @@ def plain_work(n):
     others = ("control", "counters", "redundant")
     shapes = {name: (0,) * array.ndim for name, array in plain_context().work._asdict().items() if name not in others}
     shapes |= {"q": (n,), "qd": (n,), "qdd": (n,)}
-    return Work(**carve(shapes, control=Control, counters=Counters), redundant=np.zeros(1, np.int64))
+    return Work(**carve(shapes, control=LevelControl, counters=Counters), redundant=np.zeros(1, np.int64))
 
 
 def parts(system, graph, n):

@@ -15,7 +15,7 @@ from .reading import Mistakes
 OF_RUNS = ("run", "ensemble", "output")  # tables that are no part of a scene
 
 
-class Numbers(SimpleNamespace):
+class TableNumbers(SimpleNamespace):
     """Numbers of the table as attributes."""
 
 
@@ -37,7 +37,7 @@ class NamedNumbers:
     def __init__(self, document: dict[str, Any], mistakes: Any, allow_code: bool, values: dict[str, float]) -> None:
         self.document = {key: value for key, value in document.items() if key not in OF_RUNS}
         self.name, self.places, self.allow_code = mistakes.name, mistakes.places, allow_code
-        self.values = Numbers(**values)
+        self.values = TableNumbers(**values)
 
     def __deepcopy__(self, memo: Any) -> Self:
         return self  # never changed

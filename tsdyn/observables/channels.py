@@ -70,7 +70,7 @@ def channels_of(packed: Packed, names: str | Sequence[str], lacks: str = "") -> 
     wrong = [name for name in names if not isinstance(name, str)]
     if wrong or not names:
         raise InvalidArgument(f"{said}, got {shown(wrong[0] if wrong else names)}.")
-    known = Names(packed, lacks)
+    known = ChannelNames(packed, lacks)
     return list({channel.name: channel for name in names for channel in known.meant(name)}.values())
 
 
@@ -81,7 +81,7 @@ def values_of(motion: Any, channels: Sequence[Channel]) -> Floats:
     return np.stack([channel.pick(asked[channel.ask]) for channel in channels], axis=1)
 
 
-class Names:
+class ChannelNames:
     """The names of channels of a packed scene; `lacks` says which parts of the scene aren't there."""
 
     def __init__(self, packed, lacks):

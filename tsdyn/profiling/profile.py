@@ -26,7 +26,7 @@ from ..simulation.scene_cache import prepared
 from ..simulation.segments import implicit
 from .advice import advise, timed
 from .phases import Phase, duration, phases
-from .timers import Watch, calibrate
+from .timers import Timing, calibrate
 from .tolerances import FEWEST, LONG, MOST, RESOLUTION, SAMPLE
 
 if TYPE_CHECKING:
@@ -273,12 +273,12 @@ def _rounds(scene, calls, seconds):
         watch.release()
         return watch, solution.stats
 
-    watched(Watch(half), max_steps=1)  # loads the timers
+    watched(Timing(half), max_steps=1)  # loads the timers
     least, driver, best, began, rounds = {}, np.inf, None, time.perf_counter(), 0
     most = SAMPLE * (2 + len(calls))
     while rounds < (FEWEST if seconds < LONG else 1) or (rounds < MOST and time.perf_counter() - began < most):
-        outside, _ = watched(Watch())
-        inside = watched(Watch(half))
+        outside, _ = watched(Timing())
+        inside = watched(Timing(half))
         driver, rounds = min(driver, outside.seconds), rounds + 1
         best = inside if best is None or inside[0].seconds < best[0].seconds else best
         least |= {name: min(timed(scene, *call)[1], least.get(name, np.inf)) for name, call in calls.items()}

@@ -167,7 +167,7 @@ def calibrate(count=20000, rounds=15):
     return (time.perf_counter() - began) / (read(notes) - first), round(0.5 * max(with_timer - without, 0.0))
 
 
-class Watch:
+class Timing:
     """The time of a run in its compiled driver and, with `half` the time of a timer, in the kernels that it calls."""
 
     def __init__(self, half=None):

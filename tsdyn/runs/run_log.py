@@ -10,7 +10,7 @@ import numpy as np
 from ..jit.kernels import Record, kernel
 from ..motions.tracing import LENGTH
 from ..validation import EXACT, damaged, demand, is_count
-from ..workspaces import STORED, Clock, Control, Counters, RunKernels, RunNumbers
+from ..workspaces import STORED, Clock, Counters, LevelControl, RunKernels, RunNumbers
 from .tolerances import TRIES
 
 # The log of a run: what is asked of it, and rows of what it records.
@@ -332,7 +332,7 @@ def _parts(name, value):
 
 # What a run leaves at its end: the last state, its counts and its histories.
 
-NUMBERS, COUNTERS = ctypes.sizeof(Clock), ctypes.sizeof(Control)  # bytes before them, as `Memory` lays them out
+NUMBERS, COUNTERS = ctypes.sizeof(Clock), ctypes.sizeof(LevelControl)  # bytes before them, as `Memory` lays them out
 NOW = sum(map(ctypes.sizeof, (Clock, RunNumbers, RunKernels))) // 8  # numbers before q
 
 
@@ -400,7 +400,7 @@ class RecordedEnd:
         """The `ChartLog`, or None."""
         if not isinstance(self._charts, np.ndarray):
             return self._charts
-        control, log = Control.from_buffer(self._work), ChartLog()
+        control, log = LevelControl.from_buffer(self._work), ChartLog()
         log.add(with_end(self._charts, self._numbers(), control.condition, control.contraction), None)
         return log
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from ..elements.bodies import PointMass
-from ..files.named_numbers import Numbers
+from ..files.named_numbers import TableNumbers
 from ..jit.code_hash import is_ours
 from ..model.handles import handles_of
 from ..model.packed import Derived, System, classes, is_small
@@ -31,9 +31,9 @@ def serves(family, kept, names):
         return False
     fields = family.fields.values() if names is None else map(family.field, names)
     for owner in {id(field.owner): field.owner for field in fields}.values():
-        if isinstance(owner, Numbers) and names is not None:
+        if isinstance(owner, TableNumbers) and names is not None:
             return False
-        if owner is family.template or isinstance(owner, (PointMass, Numbers)):
+        if owner is family.template or isinstance(owner, (PointMass, TableNumbers)):
             continue
         load = family.load_of(owner)
         if load is not None and any(isinstance(value, Signal) for value in load.parameters):

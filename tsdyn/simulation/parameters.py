@@ -20,7 +20,7 @@ from ..elements.element import Attachment, checked_parameters
 from ..elements.joint import Joint
 from ..elements.laws import SceneLaw
 from ..errors import InvalidArgument, UnknownParameter
-from ..files.named_numbers import Numbers
+from ..files.named_numbers import TableNumbers
 from ..files.types import Unwritable, encode
 from ..jit.code_hash import is_ours
 from ..model.handles import handles_of
@@ -117,9 +117,9 @@ class Field(NamedTuple):
 def fields_of(scene):
     """The `Field`s of a scene by name, "object.attribute"; names that stand for several are left out.
 
-    Numbers of the table `parameters` of its file are first.
+    TableNumbers of the table `parameters` of its file are first.
     """
-    numbers = Numbers() if scene._named is None else scene._named.values
+    numbers = TableNumbers() if scene._named is None else scene._named.values
     found, several = {name: Field(numbers, name, "") for name in vars(numbers)}, set()
     found[GRAVITY] = Field(scene, GRAVITY, "m/s^2")
     for owner in (*scene.bodies, *scene._added, *scene._forces):
@@ -265,14 +265,14 @@ def shown(value: Any) -> str:
     return f"[{', '.join(f'{x + 0.0:.{DIGITS}g}' for x in array.tolist())}]"
 
 
-# Numbers of scenes with other values, written into copies of the packed arrays.
+# TableNumbers of scenes with other values, written into copies of the packed arrays.
 
 # entries of `Derived` that numbers don't change
 KEPT = ("handles", "body_indices", "members", "places_within", "coordinate_starts", "holonomic", "aligned")
 
 
 class Edit:
-    """Numbers of a `Family` with changes; arrays are copied when they are first written to."""
+    """TableNumbers of a `Family` with changes; arrays are copied when they are first written to."""
 
     def __init__(self, family):
         self.family, self.packed = family, family.packed
@@ -286,7 +286,7 @@ class Edit:
 
     def enter(self, owner, changes):
         """Enter checked values of one owner, by attribute; False if numbers can't express them."""
-        if isinstance(owner, Numbers):
+        if isinstance(owner, TableNumbers):
             return False
         if owner is self.family.template:
             self._array("gravity")[:] = with_gravity(owner, changes)
@@ -462,7 +462,7 @@ def edits_of(scene):
     return [
         (field.owner, field.attribute, field.value)
         for name, field in fields_of(scene).items()
-        if not isinstance(field.owner, Numbers) and not field.keyword
+        if not isinstance(field.owner, TableNumbers) and not field.keyword
         if name not in before or not _equal(field.value, before[name].value)
     ]
 
@@ -580,7 +580,7 @@ class Family:
 
     def copied(self, values):
         """A copy of the template with those of some values, by name, that are numbers of its file; and the others."""
-        numbers = {name: value for name, value in values.items() if isinstance(self.field(name).owner, Numbers)}
+        numbers = {name: value for name, value in values.items() if isinstance(self.field(name).owner, TableNumbers)}
         if not numbers:
             return self.template.copy(), values
         others = {name: value for name, value in values.items() if name not in numbers}

@@ -117,7 +117,7 @@ class Field(NamedTuple):
 def fields_of(scene):
     """The `Field`s of a scene by name, "object.attribute"; names that stand for several are left out.
 
-    TableNumbers of the table `parameters` of its file are first.
+    Numbers of the table `parameters` of its file are first.
     """
     numbers = TableNumbers() if scene._named is None else scene._named.values
     found, several = {name: Field(numbers, name, "") for name in vars(numbers)}, set()
@@ -265,14 +265,14 @@ def shown(value: Any) -> str:
     return f"[{', '.join(f'{x + 0.0:.{DIGITS}g}' for x in array.tolist())}]"
 
 
-# TableNumbers of scenes with other values, written into copies of the packed arrays.
+# Numbers of scenes with other values, written into copies of the packed arrays.
 
 # entries of `Derived` that numbers don't change
 KEPT = ("handles", "body_indices", "members", "places_within", "coordinate_starts", "holonomic", "aligned")
 
 
 class Edit:
-    """TableNumbers of a `Family` with changes; arrays are copied when they are first written to."""
+    """Numbers of a `Family` with changes; arrays are copied when they are first written to."""
 
     def __init__(self, family):
         self.family, self.packed = family, family.packed

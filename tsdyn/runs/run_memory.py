@@ -73,8 +73,9 @@ def reach(context, t, h):
 
 STAND_INS = {
     "place": place_interrupted, "accelerate": accelerate, "start_chart": start_chart, "reach": reach,
-    "accelerate_here": reach, "pass_singular": reach, "expand": expand, "linearise": place_interrupted,
-    "reduce": factorise, "factorise": factorise, "residual": residual, "factorise_stages": factorise_stages,
+    "stage_place": place_interrupted, "stage_accelerate": accelerate, "accelerate_here": reach, "pass_singular": reach,
+    "expand": expand, "linearise": place_interrupted, "reduce": factorise, "factorise": factorise, "residual": residual,
+    "factorise_stages": factorise_stages,
 }  # fmt: skip
 
 
@@ -209,12 +210,16 @@ class Memory:
         self._enter_method(engine.method)
         engine.lay_out(self)
         engine.layouts += 1
-        self.engine, numbers = engine, self.run.numbers
+        self.engine, run, numbers = engine, self.run, self.run.numbers
         self.layout = Layout(self.run.now.shape[1], self.run.remembered.size, engine.skipped, bool(self.packed.loads))
         self._enter_start(task)
         reset_selection(self.graph, self.context.tangent)
         numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
         numbers.may_pass, numbers.chart_interval = may_pass, task.interval
+        if task.method.driver == "steps":
+            numbers.free_stages = free = engine.form.frees_stages and task.interval == 0
+            place, accelerate = engine.form.stage_kernels(free)
+            run.kernels.stage_place, run.kernels.stage_accelerate = place.address, accelerate.address
         numbers.leave_when_stiff = task.choose is not None
         self.load()
 

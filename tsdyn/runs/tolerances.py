@@ -133,3 +133,6 @@ LEGS, FEW = (1, 4, 16), 2
 
 # Floats of the workspace of a reader up to which it is kept for the next one (1 MB): a hundred bodies or more.
 KEPT_FLOATS = 1 << 17
+
+# |d|, the sine of half the angle by which a body has turned since q0: where stages aren't placed, a chart is left beyond.
+TURN_FREE = 0.05

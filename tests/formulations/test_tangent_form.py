@@ -80,14 +80,14 @@ def test_steps_do_not_depend_on_the_form(name, method):
 @pytest.mark.parametrize("name", ["sliding_top", "two_body_pendulum_spatial", "chain_4"])
 def test_stages_off_the_manifold_differ_by_truncation(name, method, order):
     """Stages that stay where their sums put them are those of the same method: both forms agree to its order."""
-    counts = np.array([40, 60, 80, 100] if order == 8 else [120, 240, 480])
+    counts = np.array([30, 40, 60, 80] if order == 8 else [120, 240, 480])
     apart = []
     for count in counts:
         step = method(step=1.0 / count)
         one, two = both(lambda: load(name)[0], 1.0, step, chart_interval=None)  # noqa: B023
         check(one)
         apart.append(np.abs(one.q[-1] - two.q[-1]).max())
-    assert -np.polyfit(np.log(counts), np.log(apart), 1)[0] > order - 0.6
+    assert -np.polyfit(np.log(counts), np.log(apart), 1)[0] > order - 0.8
 
 
 def driven():

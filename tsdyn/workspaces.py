@@ -263,6 +263,7 @@ class RunNumbers(Record):
     adaptive: int
     steps_wanted: int
     chart_interval: int  # steps between charts that are forced; 0 for none
+    free_stages: int  # whether stages stay where their sums put them, off the manifold
     dense: int  # 0, FILLED or STORED
     may_pass: int  # whether a singular configuration ends the run with PASSAGE
     leave_when_stiff: int
@@ -294,6 +295,8 @@ class RunKernels(Record):
 
     place: int  # the formulation's: place to error_norm
     accelerate: int
+    stage_place: int  # place and accelerate of an explicit step's stages
+    stage_accelerate: int
     complete: int
     check: int
     start_chart: int

@@ -18,8 +18,12 @@ C, F, I = ts.constraints, ts.forces, ts.integrators
 FORMS = ("tangent", "null-space")
 
 
-def both(make, end, integrator, **options):
+NEVER = 10**9  # a chart_interval that forces no chart; stages are placed on the manifold, as in the null-space form
+
+
+def both(make, end, integrator, chart_interval=NEVER, **options):
     """A run in each form, of a scene of its own."""
+    options["chart_interval"] = chart_interval
     return [
         ts.simulate(make(), (0.0, end), integrator=integrator, formulation=form, **options).raise_if_failed()
         for form in FORMS
@@ -48,13 +52,13 @@ GROWTH = {"sliding_top": 2e3, "two_body_pendulum": 2e4, "two_body_pendulum_spati
 
 
 @pytest.mark.slow_for("chain_4*")
-@pytest.mark.parametrize("interval", [None, 7])
+@pytest.mark.parametrize("interval", [NEVER, 7])
 @pytest.mark.parametrize("name", GROWTH)
 def test_thousands_of_steps_and_many_charts(name, interval):
     end = 1.0 if name == "chain_4" else 5.0
     one, two = both(lambda: load(name)[0], end, I.Nystrom4(step=end / 5000), chart_interval=interval)
     assert one.stats.steps == 5000
-    assert one.stats.charts >= (12 if interval is None else 700)
+    assert one.stats.charts >= (12 if interval == NEVER else 700)
     demand_same(one, two, GROWTH[name])
     assert one.stats.evaluations == two.stats.evaluations
     assert one.stats.placements == two.stats.placements
@@ -70,6 +74,20 @@ def test_steps_do_not_depend_on_the_form(name, method):
     np.testing.assert_array_equal(one.steps.accepted, two.steps.accepted)
     np.testing.assert_allclose(one.steps.h[:-1], two.steps.h[:-1], rtol=3 * COARSE)
     np.testing.assert_allclose(one.q, two.q, atol=TIGHT)
+
+
+@pytest.mark.parametrize(("method", "order"), [(I.Nystrom4, 4), (I.RK45, 5), (I.DOP853, 8)])
+@pytest.mark.parametrize("name", ["sliding_top", "two_body_pendulum_spatial", "chain_4"])
+def test_stages_off_the_manifold_differ_by_truncation(name, method, order):
+    """Stages that stay where their sums put them are those of the same method: both forms agree to its order."""
+    counts = np.array([30, 40, 60, 80] if order == 8 else [120, 240, 480])
+    apart = []
+    for count in counts:
+        step = method(step=1.0 / count)
+        one, two = both(lambda: load(name)[0], 1.0, step, chart_interval=None)  # noqa: B023
+        check(one)
+        apart.append(np.abs(one.q[-1] - two.q[-1]).max())
+    assert -np.polyfit(np.log(counts), np.log(apart), 1)[0] > order - 0.8
 
 
 def driven():

@@ -31,7 +31,7 @@ def test_order_with_a_chart_every_step(name):
 
 @pytest.mark.parametrize("formulation", FORMS)
 def test_order_with_charts_by_the_criteria(formulation):
-    assert abs(observed_order("sliding_top", 1.0 / np.array([60, 120, 240, 480]), formulation=formulation) - 5.0) < 0.2
+    assert abs(observed_order("sliding_top", 1.0 / np.array([120, 240, 480, 960]), formulation=formulation) - 5.0) < 0.2
 
 
 @pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])

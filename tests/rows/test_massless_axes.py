@@ -105,7 +105,7 @@ def test_many_bodies():
 def test_both_forms_agree(name):
     scene = SCENES[name]()
     free, basis = (
-        ts.simulate(scene, (0.0, 0.3), integrator=I.Nystrom4(step=5e-3), formulation=form)
+        ts.simulate(scene, (0.0, 0.3), integrator=I.Nystrom4(step=5e-3), formulation=form, chart_interval=10**9)
         for form in ("tangent", "null-space")
     )
     np.testing.assert_allclose(free.q, basis.q, rtol=0.0, atol=HELD)

@@ -328,8 +328,8 @@ def test_what_a_file_names_only_is_not_needed_to_look_at_it(suffix, tmp_path):
     whole = ts.simulate(scene, (0.0, 0.3), integrator="dop853")
     loaded = ts.load(whole.save(tmp_path / f"run.{suffix}"))
     again = ts.load(loaded.save(tmp_path / f"again.{suffix}"))
-    for found in (loaded, again, loaded[2:9], ts.load(tmp_path / f"run.{suffix}", scene=scene)):
-        one = whole[2:9] if found.t.size == 7 else whole
+    for found in (loaded, again, loaded[1:5], ts.load(tmp_path / f"run.{suffix}", scene=scene)):
+        one = whole[1:5] if found.t.size == 4 else whole
         for name in ("t", "q", "qd", "qdd", "multipliers", "energy", "kinetic_energy", "power", "linear_momentum"):
             np.testing.assert_array_equal(getattr(found, name), getattr(one, name), err_msg=name)
         for level, right in zip(found.constraint_error, one.constraint_error, strict=True):

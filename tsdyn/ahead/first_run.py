@@ -109,6 +109,7 @@ def of_method(method, form, within, far=False, rough=False):
     yield from (kernels.check, kernels.start_chart, kernels.error_norm, advance)
     if method.driver == "steps":
         yield from filter(None, called_for(method.kernel(form.first_order)[0]))
+        yield from form.stage_kernels(form.frees_stages)
     if method.step is None:
         yield from method.errors
     if method.implicit:

@@ -13,7 +13,7 @@ from .locked_orientations import moving_graph
 
 @dataclass(frozen=True)
 class Formulation:
-    """A module of kernels: place, accelerate, complete, check, start_chart."""
+    """A module of kernels: place, accelerate, complete, check, start_chart; for some stage_place, stage_accelerate."""
 
     name: str
     kernels: ModuleType
@@ -45,6 +45,16 @@ class Formulation:
             return 8 * len(graph.bodies), 8 * len(graph.bodies)
         k = n - m + redundancy(graph)
         return n if self.first_order else k, k
+
+    @property
+    def frees_stages(self):
+        """Whether stages of explicit methods may stay where their sums put them, off the manifold."""
+        return hasattr(self.kernels, "stage_place")
+
+    def stage_kernels(self, free):
+        """The kernels place and accelerate of an explicit method's stages."""
+        k = self.kernels
+        return (k.stage_place, k.stage_accelerate) if free else (k.place, k.accelerate)
 
     def addresses(self):
         """Addresses of the kernels that a driver calls, by their names in `Kernels`; loads or compiles them."""

@@ -152,6 +152,29 @@ def place(context, t, x):
     return OK
 
 
+@callback(PLACE)
+def stage_place(context, t, x):
+    """Set positions of an explicit stage from x (8 b,): poses where the sums put them, H, and the factors of S. Status."""
+    c = load(context)
+    system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
+    w.counters.placements += 1
+    l.state.time, l.state.factored = t, 0
+    if not set_time(system, t):
+        return NOT_FINITE
+    copy(vector(x, l.x.size - 8), l.x)
+    if not displace(graph, l, f.poses):
+        return CHART_LOST
+    if f.b.size > 0:
+        evaluate_rows(graph, system, f, f.rows, t)
+        w.counters.factorizations += 1
+        failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
+        if failed >= 0:
+            return MASS_SINGULAR if is_axis(graph, f.rows, failed) else SINGULAR
+    if system.forces.shape[0] > 0:
+        write_positions(graph.bodies, f.poses, w.q)
+    return OK
+
+
 @kernel
 def _solve_positions(graph, system, w, f, l, t, renewals):
     """Newton's method for u with N of the start, factorised again `renewals` times at most; poses and H there. Status.
@@ -283,6 +306,23 @@ def accelerate(context, t, y, yd, unused):
     copy(vector(y, n), l.y)
     if not solve_velocities(graph, system, w, f, l, t):
         return NOT_FINITE
+    return _accelerate(context, c, t, yd)
+
+
+@callback(ACCELERATE)
+def stage_accelerate(context, t, y, yd, unused):
+    """As `accelerate`, with the velocities of an explicit stage where the sums put them."""
+    c = load(context)
+    n = c.chart.x.size - 8
+    copy(vector(y, n), c.chart.y)
+    turn_rates(c.graph, c.chart, c.chart.y, c.tangent.poses)
+    return _accelerate(context, c, t, vector(yd, n))
+
+
+@kernel
+def _accelerate(context, c, t, yd):
+    """Accelerations and y' at the present poses and their velocities. Status."""
+    system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
     # Force laws read q and qd
     if system.forces.shape[0] > 0:
         write_velocities(graph.bodies, f.poses, w.qd)

@@ -65,10 +65,10 @@ def nystrom_step(context, run, t, h):
                 _add(xs, h * h * row[2 + j], memory[(2 + j) * n :])
             for c in range(n):
                 xs[c] += x[c]
-            status = call_place(r.kernels.place, context, ti, xs)
+            status = call_place(r.kernels.stage_place, context, ti, xs)
             if status != 0:
                 return status
-        status = call_accelerate(r.kernels.accelerate, context, ti, ys, memory[(2 + i) * n :], r.xd)
+        status = call_accelerate(r.kernels.stage_accelerate, context, ti, ys, memory[(2 + i) * n :], r.xd)
         if status != 0:
             return status
     # dx = h y + h^2 sum_j bbar_j k_j,  dy = h sum_j b_j k_j
@@ -108,12 +108,12 @@ def stage(context, r, second, t, h, i, row):
         xs[c] += r.x_old[c]
     for c in range(ny):
         ys[c] += r.y_old[c]
-    status = call_place(r.kernels.place, context, ti, xs)
+    status = call_place(r.kernels.stage_place, context, ti, xs)
     if status == 0:
         if second:
             copy(ys, k[:nx])
         # accelerate leaves x' of a second-order system alone
-        status = call_accelerate(r.kernels.accelerate, context, ti, ys, k[nx:], k[:nx])
+        status = call_accelerate(r.kernels.stage_accelerate, context, ti, ys, k[nx:], k[:nx])
     return status
 
 
@@ -210,7 +210,7 @@ def plug_in_step(context, run, t, h):
     """One step by the kernel of a plug-in. Status."""
     r = load_run(run)
     return _call(
-        r.kernels.plug_in, context, r.kernels.place, r.kernels.accelerate, t, h, r.x.size, r.y.size,
+        r.kernels.plug_in, context, r.kernels.stage_place, r.kernels.stage_accelerate, t, h, r.x.size, r.y.size,
         r.x, r.y, r.yd, r.xd, r.tableau, r.memory, r.dx, r.dy,
     )  # fmt: skip
 

@@ -245,8 +245,8 @@ LAID_OUT = (  # fields that follow from scene and method, or are filled in befor
 OWN = {  # numbers of records, likewise
     "Orders": ("top", "room", "lowest", "highest", "refined", "sweeps"),
     "RunNumbers": (
-        "first_order", "adaptive", "steps_wanted", "chart_interval", "dense", "last_stage", "stage_at", "rows",
-        "history", "blocks",
+        "first_order", "adaptive", "steps_wanted", "chart_interval", "free_stages", "dense", "last_stage", "stage_at",
+        "rows", "history", "blocks",
     ),
 }  # fmt: skip
 REMEMBERED = "context.system.remembered"  # reals of the forces that remember something

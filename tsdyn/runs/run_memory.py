@@ -74,8 +74,9 @@ def reach(context, t, h):
 
 STAND_INS = {
     "place": place_interrupted, "accelerate": accelerate, "start_chart": start_chart, "reach": reach,
-    "accelerate_here": reach, "pass_singular": reach, "expand": expand, "linearise": place_interrupted,
-    "reduce": factorise, "factorise": factorise, "residual": residual, "factorise_stages": factorise_stages,
+    "stage_place": place_interrupted, "stage_accelerate": accelerate, "accelerate_here": reach, "pass_singular": reach,
+    "expand": expand, "linearise": place_interrupted, "reduce": factorise, "factorise": factorise, "residual": residual,
+    "factorise_stages": factorise_stages,
 }  # fmt: skip
 
 
@@ -224,6 +225,10 @@ class Memory:
         reset_selection(self.graph, self.context.tangent)
         numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
         numbers.may_pass, numbers.chart_interval = may_pass, task.interval
+        if method.driver == "steps":
+            numbers.free_stages = free = engine.form.frees_stages and task.interval == 0
+            place, accelerate = engine.form.stage_kernels(free)
+            self.run.kernels.stage_place, self.run.kernels.stage_accelerate = place.address, accelerate.address
         numbers.leave_when_stiff = task.choose is not None
         self.load()
 

@@ -5,7 +5,7 @@ import math
 from ..errors import Status
 from ..formulations.accelerations import body_of, unit_friction
 from ..formulations.chart_coordinates import turned_most
-from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL
+from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL, BY_TURN
 from ..formulations.tolerances import CONTRACTION_LOST
 from ..jit.kernels import caller, entry, kernel, long_kernel, stack
 from ..maths.dense_linalg import copy
@@ -47,6 +47,7 @@ from .tolerances import (
     SHRINK,
     SLIDES,
     SLIVER,
+    TURN_FREE,
     TURN_GAIN,
     TURNED_TOO_FAR,
 )
@@ -376,6 +377,15 @@ def _go_back(r):
 
 
 @kernel
+def _take_projection(c, r):
+    """x and y at the step's end without their normal components, which stages of the next step would keep."""
+    copy(c.chart.x[: r.x.size], r.x)
+    copy(c.chart.y[: r.y.size], r.y)
+    for e in range(c.work.u.size):
+        c.work.u[e] = 0.0
+
+
+@kernel
 def _attempt(context, run, c, r, t1, implicit):
     """x, y and the accelerations at t1; what the start of the step had is kept. Status."""
     t0 = r.clock.t
@@ -386,6 +396,8 @@ def _attempt(context, run, c, r, t1, implicit):
         _add(r.x, r.x_low, r.dx)
         _add(r.y, r.y_low, r.dy)
         status = evaluate(context, c.work, r, t1, r.x, r.y, r.yd, r.xd)
+        if r.numbers.free_stages == 1:
+            _take_projection(c, r)
         if implicit:  # the last stage's own accelerations: f would amplify what its iteration has left
             copy(r.memory[r.numbers.stage_at :][: r.y.size], r.yd)
             call_complete(r.kernels.complete, context, r.yd)
@@ -403,6 +415,8 @@ def _judge_chart(context, c, r, h, driven):
     lost = not c.work.control.contraction < CONTRACTION_LOST
     if lost or (driven and too_far(c.system.bodies, r.now, c.work.qd, h)):
         return CHART_LOST, reason
+    if reason == 0 and r.numbers.free_stages == 1 and turned_most(c.chart) > TURN_FREE:
+        reason = BY_TURN
     return 0, reason
 
 

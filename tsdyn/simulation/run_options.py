@@ -134,7 +134,8 @@ class RunOptions:
         Keep `solution.steps` and `solution.charts`: 8 bytes per step, 16 to 40 more per rejected step and chart. By
         default they are kept, but for runs with a store, whose histories go to the store if they are asked for.
     chart_interval : int, optional
-        Number of steps after which a new chart is made regardless of the criteria; for experiments.
+        Number of steps after which a new chart is made regardless of the criteria; for experiments. If it is given,
+        explicit methods place every stage on the manifold in the tangent form, too, as the paper does.
 
     Attributes
     ----------

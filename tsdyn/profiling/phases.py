@@ -176,7 +176,9 @@ def phases(memory, times, stats):
 
 def _of_steps(run):
     free, stats = run.free, run.stats
-    (placed, place), (evaluated, accelerate) = run.of("kernels.place"), run.of("kernels.accelerate")
+    placed, place = run.of("kernels.place", "kernels.stage_place")
+    evaluated, accelerate = run.of("kernels.accelerate", "kernels.stage_accelerate")
+    projected = run.of("kernels.accelerate")[0] if run.memory.run.numbers.free_stages else evaluated
     stages, stage = run.of("stages.residual")
     # Newton's sweeps are those of stages where these are placed by `residual`
     sweeps = placed + (stats.newton_iterations if free and not stages else 0)
@@ -190,7 +192,7 @@ def _of_steps(run):
     parts = run.rows("positions", sweeps), *parts
     yield from _shared(parts, place, "positions", "corrections" if free else "corrections, B and D", placed)
     parts = (
-        run.part("velocities", "freed of what leaves the constraints" if free else "qd = D vd", evaluated, VELOCITIES),
+        run.part("velocities", "freed of what leaves the constraints" if free else "qd = D vd", projected, VELOCITIES),
         run.rows("accelerations", evaluated, BIAS),
         *run.forces("accelerations", evaluated),
     )

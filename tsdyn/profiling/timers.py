@@ -29,7 +29,8 @@ from ..methods.explicit import ACCELERATE, NORM, PLACE, STEP
 
 # Signatures of the kernels whose addresses stand in `Kernels` and in `StageKernels`; that of a series is the last.
 TIMED = {
-    "kernels.place": PLACE, "kernels.accelerate": ACCELERATE, "kernels.complete": "pp", "kernels.check": "p",
+    "kernels.place": PLACE, "kernels.accelerate": ACCELERATE, "kernels.stage_place": PLACE,
+    "kernels.stage_accelerate": ACCELERATE, "kernels.complete": "pp", "kernels.check": "p",
     "kernels.start_chart": "pdpppp", "kernels.step": STEP, "kernels.error_norm": NORM, "kernels.reach": "pdd",
     "stages.linearise": PLACE, "stages.reduce": "pd", "stages.factorise": "pd", "stages.solve": "pp",
     "stages.soften": "ppdp", "stages.error_norm": NORM, "stages.residual": "pddppp", "stages.correct": "pdp",

@@ -481,7 +481,7 @@ class SegmentLink:
 #   layouts         how many memories have been laid out for it
 #   memory(prepared)            a new `Memory`
 #   serves(memory)              whether a memory that was made before is that of the scene as it is now
-#   lay_out(memory)             enter the system, and the numbers and kernels of the method
+#   lay_out(memory, interval)   enter the system, and the numbers and kernels of the method
 #   reading(memory, prepared, constraint_tol)
 #                               a `TrajectoryReading` of the steps, and a picklable function with arguments that
 #                               makes it again

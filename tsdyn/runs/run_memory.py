@@ -217,7 +217,7 @@ class Memory:
             clock.h = min(method.first_step or 0.0, clock.max_step)  # 0: of the driver's own choice
         else:
             clock.h = method.step
-        engine.lay_out(self)
+        engine.lay_out(self, task.interval)
         engine.layouts += 1
         self.engine = engine
         self.layout = Layout(self.run.now.shape[1], self.run.remembered.size, engine.skipped, bool(self.packed.loads))
@@ -225,10 +225,6 @@ class Memory:
         reset_selection(self.graph, self.context.tangent)
         numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
         numbers.may_pass, numbers.chart_interval = may_pass, task.interval
-        if method.driver == "steps":
-            numbers.free_stages = free = engine.form.frees_stages and task.interval == 0
-            place, accelerate = engine.form.stage_kernels(free)
-            self.run.kernels.stage_place, self.run.kernels.stage_accelerate = place.address, accelerate.address
         numbers.leave_when_stiff = task.choose is not None
         self.load()
 

@@ -117,8 +117,8 @@ class StepEngine:
         """Whether the memory is not that of the scene before it was changed."""
         return memory.graph is self.graph
 
-    def lay_out(self, memory):
-        """Enter the system, and the numbers and kernels of the method."""
+    def lay_out(self, memory, interval):
+        """Enter the system, and the numbers and kernels of the method; interval: of forced charts, 0 for none."""
         method, form, run, nx = self.method, self.form, memory.run, self.sizes[0]
         memory.take_system(self.system)
         run.tableau[:] = self.tableau
@@ -127,6 +127,9 @@ class StepEngine:
             run.kernels.watch = watch.address
         given = method, form, self.step, self.interpolant
         _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=self.within))
+        run.numbers.free_stages = free = form.frees_stages and interval == 0
+        place, accelerate = form.stage_kernels(free)
+        run.kernels.stage_place, run.kernels.stage_accelerate = place.address, accelerate.address
         run.numbers.first_order = form.first_order
         if method.step is None:
             run.clock.turn_share = run.clock.error_before = 1.0

@@ -188,8 +188,8 @@ class SeriesEngine:
         """Whether the memory is not that of the scene before it was changed."""
         return memory.series is self.series
 
-    def lay_out(self, memory):
-        """Enter the orders of the method and the kernels."""
+    def lay_out(self, memory, interval):
+        """Enter the orders of the method and the kernels; no chart is forced by an interval."""
         method, graph = self.method, self.series.graph
         order = memory.context.expansion.order
         order.room, (order.top, order.lowest, order.highest) = room(self.highest), self.orders

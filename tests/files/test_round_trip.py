@@ -16,6 +16,7 @@ from tests.helpers.built_in import FORCES, JOINTS, PRIMITIVES, by_name
 from tests.helpers.plug_ins import Rod
 from tests.helpers.scene_marks import outcome, there_and_back
 from tests.helpers.sketched_mechanisms import MECHANISMS
+from tests.helpers.tolerances import ROUNDING
 from tsdyn.files import types
 from tsdyn.files.scene_text import marks
 from tsdyn.simulation.load import scene_file
@@ -243,3 +244,31 @@ def test_loads_in_body_axes(tmp_path):
     scene.add(ts.forces.PointForce(body, frame="body", force=(1, 2, 3), point_a=(0, 0, 1)))
     again = ts.load(scene.save(tmp_path / "scene.toml"))
     np.testing.assert_array_equal(ts.simulate(again, (0, 1)).q, ts.simulate(scene, (0, 1)).q)
+
+
+def test_a_start_with_values_of_joints(tmp_path):
+    """A pendulum at a third of a turn; a file names its joints as `scene.assemble` does."""
+    path = tmp_path / "pendulum.toml"
+    path.write_text(
+        """
+version = 1
+[parameters]
+start = 1.0471975511965976
+[[body]]
+name = "rod"
+mass = 1
+inertia = [0.1, 0.1, 0.1]
+position = [0.5, 0, 0]
+[[constraint]]
+type = "Revolute"
+name = "hinge"
+a = "ground"
+b = "rod"
+at = { point = [0, 0, 0], axis = [0, 0, 1] }
+[start]
+assemble = true
+joints = { hinge = "2 * start" }
+"""
+    )
+    position = ts.load(path).bodies[0].position
+    np.testing.assert_allclose(position, (-0.25, np.sqrt(3.0) / 4.0, 0.0), atol=ROUNDING)

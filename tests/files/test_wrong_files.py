@@ -134,6 +134,7 @@ WRONG = {  # name: (what is replaced, by what, line, words of the message)
     "table without values": ("values = [0, 1]", "value = [0, 1]", 34, ("times, values and kind",)),
     "times go back": ("times = [0, 1]", "times = [1, 0]", 34, ("each after the one before",)),
     "unknown frame": ('frame = "body"', 'frame = "boddy"', 35, ("write 'body'",)),
+    "values of joints": ("assemble = true", "assemble = true\njoints = 5", 38, ("table of numbers by name",)),
     "assemble is a number": ("assemble = true", "assemble = 1", 37, ("true or false",)),
     "run ends first": ("end = 1.0", "end = -1.0", 38, ("after the start",)),
     "unknown method": ('"RK45"', '"RK54"', 40, ("RK45",)),

@@ -84,7 +84,7 @@ def test_stages_off_the_manifold_differ_by_truncation(name, method, order):
     apart = []
     for count in counts:
         step = method(step=1.0 / count)
-        one, two = both(lambda: load(name)[0], 1.0, step, chart_interval=None)  # noqa: B023
+        one, two = both(lambda: load(name)[0], 1.0, step, chart_interval=None)
         check(one)
         apart.append(np.abs(one.q[-1] - two.q[-1]).max())
     assert -np.polyfit(np.log(counts), np.log(apart), 1)[0] > order - 0.8

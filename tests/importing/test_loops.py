@@ -96,6 +96,16 @@ def test_a_weld_holds_both_frames(tmp_path):
     assert scene.mobility().degrees_of_freedom == 0
 
 
+def test_a_weld_that_holds_upside_down_is_turned_round(tmp_path):
+    """Rows of a weld also hold where its frames are half a turn apart, as they are at zero here."""
+    flag = f'<link name="flag">{INERTIAL.format(0.1)}</link><joint name="hinge" type="continuous"><parent link="base"/>'
+    mark = '<link name="mark"/><joint name="to mark" type="fixed"><parent link="base"/><child link="mark"/>'
+    text = f"""<robot name="flag"><link name="base"/>{flag}<child link="flag"/><axis xyz="0 0 1"/></joint>
+      {mark}<origin rpy="0 0 3.141592653589793"/></joint></robot>"""
+    scene = load(tmp_path, text, loops=[("flag", "mark", "weld")])
+    np.testing.assert_allclose(scene["flag"].position, (-0.1, 0.0, 0.0), atol=HELD)
+
+
 def test_a_loop_that_cannot_close_is_left_open_and_noted(tmp_path):
     """A triangle of 0.3 m, 0.2 m and 0.8 m."""
     scene = load(tmp_path, urdf(), loops=[(*ENDS, "weld")])

@@ -3,8 +3,8 @@
 The joints of the tree hold by themselves; their free displacements are found for which the loops hold as well. A
 displacement is a twist (v, omega), which all bodies beyond the joint have about one point.
 
-    xi_i = S_i theta_i - A_i^+ Phi_i      joint i: A_i S_i = 0; the last term closes the joint itself     (1)
-    J_i  = sum_{k beyond i} A_k S_i       loops: A_k the derivative by the twist of body k                (2)
+    xi_i = Z_i theta_i - A_i^+ Phi_i      joint i: A_i Z_i = 0; the last term closes the joint itself     (1)
+    J_i  = sum_{k beyond i} A_k Z_i       loops: A_k the derivative by the twist of body k                (2)
     x_i  = e^xi_1 ... e^xi_i x_i          from the root to body i                                         (3)
 
 theta by Levenberg and Marquardt. Time and memory are proportional to the bodies, for each row of a loop.
@@ -134,7 +134,7 @@ class Loops:
         return r, beyond, float(used @ used) if np.isfinite(used).all() else np.inf
 
     def _twists(self, q, r, aims):
-        """Of each joint: the free twists S (places, 6, 6), which of them there are, and that which closes it."""
+        """Of each joint: the free twists Z (places, 6, 6), which of them there are, and that which closes it."""
         tree, A = self.tree, self.tree.slopes(q)
         count, own = len(tree.joints), A[tree.joint_rows].tocoo()
         i, j = own.coords
@@ -174,12 +174,12 @@ class Loops:
         Limits that are passed are rows of J as well.
         """
         tree = self.tree
-        A, S, free, closing = self._twists(q, r, aims)
+        A, Z, free, closing = self._twists(q, r, aims)
         place, passed = free.nonzero()[0], np.flatnonzero(beyond)
         hints = np.zeros((passed.size, place.size))
         for row, aim in enumerate(self.limits[k] for k in passed):
-            hints[row, place == aim.place] = HINT * S[aim.place, free[aim.place]] @ self._slope(q, aim)
-        S, closing = (self._about_centre(q, each) for each in (S, closing))
+            hints[row, place == aim.place] = HINT * Z[aim.place, free[aim.place]] @ self._slope(q, aim)
+        Z, closing = (self._about_centre(q, each) for each in (Z, closing))
         loops = A[tree.loop_rows].toarray().reshape(-1, len(tree.joints), 6)
         d = (q[self.metric.r[tree.bodies]] - self._centre(q)) / tree.reach
         loops[..., 3:] += np.cross(d, loops[..., :3])
@@ -187,24 +187,24 @@ class Loops:
             loops[rows, one] = -loops[rows, other]
         total = np.concatenate((np.zeros_like(loops[:, :1]), np.cumsum(loops, axis=1)), axis=1)
         carried = total[:, tree.ends] - total[:, :-1]
-        J = np.concatenate((np.einsum("rki,ki->rk", carried[:, place], S[free]), hints))
+        J = np.concatenate((np.einsum("rki,ki->rk", carried[:, place], Z[free]), hints))
         left = r[tree.loop_rows] + np.einsum("rei,ei->r", carried, closing)
-        return S, free, closing, J, np.concatenate((left, np.asarray(beyond)[passed]))
+        return Z, free, closing, J, np.concatenate((left, np.asarray(beyond)[passed]))
 
     def _step(self, linearised, damping):
         """The twists (places, 6) of a step."""
-        S, free, closing, J, left = linearised
+        Z, free, closing, J, left = linearised
         if J.shape[0] < J.shape[1]:
             theta = -J.T @ np.linalg.solve(J @ J.T + damping * np.eye(J.shape[0]), left)
         else:
             theta = -np.linalg.solve(J.T @ J + damping * np.eye(J.shape[1]), J.T @ left)
-        return self._of_joints(S, free, theta) + closing
+        return self._of_joints(Z, free, theta) + closing
 
     @staticmethod
-    def _of_joints(S, free, theta):
+    def _of_joints(Z, free, theta):
         whole = np.zeros(free.shape)
         whole[free] = theta
-        return np.einsum("ej,eji->ei", whole, S)
+        return np.einsum("ej,eji->ei", whole, Z)
 
     def _moved(self, q, twists):
         """The configuration after twists of the joints about the centre, Eq. (3)."""
@@ -288,11 +288,11 @@ class Loops:
         moves = (shares * self.half).tolist()
         within = [aim._replace(value=aim.value + move) for aim, move in zip(self.limits, moves, strict=True)]
         q = self.sketch
-        S, free, closing, J, _ = self._linearised(q, self.tree.residuals(q), [*self.aims, *within])
+        Z, free, closing, J, _ = self._linearised(q, self.tree.residuals(q), [*self.aims, *within])
         theta = rng.uniform(-1.0, 1.0, J.shape[1]) * (spread or 0.0)
         theta[np.abs(J).max(axis=0, initial=0.0) < TREE_RANK] = 0.0  # in no loop
         theta[np.repeat([edge is None for edge in self.tree.joints], free.sum(axis=1))] = 0.0
-        return self._moved(q, self._of_joints(S, free, theta) + closing)
+        return self._moved(q, self._of_joints(Z, free, theta) + closing)
 
 
 def coordinate_from(handles, q, geometry, value):

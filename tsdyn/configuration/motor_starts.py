@@ -264,16 +264,20 @@ def demand_turns(packed, q, t):
 
 def demand_aligned(packed, q, t):
     """Refuse positions q (n,) at t that meet the rows with directions opposed or turns away, by the joint's name."""
-    opposed, titles = _opposed(packed, q, t)
-    opposed = np.flatnonzero(opposed)
-    if opposed.size:
-        names = list(dict.fromkeys(titles[i] for i in opposed))
+    names = opposed(packed, q, t)
+    if names:
         raise InconsistentState(
             f"{listed(names)}: directions that the joint keeps parallel point opposite ways here. Its "
             "rows hold so, too, but it is the mirrored joint. Give one of the axes (or references) the other sign, or "
             "turn a body half a turn." + "".join(f"\n{each}" for each in elsewhere(packed, t, q))
         )
     demand_turns(packed, q, t)
+
+
+def opposed(packed, q, t):
+    """Titles of the constraints whose directions are opposed at positions q (n,) at t, each once."""
+    which, titles = _opposed(packed, q, t)
+    return list(dict.fromkeys(titles[i] for i in np.flatnonzero(which)))
 
 
 def are_aligned(packed, q, t):

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.bodies import rotation_matrix, transform_g
+from .motor_starts import opposed
 from .tolerances import INITIAL_TOL, TREE_RANK
 
 
@@ -48,10 +49,12 @@ class Tree:
             whole = len(ends) == 2 and not any(constraint is each for each in cut)
             (edges if whole else self.loops).append(edge)
         Phi, least = np.abs(metric.arrays(q)[0]), INITIAL_TOL * (1.0 + np.abs(q).max())
+        mirrored = opposed(self.packed, q, metric.t)
 
         def rank(edge):
             preferred = any(edge.constraint is each for each in first)
-            return not preferred, bool(Phi[edge.rows].max() > least), -len(edge.rows)
+            is_open = bool(Phi[edge.rows].max() > least) or edge.constraint.title in mirrored
+            return not preferred, is_open, -len(edge.rows)
 
         self._grow(sorted(edges, key=rank), np.flatnonzero(free).tolist())
         self._lay_out()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..configuration.motor_starts import are_aligned
 from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InvalidArgument, TsdynError
 from ..observables.diagnostics import constraint_error
@@ -91,11 +92,11 @@ def _scene(description: Any, make: Any, report: ImportReport, mistakes: Any) -> 
 
 
 def _close(scene: Scene, report: ImportReport) -> None:
-    """Assemble a scene whose loops are open at the start."""
+    """Assemble a scene whose loops are open, or mirrored, at the start."""
     q, qd = scene.start
     rest = np.zeros((1, q.size))
     gap = float(constraint_error(scene.packed, np.zeros(1), q[None], qd[None], rest).position[0])
-    if gap <= INITIAL_TOL:
+    if gap <= INITIAL_TOL and are_aligned(scene.packed, q, 0.0):
         return
     try:
         scene.assemble()

@@ -105,8 +105,10 @@ from examples import slider_crank, stick_slip, top
 bits = []
 for method in ("taylor", "dop853", "rk45", "nystrom4", "radau", "sdirk54", "implicit_trapezoid"):
     options = {"integrator": tsdyn.integrators.Nystrom4(step=1e-3) if method == "nystrom4" else method}
-    found = [tsdyn.simulate(example.build(), (0.0, 0.1), **options) for example in (top, slider_crank, stick_slip)]
-    found += [tsdyn.simulate(top.build(), (0.0, 0.1), formulation=f, **options) for f in ("null-space", "maggi-kane")]
+    examples = (top, slider_crank) if method == "radau" else (top, slider_crank, stick_slip)  # it refuses friction
+    found = [tsdyn.simulate(example.build(), (0.0, 0.1), **options) for example in examples]
+    forms = ("null-space", "maggi-kane") if method in ("dop853", "rk45", "nystrom4") else ()
+    found += [tsdyn.simulate(top.build(), (0.0, 0.1), formulation=form, **options) for form in forms]
     bits.append(hashlib.sha256(b"".join(one.q.tobytes() + one.multipliers.tobytes() for one in found)).hexdigest())
 report(bits=bits)
 """

@@ -37,7 +37,7 @@ def chain(count):
 
 
 def loop():
-    """A slider-crank of spatial joints, with redundant rows and a motor that moves as a sine."""
+    """A slider-crank of spatial joints, with redundant rows."""
     scene = ts.Scene(gravity=(0.0, -9.81, 0.0))
     crank = scene.add_body(mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 0.1, 0.0))
     rod = scene.add_body(mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.2, 0.1, 0.0))
@@ -73,7 +73,10 @@ def everything():
     def turned(t, state):
         return state.angle(hinge) - 1e-4
 
+    driven = chain(2)
+    driven.add(ts.forces.PointForce(driven.bodies[-1], force=(ts.motions.Sine(1.0, 2.0), 0.0, 0.0)))
     for method in (None, "dop853", "radau"):
+        ts.simulate(driven, (0.0, 0.01), integrator=method).raise_if_failed()
         solution = ts.simulate(scene, (0.0, 0.05), integrator=method, dense_output=True, events=turned)
         solution.raise_if_failed().at(0.013)
         assert solution.multipliers.size

@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.linalg import solve_continuous_are
 
 import tsdyn as ts
@@ -73,7 +74,7 @@ def test_cost_of_the_regulator_is_that_of_the_riccati_equation():
     x = np.column_stack([*states, run.displacement_rate("rail"), *map(run.angle_rate, swing_up.JOINTS)])
     u = run.actuation("regulator")
     rates = np.einsum("ki,ij,kj->k", x, Q, x) + np.einsum("ki,ij,kj->k", u, R, u)
-    cost = np.trapezoid(rates, t) if hasattr(np, "trapezoid") else np.trapz(rates, t)
+    cost = trapezoid(rates, t)
     assert abs(cost / (x[0] @ P @ x[0]) - 1.0) < LOOSE
 
 
@@ -260,12 +261,41 @@ def test_values_are_held_between_samples():
 
     scene = cart(on_rail(sampled, period=0.01))
     run = ts.simulate(scene, (0, 0.2))
-    assert np.abs(np.array(times) - 0.01 * np.arange(len(times))).max() < 4 * EPS and len(times) == 20
+    assert np.abs(np.array(times) - 0.01 * np.arange(len(times))).max() < 4 * EPS
+    assert len(times) == 20
     u = run.actuation("control")[:, 0]
     inside = np.unique(u[np.floor(run.t / 0.01 + 1e-9) == 7])
     assert inside.size == 1
     half = ts.simulate(scene, (0, 0.1))
     assert np.abs(ts.simulate(scene, (0.1, 0.2), state=half.state).q[-1] - run.q[-1]).max() < HELD
+
+
+def test_controls_add_up():
+    def half(t, state):
+        return 0.5 * balance(t, state)
+
+    scene = cart(lambda s: F.Control(half, ["rail"], name="one"))
+    scene.add(F.Control(half, ["rail"], name="other"))
+    scene.add(F.Control(clipped, ["hinge"], period=0.1, name="held"))
+    scene.add(F.Control(lambda t, state: -clipped(0.1 * np.floor(10.0 * t + 1e-9), state), ["hinge"], period=0.1))
+    whole = cart(on_rail(balance))
+    runs = [ts.simulate(each, (0, 0.5)) for each in (scene, whole)]
+    assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() < NEAR
+    assert np.abs(runs[0].actuation("one") - runs[0].actuation("other")).max() == 0.0
+
+
+def test_an_interrupt_within_a_law_keeps_what_was_computed():
+    pressed = []
+
+    def stops(t, state):
+        if state.displacement("rail") > 0.02 and not pressed:
+            pressed.append(True)
+            raise KeyboardInterrupt
+        return K @ seen(state)
+
+    run = ts.simulate(cart(on_rail(stops)), (0, 1), integrator="dop853")
+    assert run.status.name == "INTERRUPTED"
+    assert 0.0 < run.displacement("rail")[-1] < 0.02
 
 
 # Bits
@@ -324,7 +354,8 @@ def test_a_function_may_hold_handles_in_a_copy():
     runs = [
         ts.simulate(each, (0, 0.2)).q[-1] for each in (scene, scene.copy(), scene.with_parameters({"rod.mass": 0.3}))
     ]
-    assert (runs[0] == runs[1]).all() and (runs[0] == runs[2]).all()
+    assert (runs[0] == runs[1]).all()
+    assert (runs[0] == runs[2]).all()
 
 
 def test_a_run_says_how_the_law_is_called():
@@ -369,6 +400,8 @@ def test_a_law_follows_what_it_reads(monkeypatch):
         (lambda t, state: state[0], "that of the scene and has no numbers by index"),
         (lambda t, state: state.angel("hinge"), "angel"),
         (lambda t, state: undefined_name, "NameError"),  # noqa: F821
+        (lambda t, state: None, "must give 1 number, one for each actuator; it gave None"),
+        (lambda t, state: "1", "it gave '1'"),
         (lambda t: 0.0, r"function of two arguments \(t, state\)"),
         (3.0, r"function of \(t, state\)"),
     ],
@@ -408,13 +441,16 @@ def test_what_a_law_raises_ends_the_run(period):
         return 1.0 / (0.0 if t > 0.3 else 1.0)
 
     run = ts.simulate(cart(on_rail(breaks, period=period)), (0, 1))
-    assert not run.success and 0.0 < run.t[-1] < 0.4
-    assert "control" in run.message and "ZeroDivisionError" in run.message
+    assert not run.success
+    assert 0.0 < run.t[-1] < 0.4
+    assert "control" in run.message
+    assert "ZeroDivisionError" in run.message
 
 
 def test_a_value_that_is_not_finite_is_named():
     run = ts.simulate(cart(on_rail(lambda t, state: np.sqrt(0.3 - t))), (0, 1), integrator="dop853")
-    assert not run.success and "'control' is inf or nan" in run.message
+    assert not run.success
+    assert "'control' is inf or nan" in run.message
 
 
 def test_arrays_stay_for_functions_that_ask_no_method():

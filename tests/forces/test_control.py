@@ -342,7 +342,10 @@ def test_checkpoints_pickles_and_files(function, options, tmp_path):
     assert (ts.simulate(pickle.loads(pickle.dumps(scene)), (0, 0.5), integrator="dop853").q[-1] == run.q[-1]).all()
     assert (ts.simulate(scene.copy(), (0, 0.5), integrator="dop853").q[-1] == run.q[-1]).all()
     run.save(tmp_path / "solution.zarr")
-    assert (ts.load(tmp_path / "solution.zarr").energy == run.energy).all()
+    saved = ts.load(tmp_path / "solution.zarr")
+    assert (saved.energy == run.energy).all()
+    with pytest.raises(ts.TsdynError, match="solution.actuation needs the scene"):
+        saved.actuation("control")
     with pytest.raises(ts.TsdynError, match="holds data and no code"):
         scene.save(tmp_path / "scene.toml")
 

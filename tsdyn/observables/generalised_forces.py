@@ -117,7 +117,7 @@ def _raised_by_law(packed, force, t, q, qd):
     handles, law = handles_of(packed), next(load.law for load in packed.loads if load.force is force)
     try:
         with np.errstate(all="ignore"):
-            law.evaluate(float(t), q, qd, handles.angles_at_start(t, q), force.parameters())
+            law.evaluate(float(t), q.copy(), qd.copy(), handles.angles_at_start(t, q), force.parameters())
     except Exception as error:
         return error
     return None

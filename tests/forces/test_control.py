@@ -344,7 +344,7 @@ def test_checkpoints_pickles_and_files(function, options, tmp_path):
     run.save(tmp_path / "solution.zarr")
     saved = ts.load(tmp_path / "solution.zarr")
     assert (saved.energy == run.energy).all()
-    with pytest.raises(ts.TsdynError, match="solution.actuation needs the scene"):
+    with pytest.raises(ts.TsdynError, match=r"solution\.actuation needs the scene"):
         saved.actuation("control")
     with pytest.raises(ts.TsdynError, match="holds data and no code"):
         scene.save(tmp_path / "scene.toml")
@@ -466,7 +466,12 @@ def test_arrays_stay_for_functions_that_ask_no_method():
     def helped(t, state):
         return whole(t, state)
 
-    scenes = [cart(lambda s, f=f: F.PointForce(s["cart"], force=f, name="drag")) for f in (array, whole, helped)]
+    def listed(t, state):
+        (v,) = (-state.velocity(name) for name in ("cart",))
+        return v[0], 0.0, 0.0
+
+    functions = array, whole, helped, listed
+    scenes = [cart(lambda s, f=f: F.PointForce(s["cart"], force=f, name="drag")) for f in functions]
     first, *others = (ts.simulate(scene, (0, 1)) for scene in scenes)
     assert all(np.abs(first.q[-1] - other.q[-1]).max() < NEAR for other in others)
     scene = cart(lambda s: F.PointForce(s["cart"], force=whole, name="drag"))

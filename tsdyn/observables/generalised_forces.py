@@ -12,6 +12,7 @@ from ..jit.kernels import entry
 from ..maths.vectors import to_ground
 from ..model.equations import applied_forces, set_time
 from ..model.handles import BodyMotion, angle, displacement, handles_of
+from ..model.laws import answer_interrupts
 from ..motions.signals import Signal
 from ..validation import counted
 
@@ -37,6 +38,7 @@ def force_loads(system, t, q, qd, memory=None):
         system = system._replace(reals=system.reals.copy())  # signals and memory are written to
         memory = np.zeros((t.size, system.memory.size)) if memory is None else memory
         sum_forces(system, t, q, qd, memory, out)
+        answer_interrupts()
     return out
 
 

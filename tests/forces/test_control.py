@@ -477,3 +477,11 @@ def test_arrays_stay_for_functions_that_ask_no_method():
     scene = cart(lambda s: F.PointForce(s["cart"], force=whole, name="drag"))
     with pytest.raises(ts.TsdynError, match="of the state of the scene"):
         scene["drag"].force = array
+
+    class Law:
+        def __call__(self, t, state):
+            return state.velocity("cart")
+
+    law = Law()
+    with pytest.raises(ts.TsdynError, match=r"Its state is the array \(13,\) of its body"):
+        cart(lambda s: F.PointForce(s["cart"], force=lambda t, state: law(t, state)))

@@ -270,6 +270,34 @@ def test_values_are_held_between_samples():
     assert np.abs(ts.simulate(scene, (0.1, 0.2), state=half.state).q[-1] - run.q[-1]).max() < HELD
 
 
+def test_controls_add_up():
+    def half(t, state):
+        return 0.5 * balance(t, state)
+
+    scene = cart(lambda s: F.Control(half, ["rail"], name="one"))
+    scene.add(F.Control(half, ["rail"], name="other"))
+    scene.add(F.Control(clipped, ["hinge"], period=0.1, name="held"))
+    scene.add(F.Control(lambda t, state: -clipped(0.1 * np.floor(10.0 * t + 1e-9), state), ["hinge"], period=0.1))
+    whole = cart(on_rail(balance))
+    runs = [ts.simulate(each, (0, 0.5)) for each in (scene, whole)]
+    assert np.abs(runs[0].q[-1] - runs[1].q[-1]).max() < NEAR
+    assert np.abs(runs[0].actuation("one") - runs[0].actuation("other")).max() == 0.0
+
+
+def test_an_interrupt_within_a_law_keeps_what_was_computed():
+    pressed = []
+
+    def stops(t, state):
+        if state.displacement("rail") > 0.02 and not pressed:
+            pressed.append(True)
+            raise KeyboardInterrupt
+        return K @ seen(state)
+
+    run = ts.simulate(cart(on_rail(stops)), (0, 1), integrator="dop853")
+    assert run.status.name == "INTERRUPTED"
+    assert 0.0 < run.displacement("rail")[-1] < 0.02
+
+
 # Bits
 
 
@@ -314,7 +342,10 @@ def test_checkpoints_pickles_and_files(function, options, tmp_path):
     assert (ts.simulate(pickle.loads(pickle.dumps(scene)), (0, 0.5), integrator="dop853").q[-1] == run.q[-1]).all()
     assert (ts.simulate(scene.copy(), (0, 0.5), integrator="dop853").q[-1] == run.q[-1]).all()
     run.save(tmp_path / "solution.zarr")
-    assert (ts.load(tmp_path / "solution.zarr").energy == run.energy).all()
+    saved = ts.load(tmp_path / "solution.zarr")
+    assert (saved.energy == run.energy).all()
+    with pytest.raises(ts.TsdynError, match=r"solution\.actuation needs the scene"):
+        saved.actuation("control")
     with pytest.raises(ts.TsdynError, match="holds data and no code"):
         scene.save(tmp_path / "scene.toml")
 
@@ -372,6 +403,8 @@ def test_a_law_follows_what_it_reads(monkeypatch):
         (lambda t, state: state[0], "that of the scene and has no numbers by index"),
         (lambda t, state: state.angel("hinge"), "angel"),
         (lambda t, state: undefined_name, "NameError"),  # noqa: F821
+        (lambda t, state: None, "must give 1 number, one for each actuator; it gave None"),
+        (lambda t, state: "1", "it gave '1'"),
         (lambda t: 0.0, r"function of two arguments \(t, state\)"),
         (3.0, r"function of \(t, state\)"),
     ],
@@ -433,9 +466,22 @@ def test_arrays_stay_for_functions_that_ask_no_method():
     def helped(t, state):
         return whole(t, state)
 
-    scenes = [cart(lambda s, f=f: F.PointForce(s["cart"], force=f, name="drag")) for f in (array, whole, helped)]
+    def listed(t, state):
+        (v,) = (-state.velocity(name) for name in ("cart",))
+        return v[0], 0.0, 0.0
+
+    functions = array, whole, helped, listed
+    scenes = [cart(lambda s, f=f: F.PointForce(s["cart"], force=f, name="drag")) for f in functions]
     first, *others = (ts.simulate(scene, (0, 1)) for scene in scenes)
     assert all(np.abs(first.q[-1] - other.q[-1]).max() < NEAR for other in others)
     scene = cart(lambda s: F.PointForce(s["cart"], force=whole, name="drag"))
     with pytest.raises(ts.TsdynError, match="of the state of the scene"):
         scene["drag"].force = array
+
+    class Law:
+        def __call__(self, t, state):
+            return state.velocity("cart")
+
+    law = Law()
+    with pytest.raises(ts.TsdynError, match=r"Its state is the array \(13,\) of its body"):
+        cart(lambda s: F.PointForce(s["cart"], force=lambda t, state: law(t, state)))

@@ -24,6 +24,7 @@ from ..model.equations import (
     set_time,
     with_short_rows,
 )
+from ..model.laws import answer_interrupts
 from ..model.packed import no_system, with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
@@ -111,10 +112,10 @@ class Pairs:
         Q = np.zeros((2, STEP * (nc + nf)))
         system = self._system._replace(reals=motion.system.reals.copy())
         if any(load.law is not None for load in self.packed.loads):
-            see_state(
-                motion.system._replace(reals=system.reals), motion.q, motion.qd, motion.t, np.zeros(motion.q.size)
-            )
+            whole = motion.system._replace(reals=system.reals)
+            see_state(whole, motion.q, motion.qd, motion.t, np.zeros(motion.q.size))
         fill_blocks(system, x, lam, rows, *Q, np.zeros(self._size))
+        answer_interrupts()
         return _whole(rows[0, : STEP * nc]), rows[1:], *(_whole(one[STEP * nc :]) for one in Q)
 
 

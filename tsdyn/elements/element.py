@@ -517,14 +517,14 @@ def inlined(function):
     return function if hasattr(function, "py_func") else kernel(function)
 
 
-def address(kernels, name, what, error):
+def address(kernels, name, what, error, hint=""):
     """The address of a kernel; `what` is whose it is, `error` what it raises where Numba can't compile it."""
     try:
         return kernels[name].address
     except NumbaError as reason:
         raise error(
             f"{what}: Numba can't compile {name}; use plain arithmetic, NumPy functions of scalars and constants in "
-            "it, and allocate nothing."
+            f"it, and allocate nothing.{hint}"
         ) from reason
 
 

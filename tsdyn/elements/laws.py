@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dis
-from types import FunctionType, MappingProxyType
+from types import CodeType, FunctionType, MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -152,17 +152,25 @@ def sees_scene(function: Function, known: tuple[Any, ...] = ()) -> bool:
 
     It then gets the state of the scene; one that doesn't gets the array of its own body.
     """
-    plain, before = getattr(function, "py_func", function), None
+    plain = getattr(function, "py_func", function)
     if not isinstance(plain, FunctionType) or plain in known:
         return False
     code = plain.__code__
+    if _asks(code, code.co_varnames[: code.co_argcount]):
+        return True
+    return any(sees_scene(each, (*known, plain)) for each in captured(plain))
+
+
+def _asks(code, arguments):
+    """Whether a function, or one within it such as a comprehension, asks one of the arguments for a method."""
+    before = None
     for each in dis.get_instructions(code):
         asks = each.opname in ("LOAD_ATTR", "LOAD_METHOD") and each.argval in METHODS
-        if asks and before in code.co_varnames[: code.co_argcount]:
+        if asks and before in arguments:
             return True
         loads = each.opname.startswith(("LOAD_FAST", "LOAD_DEREF"))
         before = (each.argval[-1] if isinstance(each.argval, tuple) else each.argval) if loads else None
-    return any(sees_scene(each, (*known, plain)) for each in captured(plain))
+    return any(_asks(inner, arguments) for inner in code.co_consts if isinstance(inner, CodeType))
 
 
 def captured(plain: FunctionType) -> list[Any]:

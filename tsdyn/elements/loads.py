@@ -350,6 +350,10 @@ class GivenByState(ByState):
 
     first = 0
     arguments, given_numbers, slots, begin = (1, STATE), 3, 16, 1
+    hint = (
+        " Its state is the array (13,) of its body, as no function that it calls by name asks state for a method, such "
+        "as state.angle(joint)."
+    )
 
     @staticmethod
     def results(function, t, state):

@@ -154,7 +154,7 @@ def place(context, t, x):
 
 @callback(PLACE)
 def stage_place(context, t, x):
-    """Set positions of an explicit stage from x (8 b,): poses where the sums put them, H, and the factors of S. Status."""
+    """Set positions of an explicit stage from x (8 b,): poses where the sums put them, H, factors of S. Status."""
     c = load(context)
     system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
     w.counters.placements += 1

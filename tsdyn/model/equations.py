@@ -324,4 +324,4 @@ def demand_compilable(item):
             demand_callable(item, handles, 0.0, *start, handles.angles_at_start(0.0, start[0]))
         return
     if item.kernels is not item.own_kernels or not is_ours(type(item).__module__):
-        address(item.kernels, "force", item.name, item.error)
+        address(item.kernels, "force", item.name, item.error, getattr(item, "hint", ""))

@@ -174,13 +174,13 @@ class Law:
         """The values of the function (values,), a list, called in Python."""
         force = self.force
         given = force.results(getattr(force, force.given), t, self.state(t, q, qd, angles), numbers)
-        values = [number(value) for value in given]
-        if len(values) != self.values:
-            raise force.error(
-                f"{force.name}: its {force.given} must give {counted(self.values, 'number')}, one for each actuator; "
-                f"it gave {len(values)}."
-            )
-        return values
+        wanted = f"{force.name}: its {force.given} must give {counted(self.values, 'number')}, one for each actuator"
+        if len(given) != self.values:
+            raise force.error(f"{wanted}; it gave {len(given)}.")
+        strange = [value for value in given if not isinstance(value, (int, float, np.number, np.bool_))]
+        if strange:
+            raise force.error(f"{wanted}; it gave {strange[0]!r}.")
+        return [number(value) for value in given]
 
     def _trace(self, state, first):
         """The graphs of the values; None where the function is called in Python."""

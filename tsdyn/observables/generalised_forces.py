@@ -12,6 +12,7 @@ from ..jit.kernels import entry
 from ..maths.vectors import to_ground
 from ..model.equations import applied_forces, set_time
 from ..model.handles import BodyMotion, angle, displacement, handles_of
+from ..model.laws import answer_interrupts
 from ..model.packed import no_system
 from ..motions.signals import Signal
 from ..validation import counted
@@ -38,6 +39,7 @@ def force_loads(system, t, q, qd, memory=None):
         system = system._replace(reals=system.reals.copy())  # signals and memory are written to
         memory = np.zeros((t.size, system.memory.size)) if memory is None else memory
         sum_forces(system, t, q, qd, memory, out)
+        answer_interrupts()
     return out
 
 
@@ -118,7 +120,7 @@ def _raised_by_law(packed, force, t, q, qd):
     handles, law = handles_of(packed), next(load.law for load in packed.loads if load.force is force)
     try:
         with np.errstate(all="ignore"):
-            law.evaluate(float(t), q, qd, handles.angles_at_start(t, q), force.parameters())
+            law.evaluate(float(t), q.copy(), qd.copy(), handles.angles_at_start(t, q), force.parameters())
     except Exception as error:
         return error
     return None

@@ -176,20 +176,6 @@ def fma(typing, f, g, h):
 
 
 @intrinsic
-def less(typing, f, g, h):
-    """H - f g."""
-    kind = _fours(f, g, h)
-
-    def generate(context, builder, signature, arguments):
-        def subtract(f, g, h):
-            return builder.fsub(h, builder.fmul(f, g, flags=("contract",)), flags=("contract",))
-
-        return _each(builder, kind, subtract, arguments)
-
-    return kind(kind, kind, kind), generate
-
-
-@intrinsic
 def larger(typing, f, g):
     """The larger of |f| and g, one by one."""
     kind = _fours(f, g)

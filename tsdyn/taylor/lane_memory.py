@@ -1,4 +1,4 @@
-"""Memory of a batch of lanes, a case in each lane of SIMD registers; loops over instances, sums over orders."""
+"""Memory of a batch of lanes, a case in each lane of SIMD registers; loops over instances."""
 
 from functools import cache
 from typing import NamedTuple
@@ -7,73 +7,17 @@ import numpy as np
 
 from ..elements.element import address
 from ..elements.loops import constraint_rows, constraint_series, force_series, law_check, template
-from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_SPIN
+from ..elements.loops.constraint_series import BODY_ROW
 from ..elements.markers import PARAMETERS
 from ..errors import InvalidConstraint, InvalidForce
 from ..jit.compiled import Callback
-from ..jit.kernels import Record, kernel, loader, resident, specialised
+from ..jit.kernels import Record, loader, resident, specialised
 from ..jit.lanes import is_laned, makers, values_of, zeros
-from ..jit.simd import first, fma, four, get, lanes, less, second, splat, sub, third, total
 from ..model.packed import members_of
 from ..rows.constraint_graph import ConstraintGraph
 from ..rows.interface import Rows, TangentWorkspace
 from ..workspaces import plain_context
-from .coefficients import inverses, put_momentum, put_product
 from .layout import Expansion, SeriesContext, empty_series
-
-# Sums over orders in the form that suits lanes: as few sums at a time as there are registers for.
-#
-# For one case each of these sums is two, since an addition waits for the one before; lanes have three independent sums
-# where one case has one, and twice as many wouldn't fit into registers.
-
-
-@kernel
-def turn_ahead(bodies, at, orders, k, exact):
-    """As `coefficients.turn_ahead`."""
-    x, y, z = splat(0.0), splat(0.0), splat(0.0)
-    o = at + S_OMEGA * orders + 4 * (k - 1)
-    for c in range(at + 12, at + 12 * (k + 1), 12):
-        a0, a1, a2 = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8)
-        w0, w1, w2 = splat(get(bodies, o)), splat(get(bodies, o + 1)), splat(get(bodies, o + 2))
-        x = less(a2, w1, fma(a1, w2, x))
-        y = less(a0, w2, fma(a2, w0, y))
-        z = less(a1, w0, fma(a0, w1, z))
-        o -= 4
-    o, (f, _, low, _) = at + 12 * (k + 1), inverses(k, exact)
-    put_product(bodies, o, x, f, low, exact)
-    put_product(bodies, o + 4, y, f, low, exact)
-    put_product(bodies, o + 8, z, f, low, exact)
-
-
-@kernel
-def torque(bodies, at, k, forces, first):
-    """As `constraint_series.torque`."""
-    x, y, z = splat(0.0), splat(0.0), splat(0.0)
-    c, f = at, first + 4 * k
-    for _ in range(k + 1):
-        g = four(forces, f)
-        x = fma(four(bodies, c), g, x)
-        y = fma(four(bodies, c + 4), g, y)
-        z = fma(four(bodies, c + 8), g, z)
-        c += 12
-        f -= 4
-    return lanes(total(x), total(y), total(z))
-
-
-@kernel
-def spin(graph, b, bodies, at, orders, k):
-    """As `coefficients.spin`."""
-    x, y = splat(0.0), splat(0.0)
-    if graph.spins[b] != 0:
-        o, spins = at + S_OMEGA * orders, at + S_SPIN * orders
-        put_momentum(graph, b, bodies, o, spins, k)
-        for j in range(k + 1):
-            # -omega'_j x (J' omega')_{k-j}, both products of the cross product in sums of their own
-            f, g = four(bodies, spins + 4 * (k - j)), four(bodies, o + 4 * j)
-            x = fma(lanes(second(f), third(f), first(f)), lanes(third(g), first(g), second(g)), x)
-            y = fma(lanes(third(f), first(f), second(f)), lanes(second(g), third(g), first(g)), y)
-    return sub(x, y)
-
 
 # Memory of a batch of lanes: the context of a run by series, its numbers arrays of lanes, and the state of each.
 
@@ -198,7 +142,7 @@ def _loop(one, loop, markers, width):
     if (one, width) not in _known:
         function, threes = one.py_func, all(marker.code != PARAMETERS for marker in markers)
         names = {name: function.__globals__[name] for name in _NAMES if name in function.__globals__}
-        names |= makers(width, threes) | {"torque": torque}
+        names |= makers(width, threes)
         copy = specialised(loop, f"{function.__qualname__}_{width}_lanes", function, **names)
         _known[one, width] = Callback(copy, one.signature)
     return _known[one, width]

@@ -6,7 +6,7 @@ from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R, orient
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
 from ..elements.loops.law_check import call_margin
 from ..formulations.tolerances import LAND_SWEEPS, ROUNDING, ROUNDING_AT_MOST, STALLED, WALK
-from ..jit.kernels import kernel, long_kernel, specialised
+from ..jit.kernels import kernel, long_kernel
 from ..jit.lanes import any_of, below, binary_log, binary_power, both, choose, either, every, floor, opposite
 from ..jit.simd import add, first, fma, four, fourth, get, larger, let, put, second, splat, sub, third, times, total
 from ..rows.interface import (
@@ -19,8 +19,7 @@ from ..rows.interface import (
 )
 from ..runs.step_control import stretch
 from ..runs.tolerances import FROM_ZERO, SHORTEST
-from . import coefficients
-from .coefficients import put_sum
+from .coefficients import begin, expand, put_sum
 from .lane_memory import (
     BAD,
     BEFORE,
@@ -40,8 +39,6 @@ from .lane_memory import (
     TOP,
     H,
     T,
-    spin,
-    turn_ahead,
 )
 from .layout import L_OMEGA, L_P, L_R, L_RD, LOW
 from .step_end import keep_start, project_rates
@@ -400,10 +397,6 @@ def propose(c, least, most):
 #
 # Each lane has its own time, order and length of step. All are expanded to the highest order among them, tried and
 # projected together. A lane that can't go on as any other is LOST: its case is to be run alone, from its start.
-
-_OWN = {"turn_ahead": turn_ahead, "spin": spin}
-begin = long_kernel(specialised(coefficients.begin.py_func, "begin_lanes", coefficients.begin.py_func, **_OWN))
-expand = long_kernel(specialised(coefficients.expand.py_func, "expand_lanes", coefficients.expand.py_func, **_OWN))
 
 
 @kernel

@@ -198,7 +198,8 @@ def _extract(place, what):
         kind = _fours(f)
 
         def generate(context, builder, signature, arguments):
-            return _parts(builder, kind, arguments[0])[place]
+            parts = _parts(builder, kind, arguments[0])
+            return parts[place] if place < len(parts) else ir.Constant(parts[0].type, [0.0] * parts[0].type.count)
 
         return number_type(f)(kind), generate
 

@@ -442,7 +442,7 @@ class Weights:
 
     def enter(self, count):
         """Lay out the numbers of so many cases, those of the scene at first."""
-        for name, array in self._base.items() if self._followed else ():
+        for name, array in self._base.items():
             setattr(self, name, np.tile(array, (count, *[1] * array.ndim)))
 
     def fit(self):

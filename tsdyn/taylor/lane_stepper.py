@@ -32,6 +32,7 @@ from ..rows.interface import (
     TangentWorkspace,
     evaluate_without_redundant,
     factorise_selected_rows,
+    singularity_indicator,
 )
 from ..runs.step_control import stretch
 from ..runs.tolerances import FROM_ZERO, SHORTEST
@@ -465,17 +466,6 @@ def try_step(c):
     return least, most
 
 
-@kernel
-def _weakest(c):
-    """The singularity indicator of each lane: the smallest pivot relative to its diagonal entry."""
-    values, graph = c.tangent.rows.S, c.graph
-    least, kept = 1.0 + 0.0 * get(c.state, T), graph.pattern.shape[1]
-    for e in range(graph.diagonal.size):
-        share = get(values, graph.diagonal[e]) * get(values, kept + e)
-        least = choose(below(share * least, 1.0), least, 1.0 / share)
-    return least
-
-
 @long_kernel
 def accept(c):
     """The end of each lane's step is where its next one begins; LOST where that is not like any other."""
@@ -493,7 +483,7 @@ def accept(c):
         _find_lost(c, below(SMALL_STEPS - 0.5, get(s, SLOW)))
     _find_lost(c, opposite(below(-1.0, rest)))
     # Near a singular configuration a case is run alone
-    indicator = _weakest(c)
+    indicator = singularity_indicator(c.graph, c.tangent.rows)
     _find_lost(c, opposite(below(max(ILL_CONDITIONED, WARY * get(s, INDICATOR)), indicator)))
     let(s, INDICATOR, max(get(s, INDICATOR), indicator))
     # The state moves on

@@ -103,6 +103,26 @@ def test_lengths(by_python):
     compare(scene, table, found)
 
 
+def test_numbers_of_a_constraint_without_points(by_python):
+    """A body whose axis keeps an angle of its own to the ground's."""
+
+    def tilted(angle):
+        return np.stack([np.cos(angle / 2), np.sin(angle / 2), 0 * angle, 0 * angle], -1)
+
+    scene, angle = ts.Scene(), RNG.uniform(0.2, 0.4, CASES)
+    body = scene.add_body(
+        1.0, (0.2, 0.3, 0.4), orientation=tilted(np.array(0.3)), angular_velocity=(0, 0, 2), name="body"
+    )
+    scene.add(
+        ts.constraints.Dot1(body, scene.ground, axis_a=(0, 0, 1), axis_b=(0, 1, 0), value=-np.sin(0.3), name="dot")
+    )
+    table = {"dot.value": -np.sin(angle), "body.orientation": tilted(angle)}
+    found = ts.ensemble(scene, table, SPAN, threads=1)
+    assert by_python == [0]
+    assert found.success.all()
+    compare(scene, table, found)
+
+
 @pytest.mark.parametrize("joint", ["Revolute", "Universal"])
 def test_axes_and_points_of_a_pin(joint):
     scene = ts.Scene(gravity=(0, 0, -10))

@@ -242,7 +242,7 @@ def _predict(c, h):
     for b in range(c.graph.bodies.shape[0]):
         for i in range(8 * b + 4, 8 * b + 7):
             turn = max(turn, abs(f.Z[i]))
-    move_by(c.graph, f)
+    move_by(c.graph, f, True)
     return turn
 
 

@@ -246,7 +246,7 @@ def go_near_by(context, t, way, far):
     scale = far / found if found > UNDIRECTED * wanted else 0.0
     for i in range(f.Z.size):
         f.Z[i] *= scale
-    move_by(graph, f)
+    move_by(graph, f, True)
     return land(graph, c.system, c.work, f, t)
 
 

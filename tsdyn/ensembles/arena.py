@@ -17,8 +17,8 @@ from ..runs.task import Task
 from ..simulation import prepared_run
 from ..simulation.parameters import KEPT
 from ..simulation.prepared_run import run_task
-from .case_loop import OF_ROWS, Batch, Finished, FirstSlice, Starts
-from .case_numbers import pen_of
+from .case_loop import Batch, Finished, FirstSlice, Starts
+from .case_numbers import OF_ROWS, pen_of
 
 # Which cases can share arrays: those whose numbers change nothing that is found from them beforehand.
 

@@ -25,7 +25,7 @@ from ..taylor.layout import load_series
 from ..taylor.series_engine import SeriesEngine
 from ..taylor.stepper import advance_by_series
 from ..workspaces import load_run, words
-from .case_numbers import Place
+from .case_numbers import OF_ROWS, Place
 from .cases import TIMES
 from .tolerances import FEW_LONG, MOSTLY, TRIED
 
@@ -85,8 +85,6 @@ class FirstSlice:
 
 
 # Consistent starts of the cases of an arena, checked as those of runs alone are.
-
-OF_ROWS = {"mass", "inertia"}  # what the independence of rows depends on, beside where things are
 
 
 class Starts:

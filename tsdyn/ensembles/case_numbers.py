@@ -1,6 +1,5 @@
 """Numbers of the cases of a chunk: checked, laid out as rows of a table, and where each of them is written to."""
 
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -81,67 +80,62 @@ def _products(A, x):
 
 # Numbers of bodies, and of gravity, for many cases.
 
-WEIGHTS = {"mass", "inertia"}  # attributes that are numbers of a system; the others are of starts
+# Attributes of bodies that are numbers of a system, while others are of starts; independence of rows depends on them.
+OF_ROWS = {"mass", "inertia"}
 
 
-class GravityColumns:
-    """The acceleration of free fall of each case.
+class Columns:
+    """Numbers of each case that follow from values of an owner: a part of the rows of the table.
 
-    As each sort of columns it has `width`, the numbers of a case; `fill`, which checks and writes them and says which
-    cases fit; and `places`: arrays, where a part of them begins, how many words, from which number on.
+    Attributes
+    ----------
+    width : int
+        Numbers of a case.
+    fill : callable
+        fill(values, numbers, starts) checks values by name, writes numbers (k, width) and starts (k, 2, n), and says
+        which cases fit.
+    systems, graphs : sequence of (str, int, int, int)
+        Where numbers are written, in each `System` and in each constraint graph: the name of an array, where its words
+        begin, how many, from which number on.
+    turning : int
+        The body that a graph must turn to have them; -1 for every graph.
+    column : int
+        Where they begin in a row.
     """
 
-    width, written = 3, ("gravity",)
+    def __init__(self, width, fill, systems=(), graphs=(), turning=-1):
+        self.width, self.fill, self.systems, self.graphs, self.turning = width, fill, systems, graphs, turning
+        self.column = 0
 
-    def __init__(self, name):
-        self.name = name
 
-    def fill(self, values, numbers, starts):
-        """Gravity as it is."""
-        numbers[:], fits = vectors(values[self.name])
+def gravity_columns(name):
+    """The acceleration of free fall."""
+
+    def fill(values, numbers, starts):
+        numbers[:], fits = vectors(values[name])
         return fits
 
-    def places(self, systems, graphs):
-        """Gravity of each system."""
-        return [(system.gravity, 0, 3, 0) for system in systems]
+    return Columns(3, fill, [("gravity", 0, 3, 0)])
 
 
-class MassColumns:
-    """m and 1 / m of a body."""
+def mass_columns(i, name, weights):
+    """m and 1 / m of body i."""
 
-    width, written = 2, ("mass",)
-
-    def __init__(self, body, name, weights):
-        self.i, self.name, self.weights = body.index, name, weights
-        weights.follow(body)
-
-    def fill(self, values, numbers, starts):
-        """Mass and its inverse."""
-        m, fits = masses(values[self.name])
+    def fill(values, numbers, starts):
+        m, fits = masses(values[name])
         numbers[:, 0], numbers[:, 1] = m, 1.0 / m
-        self.weights.masses[self.i] = m
+        weights.mass[:, i] = m
         return fits
 
-    def places(self, systems, graphs):
-        """In each system and constraint graph."""
-        found = [(system.mass, self.i, 1, 0) for system in systems]
-        for graph in graphs:
-            found += [(graph.mass, 16 * self.i, 1, 0), (graph.inverse, 16 * self.i, 1, 1)]
-        return found
+    weights.follow(i)
+    return Columns(2, fill, [("mass", i, 1, 0)], [("mass", 16 * i, 1, 0), ("inverse", 16 * i, 1, 1)])
 
 
-class InertiaColumns:
-    """J' and its inverse, and whether the body has a gyroscopic torque, as a word."""
+def inertia_columns(i, name, weights):
+    """J' and its inverse, and whether body i has a gyroscopic torque, as a word."""
 
-    width, written = 19, ("inertia",)
-
-    def __init__(self, body, name, weights):
-        self.i, self.name, self.weights = body.index, name, weights
-        weights.follow(body)
-
-    def fill(self, values, numbers, starts):
-        """Inertia, its inverse, and whether it is that of a sphere."""
-        J, fits = inertias(values[self.name])
+    def fill(values, numbers, starts):
+        J, fits = inertias(values[name])
         moments = np.linalg.eigh(J)[0]
         fits &= moments[:, 0] > THIN * moments[:, 2]
         numbers[:, :9] = J.reshape(-1, 9)
@@ -149,54 +143,38 @@ class InertiaColumns:
         numbers[:, 9:18] = np.linalg.inv(J).reshape(-1, 9)
         spins = (J[:, :1, :1] * np.eye(3) != J).any(axis=(1, 2))
         numbers[:, 18] = spins.astype(np.int64).view(float)
-        self.weights.moments[self.i], self.weights.inertias[self.i] = moments, np.abs(J).max(axis=(1, 2))
+        weights.moments[:, i], weights.inertia[:, i] = moments, np.abs(J).max(axis=(1, 2))
         return fits
 
-    def places(self, systems, graphs):
-        """In each system, and in each graph in which the orientation isn't locked."""
-        i = self.i
-        found = [(system.inertia, 9 * i, 9, 0) for system in systems]
-        for graph in graphs:
-            if graph.bodies[i, 1] == 7:
-                for row in range(3):
-                    found.append((graph.mass, 16 * i + 4 * (row + 1), 3, 3 * row))
-                    found.append((graph.inverse, 16 * i + 4 * (row + 1), 3, 9 + 3 * row))
-                found.append((graph.spins, i, 1, 18))
-        return found
+    weights.follow(i)
+    rows = [(16 * i + 4 * (row + 1), 3, 3 * row) for row in range(3)]
+    graphs = [("mass", *row) for row in rows] + [("inverse", at, 3, 9 + j) for at, _, j in rows] + [("spins", i, 1, 18)]
+    return Columns(19, fill, [("inertia", 9 * i, 9, 0)], graphs, i)
 
 
-class StateColumns:
-    """The start of a body, which is no number of a system."""
+def start_columns(body, names, bodies):
+    """The start of a body, which is no number of a system; names by attribute."""
+    (at, length), known = bodies[body.index].tolist(), body.values
 
-    width, written = 0, ()
-
-    def __init__(self, body, names, arena):
-        self.names, self.values = names, body.values
-        self.at, length = arena.base.system.bodies[body.index].tolist()
-        self.turns = length == 7
-
-    def fill(self, values, numbers, starts):
-        """q and qd of the body in the starts of all cases."""
+    def fill(values, numbers, starts):
         fits, kept = True, {}
-        for attribute, name in self.names.items():
+        for attribute, name in names.items():
             kept[attribute], good = (orientations if attribute == "orientation" else vectors)(values[name])
             fits = fits & good
-        at, q, qd = self.at, starts[:, 0], starts[:, 1]
+        q, qd = starts[:, 0], starts[:, 1]
         if "position" in kept:
             q[:, at : at + 3] = kept["position"]
         if "velocity" in kept:
             qd[:, at : at + 3] = kept["velocity"]
-        if self.turns and not kept.keys().isdisjoint(("orientation", "angular_velocity")):
+        if length == 7 and not kept.keys().isdisjoint(("orientation", "angular_velocity")):
             p, w = (
-                kept[name] if name in kept else np.tile(self.values[name], (len(starts), 1))
+                kept[name] if name in kept else np.tile(known[name], (len(starts), 1))
                 for name in ("orientation", "angular_velocity")
             )
             q[:, at + 3 : at + 7], qd[:, at + 3 : at + 7] = p, parameter_rates(p, w)
         return fits
 
-    def places(self, systems, graphs):
-        """None: starts are no part of a system."""
-        return []
+    return Columns(0, fill)
 
 
 # Numbers of a force or a constraint for many cases.
@@ -208,23 +186,28 @@ class StateColumns:
 FACTORS = np.array([1.37, 1.61, 1.83])  # of trial values
 
 
-class CopiedColumns:
+class CopiedColumns(Columns):
     """Coordinates of markers and parameters of an item, in a row; those which values don't change as in the base.
 
-    A subclass has `_row`, and sets `_base`, the row of the item as it is.
+    Parameters
+    ----------
+    family : Family
+    item : Constraint or Force
+    names : dict
+        Names of its parameters by attribute.
+    base : ndarray (width,)
+        The row of the item as it is.
+    row : callable
+        The row for other values by attribute; None where these need more than numbers.
+    systems : sequence
+        As of `Columns`.
     """
 
-    written = ("reals",)
-
-    def __init__(self, family, item, names):
-        self.names, self._item, self._family = names, item, family
+    def __init__(self, family, item, names, base, row, systems):
+        super().__init__(len(base), self._fill, systems)
+        self.names, self._item, self._base, self._row = names, item, base, row
         known = is_ours(type(item).__module__) and all(family.field(name).is_numeric for name in names.values())
         self.sources = self._find_sources() if known else None
-
-    @property
-    def width(self):
-        """Numbers of a row."""
-        return len(self._base)
 
     def _find_sources(self):
         """Which attribute, and which of its numbers, each number of the row is; None if one is none of them."""
@@ -248,8 +231,7 @@ class CopiedColumns:
             found[j] = equal[0]
         return found if {name for name, _ in found.values()} == self.names.keys() else None
 
-    def fill(self, values, numbers, starts):
-        """The numbers of all cases."""
+    def _fill(self, values, numbers, starts):
         numbers[:] = self._base
         given = {attribute: values[name] for attribute, name in self.names.items()}
         if self.sources is None or not self._are_checked(given):
@@ -280,33 +262,22 @@ class CopiedColumns:
         return fits
 
 
-class ForceColumns(CopiedColumns):
+def force_columns(family, force, names):
     """Those of a force."""
+    load = family.load_of(force)
+    at, count = int(load.alone[0].reals), len(load.parameters)
+    base = family.packed.system.reals[at : at + 3 * len(force.coordinates) + count]
 
-    def __init__(self, family, force, names):
-        load = family.load_of(force)
-        self._at, self._count = int(load.alone[0].reals), len(load.parameters)
-        width = 3 * len(force.coordinates) + self._count
-        self._base = family.packed.system.reals[self._at : self._at + width]
-        super().__init__(family, force, names)
-
-    def _row(self, values):
-        """The numbers of one case, values by attribute; None if it needs more than numbers."""
-        other, force = with_attributes(self._item, values), self._item
+    def row(values):
+        other = with_attributes(force, values)
         given = checked_parameters(other, Signal, "loads")
-        if other.kernels is not force.kernels or len(given) != self._count or any(isinstance(x, Signal) for x in given):
+        if other.kernels is not force.kernels or len(given) != count or any(isinstance(x, Signal) for x in given):
             return None
-        row, at = self._base.copy(), 0
-        for old, new in zip(force.coordinates, other.coordinates, strict=True):
-            if new is not old:
-                row[at : at + 3] = new
-            at += 3
-        row[at:] = given
-        return row
+        pairs = zip(force.coordinates, other.coordinates, strict=True)
+        own = [base[3 * i : 3 * i + 3] if new is old else new for i, (old, new) in enumerate(pairs)]
+        return np.concatenate([*own, given])
 
-    def places(self, systems, graphs):
-        """In each system."""
-        return [(system.reals, self._at, self.width, 0) for system in systems]
+    return CopiedColumns(family, force, names, base, row, [("reals", at, len(base), 0)])
 
 
 class ConstraintColumns(CopiedColumns):
@@ -321,53 +292,48 @@ class ConstraintColumns(CopiedColumns):
     """
 
     def __init__(self, family, constraint, names):
-        first = family.packed.members[family.members[id(constraint)]].parts.start
-        self._owner = constraint if isinstance(constraint, Joint) else None
-        own = constraint.parts if self._owner else (constraint,)
-        self.parts, self._at, self.points, fixed, at = range(first, first + len(own)), [], [], set(), 0
+        packed, reals = family.packed, family.packed.system.reals
+        self._parts_of = (lambda item: item.parts) if isinstance(constraint, Joint) else (lambda item: (item,))
+        first = packed.members[family.members[id(constraint)]].parts.start
+        self.parts = range(first, first + len(self._parts_of(constraint)))
+        systems, self.points, fixed, at = [], [], set(), 0
         for i in self.parts:
-            primitive, given = family.packed.constraints[i], family.packed.parameters[i]
-            self._at.append((family.begins[i], at, 3 * len(family.packed.coordinates[i]) + len(given)))
-            for marker in primitive.markers:
+            primitive, count = packed.constraints[i], 3 * len(packed.coordinates[i]) + len(packed.parameters[i])
+            systems.append(("reals", family.begins[i], count, at))
+            for j, marker in enumerate(primitive.markers):
                 if marker.code == POINT:
-                    self.points.append((primitive.body_of(marker), at))
+                    self.points.append((primitive.body_of(marker), at + 3 * j))
                 else:
-                    fixed |= {at, at + 1, at + 2}
-                at += 3
-            at += len(given)
-        reals = family.packed.system.reals
-        self._base = np.concatenate([reals[begin : begin + count] for begin, _, count in self._at])
-        super().__init__(family, constraint, names)
+                    fixed |= {at + 3 * j + i for i in range(3)}
+            at += count
+        base = np.concatenate([reals[begin : begin + count] for _, begin, count, _ in systems])
+        self._family = family
+        super().__init__(family, constraint, names, base, self._make_row, systems)
         places = {at + i for _, at in self.points for i in range(3)}
         self.parameters = [] if self.sources is None else [j for j in self.sources if j not in places]
         self.serves = self.sources is not None and fixed.isdisjoint(self.sources)
 
-    def _row(self, values):
+    def _make_row(self, values):
         other = sketch(self._item)
-        if self._owner:
+        if isinstance(other, Joint):
             vars(other).update(a=self._family.own_body(other.a), b=self._family.own_body(other.b))
-        other = with_attributes(other, values)
-        row, own = [], self._item.parts if self._owner else (self._item,)
-        parts = other.parts if self._owner else (other,)
+        parts, own = self._parts_of(with_attributes(other, values)), self._parts_of(self._item)
         if [type(part) for part in parts] != [type(part) for part in own]:
             return None
+        row = []
         for part, old in zip(parts, own, strict=True):
             given = checked_motions(part)
             if part.rheonomic != old.rheonomic or any(isinstance(x, Motion) for x in given):
                 return None
-            row += [np.concatenate(part.coordinates), given] if part.coordinates else [given]
+            row += [*part.coordinates, given]
         row = np.concatenate(row)
         return row if len(row) == len(self._base) else None
 
-    def fill(self, values, numbers, starts):
+    def _fill(self, values, numbers, starts):
         """As of any; not where a number becomes zero, or ceases to be: masks of columns depend on that."""
-        fits = super().fill(values, numbers, starts)
+        fits = super()._fill(values, numbers, starts)
         columns = numbers[:, self.parameters]
         return fits & ((columns == 0.0) == (self._base[self.parameters] == 0.0)).all(axis=1)
-
-    def places(self, systems, graphs):
-        """In each system, primitive by primitive."""
-        return [(system.reals, begin, count, at) for system in systems for begin, at, count in self._at]
 
 
 def _scalars(values):
@@ -377,23 +343,22 @@ def _scalars(values):
 # What follows from points of constraints, where these differ from case to case.
 
 
-class GeometryColumns:
+class GeometryColumns(Columns):
     """The size of the scene in each case, and the bound on |Phi| that follows from it.
 
     Parameters
     ----------
     family : Family
     constraints : list of ConstraintColumns
-    weights : Weights
-        Is told the longest levers on each body.
+    pen : Pen
+        Its numbers of constraints are known, and its weights are told the longest levers on each body.
     tol : float
         The constraint tolerance of runs.
     """
 
-    width, written = 2, ()
-
-    def __init__(self, family, constraints, weights, tol):
-        self._family, self._constraints, self._weights, self._tol = family, constraints, weights, tol
+    def __init__(self, family, constraints, pen, tol):
+        super().__init__(2, self._fill)
+        self._family, self._constraints, self._pen, self._tol = family, constraints, pen, tol
         packed, varied = family.packed, {i for columns in constraints for i in columns.parts}
         self._lean = bool(lean_bodies(packed))
         self._reaches = [pair for i, pair in enumerate(family.reaches) if i not in varied]
@@ -405,17 +370,14 @@ class GeometryColumns:
         self._points = list(_points_of(items))
         self._loaded = list(_points_of((load.force, load.coordinates) for load in packed.loads))
         self._bodies = {id(body): i for i, body in enumerate(packed.bodies)}
+        for columns in constraints:  # the inertia of a body depends on how far its points are
+            for body, _ in columns.points:
+                if id(body) in self._bodies:
+                    pen.weights.follow(self._bodies[id(body)])
 
-    def fill(self, values, numbers, starts):
-        """Nothing yet: the numbers of constraints come first."""
-        return True
-
-    def places(self, systems, graphs):
-        """None in systems: runs and starts have them."""
-        return []
-
-    def fit(self, numbers, table, starts):
-        """Write sizes and bounds; which cases ask for no more than numbers. table: those of all columns."""
+    def _fill(self, values, numbers, starts):
+        """Sizes and bounds, and which cases ask for no more than numbers; after all constraints."""
+        table, far = self._pen.numbers, self._pen.weights.far
         found = [(body, table[:, columns.column + at : columns.column + at + 3])
                  for columns in self._constraints for body, at in columns.points]  # fmt: skip
         points = found + [(body, s[None]) for body, s in self._points]
@@ -426,15 +388,13 @@ class GeometryColumns:
         small = (length > 0.0) & (length < POINT_SIZE)
         size = np.where(small, length, whole)
         numbers[:, 0], numbers[:, 1] = size, np.where((size > 0.0) & (size < 1.0), self._tol * size, self._tol)
-        self._enter_levers(points)
+        far[:] = 0.0
+        for body, s in points:
+            if id(body) in self._bodies:
+                i = self._bodies[id(body)]
+                far[:, i] = np.maximum(far[:, i], (s * s).sum(axis=1))
         fits = small == is_small(self._family.packed.size)
         return fits & (not self._lean) & self._are_near(points, starts)
-
-    def _enter_levers(self, points):
-        for body, s in points:
-            i = self._bodies.get(id(body))
-            if i in self._weights.far:
-                self._weights.far[i] = np.maximum(self._weights.far[i], (s * s).sum(axis=1))
 
     def _are_near(self, points, starts):
         points = points + [(body, s[None]) for body, s in self._loaded]
@@ -459,51 +419,47 @@ class Weights:
 
     They do where a body has next to no inertia about an axis, also beside others (`massless_axes.lean_bodies`), or
     where masses become unequal (`length_metric.are_unequal`).
+
+    Attributes
+    ----------
+    mass, inertia, far : ndarray (k, b)
+        Of each case and body: mass, the largest |J'|, and the square of the longest lever.
+    moments : ndarray (k, b, 3)
     """
 
     def __init__(self, base, is_unequal):
-        self._base, self._is_unequal, self.far, self._thin = base, is_unequal, {}, False
-        self._moments = np.linalg.eigh(base.system.inertia.reshape(-1, 3, 3))[0]
-        self._levers, self._lean = levers(base), lean_bodies(base)
-        self.masses, self.moments, self.inertias = {}, {}, {}  # by body, of each case
+        system, self._is_unequal = base.system, is_unequal
+        self._rigid, self._lean, self._followed = system.bodies[:, 1] == 7, lean_bodies(base).keys(), set()
+        self._base = {
+            "mass": system.mass,
+            "inertia": np.abs(system.inertia).max(axis=1),
+            "far": levers(base) ** 2,
+            "moments": np.linalg.eigh(system.inertia.reshape(-1, 3, 3))[0],
+        }
 
-    def follow(self, body):
-        """Look after a body whose mass or inertia differs."""
-        if body.dimension == 7:
-            self.far[body.index] = float(self._levers[body.index] ** 2)
-            self._thin |= body.index in self._lean
+    def follow(self, i):
+        """Look after a body whose mass, inertia or levers differ."""
+        self._followed.add(i)
 
-    def fit(self, count):
-        """Which of so many cases do not."""
-        fits = np.full(count, not self._thin)
-        if self._thin or not self.far.keys() | self.masses.keys():
-            return fits
-        for i, far in self.far.items():
-            m, moments = self.masses.get(i, self._base.system.mass[i]), self.moments.get(i, self._moments[i : i + 1])
-            fits &= ~(moments[:, 0] < THIN * np.maximum(moments[:, 2], m * far))
-        return fits & ~self._are_light(count) & (self._are_unequal(count) == self._is_unequal)
+    def enter(self, count):
+        """Lay out the numbers of so many cases, those of the scene at first."""
+        for name, array in self._base.items():
+            setattr(self, name, np.tile(array, (count, *[1] * array.ndim)))
 
-    def _are_light(self, count):
-        """Which cases may have light bodies that carry others."""
-        moments, rigid = self._moments, self._base.system.bodies[:, 1] == 7
-        least, most = np.full(count, np.inf), np.zeros(count)
-        for i in np.flatnonzero(rigid):
-            own = self.moments.get(i, moments[i : i + 1])
-            far = self.masses.get(i, self._base.system.mass[i]) * self._levers[i] ** 2
-            least, most = np.minimum(least, own[:, 0]), np.maximum(most, np.maximum(own[:, 2], far))
-        return least < MASSLESS * most
-
-    def _are_unequal(self, count):
-        """As `length_metric.are_unequal`, of each case."""
-        system, found = self._base.system, np.zeros(count, bool)
-        for own, varied in ((system.mass, self.masses), (np.abs(system.inertia).max(axis=1), self.inertias)):
-            others = own > 0.0  # zero for the inertia of a point mass
-            others[list(varied)] = False
-            every = [own[others][None], *(column[:, None] for column in varied.values())]
-            every = np.hstack([np.broadcast_to(columns, (count, columns.shape[1])) for columns in every])
-            if every.size:
-                found |= every.max(axis=1) > UNEQUAL_MASSES * every.min(axis=1)
-        return found
+    def fit(self):
+        """Which cases do not."""
+        if not self._followed:
+            return True
+        rigid, own = self._rigid, [i for i in self._followed if self._rigid[i]]
+        least, most = self.moments[:, :, 0], np.maximum(self.moments[:, :, 2], self.mass * self.far)
+        thin = (least[:, own] < THIN * most[:, own]).any(axis=1)
+        if rigid.any():  # light bodies that carry others
+            thin |= least[:, rigid].min(axis=1) < MASSLESS * most[:, rigid].max(axis=1)
+        unequal = False
+        for array in (self.mass, self.inertia[:, rigid]):
+            if array.size:
+                unequal |= array.max(axis=1) > UNEQUAL_MASSES * array.min(axis=1)
+        return ~thin & (unequal == self._is_unequal) & self._lean.isdisjoint(own)
 
 
 # Numbers of the cases of a chunk: checked, laid out as rows of a table, and where each of them is written to.
@@ -551,6 +507,7 @@ class Pen:
         The arrays of a `System` that it writes to.
     moves : bool
         Whether starts differ.
+    weights : Weights
     fits : ndarray of bool (k,)
         Which cases of the chunk are written; the others must be entered in another way.
     numbers : ndarray (k, width)
@@ -558,37 +515,37 @@ class Pen:
         q, qd of each case; of all, (1, 2, n), where starts don't differ.
     """
 
+    moves = False
+
     def __init__(self, arena, owners):
         self.arena, self._parts, self._known = arena, [], ([], [])
-        self._weights = Weights(arena.base, arena.is_unequal)
+        self.weights = Weights(arena.base, arena.is_unequal)
         for owner, names in owners:
             self._parts += self._parts_of(owner, names)
         self.constraints = [part for part in self._parts if isinstance(part, ConstraintColumns)]
         self.geometry, at = None, 0
-        if self.constraints:
-            self._follow_levers()
+        if self.constraints:  # last: it follows from the numbers of the others
             tol = arena.study.options.constraint_tol
-            self.geometry = GeometryColumns(arena.study.family, self.constraints, self._weights, tol)
+            self.geometry = GeometryColumns(arena.study.family, self.constraints, self, tol)
             self._parts.append(self.geometry)
         for part in self._parts:
             part.column, at = at, at + part.width
-        self.width, self.written = at, {name for part in self._parts for name in part.written}
-        self.moves = any(isinstance(part, StateColumns) for part in self._parts)
+        self.width, self.written = at, {name for part in self._parts for name, *_ in part.systems}
 
     def _parts_of(self, owner, names):
         family = self.arena.study.family
         if owner is family.template:
-            return [GravityColumns(names["gravity"])]
+            return [gravity_columns(names["gravity"])]
         if not isinstance(owner, PointMass):
-            kind = ConstraintColumns if family.load_of(owner) is None else ForceColumns
-            return [kind(family, owner, names)]
+            return [(ConstraintColumns if family.load_of(owner) is None else force_columns)(family, owner, names)]
         parts = []
         if "mass" in names:
-            parts.append(MassColumns(owner, names["mass"], self._weights))
+            parts.append(mass_columns(owner.index, names["mass"], self.weights))
         if "inertia" in names:
-            parts.append(InertiaColumns(owner, names["inertia"], self._weights))
-        moved = {attribute: name for attribute, name in names.items() if attribute not in WEIGHTS}
-        return [*parts, StateColumns(owner, moved, self.arena)] if moved else parts
+            parts.append(inertia_columns(owner.index, names["inertia"], self.weights))
+        moved = {attribute: name for attribute, name in names.items() if attribute not in OF_ROWS}
+        self.moves = self.moves or bool(moved)
+        return [*parts, start_columns(owner, moved, self.arena.base.system.bodies)] if moved else parts
 
     def take(self, values, count):
         """Lay out the values of so many cases: arrays (count, ...) by name."""
@@ -598,23 +555,12 @@ class Pen:
         if any(array.dtype != float for array in values.values()):
             self.fits[:] = False
             return
+        self.weights.enter(count)
         with np.errstate(all="ignore"):
             for part in self._parts:
                 columns = slice(part.column, part.column + part.width)
                 self.fits &= part.fill(values, self.numbers[:, columns], self.starts)
-            if self.geometry is not None:
-                self._weights.far = dict(self._far)
-                columns = slice(self.geometry.column, self.geometry.column + 2)
-                self.fits &= self.geometry.fit(self.numbers[:, columns], self.numbers, self.starts)
-            self.fits &= self._weights.fit(count)
-
-    def _follow_levers(self):
-        """Look after the inertia of all bodies that a point of a constraint is on."""
-        for columns in self.constraints:
-            for body, _ in columns.points:
-                if isinstance(body, PointMass):
-                    self._weights.follow(body)
-        self._far = dict.fromkeys(self._weights.far, 0.0)
+            self.fits &= self.weights.fit()
 
     def size(self, k):
         """The size of the scene in case k of the chunk; None where it is that of the base."""
@@ -622,9 +568,7 @@ class Pen:
 
     def places_in(self, reals):
         """Those of numbers of constraints, in an array like `System.reals`."""
-        system = SimpleNamespace(reals=reals)
-        found = [(part, place) for part in self.constraints for place in part.places([system], [])]
-        return [Place(to[begin : begin + words], part.column + at) for part, (to, begin, words, at) in found]
+        return [_place(part, reals, *where) for part in self.constraints for _, *where in part.systems]
 
     def places(self):
         """All `Place`s, in the arrays of the arena and of its runs."""
@@ -632,9 +576,10 @@ class Pen:
         if not (_same(systems, self._known[0]) and _same(graphs, self._known[1])):
             self._known, self._places = (systems, graphs), []
             for part in self._parts:
-                for array, begin, words, at in part.places(systems, graphs):
-                    to = array.reshape(-1).view(float)[begin : begin + words]
-                    self._places.append(Place(to, part.column + at))
+                turned = [graph for graph in graphs if part.turning < 0 or graph.bodies[part.turning, 1] == 7]
+                for owners, wheres in ((systems, part.systems), (turned, part.graphs)):
+                    self._places += [_place(part, getattr(owner, name), *where)
+                                     for owner in owners for name, *where in wheres]  # fmt: skip
         return self._places
 
     def write(self, k):
@@ -645,6 +590,10 @@ class Pen:
         for to, column in self.places():
             to[...] = row[column : column + to.size]
         return (self.starts[k, 0], self.starts[k, 1]) if self.moves else self.arena.study.family.start
+
+
+def _place(part, array, begin, words, at):
+    return Place(array.reshape(-1).view(float)[begin : begin + words], part.column + at)
 
 
 def _same(arrays, known):

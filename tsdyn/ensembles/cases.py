@@ -102,6 +102,11 @@ def record_of(keep, outcome, n, times):
     return {"t": end.reached, "q": q[0], "qd": q[1]}
 
 
+def coordinate_names(bodies):
+    """Names of the coordinates of packed bodies, "crank.x" and so on, (n,)."""
+    return [f"{body.name}.{x}" for body in bodies for x in ("x", "y", "z", "e0", "e1", "e2", "e3")[: body.dimension]]
+
+
 def reduced(keep, solution):
     """What a user's function makes of a solution: arrays by name; "" stands for one without a name."""
     found = called(keep, "keep", solution)

@@ -14,6 +14,7 @@ from ..simulation.progress import bar_class
 from ..simulation.run_options import OPTIONS, from_names
 from ..simulation.scene import Scene
 from ..validation import sequence, whole
+from .arena import Arena
 from .cases import cases_of, demand_arguments, demand_whole
 from .executors import Collected, run_executor, run_threads
 from .results import Ensemble
@@ -172,9 +173,9 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     if callable(progress):
         demand_arguments(progress, "progress", ("fraction",))
     if lanes > 1:
-        from .lane_refusal import prepare_lanes
+        from .lanes import prepare_lanes
 
-        prepare_lanes(study)
+        prepare_lanes(study, Arena)
     sink = sink_of(study, store, resume)
     report, used = CaseProgress(progress, study.cases.count, sink.first), 0
     try:

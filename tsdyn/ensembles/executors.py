@@ -8,14 +8,13 @@ import threading
 import time
 import warnings
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, ThreadPoolExecutor, wait
-from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidArgument, MissingDependency, Status
 from ..runs.tolerances import SLICE_SECONDS
 from .cases import TIMES
-from .runner import PLAIN, Runner, Study
+from .runner import PLAIN, Chunk, Runner, Study
 from .tolerances import AHEAD, CHUNK_SECONDS, GROWTH, MOST_CASES, MOST_KEPT, RETRIES, SENT_SECONDS
 
 # Chunks of cases: what threads and processes are given, and what they give back.
@@ -27,20 +26,6 @@ ALWAYS = ("t", "q", "qd")  # of the same shape in every case
 OTHER_SHAPE = "keep must return arrays of the same shape for every case, it gave one of shape {}, and {} before."
 
 
-class Chunk(NamedTuple):
-    """Results of cases without a gap."""
-
-    first: int
-    status: np.ndarray  # int64 (k,)
-    messages: dict  # case -> message, of those that are not the sentence of their status
-    arrays: dict  # name -> (k, ...)
-
-    @property
-    def count(self):
-        """Number of cases."""
-        return len(self.status)
-
-
 def run_chunk(runner, first, count, offset=0):
     """Run cases from `first` on; the `Chunk`, and whether Ctrl-C has ended it early.
 
@@ -50,11 +35,11 @@ def run_chunk(runner, first, count, offset=0):
     status, arrays = np.full(count, NOT_RUN), empty(study, count)
     interrupted, k = False, 0
     try:
-        room = runner.room(first, status, arrays, messages)
-        while (k := runner.run_many(room, k)) < count:
+        chunk = Chunk(first, status, messages, arrays, runner.values(slice(first, first + count)))
+        while (k := runner.run_many(chunk, k)) < count:
             if study.stopped:
                 raise KeyboardInterrupt
-            record = runner.run(room, k)
+            record = runner.run(chunk, k)
             said = _enter(arrays, k, record.arrays)
             message = said or record.message
             if message is not PLAIN:

@@ -1,15 +1,21 @@
 """The compiled loop over cases in lanes: each lane takes the next case when its own has ended, without Python."""
 
+import contextlib
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R
-from ..errors import Status
+from ..elements.loops.constraint_rows import write_positions, write_velocities
+from ..errors import InvalidArgument, Status, TsdynError
+from ..jit.compiled import DEBUG, load
 from ..jit.kernels import Record, entry, kernel, loader, long_kernel, resident, specialised, vector
+from ..motions.signals import Signal
+from ..rows.graph_builder import redundant_rows
 from ..rows.interface import has_redundant_rows, refinements, singularity_indicator
-from ..taylor.lane_memory import (
+from ..runs.tolerances import LONG_STEPS
+from ..simulation.run_options import OPTIONS
+from ..taylor.lane_stepper import (
     BAD,
     FLOOR,
     INDICATOR,
@@ -24,14 +30,18 @@ from ..taylor.lane_memory import (
     H,
     LaneMemory,
     T,
+    accept,
+    constraint_loops,
+    force_loops,
     lane_loader,
+    reach,
+    try_step,
 )
-from ..taylor.lane_stepper import accept, reach, try_step
-from ..taylor.layout import load_series
+from ..taylor.layout import SHOWN, is_far, load_series
 from ..taylor.step_parts import set_floor
 from ..taylor.stepper import stand_at
 from ..workspaces import load_run
-from .case_loop import SUCCESS, Batch, enter_case, load_chunk, load_plan, take_start
+from .case_loop import SUCCESS, Batch, FirstSlice, enter_case, load_chunk, load_plan, take_start
 
 NOT_RUN = int(Status.NOT_RUN)
 
@@ -110,19 +120,13 @@ def _take(c, lanes, loop, l, plan, chunk, k):
 
 
 @kernel
-def _write(c, lanes, loop, l, q, qd):
+def _write(c, loop, l, q, qd):
     """q and qd of the poses in lane l."""
-    poses, bodies = loop.poses, c.graph.bodies
-    for b in range(bodies.shape[0]):
-        at, i = b * POSE, bodies[b, 0]
-        for j in range(3):
-            q[i + j], qd[i + j] = poses[at + R + j, l], poses[at + RD + j, l]
-        if bodies[b, 1] == 7:
-            x, y, z = 0.5 * poses[at + OMEGA, l], 0.5 * poses[at + OMEGA + 1, l], 0.5 * poses[at + OMEGA + 2, l]
-            e0, e1, e2, e3 = poses[at + P, l], poses[at + P + 1, l], poses[at + P + 2, l], poses[at + P + 3, l]
-            q[i + 3], q[i + 4], q[i + 5], q[i + 6] = e0, e1, e2, e3
-            qd[i + 3], qd[i + 4] = -e1 * x - e2 * y - e3 * z, e0 * x - e3 * y + e2 * z
-            qd[i + 5], qd[i + 6] = e3 * x + e0 * y - e1 * z, -e2 * x + e1 * y + e0 * z
+    poses = c.tangent.poses
+    for i in range(poses.size):
+        poses[i] = loop.poses[i, l]
+    write_positions(c.graph.bodies, poses, q)
+    write_velocities(c.graph.bodies, poses, qd)
 
 
 @kernel
@@ -138,7 +142,7 @@ def _record(c, lanes, loop, chunk, l):
     """The poses in lane l are its next output."""
     s, size, k = lanes.single, c.work.q.size, loop.cases[l]
     first = int(s[WAITS, l]) * size
-    _write(c, lanes, loop, l, chunk.q[k, first:], chunk.qd[k, first:])
+    _write(c, loop, l, chunk.q[k, first:], chunk.qd[k, first:])
     s[WAITS, l] += 1.0
 
 
@@ -178,7 +182,7 @@ def _close(c, lanes, loop, plan, chunk):
                 chunk.qd[k, :] = np.nan
             else:
                 if plan.numbers.grid == 0:
-                    _write(c, lanes, loop, l, chunk.q[k], chunk.qd[k])
+                    _write(c, loop, l, chunk.q[k], chunk.qd[k])
                 chunk.t[k], chunk.status[k] = s[T, l], SUCCESS
             loop.cases[l], s[RUNS, l], s[H, l], s[T_NEXT, l] = -1, 0.0, 0.0, s[T, l]
 
@@ -265,3 +269,100 @@ class LaneBatch(Batch):
         self._loop = self._loop._replace(pairs=self._lanes.pairs, arrays=self._lanes.arrays, poses=self._lanes.poses)
         self._where, *self._keep_loop = resident(self._loop)
         self._of = memory
+
+
+# What lanes can't serve, each part by name; the kernels of what they can.
+
+INSTEAD = "Leave lanes out: one case at a time serves every scene and method."
+PLAIN = ("formulation", "chart_interval", "redundancy")  # of which lanes have the default
+
+
+def prepare_lanes(study, make_arena):
+    """Load the kernels of lanes for a study, of which `make_arena` makes the `Arena`.
+
+    Raises
+    ------
+    InvalidArgument
+        If lanes can't serve it; says what, by name.
+    """
+    reason = _of_options(study)
+    if not reason:
+        arena = make_arena(study)
+        _examine_start(arena)
+        reason = _of_scene(arena)
+    if reason:
+        raise InvalidArgument(f"lanes={study.lanes}: {reason}. {INSTEAD}")
+    try:
+        _load(study, arena.kept)
+    except TsdynError as error:
+        raise InvalidArgument(f"lanes={study.lanes}: {error} {INSTEAD}") from error
+
+
+def _of_options(study):
+    """What is asked of the runs that lanes have not; empty for nothing."""
+    given = study.given
+    if DEBUG:
+        return "TSDYN_DEBUG=1 runs kernels as plain Python, which has no lanes"
+    changed = [f"{name}={given[name]!r}" for name in PLAIN if given[name] != OPTIONS[name]]
+    if changed:
+        return f"{' and '.join(changed)} can't be served in lanes"
+    if study.method.driver != "series":
+        return f"lanes are for Taylor series, and the method is {study.method!r}"
+    if study.method.step is not None:
+        return "a fixed step= has no lanes"
+    asked = [name for name in ("events", "dense_output", "max_steps") if given[name] not in (None, False)]
+    asked += ["channels or a function keep="] * callable(study.keep) + ["assemble="] * (study.free is not None)
+    asked += ["parameters that are a function of the case"] * (study.names is None)
+    if asked:
+        return f"{' and '.join(asked)} can't be served in lanes"
+    if not FirstSlice.serves(study):
+        return "steps that end at given times, such as knots of data and sampling times, have no lanes"
+    return ""
+
+
+def _examine_start(arena):
+    """Find the redundant rows of the scene's own start; cases may start elsewhere, so whatever is wrong is theirs."""
+    with contextlib.suppress(TsdynError):
+        arena.starts.start(arena.study.family.start)
+
+
+def _of_scene(arena):
+    """The parts of a scene that have no lanes."""
+    study, packed, found = arena.study, arena.kept.packed, []
+    graph = arena.kept.series.graph
+    if not study.has_arena or arena.pen is None:
+        return "the parameters are not all numbers that cases can share arrays for (docs/ensembles.md)"
+    found += [f"{each.name} depends on time" for each in packed.constraints if each.rheonomic]
+    for force_load in packed.loads:
+        force = force_load.force
+        if any(isinstance(value, Signal) for value in force_load.parameters):
+            found.append(f"{force.name} is a function of time")
+        elif hasattr(force.kernels, "program") or force_load.law is not None:
+            found.append(f"{force.name} is a function of the state")
+        elif force_load.normal >= 0:
+            found.append(f"{force.name} follows from a reaction")
+        elif force.sharp:
+            found.append(f"{force.name} changes within less than its series shows")
+        elif force.positive is None:
+            found.append(f"{force._kind()} doesn't say where it is analytic (`positive`)")
+        elif force.memory:
+            found.append(f"{force.name} remembers a number from step to step")
+    if redundant_rows(packed).size:
+        found.append("some rows are redundant")
+    if graph.axes.rows.shape[0]:
+        found.append("a body has no inertia about an axis")
+    if is_far(graph, study.method.orders()[2]) or study.n >= LONG_STEPS:
+        found.append("there are too many bodies for the near caches")
+    if found:
+        more = [f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else []
+        return "; ".join(found[:SHOWN] + more)
+    moved = arena.pen.moves and (study.call.state is not None or not arena.kept.handles.begin_at_zero)
+    if moved or packed.system.memory.size or (arena.pen.moves and (graph.bodies[:, 1] == 4).any()):
+        return "starts differ in a scene whose joint angles count from a given value, or with locked orientations"
+    return ""
+
+
+def _load(study, kept):
+    constraint_loops(kept.series.kinds, study.lanes)
+    force_loops(kept.packed, study.lanes)
+    load(lane_runner(study.lanes))

@@ -18,7 +18,7 @@ from ..errors import InvalidArgument, MissingDependency, Status
 from ..files import scene_text
 from ..simulation.stored_runs import demand_path, hash_of
 from ..validation import counted
-from .cases import TIMES
+from .cases import TIMES, coordinate_names
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -101,9 +101,6 @@ def _number(value):
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError
-
-
-COORDINATES = ("x", "y", "z", "e0", "e1", "e2", "e3")
 
 
 @fitting_methods
@@ -342,7 +339,7 @@ class Ensemble:
     @property
     def coordinates(self) -> list[str]:
         """Names of the coordinates, "crank.x" and so on, (n,)."""
-        return [f"{body.name}.{x}" for body in self._study.family.packed.bodies for x in COORDINATES[: body.dimension]]
+        return coordinate_names(self._study.family.packed.bodies)
 
     def to_xarray(self) -> Any:
         """Return an xarray.Dataset: dimensions case, coordinate and time, parameters as variables of the case."""

@@ -1,7 +1,8 @@
 """Cases, run one after the other."""
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from ..simulation.solution import Solution
 from ..simulation.variants import family_of, of_numbers, packed_anew, start_names
 from .arena import Arena, serves
 from .case_loop import Finished
-from .cases import keep_of, record_of, reduced, started
+from .cases import TIMES, keep_of, record_of, reduced, started
 from .tolerances import MOST_KEPT
 
 PLAIN = Status.SUCCESS.sentence
@@ -112,14 +113,19 @@ class Study:
             raise KeyboardInterrupt
 
 
-class Room(NamedTuple):
-    """A chunk of cases, and arrays for their results."""
+class Chunk(NamedTuple):
+    """Cases without a gap, and their results."""
 
     first: int
-    values: dict  # name -> (k, ...); None where arenas take none
-    status: np.ndarray
-    arrays: dict
-    messages: dict  # by the number in the chunk
+    status: np.ndarray  # int64 (k,)
+    messages: dict  # case -> message, of those that are not the sentence of their status
+    arrays: dict  # name -> (k, ...)
+    values: dict | None = None  # name -> (k, ...), for arenas
+
+    @property
+    def count(self):
+        """Number of cases."""
+        return len(self.status)
 
 
 class Runner:
@@ -128,35 +134,34 @@ class Runner:
     def __init__(self, study):
         self.study, self._arenas = study, []
 
-    def room(self, first, status, arrays, messages):
-        """The `Room` of the cases from `first` on."""
-        study, values = self.study, None
-        if study.has_arena and study.names is not None and study.free is None:
-            given = {**study.changes, **study.cases.fixed}
-            values = {name: _repeated(value, len(status)) for name, value in given.items()}
-            part = slice(first, first + len(status))
-            values |= {name: column[part] for name, column in study.cases.columns.items()}
-        return Room(first, values, status, arrays, messages)
+    def values(self, cases):
+        """Values of some cases, a slice, as arrays by name; None where arenas take none."""
+        study = self.study
+        if not study.has_arena or study.names is None or study.free is not None:
+            return None
+        given, count = {**study.changes, **study.cases.fixed}, cases.stop - cases.start
+        values = {name: _repeated(value, count) for name, value in given.items()}
+        return values | {name: column[cases] for name, column in study.cases.columns.items()}
 
-    def run_many(self, room, k):
+    def run_many(self, chunk, k):
         """Run cases from k on that need no Python; the first that was not run."""
-        return self._arenas[0].run_cases(room, k) if self._arenas else k
+        return self._arenas[0].run_cases(chunk, k) if self._arenas else k
 
-    def run(self, room, k):
+    def run(self, chunk, k):
         """The `CaseRecord` of case k of a chunk."""
         try:
-            return self._run(room, k)
+            return self._run(chunk, k)
         except TsdynError as error:
             return CaseRecord(Status.CASE_FAILED, str(error), {})
         except Exception as error:  # of a user's function: the other cases go on
             return CaseRecord(Status.CASE_FAILED, f"{type(error).__name__}: {error}", {})
 
-    def _run(self, room, k):
+    def _run(self, chunk, k):
         study = self.study
-        values = study.values(room.first + k)
+        values = study.values(chunk.first + k)
         changes = {**study.changes, **values} if study.changes else values
         if study.has_arena:
-            ran = self._in_arena(lambda arena: arena.run_case(room, k, lambda: self._scene(changes)))
+            ran = self._in_arena(lambda arena: arena.run_case(chunk, k, lambda: self._scene(changes)))
             if ran is not None:
                 return self._record(changes, *ran)
         found = study.family.numbers(changes)
@@ -166,7 +171,8 @@ class Runner:
                 return self._record(changes, *ran)
         scene = self._scene(changes)
         solution = Run(scene, study.options)._solve(replace(study.call, progress=study.report))
-        return self._recorded(solution, _Rows(solution))
+        rows = np.column_stack((solution.t, solution.q, solution.qd)) if study.keep == TIMES else None
+        return self._recorded(solution, SimpleNamespace(end=solution._end, rows=rows))
 
     def _in_arena(self, run):
         """An arena, that of the last case first, and what `run` makes of it; None if a case can't be run in any.
@@ -228,16 +234,3 @@ def _repeated(value, count):
     array = np.asarray(value)
     array = array.astype(float) if array.dtype.kind in "iuf" else array
     return np.broadcast_to(array, (count, *array.shape))
-
-
-class _Rows:
-    """Of a solution what `record_of` reads of an outcome."""
-
-    def __init__(self, solution: Any) -> None:
-        self.end, self.solution = solution._end, solution
-
-    @property
-    def rows(self):
-        """Outputs (k, 1 + 2 n): t, q, qd."""
-        solution = self.solution
-        return np.column_stack((solution.t, solution.q, solution.qd))

@@ -19,7 +19,7 @@ from ..errors import Status, StorageError
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
 from ..storage.formats import Column, StoredTable, demand_shapes, demand_writable, format_of, writing
 from ..validation import NO_LINKS, damaged
-from .cases import TIMES
+from .cases import TIMES, coordinate_names
 from .executors import empty, fitted
 from .tolerances import FLUSH, WAITING
 
@@ -216,9 +216,7 @@ class _StoredArrays(Mapping):
 
 def table_of(study, parameters, kept):
     """The `StoredTable` of a store: parameters by name with one case each, what is kept with any number of them."""
-    bodies = study.family.packed.bodies
-    names = [f"{body.name}.{x}" for body in bodies for x in ("x", "y", "z", "e0", "e1", "e2", "e3")[: body.dimension]]
-    labels, grid = {"coordinate": names}, ()
+    labels, grid = {"coordinate": coordinate_names(study.family.packed.bodies)}, ()
     if study.keep == TIMES:
         labels["time"], grid = [repr(t) for t in study.times.tolist()], ("time",)
     columns = [Column(CASE, (), {"long_name": "case", "units": "1"})]

@@ -122,7 +122,7 @@ def _correct_multipliers(c):
         put(f.Z, 8 * graph.bodies.shape[0] + 4, splat(0.0))
         weigh_bodies(graph, f.Z)
         multiply_rows(graph, f.rows, f.Z, f.b)
-        worst = largest_residual(graph, w, f)
+        worst = largest_residual(graph, f, w.control.floor)
         if sweep == 0:
             least = REACTIONS_LEFT * worst
         if worst <= least:
@@ -265,7 +265,7 @@ def _solve_positions(c, t, g):
         if f.b.size == 0:
             return OK
         evaluate_rows(graph, system, f, f.rows, t)
-        worst = largest_residual(graph, w, f)
+        worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE
         # Rounding, or a residual near it that falls no more
@@ -309,7 +309,7 @@ def _solve_rates(c, t):
         multiply_rates(graph, f.rows, f.poses, f.b)
         if rheonomic:
             add_to(l.drift, f.b)
-        worst = largest_residual(graph, w, f)
+        worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE
         if worst <= floor or (worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):

@@ -197,7 +197,7 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
             evaluate_rows(graph, system, f, f.rows, t)
         else:
             evaluate_residuals(graph, system, f, t)
-        worst = largest_residual(graph, w, f)
+        worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE
         slow = worst > SLOW * before
@@ -276,7 +276,7 @@ def solve_velocities(graph, system, w, f, l, t):
         if rheonomic:
             for e in range(f.b.size):
                 f.b[e] += l.drift[e]
-        worst = largest_residual(graph, w, f)
+        worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return False
         # Rounding; factors of S get no credit for a residual that has stopped falling

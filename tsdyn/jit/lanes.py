@@ -1,4 +1,4 @@
-"""Lanes: a number of several cases in one register; kernels run unchanged on their arrays; masks for branches."""
+"""Lanes: a number of several cases in one register; kernels run unchanged on their arrays."""
 
 import math
 import operator
@@ -12,13 +12,14 @@ from numba.extending import intrinsic, lower_builtin, lower_cast, models, regist
 from . import arrays
 from .arrays import joined, make_stacker, make_viewer
 from .kernels import kernel
+from .predicates import below, choose, floor, of_register
 from .resident import known_types
 from .simd import FOUR, spread
 
 # Lanes: a number of several cases in one register, and arrays of such numbers, on which kernels run unchanged.
 #
 # A kernel that is given arrays of lanes is compiled for them: its source is that of one case. What it compares or
-# branches on must be the same in all lanes, so numbers of lanes can't be compared.
+# branches on must be the same in all lanes, so numbers of lanes can't be compared but by masks (predicates.py).
 #
 #     lane_type(width)     of a number of so many cases        zeros(count, width)     an array of them, zero
 #     makers(width)        stack, vector, matrix, ... of them by the names of what they stand for in arrays.py
@@ -173,14 +174,6 @@ _operation("fmul", operator.mul, operator.imul)
 _operation("fdiv", operator.truediv, operator.itruediv)
 
 
-def of_register(builder, name, *values):
-    """A function that LLVM has for registers, of these."""
-    kind = values[0].type
-    wanted, full = ir.FunctionType(kind, [kind] * len(values)), f"llvm.{name}.v{kind.count}f64"
-    function = builder.module.globals.get(full) or ir.Function(builder.module, wanted, full)
-    return builder.call(function, values)
-
-
 def _of_registers(name, count, *functions):
     def generate(context, builder, signature, arguments):
         return of_register(builder, name, *arguments)
@@ -242,98 +235,12 @@ _one_by_one(math.atan2, 2, np.arctan2)
 _one_by_one(operator.pow, 2)
 
 
-# Masks: a truth value of each lane, and what is chosen by them; logarithms and exponentials of all lanes at once.
+# Logarithms and exponentials of all lanes at once.
 #
-# below(x, y)          x < y in each lane               choose(m, f, g)     f where the mask is set, g elsewhere
-# both(m, n), either(m, n), opposite(m)                 every(m), any_of(m)  of all lanes: a plain truth value
 # exponent(x), scaled(x, n)    n with 1 <= x / 2^n < 2, and x 2^n, x and n of lanes, n whole
 
 _i64 = ir.IntType(64)
 _MANTISSA, _BIAS = 52, 1023  # bits of a float's fraction; what is added to its exponent
-
-
-class Mask(types.Type):
-    """A truth value of each lane."""
-
-    def __init__(self, width):
-        self.width = width
-        super().__init__(name=f"Mask({width})")
-
-
-@register_model(Mask)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager, kind):
-        super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.width))
-
-
-@intrinsic
-def below(typing, x, y):
-    """Whether x < y, in each lane; one of them may be a plain number."""
-    kind = next(each.lane for each in (x, y) if isinstance(each, Lane))
-
-    def generate(context, builder, signature, arguments):
-        return builder.fcmp_ordered("<", *arguments)
-
-    return Mask(kind.width)(kind, kind), generate
-
-
-@intrinsic
-def choose(typing, mask, f, g):
-    """F in the lanes of the mask, g in the others: numbers, or three or four of them."""
-    kind = next((each for each in (f, g) if isinstance(each, FourLanes)), None)
-    kind = kind or next(each.lane for each in (f, g) if isinstance(each, Lane))
-
-    def generate(context, builder, signature, arguments):
-        mask, f, g = arguments
-        if isinstance(kind, Lane):
-            return builder.select(mask, f, g)
-        parts = [
-            builder.select(mask, builder.extract_value(f, i), builder.extract_value(g, i)) for i in range(kind.count)
-        ]
-        return joined(builder, parts)
-
-    return kind(mask, kind, kind), generate
-
-
-def _binary(name, what):
-    @intrinsic
-    def operation(typing, m, n):
-        def generate(context, builder, signature, arguments):
-            return getattr(builder, name)(*arguments)
-
-        return m(m, n), generate
-
-    operation.__doc__ = what
-    return operation
-
-
-both, either = _binary("and_", "Of two masks."), _binary("or_", "Of two masks.")
-
-
-@intrinsic
-def opposite(typing, m):
-    """The lanes that the mask leaves out."""
-
-    def generate(context, builder, signature, arguments):
-        return builder.not_(arguments[0])
-
-    return m(m), generate
-
-
-def _judged(sign, all_of, what):
-    @intrinsic
-    def operation(typing, m):
-        def generate(context, builder, signature, arguments):
-            bits = ir.IntType(m.width)
-            return builder.icmp_unsigned(sign, builder.bitcast(arguments[0], bits), bits(-1 if all_of else 0))
-
-        return types.boolean(m), generate
-
-    operation.__doc__ = what
-    return operation
-
-
-every, any_of = _judged("==", True, "Whether all lanes are set."), _judged("!=", False, "Whether any lane is set.")
 
 
 @intrinsic
@@ -361,16 +268,6 @@ def scaled(typing, x, n):
         return builder.fmul(value, power)
 
     return x.lane(x.lane, x.lane), generate
-
-
-@intrinsic
-def floor(typing, x):
-    """The largest whole number that is not above x."""
-
-    def generate(context, builder, signature, arguments):
-        return of_register(builder, "floor", arguments[0])
-
-    return x.lane(x.lane), generate
 
 
 @kernel

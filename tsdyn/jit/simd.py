@@ -176,20 +176,6 @@ def fma(typing, f, g, h):
 
 
 @intrinsic
-def less(typing, f, g, h):
-    """H - f g."""
-    kind = _fours(f, g, h)
-
-    def generate(context, builder, signature, arguments):
-        def subtract(f, g, h):
-            return builder.fsub(h, builder.fmul(f, g, flags=("contract",)), flags=("contract",))
-
-        return _each(builder, kind, subtract, arguments)
-
-    return kind(kind, kind, kind), generate
-
-
-@intrinsic
 def larger(typing, f, g):
     """The larger of |f| and g, one by one."""
     kind = _fours(f, g)
@@ -212,7 +198,8 @@ def _extract(place, what):
         kind = _fours(f)
 
         def generate(context, builder, signature, arguments):
-            return _parts(builder, kind, arguments[0])[place]
+            parts = _parts(builder, kind, arguments[0])
+            return parts[place] if place < len(parts) else ir.Constant(parts[0].type, [0.0] * parts[0].type.count)
 
         return number_type(f)(kind), generate
 

@@ -3,6 +3,7 @@
 import math
 
 from ..jit.kernels import kernel
+from ..jit.predicates import below, choose
 from ..jit.simd import first, fma, four, fourth, larger, second, splat, third, total
 from .tolerances import CONVERGED, ORTHOGONAL
 
@@ -242,13 +243,12 @@ def lu_solve(A, pivots, b, n):
 @kernel
 def largest_of(values, marked, weight):
     """As `largest`, where those that are marked with one count times a weight."""
-    worst = 0.0
+    worst = rest = 0.0 * weight
     for i in range(values.size):
+        # Not finite: 0 x is then no zero
         size = abs(values[i]) * (weight if marked[i] == 1.0 else 1.0)
-        if not size < math.inf:
-            return math.inf
-        worst = max(worst, size)
-    return worst
+        worst, rest = max(worst, size), rest + 0.0 * size
+    return choose(below(-1.0, rest), worst, math.inf)
 
 
 @kernel
@@ -262,7 +262,7 @@ def largest(values):
     rest = total(off)
     for i in range(fours, values.size):
         worst, rest = max(worst, abs(values[i])), rest + 0.0 * values[i]
-    return worst if rest == 0.0 else math.inf
+    return choose(below(-1.0, rest), worst, math.inf)
 
 
 # Products of dense matrices, over the nonzero entries of the first factor.

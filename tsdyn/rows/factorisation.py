@@ -9,7 +9,7 @@ diagonal block is read. The diagonal before elimination is stored after the pane
 """
 
 from ..jit.kernels import kernel, long_kernel
-from ..jit.predicates import or_one
+from ..jit.predicates import below, choose
 from ..jit.simd import get, let
 from .block_operations import eliminate, eliminate_lu, link, link_lu, subtract_products
 
@@ -26,7 +26,8 @@ def keep_diagonal(pattern, values):
     # Axis rows have negative pivots
     for i in range(pattern.negative.size):
         row = pattern.negative[i]
-        kept[row] = -or_one(abs(kept[row]))
+        size = abs(kept[row])
+        kept[row] = -choose(below(0.0, size), size, 1.0)
 
 
 @kernel

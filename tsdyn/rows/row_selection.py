@@ -7,7 +7,8 @@ import numpy as np
 
 from ..elements.loops.constraint_rows import POSE, R
 from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
-from ..jit.predicates import most
+from ..jit.predicates import below, choose, either, every, most
+from ..jit.simd import get
 from ..maths.tolerances import PIVOT_ROUNDING
 from .block_operations import eliminate, subtract_products
 from .constraint_graph import ConstraintGraph, no_graph
@@ -52,15 +53,16 @@ from .tolerances import (
 def weakest(graph, values):
     """Return the smallest pivot relative to its diagonal entry, axis rows excluded.
 
-    values are factors of S.
+    values are factors of S, of one case or of lanes.
     """
-    pattern, least = graph.pattern, 1.0
-    kept = values[pattern.shape[1] :]
+    first, least = graph.pattern.shape[1], 1.0
     for e in range(graph.diagonal.size):
         # Reciprocal pivot times diagonal entry; not a number counts as a vanishing pivot
-        share = values[graph.diagonal[e]] * kept[e]
-        if not share * least < 1.0 and not kept[e] < 0.0:
-            least = 1.0 / share
+        kept = get(values, first + e)
+        share = get(values, graph.diagonal[e]) * kept
+        strong = either(below(share * least, 1.0), below(kept, 0.0))
+        if not every(strong):
+            least = choose(strong, least, 1.0 / share)
     return least
 
 

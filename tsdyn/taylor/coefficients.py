@@ -126,18 +126,11 @@ def turn_ahead(bodies, at, orders, k, exact):
         y, v = fma(a2, w0, y), fma(a0, w2, v)
         z, w = fma(a0, w1, z), fma(a1, w0, w)
         o -= 4
-    o, f = at + 12 * (k + 1), splat(ONE_INTEGRAL[k, 0])
+    o, (f, _, low, _) = at + 12 * (k + 1), inverses(k, exact)
     # over k + 1
-    x, y, z = sub(x, u), sub(y, v), sub(z, w)
-    if exact:
-        low = splat(ONE_INTEGRAL[k, 1])
-        put(bodies, o, exact_product(x, f, low))
-        put(bodies, o + 4, exact_product(y, f, low))
-        put(bodies, o + 8, exact_product(z, f, low))
-    else:
-        put(bodies, o, times(x, f))
-        put(bodies, o + 4, times(y, f))
-        put(bodies, o + 8, times(z, f))
+    put_product(bodies, o, sub(x, u), f, low, exact)
+    put_product(bodies, o + 4, sub(y, v), f, low, exact)
+    put_product(bodies, o + 8, sub(z, w), f, low, exact)
 
 
 @kernel

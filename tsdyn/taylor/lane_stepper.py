@@ -1,111 +1,272 @@
-"""A Taylor step of every lane, as stepper.py makes one of one case: length, end, projection."""
+"""Lanes: Taylor steps of several cases at once, a case in each lane of SIMD registers, by the kernels of one case.
+
+Its own are what differs: memory, length and order of each lane's step, its end, and whether its case is left.
+"""
 
 import math
+from functools import cache
+from typing import NamedTuple
 
-from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R, orient
-from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
+import numpy as np
+
+from ..elements.element import address
+from ..elements.loops import constraint_rows, constraint_series, force_series, law_check, template
+from ..elements.loops.constraint_rows import OMEGA, POSE, RD
+from ..elements.loops.constraint_series import BODY_ROW
 from ..elements.loops.law_check import call_margin
-from ..formulations.tolerances import LAND_SWEEPS, STALLED, WALK
-from ..jit.kernels import kernel, long_kernel, specialised
-from ..jit.lanes import any_of, below, binary_log, binary_power, both, choose, either, every, floor, opposite
-from ..jit.simd import add, first, fma, four, fourth, get, larger, let, put, second, splat, sub, third, times, total
+from ..elements.markers import PARAMETERS
+from ..errors import InvalidConstraint, InvalidForce
+from ..formulations.projection import correct_positions, displace, largest_residual
+from ..formulations.tolerances import WALK
+from ..jit.compiled import Callback
+from ..jit.kernels import Record, kernel, loader, long_kernel, resident, specialised
+from ..jit.lanes import binary_log, binary_power, is_laned, makers, values_of, zeros
+from ..jit.predicates import any_of, below, both, choose, either, opposite
+from ..jit.simd import get, let
 from ..maths.tolerances import ROUNDING, ROUNDING_AT_MOST, TINY
+from ..model.packed import members_of
+from ..rows.constraint_graph import ConstraintGraph
 from ..rows.interface import (
     DYNAMICS,
     ILL_CONDITIONED,
-    evaluate_residuals,
+    Rows,
+    TangentWorkspace,
     evaluate_without_redundant,
     factorise_selected_rows,
-    find_correction,
+    singularity_indicator,
 )
 from ..runs.step_control import stretch
 from ..runs.tolerances import FROM_ZERO, HALVED, SHORTEST
-from . import coefficients
-from .coefficients import put_sum
-from .lane_memory import (
-    BAD,
-    BEFORE,
-    DONE,
-    FLOOR,
-    INDICATOR,
-    LEFT,
-    LOST,
-    MOVED,
-    NEXT,
-    RESIDUAL,
-    RUNS,
-    SIZE,
-    SLOW,
-    STEPS,
-    T_NEXT,
-    TOP,
-    H,
-    T,
-    spin,
-    turn_ahead,
+from ..workspaces import plain_context
+from .coefficients import begin, expand
+from .layout import Expansion, SeriesContext, empty_series
+from .step_end import Tops, keep_start, project_rates, sum_series
+from .step_length import size_of_order, weights
+from .tolerances import (
+    FAINT,
+    HALVINGS,
+    SMALL,
+    SMALL_STEPS,
+    STEP_COST,
+    STIFF_RATES,
+    STILL,
+    WARY,
 )
-from .layout import L_OMEGA, L_P, L_R, L_RD, LOW
-from .step_end import keep_start, project_rates
-from .step_length import largest_of_three, size_of_order
-from .tolerances import FAINT, HALVINGS, MOST_PARTS, SMALL, SMALL_STEPS, STEP_COST, STIFF_RATES, STILL, WARY, WIDE
+
+# Memory of a batch of lanes: the context of a run by series, its numbers arrays of lanes, and the state of each.
+
+# Rows of `LaneContext.state`: times (s) and sizes of each lane, and what is true of it (1.0) or not (0.0)
+(
+    T,  # of the last accepted point
+    H,  # of the step tried
+    T_NEXT,  # its end
+    TOP,  # order of omega' in this step
+    NEXT,  # in the next one
+    STEPS,  # accepted
+    SIZE,  # of the numbers that enter Phi, m
+    FLOOR,  # |Phi| that rounding leaves
+    INDICATOR,  # of singular configurations: its largest value in the run
+    SLOW,  # steps in a row in which little moves
+    WAITS,  # next output of `t_eval`
+    RUNS,  # whether a case is in the lane
+    BAD,  # whether the last projection has failed
+    LOST,  # whether its case is left to be run alone
+    RESIDUAL,  # the largest |Phi| that the last projection met
+    LEFT,  # margin of analyticity of the force laws along the step
+    ROWS,
+) = range(17)
+
+
+class LaneNumbers(Record):
+    """What lanes have in common."""
+
+    atol: float
+    rtol: float
+    t_start: float
+    t_end: float
+    max_step: float
+    first_step: float  # 0: of the driver's choice
+    first_top: int  # order of the first step
+    leave_when_stiff: int
+
+
+class LaneSystem(NamedTuple):
+    """Of a `System` what differs from case to case."""
+
+    gravity: np.ndarray
+    reals: np.ndarray
+
+
+class LaneContext(NamedTuple):
+    """All that the kernels of lanes use: of the types of `SeriesContext`, but with arrays of lanes."""
+
+    system: LaneSystem
+    graph: ConstraintGraph
+    tangent: TangentWorkspace
+    expansion: Expansion
+    numbers: LaneNumbers
+    state: np.ndarray  # (ROWS,) of lanes
+    single: np.ndarray  # (ROWS, width): the same numbers
+
+
+def laned(array, width, threes=False):
+    """An array of lanes, each with the numbers of an array of one case."""
+    out = zeros(array.size, width, threes)
+    values_of(out)[...] = array.reshape(-1, 1)
+    return out
+
+
+def lane_arrays(part):
+    """All arrays of lanes in a part of a `LaneContext`."""
+    if isinstance(part, tuple):
+        return [array for field in part for array in lane_arrays(field)]
+    return [part] if isinstance(part, np.ndarray) and is_laned(part) else []
+
+
+def lane_context(context, width):
+    """A `LaneContext` for the scene of a `SeriesContext`, without its series; loops are still those of one case."""
+    system, graph, f, x = context.system, context.graph, context.tangent, context.expansion
+
+    def of(part, names, threes=False):
+        return {name: laned(getattr(part, name), width, threes) for name in names.split()}
+
+    def room(part, names, threes=False):
+        return {name: zeros(getattr(part, name).size, width, threes) for name in names.split()}
+
+    rows = Rows(**room(f.rows, "H Y", True), **room(f.rows, "S"))
+    tangent = f._replace(**of(f, "poses"), **room(f, "b gamma a p"), **room(f, "Z", True), rows=rows)
+    expansion = x._replace(
+        **room(x, "bodies low_r2 constraints loads", True), **room(x, "low low_end start"),
+        places=x.places.copy(), forces=x.forces.copy(), order=type(x.order).from_buffer_copy(x.order),
+    )  # fmt: skip
+    A = values_of(expansion.bodies).reshape(-1, x.order.room * BODY_ROW, width)
+    A[:, [0, 5, 10]] = 1.0  # of what never turns
+    graph = graph._replace(kinds=graph.kinds.copy(), spins=graph.spins.copy(), **of(graph, "inverse mass", True))
+    state = zeros(ROWS, width)
+    system = LaneSystem(**of(system, "gravity reals"))
+    return LaneContext(system, graph, tangent, expansion, LaneNumbers(), state, values_of(state))
+
+
+@cache
+def lane_loader(width):
+    """What gives kernels sight of a `LaneContext` by its address."""
+    plain = plain_context()
+    one = SeriesContext(plain.system, plain.work, plain.graph, plain.tangent, empty_series(1, np.zeros(BODY_ROW)), None)
+    return loader(lane_context(one, width))
+
+
+# Loops over the instances of a kind, for lanes: copies of the templates with arrays of lanes in place of arrays.
+
+CONSTRAINT_LOOPS = {
+    "reduced": constraint_rows.reduced,
+    "values": constraint_rows.values,
+    "series": constraint_series.series,
+}
+FORCE_LOOPS = ("series", force_series.series), ("margin", law_check.margin)
+_NAMES = [name for name in vars(template) if name.isupper() or name.startswith("kernel_")]
+_known = {}  # (callback, width): that of lanes
+
+
+def _loop(one, loop, markers, width):
+    """The `Callback` that runs a kind for so many lanes, made of that for one case."""
+    if (one, width) not in _known:
+        function, threes = one.py_func, all(marker.code != PARAMETERS for marker in markers)
+        names = {name: function.__globals__[name] for name in _NAMES if name in function.__globals__}
+        names |= makers(width, threes)
+        copy = specialised(loop, f"{function.__qualname__}_{width}_lanes", function, **names)
+        _known[one, width] = Callback(copy, one.signature)
+    return _known[one, width]
+
+
+def constraint_loops(kinds, width):
+    """Addresses of the loops of constraints for lanes, (kinds, 3): reduced, values, series.
+
+    Raises InvalidConstraint where Numba can't compile one.
+    """
+    found = []
+    for kind in kinds:
+        own = {name: _loop(kind.kernels[name], loop, kind.markers, width) for name, loop in CONSTRAINT_LOOPS.items()}
+        found.append([address(own, name, kind.__name__, InvalidConstraint) for name in own])
+    return np.array(found, np.int64).reshape(-1, len(CONSTRAINT_LOOPS))
+
+
+def force_loops(packed, width):
+    """Addresses of the loops of forces for lanes, (kinds, 2), in the order of System.forces: series, margin or 0.
+
+    Raises InvalidForce where Numba can't compile one.
+    """
+    found = []
+    for row in packed.system.forces:
+        force = members_of(row, packed.loads)[0].force
+        loops = FORCE_LOOPS if force.positive else FORCE_LOOPS[:1]
+        own = {name: _loop(force.kernels[name], loop, force.markers, width) for name, loop in loops}
+        found.append([address(own, name, force.name, InvalidForce) if name in own else 0 for name, _ in FORCE_LOOPS])
+    return np.array(found, np.int64).reshape(-1, len(FORCE_LOOPS))
+
+
+# Memory of lanes, laid out once for the memory of one case that it is filled from.
+
+
+class LaneMemory:
+    """Arrays of lanes for the runs by series of a scene.
+
+    Parameters
+    ----------
+    series : Series
+    packed : Packed
+    memory : SeriesMemory
+        Of one case, laid out for a run: what it starts with is copied into lanes.
+    width : int
+    spinning : bool
+        Whether inertias differ, so that any body may have gyroscopic torques.
+
+    Attributes
+    ----------
+    where : int
+        Address of the `LaneContext`.
+    pairs : ndarray of int64 (k, 3)
+        Numbers of a case at its start: where they are in the memory of one case, where in lanes, how many.
+    arrays : ndarray of int64 (k, 3)
+        All arrays of lanes: where each is, where the numbers that each lane has at first, how many.
+    poses : ndarray (n, width)
+    """
+
+    def __init__(self, series, packed, memory, width, spinning):
+        one = memory.context
+        self.context = many = lane_context(one, width)
+        kinds, loops = many.graph.kinds, constraint_loops(series.kinds, width)
+        kinds["reduced"], kinds["values"], many.expansion.places["loop"] = loops.T
+        kinds["bias"] = kinds["drift"] = 0
+        many.expansion.forces["loop"], many.expansion.forces["margin"] = force_loops(packed, width).T
+        if spinning:
+            many.graph.spins[many.graph.bodies[:, 1] == 7] = 1
+        self._set_numbers(memory.run)
+        self.poses = values_of(many.tangent.poses)
+        self.where, *self._keep = resident(many)
+        pairs = [
+            (one.system.gravity, many.system.gravity),
+            (one.system.reals, many.system.reals),
+            (one.graph.inverse, many.graph.inverse),
+            (one.graph.mass, many.graph.mass),
+            (one.tangent.poses, many.tangent.poses),
+            *zip(one.tangent.rows, many.tangent.rows, strict=True),
+            (one.expansion.low_end, many.expansion.low),
+        ]
+        self.pairs = np.array([(a.ctypes.data, b.ctypes.data, a.size) for a, b in pairs], np.int64)
+        arrays = [(array, values_of(array)[:, 0].copy()) for array in lane_arrays(many)]
+        self.arrays = np.array([(a.ctypes.data, image.ctypes.data, a.size) for a, image in arrays], np.int64)
+        self._keep += arrays
+
+    def _set_numbers(self, run):
+        clock, numbers = run.clock, self.context.numbers
+        numbers.atol, numbers.rtol = clock.atol, clock.rtol
+        numbers.max_step, numbers.first_step = clock.max_step, clock.h
+        numbers.t_start, numbers.t_end = clock.t_origin, clock.t_end
+        numbers.first_top = self.context.expansion.order.next
+        numbers.leave_when_stiff = run.numbers.leave_when_stiff
+
 
 # Projection of each lane onto the constraint manifold, as formulations/projection.py has it for one case.
-#
-# A lane that has landed is left as it is while others are still corrected, so none depends on its neighbours.
-
-
-@kernel
-def _is(c, i):
-    """The lanes of which it is true."""
-    return below(0.5, get(c.state, i))
-
-
-@kernel
-def _set(c, i, mask):
-    let(c.state, i, choose(mask, 1.0, get(c.state, i)))
-
-
-@kernel
-def _largest_residual(c):
-    """The largest |b|; infinity where an entry is not finite. In small scenes pure numbers count times the lever."""
-    b, turns, floor = c.tangent.b, c.graph.turns, get(c.state, FLOOR)
-    worst = rest = 0.0 * floor
-    for e in range(b.size):
-        # Not finite: 0 x is then no zero
-        size = abs(get(b, e))
-        if turns.size > 0 and turns[e] == 1.0:
-            size *= min(floor / ROUNDING, 1.0)
-        worst, rest = max(worst, size), rest + 0.0 * size
-    return choose(below(-1.0, rest), worst, math.inf)
-
-
-@long_kernel
-def _displace(c, mask):
-    """Displace the bodies by the smallest correction of the residuals b, in the lanes of the mask."""
-    graph, f = c.graph, c.tangent
-    find_correction(graph, f.rows, f.b, f.Z)
-    moved = get(c.state, MOVED)
-    for b in range(graph.bodies.shape[0]):
-        at, o = b * POSE, 8 * b
-        # Largest component of the displacement, lane by lane
-        dr, turn = four(f.Z, o), four(f.Z, o + 4)
-        for i in range(3):
-            moved = max(moved, max(abs(get(f.Z, o + i)), abs(get(f.Z, o + 4 + i))))
-        put(f.poses, at + R, choose(mask, add(four(f.poses, at + R), dr), four(f.poses, at + R)))
-        if graph.bodies[b, 1] == 7:
-            # Lanes outside of the mask keep their pose
-            x, y, z = 0.5 * first(turn), 0.5 * second(turn), 0.5 * third(turn)
-            p = four(f.poses, at + P)
-            e0, e1, e2, e3 = first(p), second(p), third(p), fourth(p)
-            p0 = e0 - e1 * x - e2 * y - e3 * z  # p <- p o (1, dpi' / 2)
-            p1 = e1 + e0 * x - e3 * y + e2 * z
-            p2 = e2 + e3 * x + e0 * y - e1 * z
-            p3 = e3 - e2 * x + e1 * y + e0 * z
-            scale = 1.0 / math.sqrt(p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)
-            e0, e1 = choose(mask, p0 * scale, e0), choose(mask, p1 * scale, e1)
-            e2, e3 = choose(mask, p2 * scale, e2), choose(mask, p3 * scale, e3)
-            orient(f.poses, at, e0, e1, e2, e3)
-    let(c.state, MOVED, choose(mask, moved, get(c.state, MOVED)))
 
 
 @long_kernel
@@ -117,212 +278,21 @@ def _factorise(c):
 @long_kernel
 def land(c):
     """Project positions onto the manifold; H, Y and the factors of S are those of the result. Sets BAD and RESIDUAL."""
-    s, floor = c.state, get(c.state, FLOOR)
-    # Numbers of lanes begin with 0.0 * floor, an array of the right width
-    let(s, RESIDUAL, 0.0 * floor)
-    let(s, MOVED, 0.0 * floor)
-    let(s, DONE, 0.0 * floor)
-    let(s, BEFORE, 0.0 * floor + math.inf)
-    for sweep in range(LAND_SWEEPS):
-        if sweep == 0:
-            _factorise(c)
-        else:
-            evaluate_residuals(c.graph, c.system, c.tangent, 0.0)
-        # Lanes that are still corrected
-        worst, active = _largest_residual(c), opposite(_is(c, DONE))
-        let(s, RESIDUAL, choose(active, max(get(s, RESIDUAL), worst), get(s, RESIDUAL)))
-        # Converged, or falling no more; failed if that is above rounding
-        ends = opposite(both(below(floor, worst), opposite(below(STALLED * get(s, BEFORE), worst))))
-        fails = both(ends, below(ROUNDING_AT_MOST * floor, worst))
-        _set(c, BAD, both(active, either(fails, opposite(below(worst, math.inf)))))
-        _set(c, DONE, ends)
-        _set(c, DONE, opposite(below(worst, math.inf)))
-        if every(_is(c, DONE)):
-            break
-        # The others take one more correction
-        goes_on = opposite(_is(c, DONE))
-        let(s, BEFORE, choose(goes_on, worst, get(s, BEFORE)))
-        _displace(c, goes_on)
-    # Sweeps are used up
-    _set(c, BAD, opposite(_is(c, DONE)))
+    graph, f, floor = c.graph, c.tangent, get(c.state, FLOOR)
+    _factorise(c)
+    residual, _, _, failed = correct_positions(graph, c.system, f, 0.0, floor)
+    let(c.state, RESIDUAL, residual)
+    let(c.state, BAD, choose(failed, 1.0, 0.0 * floor))
     # H and S of the result serve velocities and the next step
     _factorise(c)
-    walks = below(WALK * floor, _largest_residual(c))
+    walks = below(WALK * floor, largest_residual(graph, f, floor))
     if any_of(walks):
-        _displace(c, walks)
-
-
-# State at the end of each lane's step: sums of the series, as taylor/step_end.py has them for one case.
-#
-# Each lane has its own order and length of step: coefficients above its order count as zero.
-
-
-@kernel
-def _coefficient(array, i, k, least, top):
-    """Coefficient k of a series, at array[i]: zero in the lanes whose top is below k; least is the lowest top."""
-    f = four(array, i)
-    return f if k <= least else choose(below(k - 0.5, top), f, splat(0.0 * top))
-
-
-@long_kernel
-def sum_series(c, h, least, most):
-    """The poses at h, of lanes, after orders up to TOP; least and most are those of all lanes."""
-    graph, x, poses, s = c.graph, c.expansion, c.tangent.poses, splat(h)
-    bodies, low, orders, top = x.bodies, x.low, x.order.room, get(c.state, TOP)
-    for b in range(graph.bodies.shape[0]):
-        # Horner's scheme for r and rd together; orders above a lane's own count as zero
-        first, at, l = b * orders * BODY_ROW, b * POSE, LOW * b
-        o, zero = first + S_R * orders, splat(0.0 * h)
-        v, f, fd = four(bodies, o + 4), zero, zero
-        for k in range(most + 1, 1, -1):  # r = r_0 + h (v + h f),  rd = v + h (2 f + h fd)
-            fd = fma(fd, s, f)
-            f = fma(f, s, _coefficient(bodies, o + 4 * k, k, least + 1, top + 1.0))
-        # What the state lacks to rounding moves with it
-        rest = fma(four(x.low_r2, 4 * b), s, four(low, l + L_RD))
-        change = times(add(v, fma(f, s, rest)), s)
-        put_sum(poses, at + R, four(bodies, o), add(change, four(low, l + L_R)), x.low_end, l + L_R)
-        change = times(fma(fd, s, add(f, f)), s)
-        put_sum(poses, at + RD, v, add(change, fma(four(x.low_r2, 4 * b), s, rest)), x.low_end, l + L_RD)
-        if graph.bodies[b, 1] == 7:
-            # omega'
-            w, o = zero, first + S_OMEGA * orders
-            for k in range(most, 0, -1):
-                w = fma(w, s, _coefficient(bodies, o + 4 * k, k, least, top))
-            change = fma(w, s, four(low, l + L_OMEGA))
-            put_sum(poses, at + OMEGA, four(bodies, o), change, x.low_end, l + L_OMEGA)
-            # Angle of the step, rad
-            fast = 0.0 * h
-            for i in range(3):
-                fast = max(fast, max(abs(get(bodies, o + i)), abs(get(poses, at + OMEGA + i))))
-            parts = floor(min(fast * abs(h), MOST_PARTS)) + 1.0  # in which p is followed: it and -p are the same A
-            _turn(c, b, h, parts, least, most)
-
-
-@kernel
-def _sum_columns(c, first, until, h, least, most):
-    """Columns of sum_{k >= until} A_k h^(k - until), of the body whose series begins at `first`."""
-    x, top = c.expansion, get(c.state, TOP) + 1.0
-    bodies, s = x.bodies, splat(h)
-    u = v = w = splat(0.0 * h)
-    for k in range(most + 1, until - 1, -1):
-        i = first + 12 * k
-        u = fma(u, s, _coefficient(bodies, i, k, least + 1, top))
-        v = fma(v, s, _coefficient(bodies, i + 4, k, least + 1, top))
-        w = fma(w, s, _coefficient(bodies, i + 8, k, least + 1, top))
-    return u, v, w
-
-
-@kernel
-def _turn(c, b, h, parts, least, most):
-    """A and p of body b at h: from the rotation of the step where it is narrow, else from A(h)."""
-    x, poses, at = c.expansion, c.tangent.poses, b * POSE
-    first, l = b * x.order.room * BODY_ROW, LOW * b + L_P
-    # A_0^T A(h) = I + h A_0^T sum_{k>0} A_k h^(k-1)
-    u, v, w = _sum_columns(c, first, 1, h, least, most)
-    i, j, k = four(x.bodies, first), four(x.bodies, first + 4), four(x.bodies, first + 8)
-    square = 1.0 + 0.25 * h * total(fma(i, u, fma(j, v, times(k, w))))  # d0^2
-    narrow = both(below(WIDE, square), below(parts, 1.5))
-    # d0^2 from the trace, d from the skew part
-    if any_of(narrow):
-        d0 = math.sqrt(max(square, WIDE))
-        f = 0.25 * h / d0
-        d1, d2 = f * total(sub(times(k, v), times(j, w))), f * total(sub(times(i, w), times(k, u)))
-        d3 = f * total(sub(times(j, u), times(i, v)))
-        d0 = -(d1 * d1 + d2 * d2 + d3 * d3) / (1.0 + d0)  # d0 - 1
-        _compose(c, b, d0, d1, d2, d3)
-    # Wide rotations: p from A(h), followed on the way
-    if not every(narrow):
-        e0, e1, e2, e3 = _follow(c, first, b, h, parts, least, most)
-        let(poses, at + P, choose(narrow, get(poses, at + P), e0))
-        let(poses, at + P + 1, choose(narrow, get(poses, at + P + 1), e1))
-        let(poses, at + P + 2, choose(narrow, get(poses, at + P + 2), e2))
-        let(poses, at + P + 3, choose(narrow, get(poses, at + P + 3), e3))
-        for n in range(4):
-            let(x.low_end, l + n, choose(narrow, get(x.low_end, l + n), 0.0))
-    orient(poses, at, get(poses, at + P), get(poses, at + P + 1), get(poses, at + P + 2), get(poses, at + P + 3))
-
-
-@long_kernel
-def _compose(c, b, d0, d1, d2, d3):
-    """p + low = p_0 o (1 + d0, d) of body b, of unit length."""
-    x, poses, p, at, l = c.expansion, c.tangent.poses, c.tangent.p, b * POSE, LOW * b + L_P
-    e0, e1, e2, e3 = get(x.start, 4 * b), get(x.start, 4 * b + 1), get(x.start, 4 * b + 2), get(x.start, 4 * b + 3)
-    # p = p_0 + p_0 o (d0 - 1, d), added with compensation
-    let(p, 0, e0 * d0 - e1 * d1 - e2 * d2 - e3 * d3)
-    let(p, 1, e1 * d0 + e0 * d1 - e3 * d2 + e2 * d3)
-    let(p, 2, e2 * d0 + e3 * d1 + e0 * d2 - e1 * d3)
-    let(p, 3, e3 * d0 - e2 * d1 + e1 * d2 + e0 * d3)
-    put_sum(poses, at + P, four(x.start, 4 * b), add(four(p, 0), four(x.low, l)), x.low_end, l)
-    # Of unit length again: (1 - p.p) / 2 of p
-    off = 1.0
-    for n in range(4):
-        off -= get(poses, at + P + n) * get(poses, at + P + n)
-    change = fma(four(poses, at + P), splat(0.5 * off), four(x.low_end, l))
-    put_sum(poses, at + P, four(poses, at + P), change, x.low_end, l)
-
-
-@long_kernel
-def _follow(c, first, b, h, parts, least, most):
-    """p of body b at h, followed in so many parts of the step."""
-    x, i = c.expansion, 1
-    e0, e1, e2, e3 = get(x.start, 4 * b), get(x.start, 4 * b + 1), get(x.start, 4 * b + 2), get(x.start, 4 * b + 3)
-    while True:
-        # Lanes with fewer parts stay at their end
-        on = below(i - 0.5, parts)
-        if not any_of(on):
-            return e0, e1, e2, e3
-        u, v, w = _sum_columns(c, first, 0, h * i / parts, least, most)
-        f0, f1, f2, f3 = _parameters(u, v, w, c.tangent.p, e0, e1, e2, e3)
-        e0, e1, e2, e3 = choose(on, f0, e0), choose(on, f1, e1), choose(on, f2, e2), choose(on, f3, e3)
-        i += 1
-
-
-@kernel
-def _parameters(u, v, w, p, e0, e1, e2, e3):
-    """Euler parameters of the matrix with columns u, v, w, on the side of e0 to e3; from the largest of the four."""
-    # Entries of the matrix
-    put(p, 0, u)
-    a, u1, u2 = get(p, 0), get(p, 1), get(p, 2)
-    put(p, 0, v)
-    v0, b, v2 = get(p, 0), get(p, 1), get(p, 2)
-    put(p, 0, w)
-    w0, w1, c = get(p, 0), get(p, 1), get(p, 2)
-    # 4 e0 e, 4 e_i e_j and 4 e_i^2
-    x, y, z = v2 - w1, w0 - u2, u1 - v0
-    d, e, f = w1 + v2, u2 + w0, v0 + u1
-    f0, f1, f2, f3 = 1.0 + a + b + c, 1.0 + a - b - c, 1.0 - a + b - c, 1.0 - a - b + c
-    largest = max(max(f0, f1), max(f2, f3))
-    # The first of the largest ones
-    m0, m1, m2 = opposite(below(f0, largest)), opposite(below(f1, largest)), opposite(below(f2, largest))
-    p0 = choose(m0, f0, choose(m1, x, choose(m2, y, z)))
-    p1 = choose(m0, x, choose(m1, f1, choose(m2, f, e)))
-    p2 = choose(m0, y, choose(m1, f, choose(m2, f2, d)))
-    p3 = choose(m0, z, choose(m1, e, choose(m2, d, f3)))
-    scale = 1.0 / math.sqrt(p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)
-    # p and -p are the same orientation
-    scale = choose(below(p0 * e0 + p1 * e1 + p2 * e2 + p3 * e3, 0.0), -scale, scale)
-    return p0 * scale, p1 * scale, p2 * scale, p3 * scale
+        displace(graph, f, walks)
 
 
 # Length and order of each lane's next step, as taylor/step_length.py has them for one case.
 #
 # Logarithms to base 2 throughout: the radius of convergence is the least of -log2(size_k) / k over the last orders k.
-
-
-@kernel
-def weights(c):
-    """Set the floors of Phi; weights of the coefficients of r and of omega', and 1 + the largest rate, of each lane."""
-    x, nb, orders, n = c.expansion, c.graph.bodies.shape[0], c.expansion.order.room, c.numbers
-    far, fast, speed = splat(0.0), splat(0.0), splat(0.0)
-    for b in range(nb):
-        # Largest r, omega' and rd
-        at = b * orders * BODY_ROW
-        far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
-        speed = larger(four(x.bodies, at + S_R * orders + 4), speed)
-    far, fast, tol = largest_of_three(far), largest_of_three(fast), n.atol + n.rtol
-    let(c.state, FLOOR, ROUNDING * (get(c.state, SIZE) + far))
-    rate = 1.0 + max(fast, largest_of_three(speed))
-    return tol / (n.atol + n.rtol * far), tol / (n.atol + n.rtol * fast), rate
 
 
 @kernel
@@ -365,7 +335,8 @@ def _held(h, rate, k):
 def propose(c, least, most):
     """Set H and NEXT of each lane; least and most are the least and the highest TOP."""
     n, s, top, order = c.numbers, c.state, get(c.state, TOP), c.expansion.order
-    far, fast, rate = weights(c)
+    far, fast, rate, reach = weights(c.graph, c.expansion, n.atol, n.rtol)
+    let(s, FLOOR, ROUNDING * (get(s, SIZE) + reach))
     rho, lower = _radii(c, least, most, far, fast)
     # log2 of tol
     accuracy = math.log(n.atol + n.rtol) / math.log(2.0)
@@ -386,10 +357,6 @@ def propose(c, least, most):
 #
 # Each lane has its own time, order and length of step. All are expanded to the highest order among them, tried and
 # projected together. A lane that can't go on as any other is LOST: its case is to be run alone, from its start.
-
-_OWN = {"turn_ahead": turn_ahead, "spin": spin}
-begin = long_kernel(specialised(coefficients.begin.py_func, "begin_lanes", coefficients.begin.py_func, **_OWN))
-expand = long_kernel(specialised(coefficients.expand.py_func, "expand_lanes", coefficients.expand.py_func, **_OWN))
 
 
 @kernel
@@ -432,7 +399,8 @@ def _set_ends(c):
 @long_kernel
 def reach(c, least, most):
     """The state of each lane at H, on the manifold. BAD where there is none."""
-    sum_series(c, get(c.state, H), least, most)
+    tops = Tops(least, most, get(c.state, TOP))
+    sum_series(c.graph, c.expansion, get(c.state, H), tops, c.tangent.poses, c.tangent.p)
     land(c)
     project_rates(c.graph, c.tangent, c.expansion.low_end, False)
 
@@ -492,17 +460,6 @@ def try_step(c):
     return least, most
 
 
-@kernel
-def _weakest(c):
-    """The singularity indicator of each lane: the smallest pivot relative to its diagonal entry."""
-    values, graph = c.tangent.rows.S, c.graph
-    least, kept = 1.0 + 0.0 * get(c.state, T), graph.pattern.shape[1]
-    for e in range(graph.diagonal.size):
-        share = get(values, graph.diagonal[e]) * get(values, kept + e)
-        least = choose(below(share * least, 1.0), least, 1.0 / share)
-    return least
-
-
 @long_kernel
 def accept(c):
     """The end of each lane's step is where its next one begins; LOST where that is not like any other."""
@@ -520,7 +477,7 @@ def accept(c):
         _find_lost(c, below(SMALL_STEPS - 0.5, get(s, SLOW)))
     _find_lost(c, opposite(below(-1.0, rest)))
     # Near a singular configuration a case is run alone
-    indicator = _weakest(c)
+    indicator = singularity_indicator(c.graph, c.tangent.rows)
     _find_lost(c, opposite(below(max(ILL_CONDITIONED, WARY * get(s, INDICATOR)), indicator)))
     let(s, INDICATOR, max(get(s, INDICATOR), indicator))
     # The state moves on
@@ -528,4 +485,3 @@ def accept(c):
     let(s, STEPS, get(s, STEPS) + 1.0)
     for i in range(x.low.size):
         let(x.low, i, get(x.low_end, i))
-    c.numbers.steps += 1

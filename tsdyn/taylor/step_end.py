@@ -10,12 +10,13 @@ whose rounding errors are in proportion to its angle; after more than about a ra
 """
 
 import math
+from typing import NamedTuple
 
-from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R, orient, set_pose
+from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R, orient
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
-from ..formulations.projection import normalise
-from ..jit.kernels import kernel
-from ..jit.simd import add, fma, four, put, splat, sub, times, total
+from ..jit.kernels import kernel, long_kernel
+from ..jit.predicates import any_of, below, both, choose, every, floor, within
+from ..jit.simd import add, fma, four, get, let, put, splat, sub, times, total
 from ..rows.interface import find_correction, multiply_rates
 from .coefficients import put_sum
 from .layout import L_OMEGA, L_P, L_R, L_RD, LOW
@@ -29,21 +30,42 @@ def keep_start(graph, poses, start):
         put(start, 4 * b, four(poses, b * POSE + P))
 
 
+class Tops(NamedTuple):
+    """Highest orders of omega' in a step; those of r and A are one more."""
+
+    least: int  # of all lanes
+    most: int
+    own: int  # of each lane; of one case all three are the same
+
+
 @kernel
-def sum_series(graph, x, h, poses, p):
+def tops_of(x):
+    """Those of one case."""
+    return Tops(x.order.top, x.order.top, x.order.top)
+
+
+@kernel
+def _coefficient(array, i, k, tops):
+    """Coefficient k of r or A, at array[i]: zero in lanes of a lower order."""
+    f = four(array, i)
+    return f if k <= tops.least + 1 else choose(within(k - 1, tops.own), f, splat(0.0))
+
+
+@kernel
+def sum_series(graph, x, h, tops, poses, p):
     """The poses at h: A and r from coefficients up to top + 1, omega' up to top. A is made orthogonal by way of p.
 
-    What the sums lose to rounding is x.low_end. x is an `Expansion`.
+    What the sums lose to rounding is x.low_end. x is an `Expansion`; h and tops are of one case or of lanes.
     """
-    s, bodies, low, orders, top = splat(h), x.bodies, x.low, x.order.room, x.order.top
+    s, bodies, low, orders, most = splat(h), x.bodies, x.low, x.order.room, tops.most
     for b in range(graph.bodies.shape[0]):
         # Horner's scheme for r and rd together
         first, at, l = b * orders * BODY_ROW, b * POSE, LOW * b
         o = first + S_R * orders
-        v, f, fd = four(bodies, o + 4), four(bodies, o + 4 * (top + 1)), splat(0.0)
-        for k in range(top, 1, -1):  # r = r_0 + h (v + h f),  rd = v + h (2 f + h fd)
+        v, f, fd = four(bodies, o + 4), _coefficient(bodies, o + 4 * (most + 1), most + 1, tops), splat(0.0)
+        for k in range(most, 1, -1):  # r = r_0 + h (v + h f),  rd = v + h (2 f + h fd)
             fd = fma(fd, s, f)
-            f = fma(f, s, four(bodies, o + 4 * k))
+            f = fma(f, s, _coefficient(bodies, o + 4 * k, k, tops))
         # What the state lacks to rounding moves with it
         rest = fma(four(x.low_r2, 4 * b), s, four(low, l + L_RD))
         change = times(add(v, fma(f, s, rest)), s)
@@ -53,25 +75,46 @@ def sum_series(graph, x, h, poses, p):
         if graph.bodies[b, 1] == 7:
             # omega'
             w, o = splat(0.0), first + S_OMEGA * orders
-            for k in range(top, 0, -1):
-                w = fma(w, s, four(bodies, o + 4 * k))
+            for k in range(most, 0, -1):
+                w = fma(w, s, _coefficient(bodies, o + 4 * k, k + 1, tops))
             change = fma(w, s, four(low, l + L_OMEGA))
             put_sum(poses, at + OMEGA, four(bodies, o), change, x.low_end, l + L_OMEGA)
             # Angle of the step, rad; in parts of one radian p can't change its sign unnoticed
-            fast = 0.0  # where it may turn far, p is followed on the way: it and -p are the same A
+            fast = 0.0
             for i in range(3):
-                fast = max(fast, max(abs(bodies[o + i]), abs(poses[at + OMEGA + i])))
-            parts = int(min(fast * abs(h), MOST_PARTS)) + 1
-            if parts == 1 and _rotate(bodies, first, top, h, poses, at, x, b, p):
-                continue
-            put(x.low_end, l + L_P, splat(0.0))
-            # A at the end of each part, and p from it
-            for i in range(1, parts + 1):
-                _sum_rotation(bodies, first, top, h * i / parts, poses, at)
-                _parameters(poses, at, p)
-                for j in range(4):
-                    poses[at + P + j] = p[j]
-            set_pose(poses, at, p)
+                fast = max(fast, max(abs(get(bodies, o + i)), abs(get(poses, at + OMEGA + i))))
+            _turn(x, b, h, floor(min(fast * abs(h), MOST_PARTS)) + 1.0, tops, poses, p)
+
+
+@kernel
+def _turn(x, b, h, parts, tops, poses, p):
+    """A and p of body b at h: from the rotation of the step where it is narrow, else from A(h)."""
+    at, l = b * POSE, LOW * b + L_P
+    narrow = below(parts, 1.5)
+    if any_of(narrow):
+        # A_0^T A(h) = I + h A_0^T sum_{k>0} A_k h^(k-1)
+        first = b * x.order.room * BODY_ROW
+        u, v, w = _sum_columns(x, b, 1, h, tops)
+        i, j, k = four(x.bodies, first), four(x.bodies, first + 4), four(x.bodies, first + 8)
+        square = 1.0 + 0.25 * h * total(fma(i, u, fma(j, v, times(k, w))))  # d0^2
+        narrow = both(narrow, below(WIDE, square))
+        if any_of(narrow):
+            # d0^2 from the trace, d from the skew part
+            d0 = math.sqrt(max(square, WIDE))
+            f = 0.25 * h / d0
+            d1, d2 = f * total(sub(times(k, v), times(j, w))), f * total(sub(times(i, w), times(k, u)))
+            d3 = f * total(sub(times(j, u), times(i, v)))
+            d0 = -(d1 * d1 + d2 * d2 + d3 * d3) / (1.0 + d0)  # d0 - 1
+            _compose(x, b, d0, d1, d2, d3, poses, p)
+    # Wide rotations: p from A at the end of each part, on the side of the one before; p and -p are the same A
+    if not every(narrow):
+        e0, e1, e2, e3 = _follow(x, b, h, parts, tops, p)
+        let(poses, at + P, choose(narrow, get(poses, at + P), e0))
+        let(poses, at + P + 1, choose(narrow, get(poses, at + P + 1), e1))
+        let(poses, at + P + 2, choose(narrow, get(poses, at + P + 2), e2))
+        let(poses, at + P + 3, choose(narrow, get(poses, at + P + 3), e3))
+        put(x.low_end, l, choose(narrow, four(x.low_end, l), splat(0.0)))
+    orient(poses, at, get(poses, at + P), get(poses, at + P + 1), get(poses, at + P + 2), get(poses, at + P + 3))
 
 
 @kernel
@@ -97,81 +140,79 @@ def project_rates(graph, f, low, drifting):
 
 
 @kernel
-def _sum_columns(bodies, first, top, least, h):
-    """Columns of sum_{k >= least} A_k h^(k - least)."""
-    s, c = splat(h), first + 12 * (top + 1)
-    x, y, z = four(bodies, c), four(bodies, c + 4), four(bodies, c + 8)
-    for k in range(top, least - 1, -1):
+def _sum_columns(x, b, until, h, tops):
+    """Columns of sum_{k >= until} A_k h^(k - until) of body b."""
+    s, bodies, first = splat(h), x.bodies, b * x.order.room * BODY_ROW
+    top = tops.most + 1
+    c = first + 12 * top
+    u, v = _coefficient(bodies, c, top, tops), _coefficient(bodies, c + 4, top, tops)
+    w = _coefficient(bodies, c + 8, top, tops)
+    for k in range(tops.most, until - 1, -1):
         c = first + 12 * k
-        x = fma(x, s, four(bodies, c))
-        y = fma(y, s, four(bodies, c + 4))
-        z = fma(z, s, four(bodies, c + 8))
-    return x, y, z
+        u = fma(u, s, _coefficient(bodies, c, k, tops))
+        v = fma(v, s, _coefficient(bodies, c + 4, k, tops))
+        w = fma(w, s, _coefficient(bodies, c + 8, k, tops))
+    return u, v, w
 
 
 @kernel
-def _sum_rotation(bodies, first, top, h, poses, at):
-    """A at h."""
-    x, y, z = _sum_columns(bodies, first, top, 0, h)
-    put(poses, at, x)
-    put(poses, at + 4, y)
-    put(poses, at + 8, z)
-
-
-@kernel
-def _rotate(bodies, first, top, h, poses, at, x, b, p):  # nine: the series, the pose, the body, scratch
-    """A and p of body b at h, p + low = p_0 o (d0, d); False if the rotation since the start is too wide."""
-    # A_0^T A(h) = I + h A_0^T sum_{k>0} A_k h^(k-1)
-    u, v, w = _sum_columns(bodies, first, top, 1, h)
-    i, j, k = four(bodies, first), four(bodies, first + 4), four(bodies, first + 8)
-    square = 1.0 + 0.25 * h * total(fma(i, u, fma(j, v, times(k, w))))  # d0^2
-    if not square > WIDE:
-        return False
-    # d0^2 from the trace, d from the skew part
-    d0 = math.sqrt(square)
-    f = 0.25 * h / d0
-    d1, d2 = f * total(sub(times(k, v), times(j, w))), f * total(sub(times(i, w), times(k, u)))
-    d3 = f * total(sub(times(j, u), times(i, v)))
-    d0 = -(d1 * d1 + d2 * d2 + d3 * d3) / (1.0 + d0)  # d0 - 1
-    # p = p_0 + p_0 o (d0 - 1, d)
-    e0, e1, e2, e3 = x.start[4 * b], x.start[4 * b + 1], x.start[4 * b + 2], x.start[4 * b + 3]
-    p[0] = e0 * d0 - e1 * d1 - e2 * d2 - e3 * d3
-    p[1] = e1 * d0 + e0 * d1 - e3 * d2 + e2 * d3
-    p[2] = e2 * d0 + e3 * d1 + e0 * d2 - e1 * d3
-    p[3] = e3 * d0 - e2 * d1 + e1 * d2 + e0 * d3
-    # added to p_0 with compensation
-    l = LOW * b + L_P
+def _compose(x, b, d0, d1, d2, d3, poses, p):
+    """p + low = p_0 o (1 + d0, d) of body b, of unit length."""
+    at, l = b * POSE, LOW * b + L_P
+    e0, e1, e2, e3 = get(x.start, 4 * b), get(x.start, 4 * b + 1), get(x.start, 4 * b + 2), get(x.start, 4 * b + 3)
+    # p = p_0 + p_0 o (d0, d), added with compensation
+    let(p, 0, e0 * d0 - e1 * d1 - e2 * d2 - e3 * d3)
+    let(p, 1, e1 * d0 + e0 * d1 - e3 * d2 + e2 * d3)
+    let(p, 2, e2 * d0 + e3 * d1 + e0 * d2 - e1 * d3)
+    let(p, 3, e3 * d0 - e2 * d1 + e1 * d2 + e0 * d3)
     put_sum(poses, at + P, four(x.start, 4 * b), add(four(p, 0), four(x.low, l)), x.low_end, l)
     # Of unit length again: (1 - p.p) / 2 of p
     off = 1.0
     for n in range(4):
-        off -= poses[at + P + n] * poses[at + P + n]
+        off -= get(poses, at + P + n) * get(poses, at + P + n)
     change = fma(four(poses, at + P), splat(0.5 * off), four(x.low_end, l))
     put_sum(poses, at + P, four(poses, at + P), change, x.low_end, l)
-    orient(poses, at, poses[at + P], poses[at + P + 1], poses[at + P + 2], poses[at + P + 3])
-    return True
+
+
+@long_kernel
+def _follow(x, b, h, parts, tops, p):
+    """p of body b at h, followed in so many parts of the step."""
+    i = 1
+    e0, e1, e2, e3 = get(x.start, 4 * b), get(x.start, 4 * b + 1), get(x.start, 4 * b + 2), get(x.start, 4 * b + 3)
+    while True:
+        # Lanes with fewer parts stay at their end
+        on = below(i - 0.5, parts)
+        if not any_of(on):
+            return e0, e1, e2, e3
+        u, v, w = _sum_columns(x, b, 0, h * i / parts, tops)
+        f0, f1, f2, f3 = _parameters(u, v, w, p, e0, e1, e2, e3)
+        e0, e1, e2, e3 = choose(on, f0, e0), choose(on, f1, e1), choose(on, f2, e2), choose(on, f3, e3)
+        i += 1
 
 
 @kernel
-def _parameters(poses, at, p):
-    """Euler parameters of the matrix at poses[at], on the side of those there were; from the largest of the four."""
-    # 4 e_i^2 from the diagonal, 4 e_i e_j from sums and differences beside it
-    a, b, c = poses[at], poses[at + 5], poses[at + 10]  # the diagonal
-    x, y, z = poses[at + 6] - poses[at + 9], poses[at + 8] - poses[at + 2], poses[at + 1] - poses[at + 4]
-    u, v, w = poses[at + 9] + poses[at + 6], poses[at + 2] + poses[at + 8], poses[at + 4] + poses[at + 1]
-    e0, e1, e2, e3 = 1.0 + a + b + c, 1.0 + a - b - c, 1.0 - a + b - c, 1.0 - a - b + c
-    largest = max(max(e0, e1), max(e2, e3))
-    if largest == e0:
-        p[0], p[1], p[2], p[3] = e0, x, y, z
-    elif largest == e1:
-        p[0], p[1], p[2], p[3] = x, e1, w, v
-    elif largest == e2:
-        p[0], p[1], p[2], p[3] = y, w, e2, u
-    else:
-        p[0], p[1], p[2], p[3] = z, v, u, e3
-    normalise(p)
-    # p and -p are the same orientation
-    side = p[0] * poses[at + P] + p[1] * poses[at + P + 1] + p[2] * poses[at + P + 2] + p[3] * poses[at + P + 3]
-    if side < 0.0:
-        for i in range(4):
-            p[i] = -p[i]
+def _parameters(u, v, w, p, e0, e1, e2, e3):
+    """Euler parameters of the matrix with columns u, v, w, on the side of e0 to e3; from the largest of the four."""
+    # Entries of the matrix
+    put(p, 0, u)
+    a, u1, u2 = get(p, 0), get(p, 1), get(p, 2)
+    put(p, 0, v)
+    v0, b, v2 = get(p, 0), get(p, 1), get(p, 2)
+    put(p, 0, w)
+    w0, w1, c = get(p, 0), get(p, 1), get(p, 2)
+    # 4 e0 e, 4 e_i e_j and 4 e_i^2
+    x, y, z = v2 - w1, w0 - u2, u1 - v0
+    d, e, f = w1 + v2, u2 + w0, v0 + u1
+    f0, f1, f2, f3 = 1.0 + a + b + c, 1.0 + a - b - c, 1.0 - a + b - c, 1.0 - a - b + c
+    largest = max(max(f0, f1), max(f2, f3))
+    # The first of the largest ones
+    m0, m1, m2 = below(f0, largest), below(f1, largest), below(f2, largest)
+    p0 = choose(m0, choose(m1, choose(m2, z, y), x), f0)
+    p1 = choose(m0, choose(m1, choose(m2, e, f), f1), x)
+    p2 = choose(m0, choose(m1, choose(m2, d, f2), f), y)
+    p3 = choose(m0, choose(m1, choose(m2, f3, d), e), z)
+    # Of unit length; p and -p are the same orientation
+    scale = 1.0 / math.sqrt(p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)
+    p0, p1, p2, p3 = p0 * scale, p1 * scale, p2 * scale, p3 * scale
+    other = below(p0 * e0 + p1 * e1 + p2 * e2 + p3 * e3, 0.0)
+    return choose(other, -p0, p0), choose(other, -p1, p1), choose(other, -p2, p2), choose(other, -p3, p3)

@@ -77,21 +77,27 @@ def order_in_range(bodies, nb, orders, top, far, fast):
 
 
 @long_kernel
-def weights(c, r):
-    """Set the floor of Phi. Weights of the coefficients of r and of omega' beside those of A; 1 + the largest rate."""
-    x, orders = c.expansion, c.expansion.order.room
-    rtol, atol = r.clock.rtol, r.clock.atol
+def weights(graph, x, atol, rtol):
+    """Weights of the coefficients of r and of omega' beside those of A; 1 + the largest rate; the largest |r|, m."""
+    orders = x.order.room
     far, fast, speed = splat(0.0), splat(0.0), splat(0.0)
-    for b in range(c.graph.bodies.shape[0]):
+    for b in range(graph.bodies.shape[0]):
         # Largest r, omega' and rd
         at = b * orders * BODY_ROW
         far, fast = larger(four(x.bodies, at + S_R * orders), far), larger(four(x.bodies, at + S_OMEGA * orders), fast)
         speed = larger(four(x.bodies, at + S_R * orders + 4), speed)
     far, fast = largest_of_three(far), largest_of_three(fast)
-    c.work.control.floor = ROUNDING * (c.work.control.size + far)
     # Errors are bounded by atol + rtol |value|, those of A by atol + rtol
     tol = atol + rtol
-    return tol / (atol + rtol * far), tol / (atol + rtol * fast), 1.0 + max(fast, largest_of_three(speed))
+    return tol / (atol + rtol * far), tol / (atol + rtol * fast), 1.0 + max(fast, largest_of_three(speed)), far
+
+
+@kernel
+def _weigh(c, r):
+    """The weights, and 1 + the largest rate; sets the floor of Phi."""
+    far, fast, rate, reach = weights(c.graph, c.expansion, r.clock.atol, r.clock.rtol)
+    c.work.control.floor = ROUNDING * (c.work.control.size + reach)
+    return far, fast, rate
 
 
 @kernel
@@ -110,7 +116,7 @@ def step_length(c, r):
     """Longest step rho tol^(1 / (top + 2)); sets the order of the next step, by the longer step per unit of work."""
     x, nb, orders = c.expansion, c.graph.bodies.shape[0], c.expansion.order.room
     tol = r.clock.atol + r.clock.rtol
-    far, fast, rate = weights(c, r)
+    far, fast, rate = _weigh(c, r)
     # Longest step by all orders, then by two orders less
     x.order.top = top = order_in_range(x.bodies, nb, orders, x.order.top, far, fast)
     c.trial.rate = rate
@@ -131,7 +137,7 @@ def longest(c, r, tol, most):
     distance: high orders reach no further than the singularity.
     """
     x, nb = c.expansion, c.graph.bodies.shape[0]
-    far, fast, _ = weights(c, r)
+    far, fast, _ = _weigh(c, r)
     h = 0.0
     for k in range(most, min(LEAST_ORDER, most - 1), -1):
         # rho tol^(1 / (k + 2)) for every order

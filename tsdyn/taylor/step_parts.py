@@ -30,7 +30,7 @@ from ..rows.interface import (
 from ..rows.tolerances import UNEQUAL_MASSES
 from .coefficients import begin, expand
 from .layout import load_series
-from .step_end import keep_start, project_rates, sum_series
+from .step_end import keep_start, project_rates, sum_series, tops_of
 from .tolerances import GONE, ILL_ORDERS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL
 
 # Taylor series of prescribed motions and of loads, for Taylor runs of driven scenes.
@@ -138,7 +138,7 @@ def reach(context, t, h):
         return NOT_FINITE
     # Sums of the series at h, or the poses as they are
     if h >= 0.0:
-        sum_series(c.graph, x, h, f.poses, f.p)
+        sum_series(c.graph, x, h, tops_of(x), f.poses, f.p)
     else:
         copy(x.low, x.low_end)
     # Positions, then velocities, onto the manifold
@@ -261,11 +261,11 @@ def pass_singular(context, t, h):
     orders, top = x.order.room, x.order.top
     # A selection of rows for this configuration only
     save_selection(f)
-    sum_series(graph, x, h, f.poses, f.p)
+    sum_series(graph, x, h, tops_of(x), f.poses, f.p)
     status = land(graph, c.system, w, f, t)
     # Rows whose pivots are lost are left out of the projection
     if status == SINGULAR or (status == 0 and singularity_indicator(graph, f.rows) < GONE):
-        sum_series(graph, x, h, f.poses, f.p)
+        sum_series(graph, x, h, tops_of(x), f.poses, f.p)
         if select_rows(graph, c.system, f, t, GONE) >= 0:
             status = land(graph, c.system, w, f, t)
     if status == 0:

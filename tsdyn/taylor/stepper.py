@@ -97,13 +97,6 @@ SERIES_ENDED = int(Status.SERIES_ENDED)
 
 
 @kernel
-def go_to_start(c, r):
-    """The poses at the step's start, from where p is followed."""
-    copy(r.now[0], c.work.q)
-    place_bodies(c.graph.bodies, c.work.q, c.tangent.poses)
-
-
-@kernel
 def stand_at(context, c, r, t):
     """Poses, H and the factors of S at the last accepted q, qd, for a series to begin there. Status."""
     w = c.work
@@ -316,7 +309,6 @@ def make_step(context, c, r, log, stop):
             return PASSAGE if status == 0 else status
         # Overflow of the highest coefficients
         if status == NOT_FINITE and adaptive and s.check != 0 and _lower_order(c, r):
-            go_to_start(c, r)
             _reject(r, log)
             continue
         # A projection that moves further than the tolerance corrects no truncation error: the radius was wrong
@@ -330,7 +322,6 @@ def make_step(context, c, r, log, stop):
         # Take it, or try another length from the start
         if _is_taken(c, landed) or not _choose_next(c, r, landed, tol):
             return 0
-        go_to_start(c, r)
         _reject(r, log)
 
 
@@ -451,7 +442,7 @@ def _watch_stiffness(c, r, h):
 def _mind_stop(c, r, h):
     """After a step that a stop has cut to h: the order of the next one."""
     x, tol = c.expansion, r.clock.atol + r.clock.rtol
-    far, fast, _ = weights(c, r)
+    far, fast, _, _ = weights(c.graph, x, r.clock.atol, r.clock.rtol)
     rho = radius(x.bodies, c.graph.bodies.shape[0], x.order.room, x.order.top - 2, far, fast)
     lower_order(x.order, rho, tol, h)
 
@@ -472,16 +463,13 @@ def _record_within(context, c, r, log, t0, t1):
     """What t_eval asks for in (t0, t1), then back to t1. Status."""
     w = c.work
     while is_wanted_before(r, log, t1):
-        # From the start of the step: Euler parameters are followed from there
         t = log.t_eval[r.numbers.next_eval]
-        # The end of the step again
-        go_to_start(c, r)
         status = state_within(context, c, r.kernels, t, t - t0)
         if status != 0:
             return status
         record(r, log, t, w.q, w.qd, w.qdd)
         r.numbers.next_eval += 1
-    go_to_start(c, r)
+    # The end of the step again
     reach = r.kernels.pass_singular if c.trial.singular == 1 else r.kernels.reach
     return call_reach(reach, context, t1, t1 - t0)
 

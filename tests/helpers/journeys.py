@@ -161,6 +161,10 @@ class Tour:
             for value in self.on.reaction(item):
                 self.shape(value, 3)
 
+    def actuation(self):
+        for item in self.items():
+            with_message(ts.InvalidForce, lambda item=item: self.on.actuation(item))
+
     def reaction_unique(self):
         for item in self.items():
             if hasattr(item, "on"):

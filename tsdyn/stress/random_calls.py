@@ -283,7 +283,7 @@ def attempt(label, function, positional, keywords):
     try:
         with deadline(PATIENCE), warnings.catch_warnings():
             warnings.simplefilter("error")
-            warnings.filterwarnings("ignore", "made for this scene")
+            warnings.filterwarnings("ignore", "made for this scene|.*the cubic spline overshoots")
             result = function(*positional, **keywords)
             outcome = "failed" if isinstance(result, Solution) and not result.success else "accepted"
             unsound = leaks(result)

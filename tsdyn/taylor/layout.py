@@ -256,7 +256,7 @@ def _lay_out_law(load, kind, values, table, orders):
     law, loop = load.law, address(load.force.kernels, "series", load.force.name, InvalidForce)
     width = len(law.program) + -(-law.rows * orders // 4) * 4 + 4 * (orders + 1) * len(law.bodies)
     count = -(-len(law.bodies) // force_series.INTS)  # entries of the table that its bodies fill
-    row = [loop, values, width, count, kind.stride, len(table), kind.reals, 0, 0, 0, 0, run_order.address, 0]
+    row = [count, kind.stride, width, orders, loop, values, len(table), kind.reals, 0, 0, 0, 0, run_order.address, 0]
     table += [*law.bodies, *[0] * (count * force_series.INTS - len(law.bodies))]
     return row, width
 

@@ -427,6 +427,11 @@ def _others(scene):
         (lambda s: [s["rail"], _others(s)], "belongs to another scene"),
         (lambda s: [_others(s)], "belong to another scene|belongs to another scene"),
         (lambda s: [("rail", "angle")], "has the coordinates"),
+        (
+            lambda s: [s.add(F.TorsionalSpring(s["cart"], s["rod"], axis_a=(0, 1, 0), stiffness=1.0))],
+            "is a force, whose coordinates",
+        ),
+        (lambda s: [(s.add(F.Spring(s["cart"], s["rod"], stiffness=1.0)), "angle")], "is a force, whose coordinates"),
         (lambda s: [7], "is none"),
         (lambda s: [C.Revolute(s["cart"], s["rod"], axis_a=(0, 1, 0), axis_b=(0, 1, 0))], "add its actuator"),
         (lambda s: [s.add(F.PointForce(s["cart"], force=(1, 0, 0)))], "must not be added itself"),

@@ -423,7 +423,10 @@ def _others(scene):
     [
         (lambda s: [], "actuators must be a list of one or more"),
         (lambda s: "rail", "actuators must be a list of one or more"),
-        (lambda s: ["rial"], "no joint or spring is named 'rial'; did you mean 'rail'"),
+        (
+            lambda s: ["rial"],
+            "no spring, or joint with an angle or a displacement, is named 'rial'; did you mean 'rail'",
+        ),
         (lambda s: [s["rail"], _others(s)], "belongs to another scene"),
         (lambda s: [_others(s)], "belong to another scene|belongs to another scene"),
         (lambda s: [("rail", "angle")], "has the coordinates"),
@@ -433,6 +436,10 @@ def _others(scene):
         ),
         (lambda s: [(s.add(F.Spring(s["cart"], s["rod"], stiffness=1.0)), "angle")], "is a force, whose coordinates"),
         (lambda s: [7], "is none"),
+        (lambda s: [()], "is none"),
+        (lambda s: [s["cart"]], "is none"),
+        (lambda s: [(s["cart"], "position")], "is none"),
+        (lambda s: ["cart"], "a displacement, is named 'cart'; there are 'rail', 'hinge'.$"),
         (lambda s: [C.Revolute(s["cart"], s["rod"], axis_a=(0, 1, 0), axis_b=(0, 1, 0))], "add its actuator"),
         (lambda s: [s.add(F.PointForce(s["cart"], force=(1, 0, 0)))], "must not be added itself"),
         (lambda s: [F.Torque(s["cart"], torque=lambda t: (t, 0, 0))], "must have a constant vector"),

@@ -128,11 +128,15 @@ class Control(SceneLaw, Force):
 
     def _actuator(self, scene, given):
         """(item, kind of coordinate, which); of a Spring, a PointForce or a Torque the item alone."""
-        item, *which = given if isinstance(given, tuple) else (given,)
+        item, *which = given if isinstance(given, tuple) and given else (given,)
         if isinstance(item, str):
-            item = named([*scene.constraints, *scene.forces], item, "joint or spring", self.error)
-        if getattr(item, "scene", None) is not scene:
-            where = "belongs to another scene" if hasattr(item, "scene") else "is none"
+            joints = [each for each in scene.constraints if angles(each) or displacements(each)]
+            item = named(
+                [*joints, *scene.forces], item, "spring, or joint with an angle or a displacement,", self.error
+            )
+        is_item = hasattr(item, "added")  # a constraint or a force
+        if not is_item or item.scene is not scene:
+            where = "belongs to another scene" if is_item else "is none"
             raise self.error(f"{self.name}: the actuator {item!r} {where}; {HOW}.")
         if isinstance(item, (PointForce, Torque)) and not which:
             vector = getattr(item, item.given)

@@ -71,6 +71,7 @@ class SceneLaw:
     given: str
     positive = ()
     no_series = "its function can't be traced"
+    each = ""  # what the numbers of the function are, in messages
 
     @staticmethod
     def law(x, xd, par, t, out):

@@ -100,6 +100,7 @@ class Control(SceneLaw, Force):
     particles = True
     loads, given = ("function",), "function"
     permanent = ("actuators",)
+    each = ", one for each actuator"
     quantities = MappingProxyType({"function": scene_law, "period": instants})
 
     def __init__(

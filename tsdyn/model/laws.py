@@ -174,7 +174,7 @@ class Law:
         """The values of the function (values,), a list, called in Python."""
         force = self.force
         given = force.results(getattr(force, force.given), t, self.state(t, q, qd, angles), numbers)
-        wanted = f"{force.name}: its {force.given} must give {counted(self.values, 'number')}, one for each actuator"
+        wanted = f"{force.name}: its {force.given} must give {counted(self.values, 'number')}{force.each}"
         if len(given) != self.values:
             raise force.error(f"{wanted}; it gave {len(given)}.")
         strange = [value for value in given if not isinstance(value, (int, float, np.number, np.bool_))]
@@ -193,7 +193,10 @@ class Law:
             seen = _TracedState(state, 1 + count)
             found = traced(lambda t, numbers: results(plain, t[0], seen, numbers), (1, count), self.values)
             means = [_input(0), *(_input(first + i) for i in range(count)), *seen.found]
-            graphs = [_graph(value) for value in evaluate(found, means)]
+            given = evaluate(found, means)
+            if not all(isinstance(value, Smooth) or math.isfinite(value) for value in given):
+                raise Untraceable("it gives a number that is not finite")
+            graphs = [_graph(value) for value in given]
             self._demand_same(graphs)
             self.changes = may_change(Writer(found, len(means), range(1, 1 + count), 0, len(means)).numbers())
             return graphs

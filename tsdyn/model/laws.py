@@ -171,7 +171,7 @@ class Law:
         return SceneState(self.handles, t, q, qd, angles)
 
     def evaluate(self, t, q, qd, angles, numbers):
-        """The values of the function (values,), a list, called in Python."""
+        """The values of the function (values,), a list, by Python; raises InvalidForce unless they are numbers."""
         force = self.force
         given = force.results(getattr(force, force.given), t, self.state(t, q, qd, angles), numbers)
         wanted = f"{force.name}: its {force.given} must give {counted(self.values, 'number')}{force.each}"

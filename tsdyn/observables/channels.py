@@ -90,7 +90,7 @@ class ChannelNames:
             self.things.setdefault(thing.name, []).append(thing)
 
     def meant(self, name):
-        """The channels of a name."""
+        """The channels of a name; raises InvalidArgument unless it is that of one object."""
         titles = [title for title in _heads(name) if title in self.things]
         known = [self._by_name(thing) for title in titles for thing in self.things[title]]
         found = [channels[name] for channels in known if name in channels]

@@ -1,5 +1,6 @@
 """Laws that see the whole scene: Control, point loads and user forces by its state; traced, called, sampled."""
 
+import math
 import pickle
 
 import numpy as np
@@ -423,11 +424,23 @@ def _others(scene):
     [
         (lambda s: [], "actuators must be a list of one or more"),
         (lambda s: "rail", "actuators must be a list of one or more"),
-        (lambda s: ["rial"], "no joint or spring is named 'rial'; did you mean 'rail'"),
+        (
+            lambda s: ["rial"],
+            "no spring, or joint with an angle or a displacement, is named 'rial'; did you mean 'rail'",
+        ),
         (lambda s: [s["rail"], _others(s)], "belongs to another scene"),
         (lambda s: [_others(s)], "belong to another scene|belongs to another scene"),
         (lambda s: [("rail", "angle")], "has the coordinates"),
+        (
+            lambda s: [s.add(F.TorsionalSpring(s["cart"], s["rod"], axis_a=(0, 1, 0), stiffness=1.0))],
+            "is a force, whose coordinates",
+        ),
+        (lambda s: [(s.add(F.Spring(s["cart"], s["rod"], stiffness=1.0)), "angle")], "is a force, whose coordinates"),
         (lambda s: [7], "is none"),
+        (lambda s: [()], "is none"),
+        (lambda s: [s["cart"]], "is none"),
+        (lambda s: [(s["cart"], "position")], "is none"),
+        (lambda s: ["cart"], "a displacement, is named 'cart'; there are 'rail', 'hinge'.$"),
         (lambda s: [C.Revolute(s["cart"], s["rod"], axis_a=(0, 1, 0), axis_b=(0, 1, 0))], "add its actuator"),
         (lambda s: [s.add(F.PointForce(s["cart"], force=(1, 0, 0)))], "must not be added itself"),
         (lambda s: [F.Torque(s["cart"], torque=lambda t: (t, 0, 0))], "must have a constant vector"),
@@ -436,6 +449,24 @@ def _others(scene):
 def test_wrong_actuators_are_refused(actuators, said):
     with pytest.raises(ts.TsdynError, match=said):
         cart(lambda s: F.Control(lambda t, state: [0.0] * max(len(actuators(s)), 1), actuators(s)))
+
+
+@pytest.mark.parametrize("value", [math.nan, -math.inf])
+def test_a_law_without_finite_values_is_named_when_it_is_run(value):
+    for law in (
+        on_rail(lambda t, state: value),
+        on_rail(lambda t, state: value * state.angle("hinge")),
+        lambda s: F.PointForce(
+            s["cart"], force=lambda t, state: (value, 0.0 * state.angle("hinge"), 0.0), name="control"
+        ),
+    ):
+        with pytest.raises(ts.InconsistentState, match="'control' is inf or nan at t = 0 s"):
+            ts.simulate(cart(law), (0, 1))
+
+
+def test_what_a_force_of_the_state_must_give_is_said_without_actuators():
+    with pytest.raises(ts.InvalidForce, match=r"must give 3 numbers; it gave 2\.$"):
+        cart(lambda s: F.PointForce(s["cart"], force=lambda t, state: state.position("rod")[:2]))
 
 
 @pytest.mark.parametrize("period", [None, 0.05])

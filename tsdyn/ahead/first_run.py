@@ -136,7 +136,7 @@ def _kinds(scene):
 
 
 def _default_method(scene, rtol, atol, series):
-    """The default method, as `choice.explicit` will find it."""
+    """The explicit method that the default will find to begin with."""
     kinds = (kind.kernels for kind in _kinds(scene) if not kind.normalises)
     series = series and all("series" in kernels for kernels in kinds) and pays(scene.primitives, scene.forces)
     series = series and not any(no_series(force, force.parameters()) for force in scene.forces)

@@ -20,7 +20,13 @@ from .all_kernels import compile_kernels, named
 
 
 def ship(folder):
-    """Fill the folder with the kernels of this process's target."""
+    """Fill the folder with the kernels of this process's target.
+
+    Raises
+    ------
+    TsdynError
+        If the target is not portable, or a kernel can't be compiled.
+    """
     if compilers.CHOICE or not portable():
         raise TsdynError(
             f"Kernels are shipped for a portable target, of which this processor has {available() or 'none'}: unset "

@@ -296,8 +296,8 @@ def _sparse_factors(M, H, B):
 #
 #     Phi_q^T lam - B u = d,    d = Q_A + Q_v - M qdd
 #
-# Q_A has the forces that are no actuators. Where actuators are more than degrees of freedom, |u| is least: see
-# actuator_loads.py. Many bodies take sparse matrices, so the cost is O(N) for chains and trees.
+# Q_A has the forces that are no actuators. Where actuators are more than degrees of freedom, |u| is least (`Instant`).
+# Many bodies take sparse matrices, so the cost is O(N) for chains and trees.
 
 
 class Loads(NamedTuple):

@@ -257,8 +257,8 @@ class Descent(Moves):
 #
 #     K = M D D - C* D + K*        C* = (Q_A + Q_v)_qd,    K* = (M qdd - Q_A - Q_v)_q + (Phi_q^T lam)_q
 #
-# Newton's method goes to the nearest root. One that is not stable is left by the descent of equilibrium.py, on the
-# amended potential V - Omega . J Omega / 2 (Simo, Lewis, Marsden 1991).
+# Newton's method goes to the nearest root. One that is not stable is left by `SteadyDescent`, on the amended
+# potential V - Omega . J Omega / 2 (Simo, Lewis, Marsden 1991).
 
 
 class SteadyMotion(NominalMotion):

@@ -52,7 +52,7 @@ class Derivatives(NamedTuple):
 
 @entry(no_system(), "mvmvvv")
 def fill_blocks(s, x, lam, rows, Q_q, Q_qd, kept):
-    """Blocks of all instances: s has the table of `_separate`; x (4, 14 instances) q, qd, qdd and, first of all, t.
+    """Blocks of all instances: s has the table of `Pairs`; x (4, 14 instances) q, qd, qdd and, first of all, t.
 
     rows (3, .): K, G1, G2 one after the other. Sums; zero on entry.
     """

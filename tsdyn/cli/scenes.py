@@ -126,7 +126,7 @@ def _print_table(title, rows):
 
 
 def _facts(scene, mobility, why, given):
-    """What `info` reports about a scene, for JSON."""
+    """What `tsdyn info` reports about a scene, for JSON."""
     parameters = scene.parameters()
     units = parameters.units
     return {

@@ -92,7 +92,7 @@ class Bounds:
 
 def proved(metric, q):
     """(members, sentence) of a conflict that no configuration can avoid; None where none is proved."""
-    packed, held = metric.packed, ~np.isin(metric.move[:, 0], metric.columns)
+    packed, held = metric.packed, metric.held
     index, starts = {id(body): i for i, body in enumerate(packed.bodies)}, metric.at
     points, directions = Bounds(_distance), Bounds(_angle, np.pi - PROVED)
 

@@ -109,6 +109,7 @@ class Loops:
 
     def _slope(self, q, aim):
         """The derivative of a coordinate by the twist of the body beyond its joint, (6,)."""
+        # angle = atan2(g.h, f.h), displacement = e.(x_other - x_own): as the other body moves, or by its sense the own
         g, (own, other) = aim.geometry, self.handles.motions(aim.geometry, (q,))
         if isinstance(g, AngleGeometry):
             u, w, v = (np.array(motion.arm(s, 0)) for motion, s in ((own, g.f), (own, g.g), (other, g.h)))
@@ -192,7 +193,10 @@ class Loops:
         return Z, free, closing, J, np.concatenate((left, np.asarray(beyond)[passed]))
 
     def _step(self, linearised, damping):
-        """The twists (places, 6) of a step."""
+        """The twists (places, 6) of a step.
+
+        theta = -(J^T J + damping I)^-1 J^T left = -J^T (J J^T + damping I)^-1 left, by the smaller matrix.
+        """
         Z, free, closing, J, left = linearised
         if J.shape[0] < J.shape[1]:
             theta = -J.T @ np.linalg.solve(J @ J.T + damping * np.eye(J.shape[0]), left)

@@ -53,8 +53,9 @@ class Metric:
         own = [not part.normalises for part in packed.constraints for _ in range(part.rows)]
         self.own = np.flatnonzero(np.array(own, bool))
         free = np.ones(self.size, bool)
+        self.held = np.zeros(len(rigid), bool) if held is None else held[self.r[:, 0]]  # (bodies,)
         if held is not None:
-            free[self.move[held[self.r[:, 0]]]] = False
+            free[self.move[self.held]] = False
             free[self.turn[held[self.p[:, 0]]]] = False
         self.columns = np.flatnonzero(free)
         self._last = None, None  # q of the last `linear`, and what it returned

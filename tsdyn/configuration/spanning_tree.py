@@ -36,7 +36,7 @@ class Tree:
 
     def __init__(self, metric, q, cut=(), first=()):
         self.metric, self.packed, self.reach = metric, metric.packed, metric.reach(q)
-        free = np.isin(metric.move[:, 0], metric.columns)
+        free = ~metric.held
         self.ground = free.size
         self.number = {id(body): i if free[i] else self.ground for i, body in enumerate(self.packed.bodies)}
         edges, self.loops = [], []

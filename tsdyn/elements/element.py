@@ -287,7 +287,7 @@ class Attachment:
     error: type[TsdynError] = InvalidConstraint
     lacks = ""  # what a base class is the base of, and has none of itself
     particles = False  # whether Parameters and Turn may be on a point mass: p = (1, 0, 0, 0), no turning, no torque
-    joint_coordinates: tuple[Angle | Displacement, ...] = ()  # Angle and Displacement, see element.py
+    joint_coordinates: tuple[Angle | Displacement, ...] = ()  # of a joint
     permanent: tuple[str, ...] = ()  # arguments that can't be set later
     angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
     drives = ""  # of a motor: the coordinate that it prescribes, and its attribute: "angle" or "displacement"

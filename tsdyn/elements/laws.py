@@ -71,6 +71,7 @@ class SceneLaw:
     given: str
     positive = ()
     no_series = "its function can't be traced"
+    each = ""  # what the numbers of the function are, in messages
 
     @staticmethod
     def law(x, xd, par, t, out):
@@ -134,7 +135,7 @@ def arguments_of(function):
 
 
 def scene_law(value: Any, what: str, error: Any) -> Any:
-    """Anything that can be called."""
+    """Anything that can be called with (t, state); raises `error` for anything else."""
     if not callable(value):
         raise error(f"{what} must be a function of (t, state), or an object to be called so, got {value!r}.")
     if arguments_of(value) not in (0, 2) or starred(value):

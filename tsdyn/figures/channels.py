@@ -36,7 +36,7 @@ INSIDE = 1e-9  # of a step: so near its ends are its first and last points, so t
 
 
 def time_histories(solution: Solution, names: str | Sequence[str], path: Any = None) -> Any:
-    """What `Solution.plot` does with channels."""
+    """What `Solution.plot` does with channels, and raises."""
     if not solution.t.size:
         raise InvalidArgument("plot: the solution has no outputs, so there is nothing to show.")
     channels = channels_of(solution.packed, names, solution._lacks)

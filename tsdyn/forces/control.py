@@ -66,8 +66,9 @@ class Control(SceneLaw, Force):
     Raises
     ------
     InvalidForce
-        If there is no actuator, one is of another scene, isn't added or has several coordinates. When it is added: if
-        the function gives another number of values, or raises what no other state mends.
+        If the function can't be called with (t, state), if there is no actuator, or one is of another scene, isn't
+        added or has several coordinates. When it is added: if the function gives another number of values, or raises
+        what no other state mends.
     InvalidBody, InvalidConstraint
         When it is added: if the function asks for a body or a joint that the scene hasn't.
 
@@ -99,6 +100,7 @@ class Control(SceneLaw, Force):
     particles = True
     loads, given = ("function",), "function"
     permanent = ("actuators",)
+    each = ", one for each actuator"
     quantities = MappingProxyType({"function": scene_law, "period": instants})
 
     def __init__(
@@ -106,7 +108,7 @@ class Control(SceneLaw, Force):
     ) -> None:
         given = label(name, "Control", self.error)
         self.name = given or "Control"
-        if isinstance(actuators, str) or not isinstance(actuators, (list, tuple)) or not actuators:
+        if not isinstance(actuators, (list, tuple)) or not actuators:
             raise self.error(f"{self.name}: actuators must be a list of one or more, got {actuators!r}; {HOW}.")
         self.function, self.period = function, period
         self.__dict__.update(actuators=tuple(actuators), _name=given)
@@ -127,11 +129,15 @@ class Control(SceneLaw, Force):
 
     def _actuator(self, scene, given):
         """(item, kind of coordinate, which); of a Spring, a PointForce or a Torque the item alone."""
-        item, *which = given if isinstance(given, tuple) else (given,)
+        item, *which = given if isinstance(given, tuple) and given else (given,)
         if isinstance(item, str):
-            item = named([*scene.constraints, *scene.forces], item, "joint or spring", self.error)
-        if getattr(item, "scene", None) is not scene:
-            where = "belongs to another scene" if hasattr(item, "scene") else "is none"
+            joints = [each for each in scene.constraints if angles(each) or displacements(each)]
+            item = named(
+                [*joints, *scene.forces], item, "spring, or joint with an angle or a displacement,", self.error
+            )
+        is_item = hasattr(item, "added")  # a constraint or a force
+        if not is_item or item.scene is not scene:
+            where = "belongs to another scene" if is_item else "is none"
             raise self.error(f"{self.name}: the actuator {item!r} {where}; {HOW}.")
         if isinstance(item, (PointForce, Torque)) and not which:
             vector = getattr(item, item.given)
@@ -145,14 +151,14 @@ class Control(SceneLaw, Force):
             raise self.error(f"{self.name}: add its actuator {item.name!r} to the scene first.")
         if isinstance(item, Spring) and not which:
             return (item,)
+        if isinstance(item, Force):
+            raise self.error(f"{self.name}: {item.name!r} is a force, whose coordinates can't be driven; {HOW}.")
         found = [("angle", i) for i in range(len(angles(item)))]
         found += [("displacement", i) for i in range(len(displacements(item)))]
         wanted = [one for one in found if list(one)[: len(which)] == which]
-        if len(wanted) != 1 or isinstance(item, Force):
-            several = (
-                f"has the coordinates {', '.join(f'({kind!r}, {i})' for kind, i in found)}" if found else "has none"
-            )
-            raise self.error(f"{self.name}: the actuator {item.name!r} {several}; {HOW}.")
+        if len(wanted) != 1:
+            known = ", ".join(f"({kind!r}, {i})" for kind, i in found) or "none"
+            raise self.error(f"{self.name}: the actuator {item.name!r} has the coordinates {known}; {HOW}.")
         return item, *wanted[0]
 
     @property

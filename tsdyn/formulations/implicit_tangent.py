@@ -383,7 +383,7 @@ def distance(context, ex, ey, old, rtol, atol):
 
 # Newton's method for all stages of a collocation method at once, in the tangent form.
 #
-# The equations of each stage are those of implicit_tangent.py. A correction e_i of the accelerations of stage i changes
+# The equations of each stage are those of one stage above. A correction e_i of the accelerations of stage i changes
 # the velocities of all stages j by h a_ji e_i, and their positions by h^2 (A^2)_ji e_i. With one K and C for all of
 # them the eigenvectors of A uncouple the stages (methods/collocation.py): for each eigenvalue there is one matrix
 #
@@ -555,7 +555,7 @@ def _size(c, h, tableau, p):
 
 # The tangent form for implicit methods: accelerations of a stage, and rates of another configuration, in a chart.
 #
-# Newton's method for its stages is that of implicit_tangent.py; the matrices are those of saddle_point.py.
+# Newton's methods for its stages stand above; the matrices are those of saddle_point.py.
 
 __all__ = [  # parts of the form
     "COLUMNS",

@@ -103,7 +103,7 @@ def _expand(w, vdd, out):
 
 @kernel
 def _find_bases(graph, system, w, f, t, vdd):
-    """lam_0 and, for each friction, a_i and l_i."""
+    """lam_0 without friction; a_i and l_i, accelerations and multipliers by a unit normal load of friction i."""
     r, n, m, k = f.friction, w.q.size, w.Phi.size, vdd.size
     lam, left, x, Q = r.numbers[:m], r.numbers[2 * m : 2 * m + n], r.numbers[2 * m + n : 2 * m + 2 * n], stack(14)
     # lam_0 = B^T U^T (Q_A + Q_v - M qdd_0),    qdd_0 = D vdd - U B gamma

@@ -57,7 +57,7 @@ class Formulation:
         return (k.stage_place, k.stage_accelerate) if free else (k.place, k.accelerate)
 
     def addresses(self):
-        """Addresses of the kernels that a driver calls, by their names in `Kernels`; loads or compiles them."""
+        """Addresses of the kernels that a driver calls, by their names in `RunKernels`; loads or compiles them."""
         k = self.kernels
         complete = (k if self.basis_free else null_space).complete  # qdd = D vdd - U B gamma in the others
         kernels = {"place": k.place, "accelerate": k.accelerate, "complete": complete}

@@ -223,9 +223,9 @@ def add_constraints(system, w, s, t, lam):
 #     [ M - g C_b - g^2 K_b    H^T ] [ a    ]     [ M r ]
 #     [ H                      0   ] [ dlam ]  =  [ 0   ]       r = f(k) - k, its tangent part
 #
-# K_b and C_b are those of saddle_point.py and chart_coordinates.py. The normal part of a correction is that of r: the
-# position solve removes it. Changes of the normal parts of velocities and accelerations with the configuration, of the
-# order of g omega, are neglected.
+# K_b and C_b are those above, and what chart coordinates add to them (chart_coordinates.py). The normal part of a
+# correction is that of r: the position solve removes it. Changes of the normal parts of velocities and accelerations
+# with the configuration, of the order of g omega, are neglected.
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)
 

@@ -161,9 +161,11 @@ def stage_place(context, t, x):
     l.state.time, l.state.factored = t, 0
     if not set_time(system, t):
         return NOT_FINITE
+    # (rho, eta) = x: u, of the order of truncation, stays; the end of the step takes it off
     copy(vector(x, l.x.size - 8), l.x)
     if not displace(graph, l, f.poses):
         return CHART_LOST
+    # H and S = H W H^T there
     if f.b.size > 0:
         evaluate_rows(graph, system, f, f.rows, t)
         w.counters.factorizations += 1
@@ -314,6 +316,7 @@ def stage_accelerate(context, t, y, yd, unused):
     """As `accelerate`, with the velocities of an explicit stage where the sums put them."""
     c = load(context)
     n = c.chart.x.size - 8
+    # (rhod, etad) = xd: z stays, as u does
     copy(vector(y, n), c.chart.y)
     turn_rates(c.graph, c.chart, c.chart.y, c.tangent.poses)
     return _accelerate(context, c, t, vector(yd, n))

@@ -57,8 +57,8 @@ def of_numba():
     if features is None:
         with contextlib.suppress(RuntimeError):
             features = llvm.get_host_cpu_features().flatten()
-    processor = name or llvm.get_host_cpu_name(), features or "", *["no AVX"][bool(numba.config.ENABLE_AVX) :]
-    return llvm.get_process_triple(), *processor, *_libraries()
+    avx = [] if numba.config.ENABLE_AVX else ["no AVX"]
+    return llvm.get_process_triple(), name or llvm.get_host_cpu_name(), features or "", *avx, *_libraries()
 
 
 @cache
@@ -69,5 +69,5 @@ def chosen():
 
 def _libraries():
     """Intel's mathematical functions of registers, which Numba uses where they are installed."""
-    config = numba.config  # no variable of the environment
+    config = numba.config  # USING_SVML is found by Numba, no variable of the environment sets it
     return ["SVML"] if config.USING_SVML else []

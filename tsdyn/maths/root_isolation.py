@@ -93,8 +93,6 @@ def extremes(coefficients):
 # function that stays unresolved on ever shorter intervals has a kink or a jump, judged by the signs of the samples.
 
 LARGEST = 32  # degree
-# shares of the largest sample
-
 CALM = 12  # consecutive halvings that leave one half resolved: the other has a kink or a jump
 POLISH = 16  # degree of the interpolant for an extremum
 MOST = 1 << 20  # samples of one search
@@ -134,8 +132,8 @@ class Search:
     Attributes
     ----------
     points : list of (float, float)
-        Times, increasing, and values; zero for a value that touches zero within rounding. Empty where all values are
-        noise.
+        Times, increasing, and values; zero for a value that touches zero within rounding. The start alone where all
+        values are noise.
     spent : int
         Samples taken.
     """

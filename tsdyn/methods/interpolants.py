@@ -115,7 +115,7 @@ def hermite_first_order(s, h, n, nx, ny, data, x, y):
 def hermite_second(s, h, n, nx, ny, data, x, y):
     """The second derivative of the quintic for x, as y; x is left alone."""
     d, k, y = vector(data, 6 * nx), nx, vector(y, nx)
-    # Second derivatives of the weights of `_quintic`, over h^2
+    # Second derivatives of the weights of `quintic`, over h^2
     f = 60.0 * s * (1.0 + s * (2.0 * s - 3.0)) / (h * h)
     g0, g1 = s * (s * (96.0 - 60.0 * s) - 36.0) / h, s * (s * (84.0 - 60.0 * s) - 24.0) / h
     k0, k1 = 1.0 + s * (s * (18.0 - 10.0 * s) - 9.0), s * (3.0 + s * (10.0 * s - 12.0))

@@ -156,12 +156,12 @@ class Law:
         self._n = sum(dimension for _, dimension in places)
         # Provisional inputs: t, values, numbers, angles, q, qd
         ends = np.cumsum([1, self.values, len(self.numbers), handles.count, self._n])
-        value, number, angle, q, qd = (int(end) for end in ends)
+        value, own, angle, q, qd = (int(end) for end in ends)
         arrays = [np.array([_symbol(first + i) for i in range(self._n)], object) for first in (q, qd)]
         state = _SymbolicState(handles, _symbol(0), *arrays, None)
         state.counted = [_symbol(angle + j) for j in range(handles.count)]
-        self._inputs = value, number, angle, q, qd
-        given = None if self.held else self._trace(state, number)
+        self._inputs = value, own, angle, q, qd
+        given = None if self.held else self._trace(state, own)
         self.traced = given is not None
         symbols = [_symbol(1 + i) for i in range(self.values)] if given is None else [Symbol(node) for node in given]
         self._find_program(state, symbols, places)
@@ -171,10 +171,10 @@ class Law:
         return SceneState(self.handles, t, q, qd, angles)
 
     def evaluate(self, t, q, qd, angles, numbers):
-        """The values of the function (values,), a list, called in Python."""
+        """The values of the function (values,), a list, by Python; raises InvalidForce unless they are numbers."""
         force = self.force
         given = force.results(getattr(force, force.given), t, self.state(t, q, qd, angles), numbers)
-        wanted = f"{force.name}: its {force.given} must give {counted(self.values, 'number')}, one for each actuator"
+        wanted = f"{force.name}: its {force.given} must give {counted(self.values, 'number')}{force.each}"
         if len(given) != self.values:
             raise force.error(f"{wanted}; it gave {len(given)}.")
         strange = [value for value in given if not isinstance(value, (int, float, np.number, np.bool_))]
@@ -189,11 +189,14 @@ class Law:
             if not isinstance(getattr(function, "py_func", function), FunctionType):
                 raise Untraceable("it is no plain function")
             count, results, plain = len(self.numbers), self.force.results, retold(function)
-            seen_by(function)
+            seen_by(function)  # refuses what may change unseen
             seen = _TracedState(state, 1 + count)
             found = traced(lambda t, numbers: results(plain, t[0], seen, numbers), (1, count), self.values)
             means = [_input(0), *(_input(first + i) for i in range(count)), *seen.found]
-            graphs = [_graph(value) for value in evaluate(found, means)]
+            given = evaluate(found, means)
+            if not all(isinstance(value, Smooth) or math.isfinite(value) for value in given):
+                raise Untraceable("it gives a number that is not finite")
+            graphs = [_graph(value) for value in given]
             self._demand_same(graphs)
             self.changes = may_change(Writer(found, len(means), range(1, 1 + count), 0, len(means)).numbers())
             return graphs
@@ -270,7 +273,10 @@ class Law:
     # In arrays.
 
     def pack(self, table, reals, memory):
-        """Append the instances, one for each pair of bodies, and the head; their number and the reals of each."""
+        """Append the instances, one for each pair of bodies, and the head.
+
+        Return the number of instances, and how many reals each has.
+        """
         force, at, count = self.force, len(reals), len(self.numbers)
         own = np.concatenate(force.coordinates).tolist()
         stride, pairs = len(own) + count + loops.PAIR, self._pairs()
@@ -320,6 +326,7 @@ class Law:
         return found + [0.0] * int(end - len(found))
 
     def _angle(self, geometry):
+        """The numbers of a counted angle in the head, ANGLE_WIDTH of them."""
         for body in (geometry.own, geometry.other):
             at, dimension = self.handles.where(body)
             index = self.handles.bodies.index(body) if dimension else -1
@@ -473,11 +480,10 @@ def demand_callable(force, handles, t, q, qd, angles):
     try:
         with np.errstate(all="ignore"):
             law.evaluate(t, q, qd, angles, force.parameters())
-    except (ArithmeticError, ValueError) as error:
-        if isinstance(error, TsdynError):
-            raise
     except TsdynError:
         raise
+    except (ArithmeticError, ValueError):
+        pass  # which another state may mend
     except Exception as error:
         raise force.error(
             f"{force.name}: its {force.given} raises {type(error).__name__} at the start: {str(error).rstrip('.')}."

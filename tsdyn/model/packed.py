@@ -337,12 +337,17 @@ class FrictionPlace(Record):
     normal: int
 
 
+def coupled_loads(packed):
+    """The loads of friction that depend on reactions, in the order of System.normals."""
+    return sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
+
+
 def frictions_of(packed, bodies, rows_of, sides):
     """Rows of ConstraintGraph.frictions, in the order of System.normals, and of ConstraintGraph.friction_rows.
 
     bodies gives the place of a body by its id, rows_of those of a primitive's rows, sides (m, 2) their bodies.
     """
-    found = sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
+    found = coupled_loads(packed)
     members = {id(member.constraint): member for member in packed.members} if found else {}
     frictions, rows = [], []
     for load in found:

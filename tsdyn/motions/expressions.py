@@ -4,7 +4,7 @@
     Piecewise, of data: tables and SciPy's splines
     + - * / of them and of numbers, powers, and np.sin, cos, tan, exp, log, sqrt, sinh, cosh, tanh, arctan of them
 
-A motion is a graph of operations. `jet` evaluates value and two derivatives in Python, `motion_program` the series in a
+A motion is a graph of operations. `jet` evaluates value and two derivatives in Python, `run_program` the series in a
 run, independently.
 """
 
@@ -146,7 +146,7 @@ class Smooth:
         return ordered([self])
 
     def program(self) -> list[float]:
-        """The numbers that `motion_program` interprets, with space for its rows."""
+        """The numbers that `run_program` interprets, with space for its rows."""
         row, constants, instructions, rows = {}, [], [], 0
         for node in self._order():
             operation = OPERATIONS[node._operation]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # Piecewise polynomials in time: data of splines, and their values in Python.
 #
 # On piece i the value is sum_k c[i, k] (t - knots[i])^k. At a knot the piece to its right holds, as in SciPy.
-# `motion_program` evaluates the same data in a run.
+# `run_program` evaluates the same data in a run.
 
 HEAD = 7  # numbers before the knots: pieces, coefficients of each, period, beyond, piece, shift, held
 NEXT_AFTER = 4  # neighbours tried where a knot of a later period is rounded into the piece before
@@ -92,7 +92,7 @@ class Pieces:
         return times[(times > t0) & (times <= t1)]
 
     def numbers(self):
-        """Return the numbers of the piece for `motion_program`, a list of floats."""
+        """Return the numbers of the piece for `run_program`, a list of floats."""
         head = [self.c.shape[0], self.c.shape[1], self.period, self.beyond is not False, 0, 0, 0]
         return [*map(float, head), *self.knots.tolist(), *self.c.ravel().tolist()]
 

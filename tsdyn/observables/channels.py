@@ -40,7 +40,6 @@ class Channel(NamedTuple):
     unit: str
     ask: Callable[[Any], Any]  # of a motion: a `Solution`, or states at k times; shared by the channels of one result
     pick: Callable[[Any], Floats]  # of what `ask` gives: (k,)
-
     quantity: str  # "angle", "angular velocity": what the axis of a figure is called
 
     @property
@@ -86,14 +85,15 @@ class ChannelNames:
 
     def __init__(self, packed, lacks):
         self.packed, self.lacks, self.things, handles = packed, lacks, {}, handles_of(packed)
-        self.rows, self.told = {id(row.item): row for row in handles.rows}, {}
+        self.rows, self.known = {id(row.item): row for row in handles.rows}, {}
         for thing in (*handles.bodies, *handles.items):
             self.things.setdefault(thing.name, []).append(thing)
 
     def meant(self, name):
-        """The channels of a name."""
+        """The channels of a name; raises InvalidArgument unless it is that of one object."""
         titles = [title for title in _heads(name) if title in self.things]
-        found = [told[name] for title in titles for told in map(self._told, self.things[title]) if name in told]
+        known = [self._by_name(thing) for title in titles for thing in self.things[title]]
+        found = [channels[name] for channels in known if name in channels]
         if len(found) == 1:
             return found[0]
         if found:
@@ -102,7 +102,7 @@ class ChannelNames:
 
     def _unknown(self, name, title):
         """The error of a name that stands for no channel; `title` is that of the object which it begins with."""
-        own = {each: None for thing in self.things.get(title, ()) for each in self._told(thing) if each != title}
+        own = {each: None for thing in self.things.get(title, ()) for each in self._by_name(thing) if each != title}
         near = close(name, own or self.things) or close(name.partition(".")[0], self.things)
         said = [f"did you mean {' or '.join(map(repr, near))}?"] if near else []
         if own or not near:
@@ -111,10 +111,10 @@ class ChannelNames:
             said.append(f"{'There' if said else 'there'} are {', '.join(listed[:LISTED])}{more}.")
         return InvalidArgument(" ".join([f"no channel is named {name!r};", *said, self.lacks]).rstrip())
 
-    def _told(self, thing):
+    def _by_name(self, thing):
         """The channels of an object, by each name that stands for some; found once: they share what is asked."""
-        if id(thing) in self.told:
-            return self.told[id(thing)]
+        if id(thing) in self.known:
+            return self.known[id(thing)]
         quantities, natural = _of_body(thing) if isinstance(thing, PointMass) else self._of_item(thing)
         found = {}
         for key, (unit, parts, ask, pick) in quantities.items():
@@ -123,7 +123,7 @@ class ChannelNames:
             found[name] = [Channel(name + part, unit, ask, one, quantity) for part, one in picks.items()]
             found |= {one.name: [one] for one in found[name]} if parts else {}
         found[thing.name] = [one for key in natural for one in found[f"{thing.name}.{key}"]]
-        self.told[id(thing)] = found
+        self.known[id(thing)] = found
         return found
 
     def _of_item(self, item):
@@ -135,7 +135,7 @@ class ChannelNames:
         natural = [name for kind in counts for name in (kind, rate.format(kind))]
         exerted = partial(_refused, item, self.lacks) if self.lacks else partial(_asked, "reaction", item)
         loads = {name: (unit, AXES, exerted, partial(_at, i)) for i, (name, unit) in enumerate(LOADS)}
-        heard = list(loads)
+        main = list(loads)
         every = [one for found in geometries.values() for one in found]
         own = item.geometry if isinstance(item, JointLoad) else every[0] if len(every) == 1 else None
         if own is not None:
@@ -143,14 +143,14 @@ class ChannelNames:
             name, unit = LOADS[i]
             loads[f"{name}.axis"] = unit, (), partial(_along, item, own, i, exerted), _whole
             if item.drives or isinstance(item, Force):
-                heard = [f"{name}.axis"]
+                main = [f"{name}.axis"]
         if isinstance(item, (Spring, Distance)):
             load = loads_of(self.packed).get(id(item)) or member(self.packed, item)
             ends = list(zip((item.a, item.b), load.coordinates, strict=True))
             found["length"] = "m", (), partial(_length, ends), _whole
             loads["tension"] = "N", (), partial(_tension, item, ends, exerted), _whole
-            natural, heard = ["length"], ["tension"]
-        return found | loads, natural if self.lacks and natural else natural + heard
+            natural, main = ["length"], ["tension"]
+        return found | loads, natural if self.lacks and natural else natural + main
 
 
 LOADS = ("force", "N"), ("torque", "N m")
@@ -168,9 +168,9 @@ def _coordinates(item, counts):
     for kind, count in counts.items():
         parts = tuple(f" {i + 1}" for i in range(count)) if count > 1 else ()
         for level, unit in zip(("", "_rate", "_acceleration"), KINDS[kind], strict=True):
-            found[kind + level] = told = unit, parts, partial(_asked, kind + level, item), _whole
-            if level and len(counts) == 1:
-                found[level[1:]] = told
+            found[kind + level] = unit, parts, partial(_asked, kind + level, item), _whole
+            if level and len(counts) == 1:  # a joint of one kind: "hinge.rate", too
+                found[level[1:]] = found[kind + level]
     return found
 
 

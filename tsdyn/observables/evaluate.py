@@ -15,6 +15,7 @@ from ..jit.kernels import twin
 from ..maths.matrix_rank import dependent, farthest_first, sparse_lu
 from ..maths.tolerances import COMPLEX_STEP, PIVOT_ROUNDING, RANK_TOL, ROUNDING, SUM_ROUNDING, TINY
 from ..model.equations import WIDTH, as_csr, evaluate_constraints, with_short_rows
+from ..model.packed import coupled_loads
 from ..rows.constraint_graph import coordinate_scales
 from ..validation import finite_vector, number
 from .diagnostics import starts_of
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 # Coupled friction and reactions at one state, in plain NumPy, for `scene.evaluate`.
 
-SWEEPS = 50
+ITERATIONS = 50
 JAMMED = (
     "no reactions are consistent with the friction of the joints: with large coefficients of friction the mechanism "
     "may jam here."
@@ -41,13 +42,13 @@ def balance(packed, t, q, qd, Phi_q, solve):
     Newton's method for the normal loads N = N(lam_0 + sum_i lam_i N_i).
     """
     system, n = packed.system, q.size
-    found = sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
-    units = [_unit(system, load, t, q, qd) for load in found]
+    frictions = coupled_loads(packed)
+    units = [_unit(system, load, t, q, qd) for load in frictions]
     first = solve(np.zeros(n))
     parts = np.array([solve(unit) - first for unit in units])
-    reactions = [_reaction(packed, load, q, qd, Phi_q) for load in found]
-    N = np.zeros(len(found))
-    for _ in range(SWEEPS):
+    reactions = [_reaction(packed, load, q, qd, Phi_q) for load in frictions]
+    N = np.zeros(len(frictions))
+    for _ in range(ITERATIONS):
         lam = np.nan_to_num((first + N @ parts)[n:])
         values, changes = zip(*(reaction(lam) for reaction in reactions), strict=True)
         J = np.eye(N.size) - np.array(changes) @ np.nan_to_num(parts[:, n:]).T
@@ -63,9 +64,9 @@ def balance(packed, t, q, qd, Phi_q, solve):
 
 def normal_loads(packed, t, q, qd, Phi_q, lam):
     """Return the normal loads (frictions,) by multipliers (m,), and the friction forces of unit ones (frictions, n)."""
-    found = sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
-    loads = np.array([_reaction(packed, load, q, qd, Phi_q)(lam)[0] for load in found])
-    return loads, np.array([_unit(packed.system, load, t, q, qd) for load in found])
+    frictions = coupled_loads(packed)
+    loads = np.array([_reaction(packed, load, q, qd, Phi_q)(lam)[0] for load in frictions])
+    return loads, np.array([_unit(packed.system, load, t, q, qd) for load in frictions])
 
 
 def _unit(system, load, t, q, qd):

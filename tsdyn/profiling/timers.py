@@ -27,7 +27,7 @@ from ..jit.kernels import (
 )
 from ..methods.explicit import ACCELERATE, NORM, PLACE, STEP
 
-# Signatures of the kernels whose addresses stand in `Kernels` and in `StageKernels`; that of a series is the last.
+# Signatures of the kernels whose addresses stand in `RunKernels` and in `StageKernels`; that of a series is the last.
 TIMED = {
     "kernels.place": PLACE, "kernels.accelerate": ACCELERATE, "kernels.stage_place": PLACE,
     "kernels.stage_accelerate": ACCELERATE, "kernels.complete": "pp", "kernels.check": "p",

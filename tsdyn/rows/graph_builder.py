@@ -63,7 +63,7 @@ def cut(pairs, sizes, degrees):
 
     Returns
     -------
-    list of Part
+    list of SplitPart
     """
     at_body = {}
     for node, pair in enumerate(pairs):
@@ -128,7 +128,7 @@ def _tree(hub, nodes, sizes, degrees):
 #
 # joints      constraints that are no normalisations, the two bodies and the first row of Phi of each
 # nodes       pairs of bodies that joints connect: the blocks of S; their rows are eliminated together
-# hubs        bodies with many nodes, cut into parts that welds hold together (graph_builder.py)
+# hubs        bodies with many nodes, cut into parts that welds hold together (`cut`)
 # products    where H_i W H_j^T of two joints at a body goes in S
 
 

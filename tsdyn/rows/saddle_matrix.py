@@ -360,7 +360,7 @@ class _SaddleBuilder:
                 yield target + 3 * (stride + 1), stride, base + 3 * step + a, step, own + a * (width + 1), *c
 
 
-# The rows of the saddle-point matrix of implicit methods, its factors and solves (rows/saddle_matrix.py).
+# The rows of the saddle-point matrix of implicit methods, its factors and solves.
 #
 # s is a `SaddleWorkspace`; the blocks of bodies are added by the caller.
 

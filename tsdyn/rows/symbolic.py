@@ -177,7 +177,7 @@ def _reached(groups, cliques, home):
     return above
 
 
-# Symbolic part of the sparse factorisation: fill-reducing ordering and supernodes; symbolic.py has the addresses.
+# Symbolic part of the sparse factorisation: fill-reducing ordering and supernodes.
 #
 # The pattern is symmetric. Rows are grouped into nodes (all constraint rows between two bodies); the nodes at one body
 # form a clique. Nodes are eliminated in a fill-reducing order; consecutive nodes with nearly equal remaining patterns

@@ -56,7 +56,7 @@ def restore_now(w, r):
 # Dense output of step methods: v and vd are interpolated in the chart, then positions and velocities are solved for.
 #
 # The driver uses it at the times of t_eval, in its own workspace. `Solution.at` and events use it through `read` and a
-# workspace of their own (dense_output.py), where the chart of a step is rebuilt: q0, the time and the selection of rows
+# workspace of their own (`Reader`), where the chart of a step is rebuilt: q0, the time and the selection of rows
 # determine it.
 
 NOT_FINITE = int(Status.NOT_FINITE)

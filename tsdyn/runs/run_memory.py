@@ -94,6 +94,7 @@ def call(kernel, arguments, called):
 
 
 def _enter(places, addresses):
+    """Write addresses into their records."""
     for (record, name), address in zip(places, addresses, strict=True):
         setattr(record, name, address)
 
@@ -120,7 +121,7 @@ class Layout(NamedTuple):
 
     n: int
     remembered: int  # angles and slots
-    skipped: tuple  # as of an engine
+    skipped: tuple  # work that an evaluation leaves out: gyroscopic terms, rotations, constant columns
     has_forces: bool
 
 
@@ -270,6 +271,7 @@ class Memory:
             status = STATUSES[self.advance_kernel(*arguments)]
             answer_interrupts()
             return status
+        # Begin first, alone: Ctrl-C in the first step goes back to a run that has begun
         if not self.run.numbers.begun and most > 0:
             status = self.advance(log, -1)
             if not self.run.numbers.begun:

@@ -174,7 +174,7 @@ def _reading(packed, form, constraint_tol, kernels):
 
 
 def kernels_of(method, form, step, interpolant, adaptive, within):
-    """Addresses that the driver and the reader call, by their names in `Kernels`.
+    """Addresses that the driver and the reader call, by their names in `RunKernels`.
 
     within: whether anything is asked for between the ends of steps.
     """

@@ -379,6 +379,7 @@ def _go_back(r):
 @kernel
 def _take_projection(c, r):
     """x and y at the step's end without their normal components, which stages of the next step would keep."""
+    # x <- x - Y0 u,  y <- y - Y0 z,  u <- 0
     copy(c.chart.x[: r.x.size], r.x)
     copy(c.chart.y[: r.y.size], r.y)
     for e in range(c.work.u.size):

@@ -99,7 +99,7 @@ def to_dataframe(solution, channels):
 
 
 def to_csv(solution, path, channels):
-    """As of `Records.to_csv`."""
+    """What `Records.to_csv` does, and raises."""
     demand_path(path, "path")
     if channels is not None:
         some = channels_of(solution.packed, channels, solution._lacks)

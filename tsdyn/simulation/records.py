@@ -79,7 +79,7 @@ class Records:
             q, qd, qdd over (time, coordinate), coordinates being named "body.x", "body.e0" and so on, as in stores;
             multipliers over (time, row), rows by their names; position_error, velocity_error, acceleration_error,
             kinetic_energy, potential_energy and energy over time. Units are attributes; those of each coordinate are
-            along `coordinate`, as `coordinate_units`. The provenance is among the attributes.
+            along `coordinate`, as `dataset.coordinate_units`. The provenance is among the attributes.
 
         Examples
         --------

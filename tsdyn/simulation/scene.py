@@ -428,7 +428,7 @@ class Scene:
 
     @property
     def packed(self) -> Packed:
-        """The scene as a `Packed`; packed anew only after a change."""
+        """The scene as a `Packed`; packed anew only after a change. Raises InvalidBody without bodies."""
         if self._packed is None:
             if not self._bodies:
                 raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
@@ -466,7 +466,13 @@ class Scene:
         return start
 
     def body(self, name: str) -> Body | Any:
-        """Return the body of this name."""
+        """Return the body of this name.
+
+        Raises
+        ------
+        InvalidBody
+            If there is none.
+        """
         for body in self._bodies:
             if isinstance(name, str) and body.name == name:
                 return body

@@ -211,7 +211,7 @@ class Turns:
 #
 # Near a singular configuration charts shrink towards zero, while the Taylor series of a motion that passes it smoothly
 # is regular. If a chart is made near a singularity, or a fixed step fails near one, a Taylor run continues until the
-# configuration is regular again; the method then restarts (segments.py). A fixed-step method restarts on its own time
+# configuration is regular again; the method then restarts (`_Segments`). A fixed-step method restarts on its own time
 # grid. Runs that meet no singular configuration load none of this.
 
 
@@ -297,10 +297,10 @@ class Carrier:
 
 # Segments of a run, each by one method: what a segment begins with, and how all of them make one outcome.
 #
-# A segment ends with Status.STIFF where the default method turns to its implicit method, or back (segments.py); with
+# A segment ends with Status.STIFF where the default method turns to its implicit method, or back (`Turns`); with
 # Status.STEP_COLLAPSED where friction comes to rest within a step, and the implicit method goes on; and with
-# Status.PASSAGE where series go on past a singular configuration, or have done so (segments.py). All other
-# runs have one segment.
+# Status.PASSAGE where series go on past a singular configuration, or have done so (`Carrier`). All other runs
+# have one segment.
 
 PASSAGE, STIFF = Status.PASSAGE, Status.STIFF
 METHOD, IMPLICIT, CROSSING = range(3)  # who makes a segment: the task's method, the implicit one, series

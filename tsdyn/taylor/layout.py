@@ -17,7 +17,7 @@ from ..formulations.locked_orientations import instances
 from ..jit.arrays import zeros
 from ..jit.kernels import Record, loader, records, twin
 from ..model.equations import changes_with_state
-from ..model.packed import System, members_of
+from ..model.packed import System, coupled_loads, members_of
 from ..motions.prescribed import Motion
 from ..motions.program import run_program
 from ..motions.signals import Signal
@@ -319,7 +319,7 @@ def kept_multipliers(graph):
 
 def lay_out_frictions(packed, graph, places, forces, orders):
     """The `FrictionLayout` of a packed scene; places and forces are those of the `Expansion`."""
-    found = sorted((load for load in packed.loads if load.normal >= 0), key=lambda load: load.normal)
+    found = coupled_loads(packed)
     frictions, sources = [], []
     if found:
         where = _instances(packed, graph, places)

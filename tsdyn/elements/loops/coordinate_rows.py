@@ -44,7 +44,7 @@ def values(count, stride, table, reals, q, qd, t, out):
 
 
 def remembers(count, stride, table, reals, q, qd, t, out):
-    """Let all instances remember, each in the last of its reals."""
+    """The last real of each instance = remember(x, par, t) of its kind, after an accepted step."""
     table, reals, q = integers(table, ANY), vector(reals, ANY), vector(q, ANY)
     x = stack(SIZE)
     for i in range(count):

@@ -118,7 +118,7 @@ def forces(count, stride, table, reals, q, qd, t, out):
                 s[row, 0] = x[int(body[0]) + c]
                 row += 1
     run_rows(head[int(head[PROGRAM]) :], s, 0)
-    # Forces and torques onto the coordinates
+    # Eq. (1)
     for b in range(nb):
         body = head[int(head[BODY_LIST]) + BODY_WIDTH * b :]
         at, first = int(body[0]), int(head[RESULTS]) + 6 * int(body[2])
@@ -141,7 +141,7 @@ def _add_torque(p, s, row, k, out, at, step):
 
 
 def remembers(count, stride, table, reals, q, qd, t, out):
-    """Follow the angles."""
+    """Keep each counted angle on its turn: the one nearest to the angle before."""
     reals, q = vector(reals, ANY), vector(q, ANY)
     head = reals[int(reals[stride + FORWARD]) :]
     memory = head[int(head[MEMORY]) :]
@@ -152,7 +152,7 @@ def remembers(count, stride, table, reals, q, qd, t, out):
 
 @kernel
 def _difference(head, memory, par, t):
-    """Set u_x by central differences."""
+    """Set u_x by central differences of the function, u_(q, qd) of its bodies at the last state."""
     n, values = int(head[COORDINATES]), int(head[VALUES])
     x, u, slopes = head[int(head[STATE]) :], head[int(head[SLOPES]) :], head[int(head[SLOPES]) + values :]
     for c in range(2 * n):
@@ -275,6 +275,7 @@ def series(run, k, kind, table, reals, bodies, values, poses, Z):
     scratch, all_p = values[program:], program + (rows * orders + 3) // 4 * 4
     s, xd = matrix(data_of(scratch), rows, orders), stack(4)
     memory, par, row = head[int(head[MEMORY]) :], reals[int(head[PAR]) :], 1
+    # t; values that are held, and numbers: constant
     s[0, k] = values[T] if k == 0 else (1.0 if k == 1 else 0.0)
     for i in range(int(head[VALUES])):
         s[row, k] = memory[i] if k == 0 else 0.0
@@ -286,7 +287,7 @@ def series(run, k, kind, table, reals, bodies, values, poses, Z):
             row += 1
         row += int(head[ANGLES])
     for b in range(nb):
-        # r_k and rd_k = (k + 1) r_{k+1}; p_k and pd_k
+        # r_k and rd_k = (k + 1) r_{k+1}; p_k, pd_k by omega'_k, and p_{k+1} = pd_k / (k + 1)
         dimension, at, p = int(head[int(head[BODY_LIST]) + BODY_WIDTH * b + 1]), table[b] * BODY_ROW * orders, 0
         for i in range(3):
             r = at + S_R * orders + 4 * k + i
@@ -302,13 +303,16 @@ def series(run, k, kind, table, reals, bodies, values, poses, Z):
         row += dimension
     if head[TRACED] != 0.0:
         for j in range(int(head[ANGLES])):
+            # Eq. (4): thetad is a result of the program
             if k > 0:
                 s[angles + j, k] = s[first + 6 * int(head[ACTED]) + j, k - 1] / k
             else:
                 c = head[int(head[ANGLE_LIST]) + ANGLE_WIDTH * j :]
+                # Where q of a body would begin, p being q[3:7]
                 own, other = all_p + 4 * orders * int(c[2]) - 3, all_p + 4 * orders * int(c[5]) - 3
                 s[angles + j, 0] = _angle(_four(values, own, int(c[1])), _four(values, other, int(c[4])), c, memory[j])
     call_order(run, values, scratch, rows, orders, k)
+    # F_k and tau'_k
     for b in range(nb):
         place, z = head[int(head[BODY_LIST]) + BODY_WIDTH * b + 2], 8 * table[b]
         if place >= 0.0:

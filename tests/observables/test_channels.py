@@ -239,6 +239,14 @@ def test_what_are_no_names(names):
         fall().to_dataframe(names)
 
 
+def test_a_handle_is_answered_by_its_name():
+    bob = (scene := ts.Scene()).add_point_mass(1.0, name="bob")
+    run = ts.simulate(scene, (0, 0.1))
+    for given in (bob, [bob]):
+        with pytest.raises(ts.InvalidArgument, match=r"channels must be a name .*; its name is 'bob'\."):
+            run.to_dataframe(given)
+
+
 def test_a_name_of_a_body_and_of_a_joint():
     """The quantity tells which is meant; the name alone doesn't."""
     scene = ts.Scene()
@@ -266,7 +274,7 @@ def test_csv_files(tmp_path):
     assert ",'=1+1.position.x (m)," in text
     with pytest.raises(ts.StorageError, match="can't be written"):
         fall().to_csv(tmp_path / "nowhere" / "a.csv", "hinge")
-    with pytest.raises(ts.InvalidArgument, match="path must be a path"):
+    with pytest.raises(ts.InvalidArgument, match=r"path must be a path, as text or a Path, got 3\."):
         fall().to_csv(3)
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..constraints.euler_normalization import EulerNormalization
 from ..plugins import (
     Action,
     Force,
@@ -129,7 +130,8 @@ class Control(SceneLaw, Force):
         """(item, kind of coordinate, which); of a Spring, a PointForce or a Torque the item alone."""
         item, *which = given if isinstance(given, tuple) else (given,)
         if isinstance(item, str):
-            item = named([*scene.constraints, *scene.forces], item, "joint or spring", self.error)
+            known = [each for each in scene.constraints if not isinstance(each, EulerNormalization)]
+            item = named([*known, *scene.forces], item, "joint or spring", self.error)
         if getattr(item, "scene", None) is not scene:
             where = "belongs to another scene" if hasattr(item, "scene") else "is none"
             raise self.error(f"{self.name}: the actuator {item!r} {where}; {HOW}.")

@@ -9,6 +9,7 @@ from types import BuiltinFunctionType, FunctionType
 
 import numpy as np
 
+from ..calls import lacking
 from ..elements.bodies import Ground, PointMass
 from ..elements.element import Attachment
 from ..elements.force import Force
@@ -67,6 +68,9 @@ class SceneState(Kinematics["float | Any"]):
 
     acceleration = angular_acceleration = angle_acceleration = displacement_acceleration = reaction = _refuse
     qdd = multipliers = property(_refuse)
+
+    def __getattr__(self, name):
+        raise lacking(self, name)
 
     def __getitem__(self, i):
         raise InvalidArgument(
@@ -193,7 +197,10 @@ class Law:
             seen = _TracedState(state, 1 + count)
             found = traced(lambda t, numbers: results(plain, t[0], seen, numbers), (1, count), self.values)
             means = [_input(0), *(_input(first + i) for i in range(count)), *seen.found]
-            graphs = [_graph(value) for value in evaluate(found, means)]
+            values = evaluate(found, means)
+            if not all(isinstance(value, Smooth) or math.isfinite(value) for value in values):
+                raise Untraceable("it gives a number that is not finite")
+            graphs = [_graph(value) for value in values]
             self._demand_same(graphs)
             self.changes = may_change(Writer(found, len(means), range(1, 1 + count), 0, len(means)).numbers())
             return graphs
@@ -470,14 +477,17 @@ def demand_callable(force, handles, t, q, qd, angles):
     """
     law = Law.__new__(Law)
     law.force, law.handles, law.values = force, handles, len(force.actions())
+    own = f"{force.name}: "  # what begins so says where already
     try:
         with np.errstate(all="ignore"):
             law.evaluate(t, q, qd, angles, force.parameters())
-    except (ArithmeticError, ValueError) as error:
-        if isinstance(error, TsdynError):
+    except TsdynError as error:
+        if str(error).startswith(own):
             raise
-    except TsdynError:
-        raise
+        kind = force.error if isinstance(error, AttributeError) else type(error)
+        raise kind(f"{own}its {force.given} can't be evaluated: {error}") from error
+    except (ArithmeticError, ValueError):
+        pass
     except Exception as error:
         raise force.error(
             f"{force.name}: its {force.given} raises {type(error).__name__} at the start: {str(error).rstrip('.')}."

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..constraints import Distance
 from ..elements.bodies import PointMass
-from ..elements.element import AngleGeometry
+from ..elements.element import AngleGeometry, Attachment
 from ..elements.force import Force
 from ..elements.loads import JointLoad
 from ..errors import InvalidArgument, StorageError
@@ -66,10 +66,12 @@ def channels_of(packed: Packed, names: str | Sequence[str], lacks: str = "") -> 
         If a name stands for no channel, or for those of several objects.
     """
     said = 'channels must be a name such as "hinge.angle", or a sequence of names'
-    names = [names] if isinstance(names, str) else list(sequence(names, said, InvalidArgument))
+    one = isinstance(names, (str, PointMass, Attachment))
+    names = [names] if one else list(sequence(names, said, InvalidArgument))
     wrong = [name for name in names if not isinstance(name, str)]
     if wrong or not names:
-        raise InvalidArgument(f"{said}, got {shown(wrong[0] if wrong else names)}.")
+        own = f"; its name is {wrong[0].name!r}" if wrong and isinstance(wrong[0], (PointMass, Attachment)) else ""
+        raise InvalidArgument(f"{said}, got {shown(wrong[0] if wrong else names)}{own}.")
     known = ChannelNames(packed, lacks)
     return list({channel.name: channel for name in names for channel in known.meant(name)}.values())
 

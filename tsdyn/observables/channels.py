@@ -17,10 +17,12 @@ from ..elements.element import AngleGeometry, Attachment
 from ..elements.force import Force
 from ..elements.loads import JointLoad
 from ..errors import InvalidArgument, StorageError
-from ..forces import Spring
+from ..forces import Control, Spring
 from ..model.handles import handles_of
 from ..validation import close, sequence, shown
+from .generalised_forces import law_values
 from .reactions import loads_of, member
+from .state import State
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -125,6 +127,8 @@ class ChannelNames:
             found[name] = [Channel(name + part, unit, ask, one, quantity) for part, one in picks.items()]
             found |= {one.name: [one] for one in found[name]} if parts else {}
         found[thing.name] = [one for key in natural for one in found[f"{thing.name}.{key}"]]
+        if isinstance(thing, Control):
+            found[f"{thing.name}.actuation"] = found[thing.name]
         self.told[id(thing)] = found
         return found
 
@@ -152,6 +156,12 @@ class ChannelNames:
             found["length"] = "m", (), partial(_length, ends), _whole
             loads["tension"] = "N", (), partial(_tension, item, ends, exerted), _whole
             natural, heard = ["length"], ["tension"]
+        if isinstance(item, Control):
+            ask = partial(_refused, item, self.lacks) if self.lacks else partial(_actuation, item)
+            titles, units = item.titles(), [LOADS[action.turns][1] for action in item.actions()]
+            heard = [f"actuation.{title}" for title in titles]
+            picks = [partial(_component, _whole, i) for i in range(len(heard))]
+            loads |= {name: (unit, (), ask, pick) for name, unit, pick in zip(heard, units, picks, strict=True)}
         return found | loads, natural if self.lacks and natural else natural + heard
 
 
@@ -194,6 +204,11 @@ def _of_body(body):
 
 def _asked(name, thing, motion):
     return getattr(motion, name)(thing)
+
+
+def _actuation(control, motion):
+    load = loads_of(motion.packed).get(id(control)) or member(motion.packed, control)
+    return law_values(motion, load, motion.memory if isinstance(motion, State) else motion._memory)
 
 
 def _refused(item, lacks, motion):

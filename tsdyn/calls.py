@@ -69,7 +69,7 @@ CLASSES = {  # of constraints, forces and integrators, in small letters and with
     "solve_ivp": "simulate(scene, t_span)",
     "run": "prepare(scene, ...), which returns a ts.Run, or ts.simulate(scene, t_span)",
 }
-PUBLIC = "Scene", "Solution", "Ensemble", "State"  # their subclasses are called by the same names
+PUBLIC = {name: name for name in ("Scene", "Solution", "Ensemble", "State")} | {"SceneState": "State"}  # and subclasses
 RUNS = "simulate", "run", "solve"  # what a scene has in other programs
 ATTRIBUTES = {  # of scenes, solutions, ensembles and states; what an object has of these is named
     "add_rigid_body": ("add_body(...)",),
@@ -148,13 +148,24 @@ def hint(where, name, known):
     return f"; did you mean {' or '.join(f'{where}.{word}' for word in near)}?" if near else f"; see dir({where})."
 
 
+def _kind(owner):
+    """The name of an object's class, as users know it."""
+    kinds = [cls.__name__ for cls in type(owner).__mro__]
+    return next((PUBLIC[kind] for kind in kinds if kind in PUBLIC), kinds[0])
+
+
+def _method(owner, function):
+    """The name by which a class, or a base of it, has a function as a method; None if it hasn't."""
+    held = (item for cls in owner.__mro__ for item in vars(cls).items())
+    return next((name for name, value in held if value is function), None)
+
+
 def lacking(owner, name):
     """Return the error of an attribute that an object of ours lacks, for `__getattr__`.
 
     Raises the own error of a property that has failed: Python asks `__getattr__` then, too.
     """
-    kinds = type(owner).__mro__
-    kind = next((cls.__name__ for cls in kinds if cls.__name__ in PUBLIC), kinds[0].__name__)
+    kinds, kind = type(owner).__mro__, _kind(owner)
     said = f"{kind!r} object has no attribute {name!r}"
     if name.startswith("_"):  # of a protocol
         return AttributeError(said)
@@ -165,6 +176,7 @@ def lacking(owner, name):
     if kind == "Scene" and name in RUNS:
         here = ["ts.simulate(scene, t_span)"]
     near = nearest(name, [word for word in known if not word.startswith("_")])
+    near = f"; see dir({kind.lower()})." if near == "." else near
     return UnknownAttribute(said + (f"; here it is {' or '.join(here)}." if here else near))
 
 
@@ -172,6 +184,14 @@ def argument(name, known):
     """Return what an argument is called here, or None."""
     here = ARGUMENTS.get(name)
     return here if here in known else None
+
+
+def line_of_user() -> int:
+    """Return the `stacklevel` with which a warning of the caller names the line of the user's file."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] == __package__:
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 # Calls of public functions and classes: a wrong call is refused with the nearest match.
@@ -218,6 +238,10 @@ def fitting(function: Function, then: Callable[[Any], None] | None = None) -> Fu
             title, known = function.__qualname__.removesuffix(".__new__"), inspect.signature(call)
             if function.__name__ == "__init__":
                 title = getattr(arguments[0], "_kind", lambda: type(arguments[0]).__name__)()
+            elif arguments and (method := _method(type(arguments[0]), call)):
+                title = f"{_kind(arguments[0])}.{method}"
+                known = known.replace(parameters=list(known.parameters.values())[1:])
+                arguments = arguments[1:]
             misfit = misfit_of(title, known, arguments, keywords) or _unfit(title, function, known, arguments, keywords)
             made_by = getattr(arguments[0], "_made_by", None) if function.__name__ == "__init__" else None
             if misfit is not None and made_by:

@@ -396,23 +396,29 @@ def test_a_law_follows_what_it_reads(monkeypatch):
     ("function", "said"),
     [
         (lambda t, state: (1.0, 2.0), "must give 1 number, one for each actuator; it gave 2"),
-        (lambda t, state: state.angle("hing"), "did you mean 'hinge'"),
-        (lambda t, state: state.angle("rail"), "has no angle"),
+        (lambda t, state: state.angle("hing"), "^control: its function can't .* did you mean 'hinge'"),
+        (lambda t, state: state.angle("rail"), "^control: its function can't .* has no angle"),
         (lambda t, state: state.position("card")[0], "no body is named 'card'; did you mean 'cart'"),
         (lambda t, state: state.acceleration("cart")[0], "accelerations and reactions follow from forces"),
         (lambda t, state: state.reaction("hinge")[0][0], "accelerations and reactions follow from forces"),
         (lambda t, state: state[0], "that of the scene and has no numbers by index"),
-        (lambda t, state: state.angel("hinge"), "angel"),
+        (lambda t, state: state.angel("hinge"), "^control: .*'State' object has no .*'angel'; did you mean angle"),
+        (lambda t, state: state.length("spring"), r"no attribute 'length'; see dir\(state\)"),
         (lambda t, state: undefined_name, "NameError"),  # noqa: F821
         (lambda t, state: None, "must give 1 number, one for each actuator; it gave None"),
         (lambda t, state: "1", "it gave '1'"),
         (lambda t: 0.0, r"function of two arguments \(t, state\)"),
-        (3.0, r"function of \(t, state\)"),
+        (3.0, r"function of \(t, state\), such as lambda t, state: 5\.0, got 3\.0"),
     ],
 )
 def test_wrong_functions_are_refused_where_they_are_added(function, said):
     with pytest.raises(ts.TsdynError, match=said):
         cart(on_rail(function))
+
+
+def test_a_constant_torque_of_a_joint_is_a_function():
+    with pytest.raises(ts.InvalidForce, match=r"such as lambda t, x, v: 5\.0, got 5\.0"):
+        F.JointTorque(cart()["hinge"], function=5.0)
 
 
 def _others(scene):
@@ -428,6 +434,7 @@ def _others(scene):
             lambda s: ["rial"],
             "no spring, or joint with an angle or a displacement, is named 'rial'; did you mean 'rail'",
         ),
+        (lambda s: ["cart"], "is named 'cart'; there are 'rail', 'hinge'\\.$"),
         (lambda s: [s["rail"], _others(s)], "belongs to another scene"),
         (lambda s: [_others(s)], "belong to another scene|belongs to another scene"),
         (lambda s: [("rail", "angle")], "has the coordinates"),
@@ -485,6 +492,8 @@ def test_a_value_that_is_not_finite_is_named():
     run = ts.simulate(cart(on_rail(lambda t, state: np.sqrt(0.3 - t))), (0, 1), integrator="dop853")
     assert not run.success
     assert "'control' is inf or nan" in run.message
+    with pytest.raises(ts.InconsistentState, match="'control' is inf or nan"):
+        ts.simulate(cart(on_rail(lambda t, state: np.nan)), (0, 1))
 
 
 def test_arrays_stay_for_functions_that_ask_no_method():

@@ -9,7 +9,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.commands import called
-from tests.helpers.tolerances import FAIR, HELD
+from tests.helpers.tolerances import FAIR, HELD, ROUNDING
 
 pytest.importorskip("matplotlib")
 pandas = pytest.importorskip("pandas")
@@ -239,6 +239,41 @@ def test_what_are_no_names(names):
         fall().to_dataframe(names)
 
 
+@pytest.mark.parametrize("dense", [False, True])
+@pytest.mark.parametrize("period", [None, 0.05])
+def test_actuations_of_a_control(period, dense):
+    """Functions of time, so in closed form: also within steps, and held between samples. Two act on one joint."""
+    scene = ts.Scene()
+    bar = scene.add_body(**ts.shapes.rod(1.0, axis="x", mass=3.0), position=(0.5, 0, 0), name="bar")
+    c = ts.constraints
+    hinge = scene.add(c.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    push = ts.forces.PointForce(bar, force=(0, 0, 1.0), name="push")
+    values = np.array([2.0, -3.0, 5.0])
+    scene.add(ts.forces.Control(lambda t, state: t * values, [hinge, push, "hinge"], period=period, name="law"))
+    run = ts.simulate(scene, (0, 0.98), dense_output=dense)
+    frame, last = run.to_dataframe("law"), run.t if period is None else period * np.floor(run.t / period + 1e-9)
+    assert list(frame.columns) == [
+        "law.actuation.hinge 1 (N m)",
+        "law.actuation.push (N)",
+        "law.actuation.hinge 2 (N m)",
+    ]
+    np.testing.assert_allclose(frame.to_numpy(), last[:, None] * values, atol=ROUNDING)
+    torques, forces = run.plot("law.actuation")
+    for ax, own in (torques, values[[0, 2]]), (forces, values[1:2]):
+        for line, value in zip(ax.lines, own, strict=True):
+            t = line.get_xdata()
+            inside = t if period is None else period * np.floor(t / period)
+            np.testing.assert_allclose(line.get_ydata(), inside * value, atol=ROUNDING)
+
+
+def test_a_handle_is_answered_by_its_name():
+    bob = (scene := ts.Scene()).add_point_mass(1.0, name="bob")
+    run = ts.simulate(scene, (0, 0.1))
+    for given in (bob, [bob]):
+        with pytest.raises(ts.InvalidArgument, match=r"channels must be a name .*; its name is 'bob'\."):
+            run.to_dataframe(given)
+
+
 def test_a_name_of_a_body_and_of_a_joint():
     """The quantity tells which is meant; the name alone doesn't."""
     scene = ts.Scene()
@@ -266,7 +301,7 @@ def test_csv_files(tmp_path):
     assert ",'=1+1.position.x (m)," in text
     with pytest.raises(ts.StorageError, match="can't be written"):
         fall().to_csv(tmp_path / "nowhere" / "a.csv", "hinge")
-    with pytest.raises(ts.InvalidArgument, match="path must be a path"):
+    with pytest.raises(ts.InvalidArgument, match=r"path must be a path, as text or a Path, got 3\."):
         fall().to_csv(3)
 
 

@@ -69,6 +69,21 @@ def test_a_wrong_call_names_what_would_be_right(call, words):
     assert isinstance(caught.value, TypeError)
 
 
+def test_wrong_calls_of_methods_name_the_class_that_users_know():
+    """Whatever class of tsdyn's own a method is written in."""
+    scene = pendulum()
+    run = ts.simulate(scene, (0.0, 0.01))
+    cases = ts.ensemble(scene, {"bob.mass": [1.0, 2.0]}, (0.0, 0.01))
+    known = {"Scene": scene, "Solution": run, "State": run.state, "Ensemble": cases, "Run": ts.prepare(scene)}
+    for kind, thing in known.items():
+        methods = inspect.getmembers_static(type(thing), inspect.isfunction)
+        for name in [name for name, _ in methods if not name.startswith("_")]:
+            with pytest.raises(ts.InvalidArgument) as caught:
+                getattr(thing, name)(no_such=1)
+            assert str(caught.value).startswith(f"{kind}.{name}() has no argument no_such"), caught.value
+            assert " has self" not in str(caught.value)
+
+
 def test_a_type_error_of_the_users_own_code_stays_as_it_is():
     @fitting
     def own(number):

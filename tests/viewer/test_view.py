@@ -459,6 +459,18 @@ def test_a_gif_of_a_scene_is_one_picture(tmp_path):
             assert (gif.n_frames, gif.size) == (1, (640, 480))
 
 
+def test_violated_rows_at_one_place_are_lines_of_their_own_in_a_gif(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    scene = ts.Scene()
+    for name in ("one", "two"):
+        bob = scene.add_point_mass(mass=1.0, position=(1.2, 0, 0), name=name)
+        scene.add(C.Distance(bob, scene.ground, length=1.0, name=f"rod {name}"))
+    with image.open(scene.view(tmp_path / "rods.gif")) as gif:
+        rgb = np.asarray(gif.convert("RGB")).astype(int)[-60:]
+    red = ((rgb[..., 0] > 180) & (rgb[..., 1:].max(axis=-1) < 120)).any(axis=1)
+    assert np.count_nonzero(np.diff(red.astype(int)) == 1) == 2
+
+
 def test_a_gif_needs_matplotlib(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(ts.MissingDependency, match=r"the GIF needs matplotlib: pip install 'tsdyn\[plot\]'"):

@@ -385,7 +385,7 @@ def _joint_values(scene, joints):
             raise InvalidArgument(f"assemble: {joint!r} has no joint coordinate to be given in joints.")
         if numbers.ndim != 1 or not 0 < numbers.size <= most or not np.isfinite(numbers).all():
             many = "a finite number" if most == 1 else f"up to {most} finite numbers, angles first"
-            raise InvalidArgument(f"assemble: the value of {joint!r} in joints must be {many}, got {given!r}.")
+            raise InvalidArgument(f"assemble: the value of {joint.name!r} in joints must be {many}, got {given!r}.")
         found[joint] = numbers
     return found
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Never, Self
 
 import numpy as np
 
-from ..calls import Placing, complete_signature, fitting, fitting_constructor
+from ..calls import Placing, complete_signature, fitting, fitting_constructor, line_of_user
 from ..docstrings import complete_docstring
 from ..errors import InvalidConstraint
 from ..jit.kernels import NumbaError, kernel, twin
@@ -58,7 +58,7 @@ def stop_waiting(item):
     item.scene._waiting.pop(id(item), None)
 
 
-def warn_of_waiting(scene, stacklevel):
+def warn_of_waiting(scene):
     """Warn, once, of what was made for a scene and never added."""
     if not scene._waiting:
         return
@@ -66,7 +66,7 @@ def warn_of_waiting(scene, stacklevel):
     scene._waiting.clear()
     warnings.warn(
         f"made for this scene and never added: {listed(titles)}. What scene.add(...) isn't given has no effect.",
-        stacklevel=stacklevel + 1,
+        stacklevel=line_of_user(),
     )
 
 

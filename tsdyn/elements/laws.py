@@ -137,7 +137,7 @@ def arguments_of(function):
 def scene_law(value: Any, what: str, error: Any) -> Any:
     """Anything that can be called with (t, state); raises `error` for anything else."""
     if not callable(value):
-        raise error(f"{what} must be a function of (t, state), or an object to be called so, got {value!r}.")
+        raise error(f"{what} must be a function of (t, state), such as lambda t, state: 5.0, got {value!r}.")
     if arguments_of(value) not in (0, 2) or starred(value):
         raise error(f"{what} must be a function of two arguments (t, state), got {value!r}{starred(value)}.")
     return value

@@ -418,7 +418,7 @@ def _law(x, xd, par, t, out):
 def law_of_joint(value, what, error):
     """Anything that can be called."""
     if not callable(value):
-        raise error(f"{what} must be a function of (t, coordinate, rate), or an object to be called so, got {value!r}.")
+        raise error(f"{what} must be a function of (t, coordinate, rate), such as lambda t, x, v: 5.0, got {value!r}.")
     return value
 
 

@@ -11,6 +11,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, 
 
 import numpy as np
 
+from ..calls import line_of_user
 from ..errors import InvalidArgument, MissingDependency, Status
 from ..runs.tolerances import SLICE_SECONDS
 from .cases import TIMES
@@ -364,7 +365,7 @@ class _Sender:
             self._end(report, waits=isinstance(error, BrokenExecutor))
             if isinstance(error, BrokenExecutor):
                 self.sink.reason = f"The executor broke: {type(error).__name__}: {error}"
-                warnings.warn(f"{self.sink.reason} Cases that had come back are kept.", stacklevel=4)
+                warnings.warn(f"{self.sink.reason} Cases that had come back are kept.", stacklevel=line_of_user())
             return True
         except BaseException:
             for future in self.pending:

@@ -170,6 +170,13 @@ class Control(SceneLaw, Force):
         """What each value acts as."""
         return [_action(*actuator) for actuator in self._found]
 
+    def titles(self) -> list[str]:
+        """Names of its actuators, with numbers where a joint or spring is several."""
+        names = [item.name for item, *_ in self._found]
+        return [
+            name if names.count(name) == 1 else f"{name} {names[: i + 1].count(name)}" for i, name in enumerate(names)
+        ]
+
     @classmethod
     def example(cls, rng, a, b):
         """Two components of a force on a, and a torque, that depend on both bodies."""

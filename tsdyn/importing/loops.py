@@ -8,7 +8,7 @@ hinge    so do their z axes, or a given axis    Revolute
 import numpy as np
 
 from ..errors import InvalidArgument
-from ..validation import floats, nearest, sequence
+from ..validation import floats, nearest, sequence, shown
 from .description import GROUND, HERE, Frame, JointItem, fresh, turned
 from .drawn_shapes import placed
 
@@ -36,13 +36,13 @@ def close(found, name, kind, ends, frames):
 def add_given(found, loops):
     """Add the loops (frame_a, frame_b, kind) of `ts.load`; hinges may name their axis, in both frames."""
     for loop in loops:
-        parts = sequence(loop, f"loops: each is such as {EXAMPLE}; got {loop!r}", InvalidArgument)
+        parts = sequence(loop, f"loops: each is such as {EXAMPLE}", InvalidArgument)
         if not (len(parts) == 3 or (len(parts) == 4 and parts[2] == "hinge")) or parts[2] not in KINDS:
             raise InvalidArgument(
                 f"loops: each is such as {EXAMPLE}; a hinge turns about the z axes of its frames, or about the axis in "
                 f"a fourth entry, such as (0, 1, 0). Got {loop!r}."
             )
-        turn = _towards(floats(parts[3])) if len(parts) == 4 else HERE
+        turn = _towards(parts[3]) if len(parts) == 4 else HERE
         (one, at), (other, there) = (_frame(found, name) for name in parts[:2])
         if one == other:
             raise InvalidArgument(f"loops: {parts[0]!r} and {parts[1]!r} are on the same link, {one or 'the ground'}.")
@@ -67,11 +67,14 @@ def _frame(found, name):
     raise InvalidArgument(f"loops: the file has no link, frame, site or joint {name!r}{near}")
 
 
-def _towards(axis):
+def _towards(given):
     """A rotation that takes z to an axis."""
+    axis = floats(given)
     length = np.linalg.norm(axis)
     if axis.shape != (3,) or not 0.0 < length < np.inf:
-        raise InvalidArgument(f"loops: the axis of a hinge has three numbers, not all zero; got {axis.tolist()}.")
+        raise InvalidArgument(
+            f"loops: the axis of a hinge must be three numbers, not all zero, such as (0, 1, 0); got {shown(given)}."
+        )
     u = axis / length
     across = np.cross((0.0, 0.0, 1.0), u)
     sine = np.linalg.norm(across)

@@ -85,21 +85,21 @@ def _scene(description: Any, make: Any, report: ImportReport, mistakes: Any) -> 
     except TsdynError as error:
         mistakes.add((1, 1), str(error))
         mistakes.demand_none()
-    if any(joint.loop for joint in description.joints):
-        _close(scene, report)
-    report.warn()
+    report.warn(_close(scene, report) if any(joint.loop for joint in description.joints) else 0.0)
     return scene
 
 
-def _close(scene: Scene, report: ImportReport) -> None:
-    """Assemble a scene whose loops are open, or mirrored, at the start."""
+def _close(scene: Scene, report: ImportReport) -> float:
+    """Assemble a scene whose loops are open, or mirrored, at the start; by how much they stay open."""
     q, qd = scene.start
     rest = np.zeros((1, q.size))
     gap = float(constraint_error(scene.packed, np.zeros(1), q[None], qd[None], rest).position[0])
     if gap <= INITIAL_TOL and are_aligned(scene.packed, q, 0.0):
-        return
+        return 0.0
     try:
         scene.assemble()
         report.note(f"loops that were open by up to {gap:.2g} are closed by assembly")
+        return 0.0
     except TsdynError as error:
         report.note(f"loops are open by up to {gap:.2g}, and can't be closed: {error}")
+        return gap

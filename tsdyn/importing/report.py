@@ -6,6 +6,7 @@ import html
 import warnings
 from typing import Any, NamedTuple
 
+from ..calls import line_of_user
 from ..errors import ImportLosses
 from ..validation import counted
 
@@ -101,11 +102,15 @@ class ImportReport:
         parts = [f"{len(entries)} x {what}" for what, entries in self.groups().items()]
         return "; ".join(parts)
 
-    def warn(self) -> None:
-        """Warn where something is left out."""
-        if self._left:
-            said = f"{self.source}: not carried over: {self.summary()}. print(scene.imported) lists each."
-            warnings.warn(ImportLosses(said), stacklevel=6)
+    def warn(self, open_by: float = 0.0) -> None:
+        """Warn where something is left out, or loops stay open, by the largest residual."""
+        said = [f"not carried over: {self.summary()}"] if self._left else []
+        said += [f"its loops are open by up to {open_by:.2g}, and can't be closed"] if open_by else []
+        if said:
+            warnings.warn(
+                ImportLosses(f"{self.source}: {'; '.join(said)}. print(scene.imported) tells all."),
+                stacklevel=line_of_user(),
+            )
 
     def __str__(self) -> str:
         lines = [f"{self.source} ({self.format})"]

@@ -9,6 +9,7 @@ from types import BuiltinFunctionType, FunctionType
 
 import numpy as np
 
+from ..calls import lacking
 from ..elements.bodies import Ground, PointMass
 from ..elements.element import Attachment
 from ..elements.force import Force
@@ -67,6 +68,9 @@ class SceneState(Kinematics["float | Any"]):
 
     acceleration = angular_acceleration = angle_acceleration = displacement_acceleration = reaction = _refuse
     qdd = multipliers = property(_refuse)
+
+    def __getattr__(self, name):
+        raise lacking(self, name)
 
     def __getitem__(self, i):
         raise InvalidArgument(
@@ -477,13 +481,17 @@ def demand_callable(force, handles, t, q, qd, angles):
     """
     law = Law.__new__(Law)
     law.force, law.handles, law.values = force, handles, len(force.actions())
+    own = f"{force.name}: "  # what begins so says where already
     try:
         with np.errstate(all="ignore"):
             law.evaluate(t, q, qd, angles, force.parameters())
-    except TsdynError:
-        raise
+    except TsdynError as error:
+        if str(error).startswith(own):
+            raise
+        kind = force.error if isinstance(error, AttributeError) else type(error)
+        raise kind(f"{own}its {force.given} can't be evaluated: {error}") from error
     except (ArithmeticError, ValueError):
-        pass  # which another state may mend
+        pass
     except Exception as error:
         raise force.error(
             f"{force.name}: its {force.given} raises {type(error).__name__} at the start: {str(error).rstrip('.')}."

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calls import fitting
+from ..calls import fitting, line_of_user
 from ..errors import InvalidArgument
 from ..maths.power_series import Truncated
 from ..validation import floats, one_of
@@ -162,7 +162,7 @@ class Table:
         self.times.setflags(write=False)
         self.values.setflags(write=False)
         if said:
-            warnings.warn(said, UserWarning, stacklevel=3)  # where the table is made
+            warnings.warn(said, UserWarning, stacklevel=line_of_user())
 
     def __call__(self, t: ArrayLike) -> Value:
         """The values at a time or times; NaN outside the table."""

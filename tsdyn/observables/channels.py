@@ -13,14 +13,16 @@ import numpy as np
 
 from ..constraints import Distance
 from ..elements.bodies import PointMass
-from ..elements.element import AngleGeometry
+from ..elements.element import AngleGeometry, Attachment
 from ..elements.force import Force
 from ..elements.loads import JointLoad
 from ..errors import InvalidArgument, StorageError
-from ..forces import Spring
+from ..forces import Control, Spring
 from ..model.handles import handles_of
 from ..validation import close, sequence, shown
+from .generalised_forces import law_values
 from .reactions import loads_of, member
+from .state import State
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -65,10 +67,12 @@ def channels_of(packed: Packed, names: str | Sequence[str], lacks: str = "") -> 
         If a name stands for no channel, or for those of several objects.
     """
     said = 'channels must be a name such as "hinge.angle", or a sequence of names'
-    names = [names] if isinstance(names, str) else list(sequence(names, said, InvalidArgument))
+    one = isinstance(names, (str, PointMass, Attachment))
+    names = [names] if one else list(sequence(names, said, InvalidArgument))
     wrong = [name for name in names if not isinstance(name, str)]
     if wrong or not names:
-        raise InvalidArgument(f"{said}, got {shown(wrong[0] if wrong else names)}.")
+        own = f"; its name is {wrong[0].name!r}" if wrong and isinstance(wrong[0], (PointMass, Attachment)) else ""
+        raise InvalidArgument(f"{said}, got {shown(wrong[0] if wrong else names)}{own}.")
     known = ChannelNames(packed, lacks)
     return list({channel.name: channel for name in names for channel in known.meant(name)}.values())
 
@@ -123,6 +127,8 @@ class ChannelNames:
             found[name] = [Channel(name + part, unit, ask, one, quantity) for part, one in picks.items()]
             found |= {one.name: [one] for one in found[name]} if parts else {}
         found[thing.name] = [one for key in natural for one in found[f"{thing.name}.{key}"]]
+        if isinstance(thing, Control):
+            found[f"{thing.name}.actuation"] = found[thing.name]
         self.known[id(thing)] = found
         return found
 
@@ -150,6 +156,12 @@ class ChannelNames:
             found["length"] = "m", (), partial(_length, ends), _whole
             loads["tension"] = "N", (), partial(_tension, item, ends, exerted), _whole
             natural, main = ["length"], ["tension"]
+        if isinstance(item, Control):
+            ask = partial(_refused, item, self.lacks) if self.lacks else partial(_actuation, item)
+            titles, units = item.titles(), [LOADS[action.turns][1] for action in item.actions()]
+            main = [f"actuation.{title}" for title in titles]
+            picks = [partial(_component, _whole, i) for i in range(len(main))]
+            loads |= {name: (unit, (), ask, pick) for name, unit, pick in zip(main, units, picks, strict=True)}
         return found | loads, natural if self.lacks and natural else natural + main
 
 
@@ -192,6 +204,11 @@ def _of_body(body):
 
 def _asked(name, thing, motion):
     return getattr(motion, name)(thing)
+
+
+def _actuation(control, motion):
+    load = loads_of(motion.packed).get(id(control)) or member(motion.packed, control)
+    return law_values(motion, load, motion.memory if isinstance(motion, State) else motion._memory)
 
 
 def _refused(item, lacks, motion):

@@ -81,14 +81,14 @@ def _turned(p, system, x):
     return np.einsum("kbji,kbj->kbi", G, np.einsum("bij,kbj->kbi", J, y))
 
 
-def law_values(solution, load):
-    """The values (k, values) that the function of a law of the whole scene has given."""
+def law_values(motion, load, memory):
+    """The values (k, values) of the function of a law of the whole scene; memory (k, slots) of forces."""
     law = load.law
     if law.held:
-        return solution._memory[:, load.slot : load.slot + law.values].copy()
-    rows = zip(solution.t.tolist(), solution.q, solution.qd, solution.angles, strict=True)
+        return memory[:, load.slot : load.slot + law.values].copy()
+    rows = zip(motion.t.tolist(), motion.q, motion.qd, motion.angles, strict=True)
     found = [law.evaluate(t, q.copy(), qd.copy(), angles, load.parameters) for t, q, qd, angles in rows]
-    return np.reshape(found, (solution.t.size, law.values))
+    return np.reshape(found, (motion.t.size, law.values))
 
 
 # What a user's function of a force raises at a state: kernels make nan of it, plain Python says which exception.

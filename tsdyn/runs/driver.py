@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..calls import line_of_user
 from ..errors import InconsistentState, InvalidArgument, InvalidForce, SingularConfiguration, Status
 from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
@@ -252,7 +253,7 @@ def _warn_of(error, t):
             f"progress raised {type(error).__name__}, which ends the run at t = {t:.9g} s; the solution so far is "
             f"returned.\n{told}",
             RuntimeWarning,
-            stacklevel=2,
+            stacklevel=line_of_user(),
         )
 
 

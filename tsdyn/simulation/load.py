@@ -59,7 +59,7 @@ def load(
         Loops that a URDF, MJCF or SDF file leaves open: names of two of its links, frames, sites or joints, and how
         they are held together. "weld": they coincide; "ball": their origins do; "hinge": their origins and z axes do,
         or an axis in both frames that a fourth entry gives, such as (0, 1, 0). The scene is assembled;
-        `scene.imported` says so where it can't be.
+        a warning and `scene.imported` say so where it can't be.
 
     Returns
     -------

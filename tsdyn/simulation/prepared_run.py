@@ -471,7 +471,7 @@ def demand_scene(scene):
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     if scene._waiting:
-        warn_of_waiting(scene, 4)
+        warn_of_waiting(scene)
 
 
 def run_task(task, scene, initial_tol):

@@ -136,10 +136,12 @@ class Showing:
           and so on; of several angles "angle 1" and "angle 2";
         - constraint, joint, force: force and torque, each with x, y, z, as of `reaction`; where there is one joint
           coordinate, torque.axis or force.axis, which is the load along it, on b from a;
-        - Spring, Distance: length and tension, positive where it pulls.
+        - Spring, Distance: length and tension, positive where it pulls;
+        - Control: actuation, one for each actuator by its name, "regulator.actuation.rail".
 
         A vector without component stands for all of them. An object alone stands for position, velocity and angular
-        velocity of a body, coordinates with rates, force and torque of a joint, length and tension of a spring.
+        velocity of a body, coordinates with rates, force and torque of a joint, length and tension of a spring,
+        actuations of a Control.
 
         Curves are smooth within steps: from dense output, where the run kept it, else from the quintic through
         positions, velocities and accelerations of the outputs, which is not exact, and rounds off jumps of loads.
@@ -604,7 +606,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         load = reactions.loads_of(self.packed).get(id(item))
         if load is None or load.law is None:
             raise InvalidForce(f"actuation: {control!r} is no Control of this scene, nor a load by the scene's state.")
-        return law_values(self, load)
+        return law_values(self, load, self._memory)
 
     def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
         """Force (N) and torque (N m) that a constraint, a joint as a whole, or a force exerts: (k, 3) each.

@@ -261,7 +261,7 @@ def demand_storable(call, options):
 def demand_path(path, name):
     """Raise InvalidArgument unless a value is a path."""
     if not isinstance(path, (str, os.PathLike)) or "\0" in str(path):
-        raise InvalidArgument(f"{name} must be a path to a file, got {path!r}.")
+        raise InvalidArgument(f"{name} must be a path, as text or a Path, got {path!r}.")
 
 
 def archive_of(given, kept, history, numbers, arrays):

@@ -195,10 +195,9 @@ def animation(data: dict[str, Any]) -> bytes:
         lines = [axes.plot([], [], color=GREY, linewidth=0.8)[0] for _ in ways]
         solids = axes.add_collection(PolyCollection([], linewidths=0.2, zorder=2))
         clock = axes.text(0.02, 0.96, "", transform=axes.transAxes, va="top")
-        for each in data["labels"]:
-            if each["violated"]:
-                where = painter.flat(painter.place(0, each["body"], each["point"]))
-                axes.text(*where, each["text"], color=VIOLATED, ha="center", zorder=3)
+        violated = "\n".join(each["text"] for each in data["labels"] if each["violated"])
+        behind = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
+        axes.text(0.02, 0.02, violated, transform=axes.transAxes, color=VIOLATED, va="bottom", bbox=behind, zorder=3)
         axes.axis("off")
         for k in frames:
             target, radius = _seen(painter, k)

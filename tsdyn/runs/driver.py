@@ -367,12 +367,16 @@ class Sampled:
         self.reason = ""
 
     def saved(self):
-        """When each function was evaluated last."""
-        return {"last": self.sampling.last, "begun": self.sampling.begun}
+        """When each function was evaluated last, and what it keeps."""
+        kept = [_kept(load.force.function) for load in self.sampling.loads]
+        return {"last": self.sampling.last, "begun": self.sampling.begun, "kept": kept}
 
     def restore(self, numbers):
         """As it was when it was saved."""
         self.sampling.last, self.sampling.begun = numbers["last"], numbers["begun"]
+        for load, kept in zip(self.sampling.loads, numbers["kept"], strict=True):
+            for name, (kind, value) in kept.items():
+                vars(load.force.function)[name] = np.array(value, kind)[()] if kind else value
 
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""
@@ -399,6 +403,17 @@ class Sampled:
                 raise InvalidForce(str(failure)) from failure.__cause__
             self.reason = str(failure)
             return Status.SAMPLING_FAILED
+
+
+def _kept(function):
+    """What an object with a `reset` keeps: {attribute: (type of an array or "", value)}, numbers, lists and arrays."""
+    found, attributes = {}, getattr(function, "__dict__", {})
+    for name, value in attributes.items() if hasattr(function, "reset") else ():
+        if isinstance(value, (np.ndarray, np.generic)) and value.dtype.kind in "biuf":
+            found[name] = value.dtype.str, value.tolist()
+        elif all(isinstance(x, (int, float)) for x in (value if isinstance(value, list) else [value])):
+            found[name] = "", value
+    return found
 
 
 def sampled(packed):

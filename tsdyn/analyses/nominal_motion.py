@@ -111,10 +111,10 @@ class Pairs:
         rows = np.zeros((3, max(STEP * nc, WIDTH * (len(lam) + nc))))
         Q = np.zeros((2, STEP * (nc + nf)))
         system = self._system._replace(reals=motion.system.reals.copy())
-        if any(load.law is not None for load in self.packed.loads):
-            whole = motion.system._replace(reals=system.reals)
-            see_state(whole, motion.q, motion.qd, motion.t, np.zeros(motion.q.size))
         with interrupts_answered():
+            if any(load.law is not None for load in self.packed.loads):
+                whole = motion.system._replace(reals=system.reals)
+                see_state(whole, motion.q, motion.qd, motion.t, np.zeros(motion.q.size))
             fill_blocks(system, x, lam, rows, *Q, np.zeros(self._size))
         return _whole(rows[0, : STEP * nc]), rows[1:], *(_whole(one[STEP * nc :]) for one in Q)
 

@@ -576,7 +576,7 @@ def run(task, engine, observe=None, link=None, past=None, begun=None):
     outcome = _driven(task, memory, driven, readings, watch, began)
     if watch is not None:
         readings[0].give(watch.reader)
-    # NaN may be left in what a run takes as its own, of laws after Ctrl-C, too
+    # NaN may be left in what a run takes as its own; laws give it after Ctrl-C, too
     spoilt = outcome.status is NOT_FINITE or (memory.calls_laws and outcome.status is Status.INTERRUPTED)
     if observe is None and not spoilt:
         prepared.give(memory.engine.kind, memory)

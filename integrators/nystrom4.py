@@ -37,7 +37,7 @@ class Nystrom4(ExplicitNystrom):
     >>> ball = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
     >>> rod = scene.add(ts.constraints.Distance(ball, scene.ground))
     >>> methods = [ts.integrators.Taylor(), *(ts.integrators.Nystrom4(step=h) for h in (0.008, 0.004))]
-    >>> exact, coarse, fine = (ts.simulate(scene, (0, 1), integrator=m).q[-1] for m in methods)
+    >>> exact, coarse, fine = (ts.simulate(scene, (0, 2), integrator=m).q[-1] for m in methods)
     >>> bool(14 < abs(coarse - exact).max() / abs(fine - exact).max() < 18)
     True
     """

@@ -1,7 +1,10 @@
 """Laws that see the whole scene: Control, point loads and user forces by its state; traced, called, sampled."""
 
 import math
+import os
 import pickle
+import signal
+import threading
 
 import numpy as np
 import pytest
@@ -297,6 +300,45 @@ def test_an_interrupt_within_a_law_keeps_what_was_computed():
     run = ts.simulate(cart(on_rail(stops)), (0, 1), integrator="dop853")
     assert run.status.name == "INTERRUPTED"
     assert 0.0 < run.displacement("rail")[-1] < 0.02
+
+
+@pytest.mark.parametrize("task", ["run", "read"])
+def test_ctrl_c_in_a_kernel_that_calls_a_law_is_answered(task):
+    """Each Ctrl-C ends what it came in, and leaves nothing behind; most come while the kernel computes."""
+    begun, given_up = threading.Event(), threading.Event()
+
+    def law(t, state):
+        if task == "read":
+            begun.set()
+        return np.clip(K @ seen(state), -1e3, 1e3)
+
+    def press():
+        begun.wait()
+        if not given_up.wait(0.005):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    scene = cart(on_rail(law))
+    options = {"integrator": ts.integrators.RK45(rtol=1e-6), "dense_output": task == "read"}
+    whole = ts.simulate(scene, (0, 2), **options)
+    for _ in range(5):
+        begun.clear()
+        thread = threading.Thread(target=press)
+        thread.start()
+        try:
+            if task == "run":
+                run = ts.simulate(scene, (0, 2000), progress=lambda *_: begun.set(), **options)
+                assert run.status is ts.Status.INTERRUPTED
+                assert np.isfinite(run.q).all()
+            else:
+                with pytest.raises(KeyboardInterrupt):
+                    whole.at(np.linspace(0, 2, 100_000))
+        finally:
+            given_up.set()
+            begun.set()
+            thread.join()
+            given_up.clear()
+    again = ts.simulate(scene, (0, 2), **options)
+    np.testing.assert_array_equal(again.q, whole.q)
 
 
 # Bits

@@ -229,6 +229,33 @@ def test_sampled_loads(tmp_path):
     stop_and_go_on(controlled, 2.0, tmp_path / "run.h5", again=controlled(), integrator="dop853")
 
 
+class Late:
+    """A digital controller, one sample late: it keeps a number, an array and a list, which change their shapes."""
+
+    def reset(self):
+        self.next, self.mean, self.seen = 0.0, np.zeros(1, np.float32), []
+        self.notes = [[1], [2, 3], "no numbers"]
+
+    def __call__(self, t, state):
+        given, self.next = self.next, -2.0 * state.angle_rate("hinge") * np.ones(1)
+        self.mean = (0.9 * self.mean + self.next).astype(np.float32)
+        self.seen = [*self.seen[-3:], float(self.next[0])]
+        return given + 0.1 * self.mean + 0.1 * sum(self.seen)
+
+
+def delayed():
+    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
+    rod = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+    scene.add(ts.constraints.Revolute.at(rod, scene.ground, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    scene.add(ts.forces.Control(Late(), ["hinge"], period=0.05))
+    return scene
+
+
+@pytest.mark.usefixtures("short_slices")
+def test_what_a_digital_controller_keeps(tmp_path):
+    stop_and_go_on(delayed, 2.0, tmp_path / "run.h5", again=delayed(), integrator="dop853")
+
+
 def loaded():
     """Every sort of load that has a series: of state, of time, data, friction."""
     scene = ts.Scene(gravity=(0.0, 0.0, -10.0))

@@ -24,7 +24,7 @@ from ..model.equations import (
     set_time,
     with_short_rows,
 )
-from ..model.laws import answer_interrupts
+from ..model.laws import interrupts_answered
 from ..model.packed import no_system, with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
@@ -111,11 +111,11 @@ class Pairs:
         rows = np.zeros((3, max(STEP * nc, WIDTH * (len(lam) + nc))))
         Q = np.zeros((2, STEP * (nc + nf)))
         system = self._system._replace(reals=motion.system.reals.copy())
-        if any(load.law is not None for load in self.packed.loads):
-            whole = motion.system._replace(reals=system.reals)
-            see_state(whole, motion.q, motion.qd, motion.t, np.zeros(motion.q.size))
-        fill_blocks(system, x, lam, rows, *Q, np.zeros(self._size))
-        answer_interrupts()
+        with interrupts_answered():
+            if any(load.law is not None for load in self.packed.loads):
+                whole = motion.system._replace(reals=system.reals)
+                see_state(whole, motion.q, motion.qd, motion.t, np.zeros(motion.q.size))
+            fill_blocks(system, x, lam, rows, *Q, np.zeros(self._size))
         return _whole(rows[0, : STEP * nc]), rows[1:], *(_whole(one[STEP * nc :]) for one in Q)
 
 

@@ -98,7 +98,7 @@ def prompt_interrupts(callbacks):
 
     callbacks: how the names of the functions begin that LLVM calls.
     """
-    if not _raises_here():
+    if not raises_here():
         yield
         return
     interrupted = False
@@ -124,7 +124,7 @@ def prompt_interrupts(callbacks):
 @contextlib.contextmanager
 def deferred_interrupts():
     """Put a Ctrl-C during the block off to its end."""
-    if not _raises_here():
+    if not raises_here():
         yield
         return
     interrupted = []
@@ -188,7 +188,7 @@ class CollectionsDeferred(contextlib.ContextDecorator):
         return CollectionsDeferred()
 
 
-def _raises_here():
+def raises_here():
     """Whether a Ctrl-C raises KeyboardInterrupt in this thread."""
     in_main = threading.current_thread() is threading.main_thread()
     return in_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler

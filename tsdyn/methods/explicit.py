@@ -200,7 +200,7 @@ def step_kernel(function):
 
     It writes the increments dx, dy and returns 0, or the status that `call_place` or `call_accelerate` gave. Arrays
     come as addresses, integers: `vector(x, nx)` is the array of nx floats there, without a copy. x, xd and dx have nx
-    floats, y, yd and dy have ny; lengths are not checked.
+    floats, y, yd and dy have ny; lengths are not checked. In forms with x' = y nothing is in xd.
     """
     return callback(PLUG_IN_STEP)(function)
 

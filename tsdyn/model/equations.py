@@ -20,7 +20,7 @@ from ..motions.program import HOLD, call_smooth
 from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
 from .handles import handles_of
-from .laws import answer_interrupts, demand_callable
+from .laws import demand_callable, interrupts_answered
 from .packed import no_system
 
 call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
@@ -290,10 +290,10 @@ def sampled_loads(packed, kinds, t):
         own = system._replace(forces=system.forces[i : i + 1], reals=system.reals.copy())
         for move in (0.0, near):
             out = np.empty(t.size)
-            _sample(own, q + move, qd + move, t, at, np.zeros(q.size), out)
+            with interrupts_answered():
+                _sample(own, q + move, qd + move, t, at, np.zeros(q.size), out)
             if move is not near or np.isfinite(out).all():
                 found.append((force.title, out))
-    answer_interrupts()
     return found
 
 

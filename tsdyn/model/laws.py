@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import math
+import signal
+import threading
 from itertools import combinations
 from types import BuiltinFunctionType, FunctionType
 
@@ -17,6 +20,7 @@ from ..elements.laws import captured
 from ..elements.loops import laws as loops
 from ..errors import InvalidArgument, TsdynError
 from ..jit.from_kernels import PythonCallback
+from ..jit.interrupts import raises_here
 from ..jit.kernels import twin
 from ..maths import vectors
 from ..motions.expressions import Smooth, constant, evaluate, ordered
@@ -346,30 +350,66 @@ class Law:
             self._callback = PythonCallback(self._called, loops.CALL)
         return self._callback.address
 
-    def _called(self, q, qd, angles, numbers, t, out):
-        """Let the function give its values; NaN if it raises."""
+    def _called(self, *given):
+        """Let the function give its values; NaN if it raises, or after a Ctrl-C."""
+        try:
+            if not _keyboard.pressed:
+                self._give(*given)
+        except KeyboardInterrupt:
+            _keyboard.pressed = True
+        if _keyboard.pressed:
+            _view(given[-1], self.values)[:] = math.nan
+        return 0
+
+    def _give(self, q, qd, angles, numbers, t, out):
         out = _view(out, self.values)
         try:
             parts = _view(q, self._n).copy(), _view(qd, self._n).copy(), _view(angles, self.handles.count).copy()
             out[:] = self.evaluate(t, *parts, _view(numbers, len(self.numbers)).tolist())
         except Exception:
             out[:] = math.nan
-        except KeyboardInterrupt:
-            out[:] = math.nan
-            interrupts.append(self)
-        return 0
 
     def __getstate__(self):
         return {**self.__dict__, "_callback": None}
 
 
-interrupts = []  # laws whose functions were interrupted by Ctrl-C: kernels that call them pass no exception on
+# Ctrl-C while kernels call laws. Kernels pass no exception on, and ctypes loses one that is raised in `_called` itself,
+# where Python handles a Ctrl-C that came within the kernel. It is therefore kept: further calls give NaN, which ends
+# the kernel's work, and KeyboardInterrupt is raised after that.
 
 
-def answer_interrupts():
-    """Raise KeyboardInterrupt where Ctrl-C came while a kernel called a law."""
-    if interrupts:
-        interrupts.clear()
+class _Keyboard(threading.local):
+    pressed = False
+
+
+_keyboard = _Keyboard()
+
+
+@contextlib.contextmanager
+def interrupts_answered():
+    """Raise KeyboardInterrupt at the end of a block, or before, if Ctrl-C comes while its kernels call laws."""
+    own = raises_here()
+    if own:
+        signal.signal(signal.SIGINT, _press)
+    try:
+        yield
+    finally:
+        if own:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        pressed, _keyboard.pressed = _keyboard.pressed, False
+        if pressed:
+            raise KeyboardInterrupt
+
+
+def calls_laws(packed):
+    """Whether kernels call laws of a scene in Python."""
+    return any(load.law is not None and load.law.address >= 0 for load in packed.loads)
+
+
+def _press(number, frame):
+    """Keep a Ctrl-C; the first one also ends what the function of a law is doing."""
+    again, _keyboard.pressed = _keyboard.pressed, True
+    if not again and frame.f_code is not Law._called.__code__:
         raise KeyboardInterrupt
 
 

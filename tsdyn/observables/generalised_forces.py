@@ -12,7 +12,7 @@ from ..jit.kernels import entry
 from ..maths.vectors import to_ground
 from ..model.equations import applied_forces, set_time
 from ..model.handles import BodyMotion, angle, displacement, handles_of
-from ..model.laws import answer_interrupts
+from ..model.laws import interrupts_answered
 from ..model.packed import no_system
 from ..motions.signals import Signal
 from ..validation import counted
@@ -38,8 +38,8 @@ def force_loads(system, t, q, qd, memory=None):
     if len(system.forces):
         system = system._replace(reals=system.reals.copy())  # signals and memory are written to
         memory = np.zeros((t.size, system.memory.size)) if memory is None else memory
-        sum_forces(system, t, q, qd, memory, out)
-        answer_interrupts()
+        with interrupts_answered():
+            sum_forces(system, t, q, qd, memory, out)
     return out
 
 

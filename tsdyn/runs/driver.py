@@ -368,12 +368,16 @@ class Sampled:
         self.reason = ""
 
     def saved(self):
-        """When each function was evaluated last."""
-        return {"last": self.sampling.last, "begun": self.sampling.begun}
+        """When each function was evaluated last, and what it keeps."""
+        kept = [_kept(load.force.function) for load in self.sampling.loads]
+        return {"last": self.sampling.last, "begun": self.sampling.begun, "kept": kept}
 
     def restore(self, numbers):
         """As it was when it was saved."""
         self.sampling.last, self.sampling.begun = numbers["last"], numbers["begun"]
+        for load, kept in zip(self.sampling.loads, numbers["kept"], strict=True):
+            for name, (kind, value) in kept.items():
+                vars(load.force.function)[name] = np.array(value, kind)[()] if kind else value
 
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""
@@ -400,6 +404,17 @@ class Sampled:
                 raise InvalidForce(str(failure)) from failure.__cause__
             self.reason = str(failure)
             return Status.SAMPLING_FAILED
+
+
+def _kept(function):
+    """What an object with a `reset` keeps: {attribute: (type of an array or "", value)}, numbers, lists and arrays."""
+    found, attributes = {}, getattr(function, "__dict__", {})
+    for name, value in attributes.items() if hasattr(function, "reset") else ():
+        if isinstance(value, (np.ndarray, np.generic)) and value.dtype.kind in "biuf":
+            found[name] = value.dtype.str, value.tolist()
+        elif all(isinstance(x, (int, float)) for x in (value if isinstance(value, list) else [value])):
+            found[name] = "", value
+    return found
 
 
 def sampled(packed):
@@ -562,7 +577,9 @@ def run(task, engine, observe=None, link=None, past=None, begun=None):
     outcome = _driven(task, memory, driven, readings, watch, began)
     if watch is not None:
         readings[0].give(watch.reader)
-    if observe is None and outcome.status is not NOT_FINITE:  # NaN may be left in what a run takes as its own
+    # NaN may be left in what a run takes as its own; laws give it after Ctrl-C, too
+    spoilt = outcome.status is NOT_FINITE or (memory.calls_laws and outcome.status is Status.INTERRUPTED)
+    if observe is None and not spoilt:
         prepared.give(memory.engine.kind, memory)
     return outcome
 

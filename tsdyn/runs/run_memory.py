@@ -8,7 +8,7 @@ from ..errors import Status
 from ..jit.interrupts import interruptible
 from ..jit.kernels import callback, resident
 from ..methods.explicit import ACCELERATE, PLACE
-from ..model.laws import answer_interrupts
+from ..model.laws import calls_laws, interrupts_answered
 from ..rows.interface import reset_selection, selection_parts
 from ..workspaces import FILLED, STORED, divided, enter_joints, hold, words
 from .arguments import step_count
@@ -149,6 +149,7 @@ class Memory:
         self.packed, self.weight, self.graph, self.run = prepared.packed, prepared.n, graph, run
         self.work = context.work
         self.bind(context)
+        self.calls_laws = calls_laws(prepared.packed)
         self._run, *self._keep_run = resident(run)
         work, tables = context.work, (run.now, run.before, run.remembered, run.frames, run.tableau)
         self.state, rest = divided(work.q.base, work.control, work.counters, work.q, work.qd, work.qdd)
@@ -268,15 +269,17 @@ class Memory:
         arguments = self._context, self._run, log, most
         # Short steps: Ctrl-C waits for the end of a slice
         if self.weight < LONG_STEPS:
-            status = STATUSES[self.advance_kernel(*arguments)]
-            answer_interrupts()
-            return status
+            return STATUSES[self._call(*arguments)]
         # Begin first, alone: Ctrl-C in the first step goes back to a run that has begun
         if not self.run.numbers.begun and most > 0:
             status = self.advance(log, -1)
             if not self.run.numbers.begun:
                 return status
-        return STATUSES[advance(self.advance_kernel, arguments, self.run, self.called)]
+        return STATUSES[advance(self._call, arguments, self.run, self.called)]
+
+    def _call(self, *arguments):
+        kernel = self.advance_kernel
+        return (interrupts_answered()(kernel) if self.calls_laws else kernel)(*arguments)
 
     @property
     def called(self):

@@ -5,6 +5,7 @@ import numpy as np
 from ..formulations.registry import formulation
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.explicit import called_for
+from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System
 from ..rows.interface import redundancy
 from ..rows.saddle_matrix import saddle_of
@@ -170,7 +171,8 @@ def _reading(packed, form, constraint_tol, kernels):
         _set(run.kernels, kernels)
         return Context(own, work, allocate_linear(own, n, m, False), *parts), run
 
-    return TrajectoryReading(read, workspace, system, shift=1, degree=8)
+    kernel = interrupts_answered()(read) if calls_laws(packed) else read
+    return TrajectoryReading(kernel, workspace, system, shift=1, degree=8)
 
 
 def kernels_of(method, form, step, interpolant, adaptive, within):

@@ -118,10 +118,10 @@ def _check_load(kind, name, x, reaction, par):
 
 
 @entry
-def evaluate_force_jacobian(s, q, qd, t, Q_q, Q_qd, renew, kept):
-    """Q_q, Q_qd (n, n) += the Jacobians of the forces; s is from `with_force_jacobians`."""
+def evaluate_force_jacobian(s, q, qd, t, Q, Q_q, Q_qd, renew, kept):  # nine: with what is kept
+    """Q (n,) += the forces, Q_q, Q_qd (n, n) += their Jacobians; s is from `with_force_jacobians`."""
     set_time(s, t)
-    applied_forces(s, q, qd, t, kept)  # laws of the whole scene have derivatives where they were evaluated last
+    applied_forces(s, q, qd, t, Q)  # laws of the whole scene have derivatives where they were evaluated last
     force_jacobian(s, q, qd, t, Q_q, Q_qd, renew, kept)
 
 
@@ -130,9 +130,10 @@ def jacobians(packed, q, qd, t):
     system, size = with_force_jacobians(packed)
     system = system._replace(reals=system.reals.copy())
     Q_q, Q_qd = np.zeros((2, q.size, q.size))
+    Q, kept = np.zeros(q.size), np.zeros(size)
     system.reals[system.normals] = 1.0
     if len(system.forces):
-        evaluate_force_jacobian(system, q, qd, float(t), Q_q, Q_qd, 1, np.zeros(max(size, q.size)))
+        evaluate_force_jacobian(system, q, qd, float(t), Q, Q_q, Q_qd, 1, kept)
     return Q_q, Q_qd
 
 

@@ -169,7 +169,7 @@ def test_turn_block(code_row, code_column, rng):
     assert np.isfinite(out).sum() == n * m
 
 
-INTERNAL = [kind for kind in built_in.FORCES if kind not in (F.PointForce, F.Torque, F.UserForce)]
+INTERNAL = [kind for kind in built_in.FORCES if kind not in (F.PointForce, F.Torque, F.UserForce, F.Control)]
 INTERNAL = [k for k in INTERNAL if k.__module__.startswith("tsdyn.") and not issubclass(k, JointLoad)]
 
 

@@ -209,7 +209,7 @@ class Handles:
             return named(self.bodies, body, "body", InvalidBody)
         body = self.own(body)
         if not isinstance(body, PointMass) or body not in self._where:
-            raise InvalidBody(f"{body!r} is not a body of this scene{self._elsewhere(body)}.")
+            raise InvalidBody(f"{body!r} is not a body of this solution's scene{self._elsewhere(body)}.")
         return body
 
     def _elsewhere(self, body):
@@ -246,7 +246,7 @@ class Handles:
         joint = self.item(joint)
         row, declared = self._by_item.get(id(joint)), getattr(joint, "joint_coordinates", ())
         if row is None and declared:
-            raise InvalidConstraint(f"{joint!r} is not a constraint or force of this scene.")
+            raise InvalidConstraint(f"{joint!r} is not a constraint or force of this solution's scene.")
         if row is None or not getattr(row, f"{kind}s"):
             other = "it has a displacement" if kind == "angle" else "it has an angle"
             raise InvalidConstraint(f"{joint!r} has no {kind}; {other if declared else 'it has no coordinate'}.")

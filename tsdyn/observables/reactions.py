@@ -399,7 +399,7 @@ def member(packed, constraint):
     """The `Member` of a constraint of the scene."""
     found = member_of(packed, constraint)
     if found is None:
-        raise InvalidConstraint(f"{constraint!r} is not a constraint or force of this scene.")
+        raise InvalidConstraint(f"{constraint!r} is not a constraint or force of this solution's scene.")
     return found
 
 

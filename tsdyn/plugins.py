@@ -27,7 +27,7 @@ from .elements.friction import (
     slip_series,
 )
 from .elements.joint import FramedJoint, Joint, across, beside, carried, turned_about
-from .elements.laws import Action, SceneLaw, arguments_of, instants, listed, scene_law
+from .elements.laws import Action, SceneLaw, arguments_of, instants, scene_law
 from .elements.loads import (
     STATE,
     ByState,
@@ -181,7 +181,6 @@ __all__ = [
     "kernel",
     "label",
     "linear_second",
-    "listed",
     "load",
     "load_at",
     "magnitude",

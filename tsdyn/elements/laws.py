@@ -111,17 +111,13 @@ class SceneLaw:
 
     def results(self, function: Any, t: Any, state: Any, numbers: Any) -> list[Any]:
         """What a function makes of its arguments; numbers: of its keyword arguments, in their order."""
-        return listed(function(t, state, **dict(zip(numbers_of(getattr(self, self.given)), numbers, strict=True))))
+        given = function(t, state, **dict(zip(numbers_of(getattr(self, self.given)), numbers, strict=True)))
+        return [given] if np.ndim(given) == 0 else list(np.asarray(given).ravel())
 
 
 def _code(function):
     """What is the same for a function with other numbers; an object to be called is that itself."""
     return getattr(getattr(function, "py_func", function), "__code__", function)
-
-
-def listed(given):
-    """A number, or a list or array of numbers, as a list."""
-    return [given] if np.ndim(given) == 0 else list(np.asarray(given).ravel())
 
 
 def arguments_of(function):

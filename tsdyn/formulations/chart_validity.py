@@ -26,7 +26,7 @@ from ..rows.interface import (
     selection_serves,
 )
 from .chart_coordinates import factorise_normal, turned_most
-from .tolerances import CONTRACTION_LIMIT, NO_SIZE, SAME, TURN_LIMIT, TURN_SHARE
+from .tolerances import CONTRACTION_LIMIT, NO_SIZE, SAME, TURN_SHARE
 
 # reasons to leave a chart, as stored; REASONS names them
 STAY, BY_CONTRACTION, BY_TURN, BY_INTERVAL, BY_FAILURE, AT_START, BY_SERIES = range(7)
@@ -113,7 +113,7 @@ def reason_to_leave(graph, w, f, l):
     w.control.condition = (1.0 + w.control.contraction) / max(1.0 - w.control.contraction, TINY)
     if not contraction < CONTRACTION_LIMIT:
         return BY_CONTRACTION
-    return STAY if turn < TURN_LIMIT else BY_TURN
+    return STAY if turn < l.state.turn_limit else BY_TURN
 
 
 @kernel

@@ -141,15 +141,7 @@ def place(context, t, x):
             break
     if status != OK:
         return status
-    # S = H W H^T at the solution, for accelerations
-    if f.b.size > 0:
-        w.counters.factorizations += 1
-        failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
-        if failed >= 0:
-            return MASS_SINGULAR if is_axis(graph, f.rows, failed) else SINGULAR
-    if system.forces.shape[0] > 0:
-        write_positions(graph.bodies, f.poses, w.q)
-    return OK
+    return _prepare_accelerations(graph, system, w, f)
 
 
 @callback(PLACE)
@@ -165,9 +157,16 @@ def stage_place(context, t, x):
     copy(vector(x, l.x.size - 8), l.x)
     if not displace(graph, l, f.poses):
         return CHART_LOST
-    # H and S = H W H^T there
+    # H there
     if f.b.size > 0:
         evaluate_rows(graph, system, f, f.rows, t)
+    return _prepare_accelerations(graph, system, w, f)
+
+
+@kernel
+def _prepare_accelerations(graph, system, w, f):
+    """Factors of S = H W H^T at the poses, and q for force laws. Status."""
+    if f.b.size > 0:
         w.counters.factorizations += 1
         failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
         if failed >= 0:

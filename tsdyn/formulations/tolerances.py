@@ -56,6 +56,9 @@ CURVATURE = 1.0
 # --- charts, dimensionless; docs/design-decisions.md, "Charts are small"
 CONTRACTION_LIMIT = 0.15  # relative loss of a pivot of N since q0
 TURN_LIMIT = 0.25  # |d|: the sine of half the rotation of a body since q0; 29 degrees
+# The same where stages aren't placed: smaller charts gain less than 10 % of the truncation error, and rounding of their
+# bases adds up.
+TURN_FREE = 0.05
 CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a rotation of 60 degrees
 FARTHEST = 0.9  # |d|^2: d0 = 0.32, and C grows as 1 / d0
 TURN_SHARE = 0.55  # of |d|, as a contraction: a rotation that no constraint depends on reaches 0.9 in a step, 0.5 here

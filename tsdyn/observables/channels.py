@@ -19,7 +19,7 @@ from ..elements.loads import JointLoad
 from ..errors import InvalidArgument, StorageError
 from ..forces import Control, Spring
 from ..model.handles import handles_of
-from ..validation import close, sequence, shown
+from ..validation import close, listed, sequence, shown
 from .generalised_forces import law_values
 from .reactions import loads_of, member
 from .state import State
@@ -110,9 +110,8 @@ class ChannelNames:
         near = close(name, own or self.things) or close(name.partition(".")[0], self.things)
         said = [f"did you mean {' or '.join(map(repr, near))}?"] if near else []
         if own or not near:
-            listed = [each for each in own if each.rpartition(".")[0] not in own] or list(self.things)
-            more = f" and {len(listed) - LISTED} more" if len(listed) > LISTED else ""
-            said.append(f"{'There' if said else 'there'} are {', '.join(listed[:LISTED])}{more}.")
+            known = [each for each in own if each.rpartition(".")[0] not in own] or list(self.things)
+            said.append(f"{'There' if said else 'there'} are {listed(known, LISTED)}.")
         return InvalidArgument(" ".join([f"no channel is named {name!r};", *said, self.lacks]).rstrip())
 
     def _by_name(self, thing):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..formulations.registry import formulation
+from ..formulations.tolerances import TURN_FREE, TURN_LIMIT
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.explicit import called_for
 from ..model.laws import calls_laws, interrupts_answered
@@ -129,6 +130,7 @@ class StepEngine:
         given = method, form, self.step, self.interpolant
         _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=self.within))
         run.numbers.free_stages = free = form.frees_stages and interval == 0
+        memory.context.chart.state.turn_limit = TURN_FREE if free else TURN_LIMIT
         place, accelerate = form.stage_kernels(free)
         run.kernels.stage_place, run.kernels.stage_accelerate = place.address, accelerate.address
         run.numbers.first_order = form.first_order

@@ -5,7 +5,7 @@ import math
 from ..errors import Status
 from ..formulations.accelerations import body_of, unit_friction
 from ..formulations.chart_coordinates import turned_most
-from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL, BY_TURN
+from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL
 from ..formulations.tolerances import CONTRACTION_LOST
 from ..jit.kernels import caller, entry, kernel, long_kernel, stack
 from ..maths.dense_linalg import copy
@@ -47,7 +47,6 @@ from .tolerances import (
     SHRINK,
     SLIDES,
     SLIVER,
-    TURN_FREE,
     TURN_GAIN,
     TURNED_TOO_FAR,
 )
@@ -416,8 +415,6 @@ def _judge_chart(context, c, r, h, driven):
     lost = not c.work.control.contraction < CONTRACTION_LOST
     if lost or (driven and too_far(c.system.bodies, r.now, c.work.qd, h)):
         return CHART_LOST, reason
-    if reason == 0 and r.numbers.free_stages == 1 and turned_most(c.chart) > TURN_FREE:
-        reason = BY_TURN
     return 0, reason
 
 

@@ -120,10 +120,6 @@ GETTING_ON = 2.0
 # Rejected Taylor steps for which the history of a slice has room, beyond one row for each of its steps.
 TRIES = 32
 
-# |d|, the sine of half the angle by which a body has turned since q0, beyond which a chart is left where stages are not
-# placed. Smaller charts gain less than 10 % of the truncation error, and rounding of their bases adds up.
-TURN_FREE = 0.05
-
 # --- dense output ----------------------------------------------------------------------------------------------------
 # A state inside a step is reached from the base point of its chart in so many legs. More are taken if a leg needs more
 # than FEW factorisations; a short leg needs one of N, and one of S or of the masses.

@@ -15,6 +15,7 @@ from ..elements.bodies import START, Ground, PointMass, named
 from ..errors import InvalidArgument, InvalidBody
 from ..model.handles import handles_of
 from ..model.packed import classes
+from ..validation import listed
 from .scene_cache import prepared
 
 if TYPE_CHECKING:
@@ -57,9 +58,8 @@ def remove(scene: Scene, item: Any) -> Any:
     item = found(scene, item)
     users = _users(scene, item)
     if users:
-        more = f" and {len(users) - SHOWN} more" if len(users) > SHOWN else ""
         raise InvalidArgument(
-            f"{item.name!r} can't be removed: {', '.join(user.name for user in users[:SHOWN])}{more} refer to it. "
+            f"{item.name!r} can't be removed: {listed([user.name for user in users], SHOWN)} refer to it. "
             "Remove these first."
         )
     if isinstance(item, PointMass):

@@ -6,6 +6,7 @@ import tsdyn as ts
 from tests.helpers.reduced_ode import soften, solve, with_derivatives
 from tsdyn.formulations.registry import formulation
 from tsdyn.formulations.saddle_point import add_constraints, add_forces
+from tsdyn.formulations.tolerances import TURN_LIMIT
 from tsdyn.jit.kernels import caller, entry, resident
 from tsdyn.methods.diagonally_implicit import call_linearise, call_reduce
 from tsdyn.methods.explicit import call_accelerate, call_place
@@ -69,6 +70,7 @@ class Stages:
         work.q[:], work.qd[:] = q, qd
         parts = basis_free_parts(graph, n, False, saddle_of(packed, graph, system))
         self.context = Context(system, work, allocate_linear(system, n, m, False, kept), *parts)
+        self.context.chart.state.turn_limit = TURN_LIMIT  # as `StepEngine.lay_out`
         self.address, *self._keep = resident(self.context)
         found = form.addresses() | form.implicit()
         self.at, self.k = np.array([found[name] for name in NAMES], np.int64), 8 * len(scene.bodies)

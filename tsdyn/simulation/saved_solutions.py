@@ -12,6 +12,7 @@ from ..errors import InvalidArgument, InvalidFile, Status
 from ..formulations.locked_orientations import keep_turning
 from ..formulations.registry import formulation
 from ..model.handles import handles_of
+from ..model.packed import has_rates
 from ..observables.diagnostics import ConstraintError
 from ..rows.graph_builder import graph_of, set_redundant
 from ..rows.interface import redundancy
@@ -106,9 +107,9 @@ def trajectory_of(numbers, arrays, scene, packed):
     else:
         method, form = method_of(numbers["method"]), formulation(numbers["form"])
         again = step_engine.read_again, packed, method, form.name, float(numbers["constraint_tol"])
-        form = form.serving(method)
+        form = form.serving(method, has_rates(packed))
         graph = form.graph(packed)
-        width = method.interpolant(form.first_order).size(n, *form.sizes(n, len(packed.system.segments), graph))
+        width = method.interpolant(form.first_order).size(n, *form.sizes(packed, graph))
         if method.coupled and len(blocks):
             demand((blocks[:, B_DATA] == method.kernel(form.first_order)[1][0]).all(), "the stages of steps")
     width += B_DATA + handles.count + packed.system.memory.size

@@ -23,7 +23,7 @@ class Formulation:
     first_order: bool = False
     basis_free: bool = False
 
-    def serving(self, method, rates):
+    def serving(self, method, rates=False):
         """The form that a method runs a scene in; rates: whether the scene has rows on velocities."""
         if self.basis_free and method.implicit:
             return replace(self, kernels=implicit_tangent)
@@ -75,7 +75,7 @@ class Formulation:
         if not self.mixed:
             return redundancy(graph)
         unheld = of_rates(packed)
-        unheld[graph.row[graph.dropped]] = True
+        unheld[redundant_rows(packed)] = True
         return int(unheld.sum())
 
     @property

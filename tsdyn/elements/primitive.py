@@ -171,15 +171,18 @@ class Primitive(Attachment):
         """True if the constraint depends on time."""
         names = self.quantities()
         moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
-        return moves and "phi_t" in self.kernels and (hasattr(type(self), "phi_t") or self._drifts())
+        return (moves and "phi_t" in self.kernels and hasattr(type(self), "phi_t")) or self._drifts()
 
     def _drifts(self):
-        """Whether the rate at xd = 0, which is b of A xd + b, is ever other than zero; asked at random x and t."""
+        """Whether b, the rate at xd = 0, is ever other than zero, with these or other numbers: asked at random ones."""
+        if not self.rate_rows:
+            return False
         given, size = self.parameters(), sum(marker.size for marker in self.markers)
         if any(isinstance(value, Motion) for value in given):
             return True
-        rng, out, par = np.random.default_rng(0), np.zeros(self.rate_rows), [*given, *[0.0] * self.memory]
+        rng, out = np.random.default_rng(0), np.zeros(self.rate_rows)
         for _ in range(3):
+            par = np.array([*given, *[0.0] * self.memory]) + rng.uniform(0.1, 1.0)
             twin(self.rate)(rng.normal(size=size), np.zeros(size), par, rng.uniform(0.1, 2.0), out)
             if out.any():
                 return True

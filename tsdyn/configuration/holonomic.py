@@ -1,7 +1,7 @@
 """Check that the rows of a plug-in are holonomic: its jacobian is the derivative of its phi.
 
-The tangent form would run a row on velocities that is given as one of phi. The forms with a basis solve for positions with Phi and
-Phi_q together and silently give wrong results if one isn't the derivative of the other.
+The tangent form would run a row on velocities that is given as one of phi. The forms with a basis solve for positions
+with Phi and Phi_q together and silently give wrong results if one isn't the derivative of the other.
 """
 
 import numpy as np
@@ -21,11 +21,11 @@ TRIED = 3  # instances of each kind
 
 def demand_holonomic(packed, q, t, form):
     """Raise InvalidConstraint for a plug-in whose jacobian isn't the derivative of its phi at q (n,)."""
+    if not formulation(form).basis_free:
+        demand_no_rates(packed, form)
     if packed.derived.holonomic:
         return
     seen = {}
-    if not formulation(form).basis_free:
-        demand_no_rates(packed, form)
     for constraint, given, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
         kind = type(constraint)
         seen[kind] = seen.get(kind, 0) + 1

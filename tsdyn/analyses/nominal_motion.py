@@ -124,7 +124,7 @@ def derivatives(motion):
     packed, pairs = motion.packed, Pairs(motion.packed)
     (nc, _), m, n = pairs.counts, len(motion.lam), motion.q.size
     K, rows, Q_q, Q_qd = pairs.blocks(motion, motion.lam)
-    counts = np.array([packed.constraints[i].rows for i in range(nc)], int)
+    counts = np.array([packed.constraints[i].all_rows for i in range(nc)], int)
     lines = np.arange(m) + np.repeat(np.arange(nc), counts)  # of row r in G1 and G2
     G1, G2 = (as_csr(packed, one[: WIDTH * (m + nc)].reshape(-1, WIDTH)[lines]) for one in rows)
     K = _scatter(K, pairs.columns[:nc], pairs.used[:nc], n)

@@ -39,7 +39,7 @@ from ..jit.kernels import Callback, specialised, twin
 from ..motions.prescribed import Motion
 from .element import Attachment, check_slots, inlined, layout, static_kernel
 from .loops import constraint_hessians, constraint_rows, constraint_series, coordinate_rows, rate_rows
-from .markers import PARAMETERS, TURN, Marker
+from .markers import PARAMETERS, POINT, TURN, Marker
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -171,20 +171,26 @@ class Primitive(Attachment):
         """True if the constraint depends on time."""
         names = self.quantities()
         moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
-        return (moves and "phi_t" in self.kernels and hasattr(type(self), "phi_t")) or self._drifts()
+        if self.rate_rows:
+            return self._drifts() or (moves and self.rows > 0 and hasattr(self, "phi_t"))
+        return moves and "phi_t" in self.kernels
 
     def _drifts(self):
-        """Whether b, the rate at xd = 0, is ever other than zero, with these or other numbers: asked at random ones."""
-        if not self.rate_rows:
-            return False
-        given, size = self.parameters(), sum(marker.size for marker in self.markers)
+        """Whether b, the rate at xd = 0, may be other than zero, with these or other numbers: asked at random ones."""
+        given, rng = self.parameters(), np.random.default_rng(0)
         if any(isinstance(value, Motion) for value in given):
             return True
-        rng, out = np.random.default_rng(0), np.zeros(self.rate_rows)
+        out, par = np.zeros(self.rate_rows), np.array([*given, *[0.0] * self.memory]) + rng.uniform(0.1, 1.0)
         for _ in range(3):
-            par = np.array([*given, *[0.0] * self.memory]) + rng.uniform(0.1, 1.0)
-            twin(self.rate)(rng.normal(size=size), np.zeros(size), par, rng.uniform(0.1, 2.0), out)
-            if out.any():
+            x = [rng.normal(size=marker.size) for marker in self.markers]  # directions of unit length
+            x = [
+                part if m.code == POINT else part / np.linalg.norm(part)
+                for m, part in zip(self.markers, x, strict=True)
+            ]
+            x = np.concatenate(x)
+            with np.errstate(all="ignore"):
+                twin(self.rate)(x, np.zeros(x.size), par, rng.uniform(0.1, 2.0), out)
+            if np.nan_to_num(out).any():
                 return True
         return False
 
@@ -230,7 +236,8 @@ def _compile(cls, functions):
         inner = {f"kernel_{name}": inlined(function) for name, function in functions.items()}
     except InvalidConstraint as error:
         raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
-    constants = {"ROWS": cls.all_rows, "RATES_FROM": cls.rows, **layout(cls.markers), **inner}
+    constants = {"ROWS": cls.all_rows, "RATES_FROM": cls.rows, "kernel_drift": rate_rows.nothing}
+    constants |= layout(cls.markers) | inner
     if cls.rate_rows:
         # One kernel of both sorts of rows in place of each
         names = {**rate_rows.NOTHING, **constants}
@@ -239,6 +246,7 @@ def _compile(cls, functions):
             for name, template in rate_rows.KERNELS.items()
         }
         constants |= {f"kernel_{name}": inlined(functions[name]) for name in rate_rows.KERNELS}
+        constants["kernel_drift"] = constants["kernel_phi_t"]
         inner = constants
     result = {}
     for name, (template, whose, signature) in _LOOPS.items():

@@ -116,10 +116,10 @@ def write_qdd(c):
 
 @kernel
 def _land_rates(c, t):
-    driven = is_rheonomic(c.system)
-    if driven:
+    drifting = is_rheonomic(c.system)
+    if drifting:
         find_drift(c.graph, c.system, c.tangent, t)
-    project_rates(c.graph, c.tangent, c.expansion.low_end, driven)
+    project_rates(c.graph, c.tangent, c.expansion.low_end, drifting)
 
 
 @callback("pdd")

@@ -45,7 +45,7 @@ def displace(graph, l, poses):
 
 
 @kernel
-def add_rate_residuals(graph, l, f, x):
+def add_rate_residuals(graph, f, l, x):
     """f.b = A0 (x' - x) of rows on velocities, x' being l.x: a position solve moves bodies as these rows admit at q0.
 
     It moves by x' - x = -Y0 u. Without a residual of their own these rows would leave u to the path of the iteration.

@@ -266,7 +266,7 @@ def _solve_positions(c, t, g, x):
         if f.b.size == 0:
             return OK
         evaluate_rows(graph, system, f, f.rows, t)
-        add_rate_residuals(graph, l, f, x)
+        add_rate_residuals(graph, f, l, x)
         worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE

@@ -208,7 +208,7 @@ def _solve_positions(graph, system, w, f, l, t, x, renewals):  # eight: as of `p
             evaluate_rows(graph, system, f, f.rows, t)
         else:
             evaluate_residuals(graph, system, f, t)
-        add_rate_residuals(graph, l, f, x)
+        add_rate_residuals(graph, f, l, x)
         worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE
@@ -255,7 +255,7 @@ def _solve_positions(graph, system, w, f, l, t, x, renewals):  # eight: as of `p
 def _add_rows(graph, system, f, l, t, x):
     """H where only Phi was evaluated: seldom needed, so not inlined."""
     evaluate_rows(graph, system, f, f.rows, t)
-    add_rate_residuals(graph, l, f, x)
+    add_rate_residuals(graph, f, l, x)
 
 
 @kernel

@@ -1,4 +1,5 @@
 # Written by tools/stubs.py: do not edit.
+from collections.abc import Sequence
 from typing import Any, Self
 
 from ..hints import ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Joint, Path, Points, Prescribed, Primitive, References
@@ -11,6 +12,14 @@ class AngleDriver(References, Primitive):
     def at(cls, a: BodyLike, b: BodyLike, *, reference: ArrayLike | None = ..., across: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., across_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., angle: Prescribed = ..., name: str = ...) -> Self: ...
     @property
     def opposed(self) -> tuple[Any, ...]: ...
+
+class Blade(Points, Primitive):
+    axis_a: Attribute[ArrayLike, Floats]
+    along_b: Attribute[ArrayLike, Floats]
+    across_b: Attribute[ArrayLike, Floats]
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_b: ArrayLike = ..., along_b: ArrayLike | None = ..., across_b: ArrayLike | None = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., along: ArrayLike | None = ..., across: ArrayLike | None = ..., point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_b: ArrayLike = ..., along_b: ArrayLike | None = ..., across_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
 class ConstantAngle(Axes, Joint):
     angle: Attribute[Prescribed, Any]
@@ -41,6 +50,15 @@ class Gear(Points, References, Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float | None = ..., offset: float | None = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point: ArrayLike = ..., axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float | None = ..., offset: float | None = ..., name: str = ...) -> Self: ...
+
+class KnifeEdge(Joint):
+    coordinates: Sequence[ArrayLike | None]
+    point_a: Attribute[ArrayLike, Floats]
+    axis_a: Attribute[ArrayLike, Floats]
+    normal_b: Attribute[ArrayLike, Floats]
+    def __init__(self, a: BodyLike, b: BodyLike | None = ..., coordinates: Sequence[ArrayLike | None] = ..., name: str = ..., *, point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., normal_b: ArrayLike | None = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike | None = ..., coordinates: Sequence[ArrayLike | None] = ..., name: str = ..., *, point: ArrayLike = ..., axis: ArrayLike | None = ..., normal: ArrayLike | None = ..., point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., normal_b: ArrayLike | None = ...) -> Self: ...
 
 class Parallel(Axes, Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...

@@ -53,7 +53,7 @@ def _is_rough(scene):
 def of_scene(scene, method, form, far, rough):
     """The kernels of constraints and forces, far and rough as of `of_method`, and those for several rows."""
     series, implicit = isinstance(method, Taylor), method.implicit
-    if implicit or sum(one.rows for one in scene.primitives if not one.normalises) > 1:
+    if implicit or sum(one.all_rows for one in scene.primitives if not one.normalises) > 1:
         yield from ELIMINATION["symmetric"]
         if rough or not series:
             yield from ELIMINATION["unsymmetric"]

@@ -44,7 +44,7 @@ class SceneStructure:
         self.increments = Increments(self.metric, self.reach)
         kinds = np.array([part.normalises for part in packed.constraints], bool)
         self.own = self.metric.own
-        rows = np.repeat(kinds, [part.rows for part in packed.constraints])
+        rows = np.repeat(kinds, [part.all_rows for part in packed.constraints])
         self.normals = np.flatnonzero(rows)
         at, length = places(packed)
         self._by_rows = self.increments.bodies_at(at[self.own], length[self.own])

@@ -50,7 +50,7 @@ class Metric:
         self.root = np.sqrt(np.maximum(masses, least))[:, None]
         self.fall = np.linalg.cholesky(J + (more * thin)[:, None, None] * np.eye(3)).swapaxes(1, 2)  # L^T
         self.rise = np.linalg.inv(self.fall)
-        own = [not part.normalises for part in packed.constraints for _ in range(part.rows)]
+        own = [not part.normalises for part in packed.constraints for _ in range(part.all_rows)]
         self.own = np.flatnonzero(np.array(own, bool))
         free = np.ones(self.size, bool)
         self.held = np.zeros(len(rigid), bool) if held is None else held[self.r[:, 0]]  # (bodies,)

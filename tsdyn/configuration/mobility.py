@@ -152,7 +152,7 @@ def _pivots(scene, rows):
 
     Normalisations belong to the bodies, so dependence on them is attributed to the user's constraints.
     """
-    own = np.array([type(c) is EulerNormalization for c in scene.constraints for _ in range(c.rows)])
+    own = np.array([type(c) is EulerNormalization for c in scene.constraints for _ in range(c.all_rows)])
     rest, first = np.flatnonzero(~own), np.flatnonzero(own)
     basis = unit_rows(rows[first])  # of different bodies
     left = rows[rest] - (rows[rest] @ basis.T) @ basis
@@ -221,7 +221,7 @@ class Mobility:
             for row in found:
                 groups.setdefault(id(row.constraint), []).append(row)
             for rows in groups.values():
-                whole = len(rows) == rows[0].constraint.rows
+                whole = len(rows) == rows[0].constraint.all_rows
                 title = rows[0].constraint.title
                 said = f"all of {title}" if whole and len(rows) > 1 else ", ".join(row.name for row in rows)
                 on = dict.fromkeys(name for row in rows for name in row.depends_on)
@@ -327,7 +327,7 @@ def mobility_at(scene, q, t):
     always = sorted(set(range(len(rows))) - set(redundant))
     names, owners = (
         scene.row_names(),
-        [member.constraint for member in packed.members for _ in range(member.constraint.rows)],
+        [member.constraint for member in packed.members for _ in range(member.constraint.all_rows)],
     )
 
     def described(found, among, matrix):
@@ -381,7 +381,7 @@ def _neighbours(metric, q, A):
 
 def _groups(packed, metric, rows):
     """Return the indices of `rows`, one array for each constraint."""
-    owner = np.repeat(np.arange(len(packed.members)), [member.constraint.rows for member in packed.members])
+    owner = np.repeat(np.arange(len(packed.members)), [member.constraint.all_rows for member in packed.members])
     whose = owner[metric.own[rows]] if len(rows) else np.zeros(0, int)
     return [np.flatnonzero(whose == member) for member in np.unique(whose)]
 

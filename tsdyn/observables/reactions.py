@@ -226,7 +226,7 @@ def reaction(solution, member, body):
     rows = np.zeros((len(system.segments), WIDTH))
     halves = []  # half of each row that belongs to the body
     for part in packed.constraints[member.parts]:
-        halves += [0 if body is part.a else WIDTH // 2 if body is part.b else -1] * part.rows
+        halves += [0 if body is part.a else WIDTH // 2 if body is part.b else -1] * part.all_rows
     lam = np.ascontiguousarray(particular(solution.multipliers)[:, member.rows])
     first, halves = member.rows.start, np.array(halves, np.int64)
     constraint_loads(system, solution.t, solution.q, lam, first, halves, rows, load)

@@ -1,6 +1,6 @@
 """Contact of a ball with a cylinder, from outside or inside: one row, without friction.
 
-The frame of the cylinder is f, g, u, fixed to b, u along the axis; S is the distance of the ball's centre from the axis.
+The frame of the cylinder is f, g, u, fixed to b, u along the axis; S is the distance of the ball's centre from it.
 
     d     = x_a - x_b,  X = d.f,  Y = d.g        (1)
     Phi   = (X^2 + Y^2 - S^2) / (2 S)            (2)  [m]
@@ -13,6 +13,8 @@ Never singular: S > 0.
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..plugins import Point, Primitive, Vector, dot, kernel, positive, scaled, shown
 
@@ -118,10 +120,10 @@ class CylinderContact(Primitive):
 
     @staticmethod
     def contact(x, par):
-        """Contact point (3, k), m, and normal (3, k) of marker coordinates x (len(x), k)."""
+        """Contact point and normal, (3, k) each, of marker coordinates x (len(x), k)."""
         X, Y = across_axis(x)
-        normal = (X * x[F : F + 3] + Y * x[G : G + 3]) / par[0]
-        return x[:3] + par[1] * normal, normal
+        outward = (X * x[F : F + 3] + Y * x[G : G + 3]) / par[0]
+        return x[:3] + par[1] * outward, -np.sign(par[1]) * outward
 
     @classmethod
     def example(cls, rng, a, b):

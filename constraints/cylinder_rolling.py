@@ -1,6 +1,6 @@
 """Rolling of a ball on or in a cylinder: the row of CylinderContact, and two on velocities.
 
-R is the radius of the ball, negative outside, c that of the cylinder, S = c - R; the frame of the ball is e_1, e_2, e_3.
+R is the radius of the ball, negative outside, c that of the cylinder, S = c - R; e_1, e_2, e_3 is the ball's frame.
 
     X = d.f,  Y = d.g,  L = d.u                                      (1)
     n = (X f + Y g) / S,  tau = (X g - Y f) / S,  n_j = n.e_j        (2)  contact point x_a + R n

@@ -1,7 +1,7 @@
 """Rolling ball: a ball on a plane.
 
     z.(x_a - x_b) = radius     (1)  one row; z the normal of the plane
-    t_i.w = 0                  (2)  two rows on velocities, RollingContact: no slip
+    u_1 = u_2 = 0              (2)  two rows on velocities, RollingContact: no slip
 
 Never singular.
 """

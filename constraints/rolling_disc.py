@@ -1,9 +1,9 @@
 """Rolling disc: a thin disc or a torus on a plane.
 
-    z.(x_a - x_b) = radius sqrt(1 - (z.n)^2) + tyre_radius     (1)  one row; n the axis of the disc, z the normal of the plane
-    t_i.w = 0                                                  (2)  two rows on velocities, RollingContact: no slip
+    z.(x_a - x_b) = radius sqrt(1 - (z.n)^2) + tyre_radius     (1)  one row
+    u_1 = u_2 = 0                                              (2)  two rows on velocities, RollingContact: no slip
 
-Singular where n is parallel to z: the disc lies flat.
+n is the axis of the disc, z the normal of the plane. Singular where n is parallel to z: the disc lies flat.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ class RollingDisc(Rolls, Joint):
 
     Notes
     -----
-    Body a carries the disc about center_a and axis_a, b the plane through point_b with the normal normal_b, which points
-    to the disc. Body b may move: a turntable, a ramp. Rows: contact, and on velocities slip[0], slip[1]. The disc never
-    leaves the plane: where the normal force of `solution.reaction` is negative, the plane pulls.
+    Body a carries the disc about center_a and axis_a, b the plane through point_b with the normal normal_b, which
+    points to the disc. Body b may move: a turntable, a ramp. Rows: contact, and on velocities slip[0], slip[1]. The
+    disc never leaves the plane: where `solution.friction_demand` is infinite, the plane would have to pull.
 
     Examples
     --------
@@ -46,12 +46,10 @@ class RollingDisc(Rolls, Joint):
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene()
-    >>> coin = scene.add_body(
-    ...     mass=1.0, inertia=(0.0625, 0.125, 0.0625), position=(0, 0, 0.5), velocity=(2, 0, 0), angular_velocity=(0, 4, 0)
-    ... )
-    >>> contact = scene.add(
-    ...     ts.constraints.RollingDisc(coin, scene.ground, axis_a=(0, 1, 0), radius=0.5, normal_b=(0, 0, 1))
-    ... )
+    >>> coin = scene.add_body(mass=1.0, inertia=(0.0625, 0.125, 0.0625), position=(0, 0, 0.5))
+    >>> coin.velocity, coin.angular_velocity = (2, 0, 0), (0, 4, 0)
+    >>> plane = {"normal_b": (0, 0, 1)}
+    >>> contact = scene.add(ts.constraints.RollingDisc(coin, scene.ground, axis_a=(0, 1, 0), radius=0.5, **plane))
     >>> solution = ts.simulate(scene, (0, 1))
     >>> print(solution.contact_point(contact)[-1].round(9) + 0.0)
     [2. 0. 0.]

@@ -1,7 +1,7 @@
 """Rolling ellipsoid: a rattleback, an egg on a plane.
 
     z.(x_a - x_b) = sqrt(sum a_j^2 (e_j.z)^2)     (1)  one row; z the normal of the plane, a_j semi-axes along e_j
-    t_i.w = 0                                     (2)  two rows on velocities, RollingContact: no slip
+    u_1 = u_2 = 0                                 (2)  two rows on velocities, RollingContact: no slip
 
 Never singular.
 """
@@ -37,8 +37,8 @@ class RollingEllipsoid(Rolls, Joint):
     Raises
     ------
     InvalidConstraint
-        If a semi-axis is not positive, the directions are not at right angles, the normal is missing or zero, or a point
-        or body is wrong.
+        If a semi-axis is not positive, the directions are not at right angles, the normal is missing or zero, or a
+        point or body is wrong.
 
     Notes
     -----
@@ -82,12 +82,12 @@ class RollingEllipsoid(Rolls, Joint):
 
     @Placing
     def at(cls, a: BodyLike, b: BodyLike | None = None, **arguments: Any) -> Self:
-        """Make one from points and directions in the ground frame, axes_a included, the bodies being where they stand."""
+        """Make one from points and directions in the ground frame, axes_a too, the bodies being where they stand."""
         if arguments.get("axes_a") is not None:
             axes = directions(arguments["axes_a"])
             if axes.shape == (3, 3):
                 arguments["axes_a"] = axes @ rotation_matrix(a.orientation)
-        return super(RollingEllipsoid, cls).at(a, b, **arguments)
+        return super(RollingEllipsoid, cls).at(a, b, **arguments)  # noqa: UP008 - a classmethod by its decorator
 
     def check(self):
         """Refuse semi-axes that are not positive, and directions that are not at right angles."""
@@ -101,8 +101,8 @@ class RollingEllipsoid(Rolls, Joint):
         axes = self.axes_a
         if axes.shape != (3, 3) or not (np.abs(axes @ axes.T - np.eye(3)) <= RIGHT_ANGLED).all():
             raise self.error(
-                f"{self.name}: axes_a must be three directions of unit length at right angles, shape (3, 3), or a scipy "
-                f"Rotation; got {shown(axes)}."
+                f"{self.name}: axes_a must be three directions of unit length at right angles, shape (3, 3), or a "
+                f"scipy Rotation; got {shown(axes)}."
             )
 
     def compose(self):

@@ -1,7 +1,7 @@
 """Contact of a smooth convex surface with a plane: one row, without friction.
 
-The surface is an ellipsoid with its centre at x_a and semi-axes a_j along e_j, thickened by a radius R. A ball has equal
-semi-axes; a thin disc has a_3 = 0 and R = 0, a torus a_3 = 0 and R > 0.
+The surface is an ellipsoid with its centre at x_a and semi-axes a_j along e_j, thickened by a radius R. A ball has
+equal semi-axes; a thin disc has a_3 = 0 and R = 0, a torus a_3 = 0 and R > 0.
 
     d     = x_a - x_b,  z = normal of b,  z_j = e_j.z                (1)
     s     = sqrt(sum a_j^2 z_j^2)                                    (2)
@@ -19,7 +19,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import Point, Primitive, Vector, dot, floats, inverse_root, kernel, not_negative, product, scaled, shown, square
+from ..plugins import (
+    Point,
+    Primitive,
+    Vector,
+    dot,
+    floats,
+    inverse_root,
+    kernel,
+    not_negative,
+    product,
+    scaled,
+    shown,
+    square,
+)
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike
@@ -69,7 +82,13 @@ class SmoothContact(Primitive):
     slots = 23
 
     def __init__(
-        self, a: BodyLike, b: BodyLike, *, semi_axes: ArrayLike = (1.0, 1.0, 1.0), tyre_radius: float = 0.0, **places: Any
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        semi_axes: ArrayLike | None = None,
+        tyre_radius: float = 0.0,
+        **places: Any,
     ) -> None:
         super().__init__(a, b, **places)
         self.semi_axes = semi_axes
@@ -135,10 +154,10 @@ class SmoothContact(Primitive):
 
     @staticmethod
     def contact(x, par):
-        """Contact point (3, k), m, and normal (3, k) of marker coordinates x (len(x), k)."""
+        """Contact point and normal, (3, k) each, of marker coordinates x (len(x), k)."""
         s, point = support(x, par), x[:3] - par[3] * x[Z : Z + 3]
-        for e, square in zip((3, 6, 9), par, strict=False):
-            point = point - square * along(x, e, x, Z) / s * x[e : e + 3]
+        for e, length in zip((E, E + 3, E + 6), par, strict=False):
+            point = point - length * along(x, e, x, Z) / s * x[e : e + 3]
         return point, x[Z : Z + 3]
 
     @classmethod
@@ -169,7 +188,7 @@ def support(x, par):
 def contact_series(x, par, k, s, out):
     """Coefficient k of Eq. (5), out[0]; rows of e_j, z, d, z_j, s^2, 1 / s, c_j.
 
-    Of a thin disc the third axis is left out, of a plane of the ground what is for a plane that moves.
+    The third axis of a thin disc is left out; a plane of the ground has constant directions.
     """
     for i in range(9):
         s[i, k] = x[E + i]
@@ -185,11 +204,10 @@ def contact_series(x, par, k, s, out):
         s[20 + j, k] = -par[j] * product(s[15 + j], s[19], k)
         e = E + 3 * j
         out[0, e], out[0, e + 1], out[0, e + 2] = scaled_plane(s, 9, 20 + j, k, par)
-        if moves(par):
-            f0, f1, f2 = scaled(s, 3 * j, 20 + j, k)
-            out[0, Z] += f0
-            out[0, Z + 1] += f1
-            out[0, Z + 2] += f2
+        f0, f1, f2 = scaled(s, 3 * j, 20 + j, k)
+        out[0, Z] += f0
+        out[0, Z + 1] += f1
+        out[0, Z + 2] += f2
 
 
 @kernel

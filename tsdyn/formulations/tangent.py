@@ -13,6 +13,7 @@ from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..rows.interface import (
     DYNAMICS,
     apply_multipliers,
+    clear_rates,
     evaluate_drift,
     evaluate_residuals,
     evaluate_rows,
@@ -20,7 +21,6 @@ from ..rows.interface import (
     is_axis,
     multiply_rates,
     multiply_rows,
-    project,
     redundant_rows_hold,
     refinements,
     solve_product,
@@ -42,13 +42,23 @@ from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, SLOW, SLOW_FACTOR
 
 
 @kernel
-def _tangent_part(graph, f, l, e):
-    """f.Z = P0 e."""
+def _tangent_part(graph, f, l, e, of_positions):
+    """f.Z = P0 e; of positions what their solve leaves of it."""
     copy(e, f.Z)
     for i in range(e.size, f.Z.size):
         f.Z[i] = 0.0
     if f.b.size > 0:
-        project(graph, l.rows0, f.Z, f.b)
+        _normal_part(graph, l, f.Z, f.b, of_positions)
+        apply_multipliers(graph, l.rows0, f.b, f.Z)
+
+
+@kernel
+def _normal_part(graph, l, x, u, of_positions):
+    """u = S0^-1 H0 x; of positions without the part of x that violates rows on velocities alone."""
+    multiply_rows(graph, l.rows0, x, u)
+    if of_positions:
+        clear_rates(graph, u)
+    solve_rows(graph, l.rows0, u)
 
 
 @kernel
@@ -91,9 +101,9 @@ def error_norm(context, ex, ey, old, rtol, atol):
     n, k = w.q.size, l.x.size - 8
     old = vector(old, 3 * n)
     # The normal component of the error is removed by the position solve
-    _tangent_part(graph, f, l, vector(ex, k))
+    _tangent_part(graph, f, l, vector(ex, k), True)
     total = weighted_square(graph, l, f.Z, w.q, old, 0, rtol, atol)
-    _tangent_part(graph, f, l, vector(ey, k))
+    _tangent_part(graph, f, l, vector(ey, k), False)
     total += weighted_square(graph, l, f.Z, w.qd, old, n, rtol, atol)
     return math.sqrt(total / (2 * n))
 
@@ -132,8 +142,7 @@ def place(context, t, x):
         # Start: x - Y0 u with u of the position before; if that fails, the step was long
         copy(x, l.x)
         if attempt == 1:  # a long step: from the tangent plane, P0 x
-            multiply_rows(graph, l.rows0, l.x, w.u)
-            solve_rows(graph, l.rows0, w.u)
+            _normal_part(graph, l, l.x, w.u, True)
         # x - Y0 u
         apply_multipliers(graph, l.rows0, w.u, l.x)
         status = _solve_positions(graph, system, w, f, l, t, RENEWALS * attempt)

@@ -366,6 +366,12 @@ class _GraphBuilder:
             turns[first : first + constraint.all_rows] = not has_lengths(constraint)
         return turns if is_small(self.packed.size) and turns.any() else np.zeros(0)
 
+    def _rates(self):
+        """ConstraintGraph.rates."""
+        pairs = zip(self.joints, self.firsts, strict=True)
+        found = [range(first + joint.constraint.rows, first + joint.constraint.all_rows) for joint, first in pairs]
+        return np.array(sorted(i for rows in found for i in rows), np.int64)
+
     def graph(self):
         """The `ConstraintGraph`, and the classes of its kinds."""
         parts, scales = self._products_at_hubs()
@@ -391,6 +397,7 @@ class _GraphBuilder:
             spins=spins,
             pattern=with_kernels(self.pattern),
             turns=self._turns(),
+            rates=self._rates(),
             normals=self.normals,
             parts=parts,
             scales=scales,

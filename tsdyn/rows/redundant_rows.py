@@ -21,6 +21,13 @@ def clear_redundant(f, b):
 
 
 @kernel
+def clear_rates(graph, b):
+    """Zero the entries of rows on velocities: they hold nothing in place."""
+    for i in range(graph.rates.size):
+        b[graph.rates[i]] = 0.0
+
+
+@kernel
 def keep_redundant(f, b, kept):
     """Zero the right-hand sides of redundant rows, after storing them in `kept`, one of `RedundantRows`."""
     if kept.size > 0:

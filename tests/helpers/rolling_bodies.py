@@ -4,8 +4,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-import tsdyn as ts
-
 GRAVITY = 9.81
 
 

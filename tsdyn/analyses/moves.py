@@ -38,7 +38,7 @@ class SceneStructure:
     """
 
     def __init__(self, packed, t, q):
-        self.packed, self.t, self.metric = packed, t, Metric(packed, None, t)
+        self.packed, self.t, self.metric = packed, t, Metric(packed, None, t, rates=True)
         self.reach = self.metric.reach(q)
         self.system, self.pairs = with_short_rows(packed), Pairs(packed)
         self.increments = Increments(self.metric, self.reach)

@@ -179,6 +179,8 @@ class Mobility:
     ----------
     degrees_of_freedom : int
         Coordinates less rank: of the velocities that the constraints leave, here.
+    position_degrees_of_freedom : int
+        The same without rows on velocities (rolling, knife edges): of the positions that can be reached.
     generic_degrees_of_freedom : int
         The same at configurations near this one; it is smaller where this one is singular.
     coordinates, rows, rank : int
@@ -192,6 +194,7 @@ class Mobility:
     """
 
     degrees_of_freedom: int
+    position_degrees_of_freedom: int
     generic_degrees_of_freedom: int
     coordinates: int
     rows: int
@@ -204,6 +207,8 @@ class Mobility:
         freedom = f"{self.degrees_of_freedom}"
         if self.singular:
             freedom += f" here, {self.generic_degrees_of_freedom} nearby: this configuration is singular"
+        if self.position_degrees_of_freedom != self.degrees_of_freedom:
+            freedom += f" of velocities, {self.position_degrees_of_freedom} of positions"
         facts = {
             "degrees of freedom": freedom,
             "coordinates": f"{self.coordinates}",
@@ -307,7 +312,7 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
 def mobility_at(scene, q, t):
     """As `mobility`, of arguments that are checked."""
     packed = scene.packed
-    metric = Metric(packed, None, t, lengths=True)
+    metric = Metric(packed, None, t, lengths=True, rates=True)
     Phi, Phi_q, Phi_t = metric.arrays(q)
     demand_finite(scene, Phi, Phi_q, Phi_t)
     demand_small(scene, Phi, INITIAL_TOL * (1.0 + np.abs(q).max()), "position", "Phi", (float(t), q))
@@ -335,10 +340,11 @@ def mobility_at(scene, q, t):
             place = metric.own[rows[row]]
             yield RedundantRow(names[place], tuple(names[metric.own[rows[i]]] for i in others), owners[place])
 
-    aside = len(metric.own) - len(rows) + len(packed.system.segments) - len(metric.own)
-    n = q.size
+    n, aside = q.size, len(packed.system.segments) - len(rows)
+    free = n - aside - here
     return Mobility(
-        degrees_of_freedom=n - aside - here,
+        degrees_of_freedom=free,
+        position_degrees_of_freedom=_of_positions(packed, q, t, free),
         generic_degrees_of_freedom=n - aside - generic,
         coordinates=n,
         rows=len(packed.system.segments),
@@ -347,6 +353,16 @@ def mobility_at(scene, q, t):
         dependent_here=tuple(described(dependent, kept, A)) if dependent else (),
         singular=generic > here,
     )
+
+
+def _of_positions(packed, q, t, free):
+    """Degrees of freedom of positions; `free` are those of velocities."""
+    if not any(constraint.rate_rows for constraint in packed.constraints):
+        return free
+    metric = Metric(packed, None, t, lengths=True)
+    rows, A = _core(metric, q, None)
+    normals = sum(constraint.normalises for constraint in packed.constraints)
+    return q.size - normals - (len(metric.own) - len(rows)) - rank_of(A)
 
 
 def _core(metric, q, rows):
@@ -380,8 +396,10 @@ def _neighbours(metric, q, A):
 
 
 def _groups(packed, metric, rows):
-    """Return the indices of `rows`, one array for each constraint."""
-    owner = np.repeat(np.arange(len(packed.members)), [member.constraint.all_rows for member in packed.members])
+    """Return the indices of `rows`, one array for each constraint; those on velocities come last."""
+    count = len(packed.members)
+    owner = np.repeat(np.arange(count), [member.constraint.all_rows for member in packed.members])
+    owner += count * np.array([i >= part.rows for part in packed.constraints for i in range(part.all_rows)], int)
     whose = owner[metric.own[rows]] if len(rows) else np.zeros(0, int)
     return [np.flatnonzero(whose == member) for member in np.unique(whose)]
 

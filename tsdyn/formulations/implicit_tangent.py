@@ -15,6 +15,7 @@ from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
     DYNAMICS,
     apply_multipliers,
+    clear_rates,
     clear_redundant,
     evaluate_bias,
     evaluate_drift,
@@ -366,8 +367,10 @@ def _correct_normal_part(c, g, k):
     for i in range(k.size):
         k[i] += s.r[i]
     for e in range(f.b.size):
-        w.u[e] -= g * g * f.b[e]
         s.z[e] -= g * f.b[e]
+    clear_rates(c.graph, f.b)  # u takes off what rows on positions forbid
+    for e in range(f.b.size):
+        w.u[e] -= g * g * f.b[e]
 
 
 @callback(NORM, "d")
@@ -475,10 +478,16 @@ def solve_stages(context, h, tableau, memory):
         for j in range(n):
             k[j] += s.r[j]
         for j in range(stages):  # what the normal parts of accelerations have moved is taken off again
-            a, square = h * tableau[p.a + stages * i + j], h * h * tableau[p.square + stages * i + j]
+            a = h * tableau[p.a + stages * i + j]
+            for e in range(m):
+                s.stages[i, m + e] -= a * s.normal[j, e]
+    # Of positions what rows on positions forbid
+    for j in range(stages):
+        clear_rates(c.graph, s.normal[j])
+        for i in range(stages):
+            square = h * h * tableau[p.square + stages * i + j]
             for e in range(m):
                 s.stages[i, e] -= square * s.normal[j, e]
-                s.stages[i, m + e] -= a * s.normal[j, e]
     return _size(c, h, tableau, p)
 
 

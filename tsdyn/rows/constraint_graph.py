@@ -94,9 +94,8 @@ def no_graph():
     pairs = np.zeros((0, 2), np.int64)
     kinds, products, parts = records(RowKind), records(Product), records(PartProduct)
     return ConstraintGraph(
-        pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, np.zeros(0), none, none, parts,
-        np.zeros(0), pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64),
-        no_axes(),
+        pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, np.zeros(0), none, none,
+        parts, np.zeros(0), pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64), no_axes(),
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from .block_operations import eliminate, subtract_products
 from .constraint_graph import ConstraintGraph, no_graph
 from .evaluation import evaluate_all, evaluate_every_row
 from .factorisation import keep_diagonal, update_later_blocks
-from .redundant_rows import keep_every_row, leave_redundant_rows, length, square
+from .redundant_rows import is_rate, keep_every_row, leave_redundant_rows, length, square
 from .row_workspace import Rows, TangentWorkspace, no_tangent_workspace
 from .schur_complement import (
     factorise_selected_rows,
@@ -126,15 +126,6 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
 
 
 @kernel
-def _is_rate(graph, e):
-    """Whether a row is one on velocities."""
-    for i in range(graph.rates.size):
-        if graph.rates[i] == e:
-            return True
-    return False
-
-
-@kernel
 def _choose(graph, first, size, width, panel, kept, share, A, order):
     """Order the rows of a block by pivoting, kept rows first, A (size, size) scratch; return the number of kept rows.
 
@@ -153,7 +144,7 @@ def _choose(graph, first, size, width, panel, kept, share, A, order):
             part = A[row * size + row] / kept[row] if kept[row] > 0.0 else 0.0
             if graph.row[first + row] < 0:
                 part += 2.0
-            elif graph.rates.size > 0 and part > share and not _is_rate(graph, first + row):
+            elif graph.rates.size > 0 and part > share and not is_rate(graph, first + row):
                 part += 1.0
             if part > best:
                 best, pivot = part, i

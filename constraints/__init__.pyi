@@ -1,5 +1,4 @@
 # Written by tools/stubs.py: do not edit.
-from collections.abc import Sequence
 from typing import Any, Self
 
 from ..hints import ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Joint, Orientation, Path, Points, Prescribed, Primitive, References
@@ -64,13 +63,12 @@ class Gear(Points, References, Primitive):
     def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point: ArrayLike = ..., axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float | None = ..., offset: float | None = ..., name: str = ...) -> Self: ...
 
 class KnifeEdge(Joint):
-    coordinates: Sequence[ArrayLike | None]
     point_a: Attribute[ArrayLike, Floats]
     axis_a: Attribute[ArrayLike, Floats]
     normal_b: Attribute[ArrayLike, Floats]
-    def __init__(self, a: BodyLike, b: BodyLike | None = ..., coordinates: Sequence[ArrayLike | None] = ..., name: str = ..., *, point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., normal_b: ArrayLike | None = ...) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., normal_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(cls, a: BodyLike, b: BodyLike | None = ..., coordinates: Sequence[ArrayLike | None] = ..., name: str = ..., *, point: ArrayLike = ..., axis: ArrayLike | None = ..., normal: ArrayLike | None = ..., point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., normal_b: ArrayLike | None = ...) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., normal: ArrayLike | None = ..., point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., normal_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
 class Parallel(Axes, Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...

@@ -8,8 +8,13 @@ the velocities lose one. It keeps no height; PlaneContact does. Singular if axis
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from ..plugins import Joint, Point, Vector, across
 from .blade import Blade
+
+if TYPE_CHECKING:
+    from ..hints import BodyLike
 
 
 class KnifeEdge(Joint):
@@ -37,6 +42,9 @@ class KnifeEdge(Joint):
     """
 
     markers = (Point("a"), Vector("a"), Vector("b", "normal_b"))
+
+    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+        super().__init__(a, b, **places)
 
     def compose(self):
         """Eq. (1)."""

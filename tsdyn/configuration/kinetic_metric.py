@@ -25,8 +25,8 @@ class Metric:
 
     held (n,) marks coordinates that are fixed. Rows on velocities are among the rows with `rates` alone: then Phi, zero
     for them, is met by increments that they admit. With `lengths`, the metric is that of rows/constraint_graph.py: rank
-    is geometry. The kinetic one `is_bounded` where masses or moments of inertia are raised, so that it stays a metric: it
-    says which of many configurations is near, and no physical number. Those come of `kinetic_rows`.
+    is geometry. The kinetic one `is_bounded` where masses or moments of inertia are raised, so that it stays a metric:
+    it says which of many configurations is near, and no physical number. Those come of `kinetic_rows`.
     """
 
     def __init__(self, packed, held=None, t=0.0, lengths=False, rates=False):

@@ -12,13 +12,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..plugins import Joint, Placing, Point, Vector, floats, rotation_matrix, shown
+from ..plugins import RIGHT_ANGLED, Joint, Placing, Point, Vector, floats, rotation_matrix, shown
 from .rolling_contact import Rolls, on_plane
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Orientation
-
-RIGHT_ANGLED = 1e-9  # cosines between directions of semi-axes, and their lengths from 1
 
 
 class RollingEllipsoid(Rolls, Joint):

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..plugins import (
+    FLAT,
     Point,
     Primitive,
     Vector,
@@ -159,6 +160,13 @@ class SmoothContact(Primitive):
         for e, length in zip((E, E + 3, E + 6), par, strict=False):
             point = point - length * along(x, e, x, Z) / s * x[e : e + 3]
         return point, x[Z : Z + 3]
+
+    @staticmethod
+    def singular_place(x, par):
+        """What is singular at marker coordinates x, if anything."""
+        if support(x, par) > FLAT * np.sqrt(max(par[:3])):
+            return ""
+        return "the disc lies flat on its plane, and no point of its rim is the lowest"
 
     @classmethod
     def example(cls, rng, a, b):

@@ -305,6 +305,22 @@ def test_a_disc_that_starts_slipping_or_off_the_plane_is_named():
     assert ts.simulate(scene, (0, 1)).success
 
 
+@pytest.mark.parametrize("slip", [False, True], ids=["rolling", "sliding"])
+def test_a_disc_that_lies_flat_is_named(slip):
+    scene = ts.Scene()
+    body = scene.add_body(1.0, (0.08, 0.15, 0.08), name="coin")
+    scene.add(disc(body, scene.ground, slip=slip, name="rolls"))
+    body.orientation = leaning(np.pi / 2 - 1e-12)
+    with pytest.raises(ts.SingularConfiguration, match="'rolls' contact: the disc lies flat on its plane"):
+        ts.simulate(scene, (0, 1))
+    body.position, body.orientation = (0, 0, 0.5 * np.cos(0.3)), leaning(0.3)
+    for method in (None, "dop853"):
+        solution = ts.simulate(scene, (0, 2), integrator=method)
+        assert not solution.success
+        assert "'rolls' contact: the disc lies flat on its plane" in solution.message
+        assert np.isfinite(solution.q).all()
+
+
 def test_items_without_a_contact_point_are_refused():
     scene = ts.Scene()
     body = scene.add_body(1.0, (1, 1, 1))

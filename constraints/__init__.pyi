@@ -156,12 +156,16 @@ class CylinderRolling(CylinderContact):
     point_b: Attribute[ArrayLike, Floats]
     first_b: Attribute[ArrayLike, Floats]
     second_b: Attribute[ArrayLike, Floats]
+    axis_b: Attribute[ArrayLike, Floats]
+    first_a: Attribute[ArrayLike, Floats]
+    second_a: Attribute[ArrayLike, Floats]
+    third_a: Attribute[ArrayLike, Floats]
     radius: float
     cylinder_radius: float
     inside: bool
-    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., radius: float | None = ..., cylinder_radius: float | None = ..., inside: bool = ..., name: str = ...) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., radius: float | None = ..., cylinder_radius: float | None = ..., inside: bool = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., radius: float | None = ..., cylinder_radius: float | None = ..., inside: bool = ..., name: str = ...) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., axis: ArrayLike | None = ..., third: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., radius: float | None = ..., cylinder_radius: float | None = ..., inside: bool = ..., name: str = ...) -> Self: ...
 
 class Dot1(Axes, Primitive):
     value: Attribute[Prescribed, Any]
@@ -212,11 +216,13 @@ class RollingContact(SmoothContact):
     third_a: Attribute[ArrayLike, Floats]
     point_b: Attribute[ArrayLike, Floats]
     normal_b: Attribute[ArrayLike, Floats]
+    first_b: Attribute[ArrayLike, Floats]
+    second_b: Attribute[ArrayLike, Floats]
     semi_axes: Attribute[ArrayLike, Floats]
     tyre_radius: float
-    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., third: ArrayLike | None = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., third: ArrayLike | None = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> Self: ...
 
 class RollingDisc(Joint):
     center_a: Attribute[ArrayLike, Floats]

@@ -51,7 +51,8 @@ class RollingEllipsoid(Rolls, Joint):
     >>> scene = ts.Scene(gravity=(0, 0, -10))
     >>> stone = scene.add_body(mass=1.0, inertia=(1, 2, 3), position=(0, 0, 0.1))
     >>> contact = ts.constraints.RollingEllipsoid(stone, scene.ground, semi_axes=(0.4, 0.2, 0.1), normal_b=(0, 0, 1))
-    >>> force, _ = ts.simulate(scene, (0, 1)).reaction(scene.add(contact))
+    >>> contact = scene.add(contact)
+    >>> force, _ = ts.simulate(scene, (0, 1)).reaction(contact)
     >>> print(force[-1].round(9) + 0.0)
     [ 0.  0. 10.]
     """

@@ -227,7 +227,8 @@ def _compile(cls, functions):
         inner = {f"kernel_{name}": inlined(function) for name, function in functions.items()}
     except InvalidConstraint as error:
         raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
-    constants = {"ROWS": cls.all_rows, "RATES_FROM": cls.rows, **layout(cls.markers), **inner}
+    constants = {"ROWS": cls.all_rows, "RATES_FROM": cls.rows, "kernel_drift": rate_rows.nothing}
+    constants |= layout(cls.markers) | inner
     if cls.rate_rows:
         # One kernel of both sorts of rows in place of each
         names = {**rate_rows.NOTHING, **constants}
@@ -236,6 +237,7 @@ def _compile(cls, functions):
             for name, template in rate_rows.KERNELS.items()
         }
         constants |= {f"kernel_{name}": inlined(functions[name]) for name in rate_rows.KERNELS}
+        constants["kernel_drift"] = constants["kernel_phi_t"]
         inner = constants
     result = {}
     for name, (template, whose, signature) in _LOOPS.items():

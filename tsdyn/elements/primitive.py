@@ -39,7 +39,7 @@ from ..jit.kernels import Callback, specialised, twin
 from ..motions.prescribed import Motion
 from .element import Attachment, check_slots, inlined, layout, static_kernel
 from .loops import constraint_hessians, constraint_rows, constraint_series, coordinate_rows, rate_rows
-from .markers import PARAMETERS, TURN, Marker
+from .markers import PARAMETERS, POINT, TURN, Marker
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -171,17 +171,26 @@ class Primitive(Attachment):
         """True if the constraint depends on time."""
         names = self.quantities()
         moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
-        return moves and "phi_t" in self.kernels and (hasattr(type(self), "phi_t") or self._drifts())
+        if self.rate_rows:
+            return self._drifts() or (moves and self.rows > 0 and hasattr(self, "phi_t"))
+        return moves and "phi_t" in self.kernels
 
     def _drifts(self):
         """Whether the rate at xd = 0, which is b of A xd + b, is ever other than zero; asked at random x and t."""
-        given, size = self.parameters(), sum(marker.size for marker in self.markers)
+        given, rng = self.parameters(), np.random.default_rng(0)
         if any(isinstance(value, Motion) for value in given):
             return True
-        rng, out, par = np.random.default_rng(0), np.zeros(self.rate_rows), [*given, *[0.0] * self.memory]
+        out, par = np.zeros(self.rate_rows), [*given, *[0.0] * self.memory]
         for _ in range(3):
-            twin(self.rate)(rng.normal(size=size), np.zeros(size), par, rng.uniform(0.1, 2.0), out)
-            if out.any():
+            x = [rng.normal(size=marker.size) for marker in self.markers]  # directions of unit length
+            x = [
+                part if m.code == POINT else part / np.linalg.norm(part)
+                for m, part in zip(self.markers, x, strict=True)
+            ]
+            x = np.concatenate(x)
+            with np.errstate(all="ignore"):
+                twin(self.rate)(x, np.zeros(x.size), par, rng.uniform(0.1, 2.0), out)
+            if np.nan_to_num(out).any():
                 return True
         return False
 

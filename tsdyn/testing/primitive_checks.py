@@ -221,7 +221,7 @@ def _check_rates(f, name, rows, motion, labels):
             f"{name}: rate[{i}] is the derivative of a function of positions. Write that function as a row of phi: "
             "positions then hold to rounding, too, in place of drifting by what velocities lack.",
             UserWarning,
-            stacklevel=2,
+            stacklevel=4,
         )
 
 

@@ -424,7 +424,7 @@ def _rolling_disc(each, r):
     """With a spoke from the centre to the rim, on both sides."""
     tyre, whole = each.item.tyre_radius, each.item.radius + each.item.tyre_radius
     thick = max(2.0 * tyre, THIN * whole)
-    spoke = ("box", np.array([0.5 * whole, 0, 0]), (whole, MARK * whole, 1.1 * thick))
+    spoke = ("box", np.array([0.5 * whole, 0, 0]), (whole, MARK * whole, 1.5 * thick))
     return [
         _plane(each, r)[0],
         *_surface(each, "cylinder", along(each.places["axis_a"]), (whole, whole, thick), [spoke]),

@@ -100,6 +100,7 @@ class Derived:
     holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
     loads: dict = None  # reactions.loads_of
     row_parts: list = field(default_factory=list)  # idle: observables.row_parts.taken
+    with_singular_places: list = None  # indices of primitives: contacts.singular_place
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts
     engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine

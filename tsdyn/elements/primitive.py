@@ -182,11 +182,9 @@ class Primitive(Attachment):
             return True
         out, par = np.zeros(self.rate_rows), [*given, *[0.0] * self.memory]
         for _ in range(3):
-            x = [rng.normal(size=marker.size) for marker in self.markers]  # directions of unit length
-            x = [
-                part if m.code == POINT else part / np.linalg.norm(part)
-                for m, part in zip(self.markers, x, strict=True)
-            ]
+            x = [rng.normal(size=marker.size) for marker in self.markers]
+            for part, marker in zip(x, self.markers, strict=True):  # directions of unit length
+                part /= 1.0 if marker.code == POINT else np.linalg.norm(part)
             x = np.concatenate(x)
             with np.errstate(all="ignore"):
                 twin(self.rate)(x, np.zeros(x.size), par, rng.uniform(0.1, 2.0), out)

@@ -97,17 +97,21 @@ def broken(kind, name, entry):
     def four(x, xd, par, t, out):
         spoil(x, xd, par, t, out)
 
-    return type("Broken", (kind,), {name: staticmethod(four if name == "gamma" else three)})
+    return type("Broken", (kind,), {name: staticmethod(four if "gamma" in name else three)})
 
 
 def entries(kind):
     size = sum(marker.size for marker in kind.markers)
     for row in range(kind.rows):
         yield kind, "gamma", row
-        if "phi_t" in kind.kernels:
+        if getattr(kind, "phi_t", None):
             yield kind, "phi_t", row
         for column in range(size):
             yield kind, "jacobian", (row, column)
+    for row in range(kind.rate_rows):
+        yield kind, "rate_gamma", row
+        for column in range(size):
+            yield kind, "rate_jacobian", (row, column)
 
 
 @pytest.mark.parametrize("kind", [*PRIMITIVES, DrivenPivot], ids=lambda kind: kind.__name__)

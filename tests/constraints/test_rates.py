@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import tsdyn as ts
-from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, HELD, NEAR, ROUNDING
+from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, NEAR, ROUNDING
 from tsdyn.plugins import Motion
 from tsdyn.runs import driver
 
@@ -514,3 +514,23 @@ def test_it_is_the_motion_of_reduced_equations():
     solution = ts.simulate(scene, (0.0, 2.0), rtol=1e-11, atol=1e-11).raise_if_failed()
     np.testing.assert_allclose(solution.state.position(skate, (-0.2, 0, 0))[:2], right[:2], rtol=0, atol=NEAR)
     held(solution)
+
+
+def test_inverse_dynamics_of_a_motion():
+    """The thrust along the blade that was given is found, whatever the blade's own force."""
+    scene = ts.Scene(gravity=(0.0, 0.0, -9.81))
+    skate = body_on_ice(scene, (1.0, 0, 0), 0.7, name="skate")
+    scene.add(C.KnifeEdge(skate, scene.ground, **EDGE, name="edge"))
+    scene.add(F.PointForce(skate, force=(2.0, 0.0, 0.0), frame="body", name="thrust"))
+    scene.add(F.Torque(skate, torque=(0.0, 0.0, 0.2), name="turn"))
+    solution = ts.simulate(scene, (0.0, 2.0), rtol=1e-10, atol=1e-10)
+    found = scene.inverse_dynamics(solution, ["thrust.x", "turn.z"])
+    np.testing.assert_allclose(found.loads["thrust.x"], 2.0, rtol=0, atol=FINE)
+    np.testing.assert_allclose(found.loads["turn.z"], 0.2, rtol=0, atol=FINE)
+    np.testing.assert_allclose(found.reaction("edge")[0], solution.reaction("edge")[0], rtol=0, atol=FINE)
+
+
+def test_kinematics_refuses_them():
+    scene = sleigh()
+    with pytest.raises(ts.InvalidArgument, match=r"edge.*rows on velocities"):
+        scene.kinematics([0.0, 1.0])

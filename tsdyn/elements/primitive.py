@@ -172,7 +172,7 @@ class Primitive(Attachment):
         names = self.quantities()
         moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
         if self.rate_rows:
-            return self._drifts() or (moves and self.rows > 0 and hasattr(self, "phi_t"))
+            return self._drifts() or (moves and self.rows > 0 and getattr(self, "phi_t", None) is not None)
         return moves and "phi_t" in self.kernels
 
     def _drifts(self):

@@ -119,7 +119,7 @@ def _check_perturbed(constraint, name, rng):
 def _check_kernels(constraint, name, rng, par):
     kind, size = type(constraint), sum(m.size for m in constraint.markers)
     x, xd, t = rng.normal(size=size), 10.0 * rng.normal(size=size), rng.uniform(0.1, 2.0)
-    written = [kernel for kernel in ("phi", "jacobian", "gamma", "phi_t") if kind.rows and hasattr(kind, kernel)]
+    written = [kernel for kernel in ("phi", "jacobian", "gamma", "phi_t") if kind.rows and getattr(kind, kernel, None)]
     rates = ["rate", "rate_jacobian", "rate_gamma"] if kind.rate_rows else []
     f = SimpleNamespace(**{kernel: _python(constraint, kernel, name, par) for kernel in (*written, *rates)})
     for kernel in written:

@@ -174,7 +174,7 @@ def _check_rows(scene, primitive, name, q, t):
     if kind.rows:
         run_truncated(kind, "phi", name, x, par, t, Phi)
         run_truncated(kind, "jacobian", name, x, par, t, Phi_x)
-        if rows and hasattr(kind, "phi_t"):
+        if rows and getattr(kind, "phi_t", None):
             run_truncated(kind, "phi_t", name, x, par, t, Phi_t)
     if kind.rate_rows:
         # A, b, and for Phi the integral of the rate

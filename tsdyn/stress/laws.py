@@ -119,7 +119,7 @@ def motors(solution):
 # Laws that hold of every run, whatever its scene: no reference solution is needed.
 #
 # Each law takes a `Solution` and yields what it found as `Finding`s: a size, and the limit that it must not exceed.
-# LAWS lists those of a single run; comparisons.py compares runs.
+# LAWS lists those of a single run; judgement.py compares runs.
 
 LEVELS = ("position", "velocity", "acceleration")
 

@@ -9,8 +9,8 @@ Rods are 1 m long, of 1 kg, (0.1, 0.1, 0.02) kg m^2, along their body z axis, th
 
 import numpy as np
 
-from ... import constraints, forces
-from ...simulation.scene import Scene
+from .. import constraints, forces
+from ..simulation.scene import Scene
 
 GRAVITY = (0.0, 0.0, -9.81)
 HALF = 0.5  # m, from a rod's centroid to its ends

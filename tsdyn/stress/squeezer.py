@@ -6,9 +6,9 @@ Lengths in m, masses in kg, angles in rad, named as there; the mechanism lies in
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...constraints import Revolute
-from ...forces import Spring, Torque
-from ...simulation.scene import Scene
+from ..constraints import Revolute
+from ..forces import Spring, Torque
+from ..simulation.scene import Scene
 
 MASS = (0.04325, 0.00365, 0.02373, 0.00706, 0.07050, 0.00706, 0.05498)
 INERTIA = (2.194e-6, 4.410e-7, 5.255e-6, 5.667e-7, 1.169e-5, 5.667e-7, 1.912e-5)

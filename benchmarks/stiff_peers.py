@@ -20,7 +20,7 @@ from benchmarks import stiff
 from benchmarks.contender import timed
 from benchmarks.peers import dae_chain, stiff_odes
 from benchmarks.stiff_chain import chain
-from tsdyn.benchmarking.engines import Exudyn, MuJoCo
+from tsdyn.measuring.engines import Exudyn, MuJoCo
 from tsdyn.stress.gallery import governor
 
 OUTPUTS = 50

@@ -17,8 +17,8 @@ import numpy as np
 import tsdyn as ts
 from benchmarks import ensemble_peers, provenance, stiff, stiff_peers, work_precision
 from examples import drive_train, four_bar, stick_slip, top
-from tsdyn.benchmarking.benchmark import agreed
 from tsdyn.cli import main as tsdyn
+from tsdyn.measuring.benchmark import agreed
 from tsdyn.stress import rods
 from tsdyn.stress.gallery import kapitza
 

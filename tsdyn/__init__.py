@@ -142,22 +142,22 @@ __all__ = [
 
 if TYPE_CHECKING:
     from . import plots, testing
-    from .benchmarking.benchmark import benchmark
-    from .benchmarking.compare import compare
     from .ensembles.ensemble import ensemble
     from .ensembles.results import Ensemble
-    from .profiling.profile import profile
+    from .measuring.benchmark import benchmark
+    from .measuring.compare import compare
+    from .measuring.profile import profile
 else:
     from ._discovery import refusing as _refusing
 
     _refuse = _refusing("ts", __all__, constraints, forces, integrators, motions)
     _LATER = {
         "Ensemble": ".ensembles.results",
-        "benchmark": ".benchmarking.benchmark",
-        "compare": ".benchmarking.compare",
+        "benchmark": ".measuring.benchmark",
+        "compare": ".measuring.compare",
         "ensemble": ".ensembles.ensemble",
         "plots": ".plots",
-        "profile": ".profiling.profile",
+        "profile": ".measuring.profile",
         "testing": ".testing",
     }
 

@@ -49,7 +49,7 @@ def test_plug_ins_are_left_to_this_process():
 def test_every_kernel_of_the_package_is_found_by_its_name():
     kernels = list(all_kernels._all())
     assert len(kernels) > 150
-    timers = "tsdyn.profiling"  # made as they are needed
+    timers = "tsdyn.measuring"  # made as they are needed
     nameless = [kernel.py_func for kernel in kernels if not workers.name_of(kernel)]
     assert [function.__qualname__ for function in nameless if not function.__module__.startswith(timers)] == []
     assert {*all_kernels._default()} <= {*kernels}

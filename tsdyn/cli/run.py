@@ -9,9 +9,9 @@ import numpy as np
 
 from ..errors import InconsistentState, InvalidArgument
 from ..files import run_tables, types
+from ..files.formats import SUFFIXES as SOLUTIONS
+from ..graphics.view import page_path
 from ..observables.channels import channels_of
-from ..storage.formats import SUFFIXES as SOLUTIONS
-from ..viewer.view import page_path
 from .parser import print_json
 from .scene_file import load_document, load_run, robot_options
 
@@ -205,7 +205,7 @@ def demand_format(path):
     if suffix not in (*TABLES, *SOLUTIONS):
         raise InvalidArgument(f"results are written to {', '.join((*SOLUTIONS, *TABLES))}; got {path!r}.")
     if suffix in SOLUTIONS:
-        from ..storage.saved_file import format_at
+        from ..files.saved_file import format_at
 
         format_at(path)
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from ..elements.bodies import PointMass
-from ..files.named_numbers import TableNumbers
+from ..files.scene_text import TableNumbers
 from ..jit.code_hash import is_ours
 from ..model.handles import handles_of
 from ..model.packed import Derived, System, classes, is_small

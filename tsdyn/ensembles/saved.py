@@ -27,7 +27,7 @@ RECORD = {  # of every file, with the types of it
 
 def load(path: Path, scene: Scene | None, allow_code: bool) -> Ensemble:
     """Return the ensemble of a file; arguments as of `ts.load`."""
-    from ..storage import saved_file
+    from ..files import saved_file
 
     path = Path(path).absolute()
     record, arrays = saved_file.read(path, FORMAT)

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import MissingDependency, StorageError
+from ..files.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
 from ..observables.channels import channels_of, values_of
-from ..storage.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
 from ..validation import text_cell
 from .saved_solutions import labelled_rows, provenance
 from .stored_runs import demand_path

@@ -107,8 +107,8 @@ def load(
     _demand_robot(free_base, outside, loops)
     if suffix == ".xacro":
         raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
-    from ..storage.formats import SUFFIXES
-    from ..storage.saved_file import STORE, kind_of
+    from ..files.formats import SUFFIXES
+    from ..files.saved_file import STORE, kind_of
     from .outline_solution import Outline
     from .saved_solutions import load as load_solution
 

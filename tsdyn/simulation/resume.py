@@ -66,7 +66,7 @@ def resume(
     >>> ts.resume(path).reached
     2.0
     """
-    from ..storage import checkpoint
+    from ..files import checkpoint
 
     demand_path(path, "path")
     return _resumed(path, *checkpoint.read(path), scene, events, progress)
@@ -106,8 +106,8 @@ def _scene_of(path, numbers, arrays):
 
 def ended_run(path: Place, scene: Scene | None) -> Solution:
     """Return the solution of a store whose run has ended; raises StorageError that names the call for any other."""
-    from ..storage import checkpoint
-    from ..storage.formats import format_of
+    from ..files import checkpoint
+    from ..files.formats import format_of
     from .outline_solution import Outline
     from .saved_solutions import outlined_run
 

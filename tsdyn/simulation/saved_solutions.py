@@ -153,8 +153,8 @@ def provenance(solution: Solution) -> dict[str, Any]:
 
 def save(solution: Solution, path: Place) -> Path:
     """As of `Records.save`."""
-    from ..storage import saved_file
-    from ..storage.archive import tables_of
+    from ..files import saved_file
+    from ..files.archive import tables_of
 
     demand_path(path, "path")
     path = Path(path).absolute()
@@ -266,7 +266,7 @@ def _plain(value):
 
 def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[type[Any], ...]) -> Solution:
     """Return the solution of a file; arguments as of `ts.load`, and the classes `Scene` and `Solution`."""
-    from ..storage import saved_file
+    from ..files import saved_file
 
     path = Path(path).absolute()
     if scene is not None and not isinstance(scene, kinds[0]):
@@ -321,8 +321,8 @@ def _outlined(path, record, arrays, why, kinds):
 
 def outlined_run(path, numbers, arrays, why, kinds):
     """The `Outline` of the store of a run that has ended, from its checkpoint; what its scene doesn't tell is NaN."""
-    from ..storage.archive import tables_of
-    from ..storage.formats import format_of
+    from ..files.archive import tables_of
+    from ..files.formats import format_of
 
     known, told = numbers["arguments"]["outline"], numbers["provenance"]
     scene = scene_of(known, arrays["outline"], why, kinds[0])
@@ -359,8 +359,8 @@ def _again(record):
 
 def _solution(path, record, arrays, scene, kind, width=None):
     """The solution of a record that fits the scene; width: of what it remembers, if not that of the scene."""
-    from ..storage.archive import StoredLog, StoredOutputs, tables_of
-    from ..storage.formats import demand_shapes
+    from ..files.archive import StoredLog, StoredOutputs, tables_of
+    from ..files.formats import demand_shapes
 
     found, packed = kind.__new__(kind), scene.packed
     outputs = StoredOutputs(path, record["tables"])

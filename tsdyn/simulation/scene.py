@@ -552,8 +552,8 @@ class Scene:
         ...     print("rod: Phi = 0.22" in page.read_text())
         True
         """
-        from ..viewer.run_data import scene_data
-        from ..viewer.view import show
+        from ..graphics.run_data import scene_data
+        from ..graphics.view import show
 
         t, packed, (q, qd) = finite(t, "view: t (s)"), self.packed, self.start
         try:

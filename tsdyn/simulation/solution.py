@@ -96,8 +96,8 @@ class Showing:
         ...     print(page.name)
         pendulum.html
         """
-        from ..viewer.run_data import run_data
-        from ..viewer.view import show
+        from ..graphics.run_data import run_data
+        from ..graphics.view import show
 
         return show(run_data(self, shapes=shapes, trails=trails, camera=camera, follow=follow), path)
 
@@ -165,10 +165,10 @@ class Showing:
         if path is None and is_picture(channels):
             channels, path = None, channels
         if channels is None:
-            from ..figures.histories import overview
+            from ..graphics.curves import overview
 
             return overview(self, path)
-        from ..figures.channels import time_histories
+        from ..graphics.curves import time_histories
 
         return time_histories(self, channels, path)
 

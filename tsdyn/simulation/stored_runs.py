@@ -247,7 +247,7 @@ def demand_storable(call, options):
     path, interval = call.store, call.checkpoint
     if path is None:
         raise InvalidArgument("checkpoint needs a store, which it goes on with: simulate(..., store='run.h5').")
-    from ..storage.formats import demand_free, format_of
+    from ..files.formats import demand_free, format_of
 
     demand_path(path, "store")
     format_of(path)
@@ -266,8 +266,8 @@ def demand_path(path, name):
 
 def archive_of(given, kept, history, numbers, arrays):
     """The `Archive` of a run, made or, with the numbers and arrays of a checkpoint, gone on with."""
-    from ..storage.archive import Archive, tables_of
-    from ..storage.formats import demand_shapes, format_of, writing
+    from ..files.archive import Archive, tables_of
+    from ..files.formats import demand_shapes, format_of, writing
 
     facts = _facts(given, kept)
     if numbers is not None:
@@ -292,7 +292,7 @@ def archive_of(given, kept, history, numbers, arrays):
 
 def begin_again(archive, given):
     """Let another method begin at the start; the archive."""
-    from ..storage.formats import writing
+    from ..files.formats import writing
 
     with writing(archive.path):
         archive.begin_again(_asked(given))
@@ -325,7 +325,7 @@ def ended(archive, outcome, seconds, task):
 
 def call_to_go_on(archive):
     """The call of `resume` that goes on with a run; "" where there is no checkpoint."""
-    from ..storage.checkpoint import place
+    from ..files.checkpoint import place
 
     if not any(path.exists() for path in place(archive.path)):
         return ""
@@ -336,7 +336,7 @@ def call_to_go_on(archive):
 
 def _stored(archive):
     """Outputs, steps and charts of an archive."""
-    from ..storage.archive import StoredLog, StoredOutputs
+    from ..files.archive import StoredLog, StoredOutputs
 
     outputs = StoredOutputs(archive.path, archive.columns)
     return outputs, StoredLog.of(outputs, "steps"), StoredLog.of(outputs, "charts")

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..benchmarking.tolerances import REFERENCE_TOLERANCES
 from ..constraints import Distance, PlaneContact, Spherical
 from ..errors import CheckFailed, InvalidArgument, StepFailure
 from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853, RK45
 from ..maths.tolerances import EPS
+from ..measuring.tolerances import REFERENCE_TOLERANCES
 from ..methods.integrator import Integrator
 from ..observables.diagnostics import ConstraintError, constraint_error
 from ..runs.tolerances import STRETCH

@@ -55,16 +55,19 @@ from .motions.tables import Table  # noqa: E402
 from .observables.state import State  # noqa: E402
 from .simulation.load import LOADERS as _LOADERS  # noqa: E402
 from .simulation.load import load  # noqa: E402
-from .simulation.prepared_run import Run, prepare  # noqa: E402
+from .simulation.prepared_run import (  # noqa: E402
+    Run,
+    prepare,
+    simulate,
+)
 from .simulation.resume import resume  # noqa: E402
 from .simulation.run_options import RunOptions  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402
-from .simulation.simulate import simulate  # noqa: E402
 from .simulation.solution import Solution  # noqa: E402
 
 
 def _ensemble_of(*given):
-    from .ensembles.saved import load
+    from .ensembles.ensemble import load
 
     return load(*given)
 

@@ -538,7 +538,7 @@ def test_a_run_loads_nothing_that_draws():
     code = "import sys; from examples import top; top.ts.simulate(top.build(), (0.0, 0.1)); print(*sys.modules)"
     result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     modules = result.stdout.split()
-    assert "tsdyn.simulation.simulate" in modules
+    assert "tsdyn.simulation.prepared_run" in modules
     assert not [name for name in modules if name.startswith(("tsdyn.graphics", "matplotlib", "webbrowser"))]
 
 

@@ -46,7 +46,7 @@ def _profile(parsed):
     are not given are those of the file, else of ts.simulate.
     """
     from ..measuring.profile import profile
-    from .scene_file import load_run, robot_options
+    from .parser import load_run, robot_options
 
     began = time.perf_counter()
     scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
@@ -71,7 +71,7 @@ def _benchmark(parsed):
     a run of each method reached its end.
     """
     from ..measuring.benchmark import benchmark
-    from .scene_file import load_run, robot_options
+    from .parser import load_run, robot_options
 
     tolerances, steps = _numbers(parsed.tolerances, "--tolerances"), _numbers(parsed.steps, "--steps")
     methods = None if parsed.methods is None else [word.strip() for word in parsed.methods.split(",")]

@@ -323,7 +323,7 @@ class Ensemble:
         TsdynError
             If a value of the case is inadmissible.
         """
-        from ..simulation.simulate import simulate
+        from ..simulation.prepared_run import simulate
 
         study, i = self._study, self._number_of(i)
         return simulate(study.scene.with_parameters(self._values(i)), **study.given)

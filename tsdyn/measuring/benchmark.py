@@ -21,8 +21,8 @@ from ..errors import InvalidArgument, Status
 from ..formulations.registry import formulation as find_formulation
 from ..integrators import DOP853, RK45, SDIRK54
 from ..methods.integrator import Integrator, registered
+from ..simulation.prepared_run import simulate
 from ..simulation.scene import Scene
-from ..simulation.simulate import simulate
 from ..validation import floats, positive, unknown_name, whole
 from .tolerances import ENOUGH, REFERENCE_TOLERANCES, ROOM
 

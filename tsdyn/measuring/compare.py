@@ -14,9 +14,9 @@ from ..calls import fitting
 from ..drawing import BLUE, VERMILION, Tabulated, new_figure
 from ..elements.bodies import transform_g
 from ..errors import InvalidArgument
-from ..observables import diagnostics, power
+from ..observables import diagnostics
 from ..runs.arguments import interval
-from ..simulation.simulate import simulate
+from ..simulation.prepared_run import simulate
 from ..validation import nearest, positive, whole
 from .benchmark import poses
 from .engines import ENGINES
@@ -250,6 +250,6 @@ def _levels(ours, t, q, qd):
     """Constraint violation and energy of a trajectory; angles count the turns of ours."""
     packed, memory = ours.packed, ours._memory
     error = diagnostics.constraint_error(packed, t, q, qd, np.zeros_like(q), memory)
-    forces = power.force_powers(SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=packed))
+    forces = diagnostics.force_powers(SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=packed))
     energy = diagnostics.kinetic_energy(packed.system, q, qd) + diagnostics.potential_energy(packed.system, q)
     return Levels(error.position, error.velocity, energy + forces.potential)

@@ -12,8 +12,8 @@ import numpy as np
 from ..constraints import Distance, PlaneContact, Spherical
 from ..integrators import Nystrom4
 from ..observables.diagnostics import ConstraintError
+from ..simulation.prepared_run import simulate
 from ..simulation.scene import Scene
-from ..simulation.simulate import simulate
 from .tolerances import PAPER_TOLERANCES, ROUNDING
 
 LEVELS = ConstraintError._fields

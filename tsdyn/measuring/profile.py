@@ -19,12 +19,11 @@ from ..jit.kernels import DEBUG
 from ..observables.state import remembered
 from ..runs.arguments import interval, state_arrays
 from ..simulation import prepared_run
-from ..simulation.prepared_run import DRIVERS
+from ..simulation.prepared_run import DRIVERS, simulate
 from ..simulation.run_options import OPTIONS, from_names
 from ..simulation.scene import Scene
 from ..simulation.scene_cache import prepared
 from ..simulation.segments import implicit
-from ..simulation.simulate import simulate
 from ..taylor.layout import lacking, without_series
 from . import tolerances as limits
 from .benchmark import COLOURS, poses

@@ -15,9 +15,9 @@ from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
 from ..model.kinematics import Anchor, Kinematics
-from ..observables import diagnostics, power, reactions
+from ..observables import diagnostics, reactions
+from ..observables.diagnostics import driving_power, force_powers, power_of
 from ..observables.generalised_forces import law_values
-from ..observables.power import driving_power, force_powers, power_of
 from ..observables.reactions import acted, exerted, member, multipliers, with_normal_loads
 from ..observables.state import RememberingState
 from ..validation import counted, floats
@@ -193,7 +193,7 @@ def energy_error(solution, task):
         for first, rows, last in zip((task.q, task.qd), (some.q, some.qd), solution._last[:2], strict=True)
     )
     memory = np.vstack((task.remembered[-slots:] if slots else np.zeros(0), some._remembers, solution._remembered))
-    forces = power.force_powers(SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=packed))
+    forces = diagnostics.force_powers(SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=packed))
     kinetic = diagnostics.kinetic_energy(system, q, qd)
     largest = kinetic.max()
     if not (
@@ -292,12 +292,12 @@ class Balances:
 
     @cached_property
     def _force_powers(self):
-        return power.force_powers(self)
+        return diagnostics.force_powers(self)
 
     @cached_property
     def power(self) -> Floats:
         """Power (k,), W, of applied forces, actuators and driven constraints: dE/dt = power - dissipation."""
-        return self._force_powers.applied + power.driving_power(self)
+        return self._force_powers.applied + diagnostics.driving_power(self)
 
     @property
     def dissipation(self) -> Floats:
@@ -323,7 +323,7 @@ class Balances:
         Of a motor or a driver: the power of its force or torque along the prescribed motion. Of a force: the power of
         its loads and actuators, less dissipation; stored energy of a spring doesn't count. Of other constraints: zero.
         """
-        return power.power_of(self, self._part(item))
+        return diagnostics.power_of(self, self._part(item))
 
     def work_of(self, item: ItemLike) -> Floats:
         """Work (k,), J, since the start, of one constraint or force: the integral of `power_of`.

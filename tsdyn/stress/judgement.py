@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InvalidArgument, TsdynError
 from ..integrators import Nystrom4
 from ..maths.tolerances import EPS
-from ..simulation.simulate import simulate
+from ..simulation.prepared_run import simulate
 from . import random_scenes
 from .laws import (
     Finding,

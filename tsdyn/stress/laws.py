@@ -16,10 +16,9 @@ from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, ROUNDING_AT_MOST, S
 from ..model.equations import WIDTH, places, with_short_rows
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
-from ..simulation.prepared_run import Run
+from ..simulation.prepared_run import Run, simulate
 from ..simulation.resume import resume
 from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
-from ..simulation.simulate import simulate
 from .tolerances import (
     BODIES,
     FLOOR,

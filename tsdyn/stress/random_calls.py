@@ -27,11 +27,10 @@ from ..methods.integrator import Integrator
 from ..motions.prescribed import Motion
 from ..motions.tables import Table
 from ..simulation.load import load
-from ..simulation.prepared_run import prepare
+from ..simulation.prepared_run import prepare, simulate
 from ..simulation.resume import resume
 from ..simulation.run_options import RunOptions
 from ..simulation.scene import Scene
-from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
 from .judgement import FAULT, Judgement
 

@@ -13,7 +13,7 @@ from ..drawing import BLUE, GREEN, GREY, VERMILION, new_figure
 from ..errors import TsdynError
 from ..integrators import DOP853, Nystrom4, Taylor
 from ..maths.tolerances import EPS
-from ..simulation.simulate import simulate
+from ..simulation.prepared_run import simulate
 from ..simulation.solution import Solution
 from .gallery import CASES, Case
 from .laws import energy_left, findings, resumed_is_same, same_bits

@@ -16,8 +16,8 @@ from ..measuring.tolerances import REFERENCE_TOLERANCES
 from ..methods.integrator import Integrator
 from ..observables.diagnostics import ConstraintError, constraint_error
 from ..runs.tolerances import STRETCH
+from ..simulation.prepared_run import simulate
 from ..simulation.scene import Scene
-from ..simulation.simulate import simulate
 from .series_checks import demand_kind
 from .tolerances import (
     BOUNDED,

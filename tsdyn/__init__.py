@@ -55,11 +55,7 @@ from .motions.tables import Table  # noqa: E402
 from .observables.state import State  # noqa: E402
 from .simulation.load import LOADERS as _LOADERS  # noqa: E402
 from .simulation.load import load  # noqa: E402
-from .simulation.prepared_run import (  # noqa: E402
-    Run,
-    prepare,
-    simulate,
-)
+from .simulation.prepared_run import Run, prepare, simulate  # noqa: E402
 from .simulation.resume import resume  # noqa: E402
 from .simulation.run_options import RunOptions  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402

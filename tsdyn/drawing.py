@@ -147,7 +147,6 @@ def save(figure: Any, path: str | Path) -> Path:
 
 # What all figures share: axes, and curves of many points.
 
-
 ZERO = 1e-17  # what an error of exactly zero is drawn as: below any other
 SHOWN = {  # first argument: what it must be
     "solution": "a Solution, which ts.simulate returns",

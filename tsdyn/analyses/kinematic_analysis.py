@@ -440,7 +440,6 @@ def _remembering(packed, times, levels):
 #
 # Coordinates are joints, names such as "pin.angle", "slide.displacement" and "ball.x", bodies and points of bodies.
 
-
 WHO = "inverse_dynamics"
 MOST_NAMED = 10  # coordinates and bodies in a message
 

@@ -230,7 +230,6 @@ def demand_lanes(lanes):
 
 # Ensembles of files, as `ts.load` reads them.
 
-
 RECORD = {  # of every file, with the types of it
     "count": int, "keep": str, "is_single": bool, "kept": list, "parameters": list, "coordinates": list,
     "messages": dict, "reason": str, "threads": int, "lanes": int, "interrupted": bool, "options": dict,

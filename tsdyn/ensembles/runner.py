@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..ahead.first_run import prepare_first_run
+from ..ahead import prepare_first_run
 from ..elements.bodies import PointMass
 from ..errors import Status, TsdynError
 from ..files.scene_text import TableNumbers
@@ -250,7 +250,6 @@ class Arena:
 
 
 # The cases of a chunk.
-
 
 PLAIN = Status.SUCCESS.sentence
 

@@ -18,7 +18,6 @@ from .types import Unwritable, decode_array, decode_number, encode
 
 # A scene as plain data: bodies, constraints and forces with the arguments that make them again.
 
-
 VERSION = 1
 BUILT = {"built_a": 0, "built_b": 1}  # orientations of a and b at which an angle is zero
 

@@ -243,7 +243,6 @@ every = 0.01 # outputs; without it one a step
 
 # The table `parameters` of a scene file: numbers by name, and the scene of the file with other ones.
 
-
 OF_RUNS = ("run", "ensemble", "output")  # tables that are no part of a scene
 
 

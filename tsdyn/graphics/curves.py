@@ -235,7 +235,6 @@ def overview(solution: Solution, path: Any = None) -> Any:
 # positions, velocities and accelerations of the outputs on both sides. Between outputs that are too far apart for that
 # there is no curve; they are dots.
 
-
 WIDTH, HEIGHT, LABEL = 8.0, 2.2, 26  # of a panel, inches; characters of a line of its label
 POINTS, FEWEST = 2000, 3  # of a curve at least, and of each step
 MOST = 20_000  # steps that are drawn
@@ -327,7 +326,6 @@ def _unresolved(t, q, qd, qdd):
 
 
 # Phase portraits and Poincare sections of a joint coordinate.
-
 
 KINDS = {"angle": "rad", "displacement": "m"}
 

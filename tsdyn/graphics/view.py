@@ -141,7 +141,6 @@ def has_display() -> bool:
 
 # Pictures by matplotlib: what the page shows, as shaded polygons, painted from back to front; GIFs of them.
 
-
 SIDES, BANDS, TURNS = 20, 10, 6  # of cylinders and balls; of coils
 LIGHT = np.array([0.35, 0.25, 0.9]) / np.linalg.norm([0.35, 0.25, 0.9])  # in the camera's frame
 FINE, CELLS = 2000, 12  # triangles of a mesh above which it is painted coarsely, by so many cells along its extent

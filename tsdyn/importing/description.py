@@ -205,7 +205,6 @@ class Description:
 
 # What became of a file: what was left out, what was carried over in another way, and where its frames are.
 
-
 SHOWN = 8  # names of a group in a text
 UNBOUNDED = 1e3  # rad or m: a range from which on limits say nothing on where a loop closes
 

@@ -324,7 +324,6 @@ def _once(scene, method, options, state, start):
 # Alternatives are run in separate calls and reported only where they are faster. Where an alternative may cost
 # accuracy, the difference between the two final states is reported with it.
 
-
 SHOWN = 3  # parts without series, by name
 
 

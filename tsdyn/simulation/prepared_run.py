@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..ahead.first_run import kernels_of, prepare_first_run
+from ..ahead import kernels_of, prepare_first_run
 from ..calls import ELSEWHERE, fitting
 from ..configuration.holonomic import demand_holonomic
 from ..elements.element import warn_of_waiting
@@ -491,7 +491,6 @@ def run_task(task, scene, initial_tol):
 
 
 # `simulate`: prepare a run, or take the last one of the same options, and run it; whether a run could begin.
-
 
 KEPT = 8  # runs of a scene
 

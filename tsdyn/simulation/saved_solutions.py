@@ -417,7 +417,6 @@ def _solution(path, record, arrays, scene, kind, width=None):
 
 # Outputs of a run as labelled arrays and data frames, with the names and units of stores.
 
-
 ERRORS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 ENERGIES = ("kinetic_energy", "potential_energy", "energy")
 INDEX, HEAD = "time", "time (s)"

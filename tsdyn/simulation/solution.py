@@ -16,7 +16,6 @@ from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import diagnostics, reactions
-from ..observables.diagnostics import driving_power, force_powers, power_of
 from ..observables.generalised_forces import law_values
 from ..observables.reactions import acted, exerted, member, multipliers, with_normal_loads
 from ..observables.state import RememberingState
@@ -213,7 +212,7 @@ AT_ONCE = 2000  # pieces of the interval, evaluated in one call
 def work(solution, trajectory, item=None):
     """Work (k,), J, since the start: of applied and driving forces, less dissipation.
 
-    item restricts it to one constraint or force, as in `power.power_of`.
+    item restricts it to one constraint or force, as in `diagnostics.power_of`.
     """
     edges = np.unique(np.concatenate([[trajectory.start], trajectory.edges, solution.t]))
     pieces = np.zeros(0)
@@ -261,10 +260,10 @@ def _power(solution, trajectory, item, t):
     if system.rheonomic[0]:
         at.multipliers = multipliers(solution.packed, t, q, qd, qdd, memory)
     if item is not None:
-        power = power_of(at, item)
+        power = diagnostics.power_of(at, item)
     else:
-        powers = force_powers(at)
-        power = powers.applied + driving_power(at) - powers.dissipation
+        powers = diagnostics.force_powers(at)
+        power = powers.applied + diagnostics.driving_power(at) - powers.dissipation
     return power if status == 0 else np.full(t.size, np.nan)
 
 

@@ -30,7 +30,6 @@ from .squeezer import squeezer
 
 # Planar linkages of Revolute joints in space: three of the rows of every loop are redundant.
 
-
 AXIS = (0.0, 0.0, 1.0)
 GRAVITY = (0.0, -9.81, 0.0)  # m/s^2
 
@@ -160,7 +159,6 @@ def slider_crank(rate=4.0):
 
 # Bricard's six-bar in space: mobile only by its geometry.
 
-
 CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1), (0, 1, 1), (0, 0, 1)], float)  # m
 
 
@@ -201,7 +199,6 @@ def governor(stiffness=300.0, damping=5.0):
 
 
 # One body each: a sleeping top, Kapitza's pendulum, upside down on a pivot that shakes, and one that is struck.
-
 
 HEIGHT, FREQUENCY = 0.05, 120.0  # m, rad/s: of Kapitza's pivot
 STRUCK, WIDTH = 61.8, 0.05  # s: when a pendulum is struck, and for how long

@@ -32,7 +32,6 @@ from .tolerances import FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, 
 # FALL must be left by steps shorter by SHORTER, or from those to steps shorter still, where an adaptive run comes to
 # the end.
 
-
 FEW = 20  # bodies
 DEFAULT = 1e-8  # rtol, and atol, of a run without one
 

@@ -45,7 +45,6 @@ from .tolerances import (
 
 # Test scenes of `check_integrator`, with their reference solutions.
 
-
 GRID = 16  # equal parts of the span, at whose ends fixed steps are compared
 INNER = np.sort(np.random.default_rng(1).uniform(0.01, 0.99, 40))  # fractions of the span, within the steps
 

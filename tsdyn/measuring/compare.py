@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..calls import fitting
-from ..drawing import BLUE, VERMILION, Tabulated, new_figure
+from ..drawing import BLUE, VERMILION, ZERO, Tabulated, new_figure
 from ..elements.bodies import transform_g
 from ..errors import InvalidArgument
 from ..observables import diagnostics
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from ..hints import Floats, Scene
 
 # `Comparison`: how far the run of another engine is from the reference.
-
-LEAST = 1e-17  # drawn on a logarithmic axis in place of zero
 
 
 class Levels(NamedTuple):
@@ -107,14 +105,14 @@ class Comparison(Tabulated):
         """The matplotlib Figure: error, constraint violation and energy against time, and cost."""
         with new_figure(9.0, 6.0) as figure:
             (error, violation), (energy, cost) = figure.subplots(2, 2)
-            error.semilogy(self.t, np.maximum(self.error, LEAST), color=VERMILION, label="position (m)")
-            angle = np.maximum(self.rotation_error.max(axis=1), LEAST)
+            error.semilogy(self.t, np.maximum(self.error, ZERO), color=VERMILION, label="position (m)")
+            angle = np.maximum(self.rotation_error.max(axis=1), ZERO)
             error.semilogy(self.t, angle, color=VERMILION, linestyle="--", label="rotation (rad)")
             error.set(xlabel="time (s)", ylabel="largest error", title=f"{self.engine}, {self.method}, {self.step:g} s")
             for one, colour, name in ((self.theirs, VERMILION, self.engine), (self.ours, BLUE, "tsdyn")):
-                violation.semilogy(self.t, np.maximum(one.position, LEAST), color=colour, label=name)
-                violation.semilogy(self.t, np.maximum(one.velocity, LEAST), color=colour, linestyle="--")
-                change = np.maximum(np.abs(one.energy - one.energy[0]), LEAST)
+                violation.semilogy(self.t, np.maximum(one.position, ZERO), color=colour, label=name)
+                violation.semilogy(self.t, np.maximum(one.velocity, ZERO), color=colour, linestyle="--")
+                change = np.maximum(np.abs(one.energy - one.energy[0]), ZERO)
                 energy.semilogy(self.t, change, color=colour, label=name)
             violation.set(
                 xlabel="time (s)", ylabel="position (m), velocity (m/s, dashed)", title="constraint violation"

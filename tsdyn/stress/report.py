@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..drawing import BLUE, GREEN, GREY, VERMILION, new_figure
+from ..drawing import BLUE, GREEN, GREY, VERMILION, ZERO, new_figure
 from ..errors import TsdynError
 from ..integrators import DOP853, Nystrom4, Taylor
 from ..maths.tolerances import EPS
@@ -130,11 +130,9 @@ def without_figures(case, message):
     return {"case": case.name, "hard": case.hard, "success": False, "message": message, **unknown}
 
 
-# The report of `tsdyn stress` as text, as Markdown, as plain data and as a figure.
 # The figure of `tsdyn stress`: constraint errors and energy errors of the cases of the gallery, over time.
 
 COLOURS = 10  # of matplotlib's cycle
-ZERO = 1e-17  # what an error of zero is drawn as
 LEVELS = (("position", BLUE, "o"), ("velocity", GREEN, "s"), ("acceleration", VERMILION, "^"))
 
 

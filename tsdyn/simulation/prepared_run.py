@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
 
 
-# `prepare`: what all runs of a scene with the same options share, worked out once; the choice of the method.
 # Choice of the default method: Taylor; DOP853 where a part of the scene has no series; implicit where it is stiff.
 #
 # Taylor steps with sharp forces are shorter, and no quicker than those of DOP853 in scenes without constraints. Where

@@ -22,7 +22,7 @@ from .elements.primitive import Primitive
 from .ensembles.results import Ensemble
 from .errors import TsdynError
 from .measuring.benchmark import Benchmark, Reference
-from .measuring.phases import Phase
+from .measuring.phase_times import Phase
 from .measuring.profile import Profile
 from .methods.integrator import Integrator
 from .model.handles import Handles

@@ -10,7 +10,7 @@ from benchmarks import stiff
 from examples import drive_train, pendulum_chain, top, two_body_pendulum
 from tests.helpers.processes import REPORT, run
 from tests.helpers.scenes import build, random_chain
-from tsdyn.measuring.phases import TIMERS
+from tsdyn.measuring.phase_times import TIMERS
 from tsdyn.simulation.scene_cache import prepared
 
 I = ts.integrators
@@ -203,7 +203,7 @@ def test_a_run_loads_no_timer():
 import sys
 from examples import top
 tsdyn.simulate(top.build(), (0.0, 0.01), integrator="dop853")
-report(timers="tsdyn.measuring.phases" in sys.modules)
+report(timers="tsdyn.measuring.phase_times" in sys.modules)
 """
     )
     assert run(code, {})[0]["timers"] is False
@@ -215,7 +215,7 @@ def test_the_unit_of_the_clock_in_a_process_that_has_loaded_nothing():
     code = (
         REPORT
         + """
-import tsdyn.measuring.phases as timers
+import tsdyn.measuring.phase_times as timers
 timers.HAS_CYCLES = False
 report(unit=timers.calibrate()[0])
 """

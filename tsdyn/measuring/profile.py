@@ -27,7 +27,7 @@ from ..simulation.segments import implicit
 from ..taylor.layout import lacking, without_series
 from . import tolerances as limits
 from .benchmark import COLOURS, poses
-from .phases import Phase, Timing, calibrate, duration, phases
+from .phase_times import Phase, Timing, calibrate, duration, phases
 from .tolerances import FEWEST, LONG, MOST, RESOLUTION, SAMPLE
 
 if TYPE_CHECKING:

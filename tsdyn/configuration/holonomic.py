@@ -8,7 +8,6 @@ import numpy as np
 
 from ..elements.loops.template import state
 from ..errors import InvalidConstraint
-from ..formulations.registry import formulation
 from ..jit.code_hash import is_ours
 from ..jit.kernels import twin
 from ..motions.prescribed import Motion
@@ -21,8 +20,6 @@ TRIED = 3  # instances of each kind
 
 def demand_holonomic(packed, q, t, form):
     """Raise InvalidConstraint for a plug-in whose jacobian isn't the derivative of its phi at q (n,)."""
-    if not formulation(form).basis_free:
-        demand_no_rates(packed, form)
     if packed.derived.holonomic:
         return
     seen = {}
@@ -41,16 +38,6 @@ def demand_holonomic(packed, q, t, form):
                 f"ts.testing.check_primitive({kind.__name__}); make a row on velocities alone one of rate_rows."
             )
     packed.derived.holonomic = True
-
-
-def demand_no_rates(packed, form):
-    """Raise InvalidConstraint for rows on velocities, where a form has none."""
-    for member in packed.members:
-        if member.constraint.rate_rows:
-            raise InvalidConstraint(
-                f"{member.constraint.title}: it has rows on velocities, which {form!r} has no equations for; use "
-                "formulation='tangent'."
-            )
 
 
 def _markers(packed, constraint, places, q):

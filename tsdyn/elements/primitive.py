@@ -176,11 +176,11 @@ class Primitive(Attachment):
         return moves and "phi_t" in self.kernels
 
     def _drifts(self):
-        """Whether the rate at xd = 0, which is b of A xd + b, is ever other than zero; asked at random x and t."""
+        """Whether b, the rate at xd = 0, may be other than zero, with these or other numbers: asked at random ones."""
         given, rng = self.parameters(), np.random.default_rng(0)
         if any(isinstance(value, Motion) for value in given):
             return True
-        out, par = np.zeros(self.rate_rows), [*given, *[0.0] * self.memory]
+        out, par = np.zeros(self.rate_rows), np.array([*given, *[0.0] * self.memory]) + rng.uniform(0.1, 1.0)
         for _ in range(3):
             x = [rng.normal(size=marker.size) for marker in self.markers]
             for part, marker in zip(x, self.markers, strict=True):  # directions of unit length

@@ -36,7 +36,7 @@ from ..rows.interface import (
 )
 from ..workspaces import load
 from .accelerations import body_forces
-from .chart_coordinates import displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
+from .chart_coordinates import add_rate_residuals, displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
 from .chart_validity import measure_turns
 from .projection import largest_residual, velocity_floor
 from .saddle_point import add_blocks, degrees, factorise, linearise, reduce, soften, solve, take_solution, turned_back
@@ -186,7 +186,7 @@ def residual(context, t, g, x, y, k):
     # x - Y0 u and xd - Y0 z
     apply_multipliers(graph, l.rows0, w.u, l.x)
     apply_multipliers(graph, l.rows0, s.z, l.y)
-    status = _solve_positions(c, t, g)
+    status = _solve_positions(c, t, g, vector(x, n))
     if status == OK:
         status = _solve_rates(c, t)
     if status != OK:
@@ -253,7 +253,7 @@ def _rate_size(c, x):
 
 
 @kernel
-def _solve_positions(c, t, g):
+def _solve_positions(c, t, g, x):
     """Newton's method for u: poses and H. Status.
 
     Stops when the position error over g is a velocity well below the tolerance of the stage.
@@ -266,6 +266,7 @@ def _solve_positions(c, t, g):
         if f.b.size == 0:
             return OK
         evaluate_rows(graph, system, f, f.rows, t)
+        add_rate_residuals(graph, f, l, x)
         worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE

@@ -29,6 +29,7 @@ from ..rows.interface import (
 from ..workspaces import load
 from .accelerations import call_friction, refine_accelerations, solve_accelerations
 from .chart_coordinates import (
+    add_rate_residuals,
     displace,
     factorise_normal,
     turn_rates,
@@ -145,7 +146,7 @@ def place(context, t, x):
             _normal_part(graph, l, l.x, w.u, True)
         # x - Y0 u
         apply_multipliers(graph, l.rows0, w.u, l.x)
-        status = _solve_positions(graph, system, w, f, l, t, RENEWALS * attempt)
+        status = _solve_positions(graph, system, w, f, l, t, x, RENEWALS * attempt)
         if status == OK or f.b.size == 0:
             break
     if status != OK:
@@ -186,7 +187,7 @@ def _prepare_accelerations(graph, system, w, f):
 
 
 @kernel
-def _solve_positions(graph, system, w, f, l, t, renewals):
+def _solve_positions(graph, system, w, f, l, t, x, renewals):  # eight: as of `place`, its coordinates and a limit
     """Newton's method for u with N of the start, factorised again `renewals` times at most; poses and H there. Status.
 
     Stops when |Phi|, measured or extrapolated from the convergence rate, is below u_tol^(3/2) or rounding. H is
@@ -207,6 +208,7 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
             evaluate_rows(graph, system, f, f.rows, t)
         else:
             evaluate_residuals(graph, system, f, t)
+        add_rate_residuals(graph, f, l, x)
         worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE
@@ -214,7 +216,7 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
         # Solved, or as close as rounding allows
         if worst <= goal or (slow and worst <= ROUNDING_AT_MOST * floor):
             if not with_H:
-                _add_rows(graph, system, f, t)
+                _add_rows(graph, system, f, l, t, x)
             elif sweep == 0:
                 w.counters.at_rounding += 1
             else:
@@ -226,7 +228,7 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
             if renewals < 0:
                 return NEWTON_FAILED
             if not with_H:
-                _add_rows(graph, system, f, t)
+                _add_rows(graph, system, f, l, t, x)
             l.state.factored = 0
         elif before < math.inf:
             # The first sweep with new factors measures the curvature |Phi| / |Phi before|^2, later sweeps measure the
@@ -250,9 +252,10 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
 
 
 @long_kernel
-def _add_rows(graph, system, f, t):
+def _add_rows(graph, system, f, l, t, x):
     """H where only Phi was evaluated: seldom needed, so not inlined."""
     evaluate_rows(graph, system, f, f.rows, t)
+    add_rate_residuals(graph, f, l, x)
 
 
 @kernel

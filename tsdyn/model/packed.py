@@ -613,6 +613,17 @@ def member_of(packed, constraint):
     return known.members.get(id(constraint))
 
 
+def has_rates(scene):
+    """Whether any constraint of a scene, or of a `Packed`, has rows on velocities."""
+    return any(constraint.rate_rows for constraint in scene.constraints)
+
+
+def of_rates(packed):
+    """Which rows of Phi are rows on velocities, bool (m,)."""
+    counts = [count for constraint in packed.constraints for count in (constraint.rows, constraint.rate_rows)]
+    return np.repeat(np.arange(len(counts)) % 2 == 1, counts)
+
+
 def classes(packed):
     """The classes of constraints, in the order of System.kinds."""
     return list(dict.fromkeys(type(constraint) for constraint in packed.constraints))

@@ -26,13 +26,10 @@ from ..plugins import (
     Vector,
     dot,
     floats,
-    inverse_root,
     kernel,
     not_negative,
-    product,
     scaled,
     shown,
-    square,
 )
 
 if TYPE_CHECKING:
@@ -196,26 +193,51 @@ def support(x, par):
 def contact_series(x, par, k, s, out):
     """Coefficient k of Eq. (5), out[0]; rows of e_j, z, d, z_j, s^2, 1 / s, c_j.
 
-    The third axis of a thin disc is left out; a plane of the ground has constant directions.
+    The third axis of a thin disc is left out, and what is for a plane that moves where it is the ground's.
     """
+    count = axes(par)
     for i in range(9):
         s[i, k] = x[E + i]
     for i in range(3):
         s[9 + i, k], s[12 + i, k] = x[Z + i], x[i] - x[P + i]
         out[0, i], out[0, P + i], out[0, Z + i] = x[Z + i], -x[Z + i], x[i] - x[P + i]
-    s[18, k] = 0.0
-    for j in range(axes(par)):
+    for j in range(count):
         s[15 + j, k] = dot_plane(s, 3 * j, 9, k, par)
-        s[18, k] += par[j] * square(s[15 + j], k)
-    s[19, k] = inverse_root(s[18], s[19], k)
-    for j in range(axes(par)):
-        s[20 + j, k] = -par[j] * product(s[15 + j], s[19], k)
+    expand(par, count, k, s)
+    for j in range(count):
         e = E + 3 * j
         out[0, e], out[0, e + 1], out[0, e + 2] = scaled_plane(s, 9, 20 + j, k, par)
-        f0, f1, f2 = scaled(s, 3 * j, 20 + j, k)
-        out[0, Z] += f0
-        out[0, Z + 1] += f1
-        out[0, Z + 2] += f2
+        if moves(par):
+            f0, f1, f2 = scaled(s, 3 * j, 20 + j, k)
+            out[0, Z] += f0
+            out[0, Z + 1] += f1
+            out[0, Z + 2] += f2
+
+
+@kernel
+def expand(par, count, k, s):
+    """Coefficients k of s^2, 1 / s and c_j, Eqs. (2) and (3), in one loop: their sums don't wait for each other."""
+    z, y, x, q, v = s[15], s[16], s[17], s[18], s[19]
+    zz, yy, xx, qv, zv, yv, xv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for l in range(1, k):
+        u = v[k - l]
+        zz += z[l] * z[k - l]
+        yy += y[l] * y[k - l]
+        qv += (0.5 * l - k) * q[l] * u
+        zv += z[l] * u
+        yv += y[l] * u
+        if count == 3:
+            xx += x[l] * x[k - l]
+            xv += x[l] * u
+    ends = 2.0 if k > 0 else 1.0
+    q[k] = par[0] * (ends * z[0] * z[k] + zz) + par[1] * (ends * y[0] * y[k] + yy)
+    q[k] += par[2] * (ends * x[0] * x[k] + xx) if count == 3 else 0.0
+    v[k] = (qv - 0.5 * k * q[k] * v[0]) / (k * q[0]) if k > 0 else 1.0 / np.sqrt(q[0])
+    u = v[0] if k > 0 else 0.0
+    s[20, k] = -par[0] * (z[0] * v[k] + z[k] * u + zv)
+    s[21, k] = -par[1] * (y[0] * v[k] + y[k] * u + yv)
+    if count == 3:
+        s[22, k] = -par[2] * (x[0] * v[k] + x[k] * u + xv)
 
 
 @kernel

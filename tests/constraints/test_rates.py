@@ -496,14 +496,6 @@ def test_a_motion_that_is_not_steady_is_not_linearised():
         sleigh().linearise()
 
 
-@pytest.mark.parametrize("form", ["null-space", "maggi-kane"])
-def test_forms_without_equations_for_them_say_so(form):
-    scene = sleigh()
-    ts.simulate(scene, (0.0, 0.1), integrator="sdirk54")  # what one form has checked is no leave for another
-    with pytest.raises(ts.InvalidConstraint, match=r"'edge'.*rows on velocities"):
-        ts.simulate(scene, (0.0, 0.1), formulation=form)
-
-
 def test_it_is_the_motion_of_reduced_equations():
     """The springy skate in motion, against its planar equations by another integrator."""
     scene = springy()

@@ -91,7 +91,9 @@ class SceneStructure:
     def _rods(self):
         """Which parts hold two points at a distance: the difference of displacements rotates them."""
         kept = [self.packed.constraints[i] for i in self.parts[: self.constraints]]
-        return np.flatnonzero([part.rows == 1 and all(m.code == POINT for m in part.markers) for part in kept])
+        return np.flatnonzero(
+            [part.rows == part.all_rows == 1 and all(m.code == POINT for m in part.markers) for part in kept]
+        )
 
     def stiffness(self, pairs, own):
         """Numbers of the sum of blocks of pairs (e, 12, 12) and of bodies (b, 6, 6), for `blocks`."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..drawing import aligned
 from ..errors import InvalidArgument, TsdynError
-from .parser import print_json
+from .parser import load_document, load_run, load_scene, print_json, robot_options
 from .run import (
     SOLUTIONS,
     add_channels,
@@ -18,7 +18,6 @@ from .run import (
     demand_new,
     write,
 )
-from .scene_file import load_document, load_run, load_scene, robot_options
 
 SCENES = (".toml",)
 
@@ -58,7 +57,7 @@ def _check(parsed):
     All mistakes of the file are listed with line and column; then the start is compared with the constraints. The exit
     code is 0 only if a run could begin.
     """
-    from ..simulation.simulate import demand_startable
+    from ..simulation.prepared_run import demand_startable
 
     found = {"file": parsed.scene, "ok": True, "mistakes": [], "message": "It can start."}
     try:
@@ -107,7 +106,7 @@ def _info(parsed):
         return 0
     print(f"{parsed.scene}: {scene!r}")
     _print_table("bodies", [(body.name, type(body).__name__, f"{body.mass:g} kg") for body in scene.bodies])
-    items = [(item.name, type(item).__name__, f"{item.rows} rows") for item in scene._added]
+    items = [(item.name, type(item).__name__, f"{item.all_rows} rows") for item in scene._added]
     _print_table("constraints", items)
     _print_table("forces", [(force.name, force._kind(), "") for force in scene.forces])
     if parsed.parameters:
@@ -131,7 +130,7 @@ def _facts(scene, mobility, why, given):
     units = parameters.units
     return {
         "bodies": [{"name": body.name, "type": type(body).__name__, "mass": float(body.mass)} for body in scene.bodies],
-        "constraints": [{"name": it.name, "type": type(it).__name__, "rows": it.rows} for it in scene._added],
+        "constraints": [{"name": it.name, "type": type(it).__name__, "rows": it.all_rows} for it in scene._added],
         "forces": [{"name": force.name, "type": force._kind()} for force in scene.forces],
         "coordinates": mobility.coordinates,
         "rows": mobility.rows,

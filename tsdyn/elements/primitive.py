@@ -183,7 +183,7 @@ class Primitive(Attachment):
         names = self.quantities()
         moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
         if self.rate_rows:
-            return self._drifts() or (moves and self.rows > 0 and hasattr(self, "phi_t"))
+            return self._drifts() or (moves and self.rows > 0 and getattr(self, "phi_t", None) is not None)
         return moves and "phi_t" in self.kernels
 
     def _drifts(self):
@@ -193,11 +193,9 @@ class Primitive(Attachment):
             return True
         out, par = np.zeros(self.rate_rows), np.array([*given, *[0.0] * self.memory]) + rng.uniform(0.1, 1.0)
         for _ in range(3):
-            x = [rng.normal(size=marker.size) for marker in self.markers]  # directions of unit length
-            x = [
-                part if m.code == POINT else part / np.linalg.norm(part)
-                for m, part in zip(self.markers, x, strict=True)
-            ]
+            x = [rng.normal(size=marker.size) for marker in self.markers]
+            for part, marker in zip(x, self.markers, strict=True):  # directions of unit length
+                part /= 1.0 if marker.code == POINT else np.linalg.norm(part)
             x = np.concatenate(x)
             with np.errstate(all="ignore"):
                 twin(self.rate)(x, np.zeros(x.size), par, rng.uniform(0.1, 2.0), out)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..elements.bodies import rotation_matrix
+from ..elements.markers import POINT
 from ..jit.kernels import twin
-from .diagnostics import marker_jets, starts_of
+from ..model.packed import index_of
 
 
 def touching(packed, member, q):
@@ -32,6 +34,13 @@ def singular_place(packed, q):
 
 
 def _markers(packed, i, q):
-    """Coordinates (len(x), k) of the markers of a primitive along positions q (k, n)."""
-    jets = marker_jets(starts_of(packed), packed.constraints[i], packed.coordinates[i], q, q, q)
-    return np.array([np.broadcast_to(c.x, len(q)) for place in jets for c in place])
+    """Coordinates (len(x), k) of the markers of a primitive, Points and Vectors, along positions q (k, n)."""
+    part, found = packed.constraints[i], []
+    for marker, s in zip(part.markers, packed.coordinates[i], strict=True):
+        body, x = part.body_of(marker), np.broadcast_to(s, (len(q), 3))
+        if body.dimension:
+            at = packed.system.bodies[index_of(packed, body), 0]
+            x = rotation_matrix(q[:, at + 3 : at + 7]) @ s if body.dimension == 7 else x
+            x = x + q[:, at : at + 3] if marker.code == POINT else x
+        found.append(x)
+    return np.concatenate(found, axis=1).T

@@ -103,7 +103,7 @@ def of_scene(scene, method, form, far, rough):
 def of_constraint(kind, moving, series=True, far=False, second=(), grounded=False):
     """The loops over constraints of a class.
 
-    moving: whether one of them depends on time; second: derivatives; grounded: whether all are contacts with the ground.
+    moving: whether one of them depends on time; second: derivatives; grounded: whether all touch the ground.
     """
     names = ["phi", "jacobian", "gamma", *["phi_t"] * moving, *["remember"] * bool(kind.memory)]
     if not kind.normalises:

@@ -1,6 +1,6 @@
 """Cost of a step: the general machinery against the same mathematics written by hand for the sliding top.
 
-Runs of both are interleaved in one process; quote the ratio. Steps of series follow, of a coin that rolls beside the top,
+Runs of both are interleaved in one process; quote the ratio. Steps of series follow, of a rolling coin beside the top,
 then the phases of a step by `ts.profile`, for the top and for a chain. Run it: python -m benchmarks.step_cost
 """
 

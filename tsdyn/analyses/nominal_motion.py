@@ -27,7 +27,7 @@ from ..model.equations import (
     with_short_rows,
 )
 from ..model.laws import interrupts_answered
-from ..model.packed import no_system, with_curvatures, with_force_jacobians
+from ..model.packed import no_system, of_rates, with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..rows.constraint_graph import REDUCED, are_unequal, coordinate_scales
@@ -206,7 +206,7 @@ class NominalMotion:
         self.system.reals[self.system.memory] = memory
         self.Phi, rows, self.Phi_t, gamma = constraint_arrays(self.system, q, qd, self.t, WIDTH)
         self.Phi_q = as_csr(packed, rows)
-        self._on_rates = np.array([i >= one.rows for one in packed.constraints for i in range(one.all_rows)], bool)
+        self._on_rates = of_rates(packed)
         self.kept = np.setdiff1d(np.arange(len(self.Phi)), self._redundant())
         self.rates = self.kept[self._on_rates[self.kept]]
         self.H, self.M = self.Phi_q[self.kept], mass_matrix_sparse(self.system, q)

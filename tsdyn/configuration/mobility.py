@@ -15,6 +15,7 @@ from ..errors import InvalidArgument, RedundantConstraints
 from ..jit.interrupts import CollectionsDeferred
 from ..maths.matrix_rank import farthest_first, rank_of, singular_values, unit_rows
 from ..maths.tolerances import RANK_TOL
+from ..model.packed import has_rates, of_rates
 from ..rows.constraint_graph import coordinate_scales
 from ..validation import counted, finite_vector, number
 from .continuation import close
@@ -357,7 +358,7 @@ def mobility_at(scene, q, t):
 
 def _of_positions(packed, q, t, free):
     """Degrees of freedom of positions; `free` are those of velocities."""
-    if not any(constraint.rate_rows for constraint in packed.constraints):
+    if not has_rates(packed):
         return free
     metric = Metric(packed, None, t, lengths=True)
     rows, A = _core(metric, q, None)
@@ -399,7 +400,7 @@ def _groups(packed, metric, rows):
     """Return the indices of `rows`, one array for each constraint; those on velocities come last."""
     count = len(packed.members)
     owner = np.repeat(np.arange(count), [member.constraint.all_rows for member in packed.members])
-    owner += count * np.array([i >= part.rows for part in packed.constraints for i in range(part.all_rows)], int)
+    owner += count * of_rates(packed)
     whose = owner[metric.own[rows]] if len(rows) else np.zeros(0, int)
     return [np.flatnonzero(whose == member) for member in np.unique(whose)]
 

@@ -28,8 +28,11 @@ from ..plugins import (
     floats,
     kernel,
     not_negative,
+    quotient,
+    root,
     scaled,
     shown,
+    square,
 )
 
 if TYPE_CHECKING:
@@ -78,6 +81,7 @@ class SmoothContact(Primitive):
         Vector("b", "normal_b"),
     )
     slots = 23
+    normal = "normal_b"
 
     def __init__(
         self,
@@ -149,6 +153,18 @@ class SmoothContact(Primitive):
     def series(x, par, k, s, out):
         """Of Eq. (5)."""
         contact_series(x, par, k, s, out)
+
+    @staticmethod
+    def arm_series(n, par, k, s, out):
+        """Of Eq. (3), c_j - R z_j; rows of z_j, s^2, s, z_j / s."""
+        s[3, k] = out[2] = 0.0
+        for j in range(axes(par)):
+            s[j, k] = n[j]
+            s[3, k] += par[j] * square(s[j], k)
+        s[4, k] = root(s[3], s[4], k)
+        for j in range(axes(par)):
+            s[5 + j, k] = quotient(s[j], s[4], s[5 + j], k)
+            out[j] = -par[j] * s[5 + j, k] - par[3] * n[j]
 
     @staticmethod
     def contact(x, par):

@@ -138,7 +138,7 @@ class RollingContact(SmoothContact):
             s[23 + i, k], s[26 + i, k] = t, u
             out[1, i], out[1, P + i], out[2, i], out[2, P + i] = t, -t, u, -u
         for j in range(axes(par)):
-            s[29 + j, k] = s[20 + j, k] - par[3] * s[15 + j, k]
+            s[29 + j, k] = s[19 + j, k] - par[3] * s[15 + j, k]
             e = E + 3 * j
             out[1, e], out[1, e + 1], out[1, e + 2] = scaled_plane(s, 23, 29 + j, k, par)
             out[2, e], out[2, e + 1], out[2, e + 2] = scaled_plane(s, 26, 29 + j, k, par)

@@ -28,11 +28,8 @@ from ..plugins import (
     floats,
     kernel,
     not_negative,
-    quotient,
-    root,
     scaled,
     shown,
-    square,
 )
 
 if TYPE_CHECKING:
@@ -80,7 +77,7 @@ class SmoothContact(Primitive):
         Point("b"),
         Vector("b", "normal_b"),
     )
-    slots = 23
+    slots = 22
     normal = "normal_b"
 
     def __init__(
@@ -156,15 +153,14 @@ class SmoothContact(Primitive):
 
     @staticmethod
     def arm_series(n, par, k, s, out):
-        """Of Eq. (3), c_j - R z_j; rows of z_j, s^2, s, z_j / s."""
-        s[3, k] = out[2] = 0.0
-        for j in range(axes(par)):
-            s[j, k] = n[j]
-            s[3, k] += par[j] * square(s[j], k)
-        s[4, k] = root(s[3], s[4], k)
-        for j in range(axes(par)):
-            s[5 + j, k] = quotient(s[j], s[4], s[5 + j], k)
-            out[j] = -par[j] * s[5 + j, k] - par[3] * n[j]
+        """Of Eq. (3), c_j - R z_j; rows of `expand`."""
+        count = axes(par)
+        out[2] = 0.0
+        for j in range(count):
+            s[15 + j, k] = n[j]
+        expand(par, count, k, s)
+        for j in range(count):
+            out[j] = s[19 + j, k] - par[3] * n[j]
 
     @staticmethod
     def contact(x, par):
@@ -207,7 +203,7 @@ def support(x, par):
 
 @kernel
 def contact_series(x, par, k, s, out):
-    """Coefficient k of Eq. (5), out[0]; rows of e_j, z, d, z_j, s^2, 1 / s, c_j.
+    """Coefficient k of Eq. (5), out[0]; rows of e_j, z, d, z_j, s, c_j.
 
     The third axis of a thin disc is left out, and what is for a plane that moves where it is the ground's.
     """
@@ -222,9 +218,9 @@ def contact_series(x, par, k, s, out):
     expand(par, count, k, s)
     for j in range(count):
         e = E + 3 * j
-        out[0, e], out[0, e + 1], out[0, e + 2] = scaled_plane(s, 9, 20 + j, k, par)
+        out[0, e], out[0, e + 1], out[0, e + 2] = scaled_plane(s, 9, 19 + j, k, par)
         if moves(par):
-            f0, f1, f2 = scaled(s, 3 * j, 20 + j, k)
+            f0, f1, f2 = scaled(s, 3 * j, 19 + j, k)
             out[0, Z] += f0
             out[0, Z + 1] += f1
             out[0, Z + 2] += f2
@@ -232,28 +228,33 @@ def contact_series(x, par, k, s, out):
 
 @kernel
 def expand(par, count, k, s):
-    """Coefficients k of s^2, 1 / s and c_j, Eqs. (2) and (3), in one loop: their sums don't wait for each other."""
-    z, y, x, q, v = s[15], s[16], s[17], s[18], s[19]
-    zz, yy, xx, qv, zv, yv, xv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    """Coefficients k of s and c_j, Eqs. (2) and (3), in one loop: their sums don't wait for each other."""
+    x, y, z, r = s[15], s[16], s[17], s[18]
+    xx, yy, zz, rr, xr, yr, zr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for l in range(1, k):
-        u = v[k - l]
-        zz += z[l] * z[k - l]
+        u = r[k - l]
+        xx += x[l] * x[k - l]
         yy += y[l] * y[k - l]
-        qv += (0.5 * l - k) * q[l] * u
-        zv += z[l] * u
-        yv += y[l] * u
+        rr += r[l] * u
+        xr += s[19, l] * u
+        yr += s[20, l] * u
         if count == 3:
-            xx += x[l] * x[k - l]
-            xv += x[l] * u
+            zz += z[l] * z[k - l]
+            zr += s[21, l] * u
     ends = 2.0 if k > 0 else 1.0
-    q[k] = par[0] * (ends * z[0] * z[k] + zz) + par[1] * (ends * y[0] * y[k] + yy)
-    q[k] += par[2] * (ends * x[0] * x[k] + xx) if count == 3 else 0.0
-    v[k] = (qv - 0.5 * k * q[k] * v[0]) / (k * q[0]) if k > 0 else 1.0 / np.sqrt(q[0])
-    u = v[0] if k > 0 else 0.0
-    s[20, k] = -par[0] * (z[0] * v[k] + z[k] * u + zv)
-    s[21, k] = -par[1] * (y[0] * v[k] + y[k] * u + yv)
-    if count == 3:
-        s[22, k] = -par[2] * (x[0] * v[k] + x[k] * u + xv)
+    square = par[0] * (ends * x[0] * x[k] + xx) + par[1] * (ends * y[0] * y[k] + yy)
+    square += par[2] * (ends * z[0] * z[k] + zz) if count == 3 else 0.0
+    if k == 0:
+        r[0] = np.sqrt(square)
+    else:
+        # 2 s_0 s_k + rr = square,  c_0 s_k + c_k s_0 + xr = -a^2 z_k
+        r[k] = 0.5 * (square - rr) / r[0]
+        xr += s[19, 0] * r[k]
+        yr += s[20, 0] * r[k]
+        zr += s[21, 0] * r[k]
+    s[19, k] = -(par[0] * x[k] + xr) / r[0]
+    s[20, k] = -(par[1] * y[k] + yr) / r[0]
+    s[21, k] = -(par[2] * z[k] + zr) / r[0] if count == 3 else 0.0
 
 
 @kernel

@@ -20,7 +20,7 @@ from .template import MARKERS, NORMAL, OWNERS, ROWS, SLOTS, extent, kernel_arm_s
 
 def is_ground_contact(kind, masks):
     """Whether all instances of a class, with these masks, are contacts of bodies that turn with the ground."""
-    on_ground = masks >> (GROUND + kind.normal_at - 1) & 1 == 1  # the point: a body may move and never turn
+    on_ground = masks >> (GROUND + kind.normal_at - 1) & 1 == 1  # of a Point: a body that never turns may move
     return "contact_rows" in kind.kernels and bool((on_ground & (masks >> UNTURNED & 1 == 0)).all())
 
 

@@ -47,6 +47,7 @@ def main():
         print(f"spin {start:g} rad/s, after 5 s {spin(solution)[-1]:.3f} rad/s")
         if start < 0.0:
             check(solution)
+            print(solution)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import tsdyn as ts
-from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, NEAR, ROUNDING
+from tests.helpers.tolerances import ALGEBRA, CLOSE, COARSE, EPS, FINE, HELD, NEAR, ROUNDING
 from tsdyn.plugins import Motion
 from tsdyn.runs import driver
 
@@ -126,6 +126,29 @@ def test_methods_keep_their_order(make, order, steps):
     assert np.log2(errors[0] / errors[1]) > order - 0.4
 
 
+@pytest.mark.slow_but("trapezoid")
+@pytest.mark.parametrize(
+    ("method", "order"),
+    [(ts.integrators.ImplicitTrapezoid, 1.9), (ts.integrators.Radau, 4.8), (ts.integrators.Nystrom4, 3.8)],
+    ids=["trapezoid", "radau", "nystrom4"],
+)
+def test_what_steps_leave_does_not_gather(method, order):
+    """A sleigh that is light about its centroid turns far: velocities along the row drift from step to step no more."""
+
+    def run(integrator, **options):
+        scene = ts.Scene(gravity=(1.0, 0.3, -9.81))
+        body = scene.add_body(1.0, (0.1, 0.1, 1e-3), velocity=(0.2, 0.3, 0), angular_velocity=(0, 0, 1), name="sleigh")
+        scene.add(C.PlaneContact(body, scene.ground, normal_b=(0, 0, 1)))
+        scene.add(C.Parallel(body, scene.ground, **FLAT))
+        scene.add(C.KnifeEdge(body, scene.ground, point_a=(-0.3, 0, 0), **EDGE))
+        return ts.simulate(scene, (0.0, 3.0), integrator=integrator, **options).raise_if_failed().q[-1]
+
+    right = run("taylor", rtol=1e-13, atol=1e-13)
+    errors = [np.abs(run(method(step=step)) - right).max() for step in (0.04, 0.02)]
+    assert errors[1] < COARSE
+    assert np.log2(errors[0] / errors[1]) > order
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", [ts.integrators.Taylor(), ts.integrators.Nystrom4(step=1e-3)], ids=["taylor", "n4"])
 def test_rounding_does_not_grow(method):
@@ -167,6 +190,8 @@ def train(count):
             scene.add(C.Dot2(before, skate, axis_a=(1, 0, 0), point_a=(-0.5, 0, 0), point_b=(0.5, 0, 0)))
             scene.add(C.Dot2(before, skate, axis_a=(0, 1, 0), point_a=(-0.5, 0, 0), point_b=(0.5, 0, 0)))
         before = skate
+    scene["skate 0"].angular_velocity = (0, 0, 1.0)
+    scene.assemble()
     return scene
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from benchmarks import mechanisms, ours, peers
+from benchmarks import mechanisms, ours, peers, rolling
 from benchmarks.by_hand import contenders as by_hand
 from benchmarks.contender import Contender, Outcome, rotation
 from benchmarks.measure import Measured, Row, measure
@@ -26,6 +26,12 @@ def error(contender, name, value):
     scene = SCENES[name]
     reference = scene.reference()
     return contender.prepare(scene)(value).error(reference.r[-1], reference.A[-1])
+
+
+def test_rolling_ends_where_the_closed_forms_say():
+    """By each program that is installed, to what its middle setting allows."""
+    for _, program, _, values, run, exact in rolling.contenders():
+        assert np.linalg.norm(run(values[1])[1] - exact) < (1e-9 if program == "tsdyn" else 0.01)
 
 
 @pytest.mark.parametrize("links", [4, 16])

@@ -134,6 +134,10 @@ class StepEngine:
         given = method, form, self.step, self.interpolant
         _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=self.within))
         run.numbers.free_stages = free = form.frees_stages and interval == 0
+        # Rates of chart coordinates keep what a step leaves of them along rows on velocities, and positions follow it:
+        # where it isn't taken off, a chart lasts for one step
+        drifts = form.basis_free and not free and self.graph.rates.size > 0
+        run.numbers.chart_interval = interval or int(drifts)
         memory.context.chart.state.turn_limit = TURN_FREE if free else TURN_LIMIT
         place, accelerate = form.stage_kernels(free)
         run.kernels.stage_place, run.kernels.stage_accelerate = place.address, accelerate.address

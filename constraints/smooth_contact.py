@@ -79,7 +79,6 @@ class SmoothContact(Primitive):
         Vector("b", "normal_b"),
     )
     slots = 22
-    chooses = True
     normal = "normal_b"
 
     def __init__(

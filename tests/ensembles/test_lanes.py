@@ -167,14 +167,6 @@ def redundant():
     return scene
 
 
-def coin():
-    scene = ts.Scene()
-    body = scene.add_body(1.0, (0.07, 0.12, 0.06), position=(0, 0, 0.5), name="coin")
-    contact = {"axis_a": (0, 1, 0), "radius": 0.5, "normal_b": (0, 0, 1)}
-    scene.add(ts.constraints.RollingDisc(body, scene.ground, **contact, name="coin"))
-    return scene
-
-
 REFUSED = {
     "lanes must be one of 1, 4, got 3": (spring, {"lanes": 3}),
     "lanes must be one of 1, 4, got True": (spring, {"lanes": True}),
@@ -192,7 +184,6 @@ REFUSED = {
     ),
     "wind is a function of time": (pushed, {}),
     "some rows are redundant": (redundant, {}),
-    "'coin' contact has kernels that choose by its parameters": (coin, {"parameters": {"coin.mass": uniform()}}),
 }  # fmt: skip
 
 

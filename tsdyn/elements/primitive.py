@@ -123,7 +123,6 @@ class Primitive(Attachment):
     memory = 0
     normal = ""
     normal_at = -1  # among the markers
-    chooses = False  # whether its kernels choose by par, which they can't of several cases at once
     normalises = False  # whether it does no more than keep the length of p
     prescribed: str | tuple[str, ...] = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind

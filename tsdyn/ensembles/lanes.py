@@ -333,7 +333,6 @@ def _of_scene(arena):
     if not study.has_arena or arena.pen is None:
         return "the parameters are not all numbers that cases can share arrays for (docs/ensembles.md)"
     found += [f"{each.name} depends on time" for each in packed.constraints if each.rheonomic]
-    found += [f"{each.name} has kernels that choose by its parameters" for each in packed.constraints if each.chooses]
     for force_load in packed.loads:
         force = force_load.force
         if any(isinstance(value, Signal) for value in force_load.parameters):

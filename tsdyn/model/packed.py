@@ -100,6 +100,7 @@ class Derived:
     holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
     loads: dict = None  # reactions.loads_of
     row_parts: list = field(default_factory=list)  # idle: observables.row_parts.taken
+    with_singular_places: list = None  # indices of primitives: contacts.singular_place
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts
     engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine
@@ -518,7 +519,7 @@ def _segments(primitives, where):
     found = []
     for constraint in primitives:
         spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
-        found += [[*spans[0], *spans[1]]] * constraint.rows
+        found += [[*spans[0], *spans[1]]] * constraint.all_rows
     return found
 
 
@@ -530,7 +531,7 @@ def _pack_constraints(parameters, n, where, table, reals):
     groups, row = {}, 0
     for constraint in parameters:
         groups.setdefault(type(constraint), []).append((constraint, row))
-        row += constraint.rows
+        row += constraint.all_rows
     kinds, motions, kept = [], [], {}
     for kind, members in groups.items():
         first = len(table), len(reals)
@@ -587,7 +588,7 @@ def _append_programs(motions, reals):
 def _members(constraints):
     part = row = 0
     for constraint in constraints:
-        parts, rows = slice(part, part + len(constraint.parts)), slice(row, row + constraint.rows)
+        parts, rows = slice(part, part + len(constraint.parts)), slice(row, row + constraint.all_rows)
         yield Member(constraint, constraint.coordinates, parts, rows)
         part, row = parts.stop, rows.stop
 
@@ -606,10 +607,21 @@ def member_of(packed, constraint):
     if known.members is None:
         found, row = {}, 0
         for i, part in enumerate(packed.constraints):
-            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + part.rows))
-            row += part.rows
+            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + part.all_rows))
+            row += part.all_rows
         known.members = found | {id(member.constraint): member for member in packed.members}
     return known.members.get(id(constraint))
+
+
+def has_rates(scene):
+    """Whether any constraint of a scene, or of a `Packed`, has rows on velocities."""
+    return any(constraint.rate_rows for constraint in scene.constraints)
+
+
+def of_rates(packed):
+    """Which rows of Phi are rows on velocities, bool (m,)."""
+    counts = [count for constraint in packed.constraints for count in (constraint.rows, constraint.rate_rows)]
+    return np.repeat(np.arange(len(counts)) % 2 == 1, counts)
 
 
 def classes(packed):

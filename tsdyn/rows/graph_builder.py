@@ -195,7 +195,7 @@ class _GraphBuilder:
             elif i not in omitted:
                 pair = tuple(self.bodies.get(id(body), self.nb) for body in (constraint.a, constraint.b))
                 self.joints.append(_Joint(constraint, pair, row))
-            row += constraint.rows
+            row += constraint.all_rows
 
     def _find_nodes(self):
         """The nodes, how many rows each has, and of every joint its node and its first row within."""
@@ -205,7 +205,7 @@ class _GraphBuilder:
             if node == len(self.sizes):
                 self.sizes.append(0)
             self.inside.append((node, self.sizes[node]))
-            self.sizes[node] += constraint.rows
+            self.sizes[node] += constraint.all_rows
 
     def _cut_hubs(self):
         """Parts of hubs, and the cliques: nodes that meet at a body or a part. Frictions couple a hub's rows whole."""
@@ -239,8 +239,8 @@ class _GraphBuilder:
         self.sides, self.places = np.full((m, 2), self.nb, np.int64), np.full(m, -1, np.int64)
         self.at_body, self.at_node = [[] for _ in range(self.nb)], [[] for _ in self.nodes]
         for i, (constraint, pair, row) in enumerate(self.joints):
-            e = np.arange(self.firsts[i], self.firsts[i] + constraint.rows)
-            self.sides[e], self.places[e] = pair, np.arange(row, row + constraint.rows)
+            e = np.arange(self.firsts[i], self.firsts[i] + constraint.all_rows)
+            self.sides[e], self.places[e] = pair, np.arange(row, row + constraint.all_rows)
             self.at_node[self.inside[i][0]].append(i)
             for side, body in enumerate(pair):
                 if body < self.nb and body not in self.hubs:
@@ -256,7 +256,7 @@ class _GraphBuilder:
         target, stride, _ = self.where(node, other_node)
         left, right = 16 * self.firsts[i] + 8 * side, 16 * self.firsts[j] + 8 * other
         return (
-            left, self.joints[i].constraint.rows, right, self.joints[j].constraint.rows,
+            left, self.joints[i].constraint.all_rows, right, self.joints[j].constraint.all_rows,
             target + r * stride + c, stride,
         )  # fmt: skip
 
@@ -289,7 +289,7 @@ class _GraphBuilder:
                     target, stride, after = self.where(node, weld)
                     to, kind = (target + r, WELD_ROWS) if after else (target + r * stride, ROWS_WELD)
                     left = 16 * self.firsts[i] + 8 * side
-                    products.append((left, self.joints[i].constraint.rows, 0, count, to, stride, kind, part.body))
+                    products.append((left, self.joints[i].constraint.all_rows, 0, count, to, stride, kind, part.body))
                     scales.append(sign * part.scale)
                 for other, other_sign in part.welds:
                     # Welds with welds
@@ -322,7 +322,7 @@ class _GraphBuilder:
             )
             for i, held in enumerate(self.held)
         ]
-        counts = [joint.constraint.rows for joint in self.joints]
+        counts = [joint.constraint.all_rows for joint in self.joints]
         axes = axes_of(shares, self.lean, counts, self.inside, self.starts, self.where)
         self.sides[axes.rows["row"], 0] = axes.rows["body"]
         return axes
@@ -363,8 +363,14 @@ class _GraphBuilder:
         """ConstraintGraph.turns."""
         turns = np.zeros(len(self.places))
         for (constraint, _, _), first in zip(self.joints, self.firsts, strict=True):
-            turns[first : first + constraint.rows] = not has_lengths(constraint)
+            turns[first : first + constraint.all_rows] = not has_lengths(constraint)
         return turns if is_small(self.packed.size) and turns.any() else np.zeros(0)
+
+    def _rates(self):
+        """ConstraintGraph.rates."""
+        pairs = zip(self.joints, self.firsts, strict=True)
+        found = [range(first + joint.constraint.rows, first + joint.constraint.all_rows) for joint, first in pairs]
+        return np.array(sorted(i for rows in found for i in rows), np.int64)
 
     def graph(self):
         """The `ConstraintGraph`, and the classes of its kinds."""
@@ -376,7 +382,7 @@ class _GraphBuilder:
 
         def rows_of(part):
             first = self.firsts[index[id(part)]]
-            return range(first, first + part.rows)
+            return range(first, first + part.all_rows)
 
         frictions, friction_rows = frictions_of(self.packed, self.bodies, rows_of, self.sides)
         graph = ConstraintGraph(
@@ -391,6 +397,7 @@ class _GraphBuilder:
             spins=spins,
             pattern=with_kernels(self.pattern),
             turns=self._turns(),
+            rates=self._rates(),
             normals=self.normals,
             parts=parts,
             scales=scales,

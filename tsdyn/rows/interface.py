@@ -17,6 +17,7 @@ from .evaluation import (
     solve_series,
 )
 from .redundant_rows import (
+    clear_rates,
     clear_redundant,
     keep_every_row,
     list_redundant,
@@ -190,6 +191,7 @@ def redundancy(graph):
 #     constrain_accelerations the same with axis rows, for Z = W F and c = gamma
 #     balance_loads           lam = S^-1 H W F, F <- F - H^T lam
 #     take_reactions          F <- F - H^T lam
+#     clear_rates             b <- 0 at rows on velocities, which hold nothing in place
 #     solve_series            the same for one order of a Taylor series
 #     solve_friction_series   the same with joint friction, by N~ of accelerations.py
 # Ask:
@@ -217,6 +219,7 @@ __all__ = [
     "allocate_tangent",
     "apply_multipliers",
     "balance_loads",
+    "clear_rates",
     "clear_redundant",
     "constrain",
     "constrain_accelerations",

@@ -21,6 +21,26 @@ def clear_redundant(f, b):
 
 
 @kernel
+def clear_rates(graph, b):
+    """Zero the entries of rows on velocities: they hold nothing in place."""
+    for i in range(graph.rates.size):
+        b[graph.rates[i]] = 0.0
+
+
+@kernel
+def is_rate(graph, e):
+    """Whether a row is one on velocities; their places are in ascending order."""
+    low, high = 0, graph.rates.size
+    while low < high:
+        middle = (low + high) // 2
+        if graph.rates[middle] < e:
+            low = middle + 1
+        else:
+            high = middle
+    return low < graph.rates.size and graph.rates[low] == e
+
+
+@kernel
 def keep_redundant(f, b, kept):
     """Zero the right-hand sides of redundant rows, after storing them in `kept`, one of `RedundantRows`."""
     if kept.size > 0:

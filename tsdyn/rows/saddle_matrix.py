@@ -304,13 +304,13 @@ class _SaddleBuilder:
             kind = kinds[type(constraint)]
             i = taken[type(constraint)] = taken.get(type(constraint), -1) + 1
             e = self.row_of.get(row)
-            row += constraint.rows
+            row += constraint.all_rows
             if constraint.normalises or e is None:
                 continue
             pair = tuple(self._body(b) for b in self.graph.sides[e])
             own, reals = self._places(kind.table + CONSTRAINT_INTS * i), kind.reals + kind.stride * i
             loops = kind.stiffness, kind.jacobian
-            found.append((pair, (1, kind.stride, SPAN, *loops, reals, *own, 0, e, constraint.rows)))
+            found.append((pair, (1, kind.stride, SPAN, *loops, reals, *own, 0, e, constraint.all_rows)))
         return found
 
     def _instance(self, pair, values):

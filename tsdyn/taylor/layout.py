@@ -355,7 +355,12 @@ def _instances(packed, graph, places):
 def _sources(part, body, number, series, reals, orders):
     """Rows of Expansion.sources of the markers that a primitive has on a body."""
     return [
-        [series + force_at(j, len(part.markers), part.rows, orders), reals + 3 * j, int(marker.code == POINT), number]
+        [
+            series + force_at(j, len(part.markers), part.all_rows, orders),
+            reals + 3 * j,
+            int(marker.code == POINT),
+            number,
+        ]
         for j, marker in enumerate(part.markers)
         if part.body_of(marker) is body
     ]
@@ -473,7 +478,7 @@ def allocate_expansion(graph, kinds, packed, highest):
         varies = bool((masks & ((1 << GROUND) - 1)).any())
         driven = bool(graph.kinds[i].drift)
         slots = kind.slots + (len(kind.quantities()) if driven else 0)
-        width = instance_width(len(kind.markers), kind.rows, slots, orders, varies, driven)
+        width = instance_width(len(kind.markers), kind.all_rows, slots, orders, varies, driven)
         loop = address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint)
         rows.append([count, graph.kinds[i].stride, width, orders, loop, total])
         total += count * width
@@ -500,7 +505,7 @@ def _motions(graph, packed, orders, places, constraints):
     motions, rows = iter(packed.system.motions), []
     for i, (kind, members) in enumerate(instances(packed, graph)):
         for at, (_, given) in enumerate(members if graph.kinds[i].drift != 0 else ()):
-            first = places[i].values + at * places[i].width + scratch_at(len(kind.markers), kind.rows, orders, True)
+            first = places[i].values + at * places[i].width + scratch_at(len(kind.markers), kind.all_rows, orders, True)
             entry = 0
             for j in range(len(kind.quantities())):
                 row = first + (kind.slots + j) * orders
@@ -557,7 +562,7 @@ def _mask(kind, series, par, grounded, motion):
     varies = np.zeros(len(motion[0]), bool)
     # A random motion shows which columns have coefficients beyond order zero
     for k, x in enumerate(motion):
-        out = np.zeros((kind.rows, len(x)))
+        out = np.zeros((kind.all_rows, len(x)))
         series(x, par, k, scratch, out)
         if k > 0:
             varies |= out.any(axis=0)

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..plugins import Vector, across, shown
-from .smooth_contact import E, P, SmoothContact, Z, along, axes, contact_series, dot_plane, scaled_plane, support
+from ..plugins import Vector, across, dot, scaled, shown
+from .smooth_contact import E, P, SmoothContact, Z, along, axes, contact_series, moves, scaled_plane, support
 
 T, U = 18, 21  # where t_1 and t_2 begin in x
 
@@ -138,15 +138,16 @@ class RollingContact(SmoothContact):
             s[23 + i, k], s[26 + i, k] = t, u
             out[1, i], out[1, P + i], out[2, i], out[2, P + i] = t, -t, u, -u
         for j in range(axes(par)):
-            s[29 + j, k] = s[20 + j, k] - par[3] * s[15 + j, k]
+            s[29 + j, k] = s[19 + j, k] - par[3] * s[15 + j, k]
             e = E + 3 * j
             out[1, e], out[1, e + 1], out[1, e + 2] = scaled_plane(s, 23, 29 + j, k, par)
             out[2, e], out[2, e + 1], out[2, e + 2] = scaled_plane(s, 26, 29 + j, k, par)
-        for i in range(3):
-            s[32 + i, k] = out[0, Z + i] - par[3] * s[9 + i, k]
-        s[35, k], s[36, k] = -dot_plane(s, 32, 23, k, par), -dot_plane(s, 32, 26, k, par)
-        out[1, U], out[1, U + 1], out[1, U + 2] = scaled_plane(s, 23, 36, k, par)
-        out[2, T], out[2, T + 1], out[2, T + 2] = scaled_plane(s, 26, 35, k, par)
+        if moves(par):
+            for i in range(3):
+                s[32 + i, k] = out[0, Z + i] - par[3] * s[9 + i, k]
+            s[35, k], s[36, k] = -dot(s, 32, 23, k), -dot(s, 32, 26, k)
+            out[1, U], out[1, U + 1], out[1, U + 2] = scaled(s, 23, 36, k)
+            out[2, T], out[2, T + 1], out[2, T + 2] = scaled(s, 26, 35, k)
 
 
 class Rolls:

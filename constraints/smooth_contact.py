@@ -26,13 +26,10 @@ from ..plugins import (
     Vector,
     dot,
     floats,
-    inverse_root,
     kernel,
     not_negative,
-    product,
     scaled,
     shown,
-    square,
 )
 
 if TYPE_CHECKING:
@@ -80,7 +77,8 @@ class SmoothContact(Primitive):
         Point("b"),
         Vector("b", "normal_b"),
     )
-    slots = 23
+    slots = 22
+    normal = "normal_b"
 
     def __init__(
         self,
@@ -154,6 +152,17 @@ class SmoothContact(Primitive):
         contact_series(x, par, k, s, out)
 
     @staticmethod
+    def arm_series(n, par, k, s, out):
+        """Of Eq. (3), c_j - R z_j; rows of `expand`."""
+        count = axes(par)
+        out[2] = 0.0
+        for j in range(count):
+            s[15 + j, k] = n[j]
+        expand(par, count, k, s)
+        for j in range(count):
+            out[j] = s[19 + j, k] - par[3] * n[j]
+
+    @staticmethod
     def contact(x, par):
         """Contact point and normal, (3, k) each, of marker coordinates x (len(x), k)."""
         s, point = support(x, par), x[:3] - par[3] * x[Z : Z + 3]
@@ -194,28 +203,58 @@ def support(x, par):
 
 @kernel
 def contact_series(x, par, k, s, out):
-    """Coefficient k of Eq. (5), out[0]; rows of e_j, z, d, z_j, s^2, 1 / s, c_j.
+    """Coefficient k of Eq. (5), out[0]; rows of e_j, z, d, z_j, s, c_j.
 
-    The third axis of a thin disc is left out; a plane of the ground has constant directions.
+    The third axis of a thin disc is left out, and what is for a plane that moves where it is the ground's.
     """
+    count = axes(par)
     for i in range(9):
         s[i, k] = x[E + i]
     for i in range(3):
         s[9 + i, k], s[12 + i, k] = x[Z + i], x[i] - x[P + i]
         out[0, i], out[0, P + i], out[0, Z + i] = x[Z + i], -x[Z + i], x[i] - x[P + i]
-    s[18, k] = 0.0
-    for j in range(axes(par)):
+    for j in range(count):
         s[15 + j, k] = dot_plane(s, 3 * j, 9, k, par)
-        s[18, k] += par[j] * square(s[15 + j], k)
-    s[19, k] = inverse_root(s[18], s[19], k)
-    for j in range(axes(par)):
-        s[20 + j, k] = -par[j] * product(s[15 + j], s[19], k)
+    expand(par, count, k, s)
+    for j in range(count):
         e = E + 3 * j
-        out[0, e], out[0, e + 1], out[0, e + 2] = scaled_plane(s, 9, 20 + j, k, par)
-        f0, f1, f2 = scaled(s, 3 * j, 20 + j, k)
-        out[0, Z] += f0
-        out[0, Z + 1] += f1
-        out[0, Z + 2] += f2
+        out[0, e], out[0, e + 1], out[0, e + 2] = scaled_plane(s, 9, 19 + j, k, par)
+        if moves(par):
+            f0, f1, f2 = scaled(s, 3 * j, 19 + j, k)
+            out[0, Z] += f0
+            out[0, Z + 1] += f1
+            out[0, Z + 2] += f2
+
+
+@kernel
+def expand(par, count, k, s):
+    """Coefficients k of s and c_j, Eqs. (2) and (3), in one loop: their sums don't wait for each other."""
+    x, y, z, r = s[15], s[16], s[17], s[18]
+    xx, yy, zz, rr, xr, yr, zr = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for l in range(1, k):
+        u = r[k - l]
+        xx += x[l] * x[k - l]
+        yy += y[l] * y[k - l]
+        rr += r[l] * u
+        xr += s[19, l] * u
+        yr += s[20, l] * u
+        if count == 3:
+            zz += z[l] * z[k - l]
+            zr += s[21, l] * u
+    ends = 2.0 if k > 0 else 1.0
+    square = par[0] * (ends * x[0] * x[k] + xx) + par[1] * (ends * y[0] * y[k] + yy)
+    square += par[2] * (ends * z[0] * z[k] + zz) if count == 3 else 0.0
+    if k == 0:
+        r[0] = np.sqrt(square)
+    else:
+        # 2 s_0 s_k + rr = square,  c_0 s_k + c_k s_0 + xr = -a^2 z_k
+        r[k] = 0.5 * (square - rr) / r[0]
+        xr += s[19, 0] * r[k]
+        yr += s[20, 0] * r[k]
+        zr += s[21, 0] * r[k]
+    s[19, k] = -(par[0] * x[k] + xr) / r[0]
+    s[20, k] = -(par[1] * y[k] + yr) / r[0]
+    s[21, k] = -(par[2] * z[k] + zr) / r[0] if count == 3 else 0.0
 
 
 @kernel

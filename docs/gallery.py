@@ -144,10 +144,10 @@ SECTIONS = {
         Entry(
             "bicycle",
             "The Whipple bicycle balances itself",
-            10.0,
+            3.0,
             "lean (rad)",
             lambda m, s: m.lean(s),
-            (0.0, 0.03, 0.06),
+            (0.0, 0.15),
         ),
         Entry(
             "coin",

@@ -82,6 +82,7 @@ def main():
     """Push it, let it ride for 10 s, and print eigenvalues."""
     solution = ts.simulate(build(), (0.0, 10.0)).raise_if_failed()
     check(solution)
+    print(solution)
     for speed in (4.0, 5.0, 6.0):
         print(f"{speed:g} m/s", eigenvalues(speed).round(9))
     print(f"leans by {np.abs(lean(solution)).max():.3f} rad at most, by {abs(lean(solution)[-1]):.1e} at the end")

@@ -57,6 +57,7 @@ def main():
     """One steady turn."""
     solution = ts.simulate(build(), (0.0, 2.0 * np.pi / 2.5))
     check(solution)
+    print(solution)
     path = solution.contact_point("contact")
     print(f"circle of {np.ptp(path[:, 0]):.4f} m, friction {solution.friction_demand('contact').max():.4f}")
     print(f"upright rolling is stable above {LIMIT:.4f} rad/s")

@@ -50,6 +50,7 @@ def main():
     """One turn of the ball."""
     solution = ts.simulate(build(), (0.0, np.pi))
     check(solution)
+    print(solution)
     print("ball after one of its turns", solution.position("ball")[-1].round(9))
     print(f"friction that it needs {solution.friction_demand('contact').max():.6f}")
 

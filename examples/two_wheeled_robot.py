@@ -30,29 +30,25 @@ def build():
 
 
 def seen(state):
-    """Angles of the wheels against the body, its pitch, and their rates: (6,)."""
-    forward = state.rotation("body")[:, 0]
-    pitch = np.arcsin(-forward[2])
+    """Angles of the wheels against the body, its pitch, the wheels' rates and the speed forward: (6,)."""
+    ahead = state.rotation("body")[:, 0]
+    pitch, level = np.arcsin(-ahead[2]), ahead[:2] / np.hypot(*ahead[:2])
     angles, rates = [state.angle(hub) for hub in HUBS], [state.angle_rate(hub) for hub in HUBS]
-    return np.array([*angles, pitch, *rates, state.angular_velocity("body")[1]])
+    return np.array([*angles, pitch, *rates, state.velocity("body")[:2] @ level])
 
 
 def regulator():
-    """Gains (2, 6)."""
-    linear = build().linearise(inputs=HUBS)
-    kept = [linear.coordinates.index(name) for name in ("left hub.angle", "right hub.angle", "body.rotation y")]
-    A, B, *_ = linear.state_space()
-    j = len(linear.coordinates)
-    rows, W = [*kept, *range(j, len(A))], linear.W[kept]  # rates of what is kept, by the independent ones
-    A, B = A[np.ix_(rows, rows)], B[rows]
-    A, B = np.block([[A[:3, :3], A[:3, 3:]], [W @ A[3:, :3], W @ A[3:, 3:]]]), np.concatenate((B[:3], W @ B[3:]))
-    A[:, 3:] = A[:, 3:] @ np.linalg.inv(W)
+    """Gains (2, 6). Of the six coordinates three suffice: where it stands and its heading follow from the wheels."""
+    A, B, *_, states, _, _ = build().linearise(inputs=HUBS).state_space()
+    rates = "left hub.angle rate", "right hub.angle rate", "body.x rate"
+    kept = [states.index(name) for name in ("left hub.angle", "right hub.angle", "body.rotation y", *rates)]
+    A, B = A[np.ix_(kept, kept)], B[kept]
     P = solve_continuous_are(A, B, COST, EFFORT)
     return np.linalg.solve(EFFORT, B.T @ P)
 
 
 def controlled(lean=0.25):
-    """The robot with its regulator, at a lean, rad, and turned by half a turn of one wheel from where it is to stand."""
+    """The robot with its regulator, at rest at a lean, rad."""
     gains, scene = regulator(), build()
     body = scene["body"]
     body.position = (HEIGHT * np.sin(lean), 0, RADIUS + HEIGHT * np.cos(lean))
@@ -73,6 +69,7 @@ def main():
     """Ten seconds."""
     solution = ts.simulate(controlled(), (0.0, 10.0), t_eval=np.linspace(0, 10, 501))
     check(solution)
+    print(solution)
     torque = solution.actuation("controller")
     print(f"upright by torques of {np.abs(torque).max():.2f} N m at most")
     print(f"friction that the tyres need: {solution.friction_demand('left tyre').max():.3f}")

@@ -105,7 +105,7 @@ def of_constraint(kind, moving, series=True, far=False, second=()):
     names = ["phi", "jacobian", "gamma", *["phi_t"] * moving, *["remember"] * bool(kind.memory)]
     if not kind.normalises:
         names += ["reduced", "values", "bias", *["drift"] * moving]
-        names += ["far_" * far + "driven_" * moving + "series"] * series
+        names += ["far_" * far + "driven_" * moving + "series", "contact_rows", "contact_series"] * series
     names += second
     return [kind.kernels[name] for name in names if name in kind.kernels]
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import tsdyn as ts
-from examples import bicycle
+from examples import bicycle, two_wheeled_robot
 from tsdyn.rows.graph_builder import build
 from tsdyn.rows.interface import allocate_tangent
 
@@ -108,6 +108,20 @@ def test_snakeboard():
     found = solve_ivp(rate, (0, 10), (start, 0, 0, 0), "DOP853", solution.t, rtol=1e-13, atol=1e-13).y
     np.testing.assert_allclose(solution.position("board")[:, :2], found[2:].T, atol=1e-9)
     assert np.linalg.norm(found[2:, -1]) > 0.5  # it has gone somewhere
+
+
+def test_two_wheels_on_one_axle():
+    """Of two rows across the path one is redundant, and one is not: a push from the side moves nothing."""
+    scene = two_wheeled_robot.build()
+    assert (scene.mobility().degrees_of_freedom, len(scene.mobility().redundant)) == (3, 1)
+    assert len(scene.linearise().rates) == 3
+    place = scene["body"].position
+    scene.add(ts.forces.PointForce(scene["body"], point_a=(0, 0, -two_wheeled_robot.HEIGHT), force=(0, 5.0, 0)))
+    solution = ts.simulate(scene, (0.0, 1.0)).raise_if_failed()
+    np.testing.assert_allclose(solution.position("body"), np.tile(place, (solution.t.size, 1)), atol=1e-14)
+    assert not solution.reaction_unique("left tyre").any()
+    total = sum(solution.reaction(name)[0] for name in ("left tyre", "right tyre"))
+    np.testing.assert_allclose(total, np.tile((0, -5.0, 9.81 * 9.6), (solution.t.size, 1)), atol=1e-11)
 
 
 def test_bicycle():

@@ -8,6 +8,7 @@ A primitive works on marker coordinates x (3-vectors in the ground frame) and ne
     phi_t(x, par, t, out)        out[rows]          Phi_t; only for a primitive that depends on time
     series(x, par, k, s, out)    out[rows, len(x)]  optional: coefficient k of Phi_x, zero on entry; see recurrences.py
     series_t(x, par, k, s, out)  out[rows]          and of Phi_t, where it has what is `prescribed`; after `series`
+    arm_series(n, par, k, s, out)  out[3]           optional: coefficient k of the arm of a contact, see below
     remember(x, par, t)          optional, with memory = 1: what the last of par is after each accepted step
 
 Rows on velocities, A(x, t) xd + b(x, t) = 0, follow the rows on positions; a primitive may have either or both:
@@ -15,6 +16,11 @@ Rows on velocities, A(x, t) xd + b(x, t) = 0, follow the rows on positions; a pr
     rate(x, xd, par, t, out)        out[rate_rows]          A xd + b, linear in xd
     rate_jacobian(x, par, t, out)   out[rate_rows, len(x)]  A, zero on entry
     rate_gamma(x, xd, par, t, out)  out[rate_rows]          (A xd)_x xd + A_t xd + b_x xd + b_t
+
+A contact has rows along directions of b: derivatives of rows, and rows on velocities, are the velocities of a's
+material point at the contact along them. Its arm, from the first marker, a Point of a, follows from the normal n, both
+in components along the next three markers, Vectors of a. On the ground `arm_series` serves in place of `series`, in
+less time.
 
 `series` is of Phi_x and, below it, A; `series_t` of Phi_t and b. To the solver a row on velocities is a row of Phi that
 is zero everywhere, with A for Phi_x, b for Phi_t and rate_gamma for gamma (loops/rate_rows.py).
@@ -38,7 +44,7 @@ from ..errors import InvalidConstraint
 from ..jit.kernels import Callback, specialised, twin
 from ..motions.prescribed import Motion
 from .element import Attachment, check_slots, inlined, layout, static_kernel
-from .loops import constraint_hessians, constraint_rows, constraint_series, coordinate_rows, rate_rows
+from .loops import constraint_hessians, constraint_rows, constraint_series, coordinate_rows, ground_contacts, rate_rows
 from .markers import PARAMETERS, POINT, TURN, Marker
 
 if TYPE_CHECKING:
@@ -49,7 +55,7 @@ if TYPE_CHECKING:
 _registry = {}
 _KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of arguments
 _RATE_KERNELS = {"rate": 5, "rate_jacobian": 4, "rate_gamma": 5}
-_OPTIONAL = {"phi_t": 4, "series": 5, "series_t": 5, "remember": 3}
+_OPTIONAL = {"phi_t": 4, "series": 5, "series_t": 5, "arm_series": 5, "remember": 3}
 
 
 class Primitive(Attachment):
@@ -71,6 +77,9 @@ class Primitive(Attachment):
     prescribed : str or tuple of str, optional
         The attributes that are numbers or Motions, where nothing else makes it depend on time. With `series_t` they
         come first in `parameters()`, and their series are the rows of scratch memory from `slots` on.
+    normal : str, optional
+        Of a contact with `arm_series`: the marker of b that its first row is along, after a Point of the plane; other
+        rows are along the markers after it.
     memory : int
         1 for a primitive that keeps a number from step to step, the last of par: an angle that counts turns.
     a, b : Body or ground
@@ -112,6 +121,8 @@ class Primitive(Attachment):
     all_rows = 0  # both
     slots = 0
     memory = 0
+    normal = ""
+    normal_at = -1  # among the markers
     normalises = False  # whether it does no more than keep the length of p
     prescribed: str | tuple[str, ...] = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
@@ -223,6 +234,8 @@ _LOOPS = {  # name: template, whose kernel it is cached with, signature
     "bias": (constraint_rows.bias, "gamma", constraint_rows.SIGNATURE),
     "series": (constraint_series.series, "series", constraint_series.SIGNATURE),
     "far_series": (constraint_series.series, "series", constraint_series.SIGNATURE),
+    "contact_rows": (ground_contacts.reduced, "arm_series", constraint_rows.SIGNATURE),
+    "contact_series": (ground_contacts.series, "arm_series", constraint_series.SIGNATURE),
     "driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
     "far_driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
 }
@@ -235,6 +248,8 @@ def _compile(cls, functions):
     except InvalidConstraint as error:
         raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
     constants = {"ROWS": cls.all_rows, "RATES_FROM": cls.rows, "kernel_drift": rate_rows.nothing}
+    places = [marker.argument for marker in cls.markers]
+    constants["NORMAL"] = cls.normal_at = places.index(cls.normal) if cls.normal else -1
     constants |= layout(cls.markers) | inner
     if cls.rate_rows:
         # One kernel of both sorts of rows in place of each

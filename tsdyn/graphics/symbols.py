@@ -420,23 +420,28 @@ def _ellipsoid(each, axes, size):
     return _surface(each, "sphere", axes, size, marks)
 
 
+def _floor(each, r):
+    """The plane of a body; that of the ground is left to the grid."""
+    return [] if each.b < 0 else _plane(each, r)[:1]
+
+
 def _rolling_disc(each, r):
     """With a spoke from the centre to the rim, on both sides."""
     tyre, whole = each.item.tyre_radius, each.item.radius + each.item.tyre_radius
     thick = max(2.0 * tyre, THIN * whole)
     spoke = ("box", np.array([0.5 * whole, 0, 0]), (whole, MARK * whole, 1.5 * thick))
     return [
-        _plane(each, r)[0],
+        *_floor(each, r),
         *_surface(each, "cylinder", along(each.places["axis_a"]), (whole, whole, thick), [spoke]),
     ]
 
 
 def _rolling_ball(each, r):
-    return [_plane(each, r)[0], *_ellipsoid(each, np.eye(3), (each.item.radius,) * 3)]
+    return [*_floor(each, r), *_ellipsoid(each, np.eye(3), (each.item.radius,) * 3)]
 
 
 def _rolling_ellipsoid(each, r):
-    return [_plane(each, r)[0], *_ellipsoid(each, each.item.axes_a.T, each.item.semi_axes)]
+    return [*_floor(each, r), *_ellipsoid(each, each.item.axes_a.T, each.item.semi_axes)]
 
 
 def _ball_on_cylinder(each, r):

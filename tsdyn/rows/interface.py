@@ -23,6 +23,7 @@ from .redundant_rows import (
     list_redundant,
     mark_redundant,
     note_selection,
+    rates_hold_along,
     restore_selection,
     return_to_selection,
     save_selection,
@@ -195,7 +196,7 @@ def redundancy(graph):
 #     solve_series            the same for one order of a Taylor series
 #     solve_friction_series   the same with joint friction, by N~ of accelerations.py
 # Ask:
-#     redundant_rows_hold, rates_hold, accelerations_hold       of redundant rows
+#     redundant_rows_hold, rates_hold, accelerations_hold       of redundant rows; rates_hold_along a direction
 #     mark_redundant, self_stress                               of redundant rows
 #     singularity_indicator, is_near_singular, refinements      of the distance to a singular configuration
 #
@@ -257,6 +258,7 @@ __all__ = [
     "pivot_loss",
     "project",
     "rates_hold",
+    "rates_hold_along",
     "redundancy",
     "redundant_of",
     "redundant_rows_hold",

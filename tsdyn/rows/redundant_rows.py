@@ -10,6 +10,7 @@ from ..elements.loops.constraint_rows import POSE, R
 from ..jit.kernels import kernel
 from ..jit.simd import four, put, splat
 from ..maths.dense_linalg import copy
+from ..maths.tolerances import HALF_DIGITS
 from .tolerances import HELD
 
 
@@ -65,6 +66,22 @@ def leave_redundant_rows(graph, f, Phi, H):
             put(H, 16 * row + c, splat(0.0))
     f.selection.excess = worst
     clear_redundant(f, Phi)
+
+
+@kernel
+def rates_hold_along(graph, f, Z):
+    """Whether the redundant rows on velocities vanish for Z (b, 8), which the other rows admit."""
+    for i in range(f.dropped[0]):
+        row, total, terms = f.dropped[1 + i], 0.0, 0.0
+        for side in range(2):
+            b, at = graph.sides[row, side], 16 * i + 8 * side
+            for part in range(0, 8 if b < graph.bodies.shape[0] and is_rate(graph, row) else 0, 4):
+                for c in range(part, part + 3):
+                    total += f.redundant.H[at + c] * Z[8 * b + c]
+                terms += length(f.redundant.H, at + part) * length(Z, 8 * b + part)
+        if not abs(total) <= HALF_DIGITS * terms:
+            return False
+    return True
 
 
 @kernel

@@ -11,6 +11,7 @@ from ..elements.loops import force_series
 from ..elements.loops.constraint_rows import BODY, INTS, MASK, STILL
 from ..elements.loops.constraint_series import BODY_ROW, GROUND, UNTURNED, force_at, instance_width, scratch_at
 from ..elements.loops.friction import FRICTION_ROWS, REACTION
+from ..elements.loops.ground_contacts import is_ground_contact
 from ..elements.markers import POINT
 from ..errors import InvalidConstraint, InvalidForce
 from ..formulations.locked_orientations import instances
@@ -472,14 +473,15 @@ def allocate_expansion(graph, kinds, packed, highest):
     bodies.reshape(nb + 1, -1)[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
     rows, total = [], 0
     for i, kind in enumerate(kinds):
-        first, count = graph.kinds[i].table, int(graph.kinds[i].count)
+        count = int(graph.kinds[i].count)
         # Columns of Phi_x that vary in no instance need no series
-        masks = graph.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
+        masks = masks_of(graph, i)
         varies = bool((masks & ((1 << GROUND) - 1)).any())
         driven = bool(graph.kinds[i].drift)
         slots = kind.slots + (len(kind.quantities()) if driven else 0)
         width = instance_width(len(kind.markers), kind.all_rows, slots, orders, varies, driven)
-        loop = address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint)
+        name = "contact_series" if is_ground_contact(kind, masks) else loops[driven]
+        loop = address(kind.kernels, name, kind.__name__, InvalidConstraint)
         rows.append([count, graph.kinds[i].stride, width, orders, loop, total])
         total += count * width
     places = records(ConstraintSeries, rows)
@@ -547,6 +549,20 @@ def masks(graph, packed):
             entry[MASK] = mask | sum(int(size != 7) << (UNTURNED + j) for j, size in enumerate(length))
             constant += len(kind.markers) - (mask & ((1 << GROUND) - 1)).bit_count()
     return constant
+
+
+def masks_of(graph, i):
+    """Those of the instances of kind i."""
+    first, count = graph.kinds[i].table, int(graph.kinds[i].count)
+    return graph.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
+
+
+def with_ground_contacts(graph, kinds):
+    """The graph with the quicker loops of contacts with the ground, where all of a kind are."""
+    for i, kind in enumerate(kinds):
+        if is_ground_contact(kind, masks_of(graph, i)):
+            graph.kinds["reduced"][i] = address(kind.kernels, "contact_rows", kind.__name__, InvalidConstraint)
+    return graph
 
 
 def _random_motion(grounded):

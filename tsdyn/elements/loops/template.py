@@ -157,7 +157,8 @@ ALONG = -1  # where in x the direction ends that a force's frame follows, or -1:
 kernel_drift = kernel_rate = kernel_rate_jacobian = kernel_rate_gamma = kernel_phi_t = None
 kernel_phi = kernel_value = kernel_jacobian = kernel_gamma = kernel_series = kernel_series_t = None
 kernel_law = kernel_derivatives = kernel_remember = kernel_inputs = None
-kernel_normal_load = kernel_normal_series = None
+kernel_normal_load = kernel_normal_series = kernel_arm_series = None
+NORMAL = -1  # of a contact: the rows are along this marker and those after it
 
 # what the table of a kind holds for each instance: where its two bodies' coordinates begin, and how many they are
 AT, DIMENSION = 0, 2

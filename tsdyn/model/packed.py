@@ -383,7 +383,9 @@ class System(NamedTuple):
     reals: np.ndarray  # float64: for each instance marker coordinates, then parameters
     motions: np.ndarray  # (motions,) of tables.MotionPlace
     rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
-    segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
+    segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice; of a sum one span
+    sums: np.ndarray  # int64 (sums,): rows that several instances add to
+    tails: np.ndarray  # int64 (tails,): of every instance but the first of a sum, its row
     forces: np.ndarray  # (kinds,) of tables.ForceKind
     signals: np.ndarray  # (signals,) of tables.SignalPlace
     memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
@@ -404,6 +406,8 @@ def no_system():
         motions=records(MotionPlace),
         rheonomic=whole,
         segments=wholes,
+        sums=whole,
+        tails=whole,
         forces=records(ForceKind),
         signals=records(SignalPlace),
         memory=whole,
@@ -500,6 +504,8 @@ def pack(scene):
         motions=records(MotionPlace, [row for row, _ in motions]),
         rheonomic=np.array([any(constraint.rheonomic for constraint in primitives)], np.int64),
         segments=np.array(_segments(primitives, where), np.int64).reshape(-1, 4),
+        sums=np.array([row for part, row in first_rows(primitives) if part.summed and part.rows], np.int64),
+        tails=np.array([row for part, row in first_rows(primitives) if not part.rows], np.int64),
         forces=forces,
         signals=signals,
         memory=np.array([*memory, *kept.values()], np.int64),
@@ -514,12 +520,33 @@ def pack(scene):
 
 
 def _segments(primitives, where):
-    """The two spans of columns of each row of Phi_q that are not zero."""
+    """The two spans of columns of each row of Phi_q that are not zero; of a sum, one that covers all its bodies."""
     found = []
     for constraint in primitives:
         spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
-        found += [[*spans[0], *spans[1]]] * constraint.rows
+        if constraint.summed:
+            begin, length = found.pop()[:2] if not constraint.rows else (0, 0)
+            used = [span for span in (*spans, (begin, length)) if span[1]]
+            begin, end = min(at for at, _ in used), max(at + size for at, size in used)
+            spans = (begin, end - begin), (0, 0)
+        found += [[*spans[0], *spans[1]]] * (1 if constraint.summed else constraint.rows)
     return found
+
+
+def instances_of_kinds(packed):
+    """The primitives of each row of System.kinds, in its order."""
+    groups = {kind: [] for kind in classes(packed)}
+    for primitive in packed.constraints:
+        groups[type(primitive)].append(primitive)
+    return list(groups.values())
+
+
+def first_rows(primitives):
+    """Yield each primitive and the first of its rows; the terms of a sum have the same."""
+    row = 0
+    for primitive in primitives:
+        yield primitive, row if primitive.rows else row - 1
+        row += primitive.rows
 
 
 def _pack_constraints(parameters, n, where, table, reals):
@@ -527,10 +554,9 @@ def _pack_constraints(parameters, n, where, table, reals):
 
     Returns rows of System.kinds, of System.motions each with its Motion, and {constraint: place of what it remembers}.
     """
-    groups, row = {}, 0
-    for constraint in parameters:
+    groups = {}
+    for constraint, row in first_rows(parameters):
         groups.setdefault(type(constraint), []).append((constraint, row))
-        row += constraint.rows
     kinds, motions, kept = [], [], {}
     for kind, members in groups.items():
         first = len(table), len(reals)
@@ -540,7 +566,7 @@ def _pack_constraints(parameters, n, where, table, reals):
             _append_reals(constraint, parameters[constraint], reals, motions)
             if kind.memory:
                 kept[constraint] = len(reals)
-                reals.append(0.0)
+                reals.append(float(constraint.turn))
             if begin == first[1]:
                 stride = len(reals) - begin
             if len(reals) - begin != stride:
@@ -604,10 +630,9 @@ def member_of(packed, constraint):
     """The `Member` that a constraint, or a joint's part, is; None where it is not of that scene."""
     known = packed.derived
     if known.members is None:
-        found, row = {}, 0
-        for i, part in enumerate(packed.constraints):
-            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + part.rows))
-            row += part.rows
+        found = {}
+        for i, (part, row) in enumerate(first_rows(packed.constraints)):
+            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + max(part.rows, 1)))
         known.members = found | {id(member.constraint): member for member in packed.members}
     return known.members.get(id(constraint))
 

@@ -93,6 +93,8 @@ from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
 from .methods.interpolants import linear_second
 from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
 from .motions.expressions import Smooth
+from .motions.of_coordinates import ROWS as COORDINATE_SLOPE_ROWS
+from .motions.of_coordinates import CoordinateFunction, coordinate_function, functions_of, slope_series
 from .motions.prescribed import Motion
 from .motions.signals import Signal, numbers_of
 from .motions.tables import is_data
@@ -101,6 +103,7 @@ from .validation import finite, floats, label, not_negative, number, positive, s
 __all__ = [
     "AXIS",
     "BEARING_ROWS",
+    "COORDINATE_SLOPE_ROWS",
     "DOP853_INTERPOLANT",
     "PARALLEL",
     "STATE",
@@ -111,6 +114,7 @@ __all__ = [
     "ByState",
     "Collocation",
     "CollocationTableau",
+    "CoordinateFunction",
     "DiagonallyImplicit",
     "Displacement",
     "ExplicitNystrom",
@@ -141,6 +145,7 @@ __all__ = [
     "SceneLaw",
     "Signal",
     "Smooth",
+    "SumRow",
     "Turn",
     "Vector",
     "across",
@@ -160,6 +165,7 @@ __all__ = [
     "carried",
     "coefficient",
     "coefficient_series",
+    "coordinate_function",
     "cross",
     "direction_series",
     "displacements",
@@ -172,6 +178,7 @@ __all__ = [
     "finite",
     "fitting",
     "floats",
+    "functions_of",
     "given_series",
     "ground_point",
     "in_frame",
@@ -206,6 +213,7 @@ __all__ = [
     "slip",
     "slip_of",
     "slip_series",
+    "slope_series",
     "some",
     "specialised",
     "square",

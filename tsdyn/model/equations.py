@@ -22,7 +22,7 @@ from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
 from .handles import handles_of
 from .laws import demand_callable, interrupts_answered
-from .packed import instances_of_kinds, no_system
+from .packed import checked_motions, instances_of_kinds, no_system
 
 call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
 call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
@@ -337,7 +337,7 @@ def demand_compilable(item):
     """
     if not isinstance(item, Force):
         for part in item.parts:
-            for value in checked_parameters(part, Motion, "Motions"):
+            for value in checked_motions(part):
                 if isinstance(value, Motion):
                     value.addresses  # noqa: B018  compiled when asked for
         return

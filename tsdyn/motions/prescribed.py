@@ -161,7 +161,11 @@ class Motion:
     @staticmethod
     def numbers(given: Iterable[Motion | float]) -> list[float]:
         """Parameters as kernels receive them: value, rate and acceleration of a Motion at its origin."""
-        return [x for value in given for x in (value.value(value.origin) if isinstance(value, Motion) else (value,))]
+        return [
+            x
+            for value in given
+            for x in (value.value(value.origin) if isinstance(value, Motion) else getattr(value, "alone", (value,)))
+        ]
 
     @staticmethod
     def places(value: Motion | float) -> tuple[Motion | float, ...]:

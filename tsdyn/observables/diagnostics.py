@@ -16,6 +16,7 @@ from ..jit.kernels import twin
 from ..maths.power_series import Jet
 from ..model.kinematics import angular_velocity
 from ..model.packed import first_rows
+from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 
 if TYPE_CHECKING:
@@ -105,6 +106,10 @@ def _parameter(given, t, rate):
     """One parameter of some instances, (instances,) or one number for all, or Jets (k, instances) of Motions."""
     if isinstance(given[0], np.ndarray):  # memory of each
         return [np.transpose(given)]
+    if isinstance(given[0], CoordinateFunction):
+        if len(set(given)) > 1:
+            raise TypeError("functions are evaluated one by one")
+        return given[0].alone
     if not isinstance(given[0], Motion):
         same = all(value == given[0] for value in given)
         return [given[0] if same else np.array(given)]

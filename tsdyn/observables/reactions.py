@@ -12,6 +12,7 @@ import numpy as np
 from ..calls import fitting_methods
 from ..elements.bodies import rotation_matrix, transform_g
 from ..elements.force import Force
+from ..elements.joint import SumRow
 from ..elements.loops.constraint_rows import place_bodies, take_loads
 from ..elements.loops.coordinate_rows import BLOCK, INTS
 from ..elements.markers import POINT
@@ -420,7 +421,7 @@ def acted(packed, item, on):
         return item.on
     handles = handles_of(packed)
     on = handles.body(on) if isinstance(on, str) else handles.own(on)
-    if on is item.a or on is item.b or (isinstance(item, Force) and on in item.bodies):
+    if on is item.a or on is item.b or (isinstance(item, (Force, SumRow)) and on in item.bodies):
         if on.dimension:
             return on
         raise InvalidBody(f"{item.name}: the load on the ground is the opposite of the load on {item.on.name!r}.")

@@ -536,7 +536,7 @@ def masks(graph, packed):
                 isinstance(constraint.body_of(marker), Ground) or (size == STILL and marker.code != POINT)
                 for marker, size in zip(kind.markers, length, strict=True)
             )
-            key = grounded, tuple(Motion.numbers(par))
+            key = grounded, (*Motion.numbers(par), *[0.0] * kind.memory)
             if key not in patterns:
                 if grounded not in motions:
                     motions[grounded] = _random_motion(grounded)

@@ -56,6 +56,13 @@ def set_time(s, t):
 
 
 @kernel
+def recall(s, memory):
+    """Let forces and constraints have the memory (slots,) of an output; none where it is shorter."""
+    for i in range(s.memory.size if memory.size >= s.memory.size else 0):
+        s.reals[s.memory[i]] = memory[i]
+
+
+@kernel
 def hold_pieces(s, t):
     """Let piecewise motions and signals stay with their pieces at t, whatever time is set from now on."""
     for i in range(s.motions.shape[0]):

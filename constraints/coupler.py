@@ -1,7 +1,7 @@
 """Coupler: a joint coordinate that depends on those of other joints, on any bodies.
 
     q_0 = offset + ratio_1 q_1 + ratio_2 q_2 + ...          (1)  AngleTerm, DisplacementTerm
-    q_0 = offset + f_1(q_1) + f_2(q_2) + ...                (2)  AngleFunctionTerm, DisplacementFunctionTerm
+    q_0 = offset + f_1(q_1) + f_2(q_2) + ...                (2)  the same of functions
 
 One row, the sum of a term for each joint. Angles are counted over turns; a step must rotate each by less than half a
 turn. Never singular: the dependent coordinate stands alone.
@@ -9,7 +9,7 @@ turn. Never singular: the dependent coordinate stands alone.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,13 +28,11 @@ from ..plugins import (
     label,
     shown,
 )
-from .angle_function_term import AngleFunctionTerm
-from .angle_term import AngleTerm
-from .displacement_function_term import DisplacementFunctionTerm
-from .displacement_term import DisplacementTerm
+from .angle_term import AngleTerm, _AngleFunctionTerm
+from .displacement_term import DisplacementTerm, _DisplacementFunctionTerm
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, Data, Function, Joint
+    from ..hints import ArrayLike, Function, Joint, Prescribed
 
     JointCoordinate = Joint | tuple[Joint, str] | tuple[Joint, str, int]
 
@@ -96,10 +94,10 @@ class Coupler(SumRow):
         self,
         dependent: JointCoordinate,
         *independents: JointCoordinate,
-        ratio: float | ArrayLike | None = None,
+        ratio: ArrayLike | float | None = None,
         offset: float = 0.0,
         polynomial: ArrayLike | None = None,
-        function: Function | Data | None = None,
+        function: Prescribed | Function | None = None,
         name: str = "",
     ) -> None:
         name = label(name, "Coupler", InvalidConstraint)
@@ -119,6 +117,11 @@ class Coupler(SumRow):
     @property
     def _all(self):
         return (self.dependent, *self.independents)
+
+    @property
+    def referred(self) -> tuple[Any, ...]:
+        """Its bodies and joints."""
+        return (self.a, self.b, *(joint for joint, *_ in self._all))
 
     @property
     def ratios(self) -> list[float]:
@@ -199,22 +202,22 @@ class Coupler(SumRow):
         if kind == "angle":
             own, other, f, g, h = angles(joint)[index]
             near = np.ravel(joint.angle_near)
-            cls = AngleTerm if function is None else AngleFunctionTerm
+            cls = AngleTerm if function is None else _AngleFunctionTerm
             given["turn"] = float(near[index if near.size > 1 else 0])
             term = cls(own, other, reference_a=f, across_a=g, reference_b=h, **given)
             term.__dict__["counted"] = (joint, index)
             return term
         own, other, e, s_own, s_other = displacements(joint)[index]
-        cls = DisplacementTerm if function is None else DisplacementFunctionTerm
+        cls = DisplacementTerm if function is None else _DisplacementFunctionTerm
         return cls(own, other, axis_a=e, point_a=s_own, point_b=s_other, **given)
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random hinge and a random slide of two bodies, which it adds to the scene."""
+        """The two coordinates of a random cylindrical joint, which it adds to the scene."""
         from .cylindrical import Cylindrical
 
-        joints = [a.scene.add(Cylindrical(a, b, axis_a=u, axis_b=v)) for u, v in rng.normal(size=(2, 2, 3))]
-        return cls((joints[0], "angle"), (joints[1], "displacement"), ratio=rng.uniform(0.5, 2.0), offset=rng.normal())
+        joint = a.scene.add(Cylindrical(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3)))
+        return cls((joint, "angle"), (joint, "displacement"), ratio=rng.uniform(0.5, 2.0), offset=rng.normal())
 
 
 def _same(one, other):

@@ -180,10 +180,6 @@ class SumRow(Joint):
     scene. a and b are the bodies of the first term.
     """
 
-    def compose(self) -> Iterator[Primitive]:
-        """Yield the terms, one at least; new ones each time."""
-        raise InvalidConstraint("SumRow is the base of rows that are sums; use Coupler, or a subclass.")
-
     @cached_property
     def _composition(self):
         self.check()

@@ -469,7 +469,7 @@ def _found_again(process, *parts):
     for row, motion in zip(system.motions, values, strict=True):
         row.value, row.rate, row.acceleration = motion.addresses
     for function, begin, at in _functions(packed):
-        system.reals[at : at + PLACES] = function.places(begin, begin + int(system.reals[at + 1]))
+        system.reals[at : at + PLACES] = function.addresses(begin, begin + int(system.reals[at + 1]))
     return packed._replace(loads=find_forces(system, packed.loads))
 
 
@@ -496,7 +496,7 @@ def pack(scene):
     forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals, derived.handles)
     _append_programs(motions, reals)
     for function, begin, at in functions:
-        reals[at : at + PLACES] = function.places(begin, len(reals))
+        reals[at : at + PLACES] = function.addresses(begin, len(reals))
         reals += function.numbers()
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
@@ -602,8 +602,7 @@ def _append_reals(constraint, parameters, reals, motions, functions):
     for value in parameters:
         if isinstance(value, CoordinateFunction):
             functions.append((value, begin, len(reals)))
-            reals += [0.0] * PLACES
-            continue
+            value = 0.0  # its places are written when its program has one
         if isinstance(value, Motion):
             motions.append(([*value.addresses, len(reals), 0], value))
             reals += value.value(value.origin)
@@ -620,7 +619,7 @@ def _functions(packed):
             for value in given[id(part)]:
                 if isinstance(value, CoordinateFunction):
                     yield value, begin, at
-                at += PLACES if isinstance(value, CoordinateFunction) else 3 if isinstance(value, Motion) else 1
+                at += 3 if isinstance(value, Motion) else 1
 
 
 def _append_programs(motions, reals):

@@ -50,22 +50,17 @@ class CoordinateFunction:
     def __hash__(self) -> int:
         return id(self.smooth)
 
-    @classmethod
-    def example(cls, function: Function, scale: float) -> CoordinateFunction:
-        """`function(scale x)`, for tests."""
-        return cls(function(scale * time))
-
     @property
-    def alone(self) -> tuple[Any, ...]:
-        """Its PLACES among parameters of kernels that run as plain Python: itself and zeros."""
+    def places(self) -> tuple[Any, ...]:
+        """What it is among the parameters of a term: itself, and room for the other PLACES."""
         return (self, *[0.0] * (PLACES - 1))
 
     def numbers(self) -> list[float]:
         """The program of the function, then that of its slope along a series."""
         return [*self.smooth.program(), *(self.slope or ())]
 
-    def places(self, at: int, program: int) -> list[float]:
-        """Its PLACES among parameters that begin at `at`, both programs beginning at `program`; places in an array."""
+    def addresses(self, at: int, program: int) -> list[float]:
+        """The numbers in its PLACES; the parameters begin at `at` in an array, the programs at `program`."""
         slope = program + len(self.smooth.program())
         return [float(x) for x in (run_program.address, program - at, run_order.address, slope - at)]
 
@@ -102,6 +97,9 @@ def coordinate_function(par, at, x, order):
 @kernel
 def slope_series(par, at, s, first, k):
     """Coefficient k of the function's slope along the series in row `first` of s, whose last rows are scratch."""
+    for i in range(1, ROWS if k == 0 else 0):  # constants are written at order zero alone
+        for j in range(s.shape[1]):
+            s[first + i, j] = 0.0
     call_order(int(par[at + 2]), par[int(par[at + 3]) :], s[first:], ROWS, s.shape[1], k)
     return s[first + 1, k]
 
@@ -114,6 +112,8 @@ def _plain_function(par, at, x, order):
 
 def _plain_slope(par, at, s, first, k):
     """`slope_series` in Python."""
+    if k == 0:
+        s[first + 1 : first + ROWS] = 0.0
     twin(run_rows)(np.array(par[at].slope), s[first:], k)
     return s[first + 1, k]
 

@@ -161,11 +161,7 @@ class Motion:
     @staticmethod
     def numbers(given: Iterable[Motion | float]) -> list[float]:
         """Parameters as kernels receive them: value, rate and acceleration of a Motion at its origin."""
-        return [
-            x
-            for value in given
-            for x in (value.value(value.origin) if isinstance(value, Motion) else getattr(value, "alone", (value,)))
-        ]
+        return [x for value in given for x in (value.value(value.origin) if isinstance(value, Motion) else (value,))]
 
     @staticmethod
     def places(value: Motion | float) -> tuple[Motion | float, ...]:

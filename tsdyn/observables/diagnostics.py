@@ -106,10 +106,8 @@ def _parameter(given, t, rate):
     """One parameter of some instances, (instances,) or one number for all, or Jets (k, instances) of Motions."""
     if isinstance(given[0], np.ndarray):  # memory of each
         return [np.transpose(given)]
-    if isinstance(given[0], CoordinateFunction):
-        if len(set(given)) > 1:
-            raise TypeError("functions are evaluated one by one")
-        return given[0].alone
+    if isinstance(given[0], CoordinateFunction) and len(set(given)) > 1:
+        raise TypeError("functions are evaluated one by one")
     if not isinstance(given[0], Motion):
         same = all(value == given[0] for value in given)
         return [given[0] if same else np.array(given)]

@@ -290,15 +290,15 @@ def test_a_run_resumes_to_the_bit(tmp_path, monkeypatch):
     """Turns are state: a stored run that is interrupted after some turns goes on with them."""
     monkeypatch.setattr(driver, "FIRST_SLICE", 4)
     scene, hinge, *_ = cam(CAM["polynomial"], 40.0)
-    left = iter(range(6))
+    left = iter(range(2))
 
     def stop(fraction):
         if next(left, None) is None:
             raise KeyboardInterrupt
 
-    whole = ts.simulate(scene, (0.0, 2.0), integrator="dop853")
+    whole = ts.simulate(scene, (0.0, 6.0), integrator="dop853")
     part = ts.simulate(
-        scene, (0.0, 2.0), integrator="dop853", store=tmp_path / "part.zarr", checkpoint=0.0, progress=stop
+        scene, (0.0, 6.0), integrator="dop853", store=tmp_path / "part.zarr", checkpoint=0.0, progress=stop
     )
     assert not part.success
     assert abs(part.angle(hinge)[-1]) > 2 * np.pi

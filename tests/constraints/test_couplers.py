@@ -380,3 +380,15 @@ def test_coordinates_of_joints_with_several():
     one, other = ts.simulate(scene, (0.0, 0.5)).state.angle(arms)
     assert abs(one - other) < 1e-12
     assert abs(one) > 0.1
+
+
+@pytest.mark.parametrize(
+    "method", [ts.integrators.Taylor(step=0.05), ts.integrators.Nystrom4(step=0.05)], ids=["taylor", "nystrom4"]
+)
+def test_a_fixed_step_of_half_a_turn_ends_the_run(method):
+    """Its turns can't be counted: no run goes on with the wrong ones."""
+    scene, *_ = crossed(0.3, 0.0)
+    scene.body("one").angular_velocity, scene.body("two").angular_velocity = (0, 0, 70.0), (21.0, 0, 0)
+    solution = ts.simulate(scene, (0.0, 1.0), integrator=method)
+    assert not solution.success
+    assert "smaller step" in solution.message

@@ -151,11 +151,12 @@ def test_a_dropped_row_is_one_on_velocities():
 @pytest.mark.parametrize("method", ["SDIRK54", "ImplicitTrapezoid"])
 def test_implicit_methods_are_refused_in_the_null_space_form(method):
     integrator = getattr(I, method)(1e-6, 1e-6)
-    refuse(
-        lambda: ts.simulate(skates.skate(), (0, 1), integrator=integrator, formulation="null-space"),
-        ts.InvalidArgument,
-        (method, "rows on velocities", "null-space", "formulation='tangent'"),
-    )
+    options = {"integrator": integrator, "formulation": "null-space"}
+    for run in (
+        lambda: ts.simulate(skates.skate(), (0, 1), **options),
+        lambda: ts.ensemble(skates.skate(), {"skate.mass": [1.0, 2.0]}, (0, 1), **options),
+    ):
+        refuse(run, ts.InvalidArgument, (method, "rows on velocities", "null-space", "formulation='tangent'"))
 
 
 def test_series_against_differences():

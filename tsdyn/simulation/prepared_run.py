@@ -54,7 +54,22 @@ def first_method(options, prepared):
     if method is None:
         series = options.may_use_series and not prepared.refusal and prepared.pays
         method = adaptive(Taylor if series else DOP853, options.rtol, options.atol)
+    _demand_served(method, options.form, prepared)
     return method if options.max_step is None else frozen(method.bounded(options.max_step))
+
+
+def _demand_served(method, form, prepared):
+    """Refuse a method that doesn't solve for the stages of such a scene."""
+    if method.implicit and form.is_mixed(has_rates(prepared.packed)):
+        raise InvalidArgument(
+            f"{type(method).__name__} doesn't solve for its stages in the null-space form where there are rows on "
+            "velocities: use formulation='tangent', which does, or an explicit method."
+        )
+    if method.coupled and prepared.rough:
+        raise InvalidArgument(
+            f"{type(method).__name__} doesn't solve for reactions that friction depends on "
+            f"({', '.join(prepared.rough)}): SDIRK54 does, as do all explicit methods."
+        )
 
 
 def reason(options, prepared):
@@ -164,16 +179,6 @@ class Run:
         self._start = scene._initial()
         self.method = method = first_method(options, kept)
         self._driver = DRIVERS.get(method.driver, method.driver)
-        if method.implicit and self._form.is_mixed(has_rates(kept.packed)):
-            raise InvalidArgument(
-                f"{type(method).__name__} doesn't solve for its stages in the null-space form where there are rows on "
-                "velocities: use formulation='tangent', which does, or an explicit method."
-            )
-        if method.coupled and kept.rough:
-            raise InvalidArgument(
-                f"{type(method).__name__} doesn't solve for reactions that friction depends on "
-                f"({', '.join(kept.rough)}): SDIRK54 does, as do all explicit methods."
-            )
 
     @fitting
     @documented(*OF_CALL)

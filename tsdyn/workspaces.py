@@ -79,7 +79,7 @@ class ChartWorkspace(NamedTuple):
     x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
     y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
     rows0: Rows  # H0, Y0, S0: the rows at q0; chart_validity.set_base_point
-    X: np.ndarray  # (m * 16,)  C Y0; chart_matrix.factorise_chart_matrix
+    X: np.ndarray  # (pairs * 16,)  C Y0; chart_matrix.factorise_chart_matrix
     lower: np.ndarray  # factors of N = H C Y0; chart_matrix.factorise_chart_matrix
     upper: np.ndarray
     drift: np.ndarray  # (m,)  Phi_t
@@ -93,7 +93,7 @@ def allocate_chart(graph):
     base[4::8] = 1.0
     return ChartWorkspace(
         base, zeros(4 * (nb + 1)), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)),
-        allocate_rows(graph), zeros(16 * m), *lu_factors(graph.pattern), zeros(m), ChartState(),
+        allocate_rows(graph), zeros(16 * len(graph.sides)), *lu_factors(graph.pattern), zeros(m), ChartState(),
     )  # fmt: skip
 
 

@@ -80,6 +80,8 @@ class Primitive(Attachment):
     normal : str, optional
         Of a contact with `arm_series`: the marker of b that its first row is along, after a Point of the plane; other
         rows are along the markers after it.
+    summed : bool
+        Whether an instance may be a term of a row that several instances add up to, each on two bodies: see `SumRow`.
     memory : int
         1 for a primitive that keeps a number from step to step, the last of par: an angle that counts turns.
     a, b : Body or ground
@@ -123,6 +125,8 @@ class Primitive(Attachment):
     memory = 0
     normal = ""
     normal_at = -1  # among the markers
+    summed = False
+    counted: Any = None  # (joint, index) of the angle whose turns a term counts
     normalises = False  # whether it does no more than keep the length of p
     prescribed: str | tuple[str, ...] = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
@@ -161,7 +165,8 @@ class Primitive(Attachment):
                 continue  # of a subclass that has dropped one of them
             functions[name] = static_kernel(cls, name, arguments, where, InvalidConstraint)
         cls.kernels = MappingProxyType(_compile(cls, functions))
-        _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
+        if not cls.__name__.startswith("_"):  # a variant, which its public class makes
+            _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
     def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; a prescribed one may be a number or three functions of time."""
@@ -178,6 +183,13 @@ class Primitive(Attachment):
     def row_labels(self) -> tuple[str, ...]:
         """What follows its title in the names of its rows."""
         return ("",) if self.all_rows == 1 else tuple(f"[{i}]" for i in range(self.all_rows))
+
+    @property
+    def first_memory(self) -> float:
+        """What it remembers at first: the angle near which its joint begins to count."""
+        joint, which = self.counted or (self, 0)
+        near = np.ravel(joint.angle_near)
+        return float(near[which if near.size > 1 else 0])
 
     @property
     def rheonomic(self) -> bool:
@@ -267,7 +279,7 @@ def _compile(cls, functions):
         inner = {f"kernel_{name}": inlined(function) for name, function in functions.items()}
     except InvalidConstraint as error:
         raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
-    constants = {"ROWS": cls.all_rows, "RATES_FROM": cls.rows, "kernel_drift": rate_rows.nothing}
+    constants = {"ROWS": cls.all_rows, "RATES_FROM": cls.rows, "SUMMED": cls.summed, "kernel_drift": rate_rows.nothing}
     places = [marker.argument for marker in cls.markers]
     constants["NORMAL"] = cls.normal_at = places.index(cls.normal) if cls.normal else -1
     constants |= layout(cls.markers) | inner

@@ -27,6 +27,7 @@ from .template import (
     ROWS,
     SIZE,
     STARTS,
+    SUMMED,
     differentiate,
     kernel_drift,
     kernel_gamma,
@@ -137,7 +138,7 @@ def _derive_reaction(x, par, t, lam, J, H):
 
 @part
 def _fill_row(q, qd, own, real, along_x, along_second, out):
-    """out (n,) = along_x x_q + along_second x_qq qd, for one row of G1 or G2, at its two bodies."""
+    """out (n,) = along_x x_q + along_second x_qq qd, for one row of G1 or G2, at its two bodies; added to a sum."""
     row = stack(SPAN)
     for i in range(SPAN):
         row[i] = 0.0
@@ -149,7 +150,8 @@ def _fill_row(q, qd, own, real, along_x, along_second, out):
         _chain_second(code, dimension, at, qd, s, along_second[c:], row[7 * k :])
     for side in range(2):
         for i in range(own[DIMENSION + side]):
-            out[own[AT + side] + i] = row[7 * side + i]
+            at = own[AT + side] + i
+            out[at] = out[at] + row[7 * side + i] if SUMMED else row[7 * side + i]
 
 
 @part
@@ -207,7 +209,7 @@ def geometric_stiffness(count, stride, table, reals, q, t, lam, K):
     lam, K = vector(lam, ANY), vector(K, ANY)
     x, J, H, XHX = stack(SIZE), stack2(ROWS, SIZE), stack2(SIZE, SIZE), stack2(SPAN, SPAN)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride :]
         own_lam, n = lam[own[ROW] :], own[STRIDE]
         place_markers(q, own, real, x)
         _derive_reaction(x, real[3 * MARKERS :], t, own_lam, J, H)
@@ -231,7 +233,7 @@ def rate_slopes(count, stride, table, reals, q, qd, qdd, t, G1, G2):
     slopes = Slopes(J, a1, a2, g_xd)
     for i in range(count):
         # Markers at q and qd, and their accelerations with qdd
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride :]
         move_markers(q, qd, own, real, x, xd, xdd)
         _accelerate_markers(q, qdd, own, real, xdd)
         _derive_rates(x, xd, xdd, real[3 * MARKERS :], t, slopes)

@@ -30,16 +30,6 @@ def loop():
     return scene
 
 
-def coin():
-    """A coin that rolls on the ground, whose contact has loops of its own where a case is alone."""
-    scene = ts.Scene()
-    start = {"velocity": (2, 0, 0), "angular_velocity": (0, 4, 0)}
-    coin = scene.add_body(1.0, (0.07, 0.12, 0.06), position=(0, 0, 0.5), name="coin", **start)
-    scene.add(ts.constraints.RollingDisc(coin, scene.ground, axis_a=(0, 1, 0), radius=0.5, normal_b=(0, 0, 1)))
-    scene.add(ts.forces.Torque(coin, torque=(0.1, 0, 0.2), frame="ground"))
-    return scene
-
-
 def damped():
     """A body on a bushing, with friction, of coefficients that are zero in some cases."""
     scene = ts.Scene(gravity=(0, 0, -10))
@@ -69,7 +59,6 @@ STUDIES = {
         lambda scene: {"spring.stiffness": 20 * uniform(), "rod 1.inertia": (0.1, 0.1, 0.05) * uniform(1)},
     ),
     "damped": (damped, 0.5, damping),
-    "coin": (coin, 0.5, lambda scene: {"coin.mass": uniform(), "coin.inertia": (0.07, 0.12, 0.06) * uniform(1)}),
     "sleigh": (sleigh, 1.0, lambda scene: {"sleigh.mass": 2 * uniform(), "rod.mass": uniform()}),
     "loop": (loop, 0.3, lambda scene: {"a.mass": uniform(), "b.mass": 2 * uniform()}),
 }

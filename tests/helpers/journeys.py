@@ -161,6 +161,19 @@ class Tour:
             for value in self.on.reaction(item):
                 self.shape(value, 3)
 
+    def contact_point(self):
+        self._of_contacts(self.on.contact_point, (3,))
+
+    def friction_demand(self):
+        self._of_contacts(self.on.friction_demand, ())
+
+    def _of_contacts(self, method, size):
+        for item in self.items():
+            if "Rolling" in type(item).__name__:
+                self.shape(method(item), *size)
+            else:
+                with_message(ts.InvalidConstraint, lambda item=item: method(item))
+
     def actuation(self):
         for item in self.items():
             with_message(ts.InvalidForce, lambda item=item: self.on.actuation(item))

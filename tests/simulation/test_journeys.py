@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from examples import door, slider_crank, stick_slip, top
+from examples import coin, door, slider_crank, stick_slip, top
 from tests.helpers.built_in import INTEGRATORS
 from tests.helpers.journeys import displayed, visit
 from tests.helpers.tolerances import HELD
@@ -75,6 +75,7 @@ SCENES = {
     "friction": stick_slip.build,
     "loop": slider_crank.build,
     "loads": loads,
+    "rolling": coin.build,
 }
 
 

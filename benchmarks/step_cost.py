@@ -1,7 +1,7 @@
 """Cost of a step: the general machinery against the same mathematics written by hand for the sliding top.
 
-Runs of both are interleaved in one process; quote the ratio. `ts.profile` then gives the phases of a step, for the top
-and for a chain. Run it: python -m benchmarks.step_cost
+Runs of both are interleaved in one process; quote the ratio. Steps of series follow, of a rolling coin beside the top,
+then the phases of a step by `ts.profile`, for the top and for a chain. Run it: python -m benchmarks.step_cost
 """
 
 import numpy as np
@@ -9,9 +9,11 @@ import numpy as np
 import tsdyn as ts
 from benchmarks.by_hand import nystrom_top
 from benchmarks.contender import timed
-from examples import pendulum_chain, top
+from examples import coin, pendulum_chain, top
 
 END, ROUNDS = 10.0, 9
+SPAN = 0.0, END
+ORDERS, LENGTH = (8, 16), 0.02  # of steps of series, s
 PHASES = {
     "sliding top": (top.build, END, ts.integrators.Nystrom4(step=1e-3)),
     "chain of 16": (lambda: pendulum_chain.build(16), 1.0, ts.integrators.DOP853(1e-8, 1e-8)),
@@ -27,6 +29,23 @@ def contenders(steps, interval):
         "tsdyn, two outputs": lambda: ts.simulate(scene, (0.0, END), integrator=method, t_eval=[0.0, END]),
         "tsdyn, every step": lambda: ts.simulate(scene, (0.0, END), integrator=method),
     }
+
+
+def series():
+    """Print microseconds a step of series of one length and order, medians, and ratios to the sliding top."""
+    builds = {"sliding top": top.build, "rolling coin": coin.build}
+    for order in ORDERS:
+        method = ts.integrators.Taylor(step=LENGTH, order=order)
+        runs = {name: ts.prepare(build(), integrator=method, history=False) for name, build in builds.items()}
+        seconds = {name: [] for name in runs}
+        for _ in range(10 * ROUNDS):
+            for name, run in runs.items():
+                seconds[name].append(timed(lambda run=run: run(SPAN, t_eval=SPAN))[0])
+        first = np.array(seconds["sliding top"])
+        print(f"series of order {order}")
+        for name, values in seconds.items():
+            ratio = np.median(np.array(values) / first)
+            print(f"  {name:20} {np.median(values) / END * LENGTH * 1e6:7.3f} us a step   x {ratio:.2f}")
 
 
 def phases(name):
@@ -55,6 +74,7 @@ def main():
         for name, values in seconds.items():
             ratio = np.median(np.array(values) / first)
             print(f"  {name:20} {np.median(values) / steps * 1e6:7.3f} us a step   x {ratio:.2f}")
+    series()
     for name in PHASES:
         phases(name)
 

@@ -155,10 +155,16 @@ class Rolls:
 
     name: str
     slip: bool
+    a: Any
     error: Any
 
     def check(self) -> None:
-        """Refuse a slip that is no flag."""
+        """Refuse a slip that is no flag, and a point mass."""
+        if self.a.dimension == 3:
+            raise self.error(
+                f"{self.name}: the point mass {self.a.name!r} has no orientation and can't roll; use add_body, or "
+                "PlaneContact."
+            )
         if not isinstance(self.slip, bool):
             raise self.error(
                 f"{self.name}: slip must be False (rolling) or True (sliding without friction), got {shown(self.slip)}."

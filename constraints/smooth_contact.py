@@ -30,6 +30,7 @@ from ..plugins import (
     not_negative,
     scaled,
     shown,
+    some,
 )
 
 if TYPE_CHECKING:
@@ -260,13 +261,13 @@ def expand(par, count, k, s):
 @kernel
 def axes(par):
     """How many e_j matter."""
-    return 3 if par[2] + par[3] > 0.0 else 2
+    return 3 if some(par[2] + par[3]) else 2
 
 
 @kernel
 def moves(par):
     """Whether the plane is one of a body."""
-    return par[4] > 0.0
+    return some(par[4])
 
 
 @kernel

@@ -86,7 +86,7 @@ def of_scene(scene, method, form, far, rough):
             yield from ELIMINATION["unsymmetric"]
     for kind, moving in _kinds(scene).items():
         second = second_derivatives(form.basis_free) if implicit else ()
-        yield from of_constraint(kind, moving, series, far, second)
+        yield from of_constraint(kind, moving, series, far, second, _is_grounded(scene, kind))
     if not series and any(map(is_of_user, scene.forces)):
         yield watch
     if series and any(map(_is_checked, scene.forces)):
@@ -100,12 +100,16 @@ def of_scene(scene, method, form, far, rough):
             yield program.run_program
 
 
-def of_constraint(kind, moving, series=True, far=False, second=()):
-    """The loops over constraints of a class; moving: whether one of them depends on time; second: derivatives."""
+def of_constraint(kind, moving, series=True, far=False, second=(), grounded=False):
+    """The loops over constraints of a class.
+
+    moving: whether one of them depends on time; second: derivatives; grounded: whether all touch the ground.
+    """
     names = ["phi", "jacobian", "gamma", *["phi_t"] * moving, *["remember"] * bool(kind.memory)]
     if not kind.normalises:
         names += ["reduced", "values", "bias", *["drift"] * moving]
-        names += ["far_" * far + "driven_" * moving + "series", "contact_rows", "contact_series"] * series
+        names += ["contact_rows", "contact_series"] * series
+        names += ["far_" * far + "driven_" * moving + "series"] * (series and not grounded)
     names += second
     return [kind.kernels[name] for name in names if name in kind.kernels]
 
@@ -159,6 +163,11 @@ def _kinds(scene):
         kind = type(constraint)
         kinds[kind] = kinds.get(kind, False) or constraint.rheonomic
     return kinds
+
+
+def _is_grounded(scene, kind):
+    """Whether all constraints of a class are contacts with the ground."""
+    return bool(kind.normal) and all(one.b is scene.ground for one in scene.primitives if type(one) is kind)
 
 
 def _default_method(scene, rtol, atol, series):

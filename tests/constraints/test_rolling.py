@@ -321,6 +321,37 @@ def test_a_disc_that_lies_flat_is_named(slip):
         assert np.isfinite(solution.q).all()
 
 
+def test_a_disc_whose_equilibrium_is_flat_is_named():
+    """A ball with its centroid off its centre rolls to where that is lowest; a coin would fall flat."""
+    scene, _, _ = rolling("disc")
+    with pytest.raises(ts.SingularConfiguration, match="the disc lies flat on its plane"):
+        scene.equilibrium()
+    scene = ts.Scene()
+    body = scene.add_body(1.0, (1, 1, 1), position=(0, 0, 1))
+    scene.add(C.RollingBall(body, scene.ground, radius=1, center_a=(0, 0.3, 0), normal_b=UP))
+    scene.assemble()
+    found = scene.equilibrium()
+    np.testing.assert_allclose(found.state.position(body)[2], 0.7, atol=1e-12)
+    assert found.stable
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["disc", "ellipsoid"])
+def test_lanes(name):
+    """Cases in lanes are those one at a time, to rounding."""
+    scene, body, _ = rolling(name)
+    cases = {f"{body.name}.mass": np.linspace(1.0, 2.0, 8)}
+    one, many = (ts.ensemble(scene, cases, (0.0, 1.0), lanes=lanes) for lanes in (None, 4))
+    np.testing.assert_allclose(many.q, one.q, atol=1e-12)
+    assert not many.status.any()
+
+
+def test_a_point_mass_does_not_roll():
+    scene = ts.Scene()
+    with pytest.raises(ts.InvalidConstraint, match="point mass 'dot' has no orientation and can't roll"):
+        C.RollingBall(scene.add_point_mass(1.0, name="dot"), scene.ground, radius=1.0, normal_b=UP)
+
+
 def test_items_without_a_contact_point_are_refused():
     scene = ts.Scene()
     body = scene.add_body(1.0, (1, 1, 1))

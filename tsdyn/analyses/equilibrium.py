@@ -8,11 +8,12 @@ import numpy as np
 
 from ..calls import fitting_methods
 from ..configuration.tolerances import MOST_ROTATION
-from ..errors import InconsistentState, InvalidForce, NoEquilibrium
+from ..errors import InconsistentState, InvalidForce, NoEquilibrium, SingularConfiguration
 from ..jit.interrupts import interruptible
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, PIVOT_ROUNDING, ROUNDING, SUM_ROUNDING, TINY
 from ..model.kinematics import Anchor
 from ..observables import reactions
+from ..observables.contacts import singular_place
 from ..observables.generalised_forces import force_loads, velocity_forces
 from ..observables.state import RememberingState
 from .coordinates import Variations, chosen
@@ -445,6 +446,12 @@ def find_equilibrium(packed, handles, remembered, t, q, q0, report):
     for _ in range(MOST_SADDLES):
         if not descent.balance():
             _refuse(descent)
+        place = singular_place(packed, descent.motion.q)
+        if place:
+            raise SingularConfiguration(
+                f"equilibrium: the way down ends in a singular configuration: {place}. Start nearer to another "
+                "equilibrium, with guess=, or add what holds it."
+            )
         demand_smooth(descent.motion)
         *findings, way = _stability(descent)
         if way is None:

@@ -45,7 +45,7 @@ from ..jit.kernels import Callback, specialised, twin
 from ..motions.prescribed import Motion
 from .element import Attachment, check_slots, inlined, layout, static_kernel
 from .loops import constraint_hessians, constraint_rows, constraint_series, coordinate_rows, ground_contacts, rate_rows
-from .markers import PARAMETERS, POINT, TURN, Marker
+from .markers import PARAMETERS, POINT, TURN, VECTOR, Marker
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -150,6 +150,8 @@ class Primitive(Attachment):
         check_slots(cls, where, InvalidConstraint)
         if getattr(cls, "series", None) is not None and any(m.code == PARAMETERS for m in markers):
             raise InvalidConstraint(f"{where}: series are for primitives on Points and Vectors only.")
+        if getattr(cls, "arm_series", None) is not None:
+            _check_contact(cls, where)
         if getattr(cls, "series_t", None) is not None and not cls.quantities():
             raise InvalidConstraint(f"{where}: series_t is of what is `prescribed`; name its attributes there.")
         if cls.memory not in (0, 1) or (cls.memory == 1) != (getattr(cls, "remember", None) is not None):
@@ -225,6 +227,24 @@ class Primitive(Attachment):
         """Return a random valid instance between two bodies, for tests."""
         places = {m.argument: rng.normal(size=3) for m in cls.markers if m.code != PARAMETERS}
         return cls(a, b, **places) if any(m.body == "b" for m in cls.markers) else cls(a, **places)
+
+
+def _check_contact(cls, where):
+    """Refuse arms of what is no contact, as the module's docstring has it."""
+    places, sides = [marker.argument for marker in cls.markers], [marker.body for marker in cls.markers]
+    at = places.index(cls.normal) if cls.normal in places else 0
+    along = [marker.code for marker in cls.markers[at:][: cls.all_rows]]
+    if (
+        [marker.code for marker in cls.markers[:4]] != [POINT, VECTOR, VECTOR, VECTOR]
+        or sides[:4] != ["a"] * 4
+        or not cls.rows == 1
+        or not (at > 4 and cls.markers[at - 1].code == POINT and along == [VECTOR] * cls.all_rows)
+        or "a" in sides[at - 1 :]
+    ):
+        raise InvalidConstraint(
+            f"{where}: arm_series needs markers in this order: a Point and three Vectors of a, then a Point of b, the "
+            "Vector of b that `normal` names, and one for each further row."
+        )
 
 
 def registered() -> Mapping[str, type[Primitive]]:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from examples import bicycle, coin, turntable
 from tests.helpers import skates
 from tests.helpers.refusals import refuse
 from tests.helpers.tolerances import FINE, HELD, NEAR, TIGHT
@@ -18,14 +19,18 @@ SCENES = {
     "on a table": skates.on_a_table,
     "belt": lambda: skates.belt(2.0),
     "belt of time": lambda: skates.belt(WAVE),
+    "rough hinge": skates.rough,
+    "coin": coin.build,
+    "turntable": turntable.build,
+    "bicycle": bicycle.build,
 }
 WAYS = {  # options, largest error
     "dop853": ({"integrator": I.DOP853(1e-12, 1e-12)}, TIGHT),
     "dop853, placed": ({"integrator": I.DOP853(1e-12, 1e-12), "chart_interval": 3}, TIGHT),
     "dop853, null-space": ({"integrator": I.DOP853(1e-12, 1e-12), "formulation": "null-space"}, TIGHT),
     "dop853, maggi-kane": ({"integrator": I.DOP853(1e-12, 1e-12), "formulation": "maggi-kane"}, TIGHT),
-    "nystrom4": ({"integrator": I.Nystrom4(step=2e-3)}, FINE),
-    "nystrom4, null-space": ({"integrator": I.Nystrom4(step=2e-3), "formulation": "null-space"}, FINE),
+    "nystrom4": ({"integrator": I.Nystrom4(step=1e-3)}, NEAR),
+    "nystrom4, null-space": ({"integrator": I.Nystrom4(step=1e-3), "formulation": "null-space"}, NEAR),
     "rk45, null-space": ({"integrator": I.RK45(1e-11, 1e-11), "formulation": "null-space"}, FINE),
     "radau": ({"integrator": I.Radau(1e-11, 1e-11)}, FINE),
     "sdirk54": ({"integrator": I.SDIRK54(1e-9, 1e-9)}, NEAR),
@@ -44,10 +49,13 @@ def by_series(scene, **options):
 
 @pytest.mark.slow_but("*sleigh-dop853*", "*belt-nystrom4*", "*table-dop853, null-space", "*skate-radau")
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
-@pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
-def test_methods_and_forms_agree_with_series(make, way):
+@pytest.mark.parametrize("name", SCENES)
+def test_methods_and_forms_agree_with_series(name, way):
     """The three levels hold to rounding, the motion is that of the series, by methods and forms of every kind."""
-    scene, (options, tol) = make(), way
+    scene, (options, tol) = SCENES[name](), way
+    if "rough" in name and isinstance(options["integrator"], I.Radau):
+        refuse(lambda: ts.simulate(scene, (0, SPAN), **options), ts.InvalidArgument, ("friction depends on", "SDIRK54"))
+        return
     solution = ts.simulate(scene, (0, SPAN), **options).raise_if_failed()
     assert off(solution, by_series(scene)) < tol
     errors = solution.constraint_error

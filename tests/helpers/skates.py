@@ -111,3 +111,19 @@ def belt(speed):
     rod = scene.add_body(0.5, (0.02, 0.02, 0.01), position=(0, 0, -0.5), velocity=(first, 0, 0), name="rod")
     scene.add(C.Spherical(box, rod, point_b=(0, 0, 0.5)))
     return scene
+
+
+def rough():
+    """A sleigh on three points and a blade; a rod swings below it on a hinge whose friction depends on its reaction."""
+    scene = ts.Scene()
+    sleigh = scene.add_body(2.0, (0.3, 0.4, 0.5), velocity=(1, 0, 0), name="sleigh")
+    for point in ((1, 0, 0), (-1, 1, 0), (-1, -1, 0)):
+        scene.add(C.PlaneContact(sleigh, scene.ground, point_a=point, normal_b=(0, 0, 1)))
+    scene.add(C.KnifeEdge(sleigh, scene.ground, point_a=(-0.3, 0, 0), axis_a=(0, 1, 0), normal_b=(0, 0, 1)))
+    axis, w = np.array([0.3, 1.0, 0.0]), 2.0
+    spin = w * axis / np.linalg.norm(axis)
+    swing = {"velocity": np.add(np.cross(spin, (0, 0, -0.5)), (1, 0, 0)), "angular_velocity": spin}
+    rod = scene.add_body(0.5, (0.02, 0.02, 0.01), position=(0.2, 0, -0.5), name="rod", **swing)
+    hinge = scene.add(C.Revolute.at(sleigh, rod, point=(0.2, 0, 0), axis=axis, name="hinge"))
+    scene.add(ts.forces.RevoluteFriction(hinge, kinetic=0.05, radius=0.05, slip_velocity=0.1))
+    return scene

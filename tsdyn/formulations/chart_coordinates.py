@@ -3,7 +3,7 @@
 import math
 
 from ..elements.loops.constraint_rows import OMEGA, POSE, RD, R, orient
-from ..jit.kernels import kernel, stack, stack2
+from ..jit.kernels import kernel, long_kernel, stack, stack2
 from ..jit.simd import add, cross, first, fma, four, get, lanes, larger, let, put, second, splat, third, times, total
 from ..rows.interface import clear_redundant, factorise_chart_matrix, rotate_rate
 from .tolerances import FARTHEST
@@ -50,6 +50,13 @@ def add_rate_residuals(graph, f, l, x):
 
     It moves by x' - x = -Y0 u. Without a residual of their own these rows would leave u to the path of the iteration.
     """
+    if graph.rates.size > 0:
+        _add_rate_residuals(graph, f, l, x)
+
+
+@long_kernel
+def _add_rate_residuals(graph, f, l, x):
+    """Where there are such rows: not inlined."""
     for i in range(graph.rates.size):
         e, total = graph.rates[i], 0.0
         for side in range(2):
@@ -57,8 +64,7 @@ def add_rate_residuals(graph, f, l, x):
             for c in range(8 if body < graph.bodies.shape[0] else 0):
                 total += l.rows0.H[16 * e + 8 * side + c] * (l.x[8 * body + c] - x[8 * body + c])
         f.b[e] = total
-    if graph.rates.size > 0:
-        clear_redundant(f, f.b)
+    clear_redundant(f, f.b)
 
 
 @kernel

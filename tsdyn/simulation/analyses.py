@@ -64,7 +64,8 @@ def linearise(
     InvalidForce
         If a force has a jump or a kink at the state, is sampled, or is friction of a joint in motion.
     InvalidArgument
-        If the state, an input or an output is not of this scene.
+        If the state, an input or an output is not of this scene, or a scene with rows on velocities (rolling, knife
+        edges) is neither at rest nor in steady motion.
 
     Notes
     -----

@@ -139,8 +139,8 @@ def functions_of(given: Function | Any, count: int, what: str) -> list[Coordinat
     plain = getattr(given, "py_func", given)
     if not isinstance(plain, FunctionType):
         raise InvalidConstraint(
-            f"{what} must be a plain function of {counted(count, 'coordinate')}, one of ts.motions, a ts.Table or a spline of "
-            f"SciPy's, got {shown(given)}."
+            f"{what} must be a plain function of {counted(count, 'coordinate')}, one of ts.motions, a ts.Table or a "
+            f"spline of SciPy's, got {shown(given)}."
         )
     try:
         inspect.signature(plain).bind(*range(count))

@@ -392,3 +392,23 @@ def test_a_fixed_step_of_half_a_turn_ends_the_run(method):
     solution = ts.simulate(scene, (0.0, 1.0), integrator=method)
     assert not solution.success
     assert "smaller step" in solution.message
+
+
+@pytest.mark.slow_but("*taylor*")
+@every_method
+def test_beside_a_row_on_velocities(options):
+    """On a cart with a blade two wheels on crossed axes are coupled: the levels hold, and all methods agree."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    cart = scene.add_body(2.0, (0.3, 0.3, 0.4), velocity=(1, 0, 0), angular_velocity=(0, 0, 0.5), name="cart")
+    scene.add(C.Planar.at(scene.ground, cart, point=(0, 0, 0), axis=Z))
+    scene.add(C.KnifeEdge(cart, scene.ground, point_a=(-0.3, 0, 0), axis_a=Y, normal_b=Z))
+    one, fast = wheel(scene, cart, (0, 0, 0.3), Z, 0.3, name="one")
+    _, slow = wheel(scene, cart, (0.4, 0, 0.3), X, 0.2, name="two")
+    scene.add(C.Coupler(slow, fast, ratio=2.0))
+    scene.add(ts.forces.Torque(one, torque=(0, 0, 0.2)))
+    scene.assemble()
+    solution = ts.simulate(scene, (0.0, 1.5), **options)
+    held(solution)
+    assert np.abs(solution.angle(slow) - 2.0 * solution.angle(fast)).max() < TIGHT
+    known = ts.simulate(scene, (0.0, 1.5), rtol=1e-12, atol=1e-12)
+    assert np.abs(solution.q[-1] - known.q[-1]).max() < 1e-8 * loose(options)

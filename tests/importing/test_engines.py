@@ -125,7 +125,7 @@ def robots():
 def test_public_trees(model):
     path, free = robots() / model, TREES[model]
     scene = without_forces(load(path, free_base=free))
-    for item in [item for item in scene.constraints if type(item) is ts.constraints.Gear]:
+    for item in [item for item in scene.constraints if type(item) is ts.constraints.Coupler]:
         scene.remove(item)
     for seed in range(3):
         motions = pinocchio_motions(path, names_of(scene), np.random.default_rng(seed), free)

@@ -137,10 +137,10 @@ COORDINATES = {"revolute": "angle", "prismatic": "displacement", "screw": "angle
 def couple(scene, description, made, report):
     """Add the couplers; list those of joints without a coordinate. `made` has the constraint of each joint."""
     for coupling in description.couplings:
-        names = [coupling.follower, *coupling.drivers]
+        names = [_axis_of(made, *each) for each in (coupling.follower, *coupling.drivers)]
         reason = next(filter(None, (_reason(made.get(name)) for name, _ in names)), "")
         if not reason:
-            joints = [(constraint, COORDINATES[kind], index) for (constraint, kind), index in _placed(made, names)]
+            joints = [(made[name][0], COORDINATES[made[name][1]], index) for name, index in names]
             given = {"polynomial": coupling.polynomial} if coupling.polynomial else {}
             given = given or {"ratio": _plain(coupling.ratios), "offset": coupling.offset}
             try:
@@ -152,8 +152,9 @@ def couple(scene, description, made, report):
             report.leave(WHAT, coupling.name, f"({law}, offset {coupling.offset:g}: {reason})")
 
 
-def _placed(made, names):
-    return [(made[name], index) for name, index in names]
+def _axis_of(made, name, index):
+    """The joint and index of a coordinate: a universal joint whose axes are oblique is two hinges."""
+    return (f"{name} 2", 0) if index and f"{name} 2" in made else (name, index)
 
 
 def _plain(ratios):

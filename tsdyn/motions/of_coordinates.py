@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InvalidConstraint
 from ..jit.kernels import kernel, stack, twin
 from ..maths.power_series import Jet
-from ..validation import shown
+from ..validation import counted, shown
 from .elementary import time
 from .expressions import Smooth, evaluate, ordered
 from .prescribed import Motion
@@ -139,13 +139,15 @@ def functions_of(given: Function | Any, count: int, what: str) -> list[Coordinat
     plain = getattr(given, "py_func", given)
     if not isinstance(plain, FunctionType):
         raise InvalidConstraint(
-            f"{what} must be a plain function of {count} coordinates, one of ts.motions, a ts.Table or a spline of "
-            f"SciPy's, got {shown(given)}."
+            f"{what} must be a plain function of {counted(count, 'coordinate')}, one of ts.motions, a ts.Table or a "
+            f"spline of SciPy's, got {shown(given)}."
         )
     try:
         inspect.signature(plain).bind(*range(count))
     except TypeError as error:
-        raise InvalidConstraint(f"{what} is called with {count} coordinates, one of each joint: {error}.") from error
+        raise InvalidConstraint(
+            f"{what} is called with {counted(count, 'coordinate')}, one of each joint: {error}."
+        ) from error
     try:
         own = retold(plain)
         found = traced(lambda q: [own(*q)], (count,), 1)

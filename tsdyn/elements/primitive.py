@@ -123,7 +123,8 @@ class Primitive(Attachment):
                 continue  # of a subclass that has dropped one of them
             functions[name] = static_kernel(cls, name, arguments, where, InvalidConstraint)
         cls.kernels = MappingProxyType(_compile(cls, functions))
-        _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
+        if not cls.__name__.startswith("_"):
+            _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
     def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; a prescribed one may be a number or three functions of time."""

@@ -22,6 +22,7 @@ from ..rows.interface import (
     factorise_complex_saddle,
     factorise_saddle,
     factorise_selected_rows,
+    is_raised,
     multiply_rates,
     multiply_rows,
     solve_complex_saddle,
@@ -114,7 +115,7 @@ def _correct_multipliers(c):
     present one. S may be older, too, as long as corrections contract: at first it is that of the step's start.
     """
     w, f, s, graph, least, before, renewed = c.work, c.tangent, c.saddle, c.graph, 0.0, math.inf, False
-    lean = graph.axes.rows.shape[0] > 0  # S is of another metric than W
+    raised = is_raised(graph)  # S is of another metric than W
     for sweep in range(REACTION_SWEEPS):
         # H W e, the part of the imbalance that multipliers can balance
         copy(s.e, f.Z)
@@ -127,8 +128,8 @@ def _correct_multipliers(c):
             least = REACTIONS_LEFT * worst
         if worst <= least:
             return True
-        # Where W is that of raised inertias, N of the chart takes the place of S
-        if lean:
+        # There N of the chart takes the place of S
+        if raised:
             solve_normal(c)
         else:
             # S of an older configuration contracts no more

@@ -388,6 +388,7 @@ class System(NamedTuple):
     signals: np.ndarray  # (signals,) of tables.SignalPlace
     memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
     normals: np.ndarray  # int64 (frictions,): places in reals of the normal loads of joints' frictions
+    inertias: np.ndarray  # (kinds,) of tables.ConstraintKind: the rows h of M + h^T h, see rows/inertia_rows.py
 
 
 def no_system():
@@ -408,6 +409,7 @@ def no_system():
         signals=records(SignalPlace),
         memory=whole,
         normals=whole,
+        inertias=records(ConstraintKind),
     )
 
 
@@ -432,6 +434,7 @@ class Packed(NamedTuple):
     loads: tuple  # a packed_forces.Load for each force, in the order added
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
     slots: tuple  # of System.memory, for each constraint; -1 for none
+    inertias: tuple  # primitives whose rows add inertia to a joint coordinate, kind by kind
     derived: Derived  # what has been worked out from it
 
     def __reduce__(self):
@@ -449,7 +452,8 @@ def _found_again(process, *parts):
         return packed
     system = packed.system
     kinds = classes(packed)
-    for row, kind in zip(system.kinds, kinds, strict=True):
+    rows = [*zip(system.kinds, kinds, strict=True), *zip(system.inertias, inertia_classes(packed), strict=True)]
+    for row, kind in rows:
         for name in ("phi", "jacobian", "gamma", "phi_t", "remember"):
             row[name] = _address(kind, name) if row[name] else 0
         row["stiffness"] = row["slopes"] = 0
@@ -487,6 +491,9 @@ def pack(scene):
         for pairs in (scene._twins, scene._aliases):  # functions may hold handles of the scene that this is a copy of
             derived.handles.add_aliases((pairs or {}).items())
     forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals, derived.handles)
+    added = sorted((force.inertia_row for force in scene.forces if force.adds_inertia), key=lambda row: type(row).__qualname__)
+    added = {row: checked_motions(row) for row in added}
+    inertia_kinds, *_ = _pack_constraints(added, int(starts[-1]), where, table, reals)
     _append_programs(motions, reals)
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
@@ -504,13 +511,15 @@ def pack(scene):
         signals=signals,
         memory=np.array([*memory, *kept.values()], np.int64),
         normals=np.array(normals, np.int64),
+        inertias=records(ConstraintKind, inertia_kinds),
     )
     coordinates = tuple(constraint.coordinates for constraint in primitives)
     size = size_of(primitives, coordinates)
     order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
     slots = tuple(order.get(constraint, -1) for constraint in primitives)
     given = tuple(parameters.values())
-    return Packed(system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, derived)
+    rows = tuple(added)
+    return Packed(system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, rows, derived)
 
 
 def _segments(primitives, where):
@@ -615,6 +624,11 @@ def member_of(packed, constraint):
 def classes(packed):
     """The classes of constraints, in the order of System.kinds."""
     return list(dict.fromkeys(type(constraint) for constraint in packed.constraints))
+
+
+def inertia_classes(packed):
+    """The classes of rows that add inertia, in the order of System.inertias."""
+    return list(dict.fromkeys(type(row) for row in packed.inertias))
 
 
 def user_functions(packed):

@@ -307,7 +307,7 @@ def constraint_loads(s, t, q, lam, first, halves, rows, out):
 def find_rows(graph, s, f, q, t, whole):
     """H at q without redundant rows and, in `whole`, with them, and the factors of S; False if S is singular."""
     regular = factorise_at(graph, s, f, t, q)
-    evaluate_every_row(graph, s, f, Rows(whole, f.rows.Y, f.rows.S), t)
+    evaluate_every_row(graph, s, f, Rows(whole, f.rows.Y, f.rows.S, f.rows.h), t)
     return regular
 
 

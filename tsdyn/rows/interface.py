@@ -4,6 +4,7 @@ import numpy as np
 
 from ..elements.loops.constraint_rows import POSE
 from ..jit.arrays import zeros
+from .constraint_graph import is_raised
 from .elimination import KERNELS as ELIMINATION
 from .elimination import lu_factors
 from .evaluation import (
@@ -16,6 +17,7 @@ from .evaluation import (
     solve_friction_series,
     solve_series,
 )
+from .inertia_rows import WIDTH as INERTIA_WIDTH
 from .redundant_rows import (
     clear_redundant,
     keep_every_row,
@@ -114,7 +116,8 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
 def allocate_rows(graph):
     """Allocate `Rows`."""
     m = len(graph.row)
-    return Rows(zeros(16 * m), zeros(16 * m), zeros(graph.pattern.shape[2]))
+    inertias = zeros(INERTIA_WIDTH * len(graph.inertias))
+    return Rows(zeros(16 * m), zeros(16 * m), zeros(graph.pattern.shape[2]), inertias)
 
 
 def _allocate_friction(graph, n, basis):
@@ -240,6 +243,7 @@ __all__ = [
     "is_axis",
     "is_near_singular",
     "is_next_to_singular",
+    "is_raised",
     "is_singular_within_a_step",
     "keep_every_row",
     "list_redundant",

@@ -456,7 +456,7 @@ def reselect_rows(choice, reals, t, H, Y, S, metric):
     c = load_choice(choice)
     graph, f = c.graph, c.tangent
     m, size = graph.row.size, graph.pattern.shape[2]
-    rows = Rows(vector(H, 16 * m), vector(Y, 16 * m), vector(S, size))
+    rows = Rows(vector(H, 16 * m), vector(Y, 16 * m), vector(S, size), f.rows.h)
     return 1 if _choose_again(graph, vector(reals, ANY), f, rows, t, metric) else 0
 
 

@@ -23,6 +23,7 @@ from ..rows.interface import (
     factorise_saddle,
     factorise_selected_rows,
     is_raised,
+    multiply_inertia_rows,
     multiply_rates,
     multiply_rows,
     solve_complex_saddle,
@@ -30,6 +31,7 @@ from ..rows.interface import (
     solve_rows,
     solve_saddle,
     take_reactions,
+    unbalance_inertia_rows,
     weigh,
     weigh_bodies,
     write_saddle_rows,
@@ -84,11 +86,16 @@ def spread_normal(c, b):
 
 @kernel
 def find_imbalance(c):
-    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows. False if S is singular."""
+    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for rows of Phi. False if S is singular."""
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     # M (a + C n)
     to_bodies(graph, l, s.r, f.Z)
     add_to(s.a, f.Z)
+    # In the order of elimination: mu - (h (a + C n) + gamma_h) of inertia rows
+    for i in range(s.x.size):
+        s.x[i] = 0.0
+    multiply_inertia_rows(graph, f.rows, s.graph.row_at, f.Z, s.x)
+    unbalance_inertia_rows(graph, f.rows, s.graph.row_at, s.multipliers, s.x)
     for b in range(graph.bodies.shape[0]):
         weigh(graph.mass, b, f.Z, 8 * b, f.Z, 8 * b)
     # e = F - M (a + C n) - H^T lam
@@ -97,9 +104,6 @@ def find_imbalance(c):
     take_reactions(graph, f.rows, s.multipliers, s.e)
     if f.b.size > 0 and not _correct_multipliers(c):
         return False
-    # In the order of elimination
-    for i in range(s.x.size):
-        s.x[i] = 0.0
     for b in range(graph.bodies.shape[0]):
         at, o = s.graph.body_at[b], 8 * b
         for i in range(degrees(graph, b)):

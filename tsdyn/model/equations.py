@@ -101,6 +101,20 @@ def acceleration_bias(s, q, qd, t, gamma):
 
 
 @kernel
+def inertia_rows(s, q, t, h):
+    """h (k, n) of the inertia rows, M + h^T h; entries off the segments are left alone: zero them once."""
+    for i in range(s.inertias.shape[0]):
+        _run(s, s.inertias[i], s.inertias[i].jacobian, q, q, t, h)
+
+
+@kernel
+def inertia_bias(s, q, qd, t, gamma):
+    """gamma (k,) of the inertia rows: h qdd + gamma is the acceleration of their coordinates."""
+    for i in range(s.inertias.shape[0]):
+        _run(s, s.inertias[i], s.inertias[i].gamma, q, qd, t, gamma)
+
+
+@kernel
 def constraint_curvature(s, q, qd, qdd, t, lam, K, G1, G2):
     """K += (Phi_q^T lam)_q, G1 = (Phi_q qd + Phi_t)_q, G2 = (Phi_q qdd + gamma)_q; zero G1, G2 once."""
     for i in range(s.kinds.shape[0]):

@@ -659,10 +659,11 @@ def second_derivatives(basis_free):
 
 def with_curvatures(packed, basis_free=False):
     """The system with the kernels of second derivatives, which only implicit methods load."""
-    kinds = packed.system.kinds.copy()
+    kinds, inertias = packed.system.kinds.copy(), packed.system.inertias.copy()
     for name in second_derivatives(basis_free):
         kinds[name] = [_address(kind, name) for kind in classes(packed)]
-    return packed.system._replace(kinds=kinds)
+        inertias[name] = [_address(kind, name) for kind in inertia_classes(packed)]
+    return packed.system._replace(kinds=kinds, inertias=inertias)
 
 
 def checked_motions(constraint):

@@ -18,6 +18,12 @@ BIAS, WIDTH = 16, 20
 
 
 @kernel
+def inner(H, h, Y, y):
+    """Return the product of two rows at one body."""
+    return total(fma(four(H, h), four(Y, y), times(four(H, h + 4), four(Y, y + 4))))
+
+
+@kernel
 def set_rows_aside(graph, rows):
     """Move the inertia rows from H to h."""
     for i in range(graph.inertias.size):
@@ -76,10 +82,24 @@ def residuals(graph, rows, Z, out):
     """out = h Z + gamma_h of inertia rows."""
     for i in range(graph.inertias.size):
         e, h = graph.inertias[i], WIDTH * i
-        out[e] = get(rows.h, h + BIAS)
-        for k in range(2):
-            at, z = h + 8 * k, 8 * graph.sides[e, k]
-            out[e] += total(fma(four(rows.h, at), four(Z, z), times(four(rows.h, at + 4), four(Z, z + 4))))
+        product = inner(rows.h, h, Z, 8 * graph.sides[e, 0]) + inner(rows.h, h + 8, Z, 8 * graph.sides[e, 1])
+        out[e] = product + get(rows.h, h + BIAS)
+
+
+@kernel
+def multiply(graph, rows, places, Z, out):
+    """out[places[e]] = h Z of inertia row e."""
+    for i in range(graph.inertias.size):
+        e, h = graph.inertias[i], WIDTH * i
+        out[places[e]] = inner(rows.h, h, Z, 8 * graph.sides[e, 0]) + inner(rows.h, h + 8, Z, 8 * graph.sides[e, 1])
+
+
+@kernel
+def unbalance(graph, rows, places, mu, out):
+    """out[places[e]] <- mu - gamma_h - out[places[e]]."""
+    for i in range(graph.inertias.size):
+        e = graph.inertias[i]
+        out[places[e]] = mu[e] - get(rows.h, WIDTH * i + BIAS) - out[places[e]]
 
 
 @kernel

@@ -18,6 +18,8 @@ from .evaluation import (
     solve_series,
 )
 from .inertia_rows import WIDTH as INERTIA_WIDTH
+from .inertia_rows import multiply as multiply_inertia_rows
+from .inertia_rows import unbalance as unbalance_inertia_rows
 from .redundant_rows import (
     clear_redundant,
     keep_every_row,
@@ -250,6 +252,7 @@ __all__ = [
     "lu_factors",
     "mark_redundant",
     "more",
+    "multiply_inertia_rows",
     "multiply_rates",
     "multiply_rows",
     "note_indicator",
@@ -281,6 +284,7 @@ __all__ = [
     "solve_series",
     "take_noted_selection",
     "take_reactions",
+    "unbalance_inertia_rows",
     "weigh",
     "weigh_bodies",
     "with_reselection",

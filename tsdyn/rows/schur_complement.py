@@ -6,7 +6,7 @@ from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, 
 from ..maths.tolerances import PIVOT_ROUNDING
 from .constraint_graph import ROWS, ROWS_WELD, W_MASS, W_ROTATION, WEIGHTS, WELD_ROWS, WELDS
 from .elimination import factor, factor_lu, solve, solve_lu
-from .inertia_rows import clear_rows, leave_diagonal, put_rows_back, raise_diagonal, residuals
+from .inertia_rows import clear_rows, inner, leave_diagonal, put_rows_back, raise_diagonal, residuals
 from .inertia_rows import take_reactions as take_inertia_reactions
 from .massless_axes import AXIS_H, AXIS_OWN, AXIS_Y
 from .redundant_rows import set_redundant_diagonal
@@ -130,12 +130,6 @@ def weigh_rows(graph, H, Y):
         for k in range(2):
             at = 16 * e + 8 * k
             weigh(graph.inverse, graph.sides[e, k], H, at, Y, at)
-
-
-@kernel
-def inner(H, h, Y, y):
-    """Return the product of two rows at one body."""
-    return total(fma(four(H, h), four(Y, y), times(four(H, h + 4), four(Y, y + 4))))
 
 
 @kernel

@@ -48,7 +48,7 @@ class StepMemory(Memory):
         self.source, kept = prepared.system(implicit, basis_free)
         system, redundant = System(*(array.copy() for array in self.source)), redundancy(graph)
         rows = len(graph.row) if basis_free else None
-        work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant)
+        work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant, inertias=len(packed.inertias))
         angles, slots = prepared.handles.count, system.memory.size
         parts = basis_free_parts(graph, n, not basis_free, saddle, coupled)
         run = lay_out(n, *sizes, angles, slots, warm=warm_size(work, *parts[1:]), **lengths)
@@ -167,7 +167,7 @@ def _reading(packed, form, constraint_tol, kernels):
 
     def workspace():
         own = system._replace(reals=system.reals.copy())  # the motions' places are written to
-        work = allocate(n, m, len(packed.bodies), constraint_tol, packed.size, rows, redundant)
+        work = allocate(n, m, len(packed.bodies), constraint_tol, packed.size, rows, redundant, len(packed.inertias))
         parts = basis_free_parts(graph, n, not form.basis_free)
         run = lay_out(n, *sizes, 0, 0, warm=warm_size(work, *parts[1:]))
         _set(run.kernels, kernels)

@@ -26,7 +26,7 @@ from .elements.friction import (
     slip_of,
     slip_series,
 )
-from .elements.joint import FramedJoint, Joint, across, beside, carried, turned_about
+from .elements.joint import FramedJoint, Joint, SumRow, across, beside, carried, turned_about
 from .elements.laws import Action, SceneLaw, arguments_of, instants, scene_law
 from .elements.loads import (
     STATE,
@@ -141,6 +141,7 @@ __all__ = [
     "SceneLaw",
     "Signal",
     "Smooth",
+    "SumRow",
     "Turn",
     "Vector",
     "across",

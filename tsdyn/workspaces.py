@@ -9,7 +9,7 @@ import numpy as np
 
 from .jit.arrays import zeros
 from .jit.kernels import Record, loader
-from .model.packed import System, no_system
+from .model.packed import WIDTH, System, no_system
 from .rows.constraint_graph import ConstraintGraph, no_graph
 from .rows.interface import Rows, TangentWorkspace, allocate_rows, allocate_tangent, lu_factors
 from .rows.saddle_matrix import BLOCK, SaddleGraph, no_saddle
@@ -79,7 +79,7 @@ class ChartWorkspace(NamedTuple):
     x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
     y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
     rows0: Rows  # H0, Y0, S0: the rows at q0; chart_validity.set_base_point
-    X: np.ndarray  # (m * 16,)  C Y0; chart_matrix.factorise_chart_matrix
+    X: np.ndarray  # (pairs * 16,)  C Y0; chart_matrix.factorise_chart_matrix
     lower: np.ndarray  # factors of N = H C Y0; chart_matrix.factorise_chart_matrix
     upper: np.ndarray
     drift: np.ndarray  # (m,)  Phi_t
@@ -93,7 +93,7 @@ def allocate_chart(graph):
     base[4::8] = 1.0
     return ChartWorkspace(
         base, zeros(4 * (nb + 1)), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)),
-        allocate_rows(graph), zeros(16 * m), *lu_factors(graph.pattern), zeros(m), ChartState(),
+        allocate_rows(graph), zeros(16 * len(graph.sides)), *lu_factors(graph.pattern), zeros(m), ChartState(),
     )  # fmt: skip
 
 
@@ -444,7 +444,7 @@ class Work(NamedTuple):
     D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; null_space_chart.tangent_map
     E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.reduced_mass
     A: np.ndarray  # (k, k)  D^T M D, then its Cholesky factor; null_space.reduced_mass
-    inertia: np.ndarray  # (i, n)  inertia rows; null_space.reduced_mass
+    inertia: np.ndarray  # (i, 14)  inertia rows; null_space.reduced_mass
     inertia_D: np.ndarray  # (i, k)  their products with D; null_space.reduced_mass
     inertia_bias: np.ndarray  # (i,)  gamma of these rows; null_space.reduced_acceleration
     Q: np.ndarray  # (n,)    applied forces without gravity; null_space.reduced_acceleration
@@ -531,7 +531,7 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "v": (k,),
         "E": (3 * bodies, k),
         "A": (k, k),
-        "inertia": (inertias, n),
+        "inertia": (inertias, WIDTH),
         "inertia_D": (inertias, k),
         "inertia_bias": (inertias,),
     }

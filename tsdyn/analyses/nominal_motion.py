@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.bodies import rotation_matrix, transform_g
-from ..elements.loops.coordinate_rows import INTS, ROW, STRIDE
+from ..elements.loops.coordinate_rows import INTS, STRIDE
 from ..elements.loops.forces import FORCE_INTS as FORCE_INTS
 from ..elements.loops.template import AT
 from ..errors import InvalidForce, SingularConfiguration
@@ -25,7 +25,7 @@ from ..model.equations import (
     with_short_rows,
 )
 from ..model.laws import interrupts_answered
-from ..model.packed import no_system, with_curvatures, with_force_jacobians
+from ..model.packed import first_rows, instances_of_kinds, no_system, with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..rows.constraint_graph import REDUCED, are_unequal, coordinate_scales
@@ -87,7 +87,9 @@ class Pairs:
         self.packed = packed
         system, self._size = with_force_jacobians(packed._replace(system=with_curvatures(packed)), WIDTH)
         constraints, forces = _entries(system, system.kinds, INTS), _entries(system, system.forces, FORCE_INTS)
-        constraints = constraints[np.argsort(constraints[:, 1 + ROW], kind="stable")]
+        place = {id(part): i for i, part in enumerate(packed.constraints)}
+        order = [place[id(part)] for members in instances_of_kinds(packed) for part in members]
+        constraints = constraints[np.argsort(order, kind="stable")]
         places = np.concatenate((constraints[:, 1 + AT : 5 + AT], forces[:, 1 + AT : 5 + AT]))
         table = system.table.copy()
         table[constraints[:, 0] + STRIDE] = WIDTH
@@ -124,8 +126,13 @@ def derivatives(motion):
     packed, pairs = motion.packed, Pairs(motion.packed)
     (nc, _), m, n = pairs.counts, len(motion.lam), motion.q.size
     K, rows, Q_q, Q_qd = pairs.blocks(motion, motion.lam)
-    counts = np.array([packed.constraints[i].rows for i in range(nc)], int)
-    lines = np.arange(m) + np.repeat(np.arange(nc), counts)  # of row r in G1 and G2
+    # Lines of G1 and G2: of every row, then of the later terms of sums
+    found = [
+        [row + i + r for r in range(part.rows or 1)] for i, (part, row) in enumerate(first_rows(packed.constraints))
+    ]
+    lines = [lines for part, lines in zip(packed.constraints, found, strict=True) if part.rows]
+    lines += [lines for part, lines in zip(packed.constraints, found, strict=True) if not part.rows]
+    lines = np.array([line for each in lines for line in each], int)
     G1, G2 = (as_csr(packed, one[: WIDTH * (m + nc)].reshape(-1, WIDTH)[lines]) for one in rows)
     K = _scatter(K, pairs.columns[:nc], pairs.used[:nc], n)
     Q_q, Q_qd = (_scatter(one, pairs.columns[nc:], pairs.used[nc:], n) for one in (Q_q, Q_qd))

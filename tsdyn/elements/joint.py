@@ -173,6 +173,34 @@ class Joint(Attachment):
         return f"<{self.title}: {counted(self.rows, 'row')}>"
 
 
+class SumRow(Joint):
+    """Base of constraints of one row that is a sum of terms, each on two bodies: a row on any number of bodies.
+
+    Subclass it and yield the terms in `compose`: primitives of one row with `summed = True`, on any bodies of the scene.
+    a and b are the bodies of the first term.
+    """
+
+    def compose(self) -> Iterator[Primitive]:
+        """Yield the terms, one at least; new ones each time."""
+        raise InvalidConstraint("SumRow is the base of rows that are sums; use Coupler, or a subclass.")
+
+    @cached_property
+    def _composition(self):
+        self.check()
+        parts = tuple(self.compose())
+        for i, part in enumerate(parts):
+            stop_waiting(part)
+            # The row counts once, with the first term
+            part.__dict__.update(owner=self, name=self.title, rows=int(i == 0))
+        return Composition(parts, ("",), ())
+
+    @property
+    def bodies(self) -> tuple[AnyBody, ...]:
+        """The bodies of its terms, the ground left out."""
+        found = dict.fromkeys(body for part in self.parts for body in (part.a, part.b))
+        return tuple(body for body in found if body.dimension)
+
+
 def registered() -> Mapping[str, type[Joint]]:
     """Return every joint class known, built in or plugged in, by its full name."""
     return MappingProxyType(_registry)

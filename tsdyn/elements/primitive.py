@@ -57,6 +57,8 @@ class Primitive(Attachment):
     prescribed : str or tuple of str, optional
         The attributes that are numbers or Motions, where nothing else makes it depend on time. With `series_t` they
         come first in `parameters()`, and their series are the rows of scratch memory from `slots` on.
+    summed : bool
+        Whether an instance may be a term of a row that several instances add up to, each on two bodies: see `SumRow`.
     memory : int
         1 for a primitive that keeps a number from step to step, the last of par: an angle that counts turns.
     a, b : Body or ground
@@ -96,6 +98,9 @@ class Primitive(Attachment):
     rows = 0
     slots = 0
     memory = 0
+    summed = False
+    turn = 0.0  # what it remembers at first
+    counted: Any = None  # (joint, index) of the angle whose turns a term counts
     normalises = False  # whether it does no more than keep the length of p
     prescribed: str | tuple[str, ...] = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
@@ -191,7 +196,7 @@ def _compile(cls, functions):
         inner = {f"kernel_{name}": inlined(function) for name, function in functions.items()}
     except InvalidConstraint as error:
         raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
-    constants = {"ROWS": cls.rows, **layout(cls.markers), **inner}
+    constants = {"ROWS": cls.rows, "SUMMED": cls.summed, **layout(cls.markers), **inner}
     result = {}
     for name, (template, whose, signature) in _LOOPS.items():
         if whose in functions:

@@ -24,7 +24,14 @@ from ..maths.dense_linalg import (
 )
 from ..maths.tolerances import TINY
 from ..maths.vectors import matrix_a, matrix_g
-from ..model.equations import applied_forces, constraint_curvature, force_jacobian
+from ..model.equations import (
+    add_inertia_row,
+    applied_forces,
+    clear_rows,
+    constraint_curvature,
+    force_jacobian,
+    multiply_inertia_row,
+)
 from ..workspaces import load
 from .null_space import find_accelerations
 from .null_space_chart import NOT_FINITE, OK, SINGULAR
@@ -100,14 +107,11 @@ def _inertia_terms(system, w, linear):
 
 
 @kernel
-def _inertia_rows(w, linear):
+def _inertia_rows(system, w, linear):
     """Subtract h^T (h qdd + gamma_h) of the inertia rows from r; its change with h and gamma_h is neglected."""
     for e in range(w.inertia_bias.size):
-        f = w.inertia_bias[e]
-        for c in range(w.q.size):
-            f += w.inertia[e, c] * w.qdd[c]
-        for c in range(w.q.size):
-            linear.r[c] -= f * w.inertia[e, c]
+        f = w.inertia_bias[e] + multiply_inertia_row(system, w.inertia, e, w.qdd)
+        add_inertia_row(system, w.inertia, e, -f, linear.r)
 
 
 @kernel
@@ -138,11 +142,8 @@ def _add_mass_times(system, w, scale, X, out):
     # h^T h X
     for e in range(w.inertia_bias.size):
         for j in range(n):
-            f = 0.0
-            for c in range(n):
-                f += w.inertia[e, c] * X[c, j]
-            for c in range(n):
-                out[c, j] += scale * f * w.inertia[e, c]
+            f = scale * multiply_inertia_row(system, w.inertia, e, X[:, j])
+            add_inertia_row(system, w.inertia, e, f, out[:, j])
 
 
 @kernel
@@ -210,10 +211,12 @@ def linearise(context, t, vdd):
         applied_forces(system, w.q, w.qd, t, linear.r)
         _forces(system, w, linear, t, 1)  # stores derivatives of the laws; `reduce` evaluates the rest
     _inertia_terms(system, w, linear)
-    _inertia_rows(w, linear)
+    _inertia_rows(system, w, linear)
     # Phi_q^T lam = r;    Y = U B G1,    Z = U B G2
     multiply(w.U, w.B, linear.UB)
     transposed_times(linear.UB, linear.r, linear.lam)
+    clear_rows(system, linear.G1)
+    clear_rows(system, linear.G2)
     constraint_curvature(system, w.q, w.qd, w.qdd, t, linear.lam, linear.K, linear.G1, linear.G2)
     multiply(linear.UB, linear.G1, linear.Y)
     multiply(linear.UB, linear.G2, linear.Z)

@@ -13,13 +13,20 @@ from ..maths.dense_linalg import (
     largest,
     lu,
     lu_solve,
-    multiply,
     transposed_times,
 )
 from ..maths.tolerances import LAST_PLACE, SUM_ROUNDING
 from ..maths.vectors import multiply_g
 from ..methods.explicit import ACCELERATE, NORM, PLACE
-from ..model.equations import applied_forces, inertia_bias, inertia_rows, is_rheonomic, set_time
+from ..model.equations import (
+    add_inertia_row,
+    applied_forces,
+    inertia_bias,
+    inertia_rows,
+    is_rheonomic,
+    multiply_inertia_row,
+    set_time,
+)
 from ..rows.interface import evaluate_bias, evaluate_drift, evaluate_rows, has_redundant_rows, redundant_rows_hold
 from ..workspaces import load
 from .accelerations import (
@@ -76,11 +83,8 @@ def _add_momentum(system, b, p, x, y, scale, out):
 def _subtract_inertia(system, w, x, moving, out):
     """out -= M x, and h^T (h x + gamma_h) of inertia rows, gamma_h where x are accelerations (1) and none (0)."""
     for e in range(w.inertia_bias.size):
-        f = moving * w.inertia_bias[e]
-        for c in range(x.size):
-            f += w.inertia[e, c] * x[c]
-        for c in range(x.size):
-            out[c] -= f * w.inertia[e, c]
+        f = moving * w.inertia_bias[e] + multiply_inertia_row(system, w.inertia, e, x)
+        add_inertia_row(system, w.inertia, e, -f, out)
     for b in range(system.mass.size):
         at = system.bodies[b, 0]
         # m x on r, 4 G^T J' G x on p
@@ -296,8 +300,9 @@ def reduced_mass(system, w, t):
                     w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
     # D^T M D += (h D)^T h D of the inertia rows h
     inertia_rows(system, w.q, t, w.inertia)
-    multiply(w.inertia, w.D, w.inertia_D)
     for e in range(w.inertia_bias.size):
+        for j in range(k):
+            w.inertia_D[e, j] = multiply_inertia_row(system, w.inertia, e, w.D[:, j])
         for i in range(k):
             for j in range(i + 1):
                 w.A[i, j] += w.inertia_D[e, i] * w.inertia_D[e, j]
@@ -385,9 +390,7 @@ def reduced_acceleration(system, w, t, vdd):
     # vdd -= (h D)^T (h h_0 + gamma_h), h_0 = -U B gamma
     inertia_bias(system, w.q, w.qd, t, w.inertia_bias)
     for e in range(w.inertia_bias.size):
-        f = w.inertia_bias[e]
-        for c in range(n):
-            f += w.inertia[e, c] * w.h[c]
+        f = w.inertia_bias[e] + multiply_inertia_row(system, w.inertia, e, w.h)
         for j in range(k):
             vdd[j] -= w.inertia_D[e, j] * f
     if system.forces.shape[0] > 0:

@@ -362,22 +362,30 @@ def _normal_space(graph, w, l):
         if graph.row[e] < 0:
             continue
         # Other rows: (r, G^T pi' / 2) of Y0 = W0 H0^T, columns scaled to Phi_q0 U with a unit diagonal
-        j, scale = graph.row[e], 1.0 / diagonal[e]
-        for side in range(2):
-            body, y = graph.sides[e, side], 16 * e + 8 * side
-            if body == graph.bodies.shape[0]:
-                continue
-            i, o = graph.bodies[body, 0], 8 * body + 4
-            for c in range(3):
-                w.U[i + c, j] = scale * l.rows0.Y[y + c]
-            if graph.bodies[body, 1] == 7:
-                e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
-                f = 0.5 * scale
-                a0, a1, a2 = f * l.rows0.Y[y + 4], f * l.rows0.Y[y + 5], f * l.rows0.Y[y + 6]
-                w.U[i + 3, j] = -e1 * a0 - e2 * a1 - e3 * a2
-                w.U[i + 4, j] = e0 * a0 - e3 * a1 + e2 * a2
-                w.U[i + 5, j] = e3 * a0 + e0 * a1 - e1 * a2
-                w.U[i + 6, j] = -e2 * a0 + e1 * a1 + e0 * a2
+        _add_normal(graph, w, l, e, graph.row[e], 1.0 / diagonal[e])
+    for i in range(graph.tails.size):
+        e = graph.tails[i]
+        _add_normal(graph, w, l, graph.row.size + i, graph.row[e], 1.0 / diagonal[e])
+
+
+@kernel
+def _add_normal(graph, w, l, e, j, scale):
+    """Column j of U += scale (r, G^T pi' / 2) of a pair of sides."""
+    for side in range(2):
+        body, y = graph.sides[e, side], 16 * e + 8 * side
+        if body == graph.bodies.shape[0]:
+            continue
+        i, o = graph.bodies[body, 0], 8 * body + 4
+        for c in range(3):
+            w.U[i + c, j] += scale * l.rows0.Y[y + c]
+        if graph.bodies[body, 1] == 7:
+            e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
+            f = 0.5 * scale
+            a0, a1, a2 = f * l.rows0.Y[y + 4], f * l.rows0.Y[y + 5], f * l.rows0.Y[y + 6]
+            w.U[i + 3, j] += -e1 * a0 - e2 * a1 - e3 * a2
+            w.U[i + 4, j] += e0 * a0 - e3 * a1 + e2 * a2
+            w.U[i + 5, j] += e3 * a0 + e0 * a1 - e1 * a2
+            w.U[i + 6, j] += -e2 * a0 + e1 * a1 + e0 * a2
 
 
 @kernel

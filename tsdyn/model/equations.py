@@ -15,13 +15,14 @@ from ..elements.loops.forces import JACOBIAN as FORCE_JACOBIAN_SIGNATURE
 from ..elements.loops.template import AT, DIMENSION
 from ..jit.code_hash import is_ours
 from ..jit.kernels import caller, entry, kernel
+from ..maths.dense_linalg import clear_matrix
 from ..motions.prescribed import Motion, call_motion
 from ..motions.program import HOLD, call_smooth
 from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
 from .handles import handles_of
 from .laws import demand_callable, interrupts_answered
-from .packed import no_system
+from .packed import WIDTH, instances_of_kinds, no_system
 
 call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
 call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
@@ -73,8 +74,23 @@ def _run(s, kind, address, q, qd, t, out):
 
 
 @kernel
+def _clear_sums(s, out):
+    """out = 0 of rows that several instances add to."""
+    for i in range(s.sums.size):
+        out[s.sums[i]] = 0.0
+
+
+@kernel
+def clear_rows(s, Phi_q):
+    """Phi_q = 0, or its short rows, where several instances add to a row."""
+    if s.sums.size > 0:
+        clear_matrix(Phi_q)
+
+
+@kernel
 def constraints(s, q, t, Phi):
     """Phi (m,), Eq. 1; time has been set."""
+    _clear_sums(s, Phi)
     for i in range(s.kinds.shape[0]):
         _run(s, s.kinds[i], s.kinds[i].phi, q, q, t, Phi)
 
@@ -82,6 +98,7 @@ def constraints(s, q, t, Phi):
 @kernel
 def constraint_jacobian(s, q, t, Phi_q):
     """Phi_q (m, n); entries off the segments are left alone: zero them once."""
+    clear_rows(s, Phi_q)
     for i in range(s.kinds.shape[0]):
         _run(s, s.kinds[i], s.kinds[i].jacobian, q, q, t, Phi_q)
 
@@ -89,6 +106,7 @@ def constraint_jacobian(s, q, t, Phi_q):
 @kernel
 def time_derivative(s, q, t, Phi_t):
     """Phi_t (m,); rows that don't depend on time are left alone: zero them once."""
+    _clear_sums(s, Phi_t)
     for i in range(s.kinds.shape[0]):
         _run(s, s.kinds[i], s.kinds[i].phi_t, q, q, t, Phi_t)
 
@@ -96,22 +114,43 @@ def time_derivative(s, q, t, Phi_t):
 @kernel
 def acceleration_bias(s, q, qd, t, gamma):
     """gamma (m,), Eq. 3: Phi_q qdd + gamma = 0."""
+    _clear_sums(s, gamma)
     for i in range(s.kinds.shape[0]):
         _run(s, s.kinds[i], s.kinds[i].gamma, q, qd, t, gamma)
 
 
 @kernel
 def inertia_rows(s, q, t, h):
-    """h (k, n) of the inertia rows, M + h^T h; entries off the segments are left alone: zero them once."""
+    """h (i, 14) of the inertia rows: the mass matrix is M + h^T h."""
     for i in range(s.inertias.shape[0]):
         _run(s, s.inertias[i], s.inertias[i].jacobian, q, q, t, h)
 
 
 @kernel
 def inertia_bias(s, q, qd, t, gamma):
-    """gamma (k,) of the inertia rows: h qdd + gamma is the acceleration of their coordinates."""
+    """gamma (i,) of the inertia rows: h qdd + gamma is the acceleration of their coordinates."""
     for i in range(s.inertias.shape[0]):
         _run(s, s.inertias[i], s.inertias[i].gamma, q, qd, t, gamma)
+
+
+@kernel
+def multiply_inertia_row(s, h, e, x):
+    """Return h_e x, x (n,)."""
+    total = 0.0
+    for side in range(2):
+        at = s.inertia_segments[e, 2 * side]
+        for c in range(s.inertia_segments[e, 2 * side + 1]):
+            total += h[e, 7 * side + c] * x[at + c]
+    return total
+
+
+@kernel
+def add_inertia_row(s, h, e, scale, out):
+    """out (n,) += scale h_e."""
+    for side in range(2):
+        at = s.inertia_segments[e, 2 * side]
+        for c in range(s.inertia_segments[e, 2 * side + 1]):
+            out[at + c] += scale * h[e, 7 * side + c]
 
 
 @kernel
@@ -171,9 +210,28 @@ def evaluate_constraints(s, q, qd, t, Phi, Phi_q, Phi_t, gamma):
     acceleration_bias(s, q, qd, t, gamma)
 
 
-# Sparse Phi_q: 14 numbers a row, 7 for body a and 7 for body b; storage and products cost O(N).
+@entry(no_system(), "mmmm")
+def _fill_inertia_rows(s, q, qd, h, gamma):
+    """h (k, 14 i) and gamma (k, i) of the inertia rows at states q, qd (k, n)."""
+    for k in range(q.shape[0]):
+        inertia_rows(s, q[k], 0.0, h[k].reshape(-1, WIDTH))
+        inertia_bias(s, q[k], qd[k], 0.0, gamma[k])
 
-WIDTH = 14  # floats of a row; those of body b begin in the middle
+
+def added_inertia(system, q, qd):
+    """Yield of each inertia row its columns (c,), h (k, c) and gamma (k,) at states q, qd (k, n): M + h^T h."""
+    count = len(system.inertia_segments)
+    if count:
+        h, gamma = np.zeros((len(q), WIDTH * count)), np.zeros((len(q), count))
+        _fill_inertia_rows(system, q, qd, h, gamma)
+        used = np.arange(WIDTH // 2) < system.inertia_segments[:, 1::2, None]
+        columns = system.inertia_segments[:, ::2, None] + np.arange(WIDTH // 2)
+        for i in range(count):
+            yield columns[i][used[i]], h.reshape(-1, count, *used[i].shape)[:, i][:, used[i]], gamma[:, i]
+
+
+# Sparse Phi_q: 14 numbers a row, 7 for body a and 7 for body b; storage and products cost O(N). A row that is a sum has
+# 14 numbers for each of its terms: those of the first in its own place, those of the `tails` behind all rows.
 
 
 def with_short_rows(packed):
@@ -181,34 +239,41 @@ def with_short_rows(packed):
     known = packed.derived
     if known.short_rows is None:
         system = packed.system
-        table = system.table.copy()
-        for kind in system.kinds:
+        table, m = system.table.copy(), len(system.segments)
+        segments = np.concatenate((system.segments, np.zeros((system.tails.size, 4), np.int64)))
+        tail = {id(part): m + i for i, part in enumerate(part for part in packed.constraints if not part.rows)}
+        for kind, members in zip(system.kinds, instances_of_kinds(packed), strict=True):
             first, count = kind.table, kind.count
             own = table[first : first + INTS * count].reshape(count, INTS)
-            own[:, BLOCK] = WIDTH * own[:, ROW]
-            own[:, BLOCK + 1] = WIDTH * own[:, ROW] + WIDTH // 2
+            line = own[:, ROW]
+            if members[0].summed:
+                line = np.array([tail.get(id(part), row) for part, row in zip(members, line, strict=True)])
+                segments[line] = own[:, [AT, DIMENSION, AT + 1, DIMENSION + 1]]
+            own[:, BLOCK] = WIDTH * line
+            own[:, BLOCK + 1] = WIDTH * line + WIDTH // 2
             own[:, STRIDE] = WIDTH
-        known.short_rows = system._replace(table=table)
+        known.short_rows = system._replace(table=table, segments=segments)
     return known.short_rows
 
 
 def places(packed):
-    """Where in q the two halves of each row belong, (m, 2), and their lengths, (m, 2)."""
-    segments = packed.system.segments
+    """Where in q the two halves of each short row belong, (lines, 2), and their lengths, (lines, 2)."""
+    segments = with_short_rows(packed).segments
     return segments[:, 0::2].copy(), segments[:, 1::2].copy()
 
 
 def as_csr(packed, rows):
-    """Phi_q (m, n) as a SciPy sparse array, of rows (m, 14)."""
+    """Phi_q (m, n) as a SciPy sparse array, of short rows (lines, 14)."""
     from scipy.sparse import csr_array
 
     at, length = places(packed)
     half = np.arange(WIDTH // 2)
     columns = (at[:, :, None] + half).reshape(len(at), WIDTH)
     used = (half < length[:, :, None]).reshape(len(at), WIDTH)
-    i = np.broadcast_to(np.arange(len(at))[:, None], used.shape)
-    n = int(packed.system.bodies[:, 1].sum())
-    return csr_array((rows[used], (i[used], columns[used])), shape=(len(at), n))
+    system, m = packed.system, len(packed.system.segments)
+    i = np.broadcast_to(np.concatenate((np.arange(m), system.tails))[:, None], used.shape)
+    n = int(system.bodies[:, 1].sum())
+    return csr_array((rows[used], (i[used], columns[used])), shape=(m, n))
 
 
 # Samples of forces that depend on time by a function or a law of the user's, at states that stay the same.

@@ -137,6 +137,9 @@ def _of(redundant, turning, handles):
     return Derived(redundant, turning, handles)
 
 
+WIDTH = 14  # floats of a short row of Phi_q; those of body b begin in the middle
+
+
 # Lengths of a scene: in a small one positions are held to rounding of these, not of the pure numbers beside them.
 
 POINT_SIZE = 1e-3  # m: a scene without longer lengths, or whose points coincide; rounding of one is 1e-12 of it
@@ -383,12 +386,15 @@ class System(NamedTuple):
     reals: np.ndarray  # float64: for each instance marker coordinates, then parameters
     motions: np.ndarray  # (motions,) of tables.MotionPlace
     rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
-    segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
+    segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice; of a sum one span
+    sums: np.ndarray  # int64 (sums,): rows that several instances add to
+    tails: np.ndarray  # int64 (tails,): of every instance but the first of a sum, its row
     forces: np.ndarray  # (kinds,) of tables.ForceKind
     signals: np.ndarray  # (signals,) of tables.SignalPlace
     memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
     normals: np.ndarray  # int64 (frictions,): places in reals of the normal loads of joints' frictions
-    inertias: np.ndarray  # (kinds,) of tables.ConstraintKind: the rows h of M + h^T h, see rows/inertia_rows.py
+    inertias: np.ndarray  # (kinds,) of tables.ConstraintKind: the rows h of M + h^T h, short; see rows/inertia_rows.py
+    inertia_segments: np.ndarray  # int64 (i, 4): as segments, of these rows
 
 
 def no_system():
@@ -405,11 +411,14 @@ def no_system():
         motions=records(MotionPlace),
         rheonomic=whole,
         segments=wholes,
+        sums=whole,
+        tails=whole,
         forces=records(ForceKind),
         signals=records(SignalPlace),
         memory=whole,
         normals=whole,
         inertias=records(ConstraintKind),
+        inertia_segments=wholes,
     )
 
 
@@ -491,15 +500,17 @@ def pack(scene):
         for pairs in (scene._twins, scene._aliases):  # functions may hold handles of the scene that this is a copy of
             derived.handles.add_aliases((pairs or {}).items())
     forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals, derived.handles)
-    added = sorted((force.inertia_row for force in scene.forces if force.adds_inertia), key=lambda row: type(row).__qualname__)
-    added = {row: checked_motions(row) for row in added}
-    inertia_kinds, *_ = _pack_constraints(added, int(starts[-1]), where, table, reals)
+    added = [force.inertia_row for force in scene.forces if force.adds_inertia]
+    inertia_kinds, *_ = _pack_constraints({row: row.parameters() for row in added}, 0, where, table, reals)
+    inertias = records(ConstraintKind, inertia_kinds)
+    for kind in inertias:
+        _shorten(table, kind)
     _append_programs(motions, reals)
-    inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
+    moments = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
         mass=np.array([body.values["mass"] for body in scene.bodies]),
-        inertia=np.array(inertias).reshape(-1, 9),
+        inertia=np.array(moments).reshape(-1, 9),
         gravity=np.array(scene.gravity),  # writable, as all arrays here: what is read-only is another type to a kernel
         kinds=records(ConstraintKind, kinds),
         table=np.array(table, np.int64),
@@ -507,28 +518,59 @@ def pack(scene):
         motions=records(MotionPlace, [row for row, _ in motions]),
         rheonomic=np.array([any(constraint.rheonomic for constraint in primitives)], np.int64),
         segments=np.array(_segments(primitives, where), np.int64).reshape(-1, 4),
+        sums=np.array([row for part, row in first_rows(primitives) if part.summed and part.rows], np.int64),
+        tails=np.array([row for part, row in first_rows(primitives) if not part.rows], np.int64),
         forces=forces,
         signals=signals,
         memory=np.array([*memory, *kept.values()], np.int64),
         normals=np.array(normals, np.int64),
-        inertias=records(ConstraintKind, inertia_kinds),
+        inertias=inertias,
+        inertia_segments=np.array(_segments(added, where), np.int64).reshape(-1, 4),
     )
     coordinates = tuple(constraint.coordinates for constraint in primitives)
     size = size_of(primitives, coordinates)
     order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
     slots = tuple(order.get(constraint, -1) for constraint in primitives)
     given = tuple(parameters.values())
-    rows = tuple(added)
-    return Packed(system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, rows, derived)
+    whole = system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, tuple(added), derived
+    return Packed(*whole)
+
+
+def _shorten(table, kind):
+    """Let the rows of Phi_q of a kind be short."""
+    for own in range(int(kind.table), int(kind.table + INTS * kind.count), INTS):
+        line = WIDTH * table[own + ROW]
+        table[own + BLOCK], table[own + BLOCK + 1], table[own + STRIDE] = line, line + WIDTH // 2, WIDTH
 
 
 def _segments(primitives, where):
-    """The two spans of columns of each row of Phi_q that are not zero."""
+    """The two spans of columns of each row of Phi_q that are not zero; of a sum, one that covers all its bodies."""
     found = []
     for constraint in primitives:
         spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
-        found += [[*spans[0], *spans[1]]] * constraint.rows
+        if constraint.summed:
+            begin, length = found.pop()[:2] if not constraint.rows else (0, 0)
+            used = [span for span in (*spans, (begin, length)) if span[1]]
+            begin, end = min(at for at, _ in used), max(at + size for at, size in used)
+            spans = (begin, end - begin), (0, 0)
+        found += [[*spans[0], *spans[1]]] * (1 if constraint.summed else constraint.rows)
     return found
+
+
+def instances_of_kinds(packed):
+    """The primitives of each row of System.kinds, in its order."""
+    groups = {kind: [] for kind in classes(packed)}
+    for primitive in packed.constraints:
+        groups[type(primitive)].append(primitive)
+    return list(groups.values())
+
+
+def first_rows(primitives):
+    """Yield each primitive and the first of its rows; the terms of a sum have the same."""
+    row = 0
+    for primitive in primitives:
+        yield primitive, row if primitive.rows else row - 1
+        row += primitive.rows
 
 
 def _pack_constraints(parameters, n, where, table, reals):
@@ -536,10 +578,9 @@ def _pack_constraints(parameters, n, where, table, reals):
 
     Returns rows of System.kinds, of System.motions each with its Motion, and {constraint: place of what it remembers}.
     """
-    groups, row = {}, 0
-    for constraint in parameters:
+    groups = {}
+    for constraint, row in first_rows(parameters):
         groups.setdefault(type(constraint), []).append((constraint, row))
-        row += constraint.rows
     kinds, motions, kept = [], [], {}
     for kind, members in groups.items():
         first = len(table), len(reals)
@@ -549,7 +590,7 @@ def _pack_constraints(parameters, n, where, table, reals):
             _append_reals(constraint, parameters[constraint], reals, motions)
             if kind.memory:
                 kept[constraint] = len(reals)
-                reals.append(0.0)
+                reals.append(float(constraint.turn))
             if begin == first[1]:
                 stride = len(reals) - begin
             if len(reals) - begin != stride:
@@ -613,10 +654,9 @@ def member_of(packed, constraint):
     """The `Member` that a constraint, or a joint's part, is; None where it is not of that scene."""
     known = packed.derived
     if known.members is None:
-        found, row = {}, 0
-        for i, part in enumerate(packed.constraints):
-            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + part.rows))
-            row += part.rows
+        found = {}
+        for i, (part, row) in enumerate(first_rows(packed.constraints)):
+            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + max(part.rows, 1)))
         known.members = found | {id(member.constraint): member for member in packed.members}
     return known.members.get(id(constraint))
 

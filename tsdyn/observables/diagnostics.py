@@ -1,7 +1,7 @@
 """Constraint errors, energy and momentum of a trajectory, recomputed in NumPy from t, q, qd, qdd alone.
 
-The solver's kernels are not used. Constraint errors come from each primitive's phi, evaluated on second-order Taylor
-numbers of the marker coordinates, so neither its jacobian nor its gamma enters.
+The solver's kernels are not used, but for rows that add inertia. Constraint errors come from each primitive's phi,
+evaluated on second-order Taylor numbers of the marker coordinates, so neither its jacobian nor its gamma enters.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from ..elements.bodies import IDENTITY, rotation_matrix
 from ..elements.markers import PARAMETERS, POINT, TURN
 from ..jit.kernels import twin
 from ..maths.power_series import Jet
+from ..model.equations import added_inertia
 from ..model.kinematics import angular_velocity
+from ..model.packed import first_rows
 from ..motions.prescribed import Motion
 
 if TYPE_CHECKING:
@@ -40,12 +42,15 @@ def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0, memory=None):
     levels = tuple(np.zeros((t.size, len(packed.system.segments))) for _ in range(3))
     for rows, part in _groups(packed, t, q, qd, qdd, time_rate, memory):
         for level, values in zip(levels, part, strict=True):
-            level[:, rows] = values
+            np.add.at(level, (slice(None), rows), values)  # a row may be a sum
     return levels
 
 
 def constraint_error(packed, t, q, qd, qdd, memory=None):
     """Maximum norms of `constraint_rows` over the rows."""
+    if packed.system.sums.size:
+        rows = constraint_rows(packed, t, q, qd, qdd, memory=memory)
+        return ConstraintError(*(np.abs(level).max(axis=1, initial=0.0) for level in rows))
     worst = np.zeros((3, t.size))
     for _, part in _groups(packed, t, q, qd, qdd, 1.0, memory):
         for level, values in zip(worst, part, strict=True):
@@ -55,9 +60,9 @@ def constraint_error(packed, t, q, qd, qdd, memory=None):
 
 def _groups(packed, t, q, qd, qdd, time_rate, memory):
     """Yield rows of Phi (r,) and their three levels, (k, r) each: for constraints of one form at a time."""
-    starts, groups, row = starts_of(packed), {}, 0
-    lists = packed.constraints, packed.parameters, packed.coordinates, packed.slots
-    for constraint, values, places, slot in zip(*lists, strict=True):
+    starts, groups = starts_of(packed), {}
+    lists = first_rows(packed.constraints), packed.parameters, packed.coordinates, packed.slots
+    for (constraint, row), values, places, slot in zip(*lists, strict=True):
         if slot >= 0:
             values = *values, np.zeros(t.size) if memory is None else memory[:, slot]
         bodies = tuple(constraint.body_of(marker) for marker in constraint.markers)
@@ -68,7 +73,6 @@ def _groups(packed, t, q, qd, qdd, time_rate, memory):
         )
         members = [starts.get(body, 0) for body in bodies], places, values, row
         groups.setdefault(form, (constraint, []))[1].append(members)
-        row += constraint.rows
     most = max(AT_ONCE // max(t.size, 1), 1)
     for constraint, members in groups.values():
         for first in range(0, len(members), most):
@@ -89,12 +93,12 @@ def _levels(constraint, members, t, q, qd, qdd, time_rate):
         at, s = starts[:, j], places[:, j].T
         x += _marker_jet(marker, constraint.body_of(marker).dimension, at, s, q, qd, qdd)
     par = [entry for given in zip(*values, strict=True) for entry in _parameter(given, t, time_rate)]
-    out = [None] * constraint.rows
+    out = [None] * type(constraint).rows
     twin(type(constraint).phi)(x, par, Jet(t[:, None], time_rate), out)
     shape = t.size, len(members)
     out = [Jet.of(row) for row in out]
     levels = [[np.broadcast_to(getattr(row, name), shape) for row in out] for name in ("x", "xd", "xdd")]
-    places = np.concatenate([np.array(rows) + i for i in range(constraint.rows)])
+    places = np.concatenate([np.array(rows) + i for i in range(len(out))])
     return places, [np.concatenate(level, axis=1) for level in levels]
 
 
@@ -183,6 +187,8 @@ def kinetic_energy(system, q, qd):
         total += 0.5 * (bodies.rd**2).sum(axis=2) @ bodies.mass
         if bodies.omega is not None:
             total += 0.5 * np.einsum("kbi,bij,kbj->k", bodies.omega, bodies.inertia, bodies.omega)
+    for columns, h, _ in added_inertia(system, q, qd):
+        total += 0.5 * (h * qd[:, columns]).sum(axis=1) ** 2
     return total
 
 

@@ -13,7 +13,7 @@ from ..calls import fitting_methods
 from ..elements.bodies import rotation_matrix, transform_g
 from ..elements.force import Force
 from ..elements.loops.constraint_rows import place_bodies, take_loads
-from ..elements.loops.coordinate_rows import INTS
+from ..elements.loops.coordinate_rows import BLOCK, INTS
 from ..elements.markers import POINT
 from ..errors import InvalidBody, InvalidConstraint, RedundantConstraints
 from ..formulations.accelerations import find_reactions, normal_load
@@ -155,7 +155,7 @@ def solve_multipliers(context, t, q, r, rows, out):
     """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + Q_v - M qdd. NaN where Phi_q is singular.
 
     S lam = H W r on the graph with one step of refinement, r in terms of bodies, then the normalisations from the
-    remainder of r along p. The system is that with short rows, rows (m, 14) scratch, zero on entry.
+    remainder of r along p. The system is that with short rows, rows (lines, 14) scratch, zero on entry.
     """
     whole = load_parts(context)
     graph, s, f = whole.graph, whole.system, whole.tangent
@@ -172,11 +172,12 @@ def solve_multipliers(context, t, q, r, rows, out):
             for e in range(f.b.size):
                 if graph.row[e] >= 0:
                     out[k, graph.row[e]] += f.b[e]
-        for i in range(out.shape[1]):  # remainder of r
+        for i in range(rows.shape[0]):  # remainder of r; rows of later terms of sums are behind all others
+            row = i if i < out.shape[1] else s.tails[i - out.shape[1]]
             for half in range(2):
                 at = s.segments[i, 2 * half]
                 for c in range(s.segments[i, 2 * half + 1]):
-                    f.Q[at + c] -= rows[i, 7 * half + c] * out[k, i]
+                    f.Q[at + c] -= rows[i, 7 * half + c] * out[k, row]
         for b in range(bodies.shape[0]):
             i = graph.normals[b]
             if i >= 0:
@@ -197,11 +198,11 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
     """
     memory = with_normal_loads(packed, t, q, qd, qdd, memory)
     found = taken(packed, q.shape[1])
-    out = np.zeros((t.size, len(found.system.segments)))
+    out = np.zeros((t.size, len(packed.system.segments)))
     f = applied_loads(packed.system, t, q, qd, memory)
     f += velocity_forces(found.system, q, qd)
     f -= inertial_forces(found.system, q, qdd)
-    solve_multipliers(found.address, t, q, f, np.zeros((out.shape[1], WIDTH)), out)
+    solve_multipliers(found.address, t, q, f, np.zeros((len(found.system.segments), WIDTH)), out)
     give(packed, found)
     return out
 
@@ -221,15 +222,22 @@ def reaction(solution, member, body):
     """
     packed = solution.packed
     system = with_short_rows(packed)
-    system = system._replace(reals=system.reals.copy(), kinds=only(packed, member.parts))
+    kinds = only(packed, member.parts)
+    system = system._replace(reals=system.reals.copy(), kinds=kinds)
     load = np.zeros((solution.t.size, system.bodies[index_of(packed, body), 1]))
     rows = np.zeros((len(system.segments), WIDTH))
-    halves = []  # half of each row that belongs to the body
-    for part in packed.constraints[member.parts]:
-        halves += [0 if body is part.a else WIDTH // 2 if body is part.b else -1] * part.rows
-    lam = np.ascontiguousarray(particular(solution.multipliers)[:, member.rows])
-    first, halves = member.rows.start, np.array(halves, np.int64)
-    constraint_loads(system, solution.t, solution.q, lam, first, halves, rows, load)
+    lines = []  # short rows of the constraint: which, its row, and the half of it that belongs to the body
+    for part, first in zip(
+        packed.constraints[member.parts], system.table[kinds["table"] + BLOCK] // WIDTH, strict=True
+    ):
+        if body is part.a or body is part.b:
+            own = member_of(packed, part).rows
+            lines += [
+                (first + r, row, 0 if body is part.a else WIDTH // 2)
+                for r, row in enumerate(range(own.start, own.stop))
+            ]
+    lines, lam = np.array(lines, np.int64).reshape(-1, 3), particular(solution.multipliers)
+    constraint_loads(system, solution.t, solution.q, lam, *np.ascontiguousarray(lines.T), rows, load)
     return at_first_point(solution, body, load, member.constraint, member.coordinates)
 
 
@@ -281,20 +289,18 @@ def at_first_point(solution, body, load, item, coordinates):
     return force, torque
 
 
-@entry(no_system(), "vmmiwmm")
-def constraint_loads(s, t, q, lam, first, halves, rows, out):
-    """out (k, 7 or 3) = -Phi_q^T lam of one body; lam (k, rows of the constraint), which begin at first.
+@entry(no_system(), "vmmwwwmm")
+def constraint_loads(s, t, q, lam, lines, which, halves, rows, out):
+    """out (k, 7 or 3) = -Phi_q^T lam of one body, lam (k, m): over these lines of the short rows (lines, 14).
 
-    halves (rows,) is the first entry of the body in each row, negative if there is none.
+    which are their rows of Phi, halves where the entries of the body begin.
     """
     for k in range(t.size):
         set_time(s, t[k])
         constraint_jacobian(s, q[k], t[k], rows)
-        for i in range(lam.shape[1]):
-            if halves[i] < 0:
-                continue
+        for i in range(lines.size):
             for c in range(out.shape[1]):
-                out[k, c] -= rows[first + i, halves[i] + c] * lam[k, i]
+                out[k, c] -= rows[lines[i], halves[i] + c] * lam[k, which[i]]
 
 
 # Uniqueness of reactions among redundant constraints: reactions to which no self-stress contributes.
@@ -313,7 +319,10 @@ def find_rows(graph, s, f, q, t, whole):
 
 @entry("pvmwwvv")
 def free_loads(context, t, q, rows, sides, whole, out):
-    """out (k,): the largest load on a body by these rows in a unit self-stress, relative to their size."""
+    """out (k,): the largest load on a body by these sides of H in a unit self-stress, relative to their size.
+
+    rows are those of the multipliers, sides where the eight numbers of each begin.
+    """
     c = load_parts(context)
     graph, s, f = c.graph, c.system, c.tangent
     for k in range(t.size):
@@ -323,7 +332,7 @@ def free_loads(context, t, q, rows, sides, whole, out):
             for c in range(8):
                 load = 0.0
                 for i in range(rows.size):
-                    h = whole[16 * rows[i] + 8 * sides[i] + c]
+                    h = whole[sides[i] + c]
                     size = max(size, abs(h))
                     load += f.b[rows[i]] * h
                 f.Z[c] = load
@@ -337,11 +346,13 @@ def unique(solution, rows, body):
     if not redundancy(graph):
         return np.ones(solution.t.size, bool)
     wanted = np.flatnonzero((graph.row >= rows.start) & (graph.row < rows.stop))
-    sides = np.where(graph.sides[wanted, 0] == index_of(solution.packed, body), 0, 1)
+    owner = np.concatenate((np.arange(len(graph.row)), graph.tails))
+    pairs, side = np.nonzero((graph.sides == index_of(solution.packed, body)) & np.isin(owner, wanted)[:, None])
+    wanted, sides = owner[pairs], 16 * pairs + 8 * side
     system = solution.system._replace(reals=solution.system.reals.copy())
     context, *_keep = resident(parts(system, graph, solution.q.shape[1]))
     out = np.zeros(solution.t.size)
-    free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(graph.row)), out)
+    free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(graph.sides)), out)
     return out < RANK_TOL
 
 
@@ -380,7 +391,7 @@ def demand_unique(packed, q, t):
     system = packed.system._replace(reals=packed.system.reals.copy())
     context, *_keep = resident(parts(system, graph, q.size))
     free = np.zeros(len(graph.frictions))
-    _free_loads(context, t, q, np.zeros(16 * len(graph.row)), free)
+    _free_loads(context, t, q, np.zeros(16 * len(graph.sides)), free)
     wrong = [load.force for load in packed.loads if load.normal >= 0 and free[load.normal] > RANK_TOL]
     if wrong:
         names = ", ".join(force.name for force in wrong)

@@ -5,9 +5,9 @@ coordinate is an unknown mu beside the multipliers:
 
     M a = F - H^T lam - h^T mu,        h a + gamma_h - mu = 0
 
-The second equation is an inertia row of S: products of h with the other rows, and one more on the diagonal. It holds for
-accelerations alone. Projections of positions and the chart leave it out: it is zero in H, and one on the diagonal of
-N. Projections of velocities by the factors of S are those in the metric of M + h^T h.
+The second equation is an inertia row of S: products of h with the other rows, and one more on the diagonal. It holds
+for accelerations alone. Projections of positions and the chart leave it out: it is zero in H, and one on the diagonal
+of N. Projections by the factors of S are those in the metric of M + h^T h.
 """
 
 from ..jit.kernels import kernel

@@ -8,6 +8,7 @@ from .constraint_graph import is_raised
 from .elimination import KERNELS as ELIMINATION
 from .elimination import lu_factors
 from .evaluation import (
+    clear_sums,
     evaluate_bias,
     evaluate_drift,
     evaluate_every_row,
@@ -106,7 +107,8 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
     poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
     tangent = TangentWorkspace(
         poses, allocate_rows(graph), zeros(m), zeros(m), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n),
-        zeros(4), Landing(), Selection(), Indicator(), RedundantRows(*(zeros(k * left) for k in (16, 1, 1))),
+        zeros(4), Landing(), Selection(), Indicator(),
+        RedundantRows(zeros(16 * len(graph.sides) if redundant else 0), zeros(left), zeros(left)),
         np.zeros(m + 1, np.int64), zeros(left), np.zeros(m + 1, np.int64), zeros(left),
         *(np.zeros(size, np.int64) for size in (m + 1, m)),
         zeros(max(widest, m if choosing else 0) ** 2), _allocate_friction(graph, n, basis), np.zeros(2, np.int64),
@@ -117,16 +119,15 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
 
 def allocate_rows(graph):
     """Allocate `Rows`."""
-    m = len(graph.row)
-    inertias = zeros(INERTIA_WIDTH * len(graph.inertias))
-    return Rows(zeros(16 * m), zeros(16 * m), zeros(graph.pattern.shape[2]), inertias)
+    size, inertias = 16 * len(graph.sides), zeros(INERTIA_WIDTH * len(graph.inertias))
+    return Rows(zeros(size), zeros(size), zeros(graph.pattern.shape[2]), inertias)
 
 
 def _allocate_friction(graph, n, basis):
     k, rows = len(graph.frictions), len(graph.row) + int((graph.normals >= 0).sum())
-    m, nb = (len(graph.row), len(graph.bodies)) if k else (0, -1)
+    m, pairs, nb = (len(graph.row), len(graph.sides), len(graph.bodies)) if k else (0, 0, -1)
     factors = lu_factors(graph.pattern) if k else (zeros(0), zeros(0))
-    free = zeros(16 * k), zeros(7 * k), zeros(m), zeros(8 * (nb + 1)), zeros(16 * m), *factors
+    free = zeros(16 * k), zeros(7 * k), zeros(m), zeros(8 * (nb + 1)), zeros(16 * pairs), *factors
     if not basis:
         k = n = rows = 0
     matrices = np.zeros((k, n + rows)), np.zeros((k, k)), np.zeros(k, np.int64)
@@ -223,6 +224,7 @@ __all__ = [
     "apply_multipliers",
     "balance_loads",
     "clear_redundant",
+    "clear_sums",
     "constrain",
     "constrain_accelerations",
     "count_self_stresses",

@@ -39,21 +39,40 @@ def leave_redundant_rows(graph, f, Phi, H):
         over = abs(Phi[row]) - HELD * _position_terms(graph, f, H, row)
         if not over <= worst:
             worst = over
-        for c in range(0, 16, 4):
-            if f.redundant.H.size > 0:
-                put(f.redundant.H, 16 * i + c, four(H, 16 * row + c))
-            put(H, 16 * row + c, splat(0.0))
+        _leave_pair(f, H, row, i)
+        for j in range(graph.tails.shape[0]):
+            if graph.tails[j] == row:
+                _leave_pair(f, H, graph.row.shape[0] + j, graph.row.shape[0] + j)
     f.selection.excess = worst
     clear_redundant(f, Phi)
 
 
 @kernel
+def _leave_pair(f, H, e, kept):
+    """H = 0 of a pair of sides, kept in the place `kept`."""
+    for c in range(0, 16, 4):
+        if f.redundant.H.size > 0:
+            put(f.redundant.H, 16 * kept + c, four(H, 16 * e + c))
+        put(H, 16 * e + c, splat(0.0))
+
+
+@kernel
 def _position_terms(graph, f, H, row):
     """Size of the terms of a row at the poses: |H_r| |r| + |H_pi'|."""
+    terms = _terms_of_pair(graph, f, H, row)
+    for j in range(graph.tails.shape[0]):
+        if graph.tails[j] == row:
+            terms += _terms_of_pair(graph, f, H, graph.row.shape[0] + j)
+    return terms
+
+
+@kernel
+def _terms_of_pair(graph, f, H, e):
+    """The same of a pair of sides."""
     terms = 0.0
     for side in range(2):
         # |H_r| |r| + |H_pi'|
-        b, at = graph.sides[row, side], 16 * row + 8 * side
+        b, at = graph.sides[e, side], 16 * e + 8 * side
         if b < graph.bodies.shape[0]:
             terms += math.sqrt(square(H, at) * square(f.poses, b * POSE + R)) + length(H, at + 4)
     return terms

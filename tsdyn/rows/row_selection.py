@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.loops.constraint_rows import POSE, R
-from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
+from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, stack, vector
 from ..jit.predicates import below, choose, either, every, most
 from ..jit.simd import get
 from ..maths.tolerances import PIVOT_ROUNDING
@@ -83,6 +83,7 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
                     if body == graph.sides[j, l] and body < graph.bodies.shape[0]:
                         x += inner(H, 16 * i + 8 * k, Y, 16 * j + 8 * l)
             A[i * m + j] = x
+    _add_tails(graph, H, Y, A)
     # Scaled to a unit diagonal: pivots are squared sines of angles between rows
     for i in range(m):
         for j in range(i):
@@ -113,6 +114,22 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
     for i in range(rank, count):
         dropped[1 + i - rank] = order[i]
     return count - rank
+
+
+@kernel
+def _add_tails(graph, H, Y, A):
+    """The products of the later terms of sums, added to the lower triangle A of H W H^T."""
+    m = graph.row.size
+    for t in range(graph.tails.size):
+        for j in range(m + t + 1):
+            x, e, o = 0.0, graph.tails[t], graph.tails[j - m] if j >= m else j
+            for k in range(2):
+                for l in range(2):
+                    body = graph.sides[m + t, k]
+                    if body == graph.sides[j, l] and body < graph.bodies.shape[0]:
+                        x += inner(H, 16 * (m + t) + 8 * k, Y, 16 * j + 8 * l)
+            # Two terms of one sum count both ways
+            A[max(e, o) * m + min(e, o)] += 2.0 * x if e == o and j != m + t else x
 
 
 @kernel
@@ -380,31 +397,44 @@ def _hold(graph, f, known, q, rates, most, fastest):
 
     A body whose rates are below FAINT of the largest, `most` and `fastest`, counts as one with these.
     """
-    H = f.redundant.H
     for i in range(f.dropped[0]):
         # |H (rd, omega') + known| against the sum of its absolute terms
-        residual, terms = known[i], abs(known[i])
-        for side in range(2):
-            b, at = graph.sides[f.dropped[1 + i], side], 16 * i + 8 * side
-            if b == graph.bodies.shape[0]:
-                continue
-            # H_r rd
-            k = graph.bodies[b, 0]
-            residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
-            terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + LEAST_SHARE * most * length(H, at)
-            if graph.bodies[b, 1] == 7:
-                # H_pi' omega'
-                e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
-                d0, d1, d2, d3 = rates[k + 3], rates[k + 4], rates[k + 5], rates[k + 6]
-                x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3  # 2 (x, y, z) = omega'
-                y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
-                z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
-                residual += 2.0 * (H[at + 4] * x + H[at + 5] * y + H[at + 6] * z)
-                spin = 2.0 * math.sqrt(d0 * d0 + square(rates, k + 4))
-                terms += length(H, at + 4) * (spin + LEAST_SHARE * fastest)
+        row, residual, terms = f.dropped[1 + i], known[i], abs(known[i])
+        more, size = _pair_terms(graph, f, row, i, q, rates, most, fastest)
+        residual, terms = residual + more, terms + size
+        for j in range(graph.tails.shape[0]):
+            if graph.tails[j] == row:
+                e = graph.row.shape[0] + j
+                more, size = _pair_terms(graph, f, e, e, q, rates, most, fastest)
+                residual, terms = residual + more, terms + size
         if not abs(residual) <= HELD * terms:
             return False
     return True
+
+
+@kernel
+def _pair_terms(graph, f, e, place, q, rates, most, fastest):
+    """H (rd, omega') of a pair of sides, kept in a place of RedundantRows.H, and the sum of its absolute terms."""
+    H, residual, terms = f.redundant.H, 0.0, 0.0
+    for side in range(2):
+        b, at = graph.sides[e, side], 16 * place + 8 * side
+        if b == graph.bodies.shape[0]:
+            continue
+        # H_r rd
+        k = graph.bodies[b, 0]
+        residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
+        terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + LEAST_SHARE * most * length(H, at)
+        if graph.bodies[b, 1] == 7:
+            # H_pi' omega'
+            e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
+            d0, d1, d2, d3 = rates[k + 3], rates[k + 4], rates[k + 5], rates[k + 6]
+            x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3  # 2 (x, y, z) = omega'
+            y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
+            z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
+            residual += 2.0 * (H[at + 4] * x + H[at + 5] * y + H[at + 6] * z)
+            spin = 2.0 * math.sqrt(d0 * d0 + square(rates, k + 4))
+            terms += length(H, at + 4) * (spin + LEAST_SHARE * fastest)
+    return residual, terms
 
 
 # Selection of redundant rows during a run: renewed where the kept rows come close to dependence.
@@ -455,8 +485,8 @@ def reselect_rows(choice, reals, t, H, Y, S, metric):
     """Call `_choose` by address, 1 or 0: few scenes need it, and its code is as long as all other row code."""
     c = load_choice(choice)
     graph, f = c.graph, c.tangent
-    m, size = graph.row.size, graph.pattern.shape[2]
-    rows = Rows(vector(H, 16 * m), vector(Y, 16 * m), vector(S, size), f.rows.h)
+    pairs, size = 16 * graph.sides.shape[0], graph.pattern.shape[2]
+    rows = Rows(vector(H, pairs), vector(Y, pairs), vector(S, size), f.rows.h)
     return 1 if _choose_again(graph, vector(reals, ANY), f, rows, t, metric) else 0
 
 
@@ -536,6 +566,20 @@ def count_self_stresses(f):
 
 
 @kernel
+def _weigh_tails(graph, H, row, Z):
+    """Z += W h^T of the later terms of a row."""
+    w = stack(8)
+    for j in range(graph.tails.shape[0]):
+        for side in range(2 if graph.tails[j] == row else 0):
+            e = graph.row.shape[0] + j
+            body = graph.sides[e, side]
+            if body < graph.bodies.shape[0]:
+                weigh(graph.inverse, body, H, 16 * e + 8 * side, w, 0)
+                for c in range(8):
+                    Z[8 * body + c] += w[c]
+
+
+@kernel
 def self_stress(graph, f, H, i):
     """b = z of redundant row i, H being of every row; return the largest |z|. f.rows are factorised."""
     row = f.dropped[1 + i]
@@ -546,6 +590,8 @@ def self_stress(graph, f, H, i):
         body = graph.sides[row, side]
         if body < graph.bodies.shape[0]:
             weigh(graph.inverse, body, H, 16 * row + 8 * side, f.Z, 8 * body)
+    if graph.tails.shape[0] > 0:
+        _weigh_tails(graph, H, row, f.Z)
     # z = -S^-1 H W h^T for the kept rows
     multiply_rows(graph, f.rows, f.Z, f.b)
     solve_rows(graph, f.rows, f.b)

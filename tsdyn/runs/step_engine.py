@@ -48,7 +48,8 @@ class StepMemory(Memory):
         self.source, kept = prepared.system(implicit, basis_free)
         system, redundant = System(*(array.copy() for array in self.source)), redundancy(graph)
         rows = len(graph.row) if basis_free else None
-        work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant, inertias=len(packed.inertias))
+        inertias = len(packed.inertias)
+        work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant, inertias=inertias)
         angles, slots = prepared.handles.count, system.memory.size
         parts = basis_free_parts(graph, n, not basis_free, saddle, coupled)
         run = lay_out(n, *sizes, angles, slots, warm=warm_size(work, *parts[1:]), **lengths)

@@ -26,6 +26,7 @@ from .template import (
     ROWS,
     SIZE,
     STARTS,
+    SUMMED,
     differentiate,
     kernel_gamma,
     kernel_jacobian,
@@ -128,7 +129,7 @@ def _derive_reaction(x, par, t, lam, J, H):
 
 @part
 def _fill_row(q, qd, own, real, along_x, along_second, out):
-    """out (n,) = along_x x_q + along_second x_qq qd, for one row of G1 or G2, at its two bodies."""
+    """out (n,) = along_x x_q + along_second x_qq qd, for one row of G1 or G2, at its two bodies; added to a sum."""
     row = stack(SPAN)
     for i in range(SPAN):
         row[i] = 0.0
@@ -140,7 +141,8 @@ def _fill_row(q, qd, own, real, along_x, along_second, out):
         _chain_second(code, dimension, at, qd, s, along_second[c:], row[7 * k :])
     for side in range(2):
         for i in range(own[DIMENSION + side]):
-            out[own[AT + side] + i] = row[7 * side + i]
+            at = own[AT + side] + i
+            out[at] = out[at] + row[7 * side + i] if SUMMED else row[7 * side + i]
 
 
 @part

@@ -37,6 +37,7 @@ from .template import (
     SIZE,
     SLOTS,
     STARTS,
+    SUMMED,
     extent,
     kernel_series,
     kernel_series_t,
@@ -225,7 +226,8 @@ def _residual(k, one, b, x):
                     gradient = times(four(values, gradients - 4 * l), splat(float(l)))
                     lower = fma(gradient, four(values, places + 4 * l), lower)
         drift = get(values, at + own_scratch + SLOTS * orders + r) if DRIVEN else 0.0
-        let(b, get(table, own + ROW) + r, (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift))
+        row, residual = get(table, own + ROW) + r, (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift)
+        let(b, row, get(b, row) + residual if SUMMED else residual)
 
 
 def series(mode, k, kind, table, reals, bodies, values, b, Z):

@@ -16,6 +16,7 @@ from .template import (
     ROWS,
     SIZE,
     STARTS,
+    SUMMED,
     acceleration_bias,
     differentiate,
     kernel_value,
@@ -39,7 +40,7 @@ def values(count, stride, table, reals, q, qd, t, out):
         place_markers(q, own, real, x)
         kernel_value(x, real[3 * MARKERS :], t, f)
         for r in range(ROWS):
-            out[own[ROW] + r] = f[r]
+            out[own[ROW] + r] = out[own[ROW] + r] + f[r] if SUMMED else f[r]
     return 0
 
 
@@ -68,7 +69,8 @@ def jacobian(count, stride, table, reals, q, qd, t, out):
                 k = OWNERS[j]
                 block = own[BLOCK + k] + r * own[STRIDE]
                 s, row = real[3 * j : 3 * j + 3], f[r, STARTS[j] :]
-                chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, row, FIRST[j], out[block:])
+                fresh = 0 if SUMMED else FIRST[j]
+                chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, row, fresh, out[block:])
     return 0
 
 

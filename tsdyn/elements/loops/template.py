@@ -147,6 +147,7 @@ CODES = OWNERS = STARTS = FIRST = (
 SLOTS = 1  # rows of scratch memory of `series`
 AHEAD = False  # whether each instance has the next one's numbers brought into the cache
 DRIVEN = False  # whether the series depend on time
+SUMMED = False  # whether a row is the sum of several instances, zero before their loops run
 TRACED = False  # whether a force is given by a program
 SHARP = False  # whether the series of a force are checked against its law
 POSITIVE = ()  # rows of the scratch of `series` that are positive where the law of a force is analytic
@@ -200,14 +201,14 @@ def differentiate(x, par, t, Phi_x):
 
 @part
 def acceleration_bias(x, xd, xdd, par, t, Phi_x, gamma, out):
-    """Set out (ROWS,) = gamma + Phi_x xdd, the bias of Phi_q qdd + out = 0."""
+    """Set out (ROWS,) = gamma + Phi_x xdd, the bias of Phi_q qdd + out = 0; add it where rows are sums."""
     differentiate(x, par, t, Phi_x)
     kernel_gamma(x, xd, par, t, gamma)
     for r in range(ROWS):
         total = gamma[r]
         for c in range(SIZE):
             total += Phi_x[r, c] * xdd[c]
-        out[r] = total
+        out[r] = out[r] + total if SUMMED else total
 
 
 @part

@@ -21,6 +21,7 @@ from ..constraints.universal import Universal
 from ..elements.bodies import rotation_matrix
 from ..elements.joint import across
 from ..errors import InvalidConstraint
+from ..forces.armature import Armature
 from ..forces.bushing import Bushing
 from ..forces.spring import Spring
 from ..forces.torsional_spring import TorsionalSpring
@@ -90,6 +91,11 @@ def add_joint_forces(scene, joint, bodies, report):
     _add(scene, joint, bodies, report, SUFFIX)
     for servo in joint.servos:
         _add(scene, replace(joint, **servo._asdict()), bodies, report, "")
+    if joint.armature < 0.0:
+        report.leave("negative armature", joint.name, f"{joint.armature:g}")
+    elif joint.armature and joint.kind in ONE_AXIS:
+        name = unused(scene, joint.name + " armature")
+        scene.add(Armature(scene[joint.name], inertia=joint.armature, name=name))
 
 
 def _add(scene, joint, bodies, report, suffix):

@@ -129,6 +129,7 @@ class JointItem:
     damping: float = 0.0  # N m s/rad or N s/m
     free: float = 0.0  # coordinate at which the spring is relaxed, from the start: rad or m
     load: float = 0.0  # constant torque or force on b, N m or N
+    armature: float = 0.0  # inertia of its rotor, felt at the joint: kg m^2 or kg
     lead: float = 0.0  # of a screw, m/rad
     start: float = 0.0  # coordinate at the start, rad or m
     loop: bool = False  # holds beside the tree, so it is never merged

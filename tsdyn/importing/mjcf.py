@@ -159,7 +159,7 @@ def add_joints(mujoco, model, data, found, names, report):
                 names.of("joint", j), kinds[int(model.jnt_type[j])], last, follower, data.xanchor[j].copy(),
                 data.xaxis[j].copy(),
             )  # fmt: skip
-            _spring_and_damper(mujoco, model, j, joint, report)
+            _dynamics(mujoco, model, j, joint, report)
             _leave_limits(model, j, joint, report)
             found.joints.append(joint)
             last = follower
@@ -167,13 +167,15 @@ def add_joints(mujoco, model, data, found, names, report):
     found.links = dict(sorted(found.links.items(), key=lambda item: order[item[0]]))
 
 
-def _spring_and_damper(mujoco, model, j, joint, report):
+def _dynamics(mujoco, model, j, joint, report):
     off, bits = model.opt.disableflags, mujoco.mjtDisableBit
     dof, at = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
     if not off & bits.mjDSBL_SPRING:
         joint.stiffness = float(model.jnt_stiffness[j])
         if joint.kind in ("revolute", "prismatic"):
             joint.free = float(model.qpos_spring[at] - model.qpos0[at])
+    if joint.kind in ("revolute", "prismatic"):
+        joint.armature = float(model.dof_armature[dof])
     if not off & bits.mjDSBL_DAMPER:
         joint.damping = float(model.dof_damping[dof])
     for name, index in (("jnt_stiffnesspoly", j), ("dof_dampingpoly", dof)):
@@ -182,7 +184,7 @@ def _spring_and_damper(mujoco, model, j, joint, report):
 
 
 def _leave_limits(model, j, joint, report):
-    """List limits, friction and armature."""
+    """List limits, friction, and armature of more than one coordinate."""
     dof = int(model.jnt_dofadr[j])
     if model.jnt_limited[j]:
         low, high = model.jnt_range[j]
@@ -190,8 +192,8 @@ def _leave_limits(model, j, joint, report):
         report.leave_limits(joint.name, low - zero, high - zero, f"[{low:g}, {high:g}]")
     if friction := float(model.dof_frictionloss[dof]):
         report.leave("friction of a joint", joint.name, f"{friction:g}")
-    if armature := float(model.dof_armature[dof]):
-        report.leave("armature of a joint", joint.name, f"{armature:g}")
+    if joint.kind not in ("revolute", "prismatic") and (armature := float(model.dof_armature[dof])):
+        report.leave("armature of a ball or free joint", joint.name, f"{armature:g}")
 
 
 # Equality constraints of MJCF: connect, weld and joint, held exactly.

@@ -2,10 +2,10 @@
 
 from ..elements.loops.constraint_rows import call_body_loop
 from ..jit.kernels import kernel, long_kernel
-from .inertia_rows import clear_entries, keep_bias, set_rows_aside, subtract_multipliers
+from .inertia_rows import clear_entries, keep_bias, set_rows_aside
 from .redundant_rows import clear_redundant, keep_every_row, keep_redundant, leave_redundant_rows, restore_selection
 from .schur_complement import (
-    add_axis_multipliers,
+    add_multiplier_terms,
     apply_columns,
     clear_axes,
     find_correction,
@@ -161,6 +161,5 @@ def _complete(graph, f, omega, at, stride, k, correction):
     clear_welds(graph, f.b)
     gather_axes(graph, omega, at, stride, k + 1.0, f.b)
     if correction:
-        add_axis_multipliers(graph, f.gamma, f.b)
-        subtract_multipliers(graph, f.gamma, f.b)
+        add_multiplier_terms(graph, f.gamma, f.b)
     clear_redundant(f, f.b)

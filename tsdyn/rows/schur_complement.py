@@ -6,7 +6,7 @@ from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, 
 from ..maths.tolerances import PIVOT_ROUNDING
 from .constraint_graph import ROWS, ROWS_WELD, W_MASS, W_ROTATION, WEIGHTS, WELD_ROWS, WELDS
 from .elimination import factor, factor_lu, solve, solve_lu
-from .inertia_rows import clear_rows, inner, leave_diagonal, put_rows_back, raise_diagonal, residuals
+from .inertia_rows import clear_rows, inner, leave_diagonal, put_rows_back, raise_diagonal, residuals, subtract_multipliers
 from .inertia_rows import take_reactions as take_inertia_reactions
 from .massless_axes import AXIS_H, AXIS_OWN, AXIS_Y
 from .redundant_rows import set_redundant_diagonal
@@ -74,8 +74,9 @@ def gather_axes(graph, values, at, stride, scale, out):
 
 
 @kernel
-def add_axis_multipliers(graph, lam, out):
-    """out += lam of the axis rows: the second term of c e . omega'd + lam_e."""
+def add_multiplier_terms(graph, lam, out):
+    """out += lam of axis rows, -= mu of inertia rows: the last terms of c e . omega'd + lam_e, h a + gamma_h - mu."""
+    subtract_multipliers(graph, lam, out)
     axes = graph.axes
     for i in range(axes.rows.shape[0]):
         e = axes.rows[i].row

@@ -1,7 +1,7 @@
 # Written by tools/stubs.py: do not edit.
 from typing import Any, Self
 
-from ..hints import ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Joint, Path, Points, Prescribed, Primitive, References
+from ..hints import AnyBody, ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Function, Joint, Path, Points, Prescribed, Primitive, References
 
 class AngleDriver(References, Primitive):
     across_a: Attribute[ArrayLike, Floats]
@@ -11,6 +11,15 @@ class AngleDriver(References, Primitive):
     def at(cls, a: BodyLike, b: BodyLike, *, reference: ArrayLike | None = ..., across: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., across_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., angle: Prescribed = ..., name: str = ...) -> Self: ...
     @property
     def opposed(self) -> tuple[Any, ...]: ...
+
+class AngleTerm(References, Primitive):
+    across_a: Attribute[ArrayLike, Floats]
+    ratio: float
+    offset: float
+    turn: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, reference_a: ArrayLike | None = ..., across_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., ratio: float = ..., offset: float = ..., turn: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, reference: ArrayLike | None = ..., across: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., across_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., ratio: float = ..., offset: float = ..., turn: float = ..., name: str = ...) -> Self: ...
 
 class ConstantAngle(Axes, Joint):
     angle: Attribute[Prescribed, Any]
@@ -22,6 +31,14 @@ class Cylindrical(Points, Axes, Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
+
+class DisplacementTerm(Points, Primitive):
+    axis_a: Attribute[ArrayLike, Floats]
+    ratio: float
+    offset: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float = ..., offset: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., point: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float = ..., offset: float = ..., name: str = ...) -> Self: ...
 
 class Distance(Points, Primitive):
     length: Attribute[Prescribed, Any]
@@ -109,6 +126,25 @@ class Universal(Points, Axes, Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
+
+class Coupler(Joint):
+    dependent: JointCoordinate
+    independents: JointCoordinate
+    ratio: ArrayLike | float
+    offset: float
+    polynomial: Attribute[ArrayLike, Floats]
+    function: Prescribed | Function
+    def __init__(self, dependent: JointCoordinate, independents: JointCoordinate, *, ratio: ArrayLike | float | None = ..., offset: float = ..., polynomial: ArrayLike | None = ..., function: Prescribed | Function | None = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, dependent: JointCoordinate, *, ratio: ArrayLike | float | None = ..., offset: float = ..., polynomial: ArrayLike | None = ..., function: Prescribed | Function | None = ..., name: str = ...) -> Self: ...
+    @property
+    def bodies(self) -> tuple[AnyBody, ...]: ...
+    @property
+    def functions(self) -> list[CoordinateFunction]: ...
+    @property
+    def plain(self) -> bool: ...
+    @property
+    def ratios(self) -> list[float]: ...
 
 class Dot1(Axes, Primitive):
     value: Attribute[Prescribed, Any]

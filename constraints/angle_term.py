@@ -6,6 +6,9 @@
     theta_f = -F h / S,  theta_g = E h / S,  theta_h = (E g - F f) / S,  S = E^2 + F^2                  (3)
     thetadd = (E Fdd - F Edd) / S - 2 (E Ed + F Fd) (E Fd - F Ed) / S^2                                 (4)
               with Edd = 2 fd.hd, Fdd = 2 gd.hd
+    Phi    = ratio f(theta) + offset                                    (5)  of a function
+    Phi_x  = ratio f'(theta) theta_x                                    (6)
+    gamma  = ratio (f'(theta) thetadd + f''(theta) thetad^2)            (7)
 
 Turns are counted from the last accepted step, so a step must rotate by less than half a turn. Singular if h is along
 the axis f x g.
@@ -15,7 +18,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import Primitive, Vector, angle_near, dot, finite, product, quotient, scaled, square
+from ..plugins import (
+    COORDINATE_SLOPE_ROWS,
+    CoordinateFunction,
+    Primitive,
+    Vector,
+    angle,
+    angle_near,
+    coordinate_function,
+    dot,
+    finite,
+    product,
+    quotient,
+    scaled,
+    slope_series,
+    square,
+)
 from .angle_driver import sine_cosine_rates
 
 if TYPE_CHECKING:
@@ -134,3 +152,72 @@ class AngleTerm(Primitive):
         """A random instance, its directions nearly at right angles."""
         f, g, h = rng.normal(size=(3, 3))
         return cls(a, b, reference_a=f, across_a=g, reference_b=h, ratio=rng.uniform(0.5, 2.0), offset=rng.normal())
+
+
+class _AngleFunctionTerm(AngleTerm):
+    """The same of a function of the angle, a CoordinateFunction; made by Coupler."""
+
+    slots = 16 + COORDINATE_SLOPE_ROWS
+
+    def __init__(self, a: BodyLike, b: BodyLike, *, function: CoordinateFunction, **others: Any) -> None:
+        self.__dict__["function"] = function
+        super().__init__(a, b, **others)
+
+    def parameters(self):
+        """(ratio, offset, f); what is remembered is theta."""
+        return *super().parameters(), *self.function.places
+
+    @staticmethod
+    def phi(x, par, t, out):
+        """Eq. (5)."""
+        E = x[0] * x[6] + x[1] * x[7] + x[2] * x[8]
+        F = x[3] * x[6] + x[4] * x[7] + x[5] * x[8]
+        out[0] = par[0] * coordinate_function(par, 2, angle_near(F, E, par[6]), 0) + par[1]
+
+    @staticmethod
+    def jacobian(x, par, t, out):
+        """By Eq. (6)."""
+        E = x[0] * x[6] + x[1] * x[7] + x[2] * x[8]
+        F = x[3] * x[6] + x[4] * x[7] + x[5] * x[8]
+        factor = par[0] * coordinate_function(par, 2, angle_near(F, E, par[6]), 1) / (E * E + F * F)
+        E, F = factor * E, factor * F
+        for i in range(3):
+            out[0, i] = -F * x[6 + i]
+            out[0, 3 + i] = E * x[6 + i]
+            out[0, 6 + i] = E * x[3 + i] - F * x[i]
+
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        """By Eq. (7)."""
+        E, F, Ed, Fd, Edd, Fdd = sine_cosine_rates(x, xd, 6)
+        S, theta = E * E + F * F, angle_near(F, E, par[6])
+        rate = (E * Fd - F * Ed) / S
+        second = (E * Fdd - F * Edd) / S - 2.0 * (E * Ed + F * Fd) * rate / S
+        slope, bend = coordinate_function(par, 2, theta, 1), coordinate_function(par, 2, theta, 2)
+        out[0] = par[0] * (slope * second + bend * rate * rate)
+
+    @staticmethod
+    def remember(x, par, t):
+        """theta."""
+        E = x[0] * x[6] + x[1] * x[7] + x[2] * x[8]
+        F = x[3] * x[6] + x[4] * x[7] + x[5] * x[8]
+        return angle_near(F, E, par[6])
+
+    @staticmethod
+    def series(x, par, k, s, out):
+        """Of Eq. (6); rows of f, g, h, E, F, S, E / S, F / S, their products with the slope, theta, and its slope."""
+        for i in range(9):
+            s[i, k] = x[i]
+        s[9, k], s[10, k] = dot(s, 0, 6, k), dot(s, 3, 6, k)
+        s[11, k] = square(s[9], k) + square(s[10], k)
+        s[16, k] = angle_near(s[10, 0], s[9, 0], par[6]) if k == 0 else angle(s[10], s[9], s[11], s[16], k)
+        slope_series(par, 2, s, 16, k)
+        s[12, k] = quotient(s[9], s[11], s[12], k)
+        s[13, k] = quotient(s[10], s[11], s[13], k)
+        s[14, k], s[15, k] = product(s[12], s[17], k), product(s[13], s[17], k)
+        f0, f1, f2 = scaled(s, 6, 15, k)
+        g0, g1, g2 = scaled(s, 6, 14, k)
+        out[0, 0], out[0, 1], out[0, 2] = -par[0] * f0, -par[0] * f1, -par[0] * f2
+        out[0, 3], out[0, 4], out[0, 5] = par[0] * g0, par[0] * g1, par[0] * g2
+        for i in range(3):
+            out[0, 6 + i] = par[0] * (product(s[3 + i], s[14], k) - product(s[i], s[15], k))

@@ -1,9 +1,10 @@
 """Coupler: a joint coordinate that depends on those of other joints, on any bodies.
 
     q_0 = offset + ratio_1 q_1 + ratio_2 q_2 + ...          (1)  AngleTerm, DisplacementTerm
+    q_0 = offset + f_1(q_1) + f_2(q_2) + ...                (2)  the same of functions
 
 One row, the sum of a term for each joint. Angles are counted over turns; a step must rotate each by less than half a
-turn. Singular where a term is.
+turn. Never singular: the dependent coordinate stands alone.
 """
 
 from __future__ import annotations
@@ -14,27 +15,30 @@ import numpy as np
 
 from ..plugins import (
     Angle,
-    Displacement,
+    CoordinateFunction,
     InvalidConstraint,
+    Smooth,
     SumRow,
     angles,
     displacements,
     finite,
     fitting,
+    floats,
+    functions_of,
     label,
     shown,
 )
-from .angle_term import AngleTerm
-from .displacement_term import DisplacementTerm
+from .angle_term import AngleTerm, _AngleFunctionTerm
+from .displacement_term import DisplacementTerm, _DisplacementFunctionTerm
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, Joint
+    from ..hints import ArrayLike, Function, Joint, Prescribed
 
     JointCoordinate = Joint | tuple[Joint, str] | tuple[Joint, str, int]
 
 
 class Coupler(SumRow):
-    """A joint coordinate in proportion to those of other joints: gears, belts, differentials, mimic joints.
+    """A joint coordinate that depends on those of other joints: gears, belts, differentials, mimic joints, cams.
 
     Parameters
     ----------
@@ -46,19 +50,25 @@ class Coupler(SumRow):
     ratio : float, or one of each independent; rad or m over rad or m
         Change of the dependent coordinate over that of an independent one; 1 by default.
     offset : float, rad or m
-        The dependent coordinate where those of the independents are zero.
+        Added to the dependent coordinate.
+    polynomial : array_like (n,), optional
+        a_0, a_1, ... of q_0 = a_0 + a_1 q_1 + a_2 q_1^2 + ..., in place of a ratio.
+    function : one of ts.motions, a ts.Table, a spline of SciPy's, or a function f(q_1, ...), optional
+        The dependent coordinate, in place of a ratio; of several joints a sum of functions of one each. A plain
+        function may use arithmetic and the functions of NumPy, without branches.
 
     Raises
     ------
     InvalidConstraint
-        If a joint is missing, has no such coordinate, is given twice or is not in the scene, if couplers go in a circle,
-        or a number is not finite.
+        If a joint is missing, has no such coordinate, is given twice or isn't in the scene, if couplers go in a circle,
+        if a number is not finite, or a function is none of these.
 
     Notes
     -----
     One row. Coordinates are those of `solution.angle(joint)`, over any number of turns, and
     `solution.displacement(joint)`. a and b are the bodies of the dependent joint; `solution.reaction(coupler, on=body)`
-    serves for all bodies of the joints.
+    serves for all bodies of the joints. Functions are differentiated exactly. Ratios, polynomials and functions have
+    Taylor series; data change from piece to piece, and other methods run them.
 
     Examples
     --------
@@ -84,8 +94,10 @@ class Coupler(SumRow):
         self,
         dependent: JointCoordinate,
         *independents: JointCoordinate,
-        ratio: float | ArrayLike | None = None,
+        ratio: ArrayLike | float | None = None,
         offset: float = 0.0,
+        polynomial: ArrayLike | None = None,
+        function: Prescribed | Function | None = None,
         name: str = "",
     ) -> None:
         name = label(name, "Coupler", InvalidConstraint)
@@ -96,7 +108,7 @@ class Coupler(SumRow):
         self.__dict__.update(dependent=chosen[0], independents=tuple(chosen[1:]))
         joint = chosen[0][0]
         super().__init__(joint.a, joint.b, (), name)
-        self.ratio, self.offset = ratio, offset
+        self.ratio, self.offset, self.polynomial, self.function = ratio, offset, polynomial, function
         self.check()
 
     def _untitled(self, bodies):
@@ -107,14 +119,19 @@ class Coupler(SumRow):
         return (self.dependent, *self.independents)
 
     @property
+    def referred(self) -> tuple[Any, ...]:
+        """Its bodies and joints."""
+        return (self.a, self.b, *(joint for joint, *_ in self._all))
+
+    @property
     def ratios(self) -> list[float]:
         """The ratio of each independent coordinate."""
         given = 1.0 if self.ratio is None else self.ratio
         values = np.ravel(given).tolist() if np.ndim(given) else [given] * len(self.independents)
         if len(values) != len(self.independents):
             raise self.error(
-                f"{self.name}: {len(values)} ratios are given for {len(self.independents)} independent joints; give one "
-                "for each, or one for all."
+                f"{self.name}: {len(values)} ratios are given for {len(self.independents)} independent joints; give "
+                "one for each, or one for all."
             )
         return [finite(value, f"{self.name}: ratio", self.error) for value in values]
 
@@ -131,8 +148,29 @@ class Coupler(SumRow):
                     raise self.error(f"{self.name}: the {kind} of {joint.name!r} would depend on itself.")
                 raise self.error(f"{self.name}: the {kind} of {joint.name!r} is given twice; add up its ratios.")
             seen.append((joint, kind, index))
-        _ = self.ratios
+        given = [word for word in ("ratio", "polynomial", "function") if getattr(self, word) is not None]
+        if len(given) > 1:
+            raise self.error(f"{self.name}: give one of ratio, polynomial and function, not {' and '.join(given)}.")
         finite(self.offset, f"{self.name}: offset", self.error)
+        _ = self.ratios if self.plain else self.functions
+
+    @property
+    def plain(self) -> bool:
+        """Whether it has ratios."""
+        return self.polynomial is None and self.function is None
+
+    @property
+    def functions(self) -> list[CoordinateFunction]:
+        """The function of each independent coordinate."""
+        what, count = f"{self.name}: {'function' if self.polynomial is None else 'polynomial'}", len(self.independents)
+        if self.polynomial is None:
+            return functions_of(self.function, count, what)
+        coefficients = floats(self.polynomial)
+        if coefficients.ndim != 1 or not coefficients.size or not np.isfinite(coefficients).all():
+            raise self.error(f"{what} must be finite coefficients a_0, a_1, ..., got {shown(self.polynomial)}.")
+        if count > 1:
+            raise self.error(f"{what} is of one coordinate, and {count} independent joints are given; use function=.")
+        return [CoordinateFunction(Smooth("polynomial", (), tuple(coefficients.tolist())))]
 
     def place_in(self, scene):
         """Refuse couplers that go in a circle."""
@@ -151,30 +189,35 @@ class Coupler(SumRow):
                     ahead.append((other, (*path, other)))
 
     def compose(self):
-        """Eq. (1): the dependent coordinate, less the others."""
-        factors = [1.0, *(-ratio for ratio in self.ratios)]
-        for (joint, kind, index), factor, offset in zip(
-            self._all, factors, [-self.offset] + [0.0] * len(factors), strict=False
-        ):
-            if kind == "angle":
-                own, other, f, g, h = angles(joint)[index]
-                places = {"reference_a": f, "across_a": g, "reference_b": h}
-                turn = np.ravel(joint.angle_near)[index] if np.ndim(joint.angle_near) else joint.angle_near
-                term = AngleTerm(own, other, **places, ratio=factor, offset=offset, turn=turn)
-                term.__dict__["counted"] = (joint, index)
-            else:
-                own, other, e, s_own, s_other = displacements(joint)[index]
-                places = {"axis_a": e, "point_a": s_own, "point_b": s_other}
-                term = DisplacementTerm(own, other, **places, ratio=factor, offset=offset)
-            yield term
+        """Eq. (1) or (2): the dependent coordinate, less the others."""
+        functions = [None, *([None] * len(self.independents) if self.plain else self.functions)]
+        factors = [1.0, *(-ratio for ratio in self.ratios)] if self.plain else [1.0] + [-1.0] * len(self.independents)
+        offsets = [-float(self.offset)] + [0.0] * len(self.independents)
+        for (joint, kind, index), *numbers in zip(self._all, functions, factors, offsets, strict=True):
+            yield self._term(joint, kind, index, *numbers)
+
+    def _term(self, joint, kind, index, function, factor, offset):
+        """The term of one coordinate."""
+        given = {"ratio": factor, "offset": offset} | ({} if function is None else {"function": function})
+        if kind == "angle":
+            own, other, f, g, h = angles(joint)[index]
+            near = np.ravel(joint.angle_near)
+            cls = AngleTerm if function is None else _AngleFunctionTerm
+            given["turn"] = float(near[index if near.size > 1 else 0])
+            term = cls(own, other, reference_a=f, across_a=g, reference_b=h, **given)
+            term.__dict__["counted"] = (joint, index)
+            return term
+        own, other, e, s_own, s_other = displacements(joint)[index]
+        cls = DisplacementTerm if function is None else _DisplacementFunctionTerm
+        return cls(own, other, axis_a=e, point_a=s_own, point_b=s_other, **given)
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random hinge and a random slide of two bodies, which it adds to the scene."""
+        """The two coordinates of a random cylindrical joint, which it adds to the scene."""
         from .cylindrical import Cylindrical
 
-        joints = [a.scene.add(Cylindrical(a, b, axis_a=u, axis_b=v)) for u, v in rng.normal(size=(2, 2, 3))]
-        return cls((joints[0], "angle"), (joints[1], "displacement"), ratio=rng.uniform(0.5, 2.0), offset=rng.normal())
+        joint = a.scene.add(Cylindrical(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3)))
+        return cls((joint, "angle"), (joint, "displacement"), ratio=rng.uniform(0.5, 2.0), offset=rng.normal())
 
 
 def _same(one, other):

@@ -4,6 +4,9 @@
     Phi   = ratio a.d + offset            (1)  [m, or that of the sum]
     Phi_x = ratio [ d^T, -a^T, a^T ]      (2)  for (a, x_a, x_b)
     gamma = 2 ratio ad.dd                 (3)
+    Phi   = ratio f(s) + offset           (4)  of a function, s = a.d
+    Phi_x = ratio f'(s) [ d^T, -a^T, a^T ]                      (5)
+    gamma = ratio (2 f'(s) ad.dd + f''(s) sd^2)                 (6)
 
 Never singular by itself.
 """
@@ -12,7 +15,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import Point, Primitive, Vector, finite
+from ..plugins import (
+    COORDINATE_SLOPE_ROWS,
+    CoordinateFunction,
+    Point,
+    Primitive,
+    Vector,
+    coordinate_function,
+    dot,
+    finite,
+    scaled,
+    slope_series,
+)
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
@@ -93,3 +107,57 @@ class DisplacementTerm(Primitive):
         """A random instance."""
         places = {marker.argument: rng.normal(size=3) for marker in cls.markers}
         return cls(a, b, **places, ratio=rng.uniform(0.5, 2.0), offset=rng.normal())
+
+
+class _DisplacementFunctionTerm(DisplacementTerm):
+    """The same of a function of the offset, a CoordinateFunction; made by Coupler."""
+
+    slots = 6 + COORDINATE_SLOPE_ROWS
+
+    def __init__(self, a: BodyLike, b: BodyLike, *, function: CoordinateFunction, **others: Any) -> None:
+        self.__dict__["function"] = function
+        super().__init__(a, b, **others)
+
+    def parameters(self):
+        """(ratio, offset, f)."""
+        return *super().parameters(), *self.function.places
+
+    @staticmethod
+    def phi(x, par, t, out):
+        """Eq. (4)."""
+        s = x[0] * (x[6] - x[3]) + x[1] * (x[7] - x[4]) + x[2] * (x[8] - x[5])
+        out[0] = par[0] * coordinate_function(par, 2, s, 0) + par[1]
+
+    @staticmethod
+    def jacobian(x, par, t, out):
+        """Eq. (5)."""
+        s = x[0] * (x[6] - x[3]) + x[1] * (x[7] - x[4]) + x[2] * (x[8] - x[5])
+        slope = par[0] * coordinate_function(par, 2, s, 1)
+        for i in range(3):
+            out[0, i] = slope * (x[6 + i] - x[3 + i])
+            out[0, 3 + i] = -slope * x[i]
+            out[0, 6 + i] = slope * x[i]
+
+    @staticmethod
+    def gamma(x, xd, par, t, out):
+        """Eq. (6)."""
+        s, sd, sdd = 0.0, 0.0, 0.0
+        for i in range(3):
+            d, dd = x[6 + i] - x[3 + i], xd[6 + i] - xd[3 + i]
+            s += x[i] * d
+            sd += xd[i] * d + x[i] * dd
+            sdd += 2.0 * xd[i] * dd
+        out[0] = par[0] * (coordinate_function(par, 2, s, 1) * sdd + coordinate_function(par, 2, s, 2) * sd * sd)
+
+    @staticmethod
+    def series(x, par, k, s, out):
+        """Of Eq. (5); rows of e, d, s, and its slope."""
+        for i in range(3):
+            s[i, k], s[3 + i, k] = x[i], x[6 + i] - x[3 + i]
+        s[6, k] = dot(s, 0, 3, k)
+        slope_series(par, 2, s, 6, k)
+        f0, f1, f2 = scaled(s, 3, 7, k)
+        e0, e1, e2 = scaled(s, 0, 7, k)
+        out[0, 0], out[0, 1], out[0, 2] = par[0] * f0, par[0] * f1, par[0] * f2
+        out[0, 3], out[0, 4], out[0, 5] = -par[0] * e0, -par[0] * e1, -par[0] * e2
+        out[0, 6], out[0, 7], out[0, 8] = par[0] * e0, par[0] * e1, par[0] * e2

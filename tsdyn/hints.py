@@ -62,6 +62,7 @@ AnyBody: TypeAlias = PointMass | Ground
 Place: TypeAlias = str | PathLike[str]  # of a file
 BodyLike: TypeAlias = PointMass | Ground | str  # a handle, or a name
 ItemLike: TypeAlias = Attachment | str
+RopePoints: TypeAlias = Sequence[tuple[BodyLike, ArrayLike]]
 Orientation: TypeAlias = ArrayLike | Rotation
 Span: TypeAlias = Sequence[float] | Floats
 
@@ -197,6 +198,7 @@ __all__ = [
     "Profile",
     "Progress",
     "Random",
+    "RopePoints",
     "Redundancy",
     "RedundantRow",
     "Reference",

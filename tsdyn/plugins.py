@@ -6,7 +6,7 @@ integrators/ import from here, too. docs/plug-ins.md shows how.
 
 from .calls import Placing, fitting
 from .elements.bodies import Ground, PointMass, ground_point, named, rotation_matrix
-from .elements.element import Angle, Displacement, angles, displacements, in_frame, stop_waiting
+from .elements.element import Angle, Displacement, angles, displacements, in_frame, rope_points, stop_waiting
 from .elements.force import Force, load, vector_load
 from .elements.friction import (
     AXIS,
@@ -93,6 +93,8 @@ from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
 from .methods.interpolants import linear_second
 from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
 from .motions.expressions import Smooth
+from .motions.of_coordinates import ROWS as COORDINATE_SLOPE_ROWS
+from .motions.of_coordinates import CoordinateFunction, coordinate_function, functions_of, slope_series
 from .motions.prescribed import Motion
 from .motions.signals import Signal, numbers_of
 from .motions.tables import is_data
@@ -101,6 +103,7 @@ from .validation import finite, floats, label, not_negative, number, positive, s
 __all__ = [
     "AXIS",
     "BEARING_ROWS",
+    "COORDINATE_SLOPE_ROWS",
     "DOP853_INTERPOLANT",
     "PARALLEL",
     "STATE",
@@ -111,6 +114,7 @@ __all__ = [
     "ByState",
     "Collocation",
     "CollocationTableau",
+    "CoordinateFunction",
     "DiagonallyImplicit",
     "Displacement",
     "ExplicitNystrom",
@@ -161,6 +165,7 @@ __all__ = [
     "carried",
     "coefficient",
     "coefficient_series",
+    "coordinate_function",
     "cross",
     "direction_series",
     "displacements",
@@ -173,6 +178,7 @@ __all__ = [
     "finite",
     "fitting",
     "floats",
+    "functions_of",
     "given_series",
     "ground_point",
     "in_frame",
@@ -197,6 +203,7 @@ __all__ = [
     "rotated",
     "rotated_back",
     "rotation",
+    "rope_points",
     "rotation_matrix",
     "scaled",
     "scene_law",
@@ -207,6 +214,7 @@ __all__ = [
     "slip",
     "slip_of",
     "slip_series",
+    "slope_series",
     "some",
     "specialised",
     "square",

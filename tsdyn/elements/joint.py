@@ -176,13 +176,9 @@ class Joint(Attachment):
 class SumRow(Joint):
     """Base of constraints of one row that is a sum of terms, each on two bodies: a row on any number of bodies.
 
-    Subclass it and yield the terms in `compose`: primitives of one row with `summed = True`, on any bodies of the scene.
-    a and b are the bodies of the first term.
+    Subclass it and yield the terms in `compose`: primitives of one row with `summed = True`, on any bodies of the
+    scene. a and b are the bodies of the first term.
     """
-
-    def compose(self) -> Iterator[Primitive]:
-        """Yield the terms, one at least; new ones each time."""
-        raise InvalidConstraint("SumRow is the base of rows that are sums; use Coupler, or a subclass.")
 
     @cached_property
     def _composition(self):

@@ -128,7 +128,7 @@ class Primitive(Attachment):
                 continue  # of a subclass that has dropped one of them
             functions[name] = static_kernel(cls, name, arguments, where, InvalidConstraint)
         cls.kernels = MappingProxyType(_compile(cls, functions))
-        if not cls.__name__.startswith("_"):
+        if not cls.__name__.startswith("_"):  # a variant, which its public class makes
             _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
     def __setattr__(self, name: str, value: Never) -> None:

@@ -53,6 +53,7 @@ def _set(reading, scene, path, table):
 
 # Constraints and forces of a document.
 
+KINDS = ("angle", "displacement")  # of joint coordinates
 ITEM_KEYS = ("type", "name", "at", *BUILT, "angle_near")
 
 
@@ -73,7 +74,7 @@ def add_item(reading, scene, path, table, kinds):
     arguments, bodies = types.of_class(cls), types.bodies_of(cls)
     known_keys(path, table, (*ITEM_KEYS, *bodies, *arguments), reading.mistakes)
     positions = _positions(reading, path, table, what, bodies, arguments)
-    values = {n: one for n, one in arguments.items() if one.kind != types.REFERENCE}
+    values = {n: one for n, one in arguments.items() if one.kind not in (types.REFERENCE, types.COORDINATE)}
     given = arguments_in(reading, path, table, values, what)
     placed = _at(reading, path, table, cls, what, values)
     for argument in values.values():
@@ -118,7 +119,23 @@ def _positions(reading, path, table, what, bodies, arguments):
         if argument.kind == types.REFERENCE:
             found.append(referred(reading, path, table, (what, name, "constraint", reading.items)))
             complete = complete and found[-1] is not None
+        if argument.kind == types.COORDINATE:
+            found += _coordinates(reading, path, table, what, name)
+            complete = complete and None not in found
     return found if complete else None
+
+
+def _coordinates(reading, path, table, what, key):
+    """The joint coordinates that a key names: "hinge", ["hinge", "angle", 0], or a list of these."""
+    given = table.get(key)
+    alone = isinstance(given, list) and len(given) > 1 and given[0] in reading.items and given[1] in KINDS
+    found = []
+    for one in [given] if alone or not isinstance(given, list) else given:
+        joint, *which = one if isinstance(one, list) and one else [one]
+        own = table if key not in table else {**table, key: joint}
+        joint = referred(reading, path, own, (what, key, "constraint", reading.items))
+        found.append(None if joint is None else (joint, *which))
+    return found
 
 
 def _at(reading, path, table, cls, what, arguments):

@@ -114,7 +114,9 @@ def _item(item, refused):
         if not found[name]:
             refused.append(f"{item.name} keeps no {name}")
     for name, argument in arguments.items():
-        if name in references:
+        if argument.kind == types.COORDINATE:
+            found[name] = _coordinates(vars(item)[name])
+        if argument.kind in (types.REFERENCE, types.COORDINATE):
             continue
         try:
             value = encode(_value_of(item, argument))
@@ -126,6 +128,12 @@ def _item(item, refused):
     if getattr(item, "is_idle", False):  # says so, for nothing is left out by mistake
         found |= {name: encode(vars(item)[name]) for name in item.sources if vars(item)[name] is not None}
     return found | _history(item)
+
+
+def _coordinates(given):
+    """[joint, kind, index] of a coordinate of a joint, or of several."""
+    joint, *which = given
+    return [joint.name, *which] if which and isinstance(which[0], str) else [_coordinates(each) for each in given]
 
 
 def _value_of(item, argument):

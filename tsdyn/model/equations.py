@@ -22,7 +22,7 @@ from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
 from .handles import handles_of
 from .laws import demand_callable, interrupts_answered
-from .packed import WIDTH, instances_of_kinds, no_system
+from .packed import WIDTH, checked_motions, instances_of_kinds, no_system
 
 call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
 call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
@@ -53,6 +53,13 @@ def set_time(s, t):
         for j in range(signal.width):
             total += abs(s.reals[signal.place + j])
     return total < math.inf
+
+
+@kernel
+def recall(s, memory):
+    """Let forces and constraints have the memory (slots,) of an output; none where it is shorter."""
+    for i in range(s.memory.size if memory.size >= s.memory.size else 0):
+        s.reals[s.memory[i]] = memory[i]
 
 
 @kernel
@@ -389,7 +396,7 @@ def demand_compilable(item):
     """
     if not isinstance(item, Force):
         for part in item.parts:
-            for value in checked_parameters(part, Motion, "Motions"):
+            for value in checked_motions(part):
                 if isinstance(value, Motion):
                     value.addresses  # noqa: B018  compiled when asked for
         return

@@ -15,6 +15,7 @@ from ..elements.markers import POINT
 from ..errors import InvalidConstraint, InvalidForce
 from ..jit.interrupts import CollectionsDeferred
 from ..jit.kernels import Record, records, row_of
+from ..motions.of_coordinates import PLACES, CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tracing import Untraceable
@@ -476,6 +477,8 @@ def _found_again(process, *parts):
     ]
     for row, motion in zip(system.motions, values, strict=True):
         row.value, row.rate, row.acceleration = motion.addresses
+    for function, begin, at in _functions(packed):
+        system.reals[at : at + PLACES] = function.addresses(begin, begin + int(system.reals[at + 1]))
     return packed._replace(loads=find_forces(system, packed.loads))
 
 
@@ -493,7 +496,7 @@ def pack(scene):
     primitives = scene.primitives
     parameters = {constraint: checked_motions(constraint) for constraint in primitives}
     table, reals = [], []
-    kinds, motions, kept = _pack_constraints(parameters, int(starts[-1]), where, table, reals)
+    kinds, motions, kept, functions = _pack_constraints(parameters, int(starts[-1]), where, table, reals)
     members, derived = tuple(_members(scene.constraints)), Derived()
     if any(isinstance(force, SceneLaw) for force in scene.forces):
         derived.handles = Handles(scene.bodies, list(where.values()), members, scene.forces)
@@ -506,6 +509,9 @@ def pack(scene):
     for kind in inertias:
         _shorten(table, kind)
     _append_programs(motions, reals)
+    for function, begin, at in functions:
+        reals[at : at + PLACES] = function.addresses(begin, len(reals))
+        reals += function.numbers()
     moments = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
@@ -576,18 +582,19 @@ def first_rows(primitives):
 def _pack_constraints(parameters, n, where, table, reals):
     """Append the instances, kind by kind, to `table` and `reals`.
 
-    Returns rows of System.kinds, of System.motions each with its Motion, and {constraint: place of what it remembers}.
+    Returns rows of System.kinds, of System.motions each with its Motion, {constraint: place of what it remembers}, and
+    of each CoordinateFunction where its parameters begin and where it is.
     """
     groups = {}
     for constraint, row in first_rows(parameters):
         groups.setdefault(type(constraint), []).append((constraint, row))
-    kinds, motions, kept = [], [], {}
+    kinds, motions, kept, functions = [], [], {}, []
     for kind, members in groups.items():
         first = len(table), len(reals)
         for constraint, at_row in members:
             begin = len(reals)
             table += _places(constraint, at_row, n, where)
-            _append_reals(constraint, parameters[constraint], reals, motions)
+            _append_reals(constraint, parameters[constraint], reals, motions, functions)
             if kind.memory:
                 kept[constraint] = len(reals)
                 reals.append(float(constraint.turn))
@@ -609,18 +616,34 @@ def _pack_constraints(parameters, n, where, table, reals):
                 reals=first[1],
             )
         )
-    return kinds, motions, kept
+    return kinds, motions, kept, functions
 
 
-def _append_reals(constraint, parameters, reals, motions):
+def _append_reals(constraint, parameters, reals, motions, functions):
     """Append where the markers are, then the parameters; three places for a Motion, whose row joins `motions`."""
     reals += np.concatenate(constraint.coordinates).tolist()
+    begin = len(reals)
     for value in parameters:
+        if isinstance(value, CoordinateFunction):
+            functions.append((value, begin, len(reals)))
+            value = 0.0  # its places are written when its program has one
         if isinstance(value, Motion):
             motions.append(([*value.addresses, len(reals), 0], value))
             reals += value.value(value.origin)
         else:
             reals.append(float(value))
+
+
+def _functions(packed):
+    """Yield each `CoordinateFunction`, where in System.reals the parameters of its term begin, and where it is."""
+    given = {id(part): values for part, values in zip(packed.constraints, packed.parameters, strict=True)}
+    for kind, members in zip(packed.system.kinds, instances_of_kinds(packed), strict=True):
+        for i, part in enumerate(members):
+            begin = at = int(kind.reals + i * kind.stride) + 3 * len(part.markers)
+            for value in given[id(part)]:
+                if isinstance(value, CoordinateFunction):
+                    yield value, begin, at
+                at += 3 if isinstance(value, Motion) else 1
 
 
 def _append_programs(motions, reals):
@@ -708,7 +731,7 @@ def with_curvatures(packed, basis_free=False):
 
 def checked_motions(constraint):
     """A primitive's parameters, checked: floats and Motions."""
-    given = checked_parameters(constraint, Motion, "Motions")
+    given = checked_parameters(constraint, (Motion, CoordinateFunction), "Motions")
     if "phi_t" not in constraint.kernels and any(isinstance(p, Motion) for p in given):
         raise InvalidConstraint(f"{constraint.name}: a Motion is among its parameters, so it needs a kernel phi_t.")
     return given

@@ -17,6 +17,7 @@ from ..maths.power_series import Jet
 from ..model.equations import added_inertia
 from ..model.kinematics import angular_velocity
 from ..model.packed import first_rows
+from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 
 if TYPE_CHECKING:
@@ -106,6 +107,8 @@ def _parameter(given, t, rate):
     """One parameter of some instances, (instances,) or one number for all, or Jets (k, instances) of Motions."""
     if isinstance(given[0], np.ndarray):  # memory of each
         return [np.transpose(given)]
+    if isinstance(given[0], CoordinateFunction) and len(set(given)) > 1:
+        raise TypeError("functions are evaluated one by one")
     if not isinstance(given[0], Motion):
         same = all(value == given[0] for value in given)
         return [given[0] if same else np.array(given)]

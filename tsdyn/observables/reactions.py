@@ -12,6 +12,7 @@ import numpy as np
 from ..calls import fitting_methods
 from ..elements.bodies import rotation_matrix, transform_g
 from ..elements.force import Force
+from ..elements.joint import SumRow
 from ..elements.loops.constraint_rows import place_bodies, take_loads
 from ..elements.loops.coordinate_rows import BLOCK, INTS
 from ..elements.markers import POINT
@@ -20,7 +21,7 @@ from ..formulations.accelerations import find_reactions, normal_load
 from ..jit.kernels import entry, kernel, long_kernel, resident, stack
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import RANK_TOL, TINY
-from ..model.equations import WIDTH, constraint_jacobian, set_time, with_short_rows
+from ..model.equations import WIDTH, added_inertia, constraint_jacobian, recall, set_time, with_short_rows
 from ..model.handles import handles_of
 from ..model.packed import classes, index_of, member_of, no_system
 from ..rows.constraint_graph import REDUCED
@@ -113,8 +114,8 @@ def factorise_at(graph, s, f, t, q):
 # Normal loads of joint friction, from positions, velocities and accelerations.
 
 
-@entry("pvmmmm")
-def _solve(context, t, q, qd, r, out):
+@entry("pvmmmmm")
+def _solve(context, t, q, qd, r, memory, out):
     """out (k, frictions): normal loads with Phi_q^T lam - sum_i g_i N_i = r (k, n); NaN if there are none.
 
     H W (H^T lam - sum_i g_i N_i(lam)) = H W r: the acceleration equation for the residual forces.
@@ -122,6 +123,7 @@ def _solve(context, t, q, qd, r, out):
     c = load_parts(context)
     graph, s, f = c.graph, c.system, c.tangent
     for k in range(t.size):
+        recall(s, memory[k])
         found = factorise_at(graph, s, f, t[k], q[k])
         take_loads(graph.bodies, q[k], r[k], f.Z)
         weigh_bodies(graph, f.Z)
@@ -146,12 +148,12 @@ def with_normal_loads(packed, t, q, qd, qdd, memory):
     own = system._replace(reals=system.reals.copy())
     context, *_keep = resident(parts(own, graph_of(packed, REDUCED), q.shape[1]))
     loads = np.zeros((t.size, system.normals.size))
-    _solve(context, t, q, qd, r, loads)
+    _solve(context, t, q, qd, r, memory, loads)
     return np.hstack((memory, loads))
 
 
-@entry("pvmmmm")
-def solve_multipliers(context, t, q, r, rows, out):
+@entry("pvmmmmm")
+def solve_multipliers(context, t, q, r, memory, rows, out):
     """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + Q_v - M qdd. NaN where Phi_q is singular.
 
     S lam = H W r on the graph with one step of refinement, r in terms of bodies, then the normalisations from the
@@ -161,6 +163,7 @@ def solve_multipliers(context, t, q, r, rows, out):
     graph, s, f = whole.graph, whole.system, whole.tangent
     bodies = graph.bodies
     for k in range(t.size):
+        recall(s, memory[k])
         regular = factorise_at(graph, s, f, t[k], q[k])
         constraint_jacobian(s, q[k], t[k], rows)
         copy(r[k], f.Q)
@@ -202,7 +205,8 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
     f = applied_loads(packed.system, t, q, qd, memory)
     f += velocity_forces(found.system, q, qd)
     f -= inertial_forces(found.system, q, qdd)
-    solve_multipliers(found.address, t, q, f, np.zeros((len(found.system.segments), WIDTH)), out)
+    memory = np.zeros((t.size, 0)) if memory is None else memory
+    solve_multipliers(found.address, t, q, f, memory, np.zeros((len(found.system.segments), WIDTH)), out)
     give(packed, found)
     return out
 
@@ -237,7 +241,8 @@ def reaction(solution, member, body):
                 for r, row in enumerate(range(own.start, own.stop))
             ]
     lines, lam = np.array(lines, np.int64).reshape(-1, 3), particular(solution.multipliers)
-    constraint_loads(system, solution.t, solution.q, lam, *np.ascontiguousarray(lines.T), rows, load)
+    memory = np.zeros((solution.t.size, 0)) if solution._memory is None else solution._memory
+    constraint_loads(system, solution.t, solution.q, memory, lam, *np.ascontiguousarray(lines.T), rows, load)
     return at_first_point(solution, body, load, member.constraint, member.coordinates)
 
 
@@ -269,6 +274,11 @@ def force_reaction(solution, load, body):
     """Force and torque (k, 3) that a force exerts on a body, torque about its first point on it, ground frame."""
     force, system = load.force, solution.system._replace(forces=load.alone)
     Q = force_loads(system, solution.t, solution.q, solution.qd, solution._memory)
+    if force.adds_inertia:
+        # -h^T (h qdd + gamma_h) of its inertia row
+        rows = [one.force for one in solution.packed.loads if one.force.adds_inertia]
+        columns, h, gamma = list(added_inertia(system, solution.q, solution.qd))[rows.index(force)]
+        Q[:, columns] -= ((h * solution.qdd[:, columns]).sum(axis=1) + gamma)[:, None] * h
     at, length = solution.system.bodies[index_of(solution.packed, body)]
     return at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
 
@@ -289,14 +299,15 @@ def at_first_point(solution, body, load, item, coordinates):
     return force, torque
 
 
-@entry(no_system(), "vmmwwwmm")
-def constraint_loads(s, t, q, lam, lines, which, halves, rows, out):
+@entry(no_system(), "vmmmwwwmm")
+def constraint_loads(s, t, q, memory, lam, lines, which, halves, rows, out):
     """out (k, 7 or 3) = -Phi_q^T lam of one body, lam (k, m): over these lines of the short rows (lines, 14).
 
     which are their rows of Phi, halves where the entries of the body begin.
     """
     for k in range(t.size):
         set_time(s, t[k])
+        recall(s, memory[k])
         constraint_jacobian(s, q[k], t[k], rows)
         for i in range(lines.size):
             for c in range(out.shape[1]):
@@ -420,7 +431,7 @@ def acted(packed, item, on):
         return item.on
     handles = handles_of(packed)
     on = handles.body(on) if isinstance(on, str) else handles.own(on)
-    if on is item.a or on is item.b or (isinstance(item, Force) and on in item.bodies):
+    if on is item.a or on is item.b or (isinstance(item, (Force, SumRow)) and on in item.bodies):
         if on.dimension:
             return on
         raise InvalidBody(f"{item.name}: the load on the ground is the opposite of the load on {item.on.name!r}.")

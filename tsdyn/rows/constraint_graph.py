@@ -64,8 +64,8 @@ W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
 class ConstraintGraph(NamedTuple):
     """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero where row is -1.
 
-    A row that is a sum has a pair of sides for each of its terms: that of the first in its own place, those of the others
-    behind the pairs of all rows.
+    A row that is a sum has a pair of sides for each of its terms: that of the first in its own place, those of the
+    others behind the pairs of all rows.
     """
 
     bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length: 7, 3, or poses.STILL of what never turns
@@ -100,9 +100,9 @@ def no_graph():
     pairs = np.zeros((0, 2), np.int64)
     kinds, products, parts = records(RowKind), records(Product), records(PartProduct)
     return ConstraintGraph(
-        pairs, kinds, none, pairs, none, none, none, products, np.zeros(16), np.zeros(16), none, pattern, np.zeros(0), none, parts,
-        np.zeros(0), pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64),
-        no_axes(), none,
+        pairs, kinds, none, pairs, none, none, none, products, np.zeros(16), np.zeros(16), none, pattern, np.zeros(0),
+        none, parts, np.zeros(0), pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64), no_axes(),
+        none,
     )  # fmt: skip
 
 

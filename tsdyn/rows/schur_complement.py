@@ -6,7 +6,15 @@ from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, 
 from ..maths.tolerances import PIVOT_ROUNDING
 from .constraint_graph import ROWS, ROWS_WELD, W_MASS, W_ROTATION, WEIGHTS, WELD_ROWS, WELDS
 from .elimination import factor, factor_lu, solve, solve_lu
-from .inertia_rows import clear_rows, inner, leave_diagonal, put_rows_back, raise_diagonal, residuals, subtract_multipliers
+from .inertia_rows import (
+    clear_rows,
+    inner,
+    leave_diagonal,
+    put_rows_back,
+    raise_diagonal,
+    residuals,
+    subtract_multipliers,
+)
 from .inertia_rows import take_reactions as take_inertia_reactions
 from .massless_axes import AXIS_H, AXIS_OWN, AXIS_Y
 from .redundant_rows import set_redundant_diagonal

@@ -18,6 +18,7 @@ from ..jit.arrays import zeros
 from ..jit.kernels import Record, loader, records, twin
 from ..model.equations import changes_with_state
 from ..model.packed import System, coupled_loads, members_of
+from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.program import run_program
 from ..motions.signals import Signal
@@ -397,6 +398,9 @@ def lacking(packed):
             constraint.rheonomic or any(isinstance(value, Motion) for value in given)
         ):
             found.append((constraint, "it depends on time"))
+        elif any(isinstance(value, CoordinateFunction) and value.no_series for value in given):
+            why = next(value.no_series for value in given if isinstance(value, CoordinateFunction) and value.no_series)
+            found.append((constraint, why))
         elif "series" not in constraint.kernels:
             found.append((constraint, f"{constraint._kind()} has no kernel `series`"))
     for load in packed.loads:
@@ -532,7 +536,7 @@ def masks(graph, packed):
                 isinstance(constraint.body_of(marker), Ground) or (size == STILL and marker.code != POINT)
                 for marker, size in zip(kind.markers, length, strict=True)
             )
-            key = grounded, tuple(Motion.numbers(par))
+            key = grounded, (*Motion.numbers(par), *[0.0] * kind.memory)
             if key not in patterns:
                 if grounded not in motions:
                     motions[grounded] = _random_motion(grounded)

@@ -200,7 +200,7 @@ def geometric_stiffness(count, stride, table, reals, q, t, lam, K):
     lam, K = vector(lam, ANY), vector(K, ANY)
     x, J, H, XHX = stack(SIZE), stack2(ROWS, SIZE), stack2(SIZE, SIZE), stack2(SPAN, SPAN)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride :]
         own_lam, n = lam[own[ROW] :], own[STRIDE]
         place_markers(q, own, real, x)
         _derive_reaction(x, real[3 * MARKERS :], t, own_lam, J, H)
@@ -224,7 +224,7 @@ def rate_slopes(count, stride, table, reals, q, qd, qdd, t, G1, G2):
     slopes = Slopes(J, a1, a2, g_xd)
     for i in range(count):
         # Markers at q and qd, and their accelerations with qdd
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride :]
         move_markers(q, qd, own, real, x, xd, xdd)
         _accelerate_markers(q, qdd, own, real, xdd)
         _derive_rates(x, xd, xdd, real[3 * MARKERS :], t, slopes)

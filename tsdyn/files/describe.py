@@ -116,7 +116,9 @@ def _item(item, refused):
     for name, argument in arguments.items():
         if argument.kind == types.COORDINATE:
             found[name] = _coordinates(vars(item)[name])
-        if argument.kind in (types.REFERENCE, types.COORDINATE):
+        if argument.kind == types.POINTS:
+            found[name] = [[body.name, list(s)] for body, s in vars(item)[name]]
+        if argument.kind in types.NAMED:
             continue
         try:
             value = encode(_value_of(item, argument))

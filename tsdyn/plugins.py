@@ -98,6 +98,7 @@ from .motions.of_coordinates import CoordinateFunction, coordinate_function, fun
 from .motions.prescribed import Motion
 from .motions.signals import Signal, numbers_of
 from .motions.tables import is_data
+from .motions.tracing import gate
 from .validation import finite, floats, label, not_negative, number, positive, shown, vector3, whole
 
 __all__ = [
@@ -179,6 +180,7 @@ __all__ = [
     "fitting",
     "floats",
     "functions_of",
+    "gate",
     "given_series",
     "ground_point",
     "in_frame",

@@ -92,7 +92,7 @@ def _levels(constraint, members, t, q, qd, qdd, time_rate):
     x = []
     for j, marker in enumerate(constraint.markers):
         at, s = starts[:, j], places[:, j].T
-        x += _marker_jet(marker, constraint.body_of(marker).dimension, at, s, q, qd, qdd)
+        x += marker_jet(marker, constraint.body_of(marker).dimension, at, s, q, qd, qdd)
     par = [entry for given in zip(*values, strict=True) for entry in _parameter(given, t, time_rate)]
     out = [None] * type(constraint).rows
     twin(type(constraint).phi)(x, par, Jet(t[:, None], time_rate), out)
@@ -127,10 +127,10 @@ def marker_jets(starts, constraint, coordinates, q, qd, qdd):
     """Yield the coordinates of each marker of a constraint or force as Jets over the outputs; starts of `starts_of`."""
     for marker, s in zip(constraint.markers, coordinates, strict=True):
         body = constraint.body_of(marker)
-        yield _marker_jet(marker, body.dimension, starts.get(body, 0), s, q, qd, qdd)
+        yield marker_jet(marker, body.dimension, starts.get(body, 0), s, q, qd, qdd)
 
 
-def _marker_jet(marker, dimension, at, s, q, qd, qdd):
+def marker_jet(marker, dimension, at, s, q, qd, qdd):
     """Coordinates of a marker on a body whose own begin at `at`; or of several, at and s[i] being arrays."""
     if marker.code == TURN:
         return [Jet(0.0)] * 3

@@ -6,15 +6,16 @@ so that d(kinetic + potential)/dt = applied + driving power - dissipation. dU/dt
 Taylor arithmetic.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.markers import TURN
+from ..elements.markers import TURN, Point
 from ..jit.kernels import twin
 from ..maths.power_series import Jet
 from ..motions.signals import Signal
-from .diagnostics import constraint_rows, marker_jets, starts_of
+from .diagnostics import constraint_rows, marker_jet, marker_jets, starts_of
 from .generalised_forces import force_loads
 from .reactions import particular
 
@@ -40,6 +41,8 @@ def force_powers(solution):
 def load_powers(packed, load, t, q, qd, memory):
     """Potential energy, dissipation and applied power of one force, over outputs (k,)."""
     kind = type(load.force)
+    if hasattr(kind, "powers"):
+        return kind.powers(*_lengths(packed, load.force.points, q, qd), load.parameters)
     par = [entry for value in load.parameters for entry in (value.over(t) if isinstance(value, Signal) else [value])]
     if load.slot >= 0:
         par.append(memory[:, load.slot])
@@ -58,6 +61,17 @@ def load_powers(packed, load, t, q, qd, memory):
             system = packed.system._replace(forces=load.alone)
             work = np.einsum("kn,kn->k", force_loads(system, t, q, qd, memory), qd)
     return U.x, lost, work + U.xd + lost
+
+
+def _lengths(packed, points, q, qd):
+    """Length (k,) between points of bodies, and its rate."""
+    length, starts = Jet(np.zeros(len(q)), np.zeros(len(q))), starts_of(packed)
+    still, point = np.zeros_like(qd), Point("a")
+    places = [marker_jet(point, body.dimension, starts.get(body, 0), s, q, qd, still) for body, s in points]
+    for one, other in pairwise(places):
+        d = [b - a for a, b in zip(one, other, strict=True)]
+        length = length + np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    return length.x, length.xd
 
 
 def marker_states(packed, load, q, qd):

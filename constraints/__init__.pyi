@@ -1,7 +1,7 @@
 # Written by tools/stubs.py: do not edit.
 from typing import Any, Self
 
-from ..hints import AnyBody, ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Function, Joint, Path, Points, Prescribed, Primitive, References
+from ..hints import AnyBody, ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Function, Joint, Path, Points, Prescribed, Primitive, References, RopePoints
 
 class AngleDriver(References, Primitive):
     across_a: Attribute[ArrayLike, Floats]
@@ -100,6 +100,12 @@ class Revolute(Points, Axes, Joint):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
+class Span(Points, Primitive):
+    offset: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., offset: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., offset: float = ..., name: str = ...) -> Self: ...
+
 class Spherical(Points, Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., name: str = ...) -> None: ...
     @classmethod
@@ -165,6 +171,17 @@ class Fixed(Points, Axes, References, Joint):
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike | None = ..., axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
     @property
     def frames(self) -> tuple[Any, ...]: ...
+
+class Rope(Joint):
+    points: RopePoints
+    length: float
+    always_taut: bool
+    restitution: float
+    def __init__(self, points: RopePoints, length: float | None = ..., always_taut: bool = ..., restitution: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, points: RopePoints, length: float | None = ..., always_taut: bool = ..., restitution: float = ..., name: str = ...) -> Self: ...
+    @property
+    def bodies(self) -> tuple[AnyBody, ...]: ...
 
 class RotationMotor(Points, Axes, References, Joint):
     angle: Attribute[Prescribed, Any]

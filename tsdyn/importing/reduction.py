@@ -93,8 +93,8 @@ def _rename(description, top, report):
         elif joint.kind != "free":
             report.leave("joint between links that are fixed to each other", joint.name)
     description.joints = kept
-    for spring in description.springs:
-        spring.a, spring.b = top(spring.a), top(spring.b)
+    for tendon in description.tendons:
+        tendon.points = [(top(link), point) for link, point in tendon.points]
 
 
 # Links without mass or inertia between joints: a share of a neighbour's mass is moved to them, exactly.

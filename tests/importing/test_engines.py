@@ -37,12 +37,12 @@ def pinocchio_motions(path, names, rng, free_base, scene=None):
 
 
 def mujoco_motions(path, names, rng, actuated=True):
-    """A random state by MuJoCo: contacts, limits, friction and equality constraints off, armature zero."""
+    """A random state by MuJoCo: contacts, limits, friction and equality constraints off."""
     mujoco = pytest.importorskip("mujoco")
     spec = mujoco.MjSpec.from_file(str(path))
     spec.compiler.fusestatic = False
     model, off = spec.compile(), mujoco.mjtDisableBit
-    model.dof_armature[:] = model.body_gravcomp[:] = model.opt.density = model.opt.viscosity = 0.0
+    model.body_gravcomp[:] = model.opt.density = model.opt.viscosity = 0.0
     model.opt.disableflags |= off.mjDSBL_CONTACT | off.mjDSBL_LIMIT | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_EQUALITY
     if not actuated:
         model.opt.disableflags |= off.mjDSBL_ACTUATION

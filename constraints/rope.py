@@ -16,6 +16,8 @@ import numpy as np
 from ..plugins import InvalidConstraint, SumRow, fitting, ground_point, label, positive, rope_points
 from .span import Span
 
+VANISHING = 1e-9  # share of the rope's length below which a span has no direction; its square is below rounding
+
 if TYPE_CHECKING:
     from ..hints import RopePoints
 
@@ -46,7 +48,8 @@ class Rope(SumRow):
     -----
     One row. The tension is the multiplier of the row; `solution.reaction(rope, on=body)` is the force on each of
     its bodies, about the centroid. The masses of rope and pulleys are neglected. A pulley of radius R is a point where
-    the rope turns about its axle; the wrapped length, which changes little, is left out.
+    the rope turns about its axle; the wrapped length, which changes little, is left out. A run ends where a span
+    shrinks to length zero and has no direction.
 
     Examples
     --------
@@ -129,7 +132,7 @@ class Rope(SumRow):
         offset = self._held_length - float(self.length)
         for (a, s), (b, r) in pairwise(self.points):
             if a is not b:
-                yield Span(a, b, point_a=s, point_b=r, offset=offset)
+                yield Span(a, b, point_a=s, point_b=r, offset=offset, least=VANISHING * self.length)
                 offset = 0.0
 
     @classmethod

@@ -70,7 +70,7 @@ class Cable(SceneLaw, Force):
     Notes
     -----
     Slack below its free length. The potential energy is that of the stretch; damping takes the rest. The mass of the
-    cable is neglected. A span that shrinks to length zero has no direction: a run ends there.
+    cable is neglected. Points may pass each other at speed, as those of a Spring may: the direction turns.
 
     Examples
     --------

@@ -57,8 +57,6 @@ class AngleTerm(Primitive):
         Factor of the angle.
     offset : float
         What is added; zero by default.
-    turn : float, rad
-        The angle near which counting begins.
 
     Examples
     --------
@@ -82,16 +80,14 @@ class AngleTerm(Primitive):
     memory = 1
     summed = True
 
-    def __init__(
-        self, a: BodyLike, b: BodyLike, *, ratio: float = 1.0, offset: float = 0.0, turn: float = 0.0, **places: Any
-    ) -> None:
+    def __init__(self, a: BodyLike, b: BodyLike, *, ratio: float = 1.0, offset: float = 0.0, **places: Any) -> None:
         super().__init__(a, b, **places)
-        self.ratio, self.offset, self.turn = ratio, offset, turn
+        self.ratio, self.offset = ratio, offset
         self.check()
 
     def check(self):
         """Finite numbers."""
-        for word in ("ratio", "offset", "turn"):
+        for word in ("ratio", "offset"):
             finite(getattr(self, word), f"{self.name}: {word}", self.error)
 
     def parameters(self):

@@ -201,9 +201,7 @@ class Coupler(SumRow):
         given = {"ratio": factor, "offset": offset} | ({} if function is None else {"function": function})
         if kind == "angle":
             own, other, f, g, h = angles(joint)[index]
-            near = np.ravel(joint.angle_near)
             cls = AngleTerm if function is None else _AngleFunctionTerm
-            given["turn"] = float(near[index if near.size > 1 else 0])
             term = cls(own, other, reference_a=f, across_a=g, reference_b=h, **given)
             term.__dict__["counted"] = (joint, index)
             return term

@@ -144,6 +144,7 @@ SECTIONS = {
         Entry("hooke_joint", "Universal joint", 3.0, "speeds (rad/s)", lambda m, s: np.stack([*m.speeds(s)], axis=1)),
         Entry("cardan_shaft", "Cardan shaft", 1.0, "speeds (rad/s)", lambda m, s: m.speeds(s).T),
         Entry("geared_pair", "Gear pair", 1.5, "turn of the wheel (rad)", lambda m, s: m.turn(s, "wheel")),
+        Entry("differential", "Differential", 2.0, "cage, left, right (rad)", lambda m, s: m.turns(s).T),
         Entry("planetary_gear", "Planetary gear", 0.5, "sun, carrier (rad/s)", lambda m, s: np.stack([*m.rates(s)], 1)),
         Entry("drive_train", "Drive train with brake", 4.0, "kinetic energy (J)", lambda m, s: s.kinetic_energy),
         Entry("screw_press", "Screw press", 1.5, "platen (m)", lambda m, s: s.position("platen")[:, 2]),

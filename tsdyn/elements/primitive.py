@@ -23,6 +23,8 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Never, Self
 
+import numpy as np
+
 from ..errors import InvalidConstraint
 from ..jit.kernels import Callback, specialised
 from ..motions.prescribed import Motion
@@ -99,7 +101,6 @@ class Primitive(Attachment):
     slots = 0
     memory = 0
     summed = False
-    turn = 0.0  # what it remembers at first
     counted: Any = None  # (joint, index) of the angle whose turns a term counts
     normalises = False  # whether it does no more than keep the length of p
     prescribed: str | tuple[str, ...] = ""
@@ -146,6 +147,13 @@ class Primitive(Attachment):
     def row_labels(self) -> tuple[str, ...]:
         """What follows its title in the names of its rows."""
         return ("",) if self.rows == 1 else tuple(f"[{i}]" for i in range(self.rows))
+
+    @property
+    def first_memory(self) -> float:
+        """What it remembers at first: the angle near which its joint begins to count."""
+        joint, which = self.counted or (self, 0)
+        near = np.ravel(joint.angle_near)
+        return float(near[which if near.size > 1 else 0])
 
     @property
     def rheonomic(self) -> bool:

@@ -125,7 +125,7 @@ def _item(item, refused):
             refused.append(f"{item.name} keeps no {name}")
     for name, argument in arguments.items():
         if argument.kind == types.COORDINATE:
-            found[name] = _coordinates(vars(item)[name])
+            found[name] = _coordinate_names(vars(item)[name])
         if argument.kind == types.POINTS:
             found[name] = [[body.name, list(s)] for body, s in vars(item)[name]]
         if argument.kind in types.NAMED:
@@ -142,10 +142,10 @@ def _item(item, refused):
     return found | _history(item)
 
 
-def _coordinates(given):
+def _coordinate_names(given):
     """[joint, kind, index] of a coordinate of a joint, or of several."""
     joint, *which = given
-    return [joint.name, *which] if which and isinstance(which[0], str) else [_coordinates(each) for each in given]
+    return [joint.name, *which] if which and isinstance(which[0], str) else [_coordinate_names(each) for each in given]
 
 
 def _value_of(item, argument):

@@ -16,6 +16,7 @@ from ..elements.element import Attachment
 from ..errors import InvalidArgument
 from ..motions.elementary import Piecewise
 from ..motions.expressions import Smooth
+from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tables import Pieces, Table, is_data
@@ -51,6 +52,8 @@ def encode(value):
         return _encode_motion(value)
     if isinstance(value, Signal):
         return _encode_signal(value)
+    if isinstance(value, CoordinateFunction):
+        value = value.smooth
     if isinstance(value, Smooth):
         return _encode_smooth(value)
     if isinstance(value, Table):

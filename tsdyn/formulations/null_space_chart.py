@@ -364,8 +364,8 @@ def _normal_space(graph, w, l):
         # Other rows: (r, G^T pi' / 2) of Y0 = W0 H0^T, columns scaled to Phi_q0 U with a unit diagonal
         _add_normal(graph, w, l, e, graph.row[e], 1.0 / diagonal[e])
     for i in range(graph.tails.size):
-        e = graph.tails[i]
-        _add_normal(graph, w, l, graph.row.size + i, graph.row[e], 1.0 / diagonal[e])
+        head = graph.tails[i]
+        _add_normal(graph, w, l, graph.row.size + i, graph.row[head], 1.0 / diagonal[head])
 
 
 @kernel

@@ -597,7 +597,7 @@ def _pack_constraints(parameters, n, where, table, reals):
             _append_reals(constraint, parameters[constraint], reals, motions, functions)
             if kind.memory:
                 kept[constraint] = len(reals)
-                reals.append(float(constraint.turn))
+                reals.append(constraint.first_memory)
             if begin == first[1]:
                 stride = len(reals) - begin
             if len(reals) - begin != stride:

@@ -143,5 +143,6 @@ def remembered(state, prepared, t, q):
     for part, slot in zip(prepared.packed.constraints, prepared.packed.slots, strict=True) if fresh and slots else ():
         if slot >= 0:
             joint, which = part.counted or (None, 0)
-            memory[slot] = part.turn if joint is None else angles[prepared.handles.row(joint, "angle").first + which]
+            if joint is not None:
+                memory[slot] = angles[prepared.handles.row(joint, "angle").first + which]
     return np.concatenate((angles, memory))

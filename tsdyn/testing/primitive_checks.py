@@ -14,6 +14,7 @@ from ..errors import CheckFailed, InvalidCall, TsdynError
 from ..jit.kernels import NumbaError, twin
 from ..maths.power_series import Jet
 from ..maths.tolerances import COMPLEX_STEP
+from ..model.packed import member_of
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
@@ -222,7 +223,7 @@ def _check_assembled(scene, constraint, name, rng):
     for body in scene.bodies:
         body.angular_velocity, body.velocity = 10.0 * rng.normal(size=3), rng.normal(size=3)
     _, qd = scene.start
-    rows = slice(0, constraint.rows)
+    rows = member_of(scene.packed, constraint).rows
     Phi, Phi_q, Phi_t, gamma = (array[rows] for array in constraint_arrays(scene.system, q, qd, t))
     zero = np.zeros_like(q)
 

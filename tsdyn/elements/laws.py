@@ -17,6 +17,8 @@ from .loops import laws as loops
 from .loops.constraint_series import SIGNATURE as SERIES
 from .loops.coordinate_rows import SIGNATURE
 from .loops.forces import JACOBIAN
+from .loops.law_check import MARGIN
+from .loops.law_check import SIGNATURE as CHECK
 
 if TYPE_CHECKING:
     from ..hints import Function
@@ -32,6 +34,8 @@ KERNELS = MappingProxyType(
         "jacobian": Callback(loops.jacobian, JACOBIAN),
         "remember": Callback(loops.remembers, SIGNATURE),
         "series": Callback(loops.series, SERIES),
+        "check": Callback(loops.check, CHECK),
+        "margin": Callback(loops.margin, MARGIN),
     }
 )
 
@@ -71,6 +75,7 @@ class SceneLaw:
     given: str
     positive = ()
     no_series = "its function can't be traced"
+    checked = False  # whether its series are checked against the law, which isn't analytic everywhere
     each = ""  # what the numbers of the function are, in messages
 
     @staticmethod

@@ -94,6 +94,7 @@ class Cable(SceneLaw, Force):
     permanent = ("points",)
     sources = ("stiffness", "damping")
     loads = ()
+    checked = True
     quantities = MappingProxyType(dict.fromkeys(("stiffness", "damping", "free_length"), not_negative))
 
     def __init__(

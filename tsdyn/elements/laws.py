@@ -34,22 +34,21 @@ KERNELS = MappingProxyType(
         "jacobian": Callback(loops.jacobian, JACOBIAN),
         "remember": Callback(loops.remembers, SIGNATURE),
         "series": Callback(loops.series, SERIES),
-        "check": Callback(loops.check, CHECK),
-        "margin": Callback(loops.margin, MARGIN),
     }
 )
+CHECKS = MappingProxyType({"check": Callback(loops.check, CHECK), "margin": Callback(loops.margin, MARGIN)})
 
 
 class LawKernels(dict):
-    """The callbacks of one law: each law is run by itself."""
+    """The callbacks of one law: each law is run by itself; with those that check series where they are `checked`."""
 
-    def __init__(self):
-        super().__init__(KERNELS)
+    def __init__(self, checked=False):
+        super().__init__({**KERNELS, **CHECKS} if checked else KERNELS)
 
     __hash__ = object.__hash__
 
     def __reduce__(self):
-        return LawKernels, ()
+        return LawKernels, ("check" in self,)
 
 
 class Action(NamedTuple):
@@ -87,7 +86,7 @@ class SceneLaw:
         """The callbacks of the present function, whatever its numbers."""
         function = getattr(self, self.given)
         if _code(self.__dict__.get("_of")) is not _code(function):
-            self.__dict__.update(_kernels=LawKernels(), _of=function)
+            self.__dict__.update(_kernels=LawKernels(self.checked), _of=function)
         return self.__dict__["_kernels"]
 
     @property

@@ -137,17 +137,17 @@ class Coupler(SumRow):
 
     def check(self):
         """Joints of the scene, each once; finite numbers."""
-        seen = []
-        for joint, kind, index in self._all:
+        for i, coordinate in enumerate(self._all):
+            joint, kind, _ = coordinate
             if joint.scene is not self.scene:
                 raise self.error(f"{self.name}: {joint.name!r} belongs to another scene.")
             if not joint.added:
                 raise self.error(f"{self.name}: add its joint {joint.name!r} to the scene first.")
-            if any(joint is other and (kind, index) == which for other, *which in seen for which in [tuple(which)]):
-                if joint is self.dependent[0]:
-                    raise self.error(f"{self.name}: the {kind} of {joint.name!r} would depend on itself.")
+            before = self._all[:i]
+            if coordinate == self.dependent and before:
+                raise self.error(f"{self.name}: the {kind} of {joint.name!r} would depend on itself.")
+            if coordinate in before:
                 raise self.error(f"{self.name}: the {kind} of {joint.name!r} is given twice; add up its ratios.")
-            seen.append((joint, kind, index))
         given = [word for word in ("ratio", "polynomial", "function") if getattr(self, word) is not None]
         if len(given) > 1:
             raise self.error(f"{self.name}: give one of ratio, polynomial and function, not {' and '.join(given)}.")
@@ -174,19 +174,26 @@ class Coupler(SumRow):
 
     def place_in(self, scene):
         """Refuse couplers that go in a circle."""
-        others = [each for each in scene.constraints if isinstance(each, Coupler)]
-        ahead, path = [(self, (self,))], None
+        following = {}
+        for each in scene.constraints:
+            if isinstance(each, Coupler):
+                following.setdefault(each.dependent, []).append(each)
+        before, ahead = {self: None}, [self]  # couplers that it depends on, each with the one that led there
         while ahead:
-            coupler, path = ahead.pop()
-            for other in others:
-                if any(_same(other.dependent, each) for each in coupler.independents) and other not in path:
-                    if any(_same(self.dependent, each) for each in other.independents):
-                        names = ", ".join(repr(each.name) for each in (*path, other))
-                        raise self.error(
-                            f"{self.name}: the couplers {names} go in a circle, by which {self.dependent[0].name!r} "
-                            "would depend on itself; leave one out."
-                        )
-                    ahead.append((other, (*path, other)))
+            coupler = ahead.pop()
+            if coupler is not self and self.dependent in coupler.independents:
+                names = []
+                while coupler is not None:
+                    names.append(repr(coupler.name))
+                    coupler = before[coupler]
+                raise self.error(
+                    f"{self.name}: the couplers {', '.join(names[::-1])} go in a circle, by which "
+                    f"{self.dependent[0].name!r} would depend on itself; leave one out."
+                )
+            for other in (other for each in coupler.independents for other in following.get(each, ())):
+                if other not in before:
+                    before[other] = coupler
+                    ahead.append(other)
 
     def compose(self):
         """Eq. (1) or (2): the dependent coordinate, less the others."""
@@ -216,10 +223,6 @@ class Coupler(SumRow):
 
         joint = a.scene.add(Cylindrical(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3)))
         return cls((joint, "angle"), (joint, "displacement"), ratio=rng.uniform(0.5, 2.0), offset=rng.normal())
-
-
-def _same(one, other):
-    return one[0] is other[0] and one[1:] == other[1:]
 
 
 def _chosen(where, given):

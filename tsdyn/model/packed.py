@@ -444,7 +444,7 @@ class Packed(NamedTuple):
     loads: tuple  # a packed_forces.Load for each force, in the order added
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
     slots: tuple  # of System.memory, for each constraint; -1 for none
-    inertias: tuple  # primitives whose rows add inertia to a joint coordinate, kind by kind
+    inertias: tuple  # primitives whose rows add inertia to a joint coordinate, in the order of their forces
     derived: Derived  # what has been worked out from it
 
     def __reduce__(self):

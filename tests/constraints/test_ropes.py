@@ -126,8 +126,10 @@ def test_a_run_ends_where_a_span_vanishes():
 
 
 def test_ropes_that_cant_be():
-    scene, _ = atwood()
+    scene, rope = atwood()
     heavy, light, ground = *scene.bodies, scene.ground
+    with pytest.raises(ts.InvalidConstraint, match="always_taut can't be set later"):
+        rope.always_taut = False
     beyond = ts.Scene().add_point_mass(mass=1.0)
     wrong = {
         "1 point given": [(heavy, ORIGIN)],

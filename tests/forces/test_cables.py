@@ -112,7 +112,9 @@ def test_analyses_parameters_and_files(tmp_path):
 
 
 def test_cables_that_cant_be():
-    scene, load, _ = hoist()
+    scene, load, cable = hoist()
+    with pytest.raises(ts.InvalidForce, match="points can't be set later"):
+        cable.points = [(load, ORIGIN)]
     points = [(scene.ground, ORIGIN), (load, ORIGIN)]
     for options in ({"stiffness": -1.0}, {"stiffness": 1.0, "damping": -1.0}, {"stiffness": 1.0, "free_length": -1.0}):
         with pytest.raises(ts.InvalidForce, match="not negative"):

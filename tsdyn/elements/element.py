@@ -442,6 +442,8 @@ class Attachment:
         """
         if self.owner is not None:
             raise self.error(f"{self.name}: it follows from its joint; set {name} there.")
+        if name in self.permanent:
+            raise self.error(f"{self.name}: {name} can't be set later; remove it, and add a new one.")
         slots = [marker.argument for marker in self.markers]
         if name in slots and "coordinates" in self.__dict__:
             i = slots.index(name)

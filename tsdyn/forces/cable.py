@@ -91,7 +91,7 @@ class Cable(SceneLaw, Force):
     particles = True
     given = "law_of_state"
     law_of_state = staticmethod(_law)
-    permanent = ("points",)
+    permanent = ("points", "law_of_state")
     sources = ("stiffness", "damping")
     loads = ()
     checked = True

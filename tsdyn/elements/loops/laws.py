@@ -401,7 +401,7 @@ def margin(known, kind, h, values, least):
             for k in range(1, known):
                 change += abs(s[a, k]) * power
                 power *= h[0]
-            share = 1.0 - change / abs(s[a, 0])
+            share = 1.0 - change / abs(s[a, 0]) if s[a, 0] != 0.0 else -1.0
             left = share if not share >= left else left  # NaN, too
     least[0] = left
     return 0

@@ -46,7 +46,7 @@ from .elements.loads import (
 )
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
-from .elements.tolerances import PARALLEL
+from .elements.tolerances import FLAT, PARALLEL, RIGHT_ANGLED
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
 from .jit.predicates import some
@@ -106,7 +106,9 @@ __all__ = [
     "BEARING_ROWS",
     "COORDINATE_SLOPE_ROWS",
     "DOP853_INTERPOLANT",
+    "FLAT",
     "PARALLEL",
+    "RIGHT_ANGLED",
     "STATE",
     "Action",
     "Adaptive",

@@ -38,13 +38,13 @@ class SceneStructure:
     """
 
     def __init__(self, packed, t, q):
-        self.packed, self.t, self.metric = packed, t, Metric(packed, None, t)
+        self.packed, self.t, self.metric = packed, t, Metric(packed, None, t, rates=True)
         self.reach = self.metric.reach(q)
         self.system, self.pairs = with_short_rows(packed), Pairs(packed)
         self.increments = Increments(self.metric, self.reach)
         kinds = np.array([part.normalises for part in packed.constraints], bool)
         self.own = self.metric.own
-        rows = np.repeat(kinds, [part.rows for part in packed.constraints])
+        rows = np.repeat(kinds, [part.all_rows for part in packed.constraints])
         self.normals = np.flatnonzero(rows)
         at, length = places(packed)
         # Short rows, those of later terms of sums last; their places among those of `own`
@@ -96,7 +96,10 @@ class SceneStructure:
         """Which parts hold two points at a distance: the difference of displacements rotates them."""
         kept = [self.packed.constraints[i] for i in self.parts[: self.constraints]]
         return np.flatnonzero(
-            [part.rows == 1 and not part.summed and all(m.code == POINT for m in part.markers) for part in kept]
+            [
+                part.rows == part.all_rows == 1 and not part.summed and all(m.code == POINT for m in part.markers)
+                for part in kept
+            ]
         )
 
     def stiffness(self, pairs, own):

@@ -1,10 +1,12 @@
 """The nominal motion: accelerations and multipliers at one state, derivatives of all constraints and forces there."""
 
+from copy import copy
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from ..configuration.mobility import divide
 from ..elements.bodies import rotation_matrix, transform_g
 from ..elements.loops.coordinate_rows import INTS, STRIDE
 from ..elements.loops.forces import FORCE_INTS as FORCE_INTS
@@ -25,7 +27,7 @@ from ..model.equations import (
     with_short_rows,
 )
 from ..model.laws import interrupts_answered
-from ..model.packed import first_rows, instances_of_kinds, no_system, with_curvatures, with_force_jacobians
+from ..model.packed import first_rows, instances_of_kinds, no_system, of_rates, with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..rows.constraint_graph import REDUCED, are_unequal, coordinate_scales
@@ -128,10 +130,10 @@ def derivatives(motion):
     K, rows, Q_q, Q_qd = pairs.blocks(motion, motion.lam)
     # Lines of G1 and G2: of every row, then of the later terms of sums
     found = [
-        [row + i + r for r in range(part.rows or 1)] for i, (part, row) in enumerate(first_rows(packed.constraints))
+        [row + i + r for r in range(part.all_rows or 1)] for i, (part, row) in enumerate(first_rows(packed.constraints))
     ]
-    lines = [lines for part, lines in zip(packed.constraints, found, strict=True) if part.rows]
-    lines += [lines for part, lines in zip(packed.constraints, found, strict=True) if not part.rows]
+    lines = [lines for part, lines in zip(packed.constraints, found, strict=True) if part.all_rows]
+    lines += [lines for part, lines in zip(packed.constraints, found, strict=True) if not part.all_rows]
     lines = np.array([line for each in lines for line in each], int)
     G1, G2 = (as_csr(packed, one[: WIDTH * (m + nc)].reshape(-1, WIDTH)[lines]) for one in rows)
     K = _scatter(K, pairs.columns[:nc], pairs.used[:nc], n)
@@ -200,6 +202,8 @@ class NominalMotion:
     M, H : sparse (n, n), (m', n)
     kept : ndarray (m',)
         Rows of Phi that are independent.
+    rates : ndarray (r,)
+        Those of them that are on velocities.
     """
 
     def __init__(self, packed, memory, t, q, qd, still=False):
@@ -209,7 +213,9 @@ class NominalMotion:
         self.system.reals[self.system.memory] = memory
         self.Phi, rows, self.Phi_t, gamma = constraint_arrays(self.system, q, qd, self.t, WIDTH)
         self.Phi_q = as_csr(packed, rows)
+        self._on_rates = of_rates(packed)
         self.kept = np.setdiff1d(np.arange(len(self.Phi)), self._redundant())
+        self.rates = self.kept[self._on_rates[self.kept]]
         self.H, self.M = self.Phi_q[self.kept], mass_matrix_sparse(self.system, q)
         self._factor()
         at = self.t * np.ones(1)
@@ -246,7 +252,26 @@ class NominalMotion:
             found = dependent_rows(self.packed, self.q, self.t, REDUNDANT_SHARE)
         if found is not None and found.size > known.size and self.q.size <= DENSE:
             raise SingularConfiguration(NOT_UNIQUE)
-        return known if found is None or found.size != known.size else found
+        if found is None or found.size != known.size:
+            return known
+        return self._rates_first(found) if self._on_rates.any() else found
+
+    def _rates_first(self, found):
+        """As many redundant rows, of those on velocities where rows on positions say the same."""
+        groups = np.flatnonzero(~self._on_rates), np.flatnonzero(self._on_rates)
+        _, other = divide(self.Phi_q.toarray() * coordinate_scales(self.packed), groups)
+        return np.array(other, int) if len(other) == found.size else found
+
+    @cached_property
+    def placed(self):
+        """The same motion with the rows on positions alone as constraints; those on velocities push with `lam`."""
+        if not self.rates.size:
+            return self
+        other = copy(self)
+        other.kept, other.rates = np.setdiff1d(self.kept, self.rates), self.rates[:0]
+        other.H = self.Phi_q[other.kept]
+        other._factor()
+        return other
 
     def _factor(self):
         self._factors, self._weights = self._factored(self.H)

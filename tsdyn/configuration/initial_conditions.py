@@ -10,6 +10,7 @@ from ..jit.kernels import resident
 from ..maths.matrix_rank import dependent
 from ..maths.tolerances import LAST_PLACE
 from ..model.packed import POINT_SIZE, is_small
+from ..observables.contacts import singular_place
 from ..observables.evaluate import constraint_arrays
 from ..observables.tolerances import KEPT_FLOATS
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, by_lengths, coordinate_scales
@@ -134,6 +135,9 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     graphs of the packed scene drop them from now on.
     """
     packed = scene.packed
+    place = singular_place(packed, q)
+    if place:
+        raise SingularConfiguration(f"{place}: a singular configuration. Start from another one.")
     start = _Start(scene, system, q, qd, t, tol)
     if packed.derived.redundant is None and start.is_regular():
         release_loose_bodies(packed, start.graph, start.tangent.rows.H)

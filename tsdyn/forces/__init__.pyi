@@ -49,7 +49,8 @@ class Armature(Force):
     def inertia_row(self) -> Primitive: ...
 
 class Cable(Force):
-    points: RopePoints
+    @property
+    def points(self) -> RopePoints: ...
     stiffness: float
     damping: float
     free_length: float
@@ -74,7 +75,8 @@ class ContactFriction(JointFriction, Force):
 
 class Control(Force):
     function: ControlLaw
-    actuators: Actuators
+    @property
+    def actuators(self) -> Actuators: ...
     period: float | None
     def __init__(self, function: ControlLaw, actuators: Actuators = ..., *, period: float | None = ..., name: str = ...) -> None: ...
     def actions(self) -> list[Action]: ...

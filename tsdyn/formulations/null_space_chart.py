@@ -287,9 +287,15 @@ def update_b(w):
 @kernel
 def new_chart(graph, system, w, f, l, t):
     """Make a chart at the present q: q0, U, V by SVD, B, L; u = 0, v = 0. Status."""
-    n, m, k = w.q.size, w.u.size, w.v.size
     regular = set_base_point(graph, system, w, f, l, t, largest(w.q))  # of p, too: Phi has the normalisations
     take_selection(graph, w, f)
+    return set_bases(graph, system, w, l, t, regular)
+
+
+@kernel
+def set_bases(graph, system, w, l, t, regular):
+    """The same at the base point, for the rows of w; regular: whether all rows are independent there. Status."""
+    n, m, k = w.q.size, w.u.size, w.v.size
     evaluate_dense_rows(system, w, t)
     kept, metres = 0, unit(w.control.size)
     # Columns Phi_q0^T, positions in the unit of the scene
@@ -413,10 +419,16 @@ def _copy_matrix(A, out):
 @kernel
 def tangent_map(system, w, t):
     """Phi_q, N, B, T = B Phi_q V and D = V - U T at the present q, Eqs. 7, 9, 28. Status."""
-    m, k = w.u.size, w.v.size
     evaluate_dense_rows(system, w, t)
     form_normal_matrix(system, w)
-    # N = Phi_q U, B by Eq. 28 from the B of the configuration before
+    return map_tangent(system, w)
+
+
+@kernel
+def map_tangent(system, w):
+    """The same, N = Phi_q U being known. Status."""
+    m, k = w.u.size, w.v.size
+    # B by Eq. 28 from the B of the configuration before
     made = w.counters.factorizations
     status = update_b(w)
     if status != OK:

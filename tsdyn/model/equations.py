@@ -248,7 +248,7 @@ def with_short_rows(packed):
         system = packed.system
         table, m = system.table.copy(), len(system.segments)
         segments = np.concatenate((system.segments, np.zeros((system.tails.size, 4), np.int64)))
-        tail = {id(part): m + i for i, part in enumerate(part for part in packed.constraints if not part.rows)}
+        tail = {id(part): m + i for i, part in enumerate(part for part in packed.constraints if not part.all_rows)}
         for kind, members in zip(system.kinds, instances_of_kinds(packed), strict=True):
             first, count = kind.table, kind.count
             own = table[first : first + INTS * count].reshape(count, INTS)

@@ -101,6 +101,7 @@ class Derived:
     holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
     loads: dict = None  # reactions.loads_of
     row_parts: list = field(default_factory=list)  # idle: observables.row_parts.taken
+    with_singular_places: list = None  # indices of primitives: contacts.singular_place
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts
     engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine
@@ -524,8 +525,8 @@ def pack(scene):
         motions=records(MotionPlace, [row for row, _ in motions]),
         rheonomic=np.array([any(constraint.rheonomic for constraint in primitives)], np.int64),
         segments=np.array(_segments(primitives, where), np.int64).reshape(-1, 4),
-        sums=np.array([row for part, row in first_rows(primitives) if part.summed and part.rows], np.int64),
-        tails=np.array([row for part, row in first_rows(primitives) if not part.rows], np.int64),
+        sums=np.array([row for part, row in first_rows(primitives) if part.summed and part.all_rows], np.int64),
+        tails=np.array([row for part, row in first_rows(primitives) if not part.all_rows], np.int64),
         forces=forces,
         signals=signals,
         memory=np.array([*memory, *kept.values()], np.int64),
@@ -555,11 +556,11 @@ def _segments(primitives, where):
     for constraint in primitives:
         spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
         if constraint.summed:
-            begin, length = found.pop()[:2] if not constraint.rows else (0, 0)
+            begin, length = found.pop()[:2] if not constraint.all_rows else (0, 0)
             used = [span for span in (*spans, (begin, length)) if span[1]]
             begin, end = min(at for at, _ in used), max(at + size for at, size in used)
             spans = (begin, end - begin), (0, 0)
-        found += [[*spans[0], *spans[1]]] * (1 if constraint.summed else constraint.rows)
+        found += [[*spans[0], *spans[1]]] * (1 if constraint.summed else constraint.all_rows)
     return found
 
 
@@ -575,8 +576,8 @@ def first_rows(primitives):
     """Yield each primitive and the first of its rows; the terms of a sum have the same."""
     row = 0
     for primitive in primitives:
-        yield primitive, row if primitive.rows else row - 1
-        row += primitive.rows
+        yield primitive, row if primitive.all_rows else row - 1
+        row += primitive.all_rows
 
 
 def _pack_constraints(parameters, n, where, table, reals):
@@ -660,7 +661,7 @@ def _append_programs(motions, reals):
 def _members(constraints):
     part = row = 0
     for constraint in constraints:
-        parts, rows = slice(part, part + len(constraint.parts)), slice(row, row + constraint.rows)
+        parts, rows = slice(part, part + len(constraint.parts)), slice(row, row + constraint.all_rows)
         yield Member(constraint, constraint.coordinates, parts, rows)
         part, row = parts.stop, rows.stop
 
@@ -679,9 +680,21 @@ def member_of(packed, constraint):
     if known.members is None:
         found = {}
         for i, (part, row) in enumerate(first_rows(packed.constraints)):
-            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + max(part.rows, 1)))
+            rows = slice(row, row + max(part.all_rows, 1))
+            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), rows)
         known.members = found | {id(member.constraint): member for member in packed.members}
     return known.members.get(id(constraint))
+
+
+def has_rates(scene):
+    """Whether any constraint of a scene, or of a `Packed`, has rows on velocities."""
+    return any(constraint.rate_rows for constraint in scene.constraints)
+
+
+def of_rates(packed):
+    """Which rows of Phi are rows on velocities, bool (m,)."""
+    counts = [count for constraint in packed.constraints for count in (constraint.rows, constraint.rate_rows)]
+    return np.repeat(np.arange(len(counts)) % 2 == 1, counts)
 
 
 def classes(packed):

@@ -98,13 +98,27 @@ def _levels(constraint, members, t, q, qd, qdd, time_rate):
         at, s = starts[:, j], places[:, j].T
         x += marker_jet(marker, constraint.body_of(marker).dimension, at, s, q, qd, qdd)
     par = [entry for given in zip(*values, strict=True) for entry in _parameter(given, t, time_rate)]
-    out = [None] * type(constraint).rows
-    twin(type(constraint).phi)(x, par, Jet(t[:, None], time_rate), out)
-    shape = t.size, len(members)
+    kind = type(constraint)
+    out, shape = [None] * kind.rows, (t.size, len(members))
+    if kind.rows:
+        twin(kind.phi)(x, par, Jet(t[:, None], time_rate), out)
     out = [Jet.of(row) for row in out]
+    if constraint.rate_rows:
+        out += _rates(kind, x, par, Jet(t[:, None], time_rate), time_rate)
     levels = [[np.broadcast_to(getattr(row, name), shape) for row in out] for name in ("x", "xd", "xdd")]
     places = np.concatenate([np.array(rows) + i for i in range(len(out))])
     return places, [np.concatenate(level, axis=1) for level in levels]
+
+
+def _rates(kind, x, par, t, time_rate):
+    """The rows on velocities as derivatives of Jets that are zero: their rate, and its derivative."""
+    along, fixed = ([None] * kind.rate_rows for _ in range(2))
+    rate = twin(kind.rate)
+    rate(x, [Jet(each.xd, each.xdd) for each in x], par, t, along)
+    rate(x, [Jet(0.0) for _ in x], par, t, fixed)
+    # A xd, and b where the time goes on
+    both = [Jet.of(one) + (time_rate - 1.0) * Jet.of(b) for one, b in zip(along, fixed, strict=True)]
+    return [Jet(0.0, row.x, row.xd) for row in both]
 
 
 def _parameter(given, t, rate):

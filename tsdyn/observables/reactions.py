@@ -40,6 +40,7 @@ from ..rows.interface import (
     weigh_bodies,
 )
 from ..workspaces import arrays_of, load_parts, parts
+from .contacts import touching
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
 from .tolerances import KEPT_FLOATS
 
@@ -220,9 +221,10 @@ def particular(multipliers):
 
 
 def reaction(solution, member, body):
-    """Force and torque (k, 3) that a constraint exerts on a body, torque about its first point on it, ground frame.
+    """Force and torque (k, 3) that a constraint exerts on a body, ground frame.
 
-    -Phi_r^T lam at the centroid and the body torque -G Phi_p^T lam / 2, moved to the point. member is a system.Member.
+    -Phi_r^T lam at the centroid and the body torque -G Phi_p^T lam / 2, moved to the contact point, if there is one, or
+    to the first point on the body. member is a system.Member.
     """
     packed = solution.packed
     system = with_short_rows(packed)
@@ -243,7 +245,9 @@ def reaction(solution, member, body):
     lines, lam = np.array(lines, np.int64).reshape(-1, 3), particular(solution.multipliers)
     memory = np.zeros((solution.t.size, 0)) if solution._memory is None else solution._memory
     constraint_loads(system, solution.t, solution.q, memory, lam, *np.ascontiguousarray(lines.T), rows, load)
-    return at_first_point(solution, body, load, member.constraint, member.coordinates)
+    contact = touching(packed, member, solution.q)
+    place = None if contact is None else contact[0]
+    return at_first_point(solution, body, load, member.constraint, member.coordinates, place)
 
 
 def only(packed, parts):
@@ -283,8 +287,11 @@ def force_reaction(solution, load, body):
     return at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
 
 
-def at_first_point(solution, body, load, item, coordinates):
-    """Force and torque of generalised forces load (k, 7 or 3) on a body, about the first point of the item on it."""
+def at_first_point(solution, body, load, item, coordinates, place=None):
+    """Force and torque of generalised forces load (k, 7 or 3) on a body, about the first point of the item on it.
+
+    place (k, 3), m, is where the torque is taken about instead.
+    """
     at, length = solution.system.bodies[index_of(solution.packed, body)]
     force, torque = load[:, :3].copy(), np.zeros((load.shape[0], 3))
     if length == 7:
@@ -294,7 +301,9 @@ def at_first_point(solution, body, load, item, coordinates):
         letter = "a" if body is item.a else "b"
         pairs = zip(item.markers, coordinates, strict=True)
         points = [s for marker, s in pairs if marker.body == letter and marker.code == POINT]
-        if points:
+        if place is not None:
+            torque -= np.cross(place - solution.q[:, at : at + 3], force)
+        elif points:
             torque -= np.cross(A @ points[0], force)
     return force, torque
 
@@ -452,6 +461,34 @@ def exerted(motion, item, on):
     return reaction(motion, member(motion.packed, item), acted(motion.packed, item, on))
 
 
+def contact_point(motion, item):
+    """Contact point (k, 3) of an item along a motion."""
+    return _contact(motion, handles_of(motion.packed).item(item))[0]
+
+
+def friction_demand(motion, item):
+    """Tangential over normal force (k,); infinite where the surfaces would have to pull."""
+    item = handles_of(motion.packed).item(item)
+    _, normal = _contact(motion, item)
+    force, _ = exerted(motion, item, item.on)
+    force = force if item.on is item.a else -force
+    push = np.einsum("ki,ki->k", normal, force)
+    tangential = np.linalg.norm(force - push[:, None] * normal, axis=1)
+    return np.divide(tangential, push, out=np.full(len(push), np.inf), where=push > 0.0)
+
+
+def _contact(motion, item):
+    """Contact point and normal of an item; refused where it has none."""
+    found = member_of(motion.packed, item)
+    contact = None if found is None else touching(motion.packed, found, motion.q)
+    if contact is None:
+        raise InvalidConstraint(
+            f"{item.name} has no contact point; RollingDisc, RollingBall, RollingEllipsoid and RollingBallOnCylinder "
+            "have one."
+        )
+    return contact
+
+
 @fitting_methods
 class Exerting:
     """Mixed into states that know their scene: `packed`, t, q, qd, qdd, multipliers and the `memory` of forces."""
@@ -476,9 +513,22 @@ class Exerting:
         As `Solution.reaction` has them: on a, or b if a is the ground; in the ground frame, the torque about the item's
         first point on that body. A state at k times gives (k, 3).
         """
+        force, torque = exerted(self._motion(), item, on)
+        return (force, torque) if np.ndim(self.t) else (force[0], torque[0])
+
+    def contact_point(self, constraint: ItemLike) -> Floats:
+        """Where a rolling or sliding surface touches, as `Solution.contact_point` has it: (3,), of k times (k, 3)."""
+        point = contact_point(self._motion(), constraint)
+        return point if np.ndim(self.t) else point[0]
+
+    def friction_demand(self, constraint: ItemLike) -> Floats:
+        """Tangential over normal force, as `Solution.friction_demand` has it: a number, of k times (k,)."""
+        demand = friction_demand(self._motion(), constraint)
+        return demand if np.ndim(self.t) else demand[0]
+
+    def _motion(self):
+        """The states as what `exerted` reads."""
         packed, levels = self.packed, (self.q, self.qd, self.qdd, self.multipliers)
         t, (q, qd, qdd, lam) = np.atleast_1d(self.t), map(np.atleast_2d, levels)
         memory = with_normal_loads(packed, t, q, qd, qdd, np.atleast_2d(self.memory))
-        motion = SimpleNamespace(packed=packed, system=packed.system, t=t, q=q, qd=qd, multipliers=lam, _memory=memory)
-        force, torque = exerted(motion, item, on)
-        return (force, torque) if np.ndim(self.t) else (force[0], torque[0])
+        return SimpleNamespace(packed=packed, system=packed.system, t=t, q=q, qd=qd, multipliers=lam, _memory=memory)

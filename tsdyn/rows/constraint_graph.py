@@ -81,6 +81,7 @@ class ConstraintGraph(NamedTuple):
     spins: np.ndarray  # int64 (nb,): whether omega' x J' omega' is ever other than zero
     pattern: Pattern  # of S
     turns: np.ndarray  # (m,): one for rows that are pure numbers, such as those of axes; of no size but in small scenes
+    rates: np.ndarray  # int64 (rows on velocities,): which rows of the graph they are, in order of elimination
     normals: np.ndarray  # int64 (nb,): the row of Phi that normalises a body's p, or -1
     parts: np.ndarray  # PartProduct (products,): the products at the parts of hubs, see graph_builder.py
     scales: np.ndarray  # (products,): what they are multiplied by
@@ -101,8 +102,8 @@ def no_graph():
     kinds, products, parts = records(RowKind), records(Product), records(PartProduct)
     return ConstraintGraph(
         pairs, kinds, none, pairs, none, none, none, products, np.zeros(16), np.zeros(16), none, pattern, np.zeros(0),
-        none, parts, np.zeros(0), pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64), no_axes(),
-        none,
+        none, none, parts, np.zeros(0), pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64),
+        no_axes(), none,
     )  # fmt: skip
 
 

@@ -210,8 +210,8 @@ class _GraphBuilder:
             node = self.nodes.setdefault(tuple(sorted(set(ends.get(row, pair)))), len(self.nodes))
             if node == len(self.sizes):
                 self.sizes.append(0)
-            self.inside.append((node, self.sizes[node] - (not constraint.rows)))
-            self.sizes[node] += constraint.rows
+            self.inside.append((node, self.sizes[node] - (not constraint.all_rows)))
+            self.sizes[node] += constraint.all_rows
 
     def _cut_hubs(self):
         """Parts of hubs, and the cliques: nodes that meet at a body or a part. Frictions couple a hub's rows whole."""
@@ -242,20 +242,20 @@ class _GraphBuilder:
         """Of every row, in order of elimination, its two bodies and its place in Phi; and the joints at each body."""
         m = sum(self.sizes)
         self.firsts = [int(self.starts[node]) + offset for node, offset in self.inside]
-        self.tails = [first for (part, *_), first in zip(self.joints, self.firsts, strict=True) if not part.rows]
+        self.tails = [first for (part, *_), first in zip(self.joints, self.firsts, strict=True) if not part.all_rows]
         # Pairs of sides: those of later terms of sums follow those of the rows
         later = iter(range(m, m + len(self.tails)))
         self.pairs = [
-            first if part.rows else next(later) for (part, *_), first in zip(self.joints, self.firsts, strict=True)
+            first if part.all_rows else next(later) for (part, *_), first in zip(self.joints, self.firsts, strict=True)
         ]
-        self.counts = [part.rows or 1 for part, *_ in self.joints]
+        self.counts = [part.all_rows or 1 for part, *_ in self.joints]
         self.sides, self.places = np.full((m + len(self.tails), 2), self.nb, np.int64), np.full(m, -1, np.int64)
         self.at_body, self.at_node = [[] for _ in range(self.nb)], [[] for _ in self.nodes]
         for i, (constraint, pair, row) in enumerate(self.joints):
             e = np.arange(self.pairs[i], self.pairs[i] + self.counts[i])
             self.sides[e] = pair
-            if constraint.rows:
-                self.places[e] = np.arange(row, row + constraint.rows)
+            if constraint.all_rows:
+                self.places[e] = np.arange(row, row + constraint.all_rows)
             self.at_node[self.inside[i][0]].append(i)
             for side, body in enumerate(pair):
                 if body < self.nb and body not in self.hubs:
@@ -274,7 +274,7 @@ class _GraphBuilder:
         return left, self.counts[i], right, self.counts[j], target + r * stride + c, stride
 
     def _products(self):
-        heads = [i for i, joint in enumerate(self.joints) if joint.constraint.rows]
+        heads = [i for i, joint in enumerate(self.joints) if joint.constraint.all_rows]
         products = [(*self._product(i, 0, i, 0), 1) for i in heads]
         products += [(*self._product(i, 0, i, 0), 2) for i in range(len(self.joints)) if i not in heads]
         for found in self.at_body:
@@ -382,8 +382,14 @@ class _GraphBuilder:
         """ConstraintGraph.turns."""
         turns = np.zeros(len(self.places))
         for (constraint, _, _), first in zip(self.joints, self.firsts, strict=True):
-            turns[first : first + constraint.rows] = not has_lengths(constraint)
+            turns[first : first + constraint.all_rows] = not has_lengths(constraint)
         return turns if is_small(self.packed.size) and turns.any() else np.zeros(0)
+
+    def _rates(self):
+        """ConstraintGraph.rates."""
+        pairs = zip(self.joints, self.firsts, strict=True)
+        found = [range(first + joint.constraint.rows, first + joint.constraint.all_rows) for joint, first in pairs]
+        return np.array(sorted(i for rows in found for i in rows), np.int64)
 
     def graph(self):
         """The `ConstraintGraph`, and the classes of its kinds."""
@@ -395,7 +401,7 @@ class _GraphBuilder:
 
         def rows_of(part):
             first = self.firsts[index[id(part)]]
-            return range(first, first + part.rows)
+            return range(first, first + part.all_rows)
 
         frictions, friction_rows = frictions_of(self.packed, self.bodies, rows_of, self.sides)
         graph = ConstraintGraph(
@@ -412,6 +418,7 @@ class _GraphBuilder:
             spins=spins,
             pattern=with_kernels(self.pattern),
             turns=self._turns(),
+            rates=self._rates(),
             normals=self.normals,
             parts=parts,
             scales=scales,

@@ -22,11 +22,13 @@ from .inertia_rows import WIDTH as INERTIA_WIDTH
 from .inertia_rows import multiply as multiply_inertia_rows
 from .inertia_rows import unbalance as unbalance_inertia_rows
 from .redundant_rows import (
+    clear_rates,
     clear_redundant,
     keep_every_row,
     list_redundant,
     mark_redundant,
     note_selection,
+    rates_hold_along,
     restore_selection,
     return_to_selection,
     save_selection,
@@ -196,10 +198,11 @@ def redundancy(graph):
 #     constrain_accelerations the same with axis rows, for Z = W F and c = gamma
 #     balance_loads           lam = S^-1 H W F, F <- F - H^T lam
 #     take_reactions          F <- F - H^T lam
+#     clear_rates             b <- 0 at rows on velocities, which hold nothing in place
 #     solve_series            the same for one order of a Taylor series
 #     solve_friction_series   the same with joint friction, by N~ of accelerations.py
 # Ask:
-#     redundant_rows_hold, rates_hold, accelerations_hold       of redundant rows
+#     redundant_rows_hold, rates_hold, accelerations_hold       of redundant rows; rates_hold_along a direction
 #     mark_redundant, self_stress                               of redundant rows
 #     singularity_indicator, is_near_singular, refinements      of the distance to a singular configuration
 #
@@ -223,6 +226,7 @@ __all__ = [
     "allocate_tangent",
     "apply_multipliers",
     "balance_loads",
+    "clear_rates",
     "clear_redundant",
     "clear_sums",
     "constrain",
@@ -263,6 +267,7 @@ __all__ = [
     "pivot_loss",
     "project",
     "rates_hold",
+    "rates_hold_along",
     "redundancy",
     "redundant_of",
     "redundant_rows_hold",

@@ -10,6 +10,7 @@ from ..elements.loops.constraint_rows import POSE, R
 from ..jit.kernels import kernel
 from ..jit.simd import four, put, splat
 from ..maths.dense_linalg import copy
+from ..maths.tolerances import HALF_DIGITS
 from .tolerances import HELD
 
 
@@ -18,6 +19,26 @@ def clear_redundant(f, b):
     """Zero the right-hand sides of redundant rows."""
     for i in range(f.dropped[0]):
         b[f.dropped[1 + i]] = 0.0
+
+
+@kernel
+def clear_rates(graph, b):
+    """Zero the entries of rows on velocities: they hold nothing in place."""
+    for i in range(graph.rates.size):
+        b[graph.rates[i]] = 0.0
+
+
+@kernel
+def is_rate(graph, e):
+    """Whether a row is one on velocities; their places are in ascending order."""
+    low, high = 0, graph.rates.size
+    while low < high:
+        middle = (low + high) // 2
+        if graph.rates[middle] < e:
+            low = middle + 1
+        else:
+            high = middle
+    return low < graph.rates.size and graph.rates[low] == e
 
 
 @kernel
@@ -45,6 +66,22 @@ def leave_redundant_rows(graph, f, Phi, H):
                 _leave_pair(f, H, graph.row.shape[0] + j, graph.row.shape[0] + j)
     f.selection.excess = worst
     clear_redundant(f, Phi)
+
+
+@kernel
+def rates_hold_along(graph, f, Z):
+    """Whether the redundant rows on velocities vanish for Z (b, 8), which the other rows admit."""
+    for i in range(f.dropped[0]):
+        row, total, terms = f.dropped[1 + i], 0.0, 0.0
+        for side in range(2):
+            b, at = graph.sides[row, side], 16 * i + 8 * side
+            for part in range(0, 8 if b < graph.bodies.shape[0] and is_rate(graph, row) else 0, 4):
+                for c in range(part, part + 3):
+                    total += f.redundant.H[at + c] * Z[8 * b + c]
+                terms += length(f.redundant.H, at + part) * length(Z, 8 * b + part)
+        if not abs(total) <= HALF_DIGITS * terms:
+            return False
+    return True
 
 
 @kernel

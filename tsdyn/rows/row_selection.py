@@ -14,7 +14,7 @@ from .block_operations import eliminate, subtract_products
 from .constraint_graph import ConstraintGraph, no_graph
 from .evaluation import evaluate_all, evaluate_every_row
 from .factorisation import keep_diagonal, update_later_blocks
-from .redundant_rows import keep_every_row, leave_redundant_rows, length, square
+from .redundant_rows import is_rate, keep_every_row, leave_redundant_rows, length, square
 from .row_workspace import Rows, TangentWorkspace, no_tangent_workspace
 from .schur_complement import (
     factorise_selected_rows,
@@ -45,8 +45,9 @@ from .tolerances import (
 # Selection of independent rows of H among redundant ones, by rank-revealing elimination of S.
 #
 # Rows are ordered by diagonally pivoted Cholesky, pivots relative to the diagonal entry; rows with negligible pivots
-# are dropped. In large scenes pivoting is confined to the blocks of the fill-reducing order: the selection is
-# independent, but not the best conditioned.
+# are dropped. Rows on positions go first: rows on velocities in their place would let positions drift. In large scenes
+# pivoting is confined to the blocks of the fill-reducing order: the selection is independent, but not the best
+# conditioned.
 
 
 @kernel
@@ -70,6 +71,11 @@ def weakest(graph, values):
 def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
     """Select rows by global pivoting, A (m, m) scratch; return the number of rows with pivots below `least`."""
     m, count = graph.row.size, 0
+    # Rows on positions first, by pivots that are one larger: their residuals can't drift
+    lift = 1.0 if graph.rates.size > 0 else 0.0
+    dropped[1:] = 1
+    for i in range(graph.rates.size):
+        dropped[1 + graph.rates[i]] = 0
     for i in range(m):
         if graph.row[i] >= 0:
             order[count] = i
@@ -96,8 +102,12 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
     for k in range(count):
         best, pivot = -1.0, k
         for i in range(k, count):
-            if A[order[i] * m + order[i]] > best:
-                best, pivot = A[order[i] * m + order[i]], i
+            part = A[order[i] * m + order[i]]
+            if part > least and dropped[1 + order[i]] == 1:
+                part += lift
+            if part > best:
+                best, pivot = part, i
+        best = A[order[pivot] * m + order[pivot]]
         if count - k <= wanted or not best > least:
             rank = k
             break
@@ -133,10 +143,10 @@ def _add_tails(graph, H, Y, A):
 
 
 @kernel
-def _choose(size, width, panel, kept, joints, share, A, order):
+def _choose(graph, first, size, width, panel, kept, share, A, order):
     """Order the rows of a block by pivoting, kept rows first, A (size, size) scratch; return the number of kept rows.
 
-    joints (size,) is negative for rows that are kept in any case, the welds of a hub and the rows of axes.
+    Rows that are no rows of Phi, the welds of a hub and the rows of axes, are kept in any case.
     """
     # The diagonal block, as a symmetric matrix
     for i in range(size):
@@ -149,8 +159,10 @@ def _choose(size, width, panel, kept, joints, share, A, order):
         for i in range(k, size):
             row = order[i]
             part = A[row * size + row] / kept[row] if kept[row] > 0.0 else 0.0
-            if joints[row] < 0:
+            if graph.row[first + row] < 0:
                 part += 2.0
+            elif graph.rates.size > 0 and part > share and not is_rate(graph, first + row):
+                part += 1.0
             if part > best:
                 best, pivot = part, i
         if not best > share:
@@ -180,7 +192,7 @@ def _eliminate_choosing(graph, values, share, dropped, A, order):
         # Which rows of this block are independent of each other and of earlier blocks
         first, width, panel = starts[j], widths[j], values[heads[j] :]
         size = starts[j + 1] - first
-        rank = _choose(size, width, panel, kept[first:], graph.row[first:], share, A, order)
+        rank = _choose(graph, first, size, width, panel, kept[first:], share, A, order)
         for i in range(rank, size):
             # A dropped row: zero in its row and column, one on the diagonal
             row = order[i]

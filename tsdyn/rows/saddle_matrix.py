@@ -320,7 +320,7 @@ class _SaddleBuilder:
             pair = tuple(self._body(b) for b in self.graph.sides[next(later[e])])
             own, reals = self._places(kind.table + CONSTRAINT_INTS * i), kind.reals + kind.stride * i
             loops = kind.stiffness, kind.jacobian
-            found.append((pair, (1, kind.stride, SPAN, *loops, reals, *own, 0, e, constraint.rows or 1)))
+            found.append((pair, (1, kind.stride, SPAN, *loops, reals, *own, 0, e, constraint.all_rows or 1)))
         return found
 
     def _instance(self, pair, values):

@@ -198,9 +198,9 @@ def row_terms(packed, t, q, qd, qdd, floors=0.0):
 
 def _row_name(packed, row):
     for constraint in packed.constraints:
-        if row < constraint.rows:
-            return f"row {row + 1} of {constraint.name}" if constraint.rows > 1 else constraint.name
-        row -= constraint.rows
+        if row < constraint.all_rows:
+            return f"row {row + 1} of {constraint.name}" if constraint.all_rows > 1 else constraint.name
+        row -= constraint.all_rows
     return ""
 
 

@@ -170,21 +170,34 @@ def _check_rows(scene, primitive, name, q, t):
     par = [entry for value in given for entry in _entries(value, t)] + [0.0] * kind.memory
     numbers = [entry.c[0] if isinstance(entry, Truncated) else entry for entry in par]
     rows = [_series(par[3 * i]).c for i in range(len(kind.quantities()) if "driven_series" in kind.kernels else 0)]
-    x, _ = along(scene, primitive, primitive.coordinates, q)
-    Phi, Phi_x = zeros(kind.rows), zeros((kind.rows, len(x)))
-    run_truncated(kind, "phi", name, x, par, t, Phi)
-    run_truncated(kind, "jacobian", name, x, par, t, Phi_x)
-    columns = labels_of(kind)
+    x, xd = along(scene, primitive, primitive.coordinates, q)
+    m = kind.all_rows
+    Phi, Phi_x, Phi_t, columns = zeros(m), zeros((m, len(x))), zeros(m), labels_of(kind)
     labels = [[f"jacobian[{i}, {j}] (d phi[{i}] / d {c})" for j, c in enumerate(columns)] for i in range(kind.rows)]
-    Phi_t = zeros(kind.rows)
-    if rows:
-        run_truncated(kind, "phi_t", name, x, par, t, Phi_t)
-    for k, f, scratch in coefficients_of(kind, name, (x,), numbers, (kind.rows, len(x)), rows):
-        compare(name, k, labels, f, Phi_x)
+    if kind.rows:
+        run_truncated(kind, "phi", name, x, par, t, Phi)
+        run_truncated(kind, "jacobian", name, x, par, t, Phi_x)
+        if rows and getattr(kind, "phi_t", None):
+            run_truncated(kind, "phi_t", name, x, par, t, Phi_t)
+    if kind.rate_rows:
+        # A, b, and for Phi the integral of the rate
+        labels += [
+            [f"rate_jacobian[{i}, {j}] (d rate[{i}] / d rate of {c})" for j, c in enumerate(columns)]
+            for i in range(kind.rate_rows)
+        ]
+        rates = zeros(kind.rate_rows)
+        run_truncated(kind, "rate_jacobian", name, x, par, t, Phi_x[kind.rows :])
+        run_truncated(kind, "rate", name, x, zeros(len(x)), par, t, Phi_t[kind.rows :])
+        run_truncated(kind, "rate", name, x, xd, par, t, rates)
+        Phi[kind.rows :] = [t.of(rate).integral(0.0) for rate in rates]
+    moving = np.repeat([primitive.body_of(marker).dimension > 0 for marker in kind.markers], [3] * len(kind.markers))
+    labels = np.array(labels, object)[:, moving]  # columns of the ground are used by nobody
+    for k, f, scratch in coefficients_of(kind, name, (x,), numbers, (m, len(x)), rows):
+        compare(name, k, labels, f[:, moving], Phi_x[:, moving])
         if rows:
-            drift = np.zeros(kind.rows)
+            drift = np.zeros(m)
             twin(kind.series_t)(np.array([c.c[k] for c in x]), numbers, k, scratch, drift)
-            compare(name, k, [f"phi_t[{i}], by series_t," for i in range(kind.rows)], drift, Phi_t)
+            compare(name, k, [f"phi_t[{i}], by series_t," for i in range(m)], drift, Phi_t)
     return Phi
 
 

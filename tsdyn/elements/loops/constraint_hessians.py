@@ -23,11 +23,13 @@ from .template import (
     DIMENSION,
     MARKERS,
     OWNERS,
+    RATES_FROM,
     ROWS,
     SIZE,
     STARTS,
     SUMMED,
     differentiate,
+    kernel_drift,
     kernel_gamma,
     kernel_jacobian,
     move_markers,
@@ -43,7 +45,7 @@ class Slopes(NamedTuple):
     """Derivatives of one instance with respect to its markers, each (ROWS, SIZE)."""
 
     J: np.ndarray  # Phi_x
-    a1: np.ndarray  # Phi_xx xd + Phi_xt
+    a1: np.ndarray  # Phi_xx xd + Phi_xt = (Phi_x xd + Phi_t)_x
     a2: np.ndarray  # Phi_xx xdd + gamma_x
     g_xd: np.ndarray  # gamma_xd
 
@@ -83,11 +85,12 @@ def _slope_of_jacobian(z, x, c, par, t, zJ):
 def _derive_rates(x, xd, xdd, par, t, slopes):
     """The `Slopes`, by complex steps along x_c and xd_c.
 
-    gamma_xd = 2 (Phi_xx xd + Phi_xt), since gamma is quadratic in xd.
+    gamma_xd = 2 (Phi_xx xd + Phi_xt), since gamma is quadratic in xd. Of a row on velocities A_x isn't symmetric, and
+    a1 = (A xd + b)_x.
     """
     J, a1, a2, g_xd = slopes
     z, zd = complex_stack(SIZE), complex_stack(SIZE)
-    zJ, zg = complex_stack2(ROWS, SIZE), complex_stack(ROWS)
+    zJ, zg, zb = complex_stack2(ROWS, SIZE), complex_stack(ROWS), complex_stack(ROWS)
     for c in range(SIZE):
         z[c], zd[c] = x[c], xd[c]
     differentiate(x, par, t, J)
@@ -95,7 +98,12 @@ def _derive_rates(x, xd, xdd, par, t, slopes):
         # Along x_c: a2 = Phi_xx xdd + gamma_x
         _slope_of_jacobian(z, x, c, par, t, zJ)
         kernel_gamma(z, zd, par, t, zg)
+        kernel_drift(z, par, t, zb)
         z[c] = x[c]
+        for r in range(RATES_FROM, ROWS):
+            a1[r, c] = zb[r].imag / CONSTRAINT_STEP
+            for d in range(SIZE):
+                a1[r, c] += zJ[r, d].imag / CONSTRAINT_STEP * xd[d]
         for r in range(ROWS):
             total = zg[r].imag / CONSTRAINT_STEP
             for d in range(SIZE):
@@ -107,6 +115,7 @@ def _derive_rates(x, xd, xdd, par, t, slopes):
         zd[c] = xd[c]
         for r in range(ROWS):
             g_xd[r, c] = zg[r].imag / CONSTRAINT_STEP
+        for r in range(RATES_FROM):
             a1[r, c] = 0.5 * g_xd[r, c]
 
 

@@ -140,6 +140,7 @@ def carry_back_derivative(code, dimension, at, s, f, n, Q_q):
 # there; a loop is given each array by its address.
 
 ROWS = MARKERS = 1  # scalar constraints, and markers, of an instance
+RATES_FROM = 1  # number of rows on positions, which those on velocities follow
 SIZE = ROOM = 1  # length of x, the concatenated marker coordinates; and with room for a store of four at its end
 CODES = OWNERS = STARTS = FIRST = (
     0,
@@ -154,9 +155,11 @@ POSITIVE = ()  # rows of the scratch of `series` that are positive where the law
 FRICTIONAL = False  # whether a force is in proportion to a normal load
 KEPT = 1  # floats of a force's derivatives kept from step to step
 ALONG = -1  # where in x the direction ends that a force's frame follows, or -1: the frame of a body
+kernel_drift = kernel_rate = kernel_rate_jacobian = kernel_rate_gamma = kernel_phi_t = None
 kernel_phi = kernel_value = kernel_jacobian = kernel_gamma = kernel_series = kernel_series_t = None
 kernel_law = kernel_derivatives = kernel_remember = kernel_inputs = None
-kernel_normal_load = kernel_normal_series = None
+kernel_normal_load = kernel_normal_series = kernel_arm_series = None
+NORMAL = -1  # of a contact: the rows are along this marker and those after it
 
 # what the table of a kind holds for each instance: where its two bodies' coordinates begin, and how many they are
 AT, DIMENSION = 0, 2

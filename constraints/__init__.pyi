@@ -1,7 +1,7 @@
 # Written by tools/stubs.py: do not edit.
 from typing import Any, Self
 
-from ..hints import AnyBody, ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Function, Joint, Orientation, Path, Points, Prescribed, Primitive, References
+from ..hints import AnyBody, ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Function, Joint, Orientation, Path, Points, Prescribed, Primitive, References, RopePoints
 
 class AngleDriver(References, Primitive):
     across_a: Attribute[ArrayLike, Floats]
@@ -140,6 +140,13 @@ class SmoothContact(Primitive):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., third: ArrayLike | None = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> Self: ...
 
+class Span(Points, Primitive):
+    offset: float
+    least: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., offset: float = ..., least: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., offset: float = ..., least: float = ..., name: str = ...) -> Self: ...
+
 class Spherical(Points, Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., name: str = ...) -> None: ...
     @classmethod
@@ -168,8 +175,10 @@ class Universal(Points, Axes, Joint):
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
 class Coupler(Joint):
-    dependent: JointCoordinate
-    independents: JointCoordinate
+    @property
+    def dependent(self) -> JointCoordinate: ...
+    @property
+    def independents(self) -> JointCoordinate: ...
     ratio: ArrayLike | float
     offset: float
     polynomial: Attribute[ArrayLike, Floats]
@@ -281,6 +290,20 @@ class RollingEllipsoid(Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., axes_a: Orientation | None = ..., slip: bool = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., axes_a: Orientation | None = ..., slip: bool = ..., name: str = ...) -> Self: ...
+
+class Rope(Joint):
+    @property
+    def points(self) -> RopePoints: ...
+    length: float
+    @property
+    def always_taut(self) -> bool: ...
+    @property
+    def restitution(self) -> float: ...
+    def __init__(self, points: RopePoints, length: float | None = ..., always_taut: bool = ..., restitution: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, points: RopePoints, length: float | None = ..., always_taut: bool = ..., restitution: float = ..., name: str = ...) -> Self: ...
+    @property
+    def bodies(self) -> tuple[AnyBody, ...]: ...
 
 class RotationMotor(Points, Axes, References, Joint):
     angle: Attribute[Prescribed, Any]

@@ -178,6 +178,7 @@ SECTIONS = {
         Entry("differential", "Differential", 2.0, "cage, left, right (rad)", lambda m, s: m.turns(s).T),
         Entry("planetary_gear", "Planetary gear", 0.5, "sun, carrier (rad/s)", lambda m, s: np.stack([*m.rates(s)], 1)),
         Entry("drive_train", "Drive train with brake", 4.0, "kinetic energy (J)", lambda m, s: s.kinetic_energy),
+        Entry("hoist", "Hoist with a rope", 3.0, "tension (N)", lambda m, s: m.tension(s), (0.0, 0.2)),
         Entry("screw_press", "Screw press", 1.5, "platen (m)", lambda m, s: s.position("platen")[:, 2]),
         Entry("stick_slip", "Stick-slip", 2.0, "slide (m)", lambda m, s: s.position("slide")[:, 0]),
     ),

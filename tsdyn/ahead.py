@@ -153,7 +153,7 @@ def of_method(method, form, within, far=False, rough=False):
 def _is_checked(force):
     """Whether series of a force may differ from its law."""
     sharp = force.sharp or any(isinstance(value, Signal) and not value.entire for value in vars(force).values())
-    return sharp or force.positive != ()
+    return sharp or force.positive != () or getattr(force, "checked", False)
 
 
 def _kinds(scene):

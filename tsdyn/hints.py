@@ -62,6 +62,7 @@ AnyBody: TypeAlias = PointMass | Ground
 Place: TypeAlias = str | PathLike[str]  # of a file
 BodyLike: TypeAlias = PointMass | Ground | str  # a handle, or a name
 ItemLike: TypeAlias = Attachment | str
+RopePoints: TypeAlias = Sequence[tuple[BodyLike, ArrayLike]]
 Orientation: TypeAlias = ArrayLike | Rotation
 Span: TypeAlias = Sequence[float] | Floats
 
@@ -202,6 +203,7 @@ __all__ = [
     "Reference",
     "References",
     "RememberingState",
+    "RopePoints",
     "Rotation",
     "Scene",
     "Solution",

@@ -6,7 +6,7 @@ integrators/ import from here, too. docs/plug-ins.md shows how.
 
 from .calls import Placing, fitting
 from .elements.bodies import Ground, PointMass, ground_point, named, rotation_matrix
-from .elements.element import Angle, Displacement, angles, displacements, in_frame, stop_waiting
+from .elements.element import Angle, Displacement, angles, displacements, in_frame, rope_points, stop_waiting
 from .elements.force import Force, load, vector_load
 from .elements.friction import (
     AXIS,
@@ -98,6 +98,7 @@ from .motions.of_coordinates import CoordinateFunction, coordinate_function, fun
 from .motions.prescribed import Motion
 from .motions.signals import Signal, numbers_of
 from .motions.tables import is_data
+from .motions.tracing import gate
 from .validation import finite, floats, label, not_negative, number, positive, shown, vector3, whole
 
 __all__ = [
@@ -181,6 +182,7 @@ __all__ = [
     "fitting",
     "floats",
     "functions_of",
+    "gate",
     "given_series",
     "ground_point",
     "in_frame",
@@ -202,6 +204,7 @@ __all__ = [
     "product",
     "quotient",
     "root",
+    "rope_points",
     "rotated",
     "rotated_back",
     "rotation",

@@ -9,7 +9,7 @@ import numpy as np
 
 from .jit.arrays import zeros
 from .jit.kernels import Record, loader
-from .model.packed import System, no_system
+from .model.packed import WIDTH, System, no_system
 from .rows.constraint_graph import ConstraintGraph, no_graph
 from .rows.interface import Rows, TangentWorkspace, allocate_rows, allocate_tangent, lu_factors
 from .rows.saddle_matrix import BLOCK, SaddleGraph, no_saddle
@@ -417,7 +417,7 @@ class Counters(Record):
 
 
 class Work(NamedTuple):
-    """n coordinates, m constraints, k = n - m + d degrees of freedom, d redundant rows, b bodies.
+    """n coordinates, m constraints, k = n - m + d degrees of freedom, d redundant and i inertia rows, b bodies.
 
     "computed by" names the kernel. What belongs to a redundant row is zero, on the diagonal of N and B one.
     """
@@ -445,6 +445,9 @@ class Work(NamedTuple):
     D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; null_space_chart.tangent_map
     E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.reduced_mass
     A: np.ndarray  # (k, k)  D^T M D, then its Cholesky factor; null_space.reduced_mass
+    inertia: np.ndarray  # (i, 14)  inertia rows; null_space.reduced_mass
+    inertia_D: np.ndarray  # (i, k)  their products with D; null_space.reduced_mass
+    inertia_bias: np.ndarray  # (i,)  gamma of these rows; null_space.reduced_acceleration
     Q: np.ndarray  # (n,)    applied forces without gravity; null_space.reduced_acceleration
     h: np.ndarray  # (n,)    -U B gamma; null_space.reduced_acceleration
     householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; dense_linalg.null_space
@@ -509,14 +512,14 @@ class Context(NamedTuple):
     saddle: SaddleWorkspace
 
 
-def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=0):
+def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=0, inertias=0):
     """Lay out the scratch memory of a formulation; size is that of the numbers in the constraints.
 
     With joint_rows, how many rows are no normalisations, that of the form without a basis: no matrices.
     """
     shapes = {**dict.fromkeys(("q", "qd", "qdd"), (n,)), "u": (m if joint_rows is None else joint_rows,)}
     if joint_rows is not None:
-        n = m = bodies = redundant = 0
+        n = m = bodies = redundant = inertias = 0
     k = n - m + redundant
     shapes |= {
         **dict.fromkeys(("q0", "base", "Q", "h"), (n,)),
@@ -529,6 +532,9 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "v": (k,),
         "E": (3 * bodies, k),
         "A": (k, k),
+        "inertia": (inertias, WIDTH),
+        "inertia_D": (inertias, k),
+        "inertia_bias": (inertias,),
     }
     work = Work(**carve(shapes, control=LevelControl, counters=Counters), redundant=np.zeros(redundant + 1, np.int64))
     hold(work.control, constraint_tol, size, joint_rows is not None)

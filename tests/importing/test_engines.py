@@ -37,12 +37,12 @@ def pinocchio_motions(path, names, rng, free_base, scene=None):
 
 
 def mujoco_motions(path, names, rng, actuated=True):
-    """A random state by MuJoCo: contacts, limits, friction and equality constraints off, armature zero."""
+    """A random state by MuJoCo: contacts, limits, friction and equality constraints off."""
     mujoco = pytest.importorskip("mujoco")
     spec = mujoco.MjSpec.from_file(str(path))
     spec.compiler.fusestatic = False
     model, off = spec.compile(), mujoco.mjtDisableBit
-    model.dof_armature[:] = model.body_gravcomp[:] = model.opt.density = model.opt.viscosity = 0.0
+    model.body_gravcomp[:] = model.opt.density = model.opt.viscosity = 0.0
     model.opt.disableflags |= off.mjDSBL_CONTACT | off.mjDSBL_LIMIT | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_EQUALITY
     if not actuated:
         model.opt.disableflags |= off.mjDSBL_ACTUATION
@@ -193,3 +193,68 @@ def test_closed_loops_of_cassie(tmp_path):
         link_motions.place(scene, motions)
         assert np.abs(scene.evaluate().Phi).max() < FINE
         assert link_motions.acceleration_error(scene, motions) < CLOSE
+
+
+TENDONS = """
+<mujoco>
+  <option gravity="0 0 -10"/>
+  <worldbody>
+    <site name="left"/>
+    <site name="right" pos="1 0 0"/>
+    <geom name="drum" type="cylinder" size="0.1 0.1" pos="3 0 0"/>
+    <body name="block" pos="0.5 0 -1.2">
+      <joint name="x" type="slide" axis="1 0 0" armature="0.3"/>
+      <joint name="z" type="hinge" pos="0 0 0.7" axis="0 1 0" armature="0.2"/>
+      <geom size="0.1" mass="2"/>
+      <site name="hook" pos="0 0 0.1"/>
+    </body>
+    <body name="load" pos="2 0 -1.5"><freejoint/><geom size="0.1" mass="1"/><site name="eye" pos="0 0 0.1"/></body>
+  </worldbody>
+  <tendon>
+    <spatial name="cord" stiffness="300" springlength="0 3.2">
+      <site site="left"/> <site site="hook"/> <site site="right"/> <site site="eye"/>
+    </spatial>
+    <spatial name="loose" stiffness="300" springlength="0 9"> <site site="left"/> <site site="eye"/> </spatial>
+    <spatial name="around" stiffness="300">
+      <site site="left"/> <geom geom="drum"/> <site site="eye"/>
+    </spatial>
+    <spatial name="line"> <site site="left"/> <site site="hook"/> <site site="right"/> </spatial>
+  </tendon>
+  <equality><tendon name="tie" tendon1="line" active="true"/></equality>
+</mujoco>"""
+
+
+def test_tendons_through_sites_are_those_of_mujoco(tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    path = tmp_path / "tendons.xml"
+    path.write_text(TENDONS)
+    scene = load(path)
+    assert [type(scene[name]).__name__ for name in ("cord", "loose", "tie")] == ["Cable", "Cable", "Rope"]
+    assert [entry.where for entry in scene.imported.groups()["spring of a tendon"]] == ["around"]
+    assert "tendon" not in scene.imported.groups()
+    scene.remove(scene["tie"])  # soft in MuJoCo
+    model = mujoco.MjModel.from_xml_path(str(path))
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
+    model.tendon_stiffness[model.tendon("around").id] = 0.0
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    mujoco.mj_rnePostConstraint(model, data)
+    motions = link_motions.of_mujoco(model, data, names_of(scene))
+    link_motions.place(scene, motions)
+    assert link_motions.acceleration_error(scene, motions) < FINE
+
+
+def test_a_run_with_armature_is_that_of_mujoco():
+    """The leg of the models, its armature included, after a tenth of a second."""
+    mujoco = pytest.importorskip("mujoco")
+    scene = load(MODELS / "leg.xml")
+    model = mujoco.MjModel.from_xml_path(str(MODELS / "leg.xml"))
+    model.opt.timestep, model.opt.integrator = 1e-4, mujoco.mjtIntegrator.mjINT_RK4
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    data = mujoco.MjData(model)
+    for _ in range(1000):
+        mujoco.mj_step(model, data)
+    state = ts.simulate(scene, (0.0, 0.1), rtol=1e-11, atol=1e-11).state
+    for name in ("trunk", "thigh", "rod"):
+        origin = state.position(name, scene.imported.frames[name].position)
+        assert np.abs(origin - data.body(name).xpos).max() < FINE

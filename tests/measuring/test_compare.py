@@ -63,6 +63,18 @@ def needle():
     return scene
 
 
+def rotors():
+    """A bar on a slide, both driven by rotors."""
+    scene = ts.Scene()
+    cart = scene.add_body(mass=2.0, inertia=(0.1, 0.2, 0.3), name="cart")
+    bar = scene.add_body(mass=1.0, inertia=(0.1, 0.1, 0.02), position=(0.5, 0, 0), name="bar")
+    rail = scene.add(C.Translational.at(scene.ground, cart, point=(0, 0, 0), axis=(1, 0, 0), name="rail"))
+    hinge = scene.add(C.Revolute.at(cart, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    scene.add(ts.forces.Armature(rail, inertia=3.0))
+    scene.add(ts.forces.Armature(hinge, inertia=1e-3, ratio=20.0))
+    return scene
+
+
 def planes():
     """A top on a table, a slab on a fixed point, and a bead on the tilted side of a slab."""
     scene = ts.Scene()
@@ -80,7 +92,7 @@ def planes():
     return scene
 
 
-@pytest.mark.parametrize("build", [pendulum, four_bar, beads, joints, needle, planes])
+@pytest.mark.parametrize("build", [pendulum, four_bar, beads, joints, needle, planes, rotors])
 def test_mujoco_with_small_steps_agrees(build):
     pytest.importorskip("mujoco")
     found = ts.compare(build(), (0.0, 0.2), with_="mujoco", step=2e-4, method="rk4", outputs=20)

@@ -7,10 +7,12 @@ import numpy as np
 
 from ..configuration.kinetic_metric import kinetic_rows
 from ..elements.bodies import transform_g
+from ..elements.tolerances import FORCE_QUOTIENT
 from ..errors import SingularConfiguration
 from ..jit.interrupts import interruptible
 from ..maths.matrix_rank import interruptible_solver, sparse_lu
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, PIVOT_ROUNDING, TINY
+from ..model.equations import added_inertia
 from .coordinates import stacked
 from .tolerances import IN_TURN, STIFFNESS_ROUNDING
 
@@ -287,7 +289,8 @@ def _solvers(H, Z):
 def inertia_derivatives(motion):
     """(M qdd - Q_v)_q and Q_v_qd, sparse (n, n); blocks of p of the rigid bodies.
 
-    M_p = 4 G^T J' G, Q_v = 8 Gd^T J' Gd p; H_h p = G(p)^T h.
+    M_p = 4 G^T J' G, Q_v = 8 Gd^T J' Gd p; H_h p = G(p)^T h. Of h^T (h qdd + gamma_h) of inertia rows by central
+    differences of fourth order.
     """
     from scipy.sparse import csr_array
 
@@ -300,7 +303,21 @@ def inertia_derivatives(motion):
     K = 4.0 * _crossed(h) - 4.0 * G.swapaxes(1, 2) @ J @ Gdd - 8.0 * back @ Gd
     C = 8.0 * _crossed(g) - 8.0 * back @ G
     i, j = np.broadcast_arrays(at[:, :, None], at[:, None, :])
-    return [csr_array((blocks.ravel(), (i.ravel(), j.ravel())), (n, n)) for blocks in (K, C)]
+    K, C = (csr_array((blocks.ravel(), (i.ravel(), j.ravel())), (n, n)) for blocks in (K, C))
+    if not (motion.system.inertias.size and (motion.qd.any() or motion.qdd.any())):
+        return K, C
+    return K + csr_array(_added_slopes(motion, 1.0, 0.0)), C - csr_array(_added_slopes(motion, 0.0, 1.0))
+
+
+def _added_slopes(motion, by_q, by_qd):
+    """The derivative (n, n) of h^T (h qdd + gamma_h) by q or qd."""
+    n, step, found = motion.q.size, FORCE_QUOTIENT, np.zeros((motion.q.size, motion.q.size))
+    for k, weight in ((-2, 1.0), (-1, -8.0), (1, 8.0), (2, -1.0)):
+        moved = k * step * np.eye(n)
+        for columns, h, gamma in added_inertia(motion.system, motion.q + by_q * moved, motion.qd + by_qd * moved):
+            load = h @ motion.qdd[columns] + gamma
+            found[columns] += weight / (12.0 * step) * (load[:, None] * h).T
+    return found
 
 
 def _crossed(h):

@@ -257,9 +257,8 @@ class SteadyRest(Rest):
     def own_slopes(self):
         """The derivative of M qdd - Q_v along with the velocities."""
         levels, metric = (self.q, self.qd, self.qdd), self.frame.metric
-        shim = SimpleNamespace(
-            q=self.q, system=self.system, rigid=metric.rigid, parameters=lambda level: levels[level][metric.p]
-        )
+        parameters = {"rigid": metric.rigid, "parameters": lambda level: levels[level][metric.p]}
+        shim = SimpleNamespace(q=self.q, qd=self.qd, qdd=self.qdd, system=self.system, **parameters)
         K, C = inertia_derivatives(shim)
         D = self.field.D
         return self._of_bodies(self.M @ D @ D - C @ D + K)[:-1]

@@ -12,7 +12,7 @@ from ..elements.bodies import IDENTITY, rotation_matrix, transform_g
 from ..elements.tolerances import UNDIRECTED
 from ..maths.matrix_rank import row_lengths, sparse_lu
 from ..maths.tolerances import PIVOT_ROUNDING, RANK_TOL, SUM_ROUNDING, TINY
-from ..model.equations import WIDTH, as_csr, with_short_rows
+from ..model.equations import WIDTH, added_inertia, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
 from ..rows.constraint_graph import arms
 from .tolerances import DENSE, FIRM, LIGHTEST, SMALL_ANGLE, SOLVED, THIN
@@ -240,7 +240,7 @@ def _of_independent(unit, target):
 
 
 def kinetic_rows(system, q, rates):
-    """Rows F (6 b + 3 points, k) of rates qd (n, k): |F x|^2 = 2 T of qd = rates x, with masses as they are."""
+    """Rows F (6 b + 3 points + added, k) of rates qd (n, k): |F x|^2 = 2 T of qd = rates x, with masses as they are."""
     bodies = system.bodies
     rigid = bodies[:, 1] == 7
     p = bodies[rigid, :1] + np.arange(3, 7)
@@ -248,7 +248,8 @@ def kinetic_rows(system, q, rates):
     roots = np.sqrt(np.maximum(size, 0.0))[:, :, None] * axes.swapaxes(1, 2)
     shifts = np.sqrt(system.mass)[:, None, None] * rates[bodies[:, :1] + np.arange(3)]
     turns = 2.0 * (roots @ _transforms(q[p])) @ rates[p]
-    return np.concatenate((shifts.reshape(-1, rates.shape[1]), turns.reshape(-1, rates.shape[1])))
+    added = [h @ rates[columns] for columns, h, _ in added_inertia(system, q[None], np.zeros((1, q.size)))]
+    return np.concatenate((shifts.reshape(-1, rates.shape[1]), turns.reshape(-1, rates.shape[1]), *added))
 
 
 def least_energy(metric, q, A, x, drift):

@@ -8,6 +8,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import wraps
 from inspect import CO_VARKEYWORDS, signature, unwrap
+from itertools import pairwise
 from types import MethodType
 from typing import TYPE_CHECKING, Any, NamedTuple, Never, Self
 
@@ -19,8 +20,8 @@ from ..errors import InvalidConstraint
 from ..jit.kernels import NumbaError, kernel, twin
 from ..maths import vectors
 from ..maths.vectors import IDENTITY, unit
-from ..validation import demand_known, floats, label, listed, number
-from .bodies import Ground, PointMass, named, new_name, rotation_matrix
+from ..validation import counted, demand_known, floats, label, listed, number, shown
+from .bodies import Ground, PointMass, ground_point, named, new_name, rotation_matrix
 from .markers import PARAMETERS, POINT, TURN, Marker, entries
 from .tolerances import UNDIRECTED
 
@@ -266,6 +267,42 @@ def _meant(error, arguments, keywords):
     return arguments, keywords
 
 
+def rope_points(points: Any, what: str, error: type[TsdynError]) -> tuple[tuple[Any, tuple[float, ...]], ...]:
+    """The points of a rope or cable as pairs of a body and three floats, in its frame; names become handles."""
+    how = "give points=[(body, (x, y, z)), ...], two or more, in the order of the rope"
+    if not isinstance(points, (list, tuple)) or not all(
+        isinstance(one, (list, tuple)) and len(one) == 2 for one in points
+    ):
+        raise error(f"{what}: {how}; got {shown(points)}.")
+    if len(points) < 2:
+        raise error(f"{what}: {counted(len(points), 'point')} given; {how}.")
+    bodies = [body for body, _ in points]
+    scenes = list(dict.fromkeys(body.scene for body in bodies if isinstance(body, (PointMass, Ground))))
+    if len(scenes) > 1:
+        raise error(f"{what}: its bodies belong to different scenes.")
+    known = [scenes[0].ground, *scenes[0].bodies] if scenes else []
+    bodies = [named(known, body, "body", error) if known and isinstance(body, str) else body for body in bodies]
+    wrong = [body for body in bodies if not isinstance(body, (PointMass, Ground))]
+    if wrong:
+        raise error(f"{what}: {wrong[0]!r} is not a body; {how}.")
+    if all(body is bodies[0] for body in bodies):
+        raise error(f"{what}: all points are on {bodies[0].name!r}; a rope joins two bodies or more.")
+    found = []
+    for body, (_, s) in zip(bodies, points, strict=True):
+        place = floats(s)
+        if place.shape != (3,) or not np.isfinite(place).all() or (body.dimension == 3 and place.any()):
+            asked = "(0, 0, 0), as a point mass has one point" if body.dimension == 3 else "three finite numbers, m"
+            raise error(f"{what}: the point on {body.name!r} must be {asked}, got {shown(s)}.")
+        found.append((body, tuple(place.tolist())))
+    for i, ((a, s), (b, r)) in enumerate(pairwise(found)):
+        if not np.linalg.norm(ground_point(a, np.array(s)) - ground_point(b, np.array(r))) > 0.0:
+            raise error(
+                f"{what}: points {i} and {i + 1}, on {a.name!r} and {b.name!r}, coincide; a span of length zero has no "
+                "direction. Move one of them, or leave it out."
+            )
+    return tuple(found)
+
+
 class Attachment:
     """Base of Primitive, Joint and Force: attached to one or two bodies of a scene by markers.
 
@@ -405,6 +442,8 @@ class Attachment:
         """
         if self.owner is not None:
             raise self.error(f"{self.name}: it follows from its joint; set {name} there.")
+        if name in self.permanent:
+            raise self.error(f"{self.name}: {name} can't be set later; remove it, and add a new one.")
         slots = [marker.argument for marker in self.markers]
         if name in slots and "coordinates" in self.__dict__:
             i = slots.index(name)

@@ -109,6 +109,7 @@ class Force(Attachment):
     slots = 0
     no_series = ""
     sharp = False
+    adds_inertia = False  # whether it has an `inertia_row`, a primitive whose row h adds h^T h to the mass matrix
     slips = False  # whether it is friction, which changes at rest within a slip velocity
     positive: tuple[int, ...] | None = None
     analytic = True

@@ -17,6 +17,8 @@ from .loops import laws as loops
 from .loops.constraint_series import SIGNATURE as SERIES
 from .loops.coordinate_rows import SIGNATURE
 from .loops.forces import JACOBIAN
+from .loops.law_check import MARGIN
+from .loops.law_check import SIGNATURE as CHECK
 
 if TYPE_CHECKING:
     from ..hints import Function
@@ -34,18 +36,19 @@ KERNELS = MappingProxyType(
         "series": Callback(loops.series, SERIES),
     }
 )
+CHECKS = MappingProxyType({"check": Callback(loops.check, CHECK), "margin": Callback(loops.margin, MARGIN)})
 
 
 class LawKernels(dict):
-    """The callbacks of one law: each law is run by itself."""
+    """The callbacks of one law: each law is run by itself; with those that check series where they are `checked`."""
 
-    def __init__(self):
-        super().__init__(KERNELS)
+    def __init__(self, checked=False):
+        super().__init__({**KERNELS, **CHECKS} if checked else KERNELS)
 
     __hash__ = object.__hash__
 
     def __reduce__(self):
-        return LawKernels, ()
+        return LawKernels, ("check" in self,)
 
 
 class Action(NamedTuple):
@@ -71,6 +74,7 @@ class SceneLaw:
     given: str
     positive = ()
     no_series = "its function can't be traced"
+    checked = False  # whether its series are checked against the law, which isn't analytic everywhere
     each = ""  # what the numbers of the function are, in messages
 
     @staticmethod
@@ -82,7 +86,7 @@ class SceneLaw:
         """The callbacks of the present function, whatever its numbers."""
         function = getattr(self, self.given)
         if _code(self.__dict__.get("_of")) is not _code(function):
-            self.__dict__.update(_kernels=LawKernels(), _of=function)
+            self.__dict__.update(_kernels=LawKernels(self.checked), _of=function)
         return self.__dict__["_kernels"]
 
     @property

@@ -444,6 +444,12 @@ class JointLoad:
     def __init__(
         self, joint: Attachment, *, function: JointLaw, period: float | None = None, which: int = 0, name: str = ""
     ) -> None:
+        self._join(joint, which, name)
+        self.function, self.period = function, period
+        self.check()
+
+    def _join(self, joint, which, name):
+        """Attach it to a coordinate of a joint."""
         kind = self._kind()
         name = label(name, kind, InvalidForce)
         geometries = self.geometries(joint) if hasattr(joint, "joint_coordinates") else []
@@ -457,8 +463,6 @@ class JointLoad:
         self.__dict__.update(joint=joint, which=int(which))
         own, other = self.geometry[:2]
         super().__init__(own, other, self.coordinates, name)
-        self.function, self.period = function, period
-        self.check()
 
     def _untitled(self, bodies):
         return f"{self._kind()}({self.joint.name})"
@@ -486,14 +490,17 @@ class JointLoad:
 
     def check(self) -> None:
         """A joint that the scene has; of a continuous load a plain function of three arguments."""
-        if not self.joint.added:
-            raise self.error(f"{self.name}: add its joint {self.joint.name!r} to the scene first.")
+        self._demand_joint()
         if self.__dict__.get("period") is None and arguments_of(self.function) != 3:
             raise self.error(
                 f"{self.name}: function must be a plain Python function of three arguments (t, {self.coordinate}, "
                 f"rate), got {self.function!r}{starred(self.function)}. With period= it may be any object to be called "
                 "so."
             )
+
+    def _demand_joint(self):
+        if not self.joint.added:
+            raise self.error(f"{self.name}: add its joint {self.joint.name!r} to the scene first.")
 
     def parameters(self) -> tuple[Any, ...]:
         """None but what it remembers."""

@@ -350,6 +350,7 @@ def _of_scene(arena):
             found.append(f"{force.name} remembers a number from step to step")
     if redundant_rows(packed).size:
         found.append("some rows are redundant")
+    found += [f"{force.name} adds inertia" for force in (load.force for load in packed.loads) if force.adds_inertia]
     if graph.axes.rows.shape[0]:
         found.append("a body has no inertia about an axis")
     if is_far(graph, study.method.orders()[2]) or study.n >= LONG_STEPS:

@@ -126,7 +126,9 @@ def _item(item, refused):
     for name, argument in arguments.items():
         if argument.kind == types.COORDINATE:
             found[name] = _coordinate_names(vars(item)[name])
-        if argument.kind in (types.REFERENCE, types.COORDINATE):
+        if argument.kind == types.POINTS:
+            found[name] = [[body.name, list(s)] for body, s in vars(item)[name]]
+        if argument.kind in types.NAMED:
             continue
         try:
             value = encode(_value_of(item, argument))
@@ -241,7 +243,7 @@ def add_item(reading, scene, path, table, kinds):
     arguments, bodies = types.of_class(cls), types.bodies_of(cls)
     known_keys(path, table, (*ITEM_KEYS, *bodies, *arguments), reading.mistakes)
     positions = _positions(reading, path, table, what, bodies, arguments)
-    values = {n: one for n, one in arguments.items() if one.kind not in (types.REFERENCE, types.COORDINATE)}
+    values = {n: one for n, one in arguments.items() if one.kind not in types.NAMED}
     given = arguments_in(reading, path, table, values, what)
     placed = _at(reading, path, table, cls, what, values)
     for argument in values.values():
@@ -289,7 +291,23 @@ def _positions(reading, path, table, what, bodies, arguments):
         if argument.kind == types.COORDINATE:
             found += _coordinates(reading, path, table, what, name)
             complete = complete and None not in found
+        if argument.kind == types.POINTS:
+            found.append(_points(reading, path, table, what, name))
+            complete = complete and found[-1] is not None
     return found if complete else None
+
+
+def _points(reading, path, table, what, key):
+    """The points of a rope, [["body", [x, y, z]], ...]; None, and a mistake, where one is wrong."""
+    given, found = table.get(key), []
+    if not isinstance(given, list) or not all(isinstance(one, list) and len(one) == 2 for one in given):
+        reading.mistakes.add((*path, key), f'{what}: write {key} = [["body", [0.0, 0.0, 0.0]], ...], two or more.')
+        return None
+    for name, s in given:
+        body = referred(reading, path, {key: name}, (what, key, "body", reading.bodies))
+        place = decoded(reading, (*path, key), s, decode_array)
+        found.append(None if body is None or place is None else (body, place))
+    return None if None in found else found
 
 
 def _coordinates(reading, path, table, what, key):

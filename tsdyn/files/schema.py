@@ -48,6 +48,7 @@ BY_KIND = {
     types.VECTOR: {"$ref": "#/$defs/vector motion"},
     types.REFERENCE: {"description": "the name of a constraint", "type": "string"},
     types.COORDINATE: {"description": "the name of a joint, [name, coordinate, index], or a list of these"},
+    types.POINTS: {"description": "a list of [body, [x, y, z]]", "type": "array", "minItems": 2},
     types.NAMES: NAMES,
     types.VALUES: {"type": "object", "additionalProperties": {"$ref": "#/$defs/array"}},
     types.ANY: {},

@@ -209,9 +209,9 @@ ENUMERATIONS = {  # by the aliases of hints.py
     "Redundancy": ("drop", "refuse"),
 }
 
-NUMBER, WHOLE, FLAG, TEXT, ARRAY, MOTION_TYPE, VECTOR, FUNCTION, REFERENCE, NAMES, VALUES, ANY, COORDINATE = (
+NUMBER, WHOLE, FLAG, TEXT, ARRAY, MOTION_TYPE, VECTOR, FUNCTION, REFERENCE, NAMES, VALUES, ANY, COORDINATE, POINTS = (
     "number", "integer", "boolean", "text", "array", "motion", "vector", "function", "reference", "names", "values",
-    "any", "coordinate",
+    "any", "coordinate", "points",
 )  # fmt: skip
 KINDS = {
     "float": NUMBER,
@@ -229,7 +229,9 @@ KINDS = {
     "ControlLaw": FUNCTION,
     "Actuators": NAMES,
     "JointCoordinate": COORDINATE,
+    "RopePoints": POINTS,
 }
+NAMED = REFERENCE, COORDINATE, POINTS  # kinds that name other parts of the scene
 
 
 class Argument(NamedTuple):
@@ -429,6 +431,7 @@ _DECODERS = {
     TEXT: _text,
     REFERENCE: _text,
     COORDINATE: _any,
+    POINTS: _any,
     NAMES: _names,
     VALUES: _values,
     FUNCTION: _function,

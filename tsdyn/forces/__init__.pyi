@@ -4,7 +4,7 @@ from typing import Any, Self
 
 from .. import JointFriction
 from ..constraints import Revolute, Translational
-from ..hints import Actuators, ArrayLike, Attachment, Attribute, Axes, Body, BodyLike, ControlLaw, Floats, Force, Frame, JointLaw, JointLoads, Load, PointMass, Points, References, VectorLoad
+from ..hints import Actuators, ArrayLike, Attachment, Attribute, Axes, Body, BodyLike, ControlLaw, Floats, Force, Frame, Joint, JointLaw, JointLoads, Load, PointMass, Points, Primitive, References, RopePoints, VectorLoad
 
 class Bushing(Points, Force):
     stiffness: Attribute[ArrayLike, Floats]
@@ -33,6 +33,34 @@ class TorsionalSpring(Axes, References, Force):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., stiffness: float = ..., damping: float = ..., free_angle: float = ..., actuator: Load = ..., name: str = ...) -> Self: ...
 
+class Armature(Force):
+    @property
+    def joint(self) -> Joint: ...
+    inertia: float
+    ratio: float
+    @property
+    def which(self) -> int: ...
+    def __init__(self, joint: Joint, *, inertia: float, ratio: float = ..., which: int = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, joint: Joint, *, inertia: float, ratio: float = ..., which: int = ..., name: str = ...) -> Self: ...
+    @property
+    def geometry(self) -> Any: ...
+    @property
+    def inertia_row(self) -> Primitive: ...
+
+class Cable(Force):
+    @property
+    def points(self) -> RopePoints: ...
+    stiffness: float
+    damping: float
+    free_length: float
+    def __init__(self, points: RopePoints, *, stiffness: float = ..., damping: float = ..., free_length: float | None = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, points: RopePoints, *, stiffness: float = ..., damping: float = ..., free_length: float | None = ..., name: str = ...) -> Self: ...
+    def forget(self) -> None: ...
+    @property
+    def function_of_state(self) -> Any: ...
+
 class ContactFriction(JointFriction, Force):
     @property
     def joint(self) -> Attachment: ...
@@ -47,7 +75,8 @@ class ContactFriction(JointFriction, Force):
 
 class Control(Force):
     function: ControlLaw
-    actuators: Actuators
+    @property
+    def actuators(self) -> Actuators: ...
     period: float | None
     def __init__(self, function: ControlLaw, actuators: Actuators = ..., *, period: float | None = ..., name: str = ...) -> None: ...
     def actions(self) -> list[Action]: ...

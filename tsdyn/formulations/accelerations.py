@@ -13,7 +13,7 @@ from ..maths.tolerances import LAST_PLACE
 from ..model.equations import applied_forces
 from ..rows.interface import (
     acceleration_residuals,
-    add_axis_multipliers,
+    add_multiplier_terms,
     apply_multipliers,
     clear_redundant,
     constrain,
@@ -290,7 +290,7 @@ def find_reactions(graph, system, f, q, qd, t):
             return True
         # dlam = N~^-1 (H Z + gamma)
         acceleration_residuals(graph, f.rows, f.gamma, f.Z, f.b)
-        add_axis_multipliers(graph, r.lam, f.b)
+        add_multiplier_terms(graph, r.lam, f.b)
         if renew and not factorise_loads(graph, f, size == 0.0):
             return False
         solve_product(graph, r.lower, r.upper, f.b)

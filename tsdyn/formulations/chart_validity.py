@@ -20,6 +20,7 @@ from ..rows.interface import (
     evaluate_rows,
     factorise_rows,
     has_redundant_rows,
+    is_raised,
     pivot_loss,
     rates_hold,
     redundant_rows_hold,
@@ -56,7 +57,7 @@ def set_base_point(graph, system, w, f, l, t, largest):
     regular = True
     # H, Y and S of the last position solve serve, unless S is of another metric
     same = l.state.placement > 0 and l.state.placement == w.counters.placements
-    if same and graph.axes.rows.shape[0] == 0 and selection_serves(graph, f, f.rows):
+    if same and not is_raised(graph) and selection_serves(graph, f, f.rows):
         copy(f.rows.H, l.rows0.H)
         copy(f.rows.Y, l.rows0.Y)
         copy(f.rows.S, l.rows0.S)

@@ -23,6 +23,8 @@ from ..rows.interface import (
     factorise_complex_saddle,
     factorise_saddle,
     factorise_selected_rows,
+    is_raised,
+    multiply_inertia_rows,
     multiply_rates,
     multiply_rows,
     solve_complex_saddle,
@@ -30,6 +32,7 @@ from ..rows.interface import (
     solve_rows,
     solve_saddle,
     take_reactions,
+    unbalance_inertia_rows,
     weigh,
     weigh_bodies,
     write_saddle_rows,
@@ -116,11 +119,16 @@ def spread_normal(c, b):
 
 @kernel
 def find_imbalance(c):
-    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows. False if S is singular."""
+    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for rows of Phi. False if S is singular."""
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     # M (a + C n)
     to_bodies(graph, l, s.r, f.Z)
     add_to(s.a, f.Z)
+    # In the order of elimination: mu - (h (a + C n) + gamma_h) of inertia rows
+    for i in range(s.x.size):
+        s.x[i] = 0.0
+    multiply_inertia_rows(graph, f.rows, s.graph.row_at, f.Z, s.x)
+    unbalance_inertia_rows(graph, f.rows, s.graph.row_at, s.multipliers, s.x)
     for b in range(graph.bodies.shape[0]):
         weigh(graph.mass, b, f.Z, 8 * b, f.Z, 8 * b)
     # e = F - M (a + C n) - H^T lam
@@ -129,9 +137,6 @@ def find_imbalance(c):
     take_reactions(graph, f.rows, s.multipliers, s.e)
     if f.b.size > 0 and not _correct_multipliers(c):
         return False
-    # In the order of elimination
-    for i in range(s.x.size):
-        s.x[i] = 0.0
     for b in range(graph.bodies.shape[0]):
         at, o = s.graph.body_at[b], 8 * b
         for i in range(degrees(graph, b)):
@@ -147,7 +152,7 @@ def _correct_multipliers(c):
     present one. S may be older, too, as long as corrections contract: at first it is that of the step's start.
     """
     w, f, s, graph, least, before, renewed = c.work, c.tangent, c.saddle, c.graph, 0.0, math.inf, False
-    lean = graph.axes.rows.shape[0] > 0  # S is of another metric than W
+    raised = is_raised(graph)  # S is of another metric than W
     for sweep in range(REACTION_SWEEPS):
         # H W e, the part of the imbalance that multipliers can balance
         copy(s.e, f.Z)
@@ -160,8 +165,8 @@ def _correct_multipliers(c):
             least = REACTIONS_LEFT * worst
         if worst <= least:
             return True
-        # Where W is that of raised inertias, N of the chart takes the place of S
-        if lean:
+        # There N of the chart takes the place of S
+        if raised:
             solve_normal(c)
         else:
             # S of an older configuration contracts no more

@@ -24,7 +24,14 @@ from ..maths.dense_linalg import (
 )
 from ..maths.tolerances import TINY
 from ..maths.vectors import matrix_a, matrix_g
-from ..model.equations import applied_forces, clear_rows, constraint_curvature, force_jacobian
+from ..model.equations import (
+    add_inertia_row,
+    applied_forces,
+    clear_rows,
+    constraint_curvature,
+    force_jacobian,
+    multiply_inertia_row,
+)
 from ..workspaces import load
 from .null_space import find_accelerations
 from .null_space_chart import NOT_FINITE, OK, SINGULAR
@@ -100,10 +107,18 @@ def _inertia_terms(system, w, linear):
 
 
 @kernel
-def _add_mass_times(system, q, scale, X, out):
+def _inertia_rows(system, w, linear):
+    """Subtract h^T (h qdd + gamma_h) of the inertia rows from r; its change with h and gamma_h is neglected."""
+    for e in range(w.inertia_bias.size):
+        f = w.inertia_bias[e] + multiply_inertia_row(system, w.inertia, e, w.qdd)
+        add_inertia_row(system, w.inertia, e, -f, linear.r)
+
+
+@kernel
+def _add_mass_times(system, w, scale, X, out):
     """out += scale M X; X and out (n, n)."""
     G, a = stack2(3, 4), stack(3)
-    n = q.size
+    n = w.q.size
     for b in range(system.mass.size):
         at = system.bodies[b, 0]
         # m X on r
@@ -112,7 +127,7 @@ def _add_mass_times(system, q, scale, X, out):
                 out[c, j] += scale * system.mass[b] * X[c, j]
         if system.bodies[b, 1] == 7:
             # 4 G^T J' G X on p
-            matrix_g(q[at + 3 : at + 7], G)
+            matrix_g(w.q[at + 3 : at + 7], G)
             J = system.inertia[b]
             for j in range(n):
                 for i in range(3):
@@ -124,6 +139,11 @@ def _add_mass_times(system, q, scale, X, out):
                 z = J[6] * a[0] + J[7] * a[1] + J[8] * a[2]
                 for c in range(4):
                     out[at + 3 + c, j] += 4.0 * scale * (G[0, c] * x + G[1, c] * y + G[2, c] * z)
+    # h^T h X
+    for e in range(w.inertia_bias.size):
+        for j in range(n):
+            f = scale * multiply_inertia_row(system, w.inertia, e, X[:, j])
+            add_inertia_row(system, w.inertia, e, f, out[:, j])
 
 
 @kernel
@@ -191,6 +211,7 @@ def linearise(context, t, vdd):
         applied_forces(system, w.q, w.qd, t, linear.r)
         _forces(system, w, linear, t, 1)  # stores derivatives of the laws; `reduce` evaluates the rest
     _inertia_terms(system, w, linear)
+    _inertia_rows(system, w, linear)
     # Phi_q^T lam = r;    Y = U B G1,    Z = U B G2
     multiply(w.U, w.B, linear.UB)
     transposed_times(linear.UB, linear.r, linear.lam)
@@ -200,8 +221,8 @@ def linearise(context, t, vdd):
     multiply(linear.UB, linear.G1, linear.Y)
     multiply(linear.UB, linear.G2, linear.Z)
     # C* += 2 M Y,    K* += C* Y - M Z
-    _add_mass_times(system, w.q, 2.0, linear.Y, linear.C)
-    _add_mass_times(system, w.q, -1.0, linear.Z, linear.K)
+    _add_mass_times(system, w, 2.0, linear.Y, linear.C)
+    _add_mass_times(system, w, -1.0, linear.Z, linear.K)
     add_product(1.0, linear.C, linear.Y, linear.K)
     # An overflow shows in the sum of all entries
     total = 0.0

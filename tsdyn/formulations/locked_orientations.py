@@ -12,7 +12,7 @@ import numpy as np
 
 from ..elements.markers import PARAMETERS, VECTOR
 from ..maths.tolerances import NEGLIGIBLE, ROUNDING
-from ..model.packed import classes
+from ..model.packed import classes, inertia_classes
 from ..motions.prescribed import Motion
 from ..rows.graph_builder import build, graph_of, redundant_rows, with_loops
 from ..rows.interface import MOST_ROWS
@@ -99,10 +99,12 @@ def hold(packed, q, qd):
 
 def instances(packed, graph):
     """For each row of ConstraintGraph.kinds its class, and of its instances each constraint with its parameters."""
-    groups = {kind: [] for kind in classes(packed)}
-    for pair in zip(packed.constraints, packed.parameters, strict=True):
+    groups = {kind: [] for kind in (*classes(packed), *inertia_classes(packed))}
+    pairs = [*zip(packed.constraints, packed.parameters, strict=True)]
+    for pair in (*pairs, *((row, row.parameters()) for row in packed.inertias)):
         groups[type(pair[0])].append(pair)
-    kinds, begins, found = list(groups), packed.system.kinds["reals"], []
+    kinds, found = list(groups), []
+    begins = np.concatenate((packed.system.kinds["reals"], packed.system.inertias["reals"]))
     for row in graph.kinds:
         i = int(np.searchsorted(begins, row.reals, side="right")) - 1
         first = int((row.reals - begins[i]) // row.stride)

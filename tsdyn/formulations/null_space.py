@@ -5,11 +5,28 @@ import math
 from ..elements.loops.constraint_rows import move_bodies, place_bodies
 from ..errors import Status
 from ..jit.kernels import callback, kernel, stack, vector
-from ..maths.dense_linalg import cholesky, cholesky_solve, copy, is_finite, largest, lu, lu_solve, transposed_times
+from ..maths.dense_linalg import (
+    cholesky,
+    cholesky_solve,
+    copy,
+    is_finite,
+    largest,
+    lu,
+    lu_solve,
+    transposed_times,
+)
 from ..maths.tolerances import LAST_PLACE, SUM_ROUNDING
 from ..maths.vectors import multiply_g
 from ..methods.explicit import ACCELERATE, NORM, PLACE
-from ..model.equations import applied_forces, is_rheonomic, set_time
+from ..model.equations import (
+    add_inertia_row,
+    applied_forces,
+    inertia_bias,
+    inertia_rows,
+    is_rheonomic,
+    multiply_inertia_row,
+    set_time,
+)
 from ..rows.interface import evaluate_bias, evaluate_drift, evaluate_rows, has_redundant_rows, redundant_rows_hold
 from ..workspaces import load
 from .accelerations import (
@@ -63,15 +80,18 @@ def _add_momentum(system, b, p, x, y, scale, out):
 
 
 @kernel
-def _subtract_inertia(system, q, x, out):
-    """out -= M x."""
+def _subtract_inertia(system, w, x, moving, out):
+    """out -= M x, and h^T (h x + gamma_h) of inertia rows, gamma_h where x are accelerations (1) and none (0)."""
+    for e in range(w.inertia_bias.size):
+        f = moving * w.inertia_bias[e] + multiply_inertia_row(system, w.inertia, e, x)
+        add_inertia_row(system, w.inertia, e, -f, out)
     for b in range(system.mass.size):
         at = system.bodies[b, 0]
         # m x on r, 4 G^T J' G x on p
         for c in range(at, at + 3):
             out[c] -= system.mass[b] * x[c]
         if system.bodies[b, 1] == 7:
-            p = q[at + 3 : at + 7]
+            p = w.q[at + 3 : at + 7]
             _add_momentum(system, b, p, p, x[at + 3 : at + 7], -4.0, out[at + 3 : at + 7])
 
 
@@ -117,7 +137,7 @@ def _find_bases(graph, system, w, f, t, vdd):
         if system.bodies[b, 1] == 7:
             pd = w.qd[at + 3 : at + 7]
             _add_momentum(system, b, pd, pd, w.q[at + 3 : at + 7], 8.0, left[at + 3 : at + 7])
-    _subtract_inertia(system, w.q, x, left)
+    _subtract_inertia(system, w, x, 1.0, left)
     _multipliers(w, left, lam)
     # a_i = (D^T M D)^-1 D^T g_i,    l_i = B^T U^T (g_i - M D a_i)
     for i in range(graph.frictions.shape[0]):
@@ -138,7 +158,7 @@ def _find_bases(graph, system, w, f, t, vdd):
                         a[j] += w.D[at + c, j] * g
         cholesky_solve(w.A, a, k)
         _expand(w, a, x)
-        _subtract_inertia(system, w.q, x, left)
+        _subtract_inertia(system, w, x, 0.0, left)
         _multipliers(w, left, r.basis[i, n : n + m])
 
 
@@ -250,7 +270,7 @@ MASS_SINGULAR, UNHELD = int(Status.MASS_SINGULAR), int(Status.UNHELD)
 
 
 @kernel
-def reduced_mass(system, w):
+def reduced_mass(system, w, t):
     """E and the Cholesky factor of D^T M D at the present q. Status."""
     k = w.v.size
     for i in range(k):
@@ -282,6 +302,14 @@ def reduced_mass(system, w):
                 h = J[6] * x[i] + J[7] * y[i] + J[8] * z[i]
                 for j in range(i + 1):
                     w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
+    # D^T M D += (h D)^T h D of the inertia rows h
+    inertia_rows(system, w.q, t, w.inertia)
+    for e in range(w.inertia_bias.size):
+        for j in range(k):
+            w.inertia_D[e, j] = multiply_inertia_row(system, w.inertia, e, w.D[:, j])
+        for i in range(k):
+            for j in range(i + 1):
+                w.A[i, j] += w.inertia_D[e, i] * w.inertia_D[e, j]
     w.counters.factorizations += 1
     return OK if cholesky(w.A, k, SUM_ROUNDING) else MASS_SINGULAR
 
@@ -363,6 +391,12 @@ def reduced_acceleration(system, w, t, vdd):
                     + s2 * w.D[at + 5, j]
                     + s3 * w.D[at + 6, j]
                 )
+    # vdd -= (h D)^T (h h_0 + gamma_h), h_0 = -U B gamma
+    inertia_bias(system, w.q, w.qd, t, w.inertia_bias)
+    for e in range(w.inertia_bias.size):
+        f = w.inertia_bias[e] + multiply_inertia_row(system, w.inertia, e, w.h)
+        for j in range(k):
+            vdd[j] -= w.inertia_D[e, j] * f
     if system.forces.shape[0] > 0:
         for c in range(n):
             w.Q[c] = 0.0
@@ -404,7 +438,7 @@ def place(context, t, v):
     if status == OK:
         # Eqs. 7, 9 and 28 at the new q
         status = tangent_map(system, w, t)
-    return reduced_mass(system, w) if status == OK else status
+    return reduced_mass(system, w, t) if status == OK else status
 
 
 @callback(ACCELERATE)

@@ -15,6 +15,7 @@ from ..rows.interface import (
     factorise_selected_rows,
     inner,
     more,
+    multiply_inertia_rows,
     multiply_rows,
     solve_product,
     solve_saddle,
@@ -411,10 +412,11 @@ def _take_tangent_part(graph, f, l, x, factored, out):
 
 
 @kernel
-def _weigh(graph, s, Z):
-    """s.x = M Z, and zero for the rows."""
+def _weigh(graph, f, s, Z):
+    """s.x = M Z, h Z of inertia rows, and zero for the rows of Phi."""
     for i in range(s.x.size):
         s.x[i] = 0.0
+    multiply_inertia_rows(graph, f.rows, s.graph.row_at, Z, s.x)
     for b in range(graph.bodies.shape[0]):
         # Unknowns are in the order of elimination
         at, o, m = s.graph.body_at[b], 8 * b, WEIGHTS * b
@@ -487,7 +489,7 @@ def solve(context, x):
         s.a[i] = f.Z[i] - s.e[i]
     # Right-hand side M r
     _take_tangent_part(graph, f, l, x, l.state.factored == 1, s.r)
-    _weigh(graph, s, f.Z)
+    _weigh(graph, f, s, f.Z)
     _correct(graph, l, s, x, s.r)
     take_solution(graph, s)
     return OK
@@ -504,7 +506,7 @@ def soften(context, ex, g, ey):
     ex, ey = vector(ex, l.x.size - 8), vector(ey, l.x.size - 8)
     # M ey
     _take_tangent_part(graph, f, l, ey, True, s.r)  # N is that of the chart's check
-    _weigh(graph, s, f.Z)
+    _weigh(graph, f, s, f.Z)
     # + g K ex
     _take_tangent_part(graph, f, l, ex, True, s.e)
     _add_stiffness(graph, s, g, f.Z)

@@ -19,6 +19,7 @@ from ..rows.interface import (
     evaluate_rows,
     factorise_selected_rows,
     is_axis,
+    is_raised,
     multiply_rates,
     multiply_rows,
     redundant_rows_hold,
@@ -270,8 +271,7 @@ def solve_velocities(graph, system, w, f, l, t):
     if rheonomic:
         evaluate_drift(graph, system, f, t, l.drift)
     factored = l.state.factored == 1
-    # S is of another metric than the chart where massless axes are raised
-    if not factored and graph.axes.rows.shape[0] > 0:  # S is of another metric than the chart
+    if not factored and is_raised(graph):  # S is of another metric than the chart
         if not factorise_normal(graph, w, f, l):
             return False
         factored, l.state.factored, l.state.off = True, 1, 0.0

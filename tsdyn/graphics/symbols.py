@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -228,6 +229,7 @@ class Attached(NamedTuple):
     b: int
     places: dict[str, Any]  # argument of each marker -> coordinates (3,), frame of its body
     points: dict[str, Any]  # "a", "b" -> the first point there; absent where it has none
+    path: tuple[tuple[int, Any], ...] = ()  # of a rope or cable: the body and the place of each point
 
     def point(self, letter: str) -> Any:
         """The first point on a body, its centroid where there is none."""
@@ -241,7 +243,8 @@ def attached(packed: Any) -> tuple[list[Attached], list[Attached]]:
     def one(item, coordinates):
         points = {m.body: s for m, s in reversed([*zip(item.markers, coordinates, strict=True)]) if m.code == POINT}
         places = {m.argument: s for m, s in zip(item.markers, coordinates, strict=True)}
-        return Attached(item, index.get(id(item.a), -1), index.get(id(item.b), -1), places, points)
+        path = tuple((index.get(id(body), -1), np.array(s)) for body, s in getattr(item, "points", ()))
+        return Attached(item, index.get(id(item.a), -1), index.get(id(item.b), -1), places, points, path)
 
     constraints = [one(member.constraint, member.coordinates) for member in packed.members]
     constraints = [each for each in constraints if not getattr(each.item, "normalises", False)]
@@ -255,6 +258,9 @@ def joint_points(items: list[Attached], count: int) -> list[list[Any]]:
         for index, letter in ((each.a, "a"), (each.b, "b")):
             if index >= 0 and letter in each.points:
                 found[index].append(each.points[letter])
+        for index, point in each.path:
+            if index >= 0:
+                found[index].append(point)
     return [_different(points) for points in found]
 
 
@@ -301,7 +307,7 @@ def violation(each: Attached, drawn: list[Part | Connector], reach: float, apart
     return red
 
 
-# Symbols of constraints and forces, by kind: a pin, a ball, a slider in its guide, a plane, a coil.
+# Symbols of constraints and forces, by kind: a pin, a ball, a slider in its guide, a plane, a coil, a rope.
 
 STEEL, DARK, COIL, PLANE = "#8a929b", "#3f464e", "#a0522d", "#9fb4c7"
 SYMBOL = 0.08  # radius, per reach of the smaller body
@@ -317,6 +323,9 @@ def symbols(each: Attached, reach: Any, girth: Any, apart: float) -> list[Part |
     near = reach[bodies]
     radius = SYMBOL * min(near)
     split = apart > APART * min(near)
+    if each.path:
+        spans = ((*one, *other) for one, other in pairwise(each.path))
+        return [Connector("cylinder", *span, 0.15 * radius, COIL) for span in spans]
     for kind in type(each.item).__mro__:
         if kind.__name__ == "RotationMotor" and split:  # its joint says where the axis is
             return []

@@ -139,6 +139,7 @@ class JointItem:
     damping: float = 0.0  # N m s/rad or N s/m
     free: float = 0.0  # coordinate at which the spring is relaxed, from the start: rad or m
     load: float = 0.0  # constant torque or force on b, N m or N
+    armature: float = 0.0  # inertia of its rotor, felt at the joint: kg m^2 or kg
     lead: float = 0.0  # of a screw, m/rad
     start: float = 0.0  # coordinate at the start, rad or m
     loop: bool = False  # holds beside the tree, so it is never merged
@@ -154,17 +155,15 @@ class JointItem:
 
 
 @dataclass(eq=False)
-class SpringItem:
-    """A spring between two points, in the ground frame."""
+class TendonItem:
+    """A spring between two points, or a cable or rope through several."""
 
     name: str
-    a: str
-    b: str
-    point_a: Any
-    point_b: Any
-    stiffness: float
-    damping: float
-    free_length: float
+    kind: str  # spring, cable, rope
+    points: list  # pairs: the name of a link, a point (3,) in the ground frame, m
+    length: float  # where it has no tension, m
+    stiffness: float = 0.0
+    damping: float = 0.0
 
 
 @dataclass(eq=False)
@@ -190,7 +189,7 @@ class Description:
     gravity: Any = (0.0, 0.0, -9.81)
     links: dict = field(default_factory=dict)  # Link by name, in the order of the file
     joints: list = field(default_factory=list)
-    springs: list = field(default_factory=list)
+    tendons: list = field(default_factory=list)
     couplings: list = field(default_factory=list)
     frames: dict = field(default_factory=dict)  # name -> (name of a link, Frame in it)
     ground_shapes: list = field(default_factory=list)

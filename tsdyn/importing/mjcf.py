@@ -21,7 +21,7 @@ from .description import (
     JointItem,
     Link,
     Servo,
-    SpringItem,
+    TendonItem,
     fresh,
     of_body,
     of_quaternion,
@@ -31,7 +31,7 @@ from .description import (
 from .tolerances import CELLS, FOLDERS, OBJECTS, PARTS, TEXT
 from .xml_file import LARGEST, Node, OutsideFiles, read
 
-# Actuators and tendons of MJCF: servos with the control that MuJoCo starts with, and springs between two sites.
+# Actuators and tendons of MJCF: servos with the control that MuJoCo starts with; springs, cables, ropes through sites.
 #
 # force = gain u + b0 + b1 l + b2 ld,  l = gear q,  torque = gear force     u: 0, or the nearest control in its range
 
@@ -115,28 +115,42 @@ def _control(mujoco, model, i):
 
 
 def _add_tendon(mujoco, model, data, i, found, names, report):
-    """A spring, where a tendon has two sites and one free length."""
-    name, first, count = names.of("tendon", i), int(model.tendon_adr[i]), int(model.tendon_num[i])
+    """A spring between two sites, or a cable through several, which pulls only."""
+    name, points = names.of("tendon", i), _sites(mujoco, model, data, i, names)
     stiffness, damping = float(model.tendon_stiffness[i]), float(model.tendon_damping[i])
-    low, high = model.tendon_lengthspring[i]
-    sites = all(int(kind) == int(mujoco.mjtWrap.mjWRAP_SITE) for kind in model.wrap_type[first : first + count])
-    straight = sites and count == 2 and low == high
-    if straight and (stiffness or damping):
-        ends = [int(s) for s in model.wrap_objid[first : first + 2]]
-        bodies = [names.body(int(model.site_bodyid[s])) for s in ends]
-        if bodies[0] != bodies[1]:
-            points = [_place(model, data, s) for s in ends]
-            found.springs.append(SpringItem(name, *bodies, *points, stiffness, damping, float(low)))
-    elif stiffness or damping:
-        report.leave("spring of a tendon", name)
+    low, high = map(float, model.tendon_lengthspring[i])
+    acts, pulls = bool(stiffness or damping), low <= 0.0 < high
+    if acts and points and (pulls or low == high):
+        kind = "cable" if pulls or len(points) > 2 else "spring"
+        if len({link for link, _ in points}) > 1:
+            found.tendons.append(TendonItem(name, kind, points, high, stiffness, damping))
+        if kind == "cable" and (damping or not pulls):
+            report.note(f"{name}: a cable, which pulls only; MuJoCo's tendon damps and pushes where it would be slack")
+    elif acts:
+        report.leave("spring of a tendon", name, "" if points else "(around geoms, over pulleys or of joints)")
     if model.tendon_limited[i]:
         report.leave("limits of a tendon", name)
     if model.tendon_frictionloss[i]:
         report.leave("friction of a tendon", name)
     if getattr(model, "tendon_armature", np.zeros(i + 1))[i]:
         report.leave("armature of a tendon", name)
-    if not (stiffness or damping):
+    if not acts and not _is_tied(mujoco, model, i):
         report.leave("tendon", name)
+
+
+def _is_tied(mujoco, model, i):
+    """Whether an equality holds the length of a tendon."""
+    kinds, tendons = np.array(model.eq_type), np.array([model.eq_obj1id, model.eq_obj2id])
+    return bool(((kinds == int(mujoco.mjtEq.mjEQ_TENDON)) & (tendons == i).any(axis=0)).any())
+
+
+def _sites(mujoco, model, data, i, names):
+    """The points of a tendon through sites alone, as of a `TendonItem`; [] of any other."""
+    w = slice(int(model.tendon_adr[i]), int(model.tendon_adr[i] + model.tendon_num[i]))
+    if not all(int(kind) == int(mujoco.mjtWrap.mjWRAP_SITE) for kind in model.wrap_type[w]):
+        return []
+    sites = [int(site) for site in model.wrap_objid[w]]
+    return [(names.body(int(model.site_bodyid[site])), _place(model, data, site)) for site in sites]
 
 
 def _place(model, data, site):
@@ -167,7 +181,7 @@ def add_joints(mujoco, model, data, found, names, report):
                 names.of("joint", j), kinds[int(model.jnt_type[j])], last, follower, data.xanchor[j].copy(),
                 data.xaxis[j].copy(),
             )  # fmt: skip
-            _spring_and_damper(mujoco, model, j, joint, report)
+            _dynamics(mujoco, model, j, joint, report)
             _leave_limits(model, j, joint, report)
             found.joints.append(joint)
             last = follower
@@ -175,13 +189,15 @@ def add_joints(mujoco, model, data, found, names, report):
     found.links = dict(sorted(found.links.items(), key=lambda item: order[item[0]]))
 
 
-def _spring_and_damper(mujoco, model, j, joint, report):
+def _dynamics(mujoco, model, j, joint, report):
     off, bits = model.opt.disableflags, mujoco.mjtDisableBit
     dof, at = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
     if not off & bits.mjDSBL_SPRING:
         joint.stiffness = float(model.jnt_stiffness[j])
         if joint.kind in ("revolute", "prismatic"):
             joint.free = float(model.qpos_spring[at] - model.qpos0[at])
+    if joint.kind in ("revolute", "prismatic"):
+        joint.armature = float(model.dof_armature[dof])
     if not off & bits.mjDSBL_DAMPER:
         joint.damping = float(model.dof_damping[dof])
     for name, index in (("jnt_stiffnesspoly", j), ("dof_dampingpoly", dof)):
@@ -190,7 +206,7 @@ def _spring_and_damper(mujoco, model, j, joint, report):
 
 
 def _leave_limits(model, j, joint, report):
-    """List limits, friction and armature."""
+    """List limits, friction, and armature of more than one coordinate."""
     dof = int(model.jnt_dofadr[j])
     if model.jnt_limited[j]:
         low, high = model.jnt_range[j]
@@ -198,8 +214,8 @@ def _leave_limits(model, j, joint, report):
         report.leave_limits(joint.name, low - zero, high - zero, f"[{low:g}, {high:g}]")
     if friction := float(model.dof_frictionloss[dof]):
         report.leave("friction of a joint", joint.name, f"{friction:g}")
-    if armature := float(model.dof_armature[dof]):
-        report.leave("armature of a joint", joint.name, f"{armature:g}")
+    if joint.kind not in ("revolute", "prismatic") and (armature := float(model.dof_armature[dof])):
+        report.leave("armature of a ball or free joint", joint.name, f"{armature:g}")
 
 
 # Equality constraints of MJCF: connect, weld and joint, held exactly.
@@ -223,7 +239,7 @@ def add_loops(mujoco, model, data, found, names, report):
         elif kind == int(mujoco.mjtEq.mjEQ_JOINT):
             _add_coupling(model, i, found, names, report)
         elif kind == int(mujoco.mjtEq.mjEQ_TENDON):
-            _add_tendon_coupling(mujoco, model, i, found, names, report)
+            _add_tendon_coupling(mujoco, model, data, i, found, names, report)
         else:
             report.leave("equality of flexible bodies", name)
 
@@ -281,12 +297,19 @@ def _note_offset(name, offset, report):
         report.note(f"{name}: it starts {offset:g} off; scene.assemble() takes it there")
 
 
-def _add_tendon_coupling(mujoco, model, i, found, names, report):
-    """Fixed tendons in proportion: their lengths are sums of joint coordinates with constant coefficients."""
+def _add_tendon_coupling(mujoco, model, data, i, found, names, report):
+    """A rope through sites; fixed tendons in proportion, whose lengths are sums of joint coordinates."""
     name, a = names.of("equality", i), np.array(model.eq_data[i, :5])
+    tendon = int(model.eq_obj1id[i])
+    points = _sites(mujoco, model, data, tendon, names)
+    if points and int(model.eq_obj2id[i]) < 0:
+        length = float(model.tendon_length0[tendon] + a[0])
+        found.tendons.append(TendonItem(name, "rope", points, length))
+        _note_offset(name, float(a[0]), report)
+        return
     one, other = (_coefficients(mujoco, model, int(t[i]), names) for t in (model.eq_obj1id, model.eq_obj2id))
     if one is None or other is None or a[2:].any():
-        report.leave("equality of tendons", name, "(of sites, or by a polynomial)")
+        report.leave("equality of tendons", name, "(around geoms, of two through sites, or by a polynomial)")
         return
     # sum c q = a0 + a1 sum d q, solved for the joint of the largest coefficient
     terms = dict(one)

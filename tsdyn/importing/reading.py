@@ -20,14 +20,19 @@ from ..constraints.fixed import Fixed
 from ..constraints.parallel import Parallel
 from ..constraints.planar import Planar
 from ..constraints.revolute import Revolute
+from ..constraints.rope import Rope
 from ..constraints.screw import Screw
 from ..constraints.spherical import Spherical
 from ..constraints.translational import Translational
 from ..constraints.universal import Universal
 from ..elements.bodies import rotation_matrix
+from ..elements.element import in_frame
 from ..elements.joint import across
-from ..errors import InvalidArgument, InvalidConstraint, TsdynError
+from ..elements.markers import Point
+from ..errors import InvalidArgument, InvalidConstraint, InvalidForce, TsdynError
+from ..forces.armature import Armature
 from ..forces.bushing import Bushing
+from ..forces.cable import Cable
 from ..forces.spring import Spring
 from ..forces.torsional_spring import TorsionalSpring
 from ..forces.viscous_friction import ViscousFriction
@@ -188,6 +193,11 @@ def add_joint_forces(scene, joint, bodies, report):
     _add(scene, joint, bodies, report, SUFFIX)
     for servo in joint.servos:
         _add(scene, replace(joint, **servo._asdict()), bodies, report, "")
+    if joint.armature < 0.0:
+        report.leave("negative armature", joint.name, f"{joint.armature:g}")
+    elif joint.armature and joint.kind in ONE_AXIS:
+        name = unused(scene, joint.name + " armature")
+        scene.add(Armature(scene[joint.name], inertia=joint.armature, name=name))
 
 
 def _add(scene, joint, bodies, report, suffix):
@@ -280,14 +290,8 @@ def build(description, make, report):
             if not (joint.loop and joint.frame_a is not None):
                 made[name] = scene._added[-1], joint.kind
         add_joint_forces(scene, joint, bodies, report)
-    for spring in description.springs:
-        scene.add(
-            Spring.at(
-                bodies[spring.a], bodies[spring.b], point_a=spring.point_a, point_b=spring.point_b,
-                stiffness=spring.stiffness, damping=spring.damping, free_length=spring.free_length,
-                name=unused(scene, spring.name),
-            )
-        )  # fmt: skip
+    for tendon in description.tendons:
+        _add_tendon(scene, tendon, bodies, report)
     couple(scene, description, made, report)
     if any(joint.start for joint in description.joints):
         _start(description, bodies)
@@ -335,6 +339,22 @@ def _start(description, bodies):
     for name, link in description.links.items():
         bodies[name].position = link.start.point(link.centroid)
         bodies[name].orientation = Rotation.from_matrix(link.start.R)
+
+
+def _add_tendon(scene, tendon, bodies, report):
+    """Add a spring, a cable or a rope."""
+    given, name = {"stiffness": tendon.stiffness, "damping": tendon.damping}, unused(scene, tendon.name)
+    (a, x), *_, (b, y) = [(bodies[link], point) for link, point in tendon.points]
+    points = [(bodies[link], in_frame(bodies[link], Point("a"), point)) for link, point in tendon.points]
+    try:
+        if tendon.kind == "rope":
+            scene.add(Rope(points, tendon.length, always_taut=True, name=name))
+        elif tendon.kind == "cable":
+            scene.add(Cable(points, **given, free_length=tendon.length, name=name))
+        else:
+            scene.add(Spring.at(a, b, point_a=x, point_b=y, **given, free_length=tendon.length, name=name))
+    except (InvalidForce, InvalidConstraint) as error:
+        report.leave("tendon", tendon.name, f"({error})")
 
 
 def _add_joint(scene, joint, bodies):

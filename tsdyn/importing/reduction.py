@@ -93,8 +93,8 @@ def _rename(description, top, report):
         elif joint.kind != "free":
             report.leave("joint between links that are fixed to each other", joint.name)
     description.joints = kept
-    for spring in description.springs:
-        spring.a, spring.b = top(spring.a), top(spring.b)
+    for tendon in description.tendons:
+        tendon.points = [(top(link), point) for link, point in tendon.points]
 
 
 # Links without mass or inertia between joints: a share of a neighbour's mass is moved to them, exactly.
@@ -291,12 +291,15 @@ def gather(description, report):
 
     for first, link, second in _pairs(description, joints, joins):
         slides = [*_slides(first), *_slides(second)]
+        for joint in (first, second):
+            _leave_armature(joint, report)
         second.kind, second.slides = "translations", slides
         second.servos = first.servos + second.servos  # without counterpart there, so listed
         second.stiffness = second.damping = second.free = second.load = 0.0
         second.name = ", ".join(slide.name for slide in slides)
         _drop(description, joints, first, link)
     for first, link, second in _pairs(description, joints, _is_planar):
+        _leave_armature(first, report)
         second.kind, second.slides = "planar", first.slides
         for servo in first.servos:
             report.leave("actuator", servo.name)
@@ -308,6 +311,12 @@ def gather(description, report):
     description.frames = {
         name: (owner, at) for name, (owner, at) in description.frames.items() if owner in joints
     }  # fmt: skip
+
+
+def _leave_armature(joint, report):
+    if joint.armature:
+        report.leave("armature of a slide in a plane or in space", joint.name, f"{joint.armature:g}")
+    joint.armature = 0.0
 
 
 def _pairs(description, joints, fits):
@@ -360,7 +369,7 @@ def _free(description, joints, joint, report):
             return
         chain.append(following[0])
     axes = [one.axis for one in chain[1:] if one.kind == "revolute"]
-    plain = not any(one.stiffness or one.damping or one.load for one in chain)
+    plain = not any(one.stiffness or one.damping or one.load or one.armature for one in chain)
     plain = plain and not any(slide.stiffness or slide.damping or slide.load for slide in joint.slides)
     if not plain or (axes and (len(axes) != 3 or abs(np.linalg.det(axes)) < TYPED)):
         return

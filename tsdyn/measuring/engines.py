@@ -503,6 +503,9 @@ class MuJoCo(Engine):
         if spring.stiffness:
             joint.springref = sign * (spring.free_angle - _angle_now(spring))
 
+    def _armature(self, rotor):
+        self.joints[_link_between(self.links, rotor).body][0].armature += rotor.inertia * rotor.ratio**2
+
     def _viscousfriction(self, friction):
         _add_to(
             self.joints[_link_between(self.links, friction).body][0],
@@ -620,7 +623,7 @@ def _force_refused(item, links):
         return reason
     if kind == "PointForce":
         return "PointForce must act at the centroid" if np.any(item.coordinates[0]) else ""
-    if kind not in ("TorsionalSpring", "ViscousFriction"):
+    if kind not in ("TorsionalSpring", "ViscousFriction", "Armature"):
         return f"{kind} has no counterpart"
     link = _link_between(links, item)
     if link is None:
@@ -628,6 +631,8 @@ def _force_refused(item, links):
     if kind == "TorsionalSpring":
         return "" if _hinge_at(link, item) else "no hinge of the tree is along its axis"
     kinds = [move.kind for move in link.moves]
+    if kind == "Armature":
+        return "" if kinds in (["hinge"], ["slide"]) else "its joint has several coordinates"
     fits = (kinds in (["hinge"], ["ball"]) and not item.damping) or (kinds == ["slide"] and item.damping)
     return "" if fits else "it damps more than one joint"
 

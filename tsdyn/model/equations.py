@@ -22,7 +22,7 @@ from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
 from .handles import handles_of
 from .laws import demand_callable, interrupts_answered
-from .packed import checked_motions, instances_of_kinds, no_system
+from .packed import WIDTH, checked_motions, instances_of_kinds, no_system
 
 call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
 call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
@@ -127,6 +127,40 @@ def acceleration_bias(s, q, qd, t, gamma):
 
 
 @kernel
+def inertia_rows(s, q, t, h):
+    """h (i, 14) of the inertia rows: the mass matrix is M + h^T h."""
+    for i in range(s.inertias.shape[0]):
+        _run(s, s.inertias[i], s.inertias[i].jacobian, q, q, t, h)
+
+
+@kernel
+def inertia_bias(s, q, qd, t, gamma):
+    """gamma (i,) of the inertia rows: h qdd + gamma is the acceleration of their coordinates."""
+    for i in range(s.inertias.shape[0]):
+        _run(s, s.inertias[i], s.inertias[i].gamma, q, qd, t, gamma)
+
+
+@kernel
+def multiply_inertia_row(s, h, e, x):
+    """Return h_e x, x (n,)."""
+    total = 0.0
+    for side in range(2):
+        at = s.inertia_segments[e, 2 * side]
+        for c in range(s.inertia_segments[e, 2 * side + 1]):
+            total += h[e, 7 * side + c] * x[at + c]
+    return total
+
+
+@kernel
+def add_inertia_row(s, h, e, scale, out):
+    """out (n,) += scale h_e."""
+    for side in range(2):
+        at = s.inertia_segments[e, 2 * side]
+        for c in range(s.inertia_segments[e, 2 * side + 1]):
+            out[at + c] += scale * h[e, 7 * side + c]
+
+
+@kernel
 def constraint_curvature(s, q, qd, qdd, t, lam, K, G1, G2):
     """K += (Phi_q^T lam)_q, G1 = (Phi_q qd + Phi_t)_q, G2 = (Phi_q qdd + gamma)_q; zero G1, G2 once."""
     for i in range(s.kinds.shape[0]):
@@ -183,10 +217,28 @@ def evaluate_constraints(s, q, qd, t, Phi, Phi_q, Phi_t, gamma):
     acceleration_bias(s, q, qd, t, gamma)
 
 
+@entry(no_system(), "mmmm")
+def _fill_inertia_rows(s, q, qd, h, gamma):
+    """h (k, 14 i) and gamma (k, i) of the inertia rows at states q, qd (k, n)."""
+    for k in range(q.shape[0]):
+        inertia_rows(s, q[k], 0.0, h[k].reshape(-1, WIDTH))
+        inertia_bias(s, q[k], qd[k], 0.0, gamma[k])
+
+
+def added_inertia(system, q, qd):
+    """Yield of each inertia row its columns (c,), h (k, c) and gamma (k,) at states q, qd (k, n): M + h^T h."""
+    count = len(system.inertia_segments)
+    if count:
+        h, gamma = np.zeros((len(q), WIDTH * count)), np.zeros((len(q), count))
+        _fill_inertia_rows(system, q, qd, h, gamma)
+        used = np.arange(WIDTH // 2) < system.inertia_segments[:, 1::2, None]
+        columns = system.inertia_segments[:, ::2, None] + np.arange(WIDTH // 2)
+        for i in range(count):
+            yield columns[i][used[i]], h.reshape(-1, count, *used[i].shape)[:, i][:, used[i]], gamma[:, i]
+
+
 # Sparse Phi_q: 14 numbers a row, 7 for body a and 7 for body b; storage and products cost O(N). A row that is a sum has
 # 14 numbers for each of its terms: those of the first in its own place, those of the `tails` behind all rows.
-
-WIDTH = 14  # floats of a row; those of body b begin in the middle
 
 
 def with_short_rows(packed):

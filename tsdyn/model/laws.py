@@ -276,6 +276,8 @@ class Law:
         """Why it has no Taylor series; "" where it has them."""
         if self.why:
             return f"its {self.force.given} is a function of the scene's state that can't be traced, {self.why}"
+        if self.force.checked:
+            return ""
         return f"its {self.force.given} may change within any part of a step" if self.changes else ""
 
     # In arrays.

@@ -139,6 +139,9 @@ def _of(redundant, turning, handles):
     return Derived(redundant, turning, handles)
 
 
+WIDTH = 14  # floats of a short row of Phi_q; those of body b begin in the middle
+
+
 # Lengths of a scene: in a small one positions are held to rounding of these, not of the pure numbers beside them.
 
 POINT_SIZE = 1e-3  # m: a scene without longer lengths, or whose points coincide; rounding of one is 1e-12 of it
@@ -392,6 +395,8 @@ class System(NamedTuple):
     signals: np.ndarray  # (signals,) of tables.SignalPlace
     memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
     normals: np.ndarray  # int64 (frictions,): places in reals of the normal loads of joints' frictions
+    inertias: np.ndarray  # (kinds,) of tables.ConstraintKind: the rows h of M + h^T h, short; see rows/inertia_rows.py
+    inertia_segments: np.ndarray  # int64 (i, 4): as segments, of these rows
 
 
 def no_system():
@@ -414,6 +419,8 @@ def no_system():
         signals=records(SignalPlace),
         memory=whole,
         normals=whole,
+        inertias=records(ConstraintKind),
+        inertia_segments=wholes,
     )
 
 
@@ -438,6 +445,7 @@ class Packed(NamedTuple):
     loads: tuple  # a packed_forces.Load for each force, in the order added
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
     slots: tuple  # of System.memory, for each constraint; -1 for none
+    inertias: tuple  # primitives whose rows add inertia to a joint coordinate, in the order of their forces
     derived: Derived  # what has been worked out from it
 
     def __reduce__(self):
@@ -455,7 +463,8 @@ def _found_again(process, *parts):
         return packed
     system = packed.system
     kinds = classes(packed)
-    for row, kind in zip(system.kinds, kinds, strict=True):
+    rows = [*zip(system.kinds, kinds, strict=True), *zip(system.inertias, inertia_classes(packed), strict=True)]
+    for row, kind in rows:
         for name in ("phi", "jacobian", "gamma", "phi_t", "remember"):
             row[name] = _address(kind, name) if row[name] else 0
         row["stiffness"] = row["slopes"] = 0
@@ -495,15 +504,20 @@ def pack(scene):
         for pairs in (scene._twins, scene._aliases):  # functions may hold handles of the scene that this is a copy of
             derived.handles.add_aliases((pairs or {}).items())
     forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals, derived.handles)
+    added = [force.inertia_row for force in scene.forces if force.adds_inertia]
+    inertia_kinds, *_ = _pack_constraints({row: row.parameters() for row in added}, 0, where, table, reals)
+    inertias = records(ConstraintKind, inertia_kinds)
+    for kind in inertias:
+        _shorten(table, kind)
     _append_programs(motions, reals)
     for function, begin, at in functions:
         reals[at : at + PLACES] = function.addresses(begin, len(reals))
         reals += function.numbers()
-    inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
+    moments = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
         mass=np.array([body.values["mass"] for body in scene.bodies]),
-        inertia=np.array(inertias).reshape(-1, 9),
+        inertia=np.array(moments).reshape(-1, 9),
         gravity=np.array(scene.gravity),  # writable, as all arrays here: what is read-only is another type to a kernel
         kinds=records(ConstraintKind, kinds),
         table=np.array(table, np.int64),
@@ -517,13 +531,23 @@ def pack(scene):
         signals=signals,
         memory=np.array([*memory, *kept.values()], np.int64),
         normals=np.array(normals, np.int64),
+        inertias=inertias,
+        inertia_segments=np.array(_segments(added, where), np.int64).reshape(-1, 4),
     )
     coordinates = tuple(constraint.coordinates for constraint in primitives)
     size = size_of(primitives, coordinates)
     order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
     slots = tuple(order.get(constraint, -1) for constraint in primitives)
     given = tuple(parameters.values())
-    return Packed(system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, derived)
+    whole = system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, tuple(added), derived
+    return Packed(*whole)
+
+
+def _shorten(table, kind):
+    """Let the rows of Phi_q of a kind be short."""
+    for own in range(int(kind.table), int(kind.table + INTS * kind.count), INTS):
+        line = WIDTH * table[own + ROW]
+        table[own + BLOCK], table[own + BLOCK + 1], table[own + STRIDE] = line, line + WIDTH // 2, WIDTH
 
 
 def _segments(primitives, where):
@@ -678,6 +702,11 @@ def classes(packed):
     return list(dict.fromkeys(type(constraint) for constraint in packed.constraints))
 
 
+def inertia_classes(packed):
+    """The classes of rows that add inertia, in the order of System.inertias."""
+    return list(dict.fromkeys(type(row) for row in packed.inertias))
+
+
 def user_functions(packed):
     """Yield whatever holds compiled functions of a user's, and those functions."""
     for given in packed.parameters:
@@ -706,10 +735,11 @@ def second_derivatives(basis_free):
 
 def with_curvatures(packed, basis_free=False):
     """The system with the kernels of second derivatives, which only implicit methods load."""
-    kinds = packed.system.kinds.copy()
+    kinds, inertias = packed.system.kinds.copy(), packed.system.inertias.copy()
     for name in second_derivatives(basis_free):
         kinds[name] = [_address(kind, name) for kind in classes(packed)]
-    return packed.system._replace(kinds=kinds)
+        inertias[name] = [_address(kind, name) for kind in inertia_classes(packed)]
+    return packed.system._replace(kinds=kinds, inertias=inertias)
 
 
 def checked_motions(constraint):

@@ -61,7 +61,15 @@ OPERATIONS = {
     "log": Operation(code.LOG, 1, 0, np.log),
     "tanh": Operation(code.TANH, 2, 0, np.tanh),
     "arctan": Operation(code.ARCTAN, 2, 0, np.arctan),
+    "gate": Operation(code.GATE, 1, 0, lambda a, b: _gated(a, b)),
 }
+
+
+def _gated(a, b):
+    """b where a is positive, else zero; of numbers or graphs."""
+    if isinstance(a, Smooth) or isinstance(b, Smooth):
+        return _binary("gate", a, b)
+    return np.where(a > 0.0, b, 0.0)[()]
 
 
 PLAIN = frozenset(("polynomial", "piecewise", "add", "subtract", "multiply", "sin", "cos"))  # operations

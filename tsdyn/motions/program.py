@@ -12,7 +12,7 @@ from ..jit.kernels import ANY, callback, caller, data_of, kernel, matrix, vector
 from ..maths.recurrences import exponential, power, product, quotient, sine_cosine, square
 from .tables import HEAD as PIECES_HEAD
 
-POLYNOMIAL, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, SINE, EXP, LOG, TANH, ARCTAN, PIECEWISE = range(12)
+POLYNOMIAL, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, SINE, EXP, LOG, TANH, ARCTAN, PIECEWISE, GATE = range(13)
 HEAD, STEP, WIDTH = 6, 4, 36  # numbers before the instructions, numbers of an instruction, coefficients of a row
 HOLD = 0  # as a count: stay with the pieces at t
 SIGNATURE = "pdip"  # program, t, how many coefficients, where they go
@@ -96,6 +96,15 @@ def _hold(p, t):
 
 
 @kernel
+def _opens(a, k):
+    """Whether a is positive, or becomes so at once: whether the first of its coefficients that is not zero is."""
+    for j in range(k + 1):
+        if a[j] != 0.0:
+            return a[j] > 0.0
+    return False
+
+
+@kernel
 def operate(p, at, constants, s, t, k):
     """Coefficient k of the operation that p has from `at` on; s are the rows."""
     what, y, a, b = int(p[at]), int(p[at + 1]), int(p[at + 2]), int(p[at + 3])
@@ -122,6 +131,8 @@ def operate(p, at, constants, s, t, k):
     elif what == TANH:
         s[y, k] = _hyperbolic(s[a], s[y], s[y + 1], k)
         s[y + 1, k] = (1.0 if k == 0 else 0.0) - square(s[y], k)
+    elif what == GATE:
+        s[y, k] = s[b, k] if _opens(s[a], k) else 0.0
     else:
         s[y + 1, k] = (1.0 if k == 0 else 0.0) + square(s[a], k)
         s[y, k] = np.arctan(s[a, 0]) if k == 0 else _slope_over(s[a], s[y + 1], s[y], k)

@@ -89,6 +89,12 @@ class Symbol:
         raise AttributeError(name)
 
 
+def gate(a: Any, b: Any) -> Any:
+    """b where a is positive, else zero; of numbers or symbols."""
+    found = OPERATIONS["gate"].apply(*(value.node if isinstance(value, Symbol) else value for value in (a, b)))
+    return Symbol(found) if isinstance(found, Smooth) else found
+
+
 def symbols(first: int, count: int) -> np.ndarray:
     """An array of the inputs from `first` on."""
     found = np.empty(count, object)

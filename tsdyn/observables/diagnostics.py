@@ -1,19 +1,21 @@
 """Constraint errors, energy and momentum of a trajectory, recomputed in NumPy from t, q, qd, qdd alone.
 
-The solver's kernels are not used. Constraint errors come from each primitive's phi, evaluated on second-order Taylor
-numbers of the marker coordinates, so neither its jacobian nor its gamma enters.
+The solver's kernels are not used, but for rows that add inertia. Constraint errors come from each primitive's phi,
+evaluated on second-order Taylor numbers of the marker coordinates, so neither its jacobian nor its gamma enters.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..elements.bodies import IDENTITY, rotation_matrix
-from ..elements.markers import PARAMETERS, POINT, TURN
+from ..elements.markers import PARAMETERS, POINT, TURN, Point
 from ..jit.kernels import twin
 from ..maths.power_series import Jet
+from ..model.equations import added_inertia
 from ..model.kinematics import angular_velocity
 from ..model.packed import first_rows
 from ..motions.of_coordinates import CoordinateFunction
@@ -94,7 +96,7 @@ def _levels(constraint, members, t, q, qd, qdd, time_rate):
     x = []
     for j, marker in enumerate(constraint.markers):
         at, s = starts[:, j], places[:, j].T
-        x += _marker_jet(marker, constraint.body_of(marker).dimension, at, s, q, qd, qdd)
+        x += marker_jet(marker, constraint.body_of(marker).dimension, at, s, q, qd, qdd)
     par = [entry for given in zip(*values, strict=True) for entry in _parameter(given, t, time_rate)]
     kind = type(constraint)
     out, shape = [None] * kind.rows, (t.size, len(members))
@@ -143,10 +145,10 @@ def marker_jets(starts, constraint, coordinates, q, qd, qdd):
     """Yield the coordinates of each marker of a constraint or force as Jets over the outputs; starts of `starts_of`."""
     for marker, s in zip(constraint.markers, coordinates, strict=True):
         body = constraint.body_of(marker)
-        yield _marker_jet(marker, body.dimension, starts.get(body, 0), s, q, qd, qdd)
+        yield marker_jet(marker, body.dimension, starts.get(body, 0), s, q, qd, qdd)
 
 
-def _marker_jet(marker, dimension, at, s, q, qd, qdd):
+def marker_jet(marker, dimension, at, s, q, qd, qdd):
     """Coordinates of a marker on a body whose own begin at `at`; or of several, at and s[i] being arrays."""
     if marker.code == TURN:
         return [Jet(0.0)] * 3
@@ -206,6 +208,8 @@ def kinetic_energy(system, q, qd):
         total += 0.5 * (bodies.rd**2).sum(axis=2) @ bodies.mass
         if bodies.omega is not None:
             total += 0.5 * np.einsum("kbi,bij,kbj->k", bodies.omega, bodies.inertia, bodies.omega)
+    for columns, h, _ in added_inertia(system, q, qd):
+        total += 0.5 * (h * qd[:, columns]).sum(axis=1) ** 2
     return total
 
 
@@ -259,6 +263,8 @@ def force_powers(solution):
 def load_powers(packed, load, t, q, qd, memory):
     """Potential energy, dissipation and applied power of one force, over outputs (k,)."""
     kind = type(load.force)
+    if hasattr(kind, "powers"):
+        return kind.powers(*_lengths(packed, load.force.points, q, qd), load.parameters)
     par = [entry for value in load.parameters for entry in (value.over(t) if isinstance(value, Signal) else [value])]
     if load.slot >= 0:
         par.append(memory[:, load.slot])
@@ -277,6 +283,17 @@ def load_powers(packed, load, t, q, qd, memory):
             system = packed.system._replace(forces=load.alone)
             work = np.einsum("kn,kn->k", force_loads(system, t, q, qd, memory), qd)
     return U.x, lost, work + U.xd + lost
+
+
+def _lengths(packed, points, q, qd):
+    """Length (k,) between points of bodies, and its rate."""
+    length, starts = Jet(np.zeros(len(q)), np.zeros(len(q))), starts_of(packed)
+    still, point = np.zeros_like(qd), Point("a")
+    places = [marker_jet(point, body.dimension, starts.get(body, 0), s, q, qd, still) for body, s in points]
+    for one, other in pairwise(places):
+        d = [b - a for a, b in zip(one, other, strict=True)]
+        length = length + np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    return length.x, length.xd
 
 
 def marker_states(packed, load, q, qd):

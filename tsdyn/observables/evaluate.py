@@ -14,7 +14,7 @@ from ..jit.interrupts import CollectionsDeferred
 from ..jit.kernels import twin
 from ..maths.matrix_rank import dependent, farthest_first, sparse_lu
 from ..maths.tolerances import COMPLEX_STEP, PIVOT_ROUNDING, RANK_TOL, ROUNDING, SUM_ROUNDING, TINY
-from ..model.equations import WIDTH, as_csr, evaluate_constraints, with_short_rows
+from ..model.equations import WIDTH, added_inertia, as_csr, evaluate_constraints, with_short_rows
 from ..model.packed import coupled_loads
 from ..rows.constraint_graph import coordinate_scales
 from ..validation import finite_vector, number
@@ -330,13 +330,15 @@ def constraint_arrays(system, q, qd, t, width=None):
 
 
 def mass_matrix(system, q):
-    """M: m I on r and 4 G^T J' G on p."""
+    """M: m I on r, 4 G^T J' G on p, and h^T h of inertia rows."""
     M = np.zeros((q.size, q.size))
     for (at, length), mass, J in zip(system.bodies, system.mass, system.inertia, strict=True):
         M[at : at + 3, at : at + 3] = mass * np.eye(3)
         if length == 7:
             G = transform_g(q[at + 3 : at + 7])
             M[at + 3 : at + 7, at + 3 : at + 7] = 4.0 * G.T @ J.reshape(3, 3) @ G
+    for columns, h, _ in added_inertia(system, q[None], np.zeros((1, q.size))):
+        M[np.ix_(columns, columns)] += h.T @ h
     return M
 
 
@@ -351,4 +353,8 @@ def mass_matrix_sparse(system, q):
     i, j = np.broadcast_to(p[:, :, None], blocks.shape), np.broadcast_to(p[:, None], blocks.shape)
     values = np.concatenate((np.repeat(system.mass, 3), blocks.ravel()))
     places = [np.concatenate((r.ravel(), k.ravel())) for k in (i, j)]
-    return csr_array((values, places), (q.size, q.size))
+    M = csr_array((values, places), (q.size, q.size))
+    for columns, h, _ in added_inertia(system, q[None], np.zeros((1, q.size))):
+        i, j = np.meshgrid(columns, columns, indexing="ij")
+        M += csr_array(((h.T @ h).ravel(), (i.ravel(), j.ravel())), M.shape)
+    return M

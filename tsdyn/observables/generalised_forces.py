@@ -10,7 +10,7 @@ from ..elements.laws import SceneLaw
 from ..elements.loads import STATE, ByState
 from ..jit.kernels import entry
 from ..maths.vectors import to_ground
-from ..model.equations import applied_forces, recall, set_time
+from ..model.equations import added_inertia, applied_forces, recall, set_time
 from ..model.handles import BodyMotion, angle, displacement, handles_of
 from ..model.laws import interrupts_answered
 from ..model.packed import no_system
@@ -50,20 +50,24 @@ def applied_loads(system, t, q, qd, memory=None):
 
 
 def velocity_forces(system, q, qd):
-    """Q_v (k, n): 8 Gd^T J' Gd p on p."""
+    """Q_v (k, n): 8 Gd^T J' Gd p on p, and -h^T gamma_h of inertia rows."""
     S, at = np.zeros_like(q), _places(system, 3, 7)
     if at.size:
         S[:, at] = 8.0 * _turned(qd[:, at], system, q[:, at])
+    for columns, h, gamma in added_inertia(system, q, qd):
+        S[:, columns] -= gamma[:, None] * h
     return S
 
 
 def inertial_forces(system, q, qdd):
-    """M qdd (k, n): m rdd on r and 4 G^T J' G pdd on p."""
+    """M qdd (k, n): m rdd on r, 4 G^T J' G pdd on p, and h^T h qdd of inertia rows."""
     f, at = np.zeros_like(q), _places(system, 0, 3)
     f[:, at] = system.mass[:, None] * qdd[:, at]
     at = _places(system, 3, 7)
     if at.size:
         f[:, at] = 4.0 * _turned(q[:, at], system, qdd[:, at])
+    for columns, h, _ in added_inertia(system, q, np.zeros_like(q)):
+        f[:, columns] += (h * qdd[:, columns]).sum(axis=1)[:, None] * h
     return f
 
 

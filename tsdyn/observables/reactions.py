@@ -21,7 +21,7 @@ from ..formulations.accelerations import find_reactions, normal_load
 from ..jit.kernels import entry, kernel, long_kernel, resident, stack
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import RANK_TOL, TINY
-from ..model.equations import WIDTH, constraint_jacobian, recall, set_time, with_short_rows
+from ..model.equations import WIDTH, added_inertia, constraint_jacobian, recall, set_time, with_short_rows
 from ..model.handles import handles_of
 from ..model.packed import classes, index_of, member_of, no_system
 from ..rows.constraint_graph import REDUCED
@@ -278,6 +278,11 @@ def force_reaction(solution, load, body):
     """Force and torque (k, 3) that a force exerts on a body, torque about its first point on it, ground frame."""
     force, system = load.force, solution.system._replace(forces=load.alone)
     Q = force_loads(system, solution.t, solution.q, solution.qd, solution._memory)
+    if force.adds_inertia:
+        # -h^T (h qdd + gamma_h) of its inertia row
+        rows = [one.force for one in solution.packed.loads if one.force.adds_inertia]
+        columns, h, gamma = list(added_inertia(system, solution.q, solution.qd))[rows.index(force)]
+        Q[:, columns] -= ((h * solution.qdd[:, columns]).sum(axis=1) + gamma)[:, None] * h
     at, length = solution.system.bodies[index_of(solution.packed, body)]
     return at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
 
@@ -328,7 +333,7 @@ def constraint_loads(s, t, q, memory, lam, lines, which, halves, rows, out):
 def find_rows(graph, s, f, q, t, whole):
     """H at q without redundant rows and, in `whole`, with them, and the factors of S; False if S is singular."""
     regular = factorise_at(graph, s, f, t, q)
-    evaluate_every_row(graph, s, f, Rows(whole, f.rows.Y, f.rows.S), t)
+    evaluate_every_row(graph, s, f, Rows(whole, f.rows.Y, f.rows.S, f.rows.h), t)
     return regular
 
 

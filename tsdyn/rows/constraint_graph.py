@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit.kernels import Record, records
+from ..jit.kernels import Record, kernel, records
 from ..model.packed import FrictionPlace
 from .massless_axes import AXIS_OWN, MasslessAxes, levers, no_axes
 from .symbolic import Pattern, analyse
@@ -92,6 +92,7 @@ class ConstraintGraph(NamedTuple):
     friction_rows: np.ndarray  # int64 (rows of their joints, 2): which row, and on which side its reaction is taken
     friction_solver: np.ndarray  # int64 (1,): address of what solves for them, as the form needs it
     axes: MasslessAxes  # rows of bodies with next to no inertia about an axis
+    inertias: np.ndarray  # int64 (k,): rows that add inertia to a joint coordinate, see inertia_rows.py
 
 
 def no_graph():
@@ -102,8 +103,14 @@ def no_graph():
     return ConstraintGraph(
         pairs, kinds, none, pairs, none, none, none, products, np.zeros(16), np.zeros(16), none, pattern, np.zeros(0),
         none, none, parts, np.zeros(0), pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64),
-        no_axes(),
+        no_axes(), none,
     )  # fmt: skip
+
+
+@kernel
+def is_raised(graph):
+    """Whether S of the dynamics has another metric than the inverse masses: with axis rows or inertia rows."""
+    return graph.axes.rows.shape[0] > 0 or graph.inertias.size > 0
 
 
 # The metric of lengths, in which the rank of constraint rows is judged: geometry alone, whatever the masses.

@@ -2,9 +2,10 @@
 
 from ..elements.loops.constraint_rows import call_body_loop
 from ..jit.kernels import kernel, long_kernel
+from .inertia_rows import clear_entries, keep_bias, set_rows_aside
 from .redundant_rows import clear_redundant, keep_every_row, keep_redundant, leave_redundant_rows, restore_selection
 from .schur_complement import (
-    add_axis_multipliers,
+    add_multiplier_terms,
     apply_columns,
     clear_axes,
     find_correction,
@@ -30,6 +31,7 @@ def _clear_other_rows(graph, out):
     clear_welds(graph, out)
     if graph.axes.rows.shape[0] > 0:
         clear_axes(graph, out)
+    clear_entries(graph, out)
 
 
 @kernel
@@ -55,6 +57,7 @@ def evaluate_without_redundant(graph, reals, f, rows, t):
         kind = graph.kinds[i]
         _run_loop(graph, reals, f, t, kind, kind.reduced, f.b, rows.H)
     _clear_other_rows(graph, f.b)
+    set_rows_aside(graph, rows)
 
 
 @kernel
@@ -103,6 +106,7 @@ def evaluate_bias(graph, system, f, t):
     for i in range(graph.kinds.shape[0]):
         kind = graph.kinds[i]
         _run_loop(graph, system.reals, f, t, kind, kind.bias, f.gamma, f.rows.H)
+    keep_bias(graph, f.rows, f.gamma)
     _clear_other_rows(graph, f.gamma)
     keep_redundant(f, f.gamma, f.redundant.gamma)
 
@@ -153,9 +157,9 @@ def solve_friction_series(graph, f, omega, at, stride, k):
 @kernel
 def _complete(graph, f, omega, at, stride, k, correction):
     """The residuals f.b of all rows, from those of the primitives."""
-    # Welds: zero. Axis rows: (k + 1) c e . omega'_{k+1}, and lam_e of a first solution
+    # Welds: zero. Axis rows: (k + 1) c e . omega'_{k+1}, and lam_e of a first solution; inertia rows: less mu of that
     clear_welds(graph, f.b)
     gather_axes(graph, omega, at, stride, k + 1.0, f.b)
     if correction:
-        add_axis_multipliers(graph, f.gamma, f.b)
+        add_multiplier_terms(graph, f.gamma, f.b)
     clear_redundant(f, f.b)

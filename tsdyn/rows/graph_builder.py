@@ -136,7 +136,7 @@ def _tree(hub, nodes, sizes, degrees):
 class _Joint(NamedTuple):
     constraint: object
     pair: tuple  # the numbers of its two bodies; that of the ground is the number of bodies
-    row: int  # the first of its rows in Phi
+    row: int  # the first of its rows in Phi; -1 of one that adds inertia
 
 
 class _Lean(NamedTuple):
@@ -196,6 +196,9 @@ class _GraphBuilder:
             elif i not in omitted:
                 pair = tuple(self.bodies.get(id(body), self.nb) for body in (constraint.a, constraint.b))
                 self.joints.append(_Joint(constraint, pair, row))
+        for added in self.packed.inertias:
+            pair = tuple(self.bodies.get(id(body), self.nb) for body in (added.a, added.b))
+            self.joints.append(_Joint(added, pair, -1))
 
     def _find_nodes(self):
         """The nodes, how many rows each has, and of every joint its node and its first row within."""
@@ -340,14 +343,15 @@ class _GraphBuilder:
 
     def _kinds(self, index):
         """`kinds` and `table` of the graph, and the class of each of the kinds: runs of instances without a gap."""
-        classes = dict.fromkeys(type(constraint) for constraint in self.packed.constraints)
+        items = [*self.packed.constraints, *self.packed.inertias]
+        classes = dict.fromkeys(type(item) for item in items)
         kinds, table, used = [], [], []
-        for kind, packed_kind in zip(classes, self.system.kinds, strict=True):
+        for kind, packed_kind in zip(classes, [*self.system.kinds, *self.system.inertias], strict=True):
             if kind.normalises:
                 continue
             phi_t, stride, first_real = packed_kind.phi_t, packed_kind.stride, packed_kind.reals
             last = None  # the instance before, where it is not left out
-            for at, constraint in enumerate(c for c in self.packed.constraints if type(c) is kind):
+            for at, constraint in enumerate(item for item in items if type(item) is kind):
                 i = index.get(id(constraint))
                 if i is None:
                     continue
@@ -425,6 +429,7 @@ class _GraphBuilder:
             friction_rows=friction_rows,
             friction_solver=np.zeros(1, np.int64),
             axes=axes,
+            inertias=np.array([self.firsts[index[id(row)]] for row in self.packed.inertias], np.int64),
         )
         return graph, used
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from ..elements.loops.constraint_rows import POSE
 from ..jit.arrays import zeros
+from .constraint_graph import is_raised
 from .elimination import KERNELS as ELIMINATION
 from .elimination import lu_factors
 from .evaluation import (
@@ -17,6 +18,9 @@ from .evaluation import (
     solve_friction_series,
     solve_series,
 )
+from .inertia_rows import WIDTH as INERTIA_WIDTH
+from .inertia_rows import multiply as multiply_inertia_rows
+from .inertia_rows import unbalance as unbalance_inertia_rows
 from .redundant_rows import (
     clear_rates,
     clear_redundant,
@@ -62,7 +66,7 @@ from .schur_complement import (
     DYNAMICS,
     METRIC,
     acceleration_residuals,
-    add_axis_multipliers,
+    add_multiplier_terms,
     add_products,
     apply_multipliers,
     balance_loads,
@@ -117,8 +121,8 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
 
 def allocate_rows(graph):
     """Allocate `Rows`."""
-    size = 16 * len(graph.sides)
-    return Rows(zeros(size), zeros(size), zeros(graph.pattern.shape[2]))
+    size, inertias = 16 * len(graph.sides), zeros(INERTIA_WIDTH * len(graph.inertias))
+    return Rows(zeros(size), zeros(size), zeros(graph.pattern.shape[2]), inertias)
 
 
 def _allocate_friction(graph, n, basis):
@@ -216,7 +220,7 @@ __all__ = [
     "TangentWorkspace",
     "acceleration_residuals",
     "accelerations_hold",
-    "add_axis_multipliers",
+    "add_multiplier_terms",
     "add_products",
     "allocate_rows",
     "allocate_tangent",
@@ -247,12 +251,14 @@ __all__ = [
     "is_axis",
     "is_near_singular",
     "is_next_to_singular",
+    "is_raised",
     "is_singular_within_a_step",
     "keep_every_row",
     "list_redundant",
     "lu_factors",
     "mark_redundant",
     "more",
+    "multiply_inertia_rows",
     "multiply_rates",
     "multiply_rows",
     "note_indicator",
@@ -285,6 +291,7 @@ __all__ = [
     "solve_series",
     "take_noted_selection",
     "take_reactions",
+    "unbalance_inertia_rows",
     "weigh",
     "weigh_bodies",
     "with_reselection",

@@ -498,7 +498,7 @@ def reselect_rows(choice, reals, t, H, Y, S, metric):
     c = load_choice(choice)
     graph, f = c.graph, c.tangent
     pairs, size = 16 * graph.sides.shape[0], graph.pattern.shape[2]
-    rows = Rows(vector(H, pairs), vector(Y, pairs), vector(S, size))
+    rows = Rows(vector(H, pairs), vector(Y, pairs), vector(S, size), f.rows.h)
     return 1 if _choose_again(graph, vector(reals, ANY), f, rows, t, metric) else 0
 
 

@@ -16,6 +16,7 @@ class Rows(NamedTuple):
     H: np.ndarray  # (pairs * 16,)  [Phi_r, Phi_pi'] of the pairs of sides, m or more; constraint_rows.reduced
     Y: np.ndarray  # (pairs * 16,)  W H^T; schur_complement.weigh_rows
     S: np.ndarray  # H W H^T, then its factors; schur_complement.multiply_rows, factorisation.factor
+    h: np.ndarray  # (k * 20,)  inertia rows; inertia_rows.py
 
 
 class Friction(NamedTuple):
@@ -95,7 +96,7 @@ def no_tangent_workspace():
     """The `TangentWorkspace` of nothing, for its type."""
     none, whole, square = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
     friction = Friction(*[none] * 7, square, square, whole, none)
-    rows, records = Rows(none, none, none), (Landing(), Selection(), Indicator(), RedundantRows(none, none, none))
+    rows, records = Rows(none, none, none, none), (Landing(), Selection(), Indicator(), RedundantRows(none, none, none))
     return TangentWorkspace(
         none, rows, *[none] * 6, *records, whole, none, whole, none, whole, whole, none, friction, whole
     )

@@ -13,6 +13,7 @@ from ..jit.simd import let
 from ..maths.tolerances import SUM_ROUNDING
 from ..model.packed import first_rows, members_of
 from .elimination import factor_lu, solve_lu, with_kernels
+from .inertia_rows import clear_rows, put_rows_back
 from .massless_axes import lean_bodies
 from .schur_complement import more
 from .symbolic import Pattern, analyse, fill_reducing_order, lay_out_in_order
@@ -249,6 +250,7 @@ class _SaddleBuilder:
         self.degrees = np.where(graph.bodies[:, 1] == 7, 6, 3).tolist()
         self.body_of = {int(at): body for body, at in enumerate(system.bodies[:, 0])}
         self.row_of = {int(row): e for e, row in enumerate(graph.row) if row >= 0}
+        self.row_of |= {-1 - i: int(e) for i, e in enumerate(graph.inertias)}
         self._find_nodes()
         self.lean = lean_bodies(packed)
         forces, constraints = self._forces(), self._constraints()
@@ -306,8 +308,10 @@ class _SaddleBuilder:
     def _constraints(self):
         """The same of every constraint that is no normalisation."""
         found, taken, later = [], {}, {e: iter(ends) for e, ends in self.ends.items()}
-        kinds = dict(zip(dict.fromkeys(map(type, self.packed.constraints)), self.system.kinds, strict=True))
-        for constraint, row in first_rows(self.packed.constraints):
+        items = [*self.packed.constraints, *self.packed.inertias]
+        kinds = dict(zip(dict.fromkeys(map(type, items)), [*self.system.kinds, *self.system.inertias], strict=True))
+        rows = [*first_rows(self.packed.constraints), *((row, -1 - i) for i, row in enumerate(self.packed.inertias))]
+        for constraint, row in rows:
             kind = kinds[type(constraint)]
             i = taken[type(constraint)] = taken.get(type(constraint), -1) + 1
             e = self.row_of.get(row)
@@ -374,12 +378,14 @@ class _SaddleBuilder:
 
 @kernel
 def write_saddle_rows(graph, f, s):
-    """Set the matrix to H and H^T at the present H, axis rows, and ones on the diagonal of redundant rows."""
+    """Set the matrix to H and H^T at the present H, axis and inertia rows, and ones at redundant rows."""
     # Zeros for fill
     for i in range(s.graph.pattern.shape[1]):
         let(s.upper, i, 0.0)
         let(s.lower, i, 0.0)
+    put_rows_back(graph, f.rows)
     _write_rows(graph, f, s)
+    clear_rows(graph, f.rows)
     _write_axes(s)
 
 
@@ -401,6 +407,10 @@ def _write_rows(graph, f, s):
     for i in range(f.dropped[0]):
         at = s.graph.diagonal[f.dropped[1 + i]]
         s.upper[at] = s.lower[at] = 1.0
+    # h a - mu
+    for i in range(graph.inertias.size):
+        at = s.graph.diagonal[graph.inertias[i]]
+        s.upper[at] = s.lower[at] = -1.0
 
 
 @kernel

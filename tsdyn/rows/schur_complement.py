@@ -6,6 +6,16 @@ from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, 
 from ..maths.tolerances import PIVOT_ROUNDING
 from .constraint_graph import ROWS, ROWS_WELD, W_MASS, W_ROTATION, WEIGHTS, WELD_ROWS, WELDS
 from .elimination import factor, factor_lu, solve, solve_lu
+from .inertia_rows import (
+    clear_rows,
+    inner,
+    leave_diagonal,
+    put_rows_back,
+    raise_diagonal,
+    residuals,
+    subtract_multipliers,
+)
+from .inertia_rows import take_reactions as take_inertia_reactions
 from .massless_axes import AXIS_H, AXIS_OWN, AXIS_Y
 from .redundant_rows import set_redundant_diagonal
 from .tolerances import COMPENSATED
@@ -54,10 +64,11 @@ def multiply_axes_both(graph, H, X, lower, upper):
 
 @kernel
 def leave_axes_out(graph, values):
-    """Replace axis rows by minus one on the diagonal: S for the given inertias, with zero multipliers of axis rows."""
+    """Replace axis and inertia rows by minus one, or one, on the diagonal, so that their multipliers are zero."""
     axes = graph.axes
     for i in range(axes.rows.shape[0]):
         let(values, graph.diagonal[axes.rows[i].row], -1.0)
+    leave_diagonal(graph, values)
 
 
 @kernel
@@ -71,8 +82,9 @@ def gather_axes(graph, values, at, stride, scale, out):
 
 
 @kernel
-def add_axis_multipliers(graph, lam, out):
-    """out += lam of the axis rows: the second term of c e . omega'd + lam_e."""
+def add_multiplier_terms(graph, lam, out):
+    """out += lam of axis rows, -= mu of inertia rows: the last terms of c e . omega'd + lam_e, h a + gamma_h - mu."""
+    subtract_multipliers(graph, lam, out)
     axes = graph.axes
     for i in range(axes.rows.shape[0]):
         e = axes.rows[i].row
@@ -127,12 +139,6 @@ def weigh_rows(graph, H, Y):
         for k in range(2):
             at = 16 * e + 8 * k
             weigh(graph.inverse, graph.sides[e, k], H, at, Y, at)
-
-
-@kernel
-def inner(H, h, Y, y):
-    """Return the product of two rows at one body."""
-    return total(fma(four(H, h), four(Y, y), times(four(H, h + 4), four(Y, y + 4))))
 
 
 @kernel
@@ -207,7 +213,9 @@ def factorise_selected_rows(graph, f, rows, metric):
 
     metric as in `factorise_rows`.
     """
-    # Y = W H^T,  S = H Y
+    # Y = W H^T,  S = H Y; inertia rows are for dynamics only
+    if metric == DYNAMICS:
+        put_rows_back(graph, rows)
     weigh_rows(graph, rows.H, rows.Y)
     form_schur_complement(graph, rows.H, rows.Y, rows.S)
     # Dropped rows are zero: one on the diagonal
@@ -220,6 +228,11 @@ def factorise_selected_rows(graph, f, rows, metric):
             leave_axes_out(graph, rows.S)
         else:
             multiply_axes(graph, rows.H, rows.Y, rows.S)
+    if metric == METRIC:
+        leave_diagonal(graph, rows.S)
+    else:
+        raise_diagonal(graph, rows.S)
+        clear_rows(graph, rows)
     return factor(graph.pattern, rows.S, PIVOT_ROUNDING)
 
 
@@ -312,6 +325,7 @@ def apply_columns(graph, X, lam, Z):
 def take_reactions(graph, rows, lam, F):
     """F <- F - H^T lam, loads on bodies."""
     _scatter(graph, rows.H, lam, F)
+    take_inertia_reactions(graph, rows, lam, F)
 
 
 @kernel
@@ -356,9 +370,10 @@ def constrain(graph, rows, c, Z, lam):
 
 @kernel
 def acceleration_residuals(graph, rows, gamma, Z, out):
-    """out = H Z + gamma, and of axis rows c e . Z; Z is (rdd, omega'd)."""
+    """out = H Z + gamma, of axis rows c e . Z, of inertia rows h Z + gamma_h; Z is (rdd, omega'd)."""
     _gather(graph, rows.H, Z, out)
     gather_axes(graph, Z, 4, 8, 1.0, out)
+    residuals(graph, rows, Z, out)
     for e in range(out.size):
         out[e] += gamma[e]
 
@@ -444,7 +459,7 @@ def factorise_chart_matrix(graph, f, l):
     _multiply_both(graph, f.rows.H, l.X, l.lower, l.upper)
     if graph.parts.shape[0] > 0:
         _multiply_chart_parts(graph, f.rows.H, l)
-    # Dropped and axis rows: one, or minus one, on the diagonal
+    # Dropped, inertia and axis rows: one, or minus one, on the diagonal
     for values in (l.lower, l.upper):
         set_redundant_diagonal(graph, f, values)
         leave_axes_out(graph, values)
@@ -453,11 +468,15 @@ def factorise_chart_matrix(graph, f, l):
 
 @kernel
 def factorise_product(graph, f, X, lower, upper):
-    """Set the LU factors of H X^T at the present H, with axis rows; return True if the matrix is nonsingular."""
+    """Set the LU factors of H X^T at the present H, with axis and inertia rows; return True if it is nonsingular."""
+    put_rows_back(graph, f.rows)
     _multiply_both(graph, f.rows.H, X, lower, upper)
     multiply_axes_both(graph, f.rows.H, X, lower, upper)
+    clear_rows(graph, f.rows)
     set_redundant_diagonal(graph, f, lower)
     set_redundant_diagonal(graph, f, upper)
+    raise_diagonal(graph, lower)
+    raise_diagonal(graph, upper)
     return factor_lu(graph.pattern, lower, upper, PIVOT_ROUNDING) < 0
 
 

@@ -49,8 +49,8 @@ class StepMemory(Memory):
         self.source, kept = prepared.system(implicit, basis_free)
         system, redundant = System(*(array.copy() for array in self.source)), redundancy(graph)
         rows = len(graph.row) if basis_free else None
-        unheld = form.redundancy(packed, graph)
-        work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=unheld)
+        unheld, inertias = form.redundancy(packed, graph), len(packed.inertias)
+        work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=unheld, inertias=inertias)
         angles, slots = prepared.handles.count, system.memory.size
         parts = basis_free_parts(graph, n, not basis_free, saddle, coupled)
         run = lay_out(n, *sizes, angles, slots, warm=warm_size(work, *parts[1:]), **lengths)
@@ -175,7 +175,7 @@ def _reading(packed, form, constraint_tol, kernels):
 
     def workspace():
         own = system._replace(reals=system.reals.copy())  # the motions' places are written to
-        work = allocate(n, m, len(packed.bodies), constraint_tol, packed.size, rows, unheld)
+        work = allocate(n, m, len(packed.bodies), constraint_tol, packed.size, rows, unheld, len(packed.inertias))
         parts = basis_free_parts(graph, n, not form.basis_free)
         run = lay_out(n, *sizes, 0, 0, warm=warm_size(work, *parts[1:]))
         _set(run.kernels, kernels)

@@ -98,7 +98,7 @@ def _sees_differences(packed):
     """Return True if there are constraints or forces, and none that may depend on absolute positions."""
     items = [*packed.constraints, *(load.force for load in packed.loads)]
     joined = packed.loads or not all(constraint.normalises for constraint in packed.constraints)
-    own = joined and all(is_ours(type(item).__module__) for item in items)
+    own = joined and not packed.inertias and all(is_ours(type(item).__module__) for item in items)
     return own and not any(isinstance(load.force.kernels, (FunctionKernels, LawKernels)) for load in packed.loads)
 
 

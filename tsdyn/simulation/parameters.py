@@ -559,6 +559,7 @@ class Family:
             items = (*self.template._added, *self.template._forces)
             known = self._structural[id(owner)] = (
                 getattr(owner, "period", None) is not None
+                or getattr(owner, "adds_inertia", False)
                 or (isinstance(owner, Joint) and not is_ours(type(owner).__module__))
                 or isinstance(owner, SumRow)  # its terms are where joints are
                 or any(value is owner for item in items for value in item.referred)

@@ -1,5 +1,6 @@
 """Termination report of a run: what happened, where, what kept its steps short, and what to try."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from ..errors import Status, TsdynError
 from ..formulations.dependent_rows import dependent_rows
 from ..maths.root_isolation import EPS
 from ..maths.tolerances import TINY
+from ..model.handles import BodyMotion, handles_of
 from ..observables.contacts import singular_place
 from ..observables.evaluate import constraint_arrays
 from ..observables.generalised_forces import NotFinite, applied_loads, jumping, not_finite
@@ -18,7 +20,18 @@ from ..rows.tolerances import UNEQUAL_MASSES
 from ..runs.tolerances import AT_LONGEST
 from ..taylor.layout import without_series
 from ..validation import counted
-from .tolerances import AT_ONCE, BLOW_UP, CLEAR, COARSE, MOST_SINGULAR, NEAR_BY, NEARLY_SINGULAR, SHORTENED, TRIALS
+from .tolerances import (
+    AT_ONCE,
+    BLOW_UP,
+    CLEAR,
+    COARSE,
+    MOST_SINGULAR,
+    NEAR_BY,
+    NEARLY_SINGULAR,
+    NO_SPAN,
+    SHORTENED,
+    TRIALS,
+)
 
 # What has kept the steps of a run short, where it isn't the motion: a `max_step`, or rounding of the forces.
 #
@@ -141,6 +154,8 @@ def account(solution, scene, reason, goes_on=""):
     lacking = without_series(solution.packed)[:FEW] if found else ()
     if lacking:
         remedy += f" Without a series: {'; '.join(lacking)}."
+    if not found and solution.status in (*NO_NUMBERS, Status.NEWTON_FAILED, Status.SINGULAR, Status.MAX_STEPS):
+        found = _vanished(solution)
     if not found and solution.status in NO_NUMBERS:
         found = not_finite_of(solution).said
     if not found and solution.status in (Status.STEP_COLLAPSED, Status.MAX_STEPS):
@@ -190,6 +205,22 @@ def not_finite_of(solution):
         if found.said:
             return found
     return NotFinite("", None)
+
+
+def _vanished(solution):
+    """Name the ropes and cables of which a span has next to no length."""
+    packed, q = solution.packed, solution._last[0]
+    handles, found = handles_of(packed), []
+    for item in (*(member.constraint for member in packed.members), *(load.force for load in packed.loads)):
+        points = getattr(item, "points", ())
+        places = [BodyMotion(*handles.where(body), (q,)).point(s, 0) for body, s in points]
+        lengths = [np.linalg.norm(np.subtract(*pair)) for pair in pairwise(places)]
+        for (a, b), length in zip(pairwise(points), lengths, strict=True):
+            if length < NO_SPAN * sum(lengths):
+                found.append(
+                    f"The span of {item.name!r} between {a[0].name!r} and {b[0].name!r} shrinks to length zero"
+                )
+    return f"{found[0]}: it has no direction there. End the run before, by an event." if found else ""
 
 
 def _jump(solution):

@@ -39,6 +39,8 @@ FINEST = 1e-10
 # Smallest singular value, of the largest, below which a failure is put down to a singular configuration; coordinates up
 # to which singular values are computed for that.
 NEARLY_SINGULAR, MOST_SINGULAR = 0.05, 600
+# Share of the length of a rope or cable below which a failure is put down to a span that vanishes.
+NO_SPAN = 1e-4
 # m or rad: a force that changes by as much within the second as within the first jumps there.
 NEAR_BY, AT_ONCE = 1e-5, 1e-8
 # Growth of the largest velocity at which a failure is put down to a motion that runs away.

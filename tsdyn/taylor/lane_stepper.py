@@ -133,7 +133,7 @@ def lane_context(context, width):
     def room(part, names, threes=False):
         return {name: zeros(getattr(part, name).size, width, threes) for name in names.split()}
 
-    rows = Rows(**room(f.rows, "H Y", True), **room(f.rows, "S"))
+    rows = Rows(**room(f.rows, "H Y", True), **room(f.rows, "S h"))
     tangent = f._replace(**of(f, "poses"), **room(f, "b gamma a p"), **room(f, "Z", True), rows=rows)
     expansion = x._replace(
         **room(x, "bodies low_r2 constraints loads", True), **room(x, "low low_end start"),

@@ -253,12 +253,18 @@ def lay_out_forces(packed, orders):
     return ForceLayout(records(ForceSeries, rows), np.array(table, np.int64), loads, records(MotionSeries, drives))
 
 
+CHECKS = "check", "margin"
+
+
 def _lay_out_law(load, kind, values, table, orders):
     """The row of Expansion.forces of a law of the whole scene, and its floats: program, rows, Euler parameters."""
     law, loop = load.law, address(load.force.kernels, "series", load.force.name, InvalidForce)
     width = len(law.program) + -(-law.rows * orders // 4) * 4 + 4 * (orders + 1) * len(law.bodies)
     count = -(-len(law.bodies) // force_series.INTS)  # entries of the table that its bodies fill
-    row = [count, kind.stride, width, orders, loop, values, len(table), kind.reals, 0, 0, 0, 0, run_order.address, 0]
+    kernels, name = load.force.kernels, load.force.name
+    check, margin = (address(kernels, each, name, InvalidForce) if load.force.checked else 0 for each in CHECKS)
+    row = [count, kind.stride, width, orders, loop, values, len(table), kind.reals]
+    row += [check, margin, 0, 0, run_order.address, 0]
     table += [*law.bodies, *[0] * (count * force_series.INTS - len(law.bodies))]
     return row, width
 

@@ -19,13 +19,19 @@ pair needs no coordinates of other bodies.
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, stack, vector
 from ...jit.simd import four, put, splat, times
 from ...maths.recurrences import angle_near
+from ...maths.tolerances import PIVOT_ROUNDING
 from ...maths.vectors import dot, to_body, to_ground
-from ...motions.tracing import LENGTH, T, call_order, run_rows
-from ..tolerances import FORCE_QUOTIENT
+from ...motions.program import DIVIDE, GATE, LOG, POWER, STEP
+from ...motions.tracing import COUNT, LENGTH, T, call_order, run_rows
+from ...motions.tracing import HEAD as PROGRAM_HEAD
+from ...motions.tracing import ROWS as PROGRAM_ROWS
+from ..tolerances import FORCE_QUOTIENT, LAW_TOLERANCE
 from .constraint_rows import POSE, P
 from .constraint_series import BODY_ROW, S_OMEGA, S_R
 from .force_series import parameters_rate
 from .forces import FORCE_INTS, force_extent
+from .law_check import ATOL, LIMITS, MOST, RTOL, TAU, TIME
+from .law_check import LENGTH as LENGTH_OF_STEP
 from .template import AT, DIMENSION, extent
 
 PAIR = 6  # floats at the end of the reals of an instance:
@@ -319,4 +325,83 @@ def series(run, k, kind, table, reals, bodies, values, poses, Z):
             for i in range(3):
                 Z[z + i] += s[first + 6 * int(place) + i, k]
                 Z[z + 4 + i] += s[first + 6 * int(place) + 3 + i, k]
+    return 0
+
+
+# Laws that aren't analytic everywhere, against their series: see law_check.py.
+
+
+@kernel
+def _summed(s, row, known, tau):
+    """The series of a row at tau, and the sum of its absolute terms."""
+    total, terms, power = 0.0, 0.0, 1.0
+    for k in range(known):
+        total += s[row, k] * power
+        terms += abs(s[row, k] * power)
+        power *= tau
+    return total, terms
+
+
+@kernel
+def _is_off(s, h, row, known, weight, speed, limits):  # seven: series, law, place, what it is compared with
+    """Whether one of three components of a load, in rows from `row` on, is not the law's."""
+    tol = limits[ATOL] + limits[RTOL] * speed
+    for i in range(3):
+        total, terms = _summed(s, row + i, known, limits[TAU])
+        off = abs(total - h[row + i, 0])
+        small = weight * off * limits[LENGTH_OF_STEP] <= max(limits[MOST] * tol, LAW_TOLERANCE)
+        if not small and not off <= max(PIVOT_ROUNDING, limits[ATOL] + limits[RTOL]) * terms:
+            return True
+    return False
+
+
+def check(run, known, kind, limits, table, reals, bodies, values, inverse):
+    """1 if the series of a law is not what its program gives at a place of the step, else 0."""
+    table, reals, values = integers(table, ANY), vector(reals, ANY), vector(values, ANY)
+    limits, inverse = vector(limits, LIMITS), vector(inverse, ANY)
+    stride, orders = extent(kind).stride, extent(kind).orders
+    head = reals[int(reals[stride + FORWARD]) :]
+    rows, first = int(head[ROW_COUNT]), int(head[RESULTS])
+    s = matrix(data_of(values[int(values[LENGTH]) :]), rows, orders)
+    h = matrix(data_of(head[int(head[ROWS]) :]), rows, ORDERS)
+    # Inputs at tau, then the program
+    for row in range(first):
+        h[row, 0], _ = _summed(s, row, known, limits[TAU])
+    h[0, 0] = limits[TIME]
+    run_rows(head[int(head[PROGRAM]) :], h, 0)
+    row = first - 2 * int(head[COORDINATES])
+    for b in range(int(head[BODIES])):
+        body, at = head[int(head[BODY_LIST]) + BODY_WIDTH * b :], 16 * table[b]
+        rate, place = row + int(head[COORDINATES]), first + 6 * int(body[2])
+        if body[2] >= 0.0:
+            # Acceleration per unit of load: 1 / m, and J'^-1, bounded by the trace
+            speed = max(abs(h[rate, 0]), abs(h[rate + 1, 0]), abs(h[rate + 2, 0]))
+            turning = inverse[at + 4] + inverse[at + 9] + inverse[at + 14]
+            if _is_off(s, h, place, known, inverse[at], speed, limits):
+                return 1
+            if _is_off(s, h, place + 3, known, turning, speed, limits):
+                return 1
+        row += int(body[1])
+    return 0
+
+
+def margin(known, kind, h, values, least):
+    """least = the minimum of itself and of 1 - sum_{k>0} |a_k| h^k / |a_0| of rows a.
+
+    Those that the program divides by, takes a root or a logarithm of, or that open a gate.
+    """
+    kind, h, p, least = extent(kind), vector(h, 1), vector(values, ANY), vector(least, 1)
+    s = matrix(data_of(p[int(p[LENGTH]) :]), int(p[PROGRAM_ROWS]), kind.orders)
+    left = least[0]
+    for i in range(int(p[COUNT])):
+        at = PROGRAM_HEAD + STEP * i
+        what = int(p[at])
+        if what in (DIVIDE, POWER, LOG, GATE):
+            a, change, power = int(p[at + 3 if what == DIVIDE else at + 2]), 0.0, h[0]
+            for k in range(1, known):
+                change += abs(s[a, k]) * power
+                power *= h[0]
+            share = 1.0 - change / abs(s[a, 0]) if s[a, 0] != 0.0 else -1.0
+            left = share if not share >= left else left  # NaN, too
+    least[0] = left
     return 0

@@ -1,0 +1,154 @@
+"""Ropes that are always taut: Atwood's machine, tackles, hoists, swinging loads; ropes that can't be."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import tsdyn as ts
+from tests.helpers.methods import one_of_each
+from tests.helpers.tolerances import FINE, NEAR
+
+C = ts.constraints
+ORIGIN, G = (0.0, 0.0, 0.0), 10.0
+METHODS = one_of_each(tol=1e-10, step=1e-3)
+
+
+def atwood(**options):
+    scene = ts.Scene(gravity=(0, 0, -G))
+    heavy = scene.add_point_mass(mass=3.0, position=(0, 0, -2), name="heavy")
+    light = scene.add_point_mass(mass=1.0, position=(1, 0, -2), name="light")
+    points = [(heavy, ORIGIN), (scene.ground, ORIGIN), (scene.ground, (1, 0, 0)), (light, ORIGIN)]
+    return scene, scene.add(C.Rope(points, always_taut=True, name="rope", **options))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_atwoods_machine(method):
+    scene, rope = atwood()
+    assert rope.length == 5.0
+    solution = ts.simulate(scene, (0.0, 0.4), **METHODS[method])
+    assert abs(solution.state.velocity("light")[2] - 0.4 * G / 2.0) < NEAR
+    assert np.abs(solution.multipliers - 15.0).max() < NEAR  # 2 m M g / (m + M)
+    force, torque = solution.reaction(rope, on=scene["light"])
+    assert np.abs(force - (0.0, 0.0, 15.0)).max() < NEAR
+    assert np.abs(torque).max() < FINE
+    assert solution.constraint_error.acceleration.max() < FINE
+    assert np.ptp(solution.energy) < 1e-7
+
+
+@pytest.mark.parametrize("parts", [2, 3, 4, 6, 9])
+def test_a_tackle_divides_the_load_by_its_parts(parts):
+    """Parts of rope carry the block of mass M, the free end the mass m: M a = n T - M g, m n a = m g - T."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    block = scene.add_body(mass=4.0, inertia=(1, 1, 1), position=(0, 0, -3), name="block")
+    weight = scene.add_point_mass(mass=1.0, position=(2, 0, -3), name="weight")
+    scene.add(C.Translational.at(scene.ground, block, point=block.position, axis=(0, 0, 1)))
+    ends = [(scene.ground, ORIGIN), (block, ORIGIN)]
+    path = [ends[i % 2] for i in range(parts % 2, parts + parts % 2 + 1)]  # ends above
+    points = [*path, (scene.ground, (2, 0, 0)), (weight, ORIGIN)]
+    if path[-1][0] is block:
+        points = [*path, (scene.ground, ORIGIN), (scene.ground, (2, 0, 0)), (weight, ORIGIN)]
+    carried = sum(one[0] is not other[0] and block in (one[0], other[0]) for one, other in pairwise(points))
+    scene.add(C.Rope(points, always_taut=True))
+    solution = ts.simulate(scene, (0.0, 0.2))
+    a = (carried - 4.0) * G / (4.0 + carried**2)
+    assert abs(solution.state.velocity(block)[2] - 0.2 * a) < NEAR
+    assert np.abs(solution.multipliers[:, 5] - (G - carried * a)).max() < NEAR
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_swinging_atwood_machine(method):
+    """(m + M) rdd = m r w^2 + g (m cos - M), r wd = -2 rd w - g sin: Tufillaro's machine."""
+    scene, _ = atwood()
+    light = scene["light"]
+    light.position = (1 + 2 * np.sin(0.8), 0, -2 * np.cos(0.8))
+    scene.bodies[0].mass = 1.5
+    solution = ts.simulate(scene, (0.0, 0.8), **METHODS[method])
+
+    def swing(t, y):
+        r, angle, rd, w = y
+        return [rd, w, (r * w * w + G * (np.cos(angle) - 1.5)) / 2.5, -(2 * rd * w + G * np.sin(angle)) / r]
+
+    r, angle, *_ = solve_ivp(swing, (0, 0.8), [2, 0.8, 0, 0], rtol=1e-12, atol=1e-12, method="DOP853").y[:, -1]
+    expected = 1 + r * np.sin(angle), 0.0, -r * np.cos(angle)
+    assert np.abs(solution.state.position(light) - expected).max() < 1e-7
+    assert np.ptp(solution.energy) < 1e-6
+
+
+def test_points_of_one_body_lie_on_the_rope_with_their_distance():
+    """A beam that hangs on a rope run through both of its ends."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    beam = scene.add_body(mass=2.0, inertia=(1, 1, 1), position=(0, 0, -1), name="beam")
+    points = [(scene.ground, (-1, 0, 0)), (beam, (-1, 0, 0)), (beam, (1, 0, 0)), (scene.ground, (1, 0, 0))]
+    rope = scene.add(C.Rope(points, always_taut=True))
+    assert rope.length == 4.0
+    solution = ts.simulate(scene, (0.0, 0.01))
+    assert np.abs(solution.multipliers[:, 0] - 10.0).max() < 1e-2  # two parts carry it
+    force, torque = solution.reaction(rope, on=beam)
+    assert np.abs(force[0] - (0, 0, 20.0)).max() < FINE
+    assert np.abs(torque[0]).max() < FINE
+
+
+def test_length_assembly_files_copies_and_analyses(tmp_path):
+    scene, rope = atwood(length=5.5)
+    with pytest.raises(ts.InconsistentState, match="rope"):
+        ts.simulate(scene, (0.0, 0.1))
+    scene.assemble()
+    assert abs(ts.simulate(scene, (0.0, 0.1)).state.velocity("heavy")[2] + 0.5) < NEAR
+    scene.save(tmp_path / "scene.toml")
+    again = ts.load(tmp_path / "scene.toml")
+    assert [body.name for body, _ in again["rope"].points] == ["heavy", "ground", "ground", "light"]
+    state = ts.simulate(again, (0.0, 0.1)).state
+    assert (state.q == ts.simulate(scene.copy(), (0.0, 0.1)).state.q).all()
+    longer = scene.with_parameters({"rope.length": 6.0})
+    longer.assemble()
+    assert abs(sum(-longer[name].position[2] for name in ("heavy", "light")) - 5.0) < 1e-6
+    assert rope.length == 5.5
+    assert scene.mobility().degrees_of_freedom == 5
+    even, _ = atwood()
+    even["heavy"].mass = 1.0
+    swings = np.abs(even.linearise().eigenvalues().imag).max()
+    assert abs(swings - np.sqrt(G / 2.0)) < NEAR  # each load is a pendulum of 2 m
+
+
+def test_a_run_ends_where_a_span_vanishes():
+    scene = ts.Scene(gravity=(0, 0, 0))
+    bead = scene.add_point_mass(mass=1.0, position=(0, 0, -1), velocity=(0, 0, 1), name="bead")
+    other = scene.add_point_mass(mass=1.0, position=(1, 0, -1), velocity=(0, 0, -1), name="other")
+    points = [(bead, ORIGIN), (scene.ground, ORIGIN), (scene.ground, (1, 0, 0)), (other, ORIGIN)]
+    scene.add(C.Rope(points, always_taut=True, name="line"))
+    for integrator in ("taylor", "dop853"):
+        solution = ts.simulate(scene, (0.0, 2.0), integrator=integrator, max_steps=100_000)
+        assert not solution.success
+        assert abs(solution.state.t - 1.0) < 1e-6
+        assert "The span of 'line' between 'bead' and 'ground' shrinks to length zero" in solution.message
+
+
+def test_ropes_that_cant_be():
+    scene, rope = atwood()
+    heavy, light, ground = *scene.bodies, scene.ground
+    with pytest.raises(ts.InvalidConstraint, match="always_taut can't be set later"):
+        rope.always_taut = False
+    beyond = ts.Scene().add_point_mass(mass=1.0)
+    wrong = {
+        "1 point given": [(heavy, ORIGIN)],
+        "coincide": [(heavy, ORIGIN), (ground, (0, 0, -2))],
+        "different scenes": [(heavy, ORIGIN), (beyond, ORIGIN)],
+        "a point mass has one point": [(heavy, (1, 0, 0)), (light, ORIGIN)],
+        "all points are on": [(ground, ORIGIN), (ground, (1, 0, 0))],
+        "not a body": [(heavy, ORIGIN), (3, ORIGIN)],
+        "no body is named 'hevy'": [("hevy", ORIGIN), (light, ORIGIN)],
+        "must be three finite numbers": [(ground, (1, 2)), (light, ORIGIN)],
+        "give points=": [heavy, light],
+    }
+    for said, points in wrong.items():
+        with pytest.raises(ts.InvalidConstraint, match=said):
+            C.Rope(points, always_taut=True)
+    span = [(ground, ORIGIN), (heavy, ORIGIN), (ground, (5, 0, 0))]
+    with pytest.raises(ts.InvalidConstraint, match="too short: 5 m"):
+        C.Rope(span, 4.0, always_taut=True)
+    with pytest.raises(ts.InvalidConstraint, match="positive"):
+        C.Rope(span, -1.0, always_taut=True)
+    with pytest.raises(ts.InvalidConstraint, match="always_taut=True"):
+        C.Rope(span)

@@ -243,13 +243,27 @@ def _gather(graph, H, Z, out):
 @kernel
 def _scatter(graph, Y, lam, Z):
     """Z <- Z - Y^T lam."""
+    # Z_a and Z_b stay in registers over the rows of a pair of bodies
+    i = j = 0
+    a, c, b, d = four(Z, 0), four(Z, 4), four(Z, 0), four(Z, 4)
     for e in range(graph.sides.shape[0]):
-        # Z_a and Z_b of each row
-        f = splat(-lam[e])
-        for k in range(2):
-            at, z = 16 * e + 8 * k, 8 * graph.sides[e, k]
-            put(Z, z, fma(four(Y, at), f, four(Z, z)))
-            put(Z, z + 4, fma(four(Y, at + 4), f, four(Z, z + 4)))
+        f, at, k, l = splat(-lam[e]), 16 * e, 8 * graph.sides[e, 0], 8 * graph.sides[e, 1]
+        if k != i or l != j:
+            _put_pair(Z, i, a, c, j, b, d)
+            i, j = k, l
+            a, c, b, d = four(Z, i), four(Z, i + 4), four(Z, j), four(Z, j + 4)
+        a, c = fma(four(Y, at), f, a), fma(four(Y, at + 4), f, c)
+        b, d = fma(four(Y, at + 8), f, b), fma(four(Y, at + 12), f, d)
+    _put_pair(Z, i, a, c, j, b, d)
+
+
+@kernel
+def _put_pair(Z, i, a, c, j, b, d):
+    """Z of two bodies, at Z[i] and at Z[j]."""
+    put(Z, i, a)
+    put(Z, i + 4, c)
+    put(Z, j, b)
+    put(Z, j + 4, d)
 
 
 @kernel

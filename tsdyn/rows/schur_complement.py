@@ -5,7 +5,7 @@ from ..jit.kernels import kernel, long_kernel, stack
 from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, times, total
 from ..maths.tolerances import PIVOT_ROUNDING
 from .constraint_graph import ROWS, ROWS_WELD, W_MASS, W_ROTATION, WEIGHTS, WELD_ROWS, WELDS
-from .elimination import factor, factor_lu, solve, solve_lu
+from .elimination import factor, factor_and_solve, factor_lu, solve, solve_lu
 from .massless_axes import AXIS_H, AXIS_OWN, AXIS_Y
 from .redundant_rows import set_redundant_diagonal
 from .tolerances import COMPENSATED
@@ -207,6 +207,13 @@ def factorise_selected_rows(graph, f, rows, metric):
 
     metric as in `factorise_rows`.
     """
+    form_selected_rows(graph, f, rows, metric)
+    return factor(graph.pattern, rows.S, PIVOT_ROUNDING)
+
+
+@kernel
+def form_selected_rows(graph, f, rows, metric):
+    """Set Y = W H^T and S = H W H^T, for `factorise_and_constrain`."""
     # Y = W H^T,  S = H Y
     weigh_rows(graph, rows.H, rows.Y)
     form_schur_complement(graph, rows.H, rows.Y, rows.S)
@@ -220,7 +227,6 @@ def factorise_selected_rows(graph, f, rows, metric):
             leave_axes_out(graph, rows.S)
         else:
             multiply_axes(graph, rows.H, rows.Y, rows.S)
-    return factor(graph.pattern, rows.S, PIVOT_ROUNDING)
 
 
 @kernel
@@ -367,6 +373,15 @@ def constrain_accelerations(graph, rows, gamma, Z, lam):
     acceleration_residuals(graph, rows, gamma, Z, lam)
     solve(graph.pattern, rows.S, lam)
     _scatter(graph, rows.Y, lam, Z)
+
+
+@kernel
+def factorise_and_constrain(graph, rows, gamma, Z, lam):
+    """The same with S of `form_selected_rows`, which is factored; return the row that fails, or -1."""
+    acceleration_residuals(graph, rows, gamma, Z, lam)
+    failed = factor_and_solve(graph.pattern, rows.S, lam, PIVOT_ROUNDING)
+    _scatter(graph, rows.Y, lam, Z)
+    return failed
 
 
 @kernel

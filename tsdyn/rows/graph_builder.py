@@ -129,7 +129,7 @@ def _tree(hub, nodes, sizes, degrees):
 # joints      constraints that are no normalisations, the two bodies and the first row of Phi of each
 # nodes       pairs of bodies that joints connect: the blocks of S; their rows are eliminated together
 # hubs        bodies with many nodes, cut into parts that welds hold together (`cut`)
-# products    where H_i W H_j^T of two joints at a body goes in S
+# products    where H_i W H_j^T of two runs of joints at a body goes in S
 
 
 class _Joint(NamedTuple):
@@ -250,25 +250,37 @@ class _GraphBuilder:
         """The joints of these nodes and their sides at a body."""
         return [(i, self.joints[i].pair.index(body)) for node in nodes for i in self.at_node[node]]
 
-    def _product(self, i, side, j, other):
-        """Columns of ConstraintGraph.products, as far as the two joints say them."""
+    def _product(self, rows, columns):
+        """Columns of ConstraintGraph.products, as far as two lists of joints and their sides say them."""
+        (i, side), (j, other) = rows[0], columns[0]
         (node, r), (other_node, c) = self.inside[i], self.inside[j]
+        rows, columns = (sum(self.joints[one].constraint.rows for one, _ in run) for run in (rows, columns))
         target, stride, _ = self.where(node, other_node)
         left, right = 16 * self.firsts[i] + 8 * side, 16 * self.firsts[j] + 8 * other
-        return (
-            left, self.joints[i].constraint.rows, right, self.joints[j].constraint.rows,
-            target + r * stride + c, stride,
-        )  # fmt: skip
+        return left, rows, right, columns, target + r * stride + c, stride
 
     def _products(self):
-        products = [(*self._product(i, 0, i, 0), 1) for i in range(len(self.joints))]
+        products = [(*self._product([(i, 0)], [(i, 0)]), 1) for i in range(len(self.joints))]
         for found in self.at_body:
-            # Pairs of joints at one body, above the diagonal only
-            for i, side in found:
-                for j, other in found:
-                    if self.firsts[i] < self.firsts[j]:
-                        products.append((*self._product(i, side, j, other), 0))
+            runs = self._runs(found)
+            # Of each joint with the rest of its run, then of pairs of runs: above the diagonal only
+            for run in runs:
+                products += [(*self._product(run[k - 1 : k], run[k:]), 0) for k in range(1, len(run))]
+            for run in runs:
+                for other in runs:
+                    if self.firsts[run[0][0]] < self.firsts[other[0][0]]:
+                        products.append((*self._product(run, other), 0))
         return records(Product, products)
+
+    def _runs(self, found):
+        """Joints and their sides at a body, in lists whose rows follow one another within a node, on one side."""
+        runs, end = [], None
+        for i, side in sorted(found, key=lambda one: self.firsts[one[0]]):
+            if (self.inside[i][0], self.firsts[i], side) != end:
+                runs.append([])
+            runs[-1].append((i, side))
+            end = self.inside[i][0], self.firsts[i] + self.joints[i].constraint.rows, side
+        return runs
 
     def _products_at_hubs(self):
         """`parts` and `scales` of the graph: products at the parts of hubs, and with the welds between these."""
@@ -279,7 +291,7 @@ class _GraphBuilder:
             for i, side in found:
                 for j, other in found:
                     if self.firsts[i] <= self.firsts[j]:
-                        products.append((*self._product(i, side, j, other), ROWS, part.body))
+                        products.append((*self._product([(i, side)], [(j, other)]), ROWS, part.body))
                         scales.append(part.scale - (i == j))  # the whole hub's is among the products
             for weld, sign in part.welds:
                 count = self.sizes[weld]

@@ -164,7 +164,7 @@ def form_schur_complement(graph, H, Y, values):
         if product.same != 0:
             for r in range(rows):
                 for c in range(r, columns):
-                    more(values, target + c, inner_both(H, left + 16 * r, Y, right + 16 * c))
+                    let(values, target + c, inner_both(H, left + 16 * r, Y, right + 16 * c))
                 target += stride
         else:
             # Rows of two primitives share one body
@@ -417,10 +417,10 @@ def _multiply_both(graph, H, X, lower, upper):
         # A primitive with itself shares both bodies
         if product.same != 0:
             for r in range(rows):
-                more(upper, target + r, inner_both(H, left + 16 * r, X, right + 16 * r))
+                let(upper, target + r, inner_both(H, left + 16 * r, X, right + 16 * r))
                 for c in range(r + 1, columns):
-                    more(upper, target + c, inner_both(H, left + 16 * r, X, right + 16 * c))
-                    more(lower, target + c, inner_both(H, right + 16 * c, X, left + 16 * r))
+                    let(upper, target + c, inner_both(H, left + 16 * r, X, right + 16 * c))
+                    let(lower, target + c, inner_both(H, right + 16 * c, X, left + 16 * r))
                 target += stride
         else:
             # Two primitives at one common body

@@ -11,6 +11,7 @@ from .template import (
     ROWS,
     SIZE,
     STARTS,
+    SUMMED,
     acceleration_bias,
     differentiate,
     kernel_phi,
@@ -245,8 +246,9 @@ def gradient(code, frame, f, i):
 
 SIGNATURE = "iippppdpp"  # count, reals per instance, table, reals, poses, unused, t, out, H
 call_body_loop = caller(SIGNATURE)
-# of the graph's table for each instance: places of its two bodies among the poses, its first row, a mask of markers
-BODY, ROW, MASK, INTS = 0, 2, 3, 4
+# of the graph's table for each instance: places of its two bodies among the poses, its first row, a mask of markers,
+# and its first pair of sides in H, which is the row's unless several instances add to one row
+BODY, ROW, MASK, PAIR, INTS = 0, 2, 3, 4, 5
 
 
 @part
@@ -266,7 +268,7 @@ def values(count, stride, table, reals, poses, unused, t, out, H):
         kernel_value(x, reals[real + 3 * MARKERS :], t, f)
         row = get(table, own + ROW)
         for r in range(ROWS):
-            let(out, row + r, f[r])
+            let(out, row + r, get(out, row + r) + f[r] if SUMMED else f[r])
     return 0
 
 
@@ -284,9 +286,9 @@ def reduced(count, stride, table, reals, poses, unused, t, out, H):
         # Phi and Phi_x of the primitive
         kernel_phi(x, par, t, f)
         differentiate(x, par, t, g)
-        row = get(table, own + ROW)
+        row, pair = get(table, own + ROW), get(table, own + (PAIR if SUMMED else ROW))
         for r in range(ROWS):
-            let(out, row + r, f[r])
+            let(out, row + r, get(out, row + r) + f[r] if SUMMED else f[r])
             # H = Phi_x x_(r, pi'), marker by marker
             a = b = na = nb = splat(0.0)
             for j in range(MARKERS):
@@ -295,7 +297,7 @@ def reduced(count, stride, table, reals, poses, unused, t, out, H):
                     a, na = add(a, force), add(na, torque)
                 else:
                     b, nb = add(b, force), add(nb, torque)
-            h = 16 * (row + r)
+            h = 16 * (pair + r)
             put(H, h, a)
             put(H, h + 4, na)
             put(H, h + 8, b)

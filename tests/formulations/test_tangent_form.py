@@ -47,6 +47,25 @@ def demand_same(one, two, growth):
         assert np.abs(a - b).max() <= growth * EPS * (1.0 + np.abs(b).max()), name
 
 
+def between_two_bodies():
+    """Primitives between the same bodies, written from either of them, beside others at both."""
+    scene = ts.Scene(gravity=(0.3, -0.2, -9.8))
+    inertia = (0.2, 0.3, 0.25)
+    a, b, c = (scene.add_body(mass=m, inertia=inertia, position=(0, 0, -z)) for m, z in ((1.2, 1), (0.7, 2), (0.9, 3)))
+    scene.add(C.Spherical(a, scene.ground, point_a=(0, 0, 1)))
+    scene.add(C.Spherical(a, b, point_a=(0, 0, -0.5), point_b=(0, 0, 0.5)))
+    scene.add(C.Dot1(b, a, axis_a=(1, 0, 0), axis_b=(0, 1, 0)))
+    scene.add(C.Dot1(a, b, axis_a=(0, 0, 1), axis_b=(0, 1, 0)))
+    scene.add(C.Distance(c, b, point_a=(0, 0, 0.2), point_b=(0.1, 0, -0.3)))
+    scene.add(C.Distance(b, c, point_a=(0.2, 0.1, -0.3), point_b=(0.1, 0, 0.1)))
+    scene.add(C.Distance(c, scene.ground, point_b=(0.7, 0.3, -3.5)))
+    return scene
+
+
+def test_primitives_between_two_bodies_written_from_either_of_them():
+    demand_same(*both(between_two_bodies, 0.2, I.Nystrom4(step=1e-3)), 2e4)
+
+
 # growth of rounding over the run: steps add up, and the motion itself parts neighbours
 GROWTH = {"sliding_top": 2e3, "two_body_pendulum": 2e4, "two_body_pendulum_spatial": 2e4, "chain_4": 2e4}
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.helpers.tolerances import CLOSE, EPS
-from tsdyn.rows.factorisation import factor, factor_lu, solve, solve_lu, solve_lu_transposed
+from tsdyn.rows.factorisation import factor, factor_and_solve, factor_lu, solve, solve_lu, solve_lu_transposed
 from tsdyn.rows.symbolic import Pattern, analyse
 
 ROOT = Path(__file__).parents[2]
@@ -131,12 +131,20 @@ def test_symmetric(problem, seed):
     to = permutation(sizes, rows).astype(int)
     assert sorted(to) == list(range(len(A)))
     _, values = fill(A, starts, {p for p in pairs if not where(*p)[2]}, where, pattern)
+    again = values.copy()
     assert factor(pattern, values, 1e-14) == -1
     b = rng.normal(size=len(A))
-    x = np.empty_like(b)
-    x[to] = b
+    x, y = np.empty_like(b), np.empty_like(b)
+    x[to] = y[to] = b
     solve(pattern, values, x)
     assert np.linalg.norm(A @ x[to] - b) <= bound(A, x)
+    assert factor_and_solve(pattern, again, y, 1e-14) == -1
+    assert (again.tobytes(), y.tobytes()) == (values.tobytes(), x.tobytes())
+    # The same row fails
+    for i in range(min(len(A), 4)):
+        A[i, i] = 0.0
+        _, values = fill(A, starts, {p for p in pairs if not where(*p)[2]}, where, pattern)
+        assert factor_and_solve(pattern, values.copy(), y, 1e-14) == factor(pattern, values, 1e-14) >= 0
 
 
 @pytest.mark.slow

@@ -19,6 +19,7 @@ from ..rows.interface import (
     constrain,
     constrain_accelerations,
     evaluate_bias,
+    factorise_and_constrain,
     factorise_product,
     inner,
     note_loads,
@@ -90,15 +91,27 @@ def refine_accelerations(graph, f):
 @kernel
 def solve_accelerations(graph, system, w, f, t):
     """Solve for accelerations and multipliers, without qdd; w.q and w.qd are read if there are forces."""
-    # Z = W F
+    free_accelerations(graph, system, w, f, t)
+    if f.b.size > 0:
+        # Eqs. 3 and 4: lam = S^-1 (H Z + gamma),  qdd = Z - Y^T lam
+        constrain_accelerations(graph, f.rows, f.gamma, f.Z, f.b)
+
+
+@kernel
+def factorise_for_accelerations(graph, system, w, f, t):
+    """The same with S that is not factored yet; return the row that fails, or -1."""
+    free_accelerations(graph, system, w, f, t)
+    return factorise_and_constrain(graph, f.rows, f.gamma, f.Z, f.b)
+
+
+@kernel
+def free_accelerations(graph, system, w, f, t):
+    """Set Z = W F and gamma."""
     body_forces(graph, system, w, f, t)
     weigh_bodies(graph, f.Z)
     note_loads(f)
-    if f.b.size == 0:
-        return
-    # Eqs. 3 and 4: lam = S^-1 (H Z + gamma),  qdd = Z - Y^T lam
-    evaluate_bias(graph, system, f, t)
-    constrain_accelerations(graph, f.rows, f.gamma, f.Z, f.b)
+    if f.b.size > 0:
+        evaluate_bias(graph, system, f, t)
 
 
 # Joint friction, shared by all forms: forces for unit normal load, normal loads, convergence of the loads.
@@ -311,10 +324,7 @@ def find_reactions(graph, system, f, q, qd, t):
 def accelerate_with_friction(graph, system, w, f, t):
     """Z = (r'', omega'') with joint friction, as `find_reactions`; f.friction.lam is where Newton's method starts."""
     forget_loads(system)
-    body_forces(graph, system, w, f, t)
-    weigh_bodies(graph, f.Z)
-    note_loads(f)
-    evaluate_bias(graph, system, f, t)
+    free_accelerations(graph, system, w, f, t)
     return find_reactions(graph, system, f, w.q, w.qd, t)
 
 

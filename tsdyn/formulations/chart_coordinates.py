@@ -17,23 +17,27 @@ from .tolerances import FARTHEST
 
 @kernel
 def displace(graph, l, poses):
-    """Set the poses at chart coordinates l.x; False if a body has rotated too far for the chart."""
+    """Set the poses at chart coordinates l.x; False if a body has rotated too far for the chart.
+
+    In two passes: the square roots of the next bodies don't wait for the poses of those before.
+    """
+    for b in range(graph.bodies.shape[0]):
+        if graph.bodies[b, 1] == 7:
+            # d = eta / 2,  d0 = sqrt(1 - |d|^2)
+            x, y, z = 0.5 * get(l.x, 8 * b + 4), 0.5 * get(l.x, 8 * b + 5), 0.5 * get(l.x, 8 * b + 6)
+            square = x * x + y * y + z * z
+            if not square < FARTHEST:
+                return False
+            put(l.d, 4 * b, lanes(x, y, z))
+            # d0 - 1, not d0: its rounding would be the same in every step
+            let(l.d, 4 * b + 3, -square / (1.0 + math.sqrt(1.0 - square)))
     for b in range(graph.bodies.shape[0]):
         at, o = b * POSE, 8 * b
         # r = r0 + rho
         put(poses, at + R, fma(four(l.x, o), splat(1.0), four(l.base, o)))
         if graph.bodies[b, 1] == 7:
-            # d = eta / 2,  d0 = sqrt(1 - |d|^2)
-            x, y, z = 0.5 * get(l.x, o + 4), 0.5 * get(l.x, o + 5), 0.5 * get(l.x, o + 6)
-            square = x * x + y * y + z * z
-            if not square < FARTHEST:
-                return False
-            w = -square / (
-                1.0 + math.sqrt(1.0 - square)
-            )  # d0 - 1, not d0: its rounding would be the same in every step
-            put(l.d, 4 * b, lanes(x, y, z))
-            let(l.d, 4 * b + 3, w)
             # p = p0 o (d0, d)
+            x, y, z, w = get(l.d, 4 * b), get(l.d, 4 * b + 1), get(l.d, 4 * b + 2), get(l.d, 4 * b + 3)
             e0, e1, e2, e3 = get(l.base, o + 4), get(l.base, o + 5), get(l.base, o + 6), get(l.base, o + 7)
             p0 = e0 + (w * e0 - e1 * x - e2 * y - e3 * z)
             p1 = e1 + (w * e1 + e0 * x - e3 * y + e2 * z)

@@ -18,6 +18,7 @@ from ..rows.interface import (
     evaluate_residuals,
     evaluate_rows,
     factorise_selected_rows,
+    form_selected_rows,
     is_axis,
     is_raised,
     multiply_rates,
@@ -28,7 +29,7 @@ from ..rows.interface import (
     solve_rows,
 )
 from ..workspaces import load
-from .accelerations import call_friction, refine_accelerations, solve_accelerations
+from .accelerations import call_friction, factorise_for_accelerations, refine_accelerations, solve_accelerations
 from .chart_coordinates import (
     add_rate_residuals,
     displace,
@@ -152,7 +153,7 @@ def place(context, t, x):
             break
     if status != OK:
         return status
-    return _prepare_accelerations(graph, system, w, f)
+    return _prepare_accelerations(graph, system, w, f, l, False)
 
 
 @callback(PLACE)
@@ -171,20 +172,31 @@ def stage_place(context, t, x):
     # H there
     if f.b.size > 0:
         evaluate_rows(graph, system, f, f.rows, t)
-    return _prepare_accelerations(graph, system, w, f)
+    # Friction takes S by other ways
+    return _prepare_accelerations(graph, system, w, f, l, f.b.size > 0 and graph.frictions.shape[0] == 0)
 
 
 @kernel
-def _prepare_accelerations(graph, system, w, f):
-    """Factors of S = H W H^T at the poses, and q for force laws. Status."""
-    if f.b.size > 0:
-        w.counters.factorizations += 1
+def _prepare_accelerations(graph, system, w, f, l, later):
+    """Factors of S = H W H^T at the poses, or S alone, to be factored `later`; q for force laws. Status."""
+    l.state.formed = 0
+    w.counters.factorizations += 1 if f.b.size > 0 else 0
+    if later:
+        form_selected_rows(graph, f, f.rows, DYNAMICS)
+        l.state.formed = 1
+    elif f.b.size > 0:
         failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
         if failed >= 0:
-            return MASS_SINGULAR if is_axis(graph, f.rows, failed) else SINGULAR
+            return _singular(graph, f, failed)
     if system.forces.shape[0] > 0:
         write_positions(graph.bodies, f.poses, w.q)
     return OK
+
+
+@kernel
+def _singular(graph, f, failed):
+    """The Status of a row of S that fails."""
+    return MASS_SINGULAR if is_axis(graph, f.rows, failed) else SINGULAR
 
 
 @kernel
@@ -346,7 +358,13 @@ def _accelerate(context, c, t, yd):
         if status != OK:
             return status
     else:
-        solve_accelerations(graph, system, w, f, t)
+        if l.state.formed == 1:
+            l.state.formed = 0
+            failed = factorise_for_accelerations(graph, system, w, f, t)
+            if failed >= 0:
+                return _singular(graph, f, failed)
+        else:
+            solve_accelerations(graph, system, w, f, t)
         if refinements(f.indicator.start) > 1:
             refine_accelerations(graph, f)
     # (rdd, omega'd) as xdd

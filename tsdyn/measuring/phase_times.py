@@ -31,7 +31,7 @@ from ..maths.dense_linalg import copy
 from ..methods.explicit import ACCELERATE, NORM, PLACE, STEP
 from ..model.equations import acceleration_bias, applied_forces, constraint_jacobian, constraints, remember
 from ..model.packed import members_of
-from ..rows.interface import DYNAMICS, evaluate_bias, evaluate_rows, factorise_selected_rows
+from ..rows.interface import DYNAMICS, evaluate_bias, evaluate_rows, factorise_selected_rows, form_selected_rows
 from ..taylor.coefficients import ADVANCE, RESIDUAL, run_forces, run_loops
 from ..taylor.layout import load_series
 from ..workspaces import load, load_run
@@ -247,7 +247,7 @@ class Phase(NamedTuple):
         return self.seconds / self.calls if self.calls else float("nan")
 
 
-ROWS, BIAS, FORCES, REMEMBER, SYSTEM, NORMAL, VELOCITIES, MASS, SERIES_ROWS, SERIES_FORCES = range(10)
+ROWS, BIAS, FORCES, REMEMBER, SYSTEM, FORMED, NORMAL, VELOCITIES, MASS, SERIES_ROWS, SERIES_FORCES = range(11)
 
 
 @entry
@@ -266,6 +266,8 @@ def _repeat(context, run, what, count):
             remember(c.system, w.q, w.qd, t, r.remembered)
         elif what == SYSTEM:
             factorise_selected_rows(graph, f, f.rows, DYNAMICS)
+        elif what == FORMED:
+            form_selected_rows(graph, f, f.rows, DYNAMICS)
         elif what == NORMAL:
             factorise_normal(graph, w, f, l)
         else:
@@ -394,9 +396,15 @@ def _of_steps(run):
     sweeps = placed + (stats.newton_iterations if free and not stages else 0)
     factored = placed if stats.factorizations else 0
     normal = max(stats.factorizations - placed - stats.charts, 0)
+    factors = []
     if free:
-        factors = run.part("accelerations", "factors of Phi_q W Phi_q^T", factored, SYSTEM)
-        parts = [factors, run.part("positions", "factors of Phi_q U", normal, NORMAL)]
+        formed = run.part("accelerations", "Phi_q W Phi_q^T", factored, FORMED)
+        system = run.part("accelerations", "factors of Phi_q W Phi_q^T", factored, SYSTEM)
+        factors = [system._replace(seconds=max(system.seconds - formed.seconds, 0.0))]
+        parts = [formed, run.part("positions", "factors of Phi_q U", normal, NORMAL)]
+        # Stages without friction factor in `accelerate`
+        if not run.memory.run.numbers.free_stages or len(run.memory.context.graph.frictions):
+            parts, factors = parts + factors, []
     else:
         parts = [run.part("accelerations", "D^T M D and its factors", placed, MASS)]
     parts = run.rows("positions", sweeps), *parts
@@ -405,6 +413,7 @@ def _of_steps(run):
         run.part("velocities", "freed of what leaves the constraints" if free else "qd = D vd", projected, VELOCITIES),
         run.rows("accelerations", evaluated, BIAS),
         *run.forces("accelerations", evaluated),
+        *factors,
     )
     accelerate += run.of("kernels.complete")[1]
     yield from _shared(parts, accelerate, "accelerations", "bodies and solves", evaluated)

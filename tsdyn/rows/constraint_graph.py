@@ -33,9 +33,9 @@ class RowKind(Record):
 
 
 class Product(Record):
-    """H Y^T of two constraints at a body; of one with itself, at both."""
+    """H Y^T of two runs of constraints at a body; of one constraint with itself, at both."""
 
-    left: int  # where the sides of the two constraints begin in H, and how many rows they have
+    left: int  # where the sides of the two runs begin in H, and how many rows they have
     rows: int
     right: int
     columns: int

@@ -11,15 +11,15 @@ from ..jit.kernels import DEBUG, callback, caller, kernel, loader, long_kernel, 
 from .factorisation import factor_blocks, factor_lu_blocks, factor_lu_row, factor_row, solve_blocks, solve_three
 from .symbolic import analyse
 
-FACTOR, FACTOR_LU, SOLVE = "ppd", "pppd", "pppp"
+FACTOR, FACTOR_LU, SOLVE = "pppid", "pppd", "ppppi"
 _load_pattern = loader(analyse([], [])[1])
 
 
 @callback(FACTOR)
-def factor_values(pattern, values, limit):
-    """Factor S in place; which row fails, or -1."""
+def factor_values(pattern, values, b, with_b, limit):
+    """Factor S in place, and begin to solve S x = b; which row fails, or -1."""
     p = _load_pattern(pattern)
-    return factor_blocks(p, vector(values, p.shape[2]), limit)
+    return factor_blocks(p, vector(values, p.shape[2]), vector(b, p.shape[0]), with_b, limit)
 
 
 @callback(FACTOR_LU)
@@ -30,16 +30,16 @@ def factor_lu_values(pattern, lower, upper, limit):
 
 
 @callback(SOLVE)
-def solve_values(pattern, lower, upper, b):
+def solve_values(pattern, lower, upper, b, begun):
     """Solve N x = b, or S x = b, in place."""
     p = _load_pattern(pattern)
-    solve_blocks(p, vector(lower, p.shape[2]), vector(upper, p.shape[2]), vector(b, p.shape[0]))
+    solve_blocks(p, vector(lower, p.shape[2]), vector(upper, p.shape[2]), vector(b, p.shape[0]), begun)
     return 0
 
 
 @long_kernel
-def _solve_linked(pattern, lower, upper, b):
-    solve_blocks(pattern, lower, upper, b)
+def _solve_linked(pattern, lower, upper, b, begun):
+    solve_blocks(pattern, lower, upper, b, begun)
     return 0
 
 
@@ -62,7 +62,7 @@ def lu_factors(pattern):
 
 
 if DEBUG:
-    from .factorisation import factor, factor_lu, solve, solve_lu
+    from .factorisation import factor, factor_and_solve, factor_lu, solve, solve_lu
 else:
     _call_factor = caller(FACTOR, linked=factor_blocks)
     _call_factor_lu = caller(FACTOR_LU, linked=factor_lu_blocks)
@@ -73,7 +73,19 @@ else:
         """`factorisation.factor`."""
         if pattern.shape[0] < 2:
             return factor_row(pattern, values, limit) if pattern.shape[0] else -1
-        return _call_factor(pattern.kernels[0], pattern, values, limit)
+        return _call_factor(pattern.kernels[0], pattern, values, values, 0, limit)
+
+    @kernel
+    def factor_and_solve(pattern, values, b, limit):
+        """`factorisation.factor_and_solve`."""
+        if pattern.shape[0] < 2:
+            failed = factor_row(pattern, values, limit) if pattern.shape[0] else -1
+            solve(pattern, values, b)
+            return failed
+        failed = _call_factor(pattern.kernels[0], pattern, values, b, 1, limit)
+        if failed < 0:
+            _call_solve(pattern.kernels[2], pattern, values, values, b, 1)
+        return failed
 
     @kernel
     def factor_lu(pattern, lower, upper, limit):
@@ -90,7 +102,7 @@ else:
         elif pattern.shape[0] == 3 and pattern.heads.size == 1:
             solve_three(lower, upper, b)
         elif pattern.shape[0] > 1:
-            _call_solve(pattern.kernels[2], pattern, lower, upper, b)
+            _call_solve(pattern.kernels[2], pattern, lower, upper, b, 0)
 
     @kernel
     def solve(pattern, values, b):

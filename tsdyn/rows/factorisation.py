@@ -38,7 +38,20 @@ def factor(pattern, values, limit):
     """
     if pattern.shape[0] == 1:
         return factor_row(pattern, values, limit)
-    return factor_blocks(pattern, values, limit)
+    return factor_blocks(pattern, values, values, 0, limit)
+
+
+@kernel
+def factor_and_solve(pattern, values, b, limit):
+    """`factor`, then `solve` where it succeeds; b is eliminated with the matrix, in the time that pivots take."""
+    if pattern.shape[0] == 1:
+        failed = factor_row(pattern, values, limit)
+        b[0] *= values[0]
+        return failed
+    failed = factor_blocks(pattern, values, b, 1, limit)
+    if failed < 0:
+        solve_blocks(pattern, values, values, b, 1)
+    return failed
 
 
 @kernel
@@ -49,8 +62,8 @@ def factor_row(pattern, values, limit):
 
 
 @long_kernel
-def factor_blocks(pattern, values, limit):
-    """Factor a matrix block by block."""
+def factor_blocks(pattern, values, b, with_b, limit):
+    """Factor a matrix block by block; with_b 1: b <- D^-1 L^-1 b, too."""
     kept = values[pattern.shape[1] :]
     starts, heads, widths, updates = pattern.starts, pattern.heads, pattern.widths, pattern.updates
     keep_diagonal(pattern, values)
@@ -63,6 +76,8 @@ def factor_blocks(pattern, values, limit):
             failed = link(values, heads[j], target, stride, pattern.shape[1] + first, limit)
             if failed >= 0:
                 return first + failed
+            if with_b == 1:
+                _forward_block(pattern, values, b, j)
             continue
         # Otherwise: the diagonal block, three pivots at a time
         panel = values[heads[j] :]
@@ -77,6 +92,8 @@ def factor_blocks(pattern, values, limit):
                 subtract_products(u, 3, width, right, right, out, width, size - k - 3, width - k - 3, True)
         # Rows of later blocks
         update_later_blocks(pattern, values, panel, j, size, width)
+        if with_b == 1:
+            _forward_block(pattern, values, b, j)
     return -1
 
 
@@ -184,29 +201,36 @@ def solve_lu(pattern, lower, upper, b):
     if pattern.shape[0] == 1:
         b[0] *= lower[0]
         return
-    solve_blocks(pattern, lower, upper, b)
+    solve_blocks(pattern, lower, upper, b, 0)
+
+
+@kernel
+def _forward_block(pattern, lower, b, j):
+    """D^-1 L^-1 b of a block, and what it takes from the rows after it."""
+    columns, segments = pattern.columns, pattern.segments
+    first, width, head = pattern.starts[j], pattern.widths[j], pattern.heads[j]
+    size = pattern.starts[j + 1] - first
+    if width == 6 and size == 3 and columns[j + 1] - columns[j] == 1:
+        _forward_link(lower, head, b, first, segments[2 * columns[j]])
+        return
+    # Three unknowns of the block, then what they take from the rows after them
+    own, u = b[first:], lower[head:]
+    while True:
+        _forward(size, width, u, own)
+        _forward_rest(size, width, u, own, b, columns[j], columns[j + 1], segments)
+        if size <= 3:
+            break
+        u, own, size = u[3 * (width + 1) :], own[3:], size - 3
 
 
 @long_kernel
-def solve_blocks(pattern, lower, upper, b):
-    """Solve block by block."""
+def solve_blocks(pattern, lower, upper, b, begun):
+    """Solve block by block; begun 1: b is D^-1 L^-1 b already."""
     starts, heads, widths = pattern.starts, pattern.heads, pattern.widths
     columns, segments = pattern.columns, pattern.segments
-    for j in range(heads.size):
-        # Forward: D^-1 L^-1 b
-        first, width, head = starts[j], widths[j], heads[j]
-        size = starts[j + 1] - first
-        if width == 6 and size == 3 and columns[j + 1] - columns[j] == 1:
-            _forward_link(lower, head, b, first, segments[2 * columns[j]])
-            continue
-        # Three unknowns of the block, then what they take from the rows after them
-        own, u = b[first:], lower[head:]
-        while True:
-            _forward(size, width, u, own)
-            _forward_rest(size, width, u, own, b, columns[j], columns[j + 1], segments)
-            if size <= 3:
-                break
-            u, own, size = u[3 * (width + 1) :], own[3:], size - 3
+    if begun == 0:
+        for j in range(heads.size):
+            _forward_block(pattern, lower, b, j)
     for j in range(heads.size - 1, -1, -1):
         # Backward: U^-1 b, from the last block on
         first, width, head = starts[j], widths[j], heads[j]

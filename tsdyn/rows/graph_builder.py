@@ -130,7 +130,7 @@ def _tree(hub, nodes, sizes, degrees):
 # nodes       pairs of bodies that joints connect: the blocks of S; their rows are eliminated together. A row that is a
 #             sum connects more than two: its terms are joints of one row and one node
 # hubs        bodies with many nodes, cut into parts that welds hold together (`cut`)
-# products    where H_i W H_j^T of two joints at a body goes in S
+# products    where H_i W H_j^T of two runs of joints at a body goes in S
 
 
 class _Joint(NamedTuple):
@@ -266,24 +266,42 @@ class _GraphBuilder:
         found = (i for node in nodes for i in self.at_node[node] if body in self.joints[i].pair)
         return [(i, self.joints[i].pair.index(body)) for i in found]
 
-    def _product(self, i, side, j, other):
-        """Columns of ConstraintGraph.products, as far as the two joints say them."""
+    def _product(self, rows, columns):
+        """Columns of ConstraintGraph.products, as far as two lists of joints and their sides say them."""
+        (i, side), (j, other) = rows[0], columns[0]
         (node, r), (other_node, c) = self.inside[i], self.inside[j]
+        rows, columns = (sum(self.counts[one] for one, _ in run) for run in (rows, columns))
         target, stride, _ = self.where(node, other_node)
         left, right = 16 * self.pairs[i] + 8 * side, 16 * self.pairs[j] + 8 * other
-        return left, self.counts[i], right, self.counts[j], target + r * stride + c, stride
+        return left, rows, right, columns, target + r * stride + c, stride
 
     def _products(self):
         heads = [i for i, joint in enumerate(self.joints) if joint.constraint.all_rows]
-        products = [(*self._product(i, 0, i, 0), 1) for i in heads]
-        products += [(*self._product(i, 0, i, 0), 2) for i in range(len(self.joints)) if i not in heads]
+        products = [(*self._product([(i, 0)], [(i, 0)]), 1) for i in heads]
+        products += [(*self._product([(i, 0)], [(i, 0)]), 2) for i in range(len(self.joints)) if i not in heads]
         for found in self.at_body:
-            # Pairs of joints at one body, above the diagonal only; two terms of one sum both ways
-            for i, side in found:
-                for j, other in found:
-                    if self.firsts[i] < self.firsts[j] or (self.firsts[i] == self.firsts[j] and i != j):
-                        products.append((*self._product(i, side, j, other), 0))
+            runs = self._runs(found)
+            # Of each joint with the rest of its run
+            for run in runs:
+                products += [(*self._product(run[k - 1 : k], run[k:]), 0) for k in range(1, len(run))]
+            # Of pairs of runs, above the diagonal only; two terms of one sum both ways
+            for run in runs:
+                for other in runs:
+                    first, second = self.firsts[run[0][0]], self.firsts[other[0][0]]
+                    if first < second or (first == second and run is not other):
+                        products.append((*self._product(run, other), 0))
         return records(Product, products)
+
+    def _runs(self, found):
+        """Joints and their sides at a body, in lists whose rows follow one another within a node, on one side."""
+        runs, end = [], None
+        for i, side in sorted(found, key=lambda one: self.firsts[one[0]]):
+            node, count = self.inside[i][0], self.counts[i]
+            if (node, self.firsts[i], self.pairs[i], side) != end:
+                runs.append([])
+            runs[-1].append((i, side))
+            end = node, self.firsts[i] + count, self.pairs[i] + count, side
+        return runs
 
     def _products_at_hubs(self):
         """`parts` and `scales` of the graph: products at the parts of hubs, and with the welds between these."""
@@ -294,7 +312,7 @@ class _GraphBuilder:
             for i, side in found:
                 for j, other in found:
                     if self.firsts[i] <= self.firsts[j]:
-                        products.append((*self._product(i, side, j, other), ROWS, part.body))
+                        products.append((*self._product([(i, side)], [(j, other)]), ROWS, part.body))
                         scales.append(part.scale - (i == j))  # the whole hub's is among the products
             for weld, sign in part.welds:
                 count = self.sizes[weld]

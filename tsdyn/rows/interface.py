@@ -72,10 +72,12 @@ from .schur_complement import (
     balance_loads,
     constrain,
     constrain_accelerations,
+    factorise_and_constrain,
     factorise_chart_matrix,
     factorise_product,
     factorise_selected_rows,
     find_correction,
+    form_selected_rows,
     inner,
     is_axis,
     more,
@@ -196,6 +198,7 @@ def redundancy(graph):
 #     project                 lam = S^-1 H Z, Z <- Z - Y^T lam
 #     constrain               lam = S^-1 (H Z + c), Z <- Z - Y^T lam
 #     constrain_accelerations the same with axis rows, for Z = W F and c = gamma
+#     factorise_and_constrain the same, the factors made with it, of S as form_selected_rows leaves it
 #     balance_loads           lam = S^-1 H W F, F <- F - H^T lam
 #     take_reactions          F <- F - H^T lam
 #     clear_rates             b <- 0 at rows on velocities, which hold nothing in place
@@ -239,6 +242,7 @@ __all__ = [
     "evaluate_residuals",
     "evaluate_rows",
     "evaluate_without_redundant",
+    "factorise_and_constrain",
     "factorise_chart_matrix",
     "factorise_complex_saddle",
     "factorise_product",
@@ -246,6 +250,7 @@ __all__ = [
     "factorise_saddle",
     "factorise_selected_rows",
     "find_correction",
+    "form_selected_rows",
     "has_redundant_rows",
     "inner",
     "is_axis",

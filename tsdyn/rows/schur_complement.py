@@ -5,7 +5,7 @@ from ..jit.kernels import kernel, long_kernel, stack
 from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, times, total
 from ..maths.tolerances import PIVOT_ROUNDING
 from .constraint_graph import ROWS, ROWS_WELD, W_MASS, W_ROTATION, WEIGHTS, WELD_ROWS, WELDS
-from .elimination import factor, factor_lu, solve, solve_lu
+from .elimination import factor, factor_and_solve, factor_lu, solve, solve_lu
 from .inertia_rows import (
     clear_rows,
     inner,
@@ -213,6 +213,13 @@ def factorise_selected_rows(graph, f, rows, metric):
 
     metric as in `factorise_rows`.
     """
+    form_selected_rows(graph, f, rows, metric)
+    return factor(graph.pattern, rows.S, PIVOT_ROUNDING)
+
+
+@kernel
+def form_selected_rows(graph, f, rows, metric):
+    """Set Y = W H^T and S = H W H^T, for `factorise_and_constrain`."""
     # Y = W H^T,  S = H Y; inertia rows are for dynamics only
     if metric == DYNAMICS:
         put_rows_back(graph, rows)
@@ -233,7 +240,6 @@ def factorise_selected_rows(graph, f, rows, metric):
     else:
         raise_diagonal(graph, rows.S)
         clear_rows(graph, rows)
-    return factor(graph.pattern, rows.S, PIVOT_ROUNDING)
 
 
 @kernel
@@ -266,11 +272,29 @@ def _gather_tails(graph, H, values, width, first, out):
 @kernel
 def _scatter(graph, Y, lam, Z):
     """Z <- Z - Y^T lam."""
-    # Z_a and Z_b of each row, and of the later terms of sums
+    # Z_a and Z_b stay in registers over the rows of a pair of bodies; then the later terms of sums
+    i = j = 0
+    a, c, b, d = four(Z, 0), four(Z, 4), four(Z, 0), four(Z, 4)
     for e in range(graph.row.shape[0]):
-        _scatter_pair(graph, Y, e, splat(-lam[e]), Z)
+        f, at, k, l = splat(-lam[e]), 16 * e, 8 * graph.sides[e, 0], 8 * graph.sides[e, 1]
+        if k != i or l != j:
+            _put_pair(Z, i, a, c, j, b, d)
+            i, j = k, l
+            a, c, b, d = four(Z, i), four(Z, i + 4), four(Z, j), four(Z, j + 4)
+        a, c = fma(four(Y, at), f, a), fma(four(Y, at + 4), f, c)
+        b, d = fma(four(Y, at + 8), f, b), fma(four(Y, at + 12), f, d)
+    _put_pair(Z, i, a, c, j, b, d)
     for i in range(graph.tails.shape[0]):
         _scatter_pair(graph, Y, graph.row.shape[0] + i, splat(-lam[graph.tails[i]]), Z)
+
+
+@kernel
+def _put_pair(Z, i, a, c, j, b, d):
+    """Z of two bodies, at Z[i] and at Z[j]."""
+    put(Z, i, a)
+    put(Z, i + 4, c)
+    put(Z, j, b)
+    put(Z, j + 4, d)
 
 
 @kernel
@@ -387,6 +411,15 @@ def constrain_accelerations(graph, rows, gamma, Z, lam):
     acceleration_residuals(graph, rows, gamma, Z, lam)
     solve(graph.pattern, rows.S, lam)
     _scatter(graph, rows.Y, lam, Z)
+
+
+@kernel
+def factorise_and_constrain(graph, rows, gamma, Z, lam):
+    """The same with S of `form_selected_rows`, which is factored; return the row that fails, or -1."""
+    acceleration_residuals(graph, rows, gamma, Z, lam)
+    failed = factor_and_solve(graph.pattern, rows.S, lam, PIVOT_ROUNDING)
+    _scatter(graph, rows.Y, lam, Z)
+    return failed
 
 
 @kernel

@@ -213,32 +213,30 @@ def marker_motion(code, poses, at, reals, s, x, xd, xdd, i):  # nine: the pose, 
 
 
 @kernel
-def add_gradient(code, poses, at, reals, s, f, i, H, h):  # nine: the pose, the marker, its gradient, the row
-    """H[h : h + 8] += f x_(r, pi') of a marker with coordinates at reals[s]: a force, then a body torque.
+def marker_frame(code, poses, at, reals, s, out):
+    """out (16,): what `gradient` needs of a marker with coordinates at reals[s], the rows of A and s; or p."""
+    if code == PARAMETERS:
+        put(out, 0, four(poses, at + P))
+        return
+    for i in range(3):
+        put(out, 4 * i, lanes(get(poses, at + i), get(poses, at + 4 + i), get(poses, at + 8 + i)))
+    put(out, 12, lanes(get(reals, s), get(reals, s + 1), get(reals, s + 2)))
 
-    f = f[i : i + 3], of Parameters 4.
-    """
+
+@kernel
+def gradient(code, frame, f, i):
+    """f x_(r, pi') of a marker: a force, and a body torque; f is f[i : i + 3], of Parameters 4."""
+    f0, f1, f2 = f[i], f[i + 1], f[i + 2]
     if code == PARAMETERS:
         # Parameters: the body torque G(p) f / 2
-        e0, e1, e2, e3 = 0.5 * poses[at + P], 0.5 * poses[at + P + 1], 0.5 * poses[at + P + 2], 0.5 * poses[at + P + 3]
-        f0, f1, f2, f3 = f[i], f[i + 1], f[i + 2], f[i + 3]
-        H[h + 4] += -e1 * f0 + e0 * f1 + e3 * f2 - e2 * f3
-        H[h + 5] += -e2 * f0 - e3 * f1 + e0 * f2 + e1 * f3
-        H[h + 6] += -e3 * f0 + e2 * f1 - e1 * f2 + e0 * f3
-        return
+        e0, e1, e2, e3, f3 = 0.5 * frame[0], 0.5 * frame[1], 0.5 * frame[2], 0.5 * frame[3], f[i + 3]
+        x = -e1 * f0 + e0 * f1 + e3 * f2 - e2 * f3
+        y = -e2 * f0 - e3 * f1 + e0 * f2 + e1 * f3
+        return splat(0.0), lanes(x, y, -e3 * f0 + e2 * f1 - e1 * f2 + e0 * f3)
     # Others: force f of a point, body torque s x A^T f
-    f0, f1, f2 = f[i], f[i + 1], f[i + 2]
-    if code == POINT:
-        let(H, h, get(H, h) + f0)
-        let(H, h + 1, get(H, h + 1) + f1)
-        let(H, h + 2, get(H, h + 2) + f2)
-    y0 = get(poses, at) * f0 + get(poses, at + 1) * f1 + get(poses, at + 2) * f2  # A^T f
-    y1 = get(poses, at + 4) * f0 + get(poses, at + 5) * f1 + get(poses, at + 6) * f2
-    y2 = get(poses, at + 8) * f0 + get(poses, at + 9) * f1 + get(poses, at + 10) * f2
-    s0, s1, s2 = get(reals, s), get(reals, s + 1), get(reals, s + 2)
-    let(H, h + 4, get(H, h + 4) + (s1 * y2 - s2 * y1))
-    let(H, h + 5, get(H, h + 5) + (s2 * y0 - s0 * y2))
-    let(H, h + 6, get(H, h + 6) + (s0 * y1 - s1 * y0))
+    turned = add(times(four(frame, 0), splat(f0)), times(four(frame, 4), splat(f1)))
+    turned = add(turned, times(four(frame, 8), splat(f2)))
+    return (lanes(f0, f1, f2) if code == POINT else splat(0.0)), cross(four(frame, 12), turned)
 
 
 # Constraint rows from body poses, one loop a kind: rows of H = [Phi_r, Phi_pi'], 2 x 8 floats, in place of Phi_q.
@@ -278,10 +276,12 @@ def reduced(count, stride, table, reals, poses, unused, t, out, H):
     """out = Phi, and H = [Phi_r, Phi_pi'] = Phi_x [x_r, x_pi'] of bodies a and b."""
     table, reals, poses, out = integers(table, ANY), vector(reals, ANY), vector(poses, ANY), vector(out, ANY)
     H = vector(H, ANY)
-    x, f, g = stack(ROOM), stack(ROWS), stack2(ROWS, SIZE)
+    x, f, g, frames = stack(ROOM), stack(ROWS), stack2(ROWS, SIZE), stack2(MARKERS, 16)
     for i in range(count):
         own, real = i * INTS, i * stride
         _place_markers(table, own, reals, real, poses, x)
+        for j in range(MARKERS):
+            marker_frame(CODES[j], poses, get(table, own + OWNERS[j]) * POSE, reals, real + 3 * j, frames[j])
         par = reals[real + 3 * MARKERS :]
         # Phi and Phi_x of the primitive
         kernel_phi(x, par, t, f)
@@ -290,12 +290,18 @@ def reduced(count, stride, table, reals, poses, unused, t, out, H):
         for r in range(ROWS):
             let(out, row + r, get(out, row + r) + f[r] if SUMMED else f[r])
             # H = Phi_x x_(r, pi'), marker by marker
-            h = 16 * (pair + r)
-            for c in range(0, 16, 4):
-                put(H, h + c, splat(0.0))
+            a = b = na = nb = splat(0.0)
             for j in range(MARKERS):
-                k, at = OWNERS[j], get(table, own + OWNERS[j]) * POSE
-                add_gradient(CODES[j], poses, at, reals, real + 3 * j, g[r], STARTS[j], H, h + 8 * k)
+                force, torque = gradient(CODES[j], frames[j], g[r], STARTS[j])
+                if OWNERS[j] == 0:
+                    a, na = add(a, force), add(na, torque)
+                else:
+                    b, nb = add(b, force), add(nb, torque)
+            h = 16 * (pair + r)
+            put(H, h, a)
+            put(H, h + 4, na)
+            put(H, h + 8, b)
+            put(H, h + 12, nb)
     return 0
 
 

@@ -33,7 +33,12 @@ class BuildWithKernels(build_py):
         super().run()
         if not self.editable_mode:
             folder = Path(self.build_lib).absolute()
-            command = [sys.executable, "-m", "tsdyn.ahead.ship", str(folder / "tsdyn" / "kernels")]
+            command = [
+                sys.executable,
+                "-c",
+                "import sys; from tsdyn.ahead import ship; ship(sys.argv[1])",
+                str(folder / "tsdyn" / "kernels"),
+            ]
             subprocess.run(command, cwd=folder, check=True)
 
 

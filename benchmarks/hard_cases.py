@@ -15,8 +15,8 @@ import numpy as np
 
 import tsdyn as ts
 from benchmarks.contender import timed
-from tsdyn.benchmarking.engines import OUTPUTS, Exudyn
-from tsdyn.stress.gallery.cases import CASES
+from tsdyn.measuring.engines import OUTPUTS, Exudyn
+from tsdyn.stress.gallery import CASES
 
 DENSE = 600  # rows that a dense solver takes in a reasonable time
 

@@ -1,4 +1,4 @@
-"""Mechanisms of `tsdyn.stress.gallery.rods`: plain data, read by tsdyn, by kernels by hand and by other engines.
+"""Mechanisms of `tsdyn.stress.rods`: plain data, read by tsdyn, by kernels by hand and by other engines.
 
 `of_file` reads the definition of a file of tests/references, in the same form.
 """
@@ -6,7 +6,7 @@
 import json
 from pathlib import Path
 
-from tsdyn.stress.gallery.rods import FAR, GRAVITY, HALF, NEAR, build, chain, hub, loop, net, tree
+from tsdyn.stress.rods import FAR, GRAVITY, HALF, NEAR, build, chain, hub, loop, net, tree
 
 FOLDER = Path(__file__).parents[1] / "tests" / "references"
 

@@ -3,7 +3,7 @@
 from inspect import signature
 
 import tsdyn as ts
-from tsdyn.benchmarking.benchmark import poses
+from tsdyn.measuring.benchmark import poses
 
 from .contender import Contender, Outcome, timed
 

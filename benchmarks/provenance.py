@@ -6,7 +6,7 @@ import subprocess
 from importlib.metadata import version
 from pathlib import Path
 
-from tsdyn.benchmarking.benchmark import machine as line  # in one line
+from tsdyn.measuring.benchmark import machine as line  # in one line
 
 ROOT = Path(__file__).parents[1]
 

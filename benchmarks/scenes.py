@@ -7,7 +7,7 @@ where there is a file; else two methods that share no code, or as little as can 
 
     chains               kernels written by hand, Taylor series against DOP853 with projection
     other mechanisms     SciPy's DOP853 on an index-1 form (peers/index1.py) against tsdyn's default
-    stiff scenes         two methods of tsdyn (`tsdyn.benchmarking.benchmark`)
+    stiff scenes         two methods of tsdyn (`tsdyn.measuring.benchmark`)
 
 Up to 64 bodies they are kept in benchmarks/results/references; delete a file to have it made anew.
 """
@@ -21,7 +21,7 @@ import numpy as np
 
 import tsdyn as ts
 from benchmarks import mechanisms, stiff
-from tsdyn.benchmarking.benchmark import Reference, agreed, poses
+from tsdyn.measuring.benchmark import Reference, agreed, poses
 
 KEPT = Path(__file__).parent / "results" / "references"
 

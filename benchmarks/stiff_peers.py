@@ -20,8 +20,8 @@ from benchmarks import stiff
 from benchmarks.contender import timed
 from benchmarks.peers import dae_chain, stiff_odes
 from benchmarks.stiff_chain import chain
-from tsdyn.benchmarking.engines import Exudyn, MuJoCo
-from tsdyn.stress.gallery.governor import governor
+from tsdyn.measuring.engines import Exudyn, MuJoCo
+from tsdyn.stress.gallery import governor
 
 OUTPUTS = 50
 LEVELS = 10.0 ** -np.arange(3, 11)

@@ -16,7 +16,7 @@ BESIDE = ("constraints", "integrators")  # packages of tsdyn that lie beside its
 BOX = {"boxstyle": "round,pad=0.35", "facecolor": "#e8eef7", "edgecolor": "#35507a"}
 # the way of the data through a run of the default formulation by a Runge-Kutta method, as (depth of the call, function)
 STEP = (
-    (0, "simulation.simulate", "simulate"),
+    (0, "simulation.prepared_run", "simulate"),
     (1, "model.packed", "pack"),
     (1, "runs.driver", "run"),
     (2, "runs.driver", "drive"),

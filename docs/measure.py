@@ -17,10 +17,10 @@ import numpy as np
 import tsdyn as ts
 from benchmarks import ensemble_peers, provenance, stiff, stiff_peers, work_precision
 from examples import drive_train, four_bar, stick_slip, top
-from tsdyn.benchmarking.benchmark import agreed
 from tsdyn.cli import main as tsdyn
-from tsdyn.stress.gallery import rods
-from tsdyn.stress.gallery.single_bodies import kapitza
+from tsdyn.measuring.benchmark import agreed
+from tsdyn.stress import rods
+from tsdyn.stress.gallery import kapitza
 
 DOCS = Path(__file__).parent
 METHODS = ("taylor", "dop853", "rk45", "nystrom4", "radau", "sdirk54", "implicittrapezoid")

@@ -6,9 +6,9 @@ Parts, links and poses are those of `solution.view()`, so that a picture needs n
 import numpy as np
 
 from tsdyn.drawing import BLUE, GREEN, VERMILION
-from tsdyn.viewer.painting import Painter
-from tsdyn.viewer.run_data import run_data
-from tsdyn.viewer.symbols import attached
+from tsdyn.graphics.run_data import run_data
+from tsdyn.graphics.symbols import attached
+from tsdyn.graphics.view import Painter
 
 
 def paint(axes, solution, shapes=None, at=(1.0,), trails=None, layers=("bodies", "joints")):

@@ -10,7 +10,7 @@ Run it: python examples/andrews_squeezer.py
 import numpy as np
 
 import tsdyn as ts
-from tsdyn.stress.gallery.squeezer import angles, squeezer
+from tsdyn.stress.squeezer import angles, squeezer
 
 END = 0.03  # s
 REFERENCE = 15.81077119629904, 0.04082224013073101, 0.5244099658805304, 1.048080741042263  # beta, gamma, delta, epsilon

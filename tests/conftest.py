@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.shared_kernels import shared_kernels
-from tsdyn.ahead.workers import compile_ahead
+from tsdyn.ahead import compile_ahead
 
 hypothesis.settings.register_profile("tsdyn", deadline=None, derandomize=True, database=None)
 hypothesis.settings.load_profile("tsdyn")

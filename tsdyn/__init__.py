@@ -55,16 +55,15 @@ from .motions.tables import Table  # noqa: E402
 from .observables.state import State  # noqa: E402
 from .simulation.load import LOADERS as _LOADERS  # noqa: E402
 from .simulation.load import load  # noqa: E402
-from .simulation.prepared_run import Run, prepare  # noqa: E402
+from .simulation.prepared_run import Run, prepare, simulate  # noqa: E402
 from .simulation.resume import resume  # noqa: E402
 from .simulation.run_options import RunOptions  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402
-from .simulation.simulate import simulate  # noqa: E402
 from .simulation.solution import Solution  # noqa: E402
 
 
 def _ensemble_of(*given):
-    from .ensembles.saved import load
+    from .ensembles.ensemble import load
 
     return load(*given)
 
@@ -142,22 +141,22 @@ __all__ = [
 
 if TYPE_CHECKING:
     from . import plots, testing
-    from .benchmarking.benchmark import benchmark
-    from .benchmarking.compare import compare
     from .ensembles.ensemble import ensemble
     from .ensembles.results import Ensemble
-    from .profiling.profile import profile
+    from .measuring.benchmark import benchmark
+    from .measuring.compare import compare
+    from .measuring.profile import profile
 else:
     from ._discovery import refusing as _refusing
 
     _refuse = _refusing("ts", __all__, constraints, forces, integrators, motions)
     _LATER = {
         "Ensemble": ".ensembles.results",
-        "benchmark": ".benchmarking.benchmark",
-        "compare": ".benchmarking.compare",
+        "benchmark": ".measuring.benchmark",
+        "compare": ".measuring.compare",
         "ensemble": ".ensembles.ensemble",
         "plots": ".plots",
-        "profile": ".profiling.profile",
+        "profile": ".measuring.profile",
         "testing": ".testing",
     }
 

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from .analyses.equilibrium import Equilibrium
 from .analyses.linearise import Linearisation
-from .benchmarking.benchmark import Benchmark, Reference
 from .configuration.assemble import AssemblyReport
 from .configuration.mobility import Mobility, RedundantRow
 from .elements.bodies import Attribute, Body, Ground, PointMass
@@ -22,6 +21,9 @@ from .elements.joint import Joint
 from .elements.primitive import Primitive
 from .ensembles.results import Ensemble
 from .errors import TsdynError
+from .measuring.benchmark import Benchmark, Reference
+from .measuring.phase_times import Phase
+from .measuring.profile import Profile
 from .methods.integrator import Integrator
 from .model.handles import Handles
 from .model.kinematics import Kinematics
@@ -31,8 +33,6 @@ from .motions.tables import Table
 from .observables.diagnostics import ConstraintError
 from .observables.evaluate import Evaluation
 from .observables.state import RememberingState, State
-from .profiling.phases import Phase
-from .profiling.profile import Profile
 from .simulation.given_motion import InverseDynamics, KinematicAnalysis
 from .simulation.parameters import ParameterList
 from .simulation.scene import Scene

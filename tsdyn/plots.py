@@ -9,15 +9,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from .benchmarking.haug_tables import DURATION, LEVELS
 from .calls import fitting
-from .drawing import BLUE, GREY, VERMILION, new_figure, save
+from .drawing import BLUE, GREY, VERMILION, ZERO, largest, new_figure, save
 from .errors import InvalidArgument
-from .figures.axes import ZERO, largest
-from .figures.ensembles import final_map, quantile_bands
-from .figures.histories import charts, constraint_error, energy, reaction, steps
-from .figures.modes import mode_shapes
-from .figures.phase import phase_portrait, poincare_section
+from .graphics.curves import charts, constraint_error, energy, phase_portrait, poincare_section, reaction, steps
+from .graphics.ensembles import final_map, quantile_bands
+from .graphics.modes import mode_shapes
+from .measuring.haug_tables import DURATION, LEVELS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,7 +49,7 @@ def tables_figure(tables: Sequence[Any]) -> Any:
     Examples
     --------
     >>> import tsdyn as ts
-    >>> from tsdyn.benchmarking.haug_tables import reproduce
+    >>> from tsdyn.measuring.haug_tables import reproduce
     >>> figure = ts.plots.tables_figure(reproduce())  # doctest: +SKIP
     >>> ts.plots.save(figure, "tables.png")  # doctest: +SKIP
     """

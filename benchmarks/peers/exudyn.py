@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tsdyn.benchmarking import engines
+from tsdyn.measuring import engines
 
 from .. import contender
 from .tree import OnTrees, tree

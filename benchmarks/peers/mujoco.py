@@ -1,6 +1,6 @@
 """MuJoCo with its Runge-Kutta method of order 4: a tree in minimal coordinates, and free bodies softly constrained."""
 
-from tsdyn.benchmarking import engines
+from tsdyn.measuring import engines
 
 from .. import contender
 from .tree import OnTrees

@@ -9,7 +9,7 @@ import pytest
 import tsdyn as ts
 from examples import top
 from tests.helpers.processes import python
-from tsdyn.ahead import all_kernels, first_run, workers
+from tsdyn import ahead
 from tsdyn.configuration.start_kernels import evaluate_start
 from tsdyn.jit.compiled import _types
 from tsdyn.runs.stepper import advance
@@ -39,42 +39,42 @@ class Height(ts.Primitive):
 
 def test_plug_ins_are_left_to_this_process():
     for kernel in Height.kernels.values():
-        assert workers.name_of(kernel) == ""
+        assert ahead.name_of(kernel) == ""
     scene = ts.Scene()
     load_ = scene.add(ts.forces.UserForce(scene.add_point_mass(1.0), function=lambda t, a, b, par, out: None))
     ours = {"series", "check"}  # of the program that the function is traced to
-    assert {workers.name_of(kernel) for name, kernel in load_.kernels.items() if name not in ours} == {""}
+    assert {ahead.name_of(kernel) for name, kernel in load_.kernels.items() if name not in ours} == {""}
 
 
 def test_every_kernel_of_the_package_is_found_by_its_name():
-    kernels = list(all_kernels._all())
+    kernels = list(ahead._all())
     assert len(kernels) > 150
-    timers = "tsdyn.profiling"  # made as they are needed
-    nameless = [kernel.py_func for kernel in kernels if not workers.name_of(kernel)]
+    timers = "tsdyn.measuring"  # made as they are needed
+    nameless = [kernel.py_func for kernel in kernels if not ahead.name_of(kernel)]
     assert [function.__qualname__ for function in nameless if not function.__module__.startswith(timers)] == []
-    assert {*all_kernels._default()} <= {*kernels}
+    assert {*ahead._default()} <= {*kernels}
 
 
 def test_longest_first():
-    names = workers.weight(advance_series.py_func), workers.weight(evaluate_start.py_func)
-    small = [workers.weight(kernel.py_func) for kernel in ts.constraints.EulerNormalization.kernels.values()]
+    names = ahead.weight(advance_series.py_func), ahead.weight(evaluate_start.py_func)
+    small = [ahead.weight(kernel.py_func) for kernel in ts.constraints.EulerNormalization.kernels.values()]
     assert min(names) > max(small)
 
 
 RUN = """
 import importlib, sys
 import tsdyn as ts
-from tsdyn.ahead import first_run
+from tsdyn import ahead
 asked = set()
-first_run.compile_ahead = asked.update
+ahead.compile_ahead = asked.update
 name, method, form, times = sys.argv[1:]
 scene = importlib.import_module(f"examples.{name}").build()
 times = [0.0, 0.005, 0.01] if times else None
 ts.simulate(scene, (0.0, 0.01), integrator=method or None, formulation=form, t_eval=times)
-from tsdyn.ahead import all_kernels
+from tsdyn import ahead
 from tsdyn.jit.compiled import is_loaded
 label = lambda kernel: kernel.py_func.__module__ + ":" + kernel.py_func.__qualname__
-used = {kernel for kernel in all_kernels._all() if is_loaded(kernel)}
+used = {kernel for kernel in ahead._all() if is_loaded(kernel)}
 print(sorted(map(label, used - asked)), sorted(map(label, {kernel for kernel in asked if not is_loaded(kernel)})))
 """
 
@@ -105,12 +105,12 @@ def test_signatures_are_those_of_the_calls():
 def test_a_prepared_scene_asks_for_nothing(monkeypatch):
     scene = top.build()
     ts.simulate(scene, (0.0, 0.01))
-    monkeypatch.setattr(first_run, "compile_ahead", lambda kernels: pytest.fail("asked again"))
+    monkeypatch.setattr(ahead, "compile_ahead", lambda kernels: pytest.fail("asked again"))
     ts.simulate(scene, (0.0, 0.01))
 
 
 def test_wrong_arguments_are_refused_before_anything_is_compiled(monkeypatch):
-    monkeypatch.setattr(first_run, "compile_ahead", lambda kernels: pytest.fail("compiled"))
+    monkeypatch.setattr(ahead, "compile_ahead", lambda kernels: pytest.fail("compiled"))
     for wrong in ({"rtol": -1.0}, {"max_step": 0.0}, {"integrator": "euler"}, {"t_eval": []}, {"history": 2}):
         with pytest.raises(ts.TsdynError):
             ts.simulate(top.build(), (0.0, 1.0), **wrong)
@@ -122,10 +122,10 @@ def test_wrong_arguments_are_refused_before_anything_is_compiled(monkeypatch):
 def test_first_run_leaves_nothing_to_its_own_process(tmp_path):
     code = """
 import tsdyn
-from tsdyn.ahead import workers
+from tsdyn import ahead
 from tsdyn.jit import cache
 from examples import top
-workers.processors = lambda: 2
+ahead.processors = lambda: 2
 end = tsdyn.simulate(top.build(), (0.0, 0.1)).q[-1]
 print(cache.statistics["misses"], end.tobytes().hex())
 """

@@ -17,16 +17,16 @@ import os
 with open("ran", "a") as file:
     file.write("once ")
 import tsdyn
-from tsdyn.ahead import workers
+from tsdyn import ahead
 from tsdyn.jit import cache
 from tsdyn.constraints import EulerNormalization
-workers.processors = lambda: 2
+ahead.processors = lambda: 2
 started = []
-start = workers._start
-workers._start = lambda: started.append(start()) or started[-1]
+start = ahead._start
+ahead._start = lambda: started.append(start()) or started[-1]
 kernels = [EulerNormalization.kernels[name] for name in ("phi", "jacobian", "gamma")]
 # CHANGED
-failed = workers.compile_ahead(kernels)
+failed = ahead.compile_ahead(kernels)
 for kernel in kernels:
     kernel.address
 counts = cache.statistics
@@ -76,10 +76,10 @@ def test_workers_fill_the_cache_without_running_the_program_again(tmp_path, way)
 @pytest.mark.parametrize(
     ("change", "started"),
     [
-        ("workers.processors = lambda: 1", 0),
+        ("ahead.processors = lambda: 1", 0),
         ("import sys; sys.executable = '/nowhere/python'", 0),
         ("import sys; sys.executable = sys._base_executable = os.path.realpath('/bin/false')", 2),
-        ("workers._start = lambda: (started.append(start()), started[-1].kill())[0] or started[-1]", 2),
+        ("ahead._start = lambda: (started.append(start()), started[-1].kill())[0] or started[-1]", 2),
         ("os.environ['TSDYN_WORKER'] = '1'", 0),
     ],
     ids=["one processor", "no Python", "not Python", "killed", "a worker itself"],
@@ -110,17 +110,17 @@ def test_debug_mode_starts_and_compiles_nothing(tmp_path):
 INTERRUPTED = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
-from tsdyn.ahead import workers
+from tsdyn import ahead
 from tsdyn.taylor.step_parts import expand_series, reach
-workers.processors = lambda: 2
-start = workers._start
+ahead.processors = lambda: 2
+start = ahead._start
 def noted():
     worker = start()
     print(worker.pid, flush=True)
     return worker
-workers._start = noted
+ahead._start = noted
 try:
-    workers.compile_ahead([expand_series, reach])
+    ahead.compile_ahead([expand_series, reach])
 except KeyboardInterrupt:
     print("interrupted", flush=True)
 """

@@ -1,5 +1,6 @@
 """tsdyn ensemble --parameters: which component a column of the table is, and what is refused, with line and column."""
 
+import csv
 import json
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.commands import called
+from tsdyn.cli.ensemble import table_of, write
 
 SCENE = """\
 version = 1
@@ -121,3 +123,19 @@ def test_what_is_refused(table, refusal):
 def test_one_principal_value_of_a_matrix_with_products_is_refused(refusal):
     told = refusal("arm.inertia[2]\n1\n", SKEW)
     assert "arm.inertia is no diagonal matrix in the scene; write arm.inertia[0] to arm.inertia[2]" in told
+
+
+def test_names_that_begin_as_formulas(tmp_path):
+    """Text that a spreadsheet would run as a formula is quoted; numbers stay numbers."""
+    scene = ts.Scene()
+    scene.add_point_mass(1.0, velocity=(-1.0, 0.0, 0.0), name="=1+1")
+    found = ts.ensemble(scene, {"=1+1.mass": [1.0, 2.0]}, (0.0, 0.1))
+    path = write(found, tmp_path / "study.csv")
+    with open(path, newline="") as file:
+        head, *rows = csv.reader(file)
+    assert not [cell for cell in head if cell.startswith(("=", "+", "-", "@"))]
+    assert head[1] == "'=1+1.mass"
+    assert [float(row[1]) for row in rows] == [1.0, 2.0]
+    assert float(rows[0][head.index("qd =1+1.x")]) == -1.0
+    (tmp_path / "cases.csv").write_text("'=1+1.mass\n3.0\n")
+    np.testing.assert_array_equal(table_of(tmp_path / "cases.csv", scene)["=1+1.mass"], [3.0])

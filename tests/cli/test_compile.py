@@ -5,16 +5,16 @@ import os
 import pytest
 
 from tests.helpers.processes import python
-from tsdyn.ahead import all_kernels
+from tsdyn import ahead
 from tsdyn.cli import main
 
 COMMAND = """
 import sys
-from tsdyn.ahead import all_kernels, workers
+from tsdyn import ahead
 from tsdyn.cli import main
 from tsdyn.constraints import EulerNormalization
-workers.processors = lambda: 2
-all_kernels._default = lambda: [EulerNormalization.kernels["phi"], EulerNormalization.kernels["gamma"]]
+ahead.processors = lambda: 2
+ahead._default = lambda: [EulerNormalization.kernels["phi"], EulerNormalization.kernels["gamma"]]
 # CHANGED
 print(main(["compile"]))
 """
@@ -43,6 +43,6 @@ def test_compile_command_that_can_not_store_says_so(tmp_path):
 
 
 def test_compile_command_in_debug_mode(monkeypatch, capsys):
-    monkeypatch.setattr(all_kernels, "DEBUG", True)
+    monkeypatch.setattr(ahead, "DEBUG", True)
     assert main(["compile"]) == 1
     assert "TSDYN_DEBUG" in capsys.readouterr().err

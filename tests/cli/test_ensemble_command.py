@@ -149,8 +149,7 @@ def test_completion(shell, capsys):
 def test_help_loads_no_run(folder):
     code = (
         "import sys; from tsdyn.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass\n"
-        "names = 'matplotlib', 'pandas', 'xarray', 'h5py', 'zarr', 'shtab', 'tsdyn.ensembles', 'tsdyn.benchmarking', "
-        "'tsdyn.profiling'\n"
+        "names = 'matplotlib', 'pandas', 'xarray', 'h5py', 'zarr', 'shtab', 'tsdyn.ensembles', 'tsdyn.measuring'\n"
         "print([name for name in sys.modules if name.startswith(names)], file=sys.stderr)"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -9,7 +9,7 @@ import pytest
 import tsdyn as ts
 from examples import top
 from tests.helpers.refusals import refuse
-from tsdyn.storage.formats import format_of
+from tsdyn.files.formats import format_of
 
 TABLE = {"top.mass": [20.0, 30.0, 40.0]}
 SUFFIXES = pytest.mark.parametrize("suffix", ["h5", "zarr"])

@@ -20,7 +20,7 @@ from tests.helpers.tolerances import ROUNDING
 from tsdyn.files import types
 from tsdyn.files.scene_text import marks
 from tsdyn.simulation.load import scene_file
-from tsdyn.stress.gallery.cases import CASES
+from tsdyn.stress.gallery import CASES
 from tsdyn.stress.random_scenes import generate
 
 ROOT = Path(__file__).parents[2]

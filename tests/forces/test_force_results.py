@@ -9,8 +9,7 @@ import tsdyn as ts
 from tests.helpers.every_force import everything, pull
 from tests.helpers.scenes import rotation, unit
 from tests.helpers.tolerances import CLOSE, COARSE, FAIR, FINE, HELD, LOOSE, NEAR, ROUGH, ROUNDING
-from tsdyn.observables.diagnostics import kinetic_energy, potential_energy
-from tsdyn.observables.power import load_powers
+from tsdyn.observables.diagnostics import kinetic_energy, load_powers, potential_energy
 
 C, F = ts.constraints, ts.forces
 RK45 = ts.integrators.RK45

@@ -14,7 +14,7 @@ from tests.helpers.reference import demand_on_the_manifold
 from tests.helpers.scenes import build, random_chain
 from tests.helpers.stages import Stages
 from tests.helpers.tolerances import CLOSE
-from tsdyn.stress.gallery import governor, rods
+from tsdyn.stress import gallery, rods
 
 SDIRK54, ImplicitTrapezoid = ts.integrators.SDIRK54, ts.integrators.ImplicitTrapezoid
 QUOTIENT = 1e-10  # of the size: what rounding and differences of sixth order leave
@@ -128,7 +128,7 @@ def net(count=3):
         (lambda: locked_scenes.hub(8), 0.1),
         (lambda: rods.build(rods.loop(6)), 0.2),
         (lambda: rods.build(rods.net(2, 2)), 0.1),
-        (governor.governor, 0.3),
+        (gallery.governor, 0.3),
         (lean, 0.3),
         (lambda: rough_joints.chain(3)[0], 0.3),
         (lambda: rough_joints.four_bar()[0], 0.3),

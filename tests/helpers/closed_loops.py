@@ -3,8 +3,7 @@
 import numpy as np
 
 import tsdyn as ts
-from tsdyn.stress.gallery.bricard import bricard
-from tsdyn.stress.gallery.planar_links import parallelogram, pin, rod
+from tsdyn.stress.gallery import bricard, parallelogram, pin, rod
 
 __all__ = ["angles", "bricard", "four_bar", "parallelogram", "pin", "ring", "rod"]
 

@@ -20,9 +20,9 @@ import numpy as np
 import zarr
 
 import tsdyn as ts
+from tsdyn.files import checkpoint, saved_file
 from tsdyn.jit import cache
 from tsdyn.runs import driver
-from tsdyn.storage import checkpoint, saved_file
 
 MEMORY = 3 << 30  # bytes beyond what is in use at the start: libraries reserve without use
 KINDS = (

@@ -6,7 +6,7 @@ joints.
 
 import tsdyn as ts
 from tests.helpers.built_in import FORCES, PRIMITIVES
-from tsdyn.ahead.first_run import of_constraint, of_force, of_method
+from tsdyn.ahead import of_constraint, of_force, of_method
 from tsdyn.configuration import start_kernels
 from tsdyn.formulations import dependent_rows
 from tsdyn.formulations.registry import FORMULATIONS

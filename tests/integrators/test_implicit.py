@@ -8,7 +8,7 @@ from benchmarks.stiff import hung, jointed
 from tests.helpers.driven_rod import driven
 from tests.helpers.reference import demand_on_the_manifold, load, run
 from tests.helpers.tolerances import CLOSE, EPS, HELD, LOOSE
-from tsdyn.stress.gallery.governor import governor
+from tsdyn.stress.gallery import governor
 
 pytestmark = pytest.mark.slow  # kernels of their own, which explicit methods don't need
 I = ts.integrators

@@ -13,7 +13,7 @@ from tests.helpers import closed_loops, locked_scenes, rough_joints
 from tests.helpers.every_force import everything
 from tests.helpers.reference import demand_on_the_manifold
 from tests.helpers.tolerances import CLOSE, EPS
-from tsdyn.stress.gallery import governor, rods
+from tsdyn.stress import gallery, rods
 
 I = ts.integrators
 ORDERS = 5, 9, 13
@@ -126,7 +126,7 @@ def test_the_observed_order(order):
     (lambda: locked_scenes.slider_crank(), 0.3),  # bodies that never turn
     (lambda: locked_scenes.hub(8), 0.1),
     (lambda: rods.build(rods.loop(6)), 0.2), (lambda: rods.build(rods.net(2, 2)), 0.1),
-    (governor.governor, 0.3),
+    (gallery.governor, 0.3),
     (lambda: everything(np.random.default_rng(3))[0], 0.2),
     (lambda: chain(5), 0.1),
 ], ids=["joint", "springs", "four-bar", "slider", "hub", "loop", "net", "governor", "forces", "chain"])  # fmt: skip

@@ -72,7 +72,7 @@ def test_a_class_name_has_one_meaning():
                 if isinstance(node, ast.ClassDef):
                     places[node.name].add(path.relative_to(ROOT.parent).as_posix())
     double = {name: found for name, found in places.items() if len(found) > 1}
-    assert double == {"Store": {"tsdyn/storage/hdf5.py", "tsdyn/storage/zarr_folder.py"}}
+    assert double == {"Store": {"tsdyn/files/hdf5.py", "tsdyn/files/zarr_folder.py"}}
 
 
 def test_functions_take_ten_positional_arguments_at_most():

@@ -13,7 +13,7 @@ import tsdyn as ts
 from examples import four_bar, top
 from tests.helpers.scene_marks import there_and_back
 from tsdyn.cli import main
-from tsdyn.storage import saved_file
+from tsdyn.files import saved_file
 
 TIMES = np.linspace(0.0, 0.2, 7)
 METHODS = ("taylor", "dop853", "nystrom4", "sdirk54")

@@ -12,7 +12,7 @@ import tsdyn as ts
 from tests.helpers import closed_loops
 from tests.helpers.closed_loops import angles
 from tests.helpers.tolerances import ALGEBRA, CLOSE, COARSE, EXACT, FAIR, HELD, LOOSE, NEAR, ROUGH, ROUNDING
-from tsdyn.stress.gallery.planar_links import four_bars
+from tsdyn.stress.gallery import four_bars
 
 ROOT = Path(__file__).parents[2]
 SHAPES = {

@@ -6,10 +6,8 @@ import pytest
 import tsdyn as ts
 from tests.helpers.closed_loops import angles as angles_of
 from tests.helpers.tolerances import CLOSE, HELD
-from tsdyn.stress.gallery.bricard import bricard
-from tsdyn.stress.gallery.cases import CASES
-from tsdyn.stress.gallery.planar_links import driven_six_bar, four_bars
-from tsdyn.stress.gallery.squeezer import angles, squeezer
+from tsdyn.stress.gallery import CASES, bricard, driven_six_bar, four_bars
+from tsdyn.stress.squeezer import angles, squeezer
 
 FREE = {  # degrees of freedom, redundant rows
     "four-bars, one loop": (1, 3),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tsdyn.errors import Status
-from tsdyn.stress import comparisons
+from tsdyn.stress import judgement
 from tsdyn.stress.judgement import judge_case, run_case
 from tsdyn.stress.random_scenes import generate
 
@@ -64,5 +64,5 @@ def test_light_links_between_heavy_bodies_keep_their_accelerations_on_the_constr
 @pytest.mark.slow_for("*")
 @pytest.mark.parametrize("seed", KEPT, ids=KEPT.values())
 def test_a_kept_scene(seed):
-    found = judge_case(generate(seed), comparisons.ALL)
+    found = judge_case(generate(seed), judgement.ALL)
     assert not found.fault, f"{found.name}: {found.word}: {found.said}"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tsdyn.stress import comparisons, laws
+from tsdyn.stress import judgement, laws
 from tsdyn.stress.random_scenes import DrawnCase
 
 C = ts.constraints
@@ -88,7 +88,7 @@ def test_momenta_of_a_loaded_scene_are_not_judged():
     body = made.add_body(1.0, (0.1, 0.2, 0.25))
     made.add(ts.forces.PointForce(body, force=(1, 0, 0), point_a=(0, 0.1, 0)))
     case = DrawnCase("loaded", made, (0.0, 0.5), {})
-    assert comparisons.momenta(case, ts.simulate(made, case.span, dense_output=True), None) == []
+    assert judgement.momenta(case, ts.simulate(made, case.span, dense_output=True), None) == []
 
 
 def test_an_error_that_does_not_fall_with_the_tolerance_is_found():
@@ -102,9 +102,9 @@ def test_an_error_that_does_not_fall_with_the_tolerance_is_found():
     def wrong(case, **options):
         return ts.simulate(other, case.span, **{"dense_output": True} | case.options | options)
 
-    [found] = comparisons.another_method(case, right(case), right)
+    [found] = judgement.another_method(case, right(case), right)
     assert not found.broken
-    [found] = comparisons.another_method(
+    [found] = judgement.another_method(
         case, right(case), lambda case, **o: (wrong if "integrator" in o else right)(case, **o)
     )
     assert found.broken

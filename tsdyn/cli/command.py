@@ -112,7 +112,7 @@ def _compile(parsed):
     Fill the cache on disk with the kernels of the default method and of every built-in constraint and force, or with
     all of them. What is there already is left alone. The exit code is 1 where a kernel can't be compiled or stored.
     """
-    from ..ahead.all_kernels import compile_kernels
+    from ..ahead import compile_kernels
 
     count, folder, failed = compile_kernels(parsed.all)
     for name, problem in failed.items():

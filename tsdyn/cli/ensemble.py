@@ -13,7 +13,7 @@ import numpy as np
 from .. import validation
 from ..errors import InvalidArgument, Status
 from ..validation import counted, text_cell, unknown_parameter
-from .parser import print_json
+from .parser import load_document, print_json, robot_options
 from .run import (
     add_channels,
     add_json,
@@ -26,7 +26,6 @@ from .run import (
     options_of,
     progress_of,
 )
-from .scene_file import load_document, robot_options
 
 # The table of `tsdyn ensemble --parameters`: a CSV file with a row for each case, a column for each number.
 

@@ -45,8 +45,8 @@ def _profile(parsed):
     Run a scene several times, print the time of each phase of a run, what was skipped, and what to change. Options that
     are not given are those of the file, else of ts.simulate.
     """
-    from ..profiling.profile import profile
-    from .scene_file import load_run, robot_options
+    from ..measuring.profile import profile
+    from .parser import load_run, robot_options
 
     began = time.perf_counter()
     scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
@@ -70,8 +70,8 @@ def _benchmark(parsed):
     Every method runs at every tolerance, against a reference that two methods agree on. The exit code is 0 only if
     a run of each method reached its end.
     """
-    from ..benchmarking.benchmark import benchmark
-    from .scene_file import load_run, robot_options
+    from ..measuring.benchmark import benchmark
+    from .parser import load_run, robot_options
 
     tolerances, steps = _numbers(parsed.tolerances, "--tolerances"), _numbers(parsed.steps, "--steps")
     methods = None if parsed.methods is None else [word.strip() for word in parsed.methods.split(",")]
@@ -111,7 +111,7 @@ def _tables(parsed):
     published ones. The exit code is 1 where a bound is broken.
     """
     # imported here: the command line answers without what a run needs
-    from ..benchmarking.haug_tables import as_text, reproduce
+    from ..measuring.haug_tables import as_text, reproduce
 
     figure = plotted(parsed, "tables")
     tables = reproduce()

@@ -9,11 +9,10 @@ import numpy as np
 
 from ..errors import InconsistentState, InvalidArgument
 from ..files import run_tables, types
+from ..files.formats import SUFFIXES as SOLUTIONS
+from ..graphics.view import page_path
 from ..observables.channels import channels_of
-from ..storage.formats import SUFFIXES as SOLUTIONS
-from ..viewer.view import page_path
-from .parser import print_json
-from .scene_file import load_document, load_run, robot_options
+from .parser import load_document, load_run, print_json, robot_options
 
 TABLES = (".csv",)
 METAVARS = {float: "X", int: "N", str: "NAME"}  # what a flag is followed by
@@ -42,7 +41,7 @@ def add_method(parser):
 
 def _flags():
     """The options of a run that have a flag: numbers and words, by name."""
-    from ..simulation.simulate import simulate
+    from ..simulation.prepared_run import simulate
 
     known = run_tables.arguments(simulate)
     return {name: one for name, one in known.items() if one.kind in (types.NUMBER, types.WHOLE, types.TEXT)}
@@ -112,7 +111,7 @@ def _run(parsed):
     What the table [run] of the file says holds where no option is given; without either the run lasts 10 s, by the
     default method. The exit code is 0 only if the run reached its end, and all results were written.
     """
-    from ..simulation.simulate import simulate
+    from ..simulation.prepared_run import simulate
 
     document = load_document(parsed.scene, parsed.allow_code, robot=robot_options(parsed))
     scene, (span, options) = document.scene, options_of(parsed, document.run)
@@ -205,7 +204,7 @@ def demand_format(path):
     if suffix not in (*TABLES, *SOLUTIONS):
         raise InvalidArgument(f"results are written to {', '.join((*SOLUTIONS, *TABLES))}; got {path!r}.")
     if suffix in SOLUTIONS:
-        from ..storage.saved_file import format_at
+        from ..files.saved_file import format_at
 
         format_at(path)
 
@@ -315,7 +314,7 @@ def _shown(parsed):
                 f"{parsed.scene} is an ensemble; show a case: ts.load({parsed.scene!r}).case(0).view()"
             )
         return found
-    from ..simulation.simulate import simulate
+    from ..simulation.prepared_run import simulate
 
     scene, given = load_run(parsed.scene, parsed.allow_code, robot_options(parsed))
     if parsed.no_run:

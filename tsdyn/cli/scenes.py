@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..drawing import aligned
 from ..errors import InvalidArgument, TsdynError
-from .parser import print_json
+from .parser import load_document, load_run, load_scene, print_json, robot_options
 from .run import (
     SOLUTIONS,
     add_channels,
@@ -18,7 +18,6 @@ from .run import (
     demand_new,
     write,
 )
-from .scene_file import load_document, load_run, load_scene, robot_options
 
 SCENES = (".toml",)
 
@@ -58,7 +57,7 @@ def _check(parsed):
     All mistakes of the file are listed with line and column; then the start is compared with the constraints. The exit
     code is 0 only if a run could begin.
     """
-    from ..simulation.simulate import demand_startable
+    from ..simulation.prepared_run import demand_startable
 
     found = {"file": parsed.scene, "ok": True, "mistakes": [], "message": "It can start."}
     try:

@@ -100,7 +100,7 @@ def _counts(parsed):
 def _cases(words):
     """Indices of the cases, and of the closed forms, that contain one of the words; all without words."""
     from ..stress.closed_forms import CLOSED_FORMS
-    from ..stress.gallery.cases import CASES
+    from ..stress.gallery import CASES
 
     names = [case.name for case in CASES], [form.name for form in CLOSED_FORMS]
     known = [*names[0], *names[1]]

@@ -34,7 +34,7 @@ REDUCED = "function"  # what is said of a function `keep`
 
 def save(ensemble: Ensemble, path: Place) -> Path:
     """As of `Ensemble.save`."""
-    from ..storage import saved_file
+    from ..files import saved_file
 
     demand_path(path, "path")
     path = Path(path).absolute()
@@ -303,7 +303,7 @@ class Ensemble:
         >>> throws.plot("stone.x").get_xlabel()
         'stone.velocity[0] (m/s)'
         """
-        from ..figures.ensembles import overview
+        from ..graphics.ensembles import overview
 
         return overview(self, what, path)
 
@@ -323,7 +323,7 @@ class Ensemble:
         TsdynError
             If a value of the case is inadmissible.
         """
-        from ..simulation.simulate import simulate
+        from ..simulation.prepared_run import simulate
 
         study, i = self._study, self._number_of(i)
         return simulate(study.scene.with_parameters(self._values(i)), **study.given)

@@ -16,8 +16,8 @@ import numpy as np
 from .. import validation
 from .._version import __version__
 from ..errors import Status, StorageError
+from ..files.formats import Column, StoredTable, demand_shapes, demand_writable, format_of, writing
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
-from ..storage.formats import Column, StoredTable, demand_shapes, demand_writable, format_of, writing
 from ..validation import NO_LINKS, damaged
 from .cases import TIMES, coordinate_names
 from .executors import empty, fitted

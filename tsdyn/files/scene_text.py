@@ -1,17 +1,20 @@
 """A scene as TOML text, and the text as a scene; the file that `tsdyn new` writes."""
 
+from __future__ import annotations
+
+import math
 import re
 import tomllib
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidFile
+from ..validation import number, shown
 from . import run_tables, toml_text
-from .build import build
-from .describe import describe, outline
-from .named_numbers import NamedNumbers
+from .build import build, describe, outline
 from .reading import Mistakes
 from .toml_text import Places
 from .types import Unwritable, encode
@@ -236,3 +239,57 @@ every = 0.01 # outputs; without it one a step
 # "arm.mass" = { normal = [2.0, 0.05] }
 # "spring.stiffness" = { uniform = [15, 25] }
 """
+
+
+# The table `parameters` of a scene file: numbers by name, and the scene of the file with other ones.
+
+OF_RUNS = ("run", "ensemble", "output")  # tables that are no part of a scene
+
+
+class TableNumbers(SimpleNamespace):
+    """Numbers of the table as attributes."""
+
+
+class NamedNumbers:
+    """What a scene of a file is made of, to make it again with other numbers.
+
+    Parameters
+    ----------
+    document : dict
+        Plain data of the file.
+    mistakes : Mistakes
+        Those of the file: none.
+    allow_code : bool
+        As of `build`.
+    values : dict
+        Numbers of the table by name.
+    """
+
+    def __init__(self, document: dict[str, Any], mistakes: Any, allow_code: bool, values: dict[str, float]) -> None:
+        self.document = {key: value for key, value in document.items() if key not in OF_RUNS}
+        self.name, self.places, self.allow_code = mistakes.name, mistakes.places, allow_code
+        self.values = TableNumbers(**values)
+
+    def __deepcopy__(self, memo: Any) -> Self:
+        return self  # never changed
+
+    def made(self, make: Any, changes: dict[str, Any]) -> Any:
+        """The scene with other numbers, by name; raises InvalidArgument where the file has mistakes with these."""
+        numbers = {name: number(value) for name, value in changes.items()}
+        for name, value in numbers.items():
+            if not math.isfinite(value):
+                raise InvalidArgument(f"{name}, of [parameters], must be a finite number, got {shown(changes[name])}.")
+        table = self.document["parameters"] | numbers
+        document, mistakes = self.document | {"parameters": table}, Mistakes(self.name, self.places)
+        scene, values = build(document, make, mistakes, self.allow_code)
+        try:
+            mistakes.demand_none()
+        except InvalidFile as error:
+            said = ", ".join(f"{name} = {value:.6g}" for name, value in numbers.items())
+            raise InvalidArgument(f"with {said}, {error}") from error
+        scene._named = NamedNumbers(document, mistakes, self.allow_code, values)
+        return scene
+
+    def text(self) -> str:
+        """The file as TOML text, without what is no part of a scene."""
+        return toml_text.write(self.document)

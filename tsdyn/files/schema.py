@@ -5,8 +5,7 @@ import json
 
 from ..motions.tables import MAKERS
 from . import run_tables, types
-from .build import KEYS
-from .describe import BUILT, VERSION
+from .build import BUILT, KEYS, VERSION
 
 ID = "tsdyn scene"
 NUMBER = {"$ref": "#/$defs/number"}

@@ -15,7 +15,7 @@ from .description import GROUND, HERE, Frame, posed, roll_pitch_yaw
 from .xml_file import OUTSIDE, exists
 
 if TYPE_CHECKING:
-    from .report import ImportReport
+    from .description import ImportReport
     from .xml_file import OutsideFiles
 
 

@@ -2,19 +2,40 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..configuration.motor_starts import are_aligned
 from ..configuration.tolerances import INITIAL_TOL
-from ..errors import InvalidArgument, TsdynError
+from ..constraints.cylindrical import Cylindrical
+from ..constraints.dot1 import Dot1
+from ..constraints.dot2 import Dot2
+from ..constraints.fixed import Fixed
+from ..constraints.gear import Gear
+from ..constraints.parallel import Parallel
+from ..constraints.planar import Planar
+from ..constraints.revolute import Revolute
+from ..constraints.screw import Screw
+from ..constraints.spherical import Spherical
+from ..constraints.translational import Translational
+from ..constraints.universal import Universal
+from ..elements.bodies import rotation_matrix
+from ..elements.joint import across
+from ..errors import InvalidArgument, InvalidConstraint, TsdynError
+from ..forces.bushing import Bushing
+from ..forces.spring import Spring
+from ..forces.torsional_spring import TorsionalSpring
+from ..forces.viscous_friction import ViscousFriction
+from ..maths.tolerances import TYPED
 from ..observables.diagnostics import constraint_error
 from . import loops, mjcf, sdf, urdf
-from .building import build
+from .description import GROUND, FrameOn, ImportReport, fresh
 from .reduction import complete, gather, merge
-from .report import ImportReport
 from .tolerances import HUGE, NO_MASS
 from .xml_file import OutsideFiles, read
 
@@ -103,3 +124,253 @@ def _close(scene: Scene, report: ImportReport) -> float:
     except TsdynError as error:
         report.note(f"loops are open by up to {gap:.2g}, and can't be closed: {error}")
         return gap
+
+
+# A scene of a description: bodies at their centroids in the axes of their links, joints, springs and couplings.
+
+# Joints that mimic others: gear pairs, where the wheels are hinged to a common carrier on parallel axes.
+
+WHAT = "joint that mimics another one"
+
+
+def couple(scene, description, bodies, report):
+    """Add what can be a gear pair; list the rest."""
+    joints = {joint.name: joint for joint in description.joints if not joint.loop}
+    for coupling in description.couplings:
+        one, other = joints.get(coupling.driver), joints.get(coupling.follower)
+        reason = _reason(one, other, coupling)
+        if not reason:
+            parallel = float(np.sign(one.axis @ other.axis))
+            try:
+                gear = Gear.at(
+                    bodies[one.b], bodies[other.b], point_a=one.point, point_b=other.point, axis_a=one.axis,
+                    ratio=coupling.ratio * parallel, name=coupling.name,
+                )  # fmt: skip
+                gear.offset += coupling.offset * parallel
+                scene.add(gear)
+            except InvalidConstraint as error:
+                reason = str(error)
+        if reason:
+            report.leave(WHAT, coupling.name, f"(ratio {coupling.ratio:g}, offset {coupling.offset:g}: {reason})")
+
+
+def _reason(one, other, coupling):
+    """Why two joints can't be a gear pair; empty if they can."""
+    if one is None or other is None:
+        return "one of them is held"
+    if one.kind != "revolute" or other.kind != "revolute":
+        return "a gear pair needs two hinges"
+    if one.a != other.a:
+        return "a gear pair needs hinges on one body"
+    if np.linalg.norm(np.cross(one.axis, other.axis)) > TYPED:
+        return "a gear pair needs parallel axes"
+    if not coupling.ratio:
+        return "a gear pair needs a ratio"
+    return ""
+
+
+# Springs, dampers and constant loads of joints.
+#
+# A hinge has a TorsionalSpring; a slide a Bushing of equal stiffness in all directions, of which the joint leaves one;
+# a ball viscous friction in rotation.
+
+SUFFIX = " spring"  # of names
+
+
+def unused(scene, name):
+    """The name, or with a number behind it where the scene has it already."""
+    return fresh(name, scene._titles or ())
+
+
+def add_joint_forces(scene, joint, bodies, report):
+    """Add what acts along a joint; what has no counterpart is listed."""
+    if joint.slides:
+        _slides(scene, joint, bodies[joint.a], bodies[joint.b], report)
+    _add(scene, joint, bodies, report, SUFFIX)
+    for servo in joint.servos:
+        _add(scene, replace(joint, **servo._asdict()), bodies, report, "")
+
+
+def _add(scene, joint, bodies, report, suffix):
+    """Add spring, damper and constant load, named after the joint."""
+    a, b, name = bodies[joint.a], bodies[joint.b], unused(scene, joint.name + suffix)
+    if not (joint.stiffness or joint.damping or joint.load):
+        return
+    if min(joint.stiffness, joint.damping) < 0.0:
+        report.leave("negative stiffness or damping", joint.name, f"{joint.stiffness:g}, {joint.damping:g}")
+        return
+    if joint.kind in ("revolute", "planar"):
+        _hinge(scene, joint, a, b, name)
+    elif joint.kind == "prismatic":
+        _slide(scene, joint, a, b, name, report)
+    elif joint.kind in ("spherical", "free"):
+        if joint.stiffness:
+            report.leave(f"stiffness of a {joint.kind} joint", joint.name, f"{joint.stiffness:g}")
+        if joint.damping:
+            places = {} if joint.point is None else {"point_a": joint.point}
+            linear = {"damping": joint.damping} if joint.kind == "free" else {}
+            scene.add(ViscousFriction.at(b, a, torsional_damping=joint.damping, **linear, **places, name=name))
+    else:
+        report.leave(f"stiffness and damping of a {joint.kind} joint", joint.name)
+
+
+def _hinge(scene, joint, a, b, name):
+    scene.add(
+        TorsionalSpring.at(
+            a, b, axis=joint.axis, stiffness=joint.stiffness, damping=joint.damping, free_angle=joint.free,
+            actuator=joint.load, name=name,
+        )
+    )  # fmt: skip
+
+
+def _slide(scene, joint, a, b, name, report):
+    """A constant load is a shift of the spring; without stiffness it is listed."""
+    free = joint.free
+    if joint.load and joint.stiffness:
+        free += joint.load / joint.stiffness
+    elif joint.load:
+        report.leave("constant force along a joint", joint.name, f"{joint.load:g} N")
+    if not (joint.stiffness or joint.damping):
+        return
+    point_a = joint.point + free * joint.axis
+    scene.add(
+        Bushing.at(
+            a, b, point_a=point_a, point_b=joint.point, stiffness=joint.stiffness, damping=joint.damping,
+            name=name,
+        )
+    )  # fmt: skip
+
+
+def _slides(scene, joint, a, b, report):
+    """Springs of several slides along axes of body a; others are listed."""
+    stiffness, damping, shift = np.zeros(3), np.zeros(3), np.zeros(3)
+    A = rotation_matrix(np.asarray(a.orientation))
+    for slide in joint.slides:
+        if not (slide.stiffness or slide.damping or slide.load):
+            continue
+        along = np.abs(A.T @ slide.axis)
+        i = int(along.argmax())
+        if abs(along[i] - 1.0) > TYPED or slide.load or min(slide.stiffness, slide.damping) < 0.0:
+            report.leave("spring or load of a slide in a plane", slide.name)
+            continue
+        stiffness[i], damping[i] = slide.stiffness, slide.damping
+        shift += slide.free * slide.axis
+    if stiffness.any() or damping.any():
+        scene.add(
+            Bushing.at(
+                a, b, point_a=joint.point + shift, point_b=joint.point, stiffness=stiffness, damping=damping,
+                name=unused(scene, f"{joint.name} springs"),
+            )
+        )  # fmt: skip
+
+
+ONE_AXIS = {"revolute": Revolute, "prismatic": Translational, "planar": Planar, "cylindrical": Cylindrical}
+
+
+def build(description, make, report):
+    """The scene; `make` makes an empty one."""
+    scene = make(gravity=description.gravity)
+    bodies = {GROUND: scene.ground}
+    for name, link in description.links.items():
+        bodies[name] = _add_body(scene, link, report)
+    for joint in description.joints:
+        if joint.kind != "free":
+            _add_joint(scene, joint, bodies)
+        add_joint_forces(scene, joint, bodies, report)
+    for spring in description.springs:
+        scene.add(
+            Spring.at(
+                bodies[spring.a], bodies[spring.b], point_a=spring.point_a, point_b=spring.point_b,
+                stiffness=spring.stiffness, damping=spring.damping, free_length=spring.free_length,
+                name=unused(scene, spring.name),
+            )
+        )  # fmt: skip
+    couple(scene, description, bodies, report)
+    if any(joint.start for joint in description.joints):
+        _start(description, bodies)
+    for name, (owner, at) in description.frames.items():
+        body = bodies[owner]
+        centroid = np.zeros(3) if owner == GROUND else description.links[owner].centroid
+        report.frames[name] = FrameOn(body.name, at.p - centroid, at.R)
+    scene.imported = report
+    scene.ground._shape = partial(_drawn, description.ground_shapes, np.zeros(3)) if description.ground_shapes else None
+    for name, link in description.links.items():
+        if link.shapes or link.helps:
+            bodies[name]._shape = partial(_drawn, link.shapes, link.centroid)
+    return scene
+
+
+def _drawn(shapes, centroid):
+    """The shapes of a link in the frame of its body."""
+    return tuple(shape.make().moved(-centroid) for shape in shapes)
+
+
+def _add_body(scene, link, report):
+    """A body; its inertia may be one that no solid has, which is noted."""
+    values, named = np.linalg.eigvalsh(link.inertia), link.name if link.name != "ground" else "ground link"
+    placed = {
+        "position": link.frame.point(link.centroid),
+        "orientation": Rotation.from_matrix(link.frame.R),
+        "name": named,
+    }
+    if values[2] <= (values[0] + values[1]) * (1.0 + TYPED):
+        return scene.add_body(link.mass, link.inertia, **placed)
+    report.note(
+        f"{named}: no solid has the principal moments of inertia {', '.join(f'{x:.4g}' for x in values)} kg m^2, as "
+        "the largest exceeds the sum of the others; they are carried over as they are"
+    )
+    body = scene.add_body(link.mass, np.full(3, values[2]), **placed)
+    inertia = (link.inertia + link.inertia.T) / 2.0
+    inertia.setflags(write=False)
+    body.values["inertia"] = inertia
+    scene.touch()
+    return body
+
+
+def _start(description, bodies):
+    """Move bodies to where they start; joints count their coordinates from where they were added."""
+    for name, link in description.links.items():
+        bodies[name].position = link.start.point(link.centroid)
+        bodies[name].orientation = Rotation.from_matrix(link.start.R)
+
+
+def _add_joint(scene, joint, bodies):
+    """Add the constraints of a joint; a force or another constraint may have its name."""
+    a, b = bodies[joint.a], bodies[joint.b]
+    name = joint.name = unused(scene, joint.name)
+    if joint.kind == "revolute" and joint.frame_b is not None:
+        one, other = joint.frame_a, joint.frame_b
+        axes = {"axis_a": one.R[:, 2], "axis_b": other.R[:, 2]}
+        scene.add(Revolute.at(a, b, point_a=one.p, point_b=other.p, **axes, name=name))
+    elif joint.kind in ONE_AXIS:
+        made = scene.add(ONE_AXIS[joint.kind].at(a, b, point=joint.point, axis=joint.axis, name=name))
+        if joint.start and joint.kind == "revolute":
+            made.__dict__["angle_near"] = (joint.start,)  # near which turns are counted
+    elif joint.kind == "screw":
+        scene.add(Screw.at(a, b, point=joint.point, axis=joint.axis, lead=joint.lead, name=name))
+    elif joint.kind == "universal":
+        scene.add(Universal.at(a, b, point=joint.point, axis=joint.axis, axis_b=joint.axis_b, name=name))
+    elif joint.kind == "spherical" and joint.frame_b is not None:
+        scene.add(Spherical.at(a, b, point_a=joint.frame_a.p, point_b=joint.frame_b.p, name=name))
+    elif joint.kind == "spherical":
+        scene.add(Spherical.at(a, b, point=joint.point, name=name))
+    elif joint.kind == "translations":
+        _add_translations(scene, joint, a, b)
+    else:
+        one, other = joint.frame_a, joint.frame_b
+        scene.add(
+            Fixed.at(
+                a, b, point_a=one.p, point_b=other.p, axis_a=one.R[:, 2], axis_b=other.R[:, 2],
+                reference_a=one.R[:, 0], reference_b=other.R[:, 0], name=name,
+            )
+        )  # fmt: skip
+
+
+def _add_translations(scene, joint, a, b):
+    """No rotation; and no displacement across two slides."""
+    n = joint.normal()
+    f, g = across(n)
+    scene.add(Parallel.at(a, b, axis=n, name=f"{joint.name}: axis"))
+    scene.add(Dot1.at(a, b, axis_a=f, axis_b=g, name=f"{joint.name}: turn"))
+    if len(joint.slides) == 2:
+        scene.add(Dot2.at(a, b, axis_a=n, point=joint.point, name=f"{joint.name}: plane"))

@@ -18,9 +18,8 @@ from ..model.equations import WIDTH, as_csr, evaluate_constraints, with_short_ro
 from ..model.packed import coupled_loads
 from ..rows.constraint_graph import coordinate_scales
 from ..validation import finite_vector, number
-from .diagnostics import starts_of
+from .diagnostics import marker_states, starts_of
 from .generalised_forces import applied_loads, force_loads, velocity_forces
-from .power import marker_states
 from .tolerances import INDEPENDENT, LARGE, REDUNDANT_SHARES
 
 if TYPE_CHECKING:

@@ -43,7 +43,7 @@ class Task(NamedTuple):
     choose: object  # a function that makes the `Turns` of a run, or the `Turns`; None where no other method goes on
     stops: np.ndarray = NO_STOPS  # times at which a step ends, as of `motions.knots.stops_of`
     sampling: object = None  # a `sampling.Sampling`, or None
-    archive: object = None  # a `storage.archive.Archive` that outputs and histories go to, or None
+    archive: object = None  # a `files.archive.Archive` that outputs and histories go to, or None
 
     @property
     def angles(self):

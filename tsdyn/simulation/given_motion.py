@@ -16,7 +16,7 @@ from ..drawing import Drawn, new_figure
 from ..elements.force import Force
 from ..errors import InvalidArgument, Status
 from ..jit.compiled import clock
-from ..observables import power, reactions
+from ..observables import diagnostics, reactions
 from ..observables.reactions import acted
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
@@ -83,8 +83,8 @@ class GivenMotion(Solution):
 
 def follow(scene, times, state, who, remedy):
     """Follow the branch of a scene without freedom to times (k,); its `Prepared`, and how far it came, a `Followed`."""
-    from ..analyses.kinematic_analysis import (
-        analyse,  # imported here: a run needs none of it
+    from ..analyses.kinematic_analysis import (  # imported here: a run needs none of it
+        analyse,
         demand_driven,
         driven_rates,
     )
@@ -302,10 +302,10 @@ class InverseDynamics(Drawn, GivenMotion):
     @cached_property
     def _force_powers(self):
         replaced = {id(one.item) for one in self._every if self._replaced(one)}
-        total = power.ForcePowers(*np.zeros((3, self.t.size)))
+        total = diagnostics.ForcePowers(*np.zeros((3, self.t.size)))
         for load in self.packed.loads:
             if id(load.force) not in replaced:
-                parts = power.load_powers(self.packed, load, self.t, self.q, self.qd, self._memory)
+                parts = diagnostics.load_powers(self.packed, load, self.t, self.q, self.qd, self._memory)
                 for sum_, part in zip(total, parts, strict=True):
                     sum_ += part
         for one in self._every:
@@ -439,7 +439,7 @@ def inverse_dynamics(
 
 def _of_coordinates(scene, motion, t):
     """A scene's motion by those of some coordinates, and what there is to say of it."""
-    from ..analyses.drivers import drive, driven_copy, way_to_start
+    from ..analyses.kinematic_analysis import drive, driven_copy, way_to_start
 
     copied, driven = driven_copy(scene, motion)
     if t is None:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from .. import validation
 from ..calls import fitting
 from ..errors import InvalidArgument, StorageError
+from .prepared_run import simulate
 from .resume import ended_run
 from .scene import Scene
-from .simulate import simulate
 from .solution import Solution
 from .stored_runs import demand_path
 
@@ -107,9 +107,9 @@ def load(
     _demand_robot(free_base, outside, loops)
     if suffix == ".xacro":
         raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
-    from ..storage.formats import SUFFIXES
-    from ..storage.saved_file import STORE, kind_of
-    from .outline_solution import Outline
+    from ..files.formats import SUFFIXES
+    from ..files.saved_file import STORE, kind_of
+    from .resume import Outline
     from .saved_solutions import load as load_solution
 
     if suffix not in SUFFIXES:

@@ -20,7 +20,7 @@ from ..elements.element import Attachment, checked_parameters
 from ..elements.joint import Joint
 from ..elements.laws import SceneLaw
 from ..errors import InvalidArgument, UnknownParameter
-from ..files.named_numbers import TableNumbers
+from ..files.scene_text import TableNumbers
 from ..files.types import Unwritable, encode
 from ..jit.code_hash import is_ours
 from ..model.handles import handles_of

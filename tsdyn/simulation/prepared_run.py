@@ -1,4 +1,4 @@
-"""`prepare`: what all runs of a scene with the same options share, worked out once; the choice of the method."""
+"""`prepare` and `simulate`: a run with its options made concrete for a scene, and calls of it."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..ahead.first_run import kernels_of, prepare_first_run
+from ..ahead import kernels_of, prepare_first_run
 from ..calls import ELSEWHERE, fitting
 from ..configuration.holonomic import demand_holonomic
 from ..elements.element import warn_of_waiting
 from ..errors import InvalidArgument, Status
 from ..integrators import DOP853, Taylor
 from ..jit.compiled import clock
-from ..methods.integrator import frozen
+from ..methods.integrator import frozen, is_plain
 from ..observables.state import remembered
 from ..runs.arguments import adaptive, demand_steps_seen, interval, output_times, state_arrays
 from ..runs.driver import Sampling
@@ -28,7 +28,7 @@ from ..validation import damaged
 from . import stored_runs
 from .local_origin import origin_of, run_near, within_rounding
 from .progress import reporter
-from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented
+from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented, from_names
 from .scene import Scene
 from .scene_cache import prepared
 from .segments import Turns, run_segments
@@ -487,3 +487,105 @@ def run_task(task, scene, initial_tol):
     if said:
         outcome = outcome._replace(reason=" ".join(part for part in (outcome.reason, said) if part))
     return outcome
+
+
+# `simulate`: prepare a run, or take the last one of the same options, and run it; whether a run could begin.
+
+KEPT = 8  # runs of a scene
+
+
+@fitting
+@documented()
+def simulate(  # many arguments, by name: each is an option of a run
+    scene: Scene,
+    t_span: Span,
+    *,
+    integrator: Method | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    formulation: Formulation = "tangent",
+    constraint_tol: float = 1e-12,
+    initial_tol: float = 1e-9,
+    redundancy: Redundancy = "drop",
+    t_eval: ArrayLike | None = None,
+    dense_output: bool = False,
+    events: Event | Sequence[Event] | None = None,
+    max_steps: int | None = None,
+    max_step: float | None = None,
+    history: bool | None = None,
+    store: Place | None = None,
+    checkpoint: float | None = None,
+    progress: Progress | None = None,
+    chart_interval: int | None = None,
+    state: State | None = None,
+) -> Solution:
+    """Integrate a scene over an interval of time; the scene is not changed.
+
+    Parameters
+    ----------
+    scene : Scene
+    t_span : (float, float), s
+        Start and end, start < end.
+    {options}
+
+    Returns
+    -------
+    Solution
+        Partial if the run ended early, by Ctrl-C for example: see `.success`, `.status`, `.message`, or call
+        `.raise_if_failed()`.
+
+    Raises
+    ------
+    TsdynError
+        A subclass, before the run starts: InvalidArgument, InvalidBody, InconsistentState, RedundantConstraints,
+        SingularConfiguration.
+
+    Examples
+    --------
+    A pendulum of 1 m, released from the horizontal:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> bob = scene.add_point_mass(mass=1.0, position=(1, 0, 0), name="bob")
+    >>> rod = scene.add(ts.constraints.Distance(bob, scene.ground, name="rod"))
+    >>> solution = ts.simulate(scene, (0, 1), t_eval=[0.0, 0.5, 1.0])
+    >>> print(solution.position(bob)[:, 2].round(6) + 0.0)
+    [ 0.       -0.9282   -0.148328]
+    >>> bool(solution.constraint_error.position.max() < 1e-12)
+    True
+    """
+    demand_scene(scene)
+    options = RunOptions(
+        integrator, rtol, atol, formulation, constraint_tol, initial_tol, redundancy, dense_output, events, max_steps,
+        max_step, history, chart_interval,
+    )  # fmt: skip
+    call = RunCall(t_span, t_eval, store, checkpoint, progress, state)
+    return _run_of(scene, options, call)._solve(call)
+
+
+def _run_of(scene, options, call):
+    """The `Run` of a scene with these options: one of the last ones, or a new one, for a call that is checked first.
+
+    Runs of a method or of events of a user aren't kept: what they do may change unseen.
+    """
+    if scene._users:
+        scene.refresh()
+    kept = scene._prepared
+    for run in () if kept is None else kept.runs:
+        if run.options == options:
+            return run
+    output_times(call.t_eval, *interval(call.t_span))
+    run = Run(scene, options)
+    if options.events is None and is_plain(run.method):
+        kept = run._prepared
+        kept.runs = (run, *kept.runs[: KEPT - 1])  # and not written to: other threads may be reading
+    return run
+
+
+# Whether a run could begin: all that `simulate` refuses before it runs anything.
+
+
+def demand_startable(scene, given):
+    """Raise what `simulate(scene, **given)` raises before a run."""
+    options, call = from_names({"t_span": (0.0, 1.0), **given})
+    Run(scene, options)._check(call)

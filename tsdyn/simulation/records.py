@@ -89,7 +89,7 @@ class Records:
         >>> float(data.q.sel(coordinate="stone.z", time=1.0)), data.energy.attrs["units"]
         (-5.0, 'J')
         """
-        from .labelled import to_xarray
+        from .saved_solutions import to_xarray
 
         return to_xarray(self)
 
@@ -128,7 +128,7 @@ class Records:
         >>> solution.to_dataframe("stone.velocity.z")["stone.velocity.z (m/s)"].to_list()
         [0.0, -10.0]
         """
-        from .labelled import to_dataframe
+        from .saved_solutions import to_dataframe
 
         return to_dataframe(self, channels)
 
@@ -165,6 +165,6 @@ class Records:
         0.0,0.0,0.0
         1.0,-5.0,-10.0
         """
-        from .labelled import to_csv
+        from .saved_solutions import to_csv
 
         return to_csv(self, path, channels)

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..calls import fitting
 from ..errors import InvalidArgument, InvalidFile, StorageError
+from ..observables.diagnostics import ConstraintError
 from ..validation import clipped, damaged
-from .outlines import Lacking
 from .prepared_run import Run
 from .run_options import demand_arguments_of_file, from_names
 from .scene import Scene
 from .scene_cache import prepared
-from .stored_runs import arguments_of, demand_path, demand_same_place, demand_same_scene
+from .solution import Solution
+from .stored_runs import Lacking, arguments_of, demand_path, demand_same_place, demand_same_scene
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..hints import Event, Place, Progress, Solution
+    from ..hints import ConstraintError as Errors
+    from ..hints import Event, Floats, Place, Progress
+
 NEEDED = ("scene", "functions"), ("events", "events")  # arguments that are passed again, and what says that they are
 
 
@@ -66,7 +69,7 @@ def resume(
     >>> ts.resume(path).reached
     2.0
     """
-    from ..storage import checkpoint
+    from ..files import checkpoint
 
     demand_path(path, "path")
     return _resumed(path, *checkpoint.read(path), scene, events, progress)
@@ -106,9 +109,8 @@ def _scene_of(path, numbers, arrays):
 
 def ended_run(path: Place, scene: Scene | None) -> Solution:
     """Return the solution of a store whose run has ended; raises StorageError that names the call for any other."""
-    from ..storage import checkpoint
-    from ..storage.formats import format_of
-    from .outline_solution import Outline
+    from ..files import checkpoint
+    from ..files.formats import format_of
     from .saved_solutions import outlined_run
 
     if not any(place.exists() for place in checkpoint.place(path)):
@@ -136,3 +138,59 @@ def ended_run(path: Place, scene: Scene | None) -> Solution:
         f"{path} is the store of a run that has not ended: its checkpoint is of t = {numbers['t']:.9g} s. "
         f"ts.resume({str(path)!r}{passed}) returns its solution, once it has gone on to the end."
     )
+
+
+# Solutions of files whose scenes have functions, or classes, that are not here: read, not run.
+
+
+class Outline(Solution):
+    """A solution whose scene lacks the parts that a file names only: they are not drawn, and nothing is run.
+
+    Outputs, kinematics, momenta and kinetic energy are those of the run. So are potential energy, power, multipliers
+    and constraint errors of a saved solution; of a store they are NaN.
+    """
+
+    _held: dict[str, Any]  # arrays of the file
+    _content: Any  # numbers and arrays of the file
+    _columns: list[int]  # of what is remembered: the angles of the joints that are here
+    _row_labels: list[list[str]]  # title and label of each row of Phi
+
+    def _set_remembered(self, rest):
+        self._all_remembered = rest
+        super()._set_remembered(rest[:, self._columns])
+
+    def _of_run(self, name):
+        return self._held[f"held_{name}"][self._slice]
+
+    @property
+    def multipliers(self) -> Floats:  # type: ignore[override]
+        """Multipliers (k, m) of the run."""
+        return self._of_run("multipliers")
+
+    @property
+    def power(self) -> Floats:  # type: ignore[override]
+        """Power of the run (k,), W."""
+        return self._of_run("power")
+
+    @property
+    def potential_energy(self) -> Floats:  # type: ignore[override]
+        """Potential energy of the run (k,), J."""
+        return self._of_run("potential_energy")
+
+    @property
+    def constraint_error(self) -> Errors:  # type: ignore[override]
+        """Constraint errors of the run, (k,) each."""
+        return ConstraintError(*(self._of_run(f"{level}_error") for level in ConstraintError._fields))
+
+
+def _refused(name):
+    def refuse(self, *_, **__):
+        raise StorageError(f"solution.{name} needs the scene as it was run. {self._lacks}")
+
+    return refuse
+
+
+for _name in ("actuation", "reaction", "reaction_unique", "rows", "at", "power_of", "work_of"):
+    setattr(Outline, _name, _refused(_name))
+for _name in ("state", "work", "dissipation"):
+    setattr(Outline, _name, property(_refused(_name)))

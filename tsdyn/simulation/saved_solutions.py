@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import csv
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InvalidArgument, InvalidFile, Status
+from ..errors import InvalidArgument, InvalidFile, MissingDependency, Status, StorageError
+from ..files.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
 from ..formulations.locked_orientations import keep_turning
 from ..formulations.registry import formulation
 from ..model.handles import handles_of
+from ..observables.channels import channels_of, values_of
 from ..observables.diagnostics import ConstraintError
 from ..rows.graph_builder import graph_of, set_redundant
 from ..rows.interface import redundancy
@@ -20,16 +23,27 @@ from ..runs.dense_output import StepPieces, Trajectory
 from ..runs.run_log import NAMES, RunEnd, demand_noted
 from ..taylor import series_engine
 from ..taylor.layout import series_width
-from ..validation import damaged, demand, demand_numbers, demand_record
+from ..validation import damaged, demand, demand_numbers, demand_record, text_cell
 from ..workspaces import B_CHART, B_DATA, B_END
 from . import local_origin
-from .outlines import Lacking, complete, outline_of, row_labels, scene_of, width_of
 from .scene_cache import prepared
-from .stored_runs import demand_path, demand_same_scene, hash_of, method_of, own_record, provenance_of
+from .stored_runs import (
+    Lacking,
+    complete,
+    demand_path,
+    demand_same_scene,
+    hash_of,
+    method_of,
+    outline_of,
+    own_record,
+    provenance_of,
+    row_labels,
+    scene_of,
+    width_of,
+)
 
 if TYPE_CHECKING:
     from ..hints import Place, Scene, Solution
-
 
 # Dense output as numbers and arrays, from which another process reads it again.
 
@@ -153,8 +167,8 @@ def provenance(solution: Solution) -> dict[str, Any]:
 
 def save(solution: Solution, path: Place) -> Path:
     """As of `Records.save`."""
-    from ..storage import saved_file
-    from ..storage.archive import tables_of
+    from ..files import saved_file
+    from ..files.archive import tables_of
 
     demand_path(path, "path")
     path = Path(path).absolute()
@@ -266,7 +280,7 @@ def _plain(value):
 
 def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[type[Any], ...]) -> Solution:
     """Return the solution of a file; arguments as of `ts.load`, and the classes `Scene` and `Solution`."""
-    from ..storage import saved_file
+    from ..files import saved_file
 
     path = Path(path).absolute()
     if scene is not None and not isinstance(scene, kinds[0]):
@@ -321,8 +335,8 @@ def _outlined(path, record, arrays, why, kinds):
 
 def outlined_run(path, numbers, arrays, why, kinds):
     """The `Outline` of the store of a run that has ended, from its checkpoint; what its scene doesn't tell is NaN."""
-    from ..storage.archive import tables_of
-    from ..storage.formats import format_of
+    from ..files.archive import tables_of
+    from ..files.formats import format_of
 
     known, told = numbers["arguments"]["outline"], numbers["provenance"]
     scene = scene_of(known, arrays["outline"], why, kinds[0])
@@ -359,8 +373,8 @@ def _again(record):
 
 def _solution(path, record, arrays, scene, kind, width=None):
     """The solution of a record that fits the scene; width: of what it remembers, if not that of the scene."""
-    from ..storage.archive import StoredLog, StoredOutputs, tables_of
-    from ..storage.formats import demand_shapes
+    from ..files.archive import StoredLog, StoredOutputs, tables_of
+    from ..files.formats import demand_shapes
 
     found, packed = kind.__new__(kind), scene.packed
     outputs = StoredOutputs(path, record["tables"])
@@ -399,3 +413,110 @@ def _solution(path, record, arrays, scene, kind, width=None):
     )  # fmt: skip
     found._take(outputs, n)
     return found
+
+
+# Outputs of a run as labelled arrays and data frames, with the names and units of stores.
+
+ERRORS = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+ENERGIES = ("kinetic_energy", "potential_energy", "energy")
+INDEX, HEAD = "time", "time (s)"
+
+
+def _columns(solution):
+    """Arrays (k, ...) by name: (array, dimensions, attributes)."""
+    table = tables_of(solution.packed.bodies, 0, False)[OUTPUTS]
+    found = {
+        column.name: (getattr(solution, column.name), (table.dimension, *column.dimensions), column.attributes)
+        for column in table.columns[1:]
+    }
+    said = {"long_name": "Lagrange multipliers", "units": "N or N m, by row"}
+    found["multipliers"] = solution.multipliers, (INDEX, "row"), said
+    for level, unit in ERRORS.items():
+        said = {"long_name": f"largest {level} constraint error", "units": unit}
+        found[f"{level}_error"] = getattr(solution.constraint_error, level), (INDEX,), said
+    for name in ENERGIES:
+        found[name] = getattr(solution, name), (INDEX,), {"long_name": name.replace("_", " "), "units": "J"}
+    return found, table
+
+
+def _row_names(solution):
+    """Names of the rows of Phi as they were run."""
+    return [f"{title}{label}" for title, label in labelled_rows(solution)]
+
+
+def _library(name):
+    try:
+        return __import__(name)
+    except ImportError as error:
+        raise MissingDependency(f"this needs {name}: pip install 'tsdyn[data]'.") from error
+
+
+def to_xarray(solution):
+    """As of `Records.to_xarray`."""
+    xarray = _library("xarray")
+    found, table = _columns(solution)
+    names = table.labels["coordinate"]
+    time = table.columns[0]
+    coordinates = {
+        INDEX: (INDEX, solution.t, time.attributes),
+        "coordinate": ("coordinate", names),
+        "coordinate_units": ("coordinate", _units_of(names, "q")),
+        "row": ("row", _row_names(solution)),
+    }
+    data = {name: (dimensions, array, said) for name, (array, dimensions, said) in found.items()}
+    return xarray.Dataset(data, coordinates, provenance(solution))
+
+
+def _units_of(names, level):
+    """The unit of each coordinate at a level."""
+    lengths, numbers = units_of_level(level).split(" or ")
+    return [lengths if name.rpartition(".")[2] in COORDINATES[:3] else numbers for name in names]
+
+
+def table_of(solution):
+    """Names (quantity, component) of columns, their units, and the columns as an array (k, columns)."""
+    found, table = _columns(solution)
+    labels = {"coordinate": table.labels["coordinate"], "row": _row_names(solution)}
+    columns, arrays, units = [], [], {}
+    for name, (array, dimensions, said) in found.items():
+        parts = labels[dimensions[1]] if len(dimensions) == 2 else [""]
+        own = _units_of(parts, name) if dimensions[1:] == ("coordinate",) else [said["units"]] * len(parts)
+        keys = [(name, part) for part in parts]
+        columns += keys
+        units |= dict(zip(keys, own, strict=True))
+        arrays.append(array.reshape(len(array), len(parts)))
+    return columns, units, np.concatenate(arrays, axis=1)
+
+
+def to_dataframe(solution, channels):
+    """As of `Records.to_dataframe`."""
+    pandas = _library("pandas")
+    index = pandas.Index(solution.t, name=HEAD)
+    if channels is not None:
+        some = channels_of(solution.packed, channels, solution._lacks)
+        frame = pandas.DataFrame(values_of(solution, some), index, [one.title for one in some])
+        units = {one.title: one.unit for one in some}
+    else:
+        columns, units, array = table_of(solution)
+        frame = pandas.DataFrame(array, index, pandas.MultiIndex.from_tuples(columns))
+    frame.attrs = {"units": units, **provenance(solution)}
+    return frame
+
+
+def to_csv(solution, path, channels):
+    """What `Records.to_csv` does, and raises."""
+    demand_path(path, "path")
+    if channels is not None:
+        some = channels_of(solution.packed, channels, solution._lacks)
+        head, array = [one.title for one in some], values_of(solution, some)
+    else:
+        columns, units, array = table_of(solution)
+        head = [f"{' '.join(filter(None, key))} ({units[key]})" for key in columns]
+    try:
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            rows = csv.writer(file)
+            rows.writerow([HEAD, *map(text_cell, head)])
+            rows.writerows([t, *row] for t, row in zip(solution.t.tolist(), array.tolist(), strict=True))
+    except OSError as error:
+        raise StorageError(f"{path} can't be written: {error.strerror}.") from error
+    return Path(path)

@@ -36,10 +36,10 @@ from ..observables.evaluate import evaluate as _evaluate
 from ..validation import counted, demand_known, finite, label, vector3
 from .analyses import equilibrium as _equilibrium
 from .analyses import linearise as _linearise
+from .analyses import set_start as _set_start
 from .given_motion import inverse_dynamics as _inverse_dynamics
 from .given_motion import kinematics as _kinematics
 from .scene_cache import preparing
-from .set_start import set_start as _set_start
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
 from .variants import copy as _copy
 from .variants import parameters as _parameters
@@ -552,8 +552,8 @@ class Scene:
         ...     print("rod: Phi = 0.22" in page.read_text())
         True
         """
-        from ..viewer.run_data import scene_data
-        from ..viewer.view import show
+        from ..graphics.run_data import scene_data
+        from ..graphics.view import show
 
         t, packed, (q, qd) = finite(t, "view: t (s)"), self.packed, self.start
         try:

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..ahead.first_run import prepare_first_run
+from ..ahead import prepare_first_run
 from ..configuration.holonomic import demand_holonomic
 from ..errors import Status, TsdynError
 from ..formulations.registry import formulation

@@ -15,9 +15,8 @@ from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
 from ..model.kinematics import Anchor, Kinematics
-from ..observables import diagnostics, power, reactions
+from ..observables import diagnostics, reactions
 from ..observables.generalised_forces import law_values
-from ..observables.power import driving_power, force_powers, power_of
 from ..observables.reactions import acted, exerted, member, multipliers, with_normal_loads
 from ..observables.state import RememberingState
 from ..validation import counted, floats
@@ -96,8 +95,8 @@ class Showing:
         ...     print(page.name)
         pendulum.html
         """
-        from ..viewer.run_data import run_data
-        from ..viewer.view import show
+        from ..graphics.run_data import run_data
+        from ..graphics.view import show
 
         return show(run_data(self, shapes=shapes, trails=trails, camera=camera, follow=follow), path)
 
@@ -165,10 +164,10 @@ class Showing:
         if path is None and is_picture(channels):
             channels, path = None, channels
         if channels is None:
-            from ..figures.histories import overview
+            from ..graphics.curves import overview
 
             return overview(self, path)
-        from ..figures.channels import time_histories
+        from ..graphics.curves import time_histories
 
         return time_histories(self, channels, path)
 
@@ -193,7 +192,7 @@ def energy_error(solution, task):
         for first, rows, last in zip((task.q, task.qd), (some.q, some.qd), solution._last[:2], strict=True)
     )
     memory = np.vstack((task.remembered[-slots:] if slots else np.zeros(0), some._remembers, solution._remembered))
-    forces = power.force_powers(SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=packed))
+    forces = diagnostics.force_powers(SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=packed))
     kinetic = diagnostics.kinetic_energy(system, q, qd)
     largest = kinetic.max()
     if not (
@@ -213,7 +212,7 @@ AT_ONCE = 2000  # pieces of the interval, evaluated in one call
 def work(solution, trajectory, item=None):
     """Work (k,), J, since the start: of applied and driving forces, less dissipation.
 
-    item restricts it to one constraint or force, as in `power.power_of`.
+    item restricts it to one constraint or force, as in `diagnostics.power_of`.
     """
     edges = np.unique(np.concatenate([[trajectory.start], trajectory.edges, solution.t]))
     pieces = np.zeros(0)
@@ -261,10 +260,10 @@ def _power(solution, trajectory, item, t):
     if system.rheonomic[0]:
         at.multipliers = multipliers(solution.packed, t, q, qd, qdd, memory)
     if item is not None:
-        power = power_of(at, item)
+        power = diagnostics.power_of(at, item)
     else:
-        powers = force_powers(at)
-        power = powers.applied + driving_power(at) - powers.dissipation
+        powers = diagnostics.force_powers(at)
+        power = powers.applied + diagnostics.driving_power(at) - powers.dissipation
     return power if status == 0 else np.full(t.size, np.nan)
 
 
@@ -292,12 +291,12 @@ class Balances:
 
     @cached_property
     def _force_powers(self):
-        return power.force_powers(self)
+        return diagnostics.force_powers(self)
 
     @cached_property
     def power(self) -> Floats:
         """Power (k,), W, of applied forces, actuators and driven constraints: dE/dt = power - dissipation."""
-        return self._force_powers.applied + power.driving_power(self)
+        return self._force_powers.applied + diagnostics.driving_power(self)
 
     @property
     def dissipation(self) -> Floats:
@@ -323,7 +322,7 @@ class Balances:
         Of a motor or a driver: the power of its force or torque along the prescribed motion. Of a force: the power of
         its loads and actuators, less dissipation; stored energy of a spring doesn't count. Of other constraints: zero.
         """
-        return power.power_of(self, self._part(item))
+        return diagnostics.power_of(self, self._part(item))
 
     def work_of(self, item: ItemLike) -> Floats:
         """Work (k,), J, since the start, of one constraint or force: the integral of `power_of`.

@@ -20,6 +20,7 @@ from ..errors import InvalidArgument, Status, StorageError
 from ..jit.code_hash import is_ours, platform_hash
 from ..jit.compilers import machine
 from ..methods.integrator import is_own, registered
+from ..model.handles import handles_of
 from ..model.kinematics import Anchor
 from ..model.packed import called_functions, user_functions
 from ..observables.state import RememberingState, State, remembered
@@ -28,12 +29,10 @@ from ..runs.arguments import state_arrays
 from ..runs.run_log import RunEnd
 from ..runs.task import Outcome
 from ..validation import clipped, damaged, demand, demand_numbers, demand_record, is_count, number, shown
-from .outlines import outline_of
 from .scene_cache import prepared
 
 if TYPE_CHECKING:
     from ..hints import Floats, Scene
-
 
 # What `simulate` was asked, as numbers and arrays: what a checkpoint begins with. Functions and code are left out.
 
@@ -247,7 +246,7 @@ def demand_storable(call, options):
     path, interval = call.store, call.checkpoint
     if path is None:
         raise InvalidArgument("checkpoint needs a store, which it goes on with: simulate(..., store='run.h5').")
-    from ..storage.formats import demand_free, format_of
+    from ..files.formats import demand_free, format_of
 
     demand_path(path, "store")
     format_of(path)
@@ -266,8 +265,8 @@ def demand_path(path, name):
 
 def archive_of(given, kept, history, numbers, arrays):
     """The `Archive` of a run, made or, with the numbers and arrays of a checkpoint, gone on with."""
-    from ..storage.archive import Archive, tables_of
-    from ..storage.formats import demand_shapes, format_of, writing
+    from ..files.archive import Archive, tables_of
+    from ..files.formats import demand_shapes, format_of, writing
 
     facts = _facts(given, kept)
     if numbers is not None:
@@ -292,7 +291,7 @@ def archive_of(given, kept, history, numbers, arrays):
 
 def begin_again(archive, given):
     """Let another method begin at the start; the archive."""
-    from ..storage.formats import writing
+    from ..files.formats import writing
 
     with writing(archive.path):
         archive.begin_again(_asked(given))
@@ -325,7 +324,7 @@ def ended(archive, outcome, seconds, task):
 
 def call_to_go_on(archive):
     """The call of `resume` that goes on with a run; "" where there is no checkpoint."""
-    from ..storage.checkpoint import place
+    from ..files.checkpoint import place
 
     if not any(path.exists() for path in place(archive.path)):
         return ""
@@ -336,7 +335,7 @@ def call_to_go_on(archive):
 
 def _stored(archive):
     """Outputs, steps and charts of an archive."""
-    from ..storage.archive import StoredLog, StoredOutputs
+    from ..files.archive import StoredLog, StoredOutputs
 
     outputs = StoredOutputs(archive.path, archive.columns)
     return outputs, StoredLog.of(outputs, "steps"), StoredLog.of(outputs, "charts")
@@ -479,3 +478,63 @@ def sources_of(functions):
             text = b"" if code is None else code.co_code + repr(code.co_consts).encode()
         found[f"{name} ({i})"] = hashlib.sha256(text).hexdigest()
     return found
+
+
+# Outlines of scenes in files: a scene without what only its owner can pass again, and what it leaves out.
+
+
+class Lacking(StorageError):
+    """A file alone doesn't give the scene."""
+
+
+def width_of(packed):
+    """How many numbers are remembered with each output: angles of joints, and what forces remember."""
+    return handles_of(packed).count + packed.system.memory.size
+
+
+def row_labels(packed):
+    """Title and label of each row of Phi."""
+    seen = {}
+    for member in packed.members:
+        title = member.constraint.title
+        seen[title] = seen.get(title, 0) + 1
+        again = "" if seen[title] == 1 else f" #{seen[title]}"
+        yield from ((title + again, label) for label in member.constraint.row_labels)
+
+
+def outline_of(scene, packed):
+    """Numbers and arrays of the outline of a scene; ({}, {}) where nothing is left out, or nothing else is there."""
+    from ..files import scene_text  # what a plain run imports none of
+
+    text, left = scene_text.write_outline(scene, type(scene))
+    if not left or not text:
+        return {}, {}
+    angles = [row.item.name for row in handles_of(packed).rows for _ in row.angles]
+    rows = [list(labels) for labels in row_labels(packed)]
+    numbers = {"left_out": left, "angles": angles, "rows": rows, "width": width_of(packed)}
+    return {"outline": numbers}, {"outline": np.frombuffer(text.encode(), np.uint8)}
+
+
+def scene_of(known, text, why, kind):
+    """The scene of the outline that numbers and a text (bytes, as an array) tell, which lacks something; `why` says.
+
+    Raises
+    ------
+    KeyError, TypeError or ValueError
+        If they tell none.
+    """
+    from ..files import scene_text
+
+    demand_record(known, {"left_out": list, "angles": list, "rows": list, "width": int})
+    demand(0 <= len(known["angles"]) <= known["width"], "the angles of joints")
+    demand(all(isinstance(word, str) for word in (*known["left_out"], *known["angles"])), "names")
+    scene = scene_text.read(text.tobytes().decode(), "its outline", kind, None)[0]
+    scene._lacks = f"{why} Without it there is no {', '.join(known['left_out'])}."
+    return scene
+
+
+def complete(found, known):
+    """Let an `Outline` know which of the remembered numbers are angles of joints that are here, and its rows."""
+    here = {row.item.name for row in found.handles.rows}
+    found._columns = [i for i, name in enumerate(known["angles"]) if name in here]
+    found._row_labels, found._width = [[str(title), str(label)] for title, label in known["rows"]], known["width"]

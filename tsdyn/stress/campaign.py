@@ -16,11 +16,11 @@ from contextlib import closing, contextmanager
 from multiprocessing.connection import wait
 from typing import NamedTuple
 
-from .checks import figures, without_figures
 from .closed_forms import CLOSED_FORMS, Measured, measured
-from .gallery.cases import CASES
+from .gallery import CASES
 from .judgement import FAULT, Judgement, judge_scene
 from .random_calls import judge_calls
+from .report import figures, without_figures
 
 LIMIT = 300.0  # s of processor time, of a job: also of those that compile kernels
 GALLERY_LIMIT = 1200.0  # s of processor time, of a case

@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 from .. import constraints, forces, shapes
 from ..errors import TsdynError
 from ..simulation.load import load
+from ..simulation.prepared_run import simulate
 from ..simulation.scene import Scene
-from ..simulation.simulate import simulate
 
 ROBOT = """<robot name="pair"><link name="base"/>{links}
 <joint name="one" type="continuous"><parent link="base"/><child link="a"/>

@@ -1,15 +1,211 @@
 """Judgement of a random scene: it runs within the laws, is refused, or ends with a message; all else is a fault."""
 
 import time
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import TsdynError
-from ..simulation.simulate import simulate
-from . import comparisons, random_scenes
-from .laws import findings
+from ..errors import InvalidArgument, TsdynError
+from ..integrators import Nystrom4
+from ..maths.tolerances import EPS
+from ..simulation.prepared_run import simulate
+from . import random_scenes
+from .laws import (
+    Finding,
+    energy_left,
+    findings,
+    is_near_singular,
+    momentum_left,
+    off_steps,
+    prepared_twice,
+    resumed_is_same,
+    same_bits,
+)
 from .random_scenes import generate
+from .tolerances import FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, SHORTER, TIGHTER
+
+# Laws that compare runs of a random scene: a tighter tolerance, another method or form, the same run once more.
+#
+# An error that exceeds MULTIPLE tolerances is judged by its convergence: at tolerances TIGHTER by a thousand less than
+# FALL of it must be left. Fixed steps have no tolerance, and may be too long for the motion: of their errors less than
+# FALL must be left by steps shorter by SHORTER, or from those to steps shorter still, where an adaptive run comes to
+# the end.
+
+FEW = 20  # bodies
+DEFAULT = 1e-8  # rtol, and atol, of a run without one
+
+
+def energy(case, solution, run):
+    """Energy less the work of loads, drivers and friction is constant, to the tolerance."""
+    roundings = ROUNDINGS * EPS * np.abs(solution.potential_energy).max(initial=0.0)
+
+    def left(one):
+        change, size = energy_left(one)
+        return max(change - roundings, 0.0) / (size or 1.0)
+
+    return _converging("energy less work", left, case, solution, run)
+
+
+def momenta(case, solution, run):
+    """Linear momentum, and angular momentum about the centroid, of a scene that nothing outside it holds or loads."""
+    scene = solution.scene
+    ends = {id(body) for item in (*scene.constraints, *scene.forces) for body in (item.a, item.b)}
+    if id(scene.ground) in ends or any(force.b is None for force in scene.forces):
+        return []
+    parts = enumerate(("linear momentum", "angular momentum"))
+    return [
+        found
+        for i, law in parts
+        for found in _converging(law, lambda one, i=i: momentum_left(one)[i], case, solution, run)
+    ]
+
+
+def another_method(case, solution, run):
+    """Two methods agree at the end of the run, to the tolerance."""
+    other = {"integrator": "rk45" if case.options.get("integrator") == "dop853" else "dop853"}
+    return _agreeing("agreement of two methods", case, solution, run, other)
+
+
+def implicit_methods(case, solution, run):
+    """So do the implicit methods, in scenes where they take few steps; Radau where it serves the scene."""
+    if len(solution.scene.bodies) > FEW:
+        return []
+    found = _agreeing("agreement with SDIRK54", case, solution, run, {"integrator": "sdirk54"})
+    with suppress(InvalidArgument):  # friction in proportion to reactions, the null-space form
+        found += _agreeing("agreement with Radau", case, solution, run, {"integrator": "radau"})
+    return found
+
+
+def another_form(case, solution, run):
+    """The tangent form and the null-space form, which is dense and for SI units, agree."""
+    name = case.options.get("integrator")
+    if len(solution.scene.bodies) > FEW or name in (None, "taylor") or case.length != 1.0:
+        return []
+    form = "tangent" if case.options.get("formulation") == "null-space" else "null-space"
+    return _agreeing("agreement of two forms", case, solution, run, {"formulation": form})
+
+
+def once_more(case, solution, run):
+    """The same run gives the same bits; so does a prepared one, after another run of it."""
+    again = run(case), run(case, by=prepared_twice)
+    return [Finding("same bits of the same run", float(sum(not same_bits(solution, one) for one in again)), 0.0)]
+
+
+def stopped(case, solution, run):
+    """A run that is stopped, and goes on from its checkpoint, gives the same bits."""
+    same = resumed_is_same(case.scene, case.span, solution, **case.options)
+    return [] if same is None else [Finding("same bits after a stop", 0.0 if same else 1.0, 0.0)]
+
+
+def output_times(case, solution, run):
+    """Output times change no step, and outputs there are those of dense output."""
+    t = np.unique(np.linspace(*case.span, 7))
+    other = run(case, t_eval=t)
+    steps = abs(other.stats.steps - solution.stats.steps)
+    size = 1.0 + np.abs(solution.q).max(initial=0.0)
+    off = np.abs(other.q - solution.at(t).q).max(initial=0.0) / size if other.success else np.inf
+    return [
+        Finding("steps with output times", float(steps), 0.0),
+        Finding("outputs within steps", float(off), off_steps(solution)),
+    ]
+
+
+def other_masses(case, solution, run):
+    """Masses, whatever their ratio, change neither the degrees of freedom nor which rows are redundant."""
+    scene = case.scene
+    if len(scene.bodies) > FEW:
+        return []
+    factors = 10.0 ** np.random.default_rng(len(scene.bodies)).uniform(-12.0, 12.0, len(scene.bodies))
+    values = {f"{body.name}.mass": f * body.mass for body, f in zip(scene.bodies, factors, strict=True)}
+    found = [_mobility(each) for each in (scene, scene.with_parameters(values))]
+    return [Finding("mobility with other masses", float(found[0] != found[1]), 0.0)]
+
+
+def _mobility(scene):
+    found = scene.mobility()
+    return found.degrees_of_freedom, found.rank, [row.name for row in found.redundant]
+
+
+ALL = (other_masses, another_method, implicit_methods, another_form, once_more, stopped, output_times)
+
+
+def _tolerance(case):
+    return case.options.get("rtol", DEFAULT)
+
+
+def _tighter(case):
+    """Return options of runs, each of which is more accurate than the one before."""
+    method = case.options.get("integrator")
+    if isinstance(method, Nystrom4):
+        return [{"integrator": Nystrom4(step=method.step / SHORTER**k), "max_steps": None} for k in (1, 2)]
+    return [{name: TIGHTER * case.options.get(name, DEFAULT) for name in ("rtol", "atol")} | {"max_steps": None}]
+
+
+def _is_resolved(case, run):
+    """Whether the motion is one that a method of fixed steps can follow to the end: an adaptive one does."""
+    fixed = isinstance(case.options.get("integrator"), Nystrom4)
+    return not fixed or run(case, integrator="dop853", rtol=DEFAULT, atol=DEFAULT * min(case.length, 1.0)).success
+
+
+def _converging(law, left, case, solution, run):
+    """Judge an error of a run, and where it is large, how it falls with the tolerance."""
+
+    def error_of(options):
+        other = run(case, **options)
+        return left(other) if other.success else np.nan
+
+    return _falling(law, error_of, left(solution), case, run)
+
+
+def _agreeing(law, case, solution, run, options):
+    """Judge the distance of the ends of two runs, and where it is large, how it falls with the tolerances."""
+    other = run(case, **options | _tolerances(case, options))
+    if not other.success:
+        return []
+
+    def apart(tighter):
+        one, two = run(case, **tighter), run(case, **tighter | options | _tolerances(case, options, TIGHTER))
+        return _distance(case, one, two) if one.success and two.success else np.nan
+
+    rounded = NEAR_SINGULAR_ENDS if is_near_singular(solution) else ROUNDED
+    return _falling(law, apart, _distance(case, solution, other), case, run, rounded)
+
+
+def _falling(law, error_of, error, case, run, rounded=ROUNDED):
+    """Judge an error, and where it is large, error_of(options), NaN for runs that fail; below `rounded` it is none."""
+    limit, first = MULTIPLE * _tolerance(case), error
+    if error <= limit:
+        return [Finding(law, error, limit)]
+    if not _is_resolved(case, run):
+        return []
+    for options in _tighter(case):
+        before, error = error, error_of(options)
+        if np.isnan(error):
+            return []
+        found = Finding(law, error, max(FALL * before, rounded), f"{first:.1e} at the looser tolerance")
+        if not found.broken:
+            break
+    return [found]
+
+
+def _tolerances(case, options, factor=1.0):
+    """Tolerances beside the name of a method; a form alone keeps those of the case, fixed steps have none."""
+    if "integrator" not in options:
+        return {}
+    return {name: factor * case.options.get(name, DEFAULT) for name in ("rtol", "atol")}
+
+
+def _distance(case, one, two):
+    """Largest distance of two runs' ends: positions in units of the scene's size, Euler parameters."""
+    scale = np.ones(one.q.shape[1])
+    lengths = (one.system.bodies[:, :1] + np.arange(3)).ravel()
+    scale[lengths] = max(np.abs(one.q[:, lengths] - one.q[0, lengths]).max(initial=0.0), case.length)
+    far = ROUNDINGS * EPS * np.abs(one.q[:, lengths]).max(initial=0.0)
+    left = np.abs(one.q[-1] - two.q[-1])
+    left[lengths] = np.maximum(left[lengths] - far, 0.0)
+    return float((left / scale).max(initial=0.0))
+
 
 MOST_STEPS = 3_000  # of a run
 COMPARED = 0.7  # of the cases are run in another way, too
@@ -35,13 +231,13 @@ class Judgement(NamedTuple):
 def judge_scene(seed, least=None, most=None):
     """Return the `Judgement` of the scene of a seed; one in PASSAGES passes places where a law is not analytic."""
     if least is None and seed % PASSAGES == PASSAGES - 1:
-        return judge_case(random_scenes.draw(seed), (comparisons.another_method,), seed)
+        return judge_case(random_scenes.draw(seed), (another_method,), seed)
     return judge_case(generate(seed, least, most), comparison(np.random.default_rng((seed, 1))), seed)
 
 
 def comparison(rng):
     """Return the comparison by which a case is judged besides the laws of its run, in a tuple, or none."""
-    return (comparisons.ALL[rng.integers(len(comparisons.ALL))],) if rng.random() < COMPARED else ()
+    return (ALL[rng.integers(len(ALL))],) if rng.random() < COMPARED else ()
 
 
 def judge_case(case, others, seed=None):
@@ -67,7 +263,7 @@ def judge(case, others):
         return f"{FAULT} no message", str(solution.status)
     found = findings(solution)
     if solution.success:
-        found += comparisons.energy(case, solution, run_case) + comparisons.momenta(case, solution, run_case)
+        found += energy(case, solution, run_case) + momenta(case, solution, run_case)
         found += [one for other in others for one in other(case, solution, run_case)]
     broken = [one for one in found if one.broken]
     if broken:

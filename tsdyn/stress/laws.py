@@ -16,10 +16,9 @@ from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, ROUNDING_AT_MOST, S
 from ..model.equations import WIDTH, places, with_short_rows
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
-from ..simulation.prepared_run import Run
+from ..simulation.prepared_run import Run, simulate
 from ..simulation.resume import resume
 from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
-from ..simulation.simulate import simulate
 from .tolerances import (
     BODIES,
     FLOOR,
@@ -119,7 +118,7 @@ def motors(solution):
 # Laws that hold of every run, whatever its scene: no reference solution is needed.
 #
 # Each law takes a `Solution` and yields what it found as `Finding`s: a size, and the limit that it must not exceed.
-# LAWS lists those of a single run; comparisons.py compares runs.
+# LAWS lists those of a single run; judgement.py compares runs.
 
 LEVELS = ("position", "velocity", "acceleration")
 

@@ -15,23 +15,22 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .. import constraints, forces, integrators, motions, shapes
-from ..benchmarking.compare import compare
 from ..elements.bodies import PointMass
 from ..elements.force import Force
 from ..elements.joint import Joint
 from ..elements.primitive import Primitive
 from ..ensembles.ensemble import ensemble
 from ..errors import Status, TsdynError
+from ..measuring.compare import compare
+from ..measuring.profile import profile
 from ..methods.integrator import Integrator
 from ..motions.prescribed import Motion
 from ..motions.tables import Table
-from ..profiling.profile import profile
 from ..simulation.load import load
-from ..simulation.prepared_run import prepare
+from ..simulation.prepared_run import prepare, simulate
 from ..simulation.resume import resume
 from ..simulation.run_options import RunOptions
 from ..simulation.scene import Scene
-from ..simulation.simulate import simulate
 from ..simulation.solution import Solution
 from .judgement import FAULT, Judgement
 

@@ -13,8 +13,8 @@ from ..maths.power_series import Truncated
 from ..model.equations import applied_forces, force_jacobian, set_time
 from ..model.packed import with_force_jacobians
 from ..motions.signals import Signal
+from ..observables.diagnostics import load_powers, marker_states
 from ..observables.generalised_forces import force_loads
-from ..observables.power import load_powers, marker_states
 from ..rows.graph_builder import build
 from ..taylor.layout import no_series
 from .series_checks import (

@@ -34,6 +34,10 @@ LOAD_SWEEPS, DAMPED, DAMPED_SHARE = 40, 12, 0.5
 # leaves rounding; two digits less are asked for, since the matrix is that of the multipliers before.
 NEWTON_DONE = 1e-10
 
+# Relative error of the multipliers that an explicit stage with joint friction may leave, over rtol of the step: a step
+# changes velocities by about their size, so a hundredth of its tolerance is left.
+LOADS_LEFT = 0.01
+
 # Error norm that the solves for u and z may leave at each iterate of a stage: less than the iteration itself (KAPPA).
 LEFT = 1e-4
 

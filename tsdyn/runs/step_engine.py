@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..formulations.registry import formulation
-from ..formulations.tolerances import TURN_FREE, TURN_LIMIT
+from ..formulations.tolerances import LOADS_LEFT, TURN_FREE, TURN_LIMIT
+from ..maths.tolerances import LAST_PLACE
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.explicit import called_for
 from ..model.laws import calls_laws, interrupts_answered
@@ -131,6 +132,8 @@ class StepEngine:
         _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=self.within))
         run.numbers.free_stages = free = form.frees_stages and interval == 0
         memory.context.chart.state.turn_limit = TURN_FREE if free else TURN_LIMIT
+        share = LOADS_LEFT * method.step_tolerances()[0] if method.step is None else 0.0
+        memory.context.chart.state.loads_left = max(share, LAST_PLACE)
         place, accelerate = form.stage_kernels(free)
         run.kernels.stage_place, run.kernels.stage_accelerate = place.address, accelerate.address
         run.numbers.first_order = form.first_order

@@ -40,7 +40,18 @@ from .chart_validity import measure_turns
 from .projection import largest_residual, velocity_floor
 from .saddle_point import add_blocks, degrees, factorise, linearise, reduce, soften, solve, take_solution, turned_back
 from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, weighted_square, write_state
-from .tolerances import FARTHEST_AHEAD, LAG, LEAST_LAG, LEFT, REACTION_SWEEPS, REACTIONS_LEFT, SLOW, STALLED, SWEEPS
+from .tolerances import (
+    FARTHEST_AHEAD,
+    LAG,
+    LEAST_LAG,
+    LEFT,
+    REACTION_SWEEPS,
+    REACTIONS_LEFT,
+    REACTIONS_LEFT_COUPLED,
+    SLOW,
+    STALLED,
+    SWEEPS,
+)
 
 # Right-hand side of a Newton correction of a stage: the normal part of accelerations, and the unbalanced loads.
 
@@ -82,8 +93,11 @@ def spread_normal(c, b):
 
 
 @kernel
-def find_imbalance(c):
-    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows. False if S is singular."""
+def find_imbalance(c, left):
+    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for the rows. False if S is singular.
+
+    left: the fraction of the imbalance along the rows that may remain.
+    """
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     # M (a + C n)
     to_bodies(graph, l, s.r, f.Z)
@@ -94,7 +108,7 @@ def find_imbalance(c):
     for i in range(s.e.size):
         s.e[i] = s.loads[i] - f.Z[i]
     take_reactions(graph, f.rows, s.multipliers, s.e)
-    if f.b.size > 0 and not _correct_multipliers(c):
+    if f.b.size > 0 and not _correct_multipliers(c, left):
         return False
     # In the order of elimination
     for i in range(s.x.size):
@@ -107,8 +121,8 @@ def find_imbalance(c):
 
 
 @kernel
-def _correct_multipliers(c):
-    """Correct lam by S^-1 H W e until H W e, e = F - M (a + C n) - H^T lam, is small; s.e = e. False if S is singular.
+def _correct_multipliers(c, left):
+    """Correct lam by S^-1 H W e until `left` of H W e is left, e = F - M (a + C n) - H^T lam = s.e. False: S singular.
 
     The saddle-point matrix was formed with an older H, so the residual normal to the constraints is eliminated with the
     present one. S may be older, too, as long as corrections contract: at first it is that of the step's start.
@@ -124,7 +138,7 @@ def _correct_multipliers(c):
         multiply_rows(graph, f.rows, f.Z, f.b)
         worst = largest_residual(graph, f, w.control.floor)
         if sweep == 0:
-            least = REACTIONS_LEFT * worst
+            least = left * worst
         if worst <= least:
             return True
         # Where W is that of raised inertias, N of the chart takes the place of S
@@ -341,7 +355,7 @@ def correct(context, g, k):
     turn_accelerations(graph, l, f.poses, k, s.a)
     _correct_normal_part(c, g, k)
     # [e, dlam] of the saddle-point matrix
-    if not find_imbalance(c):
+    if not find_imbalance(c, REACTIONS_LEFT):
         return math.inf
     solve_saddle(s)
     take_solution(graph, s)
@@ -417,7 +431,7 @@ def balance_stage(context, i, k):
     find_normal_part(c)
     copy(f.b, s.normal[i])
     # F - M (a + C n) - H^T lam
-    if not find_imbalance(c):
+    if not find_imbalance(c, REACTIONS_LEFT_COUPLED):
         return SINGULAR
     copy(s.x, s.right[i])
     # What the correction of this stage needs once all stages are solved

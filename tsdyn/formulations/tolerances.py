@@ -51,7 +51,8 @@ FARTHEST_AHEAD = 2.0
 # Corrections of the multipliers in an iteration of a stage, and the fraction of the unbalanced loads along the rows
 # that may remain: the iteration matrix, formed with an older H, acts on the remainder. With one iteration a stage, 1e-5
 # shows in the error of chains of 64 links at 1e-8: fourteen times as large.
-REACTION_SWEEPS, REACTIONS_LEFT = 8, 1e-7
+# Where all stages are solved at once every one has two iterations, and 1e-5 shows in no error; 1e-3 does.
+REACTION_SWEEPS, REACTIONS_LEFT, REACTIONS_LEFT_COUPLED = 8, 1e-7, 1e-5
 
 # 1 / m: residual after a Newton step over the square of the residual before, until it is measured. One over a metre:
 # links of usual size.

@@ -420,7 +420,7 @@ def _judge_chart(context, c, r, h, driven):
 
 @kernel
 def _reach(c, h):
-    """The step that contracts a new chart by CONTRACTION_KEPT, from one of h: contraction grows as the step at least."""
+    """The step that contracts a new chart by CONTRACTION_KEPT, from one of h: contraction grows as the step."""
     return h * CONTRACTION_KEPT / max(c.work.control.contraction, CONTRACTION_SEEN)
 
 

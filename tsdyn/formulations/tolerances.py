@@ -65,8 +65,9 @@ TURN_LIMIT = 0.25  # |d|: the sine of half the rotation of a body since q0; 29 d
 # bases adds up.
 TURN_FREE = 0.05
 CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a rotation of 60 degrees
-# Contraction of a new chart that a step is meant to cause at most; the least that tells how long it may be.
-CONTRACTION_KEPT, CONTRACTION_SEEN = 0.3, 0.01
+# Contraction of a new chart that a step is meant to cause at most: with 0.45 twice as many steps of a Peaucellier
+# linkage are rejected, with 0.25 a spinning top takes two thirds more at a tolerance of 1e-3.
+CONTRACTION_KEPT = 0.3
 FARTHEST = 0.9  # |d|^2: d0 = 0.32, and C grows as 1 / d0
 TURN_SHARE = 0.55  # of |d|, as a contraction: a rotation that no constraint depends on reaches 0.9 in a step, 0.5 here
 # Relative error of the factors of N at the end of a solve, up to which their pivots give the contraction (limit 0.15)

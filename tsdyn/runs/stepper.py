@@ -6,9 +6,10 @@ from ..errors import Status
 from ..formulations.accelerations import body_of, unit_friction
 from ..formulations.chart_coordinates import turned_most
 from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL
-from ..formulations.tolerances import CONTRACTION_KEPT, CONTRACTION_LOST, CONTRACTION_SEEN
+from ..formulations.tolerances import CONTRACTION_KEPT, CONTRACTION_LOST
 from ..jit.kernels import caller, entry, kernel, long_kernel, stack
 from ..maths.dense_linalg import copy
+from ..maths.tolerances import TINY
 from ..methods.explicit import call_step
 from ..model.equations import hold_pieces, is_rheonomic, remember, set_time
 from ..model.joint_turns import count_turns
@@ -421,7 +422,7 @@ def _judge_chart(context, c, r, h, driven):
 @kernel
 def _reach(c, h):
     """The step that contracts a new chart by CONTRACTION_KEPT, from one of h: contraction grows as the step."""
-    return h * CONTRACTION_KEPT / max(c.work.control.contraction, CONTRACTION_SEEN)
+    return h * CONTRACTION_KEPT / max(c.work.control.contraction, TINY)
 
 
 @kernel

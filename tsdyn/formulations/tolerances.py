@@ -51,7 +51,7 @@ FARTHEST_AHEAD = 2.0
 # Corrections of the multipliers in an iteration of a stage, and the fraction of the unbalanced loads along the rows
 # that may remain: the iteration matrix, formed with an older H, acts on the remainder. With one iteration a stage, 1e-5
 # shows in the error of chains of 64 links at 1e-8: fourteen times as large.
-# Where all stages are solved at once every one has two iterations, and 1e-5 shows in no error; 1e-3 does.
+# Where all stages are solved at once every one has two iterations, and 1e-5 hardly shows in errors; 1e-3 does.
 REACTION_SWEEPS, REACTIONS_LEFT, REACTIONS_LEFT_COUPLED = 8, 1e-7, 1e-5
 
 # 1 / m: residual after a Newton step over the square of the residual before, until it is measured. One over a metre:
@@ -65,8 +65,8 @@ TURN_LIMIT = 0.25  # |d|: the sine of half the rotation of a body since q0; 29 d
 # bases adds up.
 TURN_FREE = 0.05
 CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a rotation of 60 degrees
-# Contraction of a new chart that a step is meant to cause at most: with 0.45 twice as many steps of a Peaucellier
-# linkage are rejected, with 0.25 a spinning top takes two thirds more at a tolerance of 1e-3.
+# Contraction of a new chart that a step is meant to cause at most: with 0.45 three times as many steps of a Peaucellier
+# linkage are rejected; with 0.25 a spinning top takes two thirds more steps than without at 1e-3, with 0.3 a third.
 CONTRACTION_KEPT = 0.3
 FARTHEST = 0.9  # |d|^2: d0 = 0.32, and C grows as 1 / d0
 TURN_SHARE = 0.55  # of |d|, as a contraction: a rotation that no constraint depends on reaches 0.9 in a step, 0.5 here

@@ -70,6 +70,8 @@ class ChartState(Record):
     formed: int  # 1 if S is that of a stage, not factored yet
     placement: int  # number of the position solve at the end of the last step; 0 if the chart is of no use
     turn_limit: float  # |d| of a body beyond which the chart is left
+    free: int  # 1 at a stage off the manifold, where S isn't factorised if there is joint friction
+    loads_left: float  # relative error of the multipliers that such a stage may leave with joint friction
 
 
 class ChartWorkspace(NamedTuple):

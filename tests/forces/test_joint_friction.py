@@ -84,6 +84,21 @@ def test_a_pendulum_on_a_rough_pin(formulation):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("tol", [1e-4, 1e-7, 1e-10])
+def test_loads_of_explicit_stages_are_as_exact_as_the_steps(tol):
+    """Against minimal coordinates in SciPy; S is factorised where a step ends, and not at its stages."""
+    scene, bar, *_ = pendulum()
+    solution = ts.simulate(scene, (0.0, 1.0), integrator=ts.integrators.DOP853(tol, tol))
+    angle, rate = solve_ivp(pendulum_rates, (0, 1), (0, 0), method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(solution.position(bar)[-1], (0.8 * np.cos(angle), 0, -0.8 * np.sin(angle)), atol=tol)
+    np.testing.assert_allclose(solution.angular_velocity(bar)[-1], (0, rate, 0), atol=10.0 * tol)
+    assert 3 * solution.stats.factorizations < solution.stats.evaluations
+    errors = solution.constraint_error
+    assert max(errors.position.max(), errors.velocity.max()) < ALGEBRA
+    assert errors.acceleration.max() < HELD
+
+
+@pytest.mark.slow
 def test_implicit_and_fixed_steps_and_dense_output_agree():
     scene, _bar, *_ = pendulum()
     exact = ts.simulate(scene, (0.0, 1.0), dense_output=True, **PRECISE)

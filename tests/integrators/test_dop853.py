@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from examples import bricard
 from tests.helpers.reference import demand_every_level, load, run
 from tests.helpers.tolerances import HELD, ROUNDING
 from tsdyn.methods.tableau import RungeKuttaTableau
@@ -81,6 +82,16 @@ def test_evaluations_are_counted():
     assert at_steps.stats.evaluations == plain.stats.evaluations
     inside = ts.simulate(scene, (0.0, 10.0), integrator=method, t_eval=(plain.t[:2].mean(), plain.t[5:7].mean()))
     assert inside.stats.evaluations == plain.stats.evaluations + 2 * (3 + 1)
+
+
+def test_steps_follow_the_charts_of_a_linkage():
+    """At a loose tolerance charts limit the steps of Bricard's loop; few steps leave one, and the motion is right."""
+    scene, tol = bricard.build(), 1e-4
+    solution = ts.simulate(scene, (0.0, 2.0), integrator=DOP853(tol, tol))
+    exact = ts.simulate(scene, (0.0, 2.0), integrator=ts.integrators.Taylor(tol=1e-13))
+    assert 4 * solution.stats.rejected < solution.stats.steps
+    assert np.abs(solution.q[-1] - exact.q[-1]).max() < tol
+    demand_every_level(solution)
 
 
 @pytest.mark.parametrize("method", [RK45, DOP853])

@@ -4,7 +4,7 @@ import math
 
 from ..elements.loops.constraint_rows import OMEGA, POSE, P, add_torque, write_accelerations
 from ..elements.loops.forces import FORCE_INTS
-from ..elements.loops.friction import call_load_slope, call_normal_load, call_unit_friction
+from ..elements.loops.friction import DERIVE, HERE, call_load_slope, call_normal_load, call_unit_friction
 from ..errors import Status
 from ..jit.kernels import callback, caller, kernel, long_kernel, stack
 from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, times
@@ -12,6 +12,7 @@ from ..maths.dense_linalg import copy, largest
 from ..maths.tolerances import LAST_PLACE
 from ..model.equations import applied_forces
 from ..rows.interface import (
+    DYNAMICS,
     acceleration_residuals,
     add_multiplier_terms,
     apply_multipliers,
@@ -21,6 +22,7 @@ from ..rows.interface import (
     evaluate_bias,
     factorise_and_constrain,
     factorise_product,
+    factorise_selected_rows,
     inner,
     note_loads,
     solve_product,
@@ -142,12 +144,12 @@ def unit_friction(system, friction, q, qd, t, out):
 
 
 @kernel
-def normal_load(system, friction, q, qd, t, derive, reaction, out):
-    """out (7,) = the normal load of a reaction (6,) and, with derive = 1, its derivative by that."""
+def normal_load(system, f, friction, q, what, reaction, out):
+    """out (7,) = the normal load of a reaction (6,) and, with DERIVE, its derivative by that; HERE: for another q."""
     stride, own, real = _instance(system, friction)
     call_normal_load(
-        friction.normal, stride, system.table[own:], system.reals[real:], q, qd, t, friction.on, derive,
-        reaction, out,
+        friction.normal, stride, system.table[own:], system.reals[real:], q, f.friction.kept[friction.kept :],
+        friction.on, what, reaction, out,
     )  # fmt: skip
 
 
@@ -190,7 +192,7 @@ def has_converged(change, before, share, sweep, least):
 # g_i acts on the two bodies of its joint and F_n,i,lam has entries in the rows of that joint, so N~ has the block
 # pattern of S and a factorisation of comparable cost.
 
-OK, JAMMED = int(Status.SUCCESS), int(Status.JAMMED)
+OK, JAMMED, SINGULAR = int(Status.SUCCESS), int(Status.JAMMED), int(Status.SINGULAR)
 
 
 @kernel
@@ -227,13 +229,13 @@ def body_reaction(graph, f, friction, lam, out):
 
 
 @kernel
-def _find_loads(graph, system, f, q, qd, t, derive):
-    """Normal loads and, with derive = 1, their derivatives at the multipliers r.lam."""
+def _find_loads(graph, system, f, q, what):
+    """Normal loads at the multipliers r.lam, as `normal_load`."""
     r, reaction = f.friction, stack(6)
     for i in range(graph.frictions.shape[0]):
         friction = graph.frictions[i]
         body_reaction(graph, f, friction, r.lam, reaction)
-        normal_load(system, friction, q, qd, t, derive, reaction, r.load[7 * i :])
+        normal_load(system, f, friction, q, what, reaction, r.load[7 * i :])
 
 
 @kernel
@@ -278,10 +280,11 @@ def factorise_loads(graph, f, cold):
 
 
 @long_kernel
-def find_reactions(graph, system, f, q, qd, t):
+def find_reactions(graph, system, f, q, qd, t, least):  # seven: what the loads depend on, and how exact they are
     """Z = (r'', omega''), r.lam the multipliers and r.load the normal loads; Z is W F on entry, gamma as Eq. 3 has it.
 
-    H, Y and S are those of the poses. Return True if reactions were found.
+    H and Y are those of the poses; `least` is the relative error of the multipliers that may be left. Return True if
+    reactions were found.
     """
     r = f.friction
     _weigh_units(graph, system, f, q, qd, t)
@@ -296,7 +299,8 @@ def find_reactions(graph, system, f, q, qd, t):
     before, renew, done = math.inf, True, False
     for sweep in range(LOAD_SWEEPS):
         # Loads at the present lam, with derivatives where N~ is factorised
-        _find_loads(graph, system, f, q, qd, t, int(renew and size > 0.0 and not done))
+        derived = renew and size > 0.0 and not done
+        _find_loads(graph, system, f, q, (DERIVE if derived else 0) | (HERE if sweep == 0 else 0))
         # Z = W (F + sum_i g_i F_n,i - H^T lam)
         _apply_loads(graph, f)
         if done:
@@ -314,27 +318,31 @@ def find_reactions(graph, system, f, q, qd, t):
             r.lam[e] += share * f.b[e]
         # Converged: the correction is rounding, or that of a new matrix is so small that its square is
         cold, size = size == 0.0, largest(r.lam)
-        done = has_converged(change, before, share, sweep, LAST_PLACE * size)
+        done = has_converged(change, before, share, sweep, least * size)
         done = done or (renew and not cold and change <= NEWTON_DONE * size)
         renew, before = cold or sweep >= DAMPED or change > SLOW_FACTORS * before, change
     return False
 
 
 @kernel
-def accelerate_with_friction(graph, system, w, f, t):
+def accelerate_with_friction(graph, system, w, f, t, least):
     """Z = (r'', omega'') with joint friction, as `find_reactions`; f.friction.lam is where Newton's method starts."""
     forget_loads(system)
     free_accelerations(graph, system, w, f, t)
-    return find_reactions(graph, system, f, w.q, w.qd, t)
+    return find_reactions(graph, system, f, w.q, w.qd, t, least)
 
 
 @callback(SOLVE_FRICTION)
 def solve_friction(context, t, unused):
     """Solve for accelerations as accelerations.solve_accelerations, with joint friction. Status."""
     c = load(context)
-    system, f, graph = c.system, c.tangent, c.graph
-    found = accelerate_with_friction(graph, system, c.work, f, t)
+    system, f, graph, stage = c.system, c.tangent, c.graph, c.chart.state
+    found = accelerate_with_friction(graph, system, c.work, f, t, stage.loads_left if stage.free == 1 else LAST_PLACE)
     for i in range(system.normals.size):
         system.reals[system.normals[i]] = f.friction.load[7 * i]
     copy(f.friction.lam, f.b)
-    return OK if found else JAMMED
+    if found:
+        return OK
+    # Where S hasn't been factorised yet, it may be the reason
+    singular = stage.free == 1 and factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0
+    return SINGULAR if singular else JAMMED

@@ -52,6 +52,7 @@ from .tolerances import (
     NORMAL_SWEEPS,
     REACTION_SWEEPS,
     REACTIONS_LEFT,
+    REACTIONS_LEFT_COUPLED,
     SLOW,
     STALLED,
     SWEEPS,
@@ -118,8 +119,11 @@ def spread_normal(c, b):
 
 
 @kernel
-def find_imbalance(c):
-    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for rows of Phi. False if S is singular."""
+def find_imbalance(c, left):
+    """s.x = F - M (a + C n) - H^T lam, n = s.r, and zero for rows of Phi. False if S is singular.
+
+    left: the fraction of the imbalance along the rows that may remain.
+    """
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     # M (a + C n)
     to_bodies(graph, l, s.r, f.Z)
@@ -135,7 +139,7 @@ def find_imbalance(c):
     for i in range(s.e.size):
         s.e[i] = s.loads[i] - f.Z[i]
     take_reactions(graph, f.rows, s.multipliers, s.e)
-    if f.b.size > 0 and not _correct_multipliers(c):
+    if f.b.size > 0 and not _correct_multipliers(c, left):
         return False
     for b in range(graph.bodies.shape[0]):
         at, o = s.graph.body_at[b], 8 * b
@@ -145,8 +149,8 @@ def find_imbalance(c):
 
 
 @kernel
-def _correct_multipliers(c):
-    """Correct lam by S^-1 H W e until H W e, e = F - M (a + C n) - H^T lam, is small; s.e = e. False if S is singular.
+def _correct_multipliers(c, left):
+    """Correct lam by S^-1 H W e until `left` of H W e is left, e = F - M (a + C n) - H^T lam = s.e. False: S singular.
 
     The saddle-point matrix was formed with an older H, so the residual normal to the constraints is eliminated with the
     present one. S may be older, too, as long as corrections contract: at first it is that of the step's start.
@@ -162,7 +166,7 @@ def _correct_multipliers(c):
         multiply_rows(graph, f.rows, f.Z, f.b)
         worst = largest_residual(graph, f, w.control.floor)
         if sweep == 0:
-            least = REACTIONS_LEFT * worst
+            least = left * worst
         if worst <= least:
             return True
         # There N of the chart takes the place of S
@@ -386,7 +390,7 @@ def correct(context, g, k):
     if graph.rates.size > 0:
         square = weighted_square(graph, l, s.r, w.q, c.linear.now[0], 0, numbers.rtol, numbers.atol)
     # [e, dlam] of the saddle-point matrix
-    if not find_imbalance(c):
+    if not find_imbalance(c, REACTIONS_LEFT):
         return math.inf
     solve_saddle(s)
     take_solution(graph, s)
@@ -464,7 +468,7 @@ def balance_stage(context, i, k):
     find_normal_part(c)
     copy(f.b, s.normal[i])
     # F - M (a + C n) - H^T lam
-    if not find_imbalance(c):
+    if not find_imbalance(c, REACTIONS_LEFT_COUPLED):
         return SINGULAR
     copy(s.x, s.right[i])
     # What the correction of this stage needs once all stages are solved

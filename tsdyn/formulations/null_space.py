@@ -3,6 +3,7 @@
 import math
 
 from ..elements.loops.constraint_rows import move_bodies, place_bodies
+from ..elements.loops.friction import DERIVE, HERE
 from ..errors import Status
 from ..jit.kernels import callback, kernel, stack, vector
 from ..maths.dense_linalg import (
@@ -163,7 +164,7 @@ def _find_bases(graph, system, w, f, t, vdd):
 
 
 @kernel
-def _find_load(graph, system, w, friction, lam, t, out, by_row):
+def _find_load(graph, system, w, f, friction, lam, out, by_row):  # eight: as `normal_load`, and the rows
     """out (7,) as of friction_solve.normal_load, and by_row (m,) its derivative by the multipliers, of its own rows."""
     body = body_of(friction, friction.on)
     at, turns = system.bodies[body, 0], system.bodies[body, 1] == 7
@@ -193,7 +194,7 @@ def _find_load(graph, system, w, friction, lam, t, out, by_row):
                     x -= row[at + c] * out[1 + c] + torque[c] * out[4 + c]
                 by_row[e] = x
         if only_sum == 0:
-            normal_load(system, friction, w.q, w.qd, t, 1, reaction, out)
+            normal_load(system, f, friction, w.q, DERIVE | HERE, reaction, out)
 
 
 @kernel
@@ -219,7 +220,7 @@ def add_friction(graph, system, w, f, t, vdd):
         # Residual F_n,i(lam) - F_n,i;  J_ij = delta_ij - F_n,i,lam . l_j
         for i in range(frictions):
             friction = graph.frictions[i]
-            _find_load(graph, system, w, friction, lam, t, r.load[7 * i :], by_row)
+            _find_load(graph, system, w, f, friction, lam, r.load[7 * i :], by_row)
             b[i] = r.load[7 * i] - loads[i]
             for j in range(frictions):
                 x = 1.0 if i == j else 0.0

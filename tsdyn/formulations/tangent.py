@@ -27,6 +27,7 @@ from ..rows.interface import (
     refinements,
     solve_product,
     solve_rows,
+    weigh_selected_rows,
 )
 from ..workspaces import load
 from .accelerations import call_friction, factorise_for_accelerations, refine_accelerations, solve_accelerations
@@ -137,7 +138,7 @@ def place(context, t, x):
     c = load(context)
     system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
     w.counters.placements += 1
-    l.state.time = t
+    l.state.time, l.state.free = t, 0
     if not set_time(system, t):
         return NOT_FINITE
     x, status = vector(x, l.x.size - 8), NEWTON_FAILED
@@ -162,7 +163,7 @@ def stage_place(context, t, x):
     c = load(context)
     system, w, f, l, graph = c.system, c.work, c.tangent, c.chart, c.graph
     w.counters.placements += 1
-    l.state.time, l.state.factored = t, 0
+    l.state.time, l.state.factored, l.state.free = t, 0, 1
     if not set_time(system, t):
         return NOT_FINITE
     # (rho, eta) = x: u, of the order of truncation, stays; the end of the step takes it off
@@ -172,8 +173,12 @@ def stage_place(context, t, x):
     # H there
     if f.b.size > 0:
         evaluate_rows(graph, system, f, f.rows, t)
-    # Friction takes S by other ways
-    return _prepare_accelerations(graph, system, w, f, l, f.b.size > 0 and graph.frictions.shape[0] == 0)
+    # With joint friction another matrix is factorised
+    if graph.frictions.shape[0] > 0:
+        weigh_selected_rows(graph, f.rows)
+        write_positions(graph.bodies, f.poses, w.q)
+        return OK
+    return _prepare_accelerations(graph, system, w, f, l, f.b.size > 0)
 
 
 @kernel

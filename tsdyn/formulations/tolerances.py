@@ -34,6 +34,10 @@ LOAD_SWEEPS, DAMPED, DAMPED_SHARE = 40, 12, 0.5
 # leaves rounding; two digits less are asked for, since the matrix is that of the multipliers before.
 NEWTON_DONE = 1e-10
 
+# Relative error of the multipliers that an explicit stage with joint friction may leave, over rtol of the step: a step
+# changes velocities by about their size, so a hundredth of its tolerance is left.
+LOADS_LEFT = 0.01
+
 # Error norm that the solves for u and z may leave at each iterate of a stage: less than the iteration itself (KAPPA).
 LEFT = 1e-4
 
@@ -47,7 +51,8 @@ FARTHEST_AHEAD = 2.0
 # Corrections of the multipliers in an iteration of a stage, and the fraction of the unbalanced loads along the rows
 # that may remain: the iteration matrix, formed with an older H, acts on the remainder. With one iteration a stage, 1e-5
 # shows in the error of chains of 64 links at 1e-8: fourteen times as large.
-REACTION_SWEEPS, REACTIONS_LEFT = 8, 1e-7
+# Where all stages are solved at once every one has two iterations, and 1e-5 hardly shows in errors; 1e-3 does.
+REACTION_SWEEPS, REACTIONS_LEFT, REACTIONS_LEFT_COUPLED = 8, 1e-7, 1e-5
 # Sweeps for the normal part of accelerations where there are rows on velocities: each gains a digit.
 NORMAL_SWEEPS = 4
 
@@ -62,6 +67,9 @@ TURN_LIMIT = 0.25  # |d|: the sine of half the rotation of a body since q0; 29 d
 # bases adds up.
 TURN_FREE = 0.05
 CONTRACTION_LOST = 0.5  # beyond it another branch may have been found; a rotation of 60 degrees
+# Contraction of a new chart that a step is meant to cause at most: with 0.45 three times as many steps of a Peaucellier
+# linkage are rejected; with 0.25 a spinning top takes two thirds more steps than without at 1e-3, with 0.3 a third.
+CONTRACTION_KEPT = 0.3
 FARTHEST = 0.9  # |d|^2: d0 = 0.32, and C grows as 1 / d0
 TURN_SHARE = 0.55  # of |d|, as a contraction: a rotation that no constraint depends on reaches 0.9 in a step, 0.5 here
 # Relative error of the factors of N at the end of a solve, up to which their pivots give the contraction (limit 0.15)

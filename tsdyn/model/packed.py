@@ -10,6 +10,7 @@ from ..elements.element import address, checked_parameters
 from ..elements.laws import SceneLaw
 from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE
 from ..elements.loops.forces import FORCE_INTS, kept_size
+from ..elements.loops.friction import STAND
 from ..elements.loops.template import AT, DIMENSION
 from ..elements.markers import POINT
 from ..errors import InvalidConstraint, InvalidForce
@@ -340,6 +341,8 @@ class FrictionPlace(Record):
     index: int  # and its instance there
     unit: int  # addresses of friction.unit_friction and friction.normal_load
     normal: int
+    kept: int  # where its floats of Friction.kept begin
+    room: int  # and how many they are
 
 
 def coupled_loads(packed):
@@ -354,7 +357,7 @@ def frictions_of(packed, bodies, rows_of, sides):
     """
     found = coupled_loads(packed)
     members = {id(member.constraint): member for member in packed.members} if found else {}
-    frictions, rows = [], []
+    frictions, rows, kept = [], [], 0
     for load in found:
         force, first = load.force, len(rows)
         on = 0 if force.on is force.a else 1
@@ -363,7 +366,9 @@ def frictions_of(packed, bodies, rows_of, sides):
         kind, index = _place(packed.system.forces, load.alone[0])
         loops = (address(force.kernels, name, force.name, InvalidForce) for name in ("unit_friction", "normal_load"))
         pair = (bodies.get(id(body), len(bodies)) for body in (force.a, force.b))
-        frictions.append([*pair, on, first, len(rows) - first, kind, index, *loops])
+        room = STAND + sum(marker.size for marker in force.markers)
+        frictions.append([*pair, on, first, len(rows) - first, kind, index, *loops, kept, room])
+        kept += room
     return records(FrictionPlace, frictions), np.array(rows, np.int64).reshape(-1, 2)
 
 

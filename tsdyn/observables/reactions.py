@@ -15,12 +15,13 @@ from ..elements.force import Force
 from ..elements.joint import SumRow
 from ..elements.loops.constraint_rows import place_bodies, take_loads
 from ..elements.loops.coordinate_rows import BLOCK, INTS
+from ..elements.loops.friction import HERE
 from ..elements.markers import POINT
 from ..errors import InvalidBody, InvalidConstraint, RedundantConstraints
 from ..formulations.accelerations import find_reactions, normal_load
 from ..jit.kernels import entry, kernel, long_kernel, resident, stack
 from ..maths.dense_linalg import copy
-from ..maths.tolerances import RANK_TOL, TINY
+from ..maths.tolerances import LAST_PLACE, RANK_TOL, TINY
 from ..model.equations import WIDTH, added_inertia, constraint_jacobian, recall, set_time, with_short_rows
 from ..model.handles import handles_of
 from ..model.packed import classes, index_of, member_of, no_system
@@ -130,7 +131,7 @@ def _solve(context, t, q, qd, r, memory, out):
         weigh_bodies(graph, f.Z)
         for e in range(f.gamma.size):
             f.gamma[e] = 0.0
-        found = found and find_reactions(graph, s, f, q[k], qd[k], t[k])
+        found = found and find_reactions(graph, s, f, q[k], qd[k], t[k], LAST_PLACE)
         for i in range(out.shape[1]):
             out[k, i] = f.friction.load[7 * i] if found else np.nan
 
@@ -392,14 +393,14 @@ def _free_loads(context, t, q, whole, out):
             friction = graph.frictions[i]
             for c in range(6):
                 reaction[c] = 0.0
-            normal_load(s, friction, q, q, t, 0, reaction, none)
+            normal_load(s, f, friction, q, HERE, reaction, none)
             for j in range(friction.first, friction.first + friction.count):
                 e, side = graph.friction_rows[j]
                 at = 16 * e + 8 * side
                 for c in range(3):
                     reaction[c] -= whole[at + c] * f.b[e] / largest
                     reaction[3 + c] -= whole[at + 4 + c] * f.b[e] / largest
-            normal_load(s, friction, q, q, t, 0, reaction, found)
+            normal_load(s, f, friction, q, 0, reaction, found)
             out[i] = max(out[i], abs(found[0] - none[0]))
 
 

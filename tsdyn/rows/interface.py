@@ -91,6 +91,7 @@ from .schur_complement import (
     take_reactions,
     weigh,
     weigh_bodies,
+    weigh_selected_rows,
 )
 from .tolerances import ILL_CONDITIONED, MOST_ROWS
 
@@ -131,7 +132,8 @@ def _allocate_friction(graph, n, basis):
     k, rows = len(graph.frictions), len(graph.row) + int((graph.normals >= 0).sum())
     m, pairs, nb = (len(graph.row), len(graph.sides), len(graph.bodies)) if k else (0, 0, -1)
     factors = lu_factors(graph.pattern) if k else (zeros(0), zeros(0))
-    free = zeros(16 * k), zeros(7 * k), zeros(m), zeros(8 * (nb + 1)), zeros(16 * pairs), *factors
+    kept = int(graph.frictions[-1].kept + graph.frictions[-1].room) if k else 0
+    free = zeros(16 * k), zeros(7 * k), zeros(kept), zeros(m), zeros(8 * (nb + 1)), zeros(16 * pairs), *factors
     if not basis:
         k = n = rows = 0
     matrices = np.zeros((k, n + rows)), np.zeros((k, k)), np.zeros(k, np.int64)
@@ -187,6 +189,7 @@ def redundancy(graph):
 #     evaluate_bias           f.gamma = gamma         evaluate_drift          out = Phi_t
 # Factorise:
 #     factorise_rows          Y, S = L D L^T          factorise_chart_matrix  N = H C Y0 = L D U
+#     weigh_selected_rows     Y alone
 #     factorise_product       H X^T = L D U
 #     write_saddle_rows, factorise_saddle, solve_saddle         of the saddle-point matrix of implicit methods
 #     factorise_complex_saddle, solve_complex_saddle            the same with complex steps
@@ -299,6 +302,7 @@ __all__ = [
     "unbalance_inertia_rows",
     "weigh",
     "weigh_bodies",
+    "weigh_selected_rows",
     "with_reselection",
     "write_saddle_rows",
 ]

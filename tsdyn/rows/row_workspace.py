@@ -24,6 +24,7 @@ class Friction(NamedTuple):
 
     g: np.ndarray  # (k * 16,)  W times each for a normal load of one, on bodies a and b; friction_solve
     load: np.ndarray  # (k * 7,)  normal load, and its derivative by the reaction; friction.normal_load
+    kept: np.ndarray  # markers, arm and orientation of each at the present configuration; friction.normal_load
     lam: np.ndarray  # (m,)  multipliers, from one evaluation to the next; friction_solve
     Z: np.ndarray  # ((b + 1) * 8,)  accelerations of bodies without friction and reactions; friction_solve
     X: np.ndarray  # (pairs * 16,)  W (H^T - g N_lam); friction_solve
@@ -95,7 +96,7 @@ class TangentWorkspace(NamedTuple):
 def no_tangent_workspace():
     """The `TangentWorkspace` of nothing, for its type."""
     none, whole, square = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0))
-    friction = Friction(*[none] * 7, square, square, whole, none)
+    friction = Friction(*[none] * 8, square, square, whole, none)
     rows, records = Rows(none, none, none, none), (Landing(), Selection(), Indicator(), RedundantRows(none, none, none))
     return TangentWorkspace(
         none, rows, *[none] * 6, *records, whole, none, whole, none, whole, whole, none, friction, whole

@@ -208,6 +208,15 @@ def _multiply_parts(graph, H, Y, values):
 
 
 @kernel
+def weigh_selected_rows(graph, rows):
+    """Set Y = W H^T alone, the selection being given."""
+    put_rows_back(graph, rows)
+    weigh_rows(graph, rows.H, rows.Y)
+    clear_rows(graph, rows)
+    weigh_axes(graph, rows.Y)
+
+
+@kernel
 def factorise_selected_rows(graph, f, rows, metric):
     """Set Y = W H^T and the factors of S = H W H^T, the selection being given; return the row that fails, or -1.
 

@@ -243,7 +243,7 @@ LAID_OUT = (  # fields that follow from scene and method, or are filled in befor
     "block", "own", "trial", "table", "of_rates",
 )  # fmt: skip
 OWN = {  # numbers of records, likewise
-    "ChartState": ("turn_limit",),
+    "ChartState": ("turn_limit", "loads_left"),
     "Orders": ("top", "room", "lowest", "highest", "refined", "sweeps"),
     "RunNumbers": (
         "first_order", "adaptive", "steps_wanted", "chart_interval", "free_stages", "dense", "last_stage", "stage_at",

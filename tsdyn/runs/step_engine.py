@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..formulations.registry import formulation
-from ..formulations.tolerances import TURN_FREE, TURN_LIMIT
+from ..formulations.tolerances import LOADS_LEFT, TURN_FREE, TURN_LIMIT
+from ..maths.tolerances import LAST_PLACE
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.explicit import called_for
 from ..model.laws import calls_laws, interrupts_answered
@@ -139,6 +140,8 @@ class StepEngine:
         drifts = form.basis_free and not free and self.graph.rates.size > 0
         run.numbers.chart_interval = interval or int(drifts)
         memory.context.chart.state.turn_limit = TURN_FREE if free else TURN_LIMIT
+        share = LOADS_LEFT * method.step_tolerances()[0] if method.step is None else 0.0
+        memory.context.chart.state.loads_left = max(share, LAST_PLACE)
         place, accelerate = form.stage_kernels(free)
         run.kernels.stage_place, run.kernels.stage_accelerate = place.address, accelerate.address
         run.numbers.first_order = MIXED if form.mixed else form.first_order

@@ -6,9 +6,10 @@ from ..errors import Status
 from ..formulations.accelerations import body_of, unit_friction
 from ..formulations.chart_coordinates import turned_most
 from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL
-from ..formulations.tolerances import CONTRACTION_LOST
+from ..formulations.tolerances import CONTRACTION_KEPT, CONTRACTION_LOST
 from ..jit.kernels import caller, entry, kernel, long_kernel, stack
 from ..maths.dense_linalg import copy
+from ..maths.tolerances import TINY
 from ..methods.explicit import call_step
 from ..model.equations import hold_pieces, is_rheonomic, remember, set_time
 from ..model.joint_turns import count_turns
@@ -420,6 +421,12 @@ def _judge_chart(context, c, r, h, driven):
 
 
 @kernel
+def _reach(c, h):
+    """The step that contracts a new chart by CONTRACTION_KEPT, from one of h: contraction grows as the step."""
+    return h * CONTRACTION_KEPT / max(c.work.control.contraction, TINY)
+
+
+@kernel
 def _is_accepted(context, run, c, r, t1, h):
     """Accept or reject the step h to t1, by its error and by the loads along its path. True if accepted."""
     before = r.clock.error_before
@@ -448,8 +455,11 @@ def _halve(c, r, h):
 
 
 @kernel
-def _change_chart(context, c, r, log, h, status, driven):
-    """Reject a step that left the chart: back to its start, on a new chart if this one has been used. Status."""
+def _change_chart(context, c, r, log, shorter, status, driven):
+    """Reject a step that left the chart: back to its start, on a new chart if this one has been used. Status.
+
+    If the chart was new, the next step is `shorter`.
+    """
     # q, qd, qdd of the step's start
     restore_now(c.work, r)
     c.chart.state.placement = 0  # the poses are not those that the next chart begins at
@@ -462,7 +472,7 @@ def _change_chart(context, c, r, log, h, status, driven):
             near = is_singular_within_a_step(c.tangent) or (status in OFF_CHART and has_hardly_turned(c))
             return PASSAGE if near and r.numbers.may_pass == 1 else status
         r.numbers.failed = status
-        r.clock.h = QUARTERED * h
+        r.clock.h = shorter
         if driven:  # nothing else keeps the next step from being as long
             r.clock.turn_share *= HALVED
     # Rows may have become dependent
@@ -541,10 +551,13 @@ def advance(context, run, log, most):
             status = 0
             continue
         # Rejected: the step left its chart
+        shorter = QUARTERED * h
         if status == 0:
             status, reason = _judge_chart(context, c, r, h, driven)
+            if c.work.control.contraction >= CONTRACTION_LOST:
+                shorter = max(shorter, _reach(c, h))
         if status != 0:
-            status = _change_chart(context, c, r, log, h, status, driven)
+            status = _change_chart(context, c, r, log, shorter, status, driven)
             continue
         # Rejected: the error is too large, or a load changes between the stages
         if adaptive and not _is_accepted(context, run, c, r, t1, h):
@@ -557,6 +570,8 @@ def advance(context, run, log, most):
         note_accepted(r, log)
         if adaptive and t1 == stop and h < CUT_SHORT * wanted:
             r.clock.h, r.clock.error_before = max(r.clock.h, wanted), before
+        if adaptive and r.numbers.in_chart == 0:
+            r.clock.h = min(r.clock.h, _reach(c, h))
         stiff = r.numbers.last_stage > 0 and watch_stiffness(c.system.bodies, c.work, r, h)
         _move_on(c, r, t1, cut, implicit)
         status = _finish(context, run, c, r, log, t0, last, reason)

@@ -24,6 +24,7 @@ from ..formulations.accelerations import (
 from ..jit.kernels import callback, kernel, stack
 from ..jit.simd import add, cross, first, four, put, second, splat, third
 from ..maths.dense_linalg import copy
+from ..maths.tolerances import LAST_PLACE
 from ..rows.interface import add_products, evaluate_bias, note_loads, solve_friction_series, weigh_bodies
 from .coefficients import (
     change,
@@ -97,12 +98,12 @@ def _start(graph, system, w, x, f):
     note_loads(f)
     # Newton's method for lam_0; if it fails from the last multipliers, from zero
     evaluate_bias(graph, system, f, x.order.time)
-    if find_reactions(graph, system, f, w.q, w.qd, x.order.time):
+    if find_reactions(graph, system, f, w.q, w.qd, x.order.time, LAST_PLACE):
         return True
     copy(r.Z, f.Z)
     for e in range(r.lam.size):
         r.lam[e] = 0.0
-    return find_reactions(graph, system, f, w.q, w.qd, x.order.time)
+    return find_reactions(graph, system, f, w.q, w.qd, x.order.time, LAST_PLACE)
 
 
 @kernel
@@ -193,7 +194,7 @@ def accelerate_with_friction_here(context, t, h):
     copy(r.lam, kept)
     for e in range(r.lam.size):
         r.lam[e] = 0.0
-    found = accelerate_with_friction(c.graph, c.system, c.work, f, t)
+    found = accelerate_with_friction(c.graph, c.system, c.work, f, t, LAST_PLACE)
     refine_accelerations(c.graph, f)
     write_accelerations(c.graph.bodies, f.poses, f.Z, c.work.qdd)
     copy(kept, r.lam)

@@ -1,6 +1,6 @@
 """Kernels of one friction for the solver: force for unit normal load, normal load, their Taylor series."""
 
-from ...jit.kernels import ANY, caller, complex_stack, integers, kernel, part, stack, stack2, vector
+from ...jit.kernels import ANY, caller, complex_stack, data_of, integers, kernel, matrix, part, stack, stack2, vector
 from ...maths.tolerances import COMPLEX_STEP
 from ...maths.vectors import matrix_a
 from ..markers import PARAMETERS
@@ -91,8 +91,10 @@ def load_at(tau, known, x, par, s):
 # Kernels of one friction for the solver: its generalised force for unit normal load, and its normal load.
 
 UNIT_FRICTION = "ippppdp"  # floats of the instance, its table, its floats, q, qd, t, out
-NORMAL_LOAD = "ippppdiipp"  # the same to t, the side that f is on, whether to derive, f, out
-LOAD_SLOPE = "ippppdipp"  # the same without whether to derive
+NORMAL_LOAD = "ippppiipp"  # the same to q, what is kept, the side that f is on, what to do, f, out
+LOAD_SLOPE = "ippppdipp"  # the same as the first to t, the side that f is on, f, out
+DERIVE, HERE = 1, 2  # what to do besides, added up: the derivative; what is kept is set for q
+STAND = 12  # floats kept, besides the markers: the arm of the point, the orientation
 call_unit_friction, call_normal_load, call_load_slope = caller(UNIT_FRICTION), caller(NORMAL_LOAD), caller(LOAD_SLOPE)
 
 
@@ -153,21 +155,23 @@ def _stand(own, real, q, qd, side, x, s, A):
         matrix_a(q[at + 3 : at + 7], A)
 
 
-def normal_load(stride, own, real, q, qd, t, side, derive, f, out):
-    """out (7,) = the normal load of a reaction and, with derive = 1, what it changes by with that.
+def normal_load(stride, own, real, q, kept, side, what, f, out):
+    """out (7,) = the normal load of a reaction and, with DERIVE, what it changes by with that.
 
-    f (6,) is the force, ground frame, and the torque about the centroid, body frame, on the body of a side.
+    f (6,) is the force, ground frame, and the torque about the centroid, body frame, on the body of a side. With HERE
+    kept (STAND + SIZE,) is set for q, otherwise used.
     """
     own, real, f, out = integers(own, ANY), vector(real, ANY), vector(f, ANY), vector(out, ANY)
-    q, qd = vector(q, ANY), vector(qd, ANY)
-    x, s, g, z, A = stack(SIZE), stack(3), stack(6), complex_stack(6), stack2(3, 3)
-    _stand(own, real, q, qd, side, x, s, A)
+    q, kept, g, z = vector(q, ANY), vector(kept, STAND + SIZE), stack(6), complex_stack(6)
+    s, A, x = kept[:3], matrix(data_of(kept[3:]), 3, 3), kept[STAND:]
+    if what & HERE:
+        _stand(own, real, q, q, side, x, s, A)
     _about_point(A, s, f, g)
     # Complex steps along the six components of the reaction
     for i in range(6):
         z[i] = g[i]
     par = real[3 * MARKERS : stride]
-    if derive == 0:
+    if not what & DERIVE:
         out[0] = kernel_normal_load(x, g, par)
         return 0
     for i in range(6):

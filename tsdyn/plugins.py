@@ -47,6 +47,7 @@ from .elements.loads import (
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
 from .elements.tolerances import PARALLEL
+from .elements.unilateral import Side, Unilateral
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
 from .jit.predicates import some
@@ -139,6 +140,7 @@ __all__ = [
     "Primitive",
     "RungeKuttaTableau",
     "SceneLaw",
+    "Side",
     "Signal",
     "Smooth",
     "Turn",

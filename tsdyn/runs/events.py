@@ -12,6 +12,7 @@ from ..model.handles import handles_of
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import reactions
 from ..observables.reactions import Exerting
+from ..observables.state import RememberingState
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
 from .tolerances import FAST_TURN, LEAST_TIME, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
@@ -285,6 +286,13 @@ class Watch:
     def _instant(self, t, state):
         return EventInstant(self.packed, self.memory[self.angles :], self.beside, t, state)
 
+    def _instants(self, t, states):
+        """The same at times t (k,), states (k, 3, n), without multipliers."""
+        before, (q, qd, _), angles = self.beside
+        anchor = Anchor(angles, t - before, (q, qd))
+        parts = (np.ascontiguousarray(states[:, i]) for i in range(3))
+        return RememberingState.of(self.packed, self.memory[self.angles :], anchor, t, *parts, None)
+
     def _value(self, i, t, state):
         return self.events[i].value(t, self._instant(t, state))
 
@@ -337,7 +345,10 @@ class Watch:
 
         def sample(times):
             values = np.full(times.size, np.nan)
-            for k, (t, state) in enumerate(zip(times.tolist(), step.states(times), strict=True)):
+            states, over = step.states(times), getattr(self.events[i].function, "over", None)
+            if over is not None and states and not any(state is None for state in states):
+                return over(self._instants(times, np.array(states)))
+            for k, (t, state) in enumerate(zip(times.tolist(), states, strict=True)):
                 if state is not None:
                     values[k] = self._value(i, t, state)
                     good.append(t)

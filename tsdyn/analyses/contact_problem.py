@@ -13,13 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..elements.markers import POINT
 from ..elements.unilateral import contacts_of
 from ..errors import SingularConfiguration
+from ..jit.kernels import twin
 from ..maths.complementarity import lemke
 from ..maths.tolerances import RANK_TOL
+from ..model.handles import BodyMotion, counted, handles_of
 from ..model.handles import angle as angle_of
-from ..model.handles import counted, handles_of
-from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays, mass_matrix
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from .tolerances import AT_REST, DEPENDENT, LEVEL
@@ -58,38 +59,44 @@ class Gaps:
         self.sign = np.array([gap.side.sign for gap in self.list])
         self.restitution = np.array([gap.contact.restitution for gap in self.list], float)
         self.bilateral = np.setdiff1d(np.arange(len(packed.system.segments)), self.rows)
-        self._rows = _only(packed, [gap.side.row for gap in self.list], self.rows)
-        self._counted = [(i, gap.side) for i, gap in enumerate(self.list) if gap.side.joint is not None]
-        handles = handles_of(packed) if self._counted else None
-        self.are_counted = bool(self._counted)
-        self._places = [handles.row(side.joint, "angle") for _, side in self._counted]
+        self.are_counted = any(gap.side.joint is not None for gap in self.list)
+        handles, parts = handles_of(packed), {id(part): i for i, part in enumerate(packed.constraints)}
+        self._values = [self._value_of(handles, parts[id(gap.side.row)], gap.side) for gap in self.list]
 
-    def over(self, t, q, qd, qdd, angles=None):
-        """Gaps, their rates and accelerations (k, count) at times t (k,); angles (k, angles): counted ones of joints."""
-        levels = [self.sign * level for level in constraint_rows(self._rows, t, q, qd, qdd)]
-        handles = handles_of(self.packed)
-        for (i, side), place in zip(self._counted, self._places, strict=True):
-            geometry = place.angles[side.which]
-            value = angle_of(geometry, *handles.motions(geometry, (q,)), 0)
-            near = 0.0 if angles is None else angles[..., place.first + side.which]
-            levels[0][:, i] = side.sign * (counted(value, near) - side.bound)
-        return levels
+    def _value_of(self, handles, part, side):
+        """A function of q (..., n) and counted angles (..., angles) that returns a gap (...)."""
+        if side.joint is not None:
+            place = handles.row(side.joint, "angle")
+            geometry, at = place.angles[side.which], place.first + side.which
 
-    def at(self, t, q, angles):
-        """Gaps (count,) at one state."""
-        still = np.zeros((1, q.size))
-        return self.over(np.array([t]), q[None], still, still, np.asarray(angles)[None])[0][0]
+            def value(q, angles):
+                found = angle_of(geometry, *handles.motions(geometry, (q,)), 0)
+                return side.sign * (counted(found, angles[..., at]) - side.bound)
 
+            return value
+        row, given, coordinates = (
+            getattr(self.packed, name)[part] for name in ("constraints", "parameters", "coordinates")
+        )
+        phi, markers = twin(type(row).phi), list(zip(row.markers, coordinates, strict=True))
+        markers = [(m.code == POINT, handles.where(row.body_of(m)), tuple(s.tolist())) for m, s in markers]
 
-def _only(packed, parts, rows):
-    """A packed scene of some primitives alone, for `constraint_rows`."""
-    index = {id(part): i for i, part in enumerate(packed.constraints)}
-    every = [index[id(part)] for part in parts]
-    lists = {
-        name: tuple(getattr(packed, name)[i] for i in every)
-        for name in ("constraints", "parameters", "coordinates", "slots")
-    }
-    return packed._replace(system=packed.system._replace(segments=packed.system.segments[rows]), **lists)
+        def value(q, angles):
+            x, out = [], [0.0]
+            for is_point, place, s in markers:
+                body = BodyMotion(*place, (q,))
+                x += body.point(s, 0) if is_point else body.arm(s, 0)
+            phi(x, given, 0.0, out)
+            return side.sign * out[0]
+
+        return value
+
+    def value(self, i, q, angles):
+        """One gap (...) at q (..., n); angles (..., angles): counted ones of joints."""
+        return self._values[i](q, angles)
+
+    def at(self, q, angles):
+        """Gaps (count,) at q (n,)."""
+        return np.array([value(q, angles) for value in self._values], float)
 
 
 class Inertia:
@@ -136,6 +143,11 @@ class Inertia:
         drift = self.gaps.sign * self.Phi_t[self.gaps.rows]
         rates, sizes = self.J @ qd + drift, np.abs(qd) if sizes is None else sizes
         return np.where(np.abs(rates) <= AT_REST * (np.abs(self.J) @ sizes + np.abs(drift)), 0.0, rates)
+
+    def hold(self, which, rates):
+        """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
+        own = np.linalg.lstsq(self.G[np.ix_(which, which)], rates, rcond=RANK_TOL**2)[0]
+        return -self.free(self.J[which].T @ own)
 
     def accelerations(self, qd):
         """Accelerations of all gaps (count,) where all are open, at velocities qd (n,); and their terms (count,)."""

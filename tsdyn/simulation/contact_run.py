@@ -27,7 +27,7 @@ from .progress import reporter, silent
 from .run_options import RunCall
 from .scene_cache import Prepared, prepared
 from .segments import summed
-from .tolerances import CREEPING, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, TOUCHING
+from .tolerances import CREEPING, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -51,40 +51,40 @@ class _Closing:
     ----------
     gaps : Gaps
     i : int
-    seen : dict
-        What is shared with the others of its phase.
     start : tuple
         Time, gap and rate where the contact has opened with a rate; else empty.
     """
 
-    def __init__(self, gaps, i, seen, start):
-        self.gaps, self.i, self.seen, self.start = gaps, i, seen, start
+    def __init__(self, gaps, i, start):
+        self.gaps, self.i, self.start = gaps, i, start
 
     def over(self, states):
         """Values (k,) of states at k times."""
-        gaps = self.gaps
-        key = states.t.tobytes(), states.q.tobytes()
-        if key not in self.seen:  # those of other contacts at the same times are found with it
-            self.seen.clear()
-            angles = states.angles if gaps.are_counted else None
-            self.seen[key] = gaps.over(states.t, states.q, states.qd, states.qdd, angles)[0]
-        return self._divided(states.t, self.seen[key][:, self.i])
+        return self(states.t, states)
 
     def __call__(self, t, state):
-        """The value at one state."""
-        angles = state.angles if self.gaps.are_counted else np.empty(0)
-        return self._divided(np.array([t]), self.gaps.at(t, state.q, angles)[self.i])[0]
-
-    def _divided(self, t, gap):
+        """The value at a state, or values at several."""
+        gap = self.gaps.value(self.i, state.q, state.angles if self.gaps.are_counted else None)
         if not self.start:
-            return np.atleast_1d(gap)
+            return gap
         begun, first, rate = self.start
         since = np.where(t > begun, t - begun, 1.0)
         return np.where(t > begun, (gap - first) / since, rate)
 
 
 class _Leaving:
-    """The reaction of a closed contact, positive where it pushes, as an event function."""
+    """The reaction of a closed contact, positive where it pushes, as an event function.
+
+    Parameters
+    ----------
+    packed : Packed
+        Of the phase.
+    row : int
+    sign : float
+        Of the gap over Phi.
+    seen : dict
+        What is shared with the other contacts of the phase.
+    """
 
     def __init__(self, packed, row, sign, seen):
         self.packed, self.row, self.sign, self.seen = packed, row, sign, seen
@@ -174,15 +174,15 @@ class _Pieces(StepPieces):
     side = "right"
 
 
-def closed_gaps(gaps, t, q, angles=None, tol=INITIAL_TOL):
+def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):
     """Gaps that are closed, or penetrate, at q, to the relative tolerance of starts."""
-    values = gaps.at(t, q, np.empty(0) if angles is None else angles)
+    values = gaps.at(q, angles)
     return np.flatnonzero(values <= tol * (1.0 + np.abs(q).max())).tolist()
 
 
-def demand_apart(gaps, t, q, angles, tol):
+def demand_apart(gaps, q, angles, tol):
     """Raise InconsistentState where contacts penetrate."""
-    values = gaps.at(t, q, angles)
+    values = gaps.at(q, angles)
     deep = np.flatnonzero(values < -tol * (1.0 + np.abs(q).max()))
     if deep.size:
         found = listed([f"{gaps.names[i]} by {-values[i]:.3g}" for i in deep], NAMED)
@@ -222,7 +222,7 @@ class _ContactRun:
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
-        demand_apart(gaps, self.t, self.q, self.remembered[: self.count], options.initial_tol)
+        demand_apart(gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
         self.closed, self.idle, self.rest = [], [], self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
@@ -249,7 +249,7 @@ class _ContactRun:
     def run(self):
         """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
         began, first = clock(), None
-        touching = closed_gaps(self.gaps, self.t, self.q, self.remembered[: self.count], self.options.initial_tol)
+        touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         status = self._settle(touching, ())
         while status is None:
             try:
@@ -294,7 +294,7 @@ class _ContactRun:
         gaps, found = self.gaps, []
         for event, known in zip(self.users, self.found, strict=True):
             found.append(event._replace(limit=event.limit - sum(len(times) for times, *_ in known)))
-        self.watched, pushes, places = [None] * len(found), {}, {}
+        self.watched, pushes = [None] * len(found), {}
         first = {id(member.constraint): member.rows.start for member in phase.packed.members}
         for i in range(gaps.count):
             if i in self.idle:
@@ -303,7 +303,7 @@ class _ContactRun:
             if i in self.closed:
                 event = _Leaving(phase.packed, first[id(row)], sign, pushes)
             else:
-                event = _Closing(gaps, i, places, self.opened.get(i, ()))
+                event = _Closing(gaps, i, self.opened.get(i, ()))
             found.append(Event(event, gaps.names[i], 1.0, -1.0))
             self.watched.append(i)
         return found
@@ -348,7 +348,7 @@ class _ContactRun:
         if not self.per_step and goes_on and len(rows) and rows[-1, 0] == self.t:  # that of the next phase counts
             self.parts[-1] = outcome._replace(rows=rows[:-1])
         self.taken += len(self.parts[-1].rows)
-        values = gaps.at(self.t, self.q, self.remembered[: self.count])
+        values = gaps.at(self.q, self.remembered[: self.count])
         deep = [i for i in range(gaps.count) if values[i] < -PENETRATION * self.length]
         if deep:
             self.reason = f"Penetration was not noticed: {listed([gaps.names[i] for i in deep], NAMED)}. Give a max_step."
@@ -380,7 +380,7 @@ class _ContactRun:
 
     def _settle(self, touching, leaving):
         """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
-        slots, values = self.remembered[self.count :], self.gaps.at(self.t, self.q, self.remembered[: self.count])
+        slots, values = self.remembered[self.count :], self.gaps.at(self.q, self.remembered[: self.count])
         self.rest, self.opened = self.t, {}
         if not touching:
             self.closed, self.idle = [], []
@@ -404,30 +404,45 @@ class _ContactRun:
         """Jump of velocities at an impact; the rates (count,) afterwards."""
         e, before = self.gaps.restitution[touching].copy(), rates[touching]
         p, qd, after = self._jump(inertia, touching, before, e)
-        # An impact that is followed by flights below rounding is the last one
-        rebounds = [k for k in range(len(touching)) if p[k] > 0.0 and after[touching[k]] > 0.0 and e[k] > 0.0]
-        if rebounds:
-            resting = [i for i in touching if after[i] == 0.0]
-            gdd = settle(inertia, resting, qd).accelerations
-            last = []
-            for k in rebounds:
-                v, a = after[touching[k]], gdd[touching[k]]
-                if a < 0.0 and v * v < 2.0 * -a * EPS * self.length:
-                    last.append(k)
-                    if e[k] < 1.0:
-                        self.rest = max(self.rest, self.t + 2.0 * v / (-a * (1.0 - e[k])))
-            if last:
-                e[last] = 0.0
-                p, qd, after = self._jump(inertia, touching, before, e)
+        # Impacts that are followed by flights below rounding are the last ones
+        a = self._lowering(inertia, touching, qd, after)
+        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and p[k] > 0.0 and e[k] > 0.0]
+        if last:
+            flights = [2.0 * after[touching[k]] / (a[touching[k]] * (1.0 - e[k])) for k in last if e[k] < 1.0]
+            self.rest = float(max([self.rest, *(self.t + T for T in flights)]))
+            e[last] = 0.0
+            p, qd, after = self._jump(inertia, touching, before, e)
+        # Contacts that another impact lifts by less than rounding stay closed
+        for _ in touching:
+            a = self._lowering(inertia, touching, qd, after)
+            held = [i for i in touching if a[i] > 0.0 or after[i] == 0.0]
+            if not a.any():
+                break
+            change = inertia.hold(held, after[held])
+            after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
+            qd, after[held] = qd + change, 0.0
+            if (after[touching] < 0.0).any():
+                more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
+                p = p + more
         self.qd = qd
         named = zip(touching, p, strict=True)
         self.phases.impulses += [(self.t, self.gaps.names[i], float(x)) for i, x in named if x > 0.0]
         return after
 
-    def _jump(self, inertia, touching, before, e):
+    def _jump(self, inertia, touching, before, e, qd=None):
+        """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
         p = impulses(inertia, touching, before, e)
-        qd, after = jumped(inertia, self.qd, touching, before, e, p)
-        return p, qd, after
+        return p, *jumped(inertia, self.qd if qd is None else qd, touching, before, e, p)
+
+    def _lowering(self, inertia, touching, qd, rates):
+        """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""
+        opening = [i for i in touching if rates[i] > 0.0]
+        if not opening:
+            return np.zeros(self.gaps.count)
+        a = -settle(inertia, [i for i in touching if rates[i] == 0.0], qd).accelerations
+        rounding = EPS * np.maximum(self.length, ROUNDED * (np.abs(inertia.J) @ np.abs(self.q)))
+        mine = np.isin(np.arange(a.size), opening)
+        return np.where(mine & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
 
     # The whole
 
@@ -538,7 +553,7 @@ def impact(
     t = float(getattr(state, "t", 0.0))
     memory = remembered(state, kept, t, q)
     angles, slots = memory[: kept.handles.count], memory[kept.handles.count :]
-    near = closed_gaps(gaps, t, q, angles)
+    near = closed_gaps(gaps, q, angles)
     which = near if contacts is None else _chosen(gaps, contacts, near)
     e = gaps.restitution.copy()
     if isinstance(restitution, dict):

@@ -4,6 +4,7 @@ from functools import wraps
 
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument
+from ..model.handles import handles_of
 from ..validation import listed
 
 # A phase is a scene of its own, packed once for each set of closed gaps, on the bodies, joints and forces of the scene.
@@ -43,7 +44,8 @@ def at_start(scene):
     from .contact_run import closed_gaps
 
     gaps, (q, _) = Gaps(scene.packed), scene.start
-    return phase_of(scene, [gaps.list[i].side.row for i in closed_gaps(gaps, 0.0, q)])
+    angles = handles_of(scene.packed).angles_at_start(0.0, q)
+    return phase_of(scene, [gaps.list[i].side.row for i in closed_gaps(gaps, q, angles)])
 
 
 def where_it_stands(function):

@@ -67,6 +67,8 @@ PASSES, GOT_ON = 16, 1e-9
 # Of the scene's length: a gap up to which a contact takes part in an event of another, some roundings of positions; and
 # a depth that no event leaves, which tells that an event was missed.
 TOUCHING, PENETRATION = 64.0 * EPS, 1e-9
+# Roundings in a gap, of the sizes of its terms: lower flights than these are none.
+ROUNDED = 16.0
 # Events in a row without progress in time, beside one for each gap: a chain of openings that follow from each other.
 MOST_AT_AN_INSTANT = 100
 # Events after which progress is judged: a run that would need CREEPING times as many more is ended.

@@ -27,6 +27,7 @@ class Event(NamedTuple):
     name: str
     limit: float  # occurrences that end the run; inf for never
     direction: float  # of the changes that count; 0 for both
+    exact: bool = False  # whether a value at the start that is positive is no rounding of zero
 
     def value(self, t, instant):
         """The function's value; raises `EventFailed`."""
@@ -234,6 +235,9 @@ class Watch:
                     self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
                 except EventFailed as failure:
                     raise InvalidArgument(f"events: {failure}") from failure.__cause__
+                for event, track in zip(self.events, self.tracks, strict=True):
+                    if event.exact and track.value > 0.0:
+                        track.sign, track.significant = 1.0, (self.t, track.value)
         stiff = run.numbers.stiff
         # One step at a time, searched before the next one
         for _ in range(most):
@@ -449,7 +453,8 @@ class Watch:
         if a == 0.0 or (a < 0.0) == (b < 0.0):
             return [Occurrence(t0, i, step.at(t0))]
         root = self._between(i, step, (t0, a), (t1, b))
-        return [] if self._is_start(i, step, root, a) else [Occurrence(root, i, step.at(root))]
+        at_start = not self.events[i].exact and self._is_start(i, step, root, a)
+        return [] if at_start else [Occurrence(root, i, step.at(root))]
 
     def _is_start(self, i, step, t, before):
         """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before."""

@@ -304,7 +304,7 @@ class _ContactRun:
                 event = _Leaving(phase.packed, first[id(row)], sign, pushes)
             else:
                 event = _Closing(gaps, i, self.opened.get(i, ()))
-            found.append(Event(event, gaps.names[i], 1.0, -1.0))
+            found.append(Event(event, gaps.names[i], 1.0, -1.0, i not in self.closed))
             self.watched.append(i)
         return found
 
@@ -472,6 +472,7 @@ def jumped(inertia, qd, which, before, e, p, law="newton"):
     """Velocities (n,) after impulses p (k,) of the gaps `which`, and the rates (count,) of all gaps then."""
     change = inertia.free(inertia.J[which].T @ p)
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
+    after[which] = np.maximum(after[which], 0.0)  # but for rounding
     if law == "newton":  # without rounding where the impact acts
         for k, i in enumerate(which):
             if p[k] > 0.0:

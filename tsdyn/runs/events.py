@@ -478,7 +478,7 @@ class Watch:
         root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
         shift = least + ROOT * abs(root)
         # a run that continues from a terminal event must not find it again
-        ends, side = self.events[i].limit < math.inf, math.copysign(1.0, b)
+        ends, side = self.events[i].limit < math.inf and not self.events[i].exact, math.copysign(1.0, b)
         while ends and root + shift < t1 and side * value(root) <= 0.0:
             root, shift = root + shift, 2.0 * shift
         return root

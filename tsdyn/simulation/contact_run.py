@@ -27,7 +27,7 @@ from .progress import reporter, silent
 from .run_options import RunCall
 from .scene_cache import Prepared, prepared
 from .segments import summed
-from .tolerances import CREEPING, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
+from .tolerances import CREEPING, ENDLESS, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -441,6 +441,7 @@ class _ContactRun:
             return np.zeros(self.gaps.count)
         a = -settle(inertia, [i for i in touching if rates[i] == 0.0], qd).accelerations
         rounding = EPS * np.maximum(self.length, ROUNDED * (np.abs(inertia.J) @ np.abs(self.q)))
+        rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
         mine = np.isin(np.arange(a.size), opening)
         return np.where(mine & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
 
@@ -458,7 +459,7 @@ class _ContactRun:
         return Outcome(
             status, self.reason, np.concatenate([part.rows for part in parts]),
             RunEnd(
-                last.reached, np.array([self.q, self.qd, last.last[2]]), last.remembered,
+                last.reached, last.last, last.remembered,
                 summed([end.counts for end in ends]),
                 StepLog([end.steps for end in ends]) if logs else None,
                 ChartLog([end.charts for end in ends]) if logs else None,

@@ -48,6 +48,15 @@ def at_start(scene):
     return phase_of(scene, [gaps.list[i].side.row for i in closed_gaps(gaps, q, angles)])
 
 
+def demand_bilateral(scene):
+    """Raise InvalidArgument where a scene has contacts: a run has phases then."""
+    if has_contacts(scene):
+        raise InvalidArgument(
+            "a scene with unilateral constraints is run by ts.simulate: prepared runs, ensembles, benchmarks, profiles "
+            "and analyses along a motion don't serve contacts yet."
+        )
+
+
 def where_it_stands(function):
     """Decorate a method of scenes: contacts that are closed at the start hold, the others are left out."""
 

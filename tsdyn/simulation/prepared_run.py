@@ -27,7 +27,7 @@ from ..taylor.series_engine import SeriesEngine
 from ..validation import damaged
 from . import stored_runs
 from .local_origin import origin_of, run_near, within_rounding
-from .phase_scenes import has_contacts
+from .phase_scenes import demand_bilateral, has_contacts
 from .progress import reporter
 from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented, from_names
 from .scene import Scene
@@ -155,11 +155,7 @@ class Run:
 
     @fitting
     def __init__(self, scene: Scene, options: RunOptions) -> None:
-        if has_contacts(scene):
-            raise InvalidArgument(
-                "a scene with unilateral constraints is run by ts.simulate: prepared runs, ensembles and other analyses "
-                "of many runs don't serve it yet."
-            )
+        demand_bilateral(scene)
         self.scene, self.options, self._form = scene, options, options.form
         self._compiled = set()  # with outputs between steps, or not
         self._last = self._seen = None  # the last `_Last`, and state

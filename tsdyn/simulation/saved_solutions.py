@@ -173,6 +173,8 @@ def save(solution: Solution, path: Place) -> Path:
     demand_path(path, "path")
     path = Path(path).absolute()
     saved_file.format_at(path)
+    if solution._phases is not None:
+        raise InvalidArgument("files don't hold solutions with contacts yet: use to_csv or to_dataframe for outputs.")
     if solution._lacks:
         remembered = solution._width
         content = solution._content

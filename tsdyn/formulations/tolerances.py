@@ -48,6 +48,8 @@ FARTHEST_AHEAD = 2.0
 # that may remain: the iteration matrix, formed with an older H, acts on the remainder. With one iteration a stage, 1e-5
 # shows in the error of chains of 64 links at 1e-8: fourteen times as large.
 REACTION_SWEEPS, REACTIONS_LEFT = 8, 1e-7
+# Sweeps for the normal part of accelerations where there are rows on velocities: each gains a digit.
+NORMAL_SWEEPS = 4
 
 # 1 / m: residual after a Newton step over the square of the residual before, until it is measured. One over a metre:
 # links of usual size.

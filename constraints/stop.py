@@ -70,7 +70,9 @@ class Stop(Unilateral, Joint):
     ) -> None:
         found = (angles(joint) or displacements(joint)) if getattr(joint, "joint_coordinates", ()) else []
         if not found:
-            raise InvalidConstraint(f"{name or 'Stop'}: joint must be one with an angle or a displacement, got {joint!r}.")
+            raise InvalidConstraint(
+                f"{name or 'Stop'}: joint must be one with an angle or a displacement, got {joint!r}."
+            )
         self.__dict__["joint"] = joint
         super().__init__(*found[0][:2], name=name)
         self.lower, self.upper = lower, upper

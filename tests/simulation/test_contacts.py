@@ -1,5 +1,7 @@
 """Unilateral contacts and stops against closed forms: impact times, rest, openings, energies, refusals."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -86,8 +88,12 @@ def test_ten_thousand_impacts_leave_the_constraints_as_they_are():
     scene = ts.Scene(gravity=(0, 0, 0))
     bob = scene.add_point_mass(mass=1.0, position=(0, 0, 1), velocity=(500.0, 0, 0), name="bob")
     scene.add(C.Distance(bob, scene.ground))
-    scene.add(C.PlaneContact(bob, scene.ground, point_b=(0.1, 0, 0), normal_b=(-1, 0, 0), unilateral=True, restitution=1.0))
-    scene.add(C.PlaneContact(bob, scene.ground, point_b=(-0.1, 0, 0), normal_b=(1, 0, 0), unilateral=True, restitution=1.0))
+    scene.add(
+        C.PlaneContact(bob, scene.ground, point_b=(0.1, 0, 0), normal_b=(-1, 0, 0), unilateral=True, restitution=1.0)
+    )
+    scene.add(
+        C.PlaneContact(bob, scene.ground, point_b=(-0.1, 0, 0), normal_b=(1, 0, 0), unilateral=True, restitution=1.0)
+    )
     solution = ts.simulate(scene, (0, 0.4))
     assert solution.success
     between = 2 * np.arcsin(0.1) / 500.0
@@ -154,12 +160,12 @@ def test_a_cradle_at_one_instant(law):
     scene = ts.Scene(gravity=(0, 0, 0))
     balls = [scene.add_point_mass(mass=1.0, position=(0.1 * i, 0, 0), name=f"ball{i}") for i in range(3)]
     balls[0].velocity = (1, 0, 0)
-    for i, pair in enumerate(zip(balls, balls[1:], strict=False)):
+    for i, pair in enumerate(pairwise(balls)):
         scene.add(C.SphereContact(*pair, radius_a=0.05, radius_b=0.05, restitution=1.0, name=f"gap{i}"))
     after, impulses = ts.impact(scene, ts.State(0.0, *scene.start), law=law)
     np.testing.assert_allclose(after.qd[::3], [-1 / 3, 2 / 3, 2 / 3], atol=1e-15)
     np.testing.assert_allclose([impulses["gap0"], impulses["gap1"]], [4 / 3, 2 / 3], atol=1e-15)
-    plastic, _ = ts.impact(scene, ts.State(0.0, *scene.start), restitution={"gap0": 0.0, balls[1] and "gap1": 0.0}, law=law)
+    plastic, _ = ts.impact(scene, ts.State(0.0, *scene.start), restitution={"gap0": 0.0, "gap1": 0.0}, law=law)
     np.testing.assert_allclose(plastic.qd[::3], [1 / 3, 1 / 3, 1 / 3], atol=1e-15)
 
 
@@ -167,7 +173,7 @@ def test_a_cradle_with_gaps_hands_the_velocity_on():
     scene = ts.Scene(gravity=(0, 0, 0))
     balls = [scene.add_point_mass(mass=1.0, position=(0.11 * i, 0, 0), name=f"ball{i}") for i in range(5)]
     balls[0].velocity = (1, 0, 0)
-    for pair in zip(balls, balls[1:], strict=False):
+    for pair in pairwise(balls):
         scene.add(C.SphereContact(*pair, radius_a=0.05, radius_b=0.05, restitution=1.0))
     solution = ts.simulate(scene, (0, 1.0))
     np.testing.assert_allclose([t for t, *_ in solution.impulses], 0.01 * np.arange(1, 5), atol=1e-14)
@@ -179,7 +185,9 @@ def test_impacts_never_add_energy(seed):
     """Random boxes and velocities, all corners down at once, by both laws and any coefficients."""
     rng = np.random.default_rng(seed)
     scene = ts.Scene()
-    box = scene.add_body(mass=2.0, inertia=(1, 2, 2.5), velocity=rng.normal(size=3), angular_velocity=rng.normal(size=3))
+    box = scene.add_body(
+        mass=2.0, inertia=(1, 2, 2.5), velocity=rng.normal(size=3), angular_velocity=rng.normal(size=3)
+    )
     other = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(2, 0, 0), velocity=rng.normal(size=3))
     scene.add(C.SphereContact(box, other, radius_a=1.0, radius_b=1.0, restitution=rng.uniform(), name="side"))
     for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
@@ -243,7 +251,9 @@ def test_a_stop_of_a_slide():
     slide = scene.add(C.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, 0)))
     scene.add(C.Stop(slide, lower=-0.1, upper=0.3, restitution=1.0, name="buffers"))
     solution = ts.simulate(scene, (0, 3.0))
-    np.testing.assert_allclose([t for t, *_ in solution.impulses], [0.6, 1.4, 2.2, 3.0][: len(solution.impulses)], atol=1e-13)
+    np.testing.assert_allclose(
+        [t for t, *_ in solution.impulses], [0.6, 1.4, 2.2, 3.0][: len(solution.impulses)], atol=1e-13
+    )
     assert -0.1 - 1e-14 < solution.displacement(slide).min() < solution.displacement(slide).max() < 0.3 + 1e-14
 
 
@@ -356,7 +366,11 @@ def test_coefficients_and_bounds():
     with pytest.raises(ts.InvalidConstraint, match="friction"):
         C.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True, kinetic=0.3)
     scene, _ = pendulum(0.0)
-    for bounds, match in (((1, 1), "lower must be below"), ((2, 1), "lower must be below"), ((None, None), "give lower")):
+    for bounds, match in (
+        ((1, 1), "lower must be below"),
+        ((2, 1), "lower must be below"),
+        ((None, None), "give lower"),
+    ):
         with pytest.raises(ts.InvalidConstraint, match=match):
             C.Stop(scene["hinge"], *bounds)
     with pytest.raises(ts.InvalidConstraint, match="angle or a displacement"):
@@ -401,7 +415,7 @@ def test_what_does_not_serve_contacts_yet_says_so(tmp_path):
         scene.equilibrium,
         lambda: ts.simulate(scene, (0, 1)).save(tmp_path / "run.h5"),
     ):
-        with pytest.raises(ts.InvalidArgument, match="contact|unilateral|bilateral"):
+        with pytest.raises(ts.InvalidArgument, match=r"contact|unilateral|bilateral"):
             call()
     with pytest.raises(ts.InvalidArgument, match="law"):
         ts.impact(scene, ts.State(0.0, *scene.start), law="stronge")

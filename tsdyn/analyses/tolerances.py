@@ -113,8 +113,8 @@ CONSISTENT = 1e-6
 DENSE_INSTANT = 120
 
 # --- contacts --------------------------------------------------------------------------------------------------------
-# Rate of a gap over the sum of its terms up to which it is zero: velocities after an impact are right to rounding, those
-# of a chain of joints to some hundred.
+# Rate of a gap over the sum of its terms up to which it is zero: velocities after an impact are right to rounding,
+# those of a chain to some hundred.
 AT_REST = 1e-12
 # The same of accelerations, and of reactions as the accelerations that they make.
 LEVEL = 1e-11

@@ -121,7 +121,7 @@ class Phases:
     def begin(self, t, packed, names):
         """A phase begins at t."""
         index = {id(part): i for i, part in enumerate(packed.constraints)}
-        first = np.cumsum([0, *(part.rows for part in packed.constraints)])
+        first = np.cumsum([0, *(part.all_rows for part in packed.constraints)])
         pairs = [(row, first[index[key]] + i) for key, row, i in self._rows if key in index]
         self.starts.append(t)
         self.packed.append(packed)
@@ -226,9 +226,9 @@ class _ContactRun:
         self.users = prepared_events(options.events) or []
         self.closed, self.idle, self.rest = [], [], self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
-        firsts = np.cumsum([0, *(part.rows for part in scene.packed.constraints)])
+        firsts = np.cumsum([0, *(part.all_rows for part in scene.packed.constraints)])
         self.phases = Phases(
-            [(id(p), firsts[k] + i, i) for k, p in enumerate(scene.packed.constraints) for i in range(p.rows)]
+            [(id(p), firsts[k] + i, i) for k, p in enumerate(scene.packed.constraints) for i in range(p.all_rows)]
         )
         self.reason, self.method, self.at_once, self.judged = "", "", 0, (self.t, 0)
 
@@ -265,7 +265,9 @@ class _ContactRun:
         if first is None:  # nothing could begin
             raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
         self.report(None)
-        return first._replace(prepared=Prepared(self.scene, self.scene.packed), span=self.span), self._outcome(status, began)
+        return first._replace(prepared=Prepared(self.scene, self.scene.packed), span=self.span), self._outcome(
+            status, began
+        )
 
     # One phase
 
@@ -351,7 +353,9 @@ class _ContactRun:
         values = gaps.at(self.q, self.remembered[: self.count])
         deep = [i for i in range(gaps.count) if values[i] < -PENETRATION * self.length]
         if deep:
-            self.reason = f"Penetration was not noticed: {listed([gaps.names[i] for i in deep], NAMED)}. Give a max_step."
+            self.reason = (
+                f"Penetration was not noticed: {listed([gaps.names[i] for i in deep], NAMED)}. Give a max_step."
+            )
             return Status.CONTACT_FAILED
         if not goes_on:
             return Status.SUCCESS if outcome.status is Status.EVENT and fired else outcome.status
@@ -452,6 +456,7 @@ class _ContactRun:
         ends = [part.end for part in parts]
         last = ends[-1]
         logs = self.options.history is not False
+        numbers = np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts])
         events = None
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
@@ -465,7 +470,7 @@ class _ContactRun:
                 ChartLog([end.charts for end in ends]) if logs else None,
             ),
             _Pieces([part.trajectory for part in parts]) if self.options.dense_output else None,
-            events, began, self.method, (self.phases, np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts])),
+            events, began, self.method, (self.phases, numbers),
         )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from ..methods.integrator import is_plain
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import diagnostics, reactions
 from ..observables.generalised_forces import law_values
-from ..observables.reactions import acted, exerted, member, multipliers, with_normal_loads
+from ..observables.reactions import acted, exerted, member, with_normal_loads
 from ..observables.state import RememberingState
 from ..validation import counted, floats
 from .records import Records

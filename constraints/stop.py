@@ -10,16 +10,12 @@ gap is measured by the counted angle, over any number of turns. Never singular b
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..plugins import InvalidConstraint, Joint, Side, Unilateral, angles, displacements, finite, shown
 from .dot1 import Dot1
 from .dot2 import Dot2
-
-if TYPE_CHECKING:
-    from ..hints import Joint as AnyJoint
 
 
 class Stop(Unilateral, Joint):
@@ -62,7 +58,7 @@ class Stop(Unilateral, Joint):
 
     def __init__(
         self,
-        joint: AnyJoint,
+        joint: Joint,
         lower: float | None = None,
         upper: float | None = None,
         restitution: float = 0.0,

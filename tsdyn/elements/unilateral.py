@@ -56,7 +56,7 @@ class Unilateral:
             raise InvalidConstraint(f"{self.name}: restitution is of a contact that opens; set unilateral=True.")
 
     @property
-    def sides(self) -> tuple[Side, ...]:
+    def sides(self) -> tuple[Any, ...]:
         """Its inequalities, in the order of its rows."""
         return tuple(Side(part, 1.0) for part in self.parts)
 

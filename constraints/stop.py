@@ -10,6 +10,7 @@ gap is measured by the counted angle, over any number of turns. Never singular b
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ class Stop(Unilateral, Joint):
     >>> scene = ts.Scene()
     >>> door = scene.add_body(mass=20.0, inertia=(1, 1, 2), position=(0.5, 0, 0))
     >>> hinge = scene.add(ts.constraints.Revolute.at(scene.ground, door, point=(0, 0, 0), axis=(0, 0, 1)))
-    >>> scene.set(hinge, rate=1.5)
+    >>> _ = scene.set(hinge, rate=1.5)
     >>> stop = scene.add(ts.constraints.Stop(hinge, lower=0.0, upper=1.5, restitution=0.4, name="stop"))
     >>> solution = ts.simulate(scene, (0, 2))
     >>> print(f"{solution.impulses[0][0]:.3f} s", solution.angle_rate(hinge)[[0, -1]].round(9))
@@ -92,7 +93,7 @@ class Stop(Unilateral, Joint):
             )
 
     @property
-    def geometry(self):
+    def geometry(self) -> Any:
         """Where the coordinate is measured: an `AngleGeometry` or a `DisplacementGeometry`."""
         return (angles(self.joint) or displacements(self.joint))[0]
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..configuration.tolerances import INITIAL_TOL
 from ..elements.markers import POINT
 from ..elements.unilateral import contacts_of
 from ..errors import SingularConfiguration
@@ -97,6 +98,12 @@ class Gaps:
     def at(self, q, angles):
         """Gaps (count,) at q (n,)."""
         return np.array([value(q, angles) for value in self._values], float)
+
+
+def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):
+    """Gaps that are closed, or penetrate, at q, to the relative tolerance of starts."""
+    values = gaps.at(q, angles)
+    return np.flatnonzero(values <= tol * (1.0 + np.abs(q).max())).tolist()
 
 
 class Inertia:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, impulses, settle
+from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
 from ..calls import fitting
-from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
 from ..jit.compiled import clock
 from ..maths.tolerances import EPS
@@ -172,12 +171,6 @@ class _Pieces(StepPieces):
     """Dense output of phases: where one begins, its own."""
 
     side = "right"
-
-
-def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):
-    """Gaps that are closed, or penetrate, at q, to the relative tolerance of starts."""
-    values = gaps.at(q, angles)
-    return np.flatnonzero(values <= tol * (1.0 + np.abs(q).max())).tolist()
 
 
 def demand_apart(gaps, q, angles, tol):

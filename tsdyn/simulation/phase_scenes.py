@@ -40,8 +40,7 @@ def at_start(scene):
     """The scene with those contacts closed that are so at its start; a scene without contacts as it is."""
     if not has_contacts(scene):
         return scene
-    from ..analyses.contact_problem import Gaps
-    from .contact_run import closed_gaps
+    from ..analyses.contact_problem import Gaps, closed_gaps
 
     gaps, (q, _) = Gaps(scene.packed), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)

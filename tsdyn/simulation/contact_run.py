@@ -356,8 +356,7 @@ class _ContactRun:
         if self._is_stuck():
             return Status.CONTACT_FAILED
         near = [i for i in range(gaps.count) if values[i] <= TOUCHING * self.length]
-        leaving = [i for i in fired if i in self.closed]
-        return self._settle(sorted({*near, *fired, *self.closed, *self.idle}), leaving)
+        return self._settle(sorted({*near, *fired, *self.closed, *self.idle}), fired)
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -375,7 +374,7 @@ class _ContactRun:
             self.judged = self.t, 0
         return False
 
-    def _settle(self, touching, leaving):
+    def _settle(self, touching, fired):
         """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
         slots, values = self.remembered[self.count :], self.gaps.at(self.q, self.remembered[: self.count])
         self.rest, self.opened = self.t, {}
@@ -385,11 +384,14 @@ class _ContactRun:
         try:
             inertia = Inertia(self.gaps, self.t, self.q, self.qd, slots)
             rates = inertia.rates(self.qd)
+            noise = [i for i in fired if i not in self.closed and rates[i] > 0.0]
+            if noise:  # a gap that closes with a rate of rounding
+                self.qd, rates = held(inertia, self.qd, noise, rates)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
             self.opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
-            found = settle(inertia, resting, self.qd, leaving)
+            found = settle(inertia, resting, self.qd, [i for i in fired if i in self.closed])
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
@@ -412,12 +414,9 @@ class _ContactRun:
         # Contacts that another impact lifts by less than rounding stay closed
         for _ in touching:
             a = self._lowering(inertia, touching, qd, after)
-            held = [i for i in touching if a[i] > 0.0 or after[i] == 0.0]
             if not a.any():
                 break
-            change = inertia.hold(held, after[held])
-            after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
-            qd, after[held] = qd + change, 0.0
+            qd, after = held(inertia, qd, [i for i in touching if a[i] > 0.0 or after[i] == 0.0], after)
             if (after[touching] < 0.0).any():
                 more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
                 p = p + more
@@ -476,6 +475,14 @@ def jumped(inertia, qd, which, before, e, p, law="newton"):
         for k, i in enumerate(which):
             if p[k] > 0.0:
                 after[i] = -e[k] * min(before[k], 0.0)
+    return qd + change, after
+
+
+def held(inertia, qd, which, rates):
+    """Velocities (n,) and rates (count,) after the least change, by kinetic energy, that ends the rates of some gaps."""
+    change = inertia.hold(which, rates[which])
+    after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
+    after[which] = 0.0
     return qd + change, after
 
 

@@ -96,12 +96,6 @@ class Planar(Points, Axes, Joint):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
-class PlaneContact(Points, Primitive):
-    normal_b: Attribute[ArrayLike, Floats]
-    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., name: str = ...) -> None: ...
-    @classmethod
-    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., normal: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
-
 class PointDriver(Points, Joint):
     path: Attribute[Path, Any]
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., path: Path | None = ..., name: str = ...) -> None: ...
@@ -231,6 +225,18 @@ class Fixed(Points, Axes, References, Joint):
     @property
     def frames(self) -> tuple[Any, ...]: ...
 
+class PlaneContact(Points, Primitive):
+    normal_b: Attribute[ArrayLike, Floats]
+    unilateral: bool
+    restitution: float
+    kinetic: float
+    static: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., unilateral: bool = ..., restitution: float = ..., kinetic: float = ..., static: float | None = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., normal: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., unilateral: bool = ..., restitution: float = ..., kinetic: float = ..., static: float | None = ..., name: str = ...) -> Self: ...
+    @property
+    def sides(self) -> tuple[Any, ...]: ...
+
 class RollingBall(Joint):
     center_a: Attribute[ArrayLike, Floats]
     point_b: Attribute[ArrayLike, Floats]
@@ -324,6 +330,31 @@ class Screw(Points, Axes, References, Joint):
     def frames(self) -> tuple[Any, ...]: ...
     @property
     def travel_per_radian(self) -> float: ...
+
+class SphereContact(Joint):
+    center_a: Attribute[ArrayLike, Floats]
+    center_b: Attribute[ArrayLike, Floats]
+    radius_a: float
+    radius_b: float
+    normal_b: Attribute[ArrayLike, Floats]
+    inside: bool
+    restitution: float
+    kinetic: float
+    static: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., center_b: ArrayLike = ..., radius_a: float, radius_b: float | None = ..., normal_b: ArrayLike | None = ..., inside: bool = ..., restitution: float = ..., kinetic: float = ..., static: float | None = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., center_a: ArrayLike = ..., center_b: ArrayLike = ..., radius_a: float, radius_b: float | None = ..., normal_b: ArrayLike | None = ..., inside: bool = ..., restitution: float = ..., kinetic: float = ..., static: float | None = ..., name: str = ...) -> Self: ...
+
+class Stop(Joint):
+    joint: Joint
+    lower: float
+    upper: float
+    restitution: float
+    def __init__(self, joint: Joint, lower: float | None = ..., upper: float | None = ..., restitution: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, joint: Joint, lower: float | None = ..., upper: float | None = ..., restitution: float = ..., name: str = ...) -> Self: ...
+    @property
+    def geometry(self) -> Any: ...
 
 class Translational(Points, Axes, References, Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., name: str = ...) -> None: ...

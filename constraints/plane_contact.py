@@ -1,25 +1,35 @@
-"""Point on plane: a point of a stays in a plane of b (bilateral).
+"""Point on plane: a point of a stays in a plane of b, or on one side of it.
 
     d     = x_a - x_b,  n = normal of b in the ground frame
     Phi   = n.d                       (1)  [m]
     Phi_x = [ n^T, -n^T, d^T ]        (2)  for (x_a, x_b, n)
     gamma = 2 nd.dd                   (3)
 
-Never singular by itself.
+Never singular by itself. A unilateral contact has the gap Phi >= 0.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import Point, Primitive, Vector
+from ..plugins import Point, Primitive, Unilateral, Vector
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
 
 
-class PlaneContact(Primitive):
-    """A point of one body in a plane fixed to another: bilateral contact without friction.
+class PlaneContact(Unilateral, Primitive):
+    """A point of one body in a plane fixed to another, or on one side of it: contact without friction.
+
+    Parameters
+    ----------
+    unilateral : bool
+        Whether the contact opens: the point stays on the side of normal_b, and the plane only pushes. By default the
+        plane holds the point on both sides.
+    restitution : float, 0 to 1
+        Coefficient of restitution e of a unilateral contact: 0 for plastic impacts, 1 for elastic ones.
+    kinetic, static : float, float or None
+        Coefficients of friction of a unilateral contact; not available yet.
 
     Notes
     -----
@@ -37,13 +47,42 @@ class PlaneContact(Primitive):
     >>> solution = ts.simulate(scene, (0, 1))
     >>> print(solution.position("block")[-1].round(3) + 0.0, solution.multipliers[0].round(3))
     [ 2.5  0.  -2.5] [-7.071]
+
+    A ball falls on a floor from 1.25 m, and rebounds with half its velocity:
+
+    >>> scene = ts.Scene(gravity=(0, 0, -10))
+    >>> ball = scene.add_point_mass(mass=1.0, position=(0, 0, 1.25), name="ball")
+    >>> floor = ts.constraints.PlaneContact(
+    ...     ball, scene.ground, normal_b=(0, 0, 1), unilateral=True, restitution=0.5, name="floor"
+    ... )
+    >>> scene.add(floor)
+    <PlaneContact 'floor'>
+    >>> solution = ts.simulate(scene, (0, 1.2))
+    >>> print([(round(t, 9), name, round(impulse, 9)) for t, name, impulse in solution.impulses])
+    [(0.5, 'floor', 7.5), (1.0, 'floor', 3.75)]
     """
 
     rows = 1
     markers = (Point("a"), Point("b"), Vector("b", "normal_b"))
 
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        unilateral: bool = False,
+        restitution: float = 0.0,
+        kinetic: float = 0.0,
+        static: float | None = None,
+        **places: Any,
+    ) -> None:
         super().__init__(a, b, **places)
+        self.unilateral = bool(unilateral)
+        self._set_law(restitution, kinetic, static)
+
+    def check(self):
+        """Refuse inadmissible coefficients of impact and friction."""
+        self._check_law()
 
     @staticmethod
     def phi(x, par, t, out):

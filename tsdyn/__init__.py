@@ -125,6 +125,7 @@ __all__ = [
     "constraints",
     "ensemble",
     "forces",
+    "impact",
     "integrators",
     "kernel",
     "load",
@@ -146,6 +147,7 @@ if TYPE_CHECKING:
     from .measuring.benchmark import benchmark
     from .measuring.compare import compare
     from .measuring.profile import profile
+    from .simulation.contact_run import impact
 else:
     from ._discovery import refusing as _refusing
 
@@ -155,6 +157,7 @@ else:
         "benchmark": ".measuring.benchmark",
         "compare": ".measuring.compare",
         "ensemble": ".ensembles.ensemble",
+        "impact": ".simulation.contact_run",
         "plots": ".plots",
         "profile": ".measuring.profile",
         "testing": ".testing",

@@ -335,6 +335,7 @@ class Status(IntEnum):
     CASE_FAILED = 19
     NOT_RUN = 20
     SERIES_ENDED = 21
+    CONTACT_FAILED = 22
 
     def __str__(self) -> str:
         return self.name.lower()
@@ -420,5 +421,9 @@ _SENTENCES = {
         "A fixed step by series passes a place where the law of a force is not analytic, such as zero length "
         "of a spring.",
         "Leave out step=, so that steps end before such places, or take 'dop853' or 'nystrom4', which use no series.",
+    ),
+    Status.CONTACT_FAILED: (
+        "The contacts leave no way on.",
+        "Look at the contacts named, at what drives their bodies together, and at their coefficients of restitution.",
     ),
 }

@@ -47,6 +47,7 @@ from .elements.loads import (
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
 from .elements.tolerances import FLAT, PARALLEL, RIGHT_ANGLED
+from .elements.unilateral import Side, Unilateral
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
 from .jit.predicates import some
@@ -146,10 +147,12 @@ __all__ = [
     "Primitive",
     "RungeKuttaTableau",
     "SceneLaw",
+    "Side",
     "Signal",
     "Smooth",
     "SumRow",
     "Turn",
+    "Unilateral",
     "Vector",
     "across",
     "act",

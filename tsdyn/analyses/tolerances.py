@@ -111,3 +111,13 @@ DELTA = 1e-10
 CONSISTENT = 1e-6
 # Coordinates up to which the matrices of an instant are dense: a dense factorisation takes less time there.
 DENSE_INSTANT = 120
+
+# --- contacts --------------------------------------------------------------------------------------------------------
+# Rate of a gap over the sum of its terms up to which it is zero: velocities after an impact are right to rounding,
+# those of a chain to some hundred.
+AT_REST = 1e-12
+# The same of accelerations, and of reactions as the accelerations that they make.
+LEVEL = 1e-11
+# Part of a row that is independent of others, up to which it depends on them: sines of angles, squares of which are
+# found to 1e-14.
+DEPENDENT = 1e-7

@@ -41,6 +41,9 @@ RANK_TOL = 1e-7
 # (the next sweep squares it).
 ORTHOGONAL, CONVERGED = 1e-15, 1e-10
 
+# Pivot of Lemke's method, of a matrix with unit diagonal, up to which it is zero: depth of the pivots beside rounding.
+LEAST_PIVOT = 1e-11
+
 # Rows of a sparse matrix from which a factorisation may take more than 0.1 s.
 LONG_LU = 1 << 15
 # Numbers of right-hand sides from which a solution may.

@@ -381,6 +381,8 @@ class Reader:
 class StepPieces:
     """The trajectories of a run's parts, one after the other, as one `Trajectory`."""
 
+    side = "left"  # at the end of a part: that part
+
     def __init__(self, parts):
         self.parts, self.start, self.end = parts, parts[0].start, parts[-1].end
 
@@ -400,7 +402,7 @@ class StepPieces:
 
     def _gathered(self, t, ask):
         """What the parts say of times t, in their order; where it is no array, a list."""
-        piece = np.searchsorted([part.end for part in self.parts[:-1]], t)
+        piece = np.searchsorted([part.end for part in self.parts[:-1]], t, side=self.side)
         order, found = [], []
         for i, part in enumerate(self.parts):
             at = np.flatnonzero(piece == i)

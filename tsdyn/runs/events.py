@@ -12,6 +12,7 @@ from ..model.handles import handles_of
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import reactions
 from ..observables.reactions import Exerting
+from ..observables.state import RememberingState
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
 from .tolerances import FAST_TURN, LEAST_TIME, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
@@ -26,6 +27,7 @@ class Event(NamedTuple):
     name: str
     limit: float  # occurrences that end the run; inf for never
     direction: float  # of the changes that count; 0 for both
+    exact: bool = False  # whether a value at the start that is positive is no rounding of zero
 
     def value(self, t, instant):
         """The function's value; raises `EventFailed`."""
@@ -233,6 +235,9 @@ class Watch:
                     self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
                 except EventFailed as failure:
                     raise InvalidArgument(f"events: {failure}") from failure.__cause__
+                for event, track in zip(self.events, self.tracks, strict=True):
+                    if event.exact and track.value > 0.0:
+                        track.sign, track.significant = 1.0, (self.t, track.value)
         stiff = run.numbers.stiff
         # One step at a time, searched before the next one
         for _ in range(most):
@@ -284,6 +289,13 @@ class Watch:
 
     def _instant(self, t, state):
         return EventInstant(self.packed, self.memory[self.angles :], self.beside, t, state)
+
+    def _instants(self, t, states):
+        """The same at times t (k,), states (k, 3, n), without multipliers."""
+        before, (q, qd, _), angles = self.beside
+        anchor = Anchor(angles, t - before, (q, qd))
+        parts = (np.ascontiguousarray(states[:, i]) for i in range(3))
+        return RememberingState.of(self.packed, self.memory[self.angles :], anchor, t, *parts, None)
 
     def _value(self, i, t, state):
         return self.events[i].value(t, self._instant(t, state))
@@ -337,7 +349,10 @@ class Watch:
 
         def sample(times):
             values = np.full(times.size, np.nan)
-            for k, (t, state) in enumerate(zip(times.tolist(), step.states(times), strict=True)):
+            states, over = step.states(times), getattr(self.events[i].function, "over", None)
+            if over is not None and states and not any(state is None for state in states):
+                return over(self._instants(times, np.array(states)))
+            for k, (t, state) in enumerate(zip(times.tolist(), states, strict=True)):
                 if state is not None:
                     values[k] = self._value(i, t, state)
                     good.append(t)
@@ -438,7 +453,8 @@ class Watch:
         if a == 0.0 or (a < 0.0) == (b < 0.0):
             return [Occurrence(t0, i, step.at(t0))]
         root = self._between(i, step, (t0, a), (t1, b))
-        return [] if self._is_start(i, step, root, a) else [Occurrence(root, i, step.at(root))]
+        at_start = not self.events[i].exact and self._is_start(i, step, root, a)
+        return [] if at_start else [Occurrence(root, i, step.at(root))]
 
     def _is_start(self, i, step, t, before):
         """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before."""
@@ -462,7 +478,7 @@ class Watch:
         root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
         shift = least + ROOT * abs(root)
         # a run that continues from a terminal event must not find it again
-        ends, side = self.events[i].limit < math.inf, math.copysign(1.0, b)
+        ends, side = self.events[i].limit < math.inf and not self.events[i].exact, math.copysign(1.0, b)
         while ends and root + shift < t1 and side * value(root) <= 0.0:
             root, shift = root + shift, 2.0 * shift
         return root

@@ -62,3 +62,4 @@ class Outcome(NamedTuple):
     events: tuple  # times, positions, velocities of each event; or None
     began: float  # by `jit.compiled.clock` when the driver began, prepared
     method: str = ""  # the methods of a run that has turned from one to another
+    phases: tuple = None  # of a run with contacts: its `contact_run.Phases`, and the number of that of each output

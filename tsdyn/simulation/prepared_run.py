@@ -28,6 +28,7 @@ from ..taylor.series_engine import SeriesEngine
 from ..validation import damaged
 from . import stored_runs
 from .local_origin import origin_of, run_near, within_rounding
+from .phase_scenes import demand_bilateral, has_contacts
 from .progress import reporter
 from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented, from_names
 from .scene import Scene
@@ -171,6 +172,7 @@ class Run:
 
     @fitting
     def __init__(self, scene: Scene, options: RunOptions) -> None:
+        demand_bilateral(scene)
         self.scene, self.options, self._form = scene, options, options.form
         self._compiled = set()  # with outputs between steps, or not
         self._last = self._seen = None  # the last `_Last`, and state
@@ -302,8 +304,8 @@ class Run:
             self._last = _Last(call.t_span, call.t_eval, start, bits, known.engines, task, is_regular)
         return task
 
-    def _new_task(self, call, start):
-        """The same; start: q, qd as given."""
+    def _new_task(self, call, start, memory=None):
+        """The same; start: q, qd as given, memory: joint angles and what forces remember, by default of the state."""
         options, kept, method, state = self.options, self._prepared, self.method, call.state
         span = interval(call.t_span)
         times = output_times(call.t_eval, *span)
@@ -311,7 +313,7 @@ class Run:
         within = options.dense_output or options.events is not None or between(times, span)
         self._prepare_kernels(within)
         stops = kept.stops(*span, method.step is None)
-        memory = remembered(state, kept, span[0], start[0])
+        memory = remembered(state, kept, span[0], start[0]) if memory is None else memory
         q, qd = kept.start(self.scene, start, span[0], options.initial_tol, memory, options.redundancy == "drop")
         if not self._form.basis_free or method.implicit:
             demand_holonomic(kept.packed, q, span[0], options.formulation)
@@ -572,7 +574,18 @@ def simulate(  # many arguments, by name: each is an option of a run
         max_step, history, chart_interval,
     )  # fmt: skip
     call = RunCall(t_span, t_eval, store, checkpoint, progress, state)
+    if has_contacts(scene):
+        return _solve_contacts(scene, options, call)
     return _run_of(scene, options, call)._solve(call)
+
+
+def _solve_contacts(scene, options, call):
+    """Run a scene with unilateral constraints."""
+    from .contact_run import run_contacts
+
+    started = clock()
+    task, outcome = run_contacts(scene, options, call, _run_of, run_task, instead)
+    return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": clock() - outcome.began})
 
 
 def _run_of(scene, options, call):

@@ -174,6 +174,8 @@ def save(solution: Solution, path: Place) -> Path:
     demand_path(path, "path")
     path = Path(path).absolute()
     saved_file.format_at(path)
+    if solution._phases is not None:
+        raise InvalidArgument("files don't hold solutions with contacts yet: use to_csv or to_dataframe for outputs.")
     if solution._lacks:
         remembered = solution._width
         content = solution._content
@@ -410,6 +412,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
         t_events=events[0], q_events=events[1], qd_events=events[2],
         _method=record["method"], _trajectory=trajectory, _end=run_end, _turned="", _seconds=record["seconds"],
         _energy_error=record["energy_error"], _reason=record["reason"], _message=record["message"],
+        _phases=None, _phase_of_rows=None,
         _provenance=record["provenance"],
     )  # fmt: skip
     found._take(outputs, n)

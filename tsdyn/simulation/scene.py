@@ -39,6 +39,7 @@ from .analyses import linearise as _linearise
 from .analyses import set_start as _set_start
 from .given_motion import inverse_dynamics as _inverse_dynamics
 from .given_motion import kinematics as _kinematics
+from .phase_scenes import where_it_stands, without_contacts
 from .scene_cache import preparing
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
 from .variants import copy as _copy
@@ -211,6 +212,7 @@ class Scene:
     ground: AnyBody
     imported: ImportReport | None = None
     _named = None  # of a file with a table `parameters`: its `NamedNumbers`
+    _phases = None  # of a scene with contacts: see phase_scenes.py
     _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:
@@ -408,18 +410,22 @@ class Scene:
     def __getstate__(self):
         """Leave out the packed scene, which holds addresses of this process."""
         _ = self._bodies  # made, if they weren't
-        gone = dict.fromkeys(("_packed", "_start", "_prepared", "_users", "_twins", "_aliases"))
+        gone = dict.fromkeys(("_packed", "_start", "_prepared", "_phases", "_users", "_twins", "_aliases"))
         return {**self.__dict__, **gone, "_spare": {}, "_waiting": {}}
 
     def touch(self) -> None:
         """Discard the packed numbers after a change."""
         if "_later" in self.__dict__:
             make_handles(self)
-        self._packed = self._start = self._prepared = None
+        self._packed = self._start = self._prepared = self._phases = None
 
     def touch_start(self) -> None:
         """Discard what depends on the start, after a change of it: redundant rows, bodies that turn, a local origin."""
         known = None if self._packed is None else self._packed.derived
+        if self._phases is not None:
+            for phase in self._phases.values():  # one of them may be at work
+                phase._start = None
+            self._phases = None
         if known is not None and known.is_of_start:
             self.touch()
         elif known is not None:
@@ -564,16 +570,16 @@ class Scene:
         return show(scene_data(self, t, said, shapes=shapes, camera=camera, follow=follow), path)
 
     place = _place
-    evaluate = _evaluate
-    assemble = _assemble
-    mobility = _mobility
-    linearise = _linearise
-    equilibrium = _equilibrium
-    kinematics = _kinematics
-    inverse_dynamics = _inverse_dynamics
+    evaluate = where_it_stands(_evaluate)
+    assemble = where_it_stands(_assemble)
+    mobility = where_it_stands(_mobility)
+    linearise = where_it_stands(_linearise)
+    equilibrium = without_contacts(_equilibrium)
+    kinematics = without_contacts(_kinematics)
+    inverse_dynamics = without_contacts(_inverse_dynamics)
     parameters = _parameters
     with_parameters = _with_parameters
-    set = set_joint
+    set = where_it_stands(set_joint)
     set_start = _set_start
     remove = _remove
     copy = _copy

@@ -20,6 +20,7 @@ from ..observables.reactions import demand_unique
 from ..runs.driver import instants_of, sampled
 from ..taylor.layout import pays, refusal
 from ..taylor.series_engine import Series
+from .phase_scenes import demand_bilateral
 
 preparing = RLock()  # threads that prepare a scene at once share what they find
 SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocate nothing
@@ -31,7 +32,13 @@ FEW_LAYOUTS = 2  # of memories that other engines have used
 
 
 def prepared(scene):
-    """Return the `Prepared` of the present scene."""
+    """Return the `Prepared` of the present scene, which is to be run."""
+    demand_bilateral(scene)
+    return prepared_numbers(scene)
+
+
+def prepared_numbers(scene):
+    """The same of any scene: one with contacts is not run by it, see contact_run.py."""
     if scene._lacks:
         raise StorageError(scene._lacks)
     if scene._users:

@@ -498,7 +498,7 @@ class _Segments:
         ends = [part.end for part in parts]
         steps = StepLog([end.steps for end in ends]) if logs else None
         charts = ChartLog([end.charts for end in ends]) if logs else None
-        counts = _summed([end.counts for end in ends])
+        counts = summed([end.counts for end in ends])
         return last._replace(
             reason=" ".join(part for part in said if part),
             rows=self._rows(),
@@ -539,7 +539,7 @@ class _Segments:
         return " and ".join(repr(method) for method in (first[::-1] if most else first))
 
 
-def _summed(counts):
+def summed(counts):
     """Return the counts of the whole run."""
     ways = {"stiff": any, "largest_landing": max}
     return {name: ways.get(name, sum)(each[name] for each in counts) for name in counts[0]}

@@ -17,7 +17,7 @@ from ..methods.integrator import is_plain
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import diagnostics, reactions
 from ..observables.generalised_forces import law_values
-from ..observables.reactions import acted, exerted, member, multipliers, with_normal_loads
+from ..observables.reactions import acted, exerted, member, with_normal_loads
 from ..observables.state import RememberingState
 from ..validation import counted, floats
 from .records import Records
@@ -258,7 +258,7 @@ def _power(solution, trajectory, item, t):
     memory = with_normal_loads(solution.packed, t, q, qd, qdd, memory)
     at = SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=solution.packed, system=system)
     if system.rheonomic[0]:
-        at.multipliers = multipliers(solution.packed, t, q, qd, qdd, memory)
+        at.multipliers = solution._multipliers_at(t, q, qd, qdd, memory)
     if item is not None:
         power = diagnostics.power_of(at, item)
     else:
@@ -437,6 +437,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         self.status, self._trajectory = outcome.status, outcome.trajectory
         self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)
         self.handles = task.prepared.handles
+        self._phases, self._phase_of_rows = outcome.phases or (None, None)
         self._take(outcome.rows, task.q.size)
         self._seconds, self._energy_error, self._end = seconds, None, outcome.end
         near = outcome.end.near_steps
@@ -495,7 +496,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """The last state reached, to continue from: simulate(scene, (state.t, t_end), state=state)."""
         q, qd, qdd = (a.copy() for a in self._last)
         t, memory = np.array([self._reached]), self._remembered[None]
-        lam = reactions.multipliers(self.packed, t, q[None], qd[None], qdd[None], memory)[0]
+        lam = self._multipliers_at(t, q[None], qd[None], qdd[None], memory)[0]
         remembered = self.packed, self._remembered.copy(), Anchor(self._angles)
         return RememberingState.of(*remembered, self._reached, q, qd, qdd, lam)
 
@@ -541,7 +542,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         if status != Status.SUCCESS:
             raise StepFailure(f"no state could be found at some t in {t!r}. {status.sentence} {status.remedy}", self)
         q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
-        parts = q, qd, qdd, reactions.multipliers(self.packed, every, q, qd, qdd, memory)
+        parts = q, qd, qdd, self._multipliers_at(every, q, qd, qdd, memory)
         anchor = self._anchor_of(every)
         if times.ndim:
             return RememberingState.of(self.packed, memory, anchor, every, *parts)
@@ -557,6 +558,16 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         starts, back = np.unique(start, return_inverse=True)
         states, _, _ = self._trajectory(starts)
         return Anchor(angles, t - start, (states[back, 0], states[back, 1]))
+
+    @property
+    def phases(self) -> list[tuple[float, float, tuple[str, ...]]]:
+        """Start and end (s) of each phase, and names of the contacts that are closed in it; one without contacts."""
+        return [(self.span[0], self.reached, ())] if self._phases is None else list(self._phases.list)
+
+    @property
+    def impulses(self) -> list[tuple[float, str, float]]:
+        """Time (s), name and impulse of each contact at each impact; N s, or N m s of an angle."""
+        return [] if self._phases is None else list(self._phases.impulses)
 
     @property
     def steps(self) -> Steps:
@@ -583,12 +594,22 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     @cached_property
     def multipliers(self) -> Floats:
         """Multipliers (k, m), computed on first access."""
-        return reactions.multipliers(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
+        return self._multipliers_at(self.t, self.q, self.qd, self.qdd, self._memory, self._phase_of_rows)
+
+    def _multipliers_at(self, t, q, qd, qdd, memory, numbers=None):
+        """Multipliers (k, m) at times of the run; with contacts in their phases, by number or by time."""
+        if self._phases is None:
+            return reactions.multipliers(self.packed, t, q, qd, qdd, memory)
+        numbers = self._phases.at(t) if numbers is None else numbers
+        return self._phases.multipliers(numbers, len(self.system.segments), t, q, qd, qdd, memory)
 
     @cached_property
     def constraint_error(self) -> ConstraintError:
         """Maximum norms of Eqs. 1-3 at every output, recomputed independently of the solver."""
-        return diagnostics.constraint_error(self.packed, self.t, self.q, self.qd, self.qdd, self._memory)
+        motion = self.t, self.q, self.qd, self.qdd, self._memory
+        if self._phases is not None:
+            return self._phases.constraint_error(self._phase_of_rows, *motion)
+        return diagnostics.constraint_error(self.packed, *motion)
 
     def actuation(self, control: ItemLike) -> Floats:
         """The values (k, actuators) of the function of a Control at the outputs; those held if it has a period.

@@ -224,6 +224,8 @@ class RunOutputs:
         for name in ("t", "q", "qd", "qdd", "_remembers"):
             setattr(other, name, getattr(self, name)[part])
         other.anchor = Anchor(self.anchor.angles[part])
+        if self._phase_of_rows is not None:
+            other._phase_of_rows = self._phase_of_rows[part]
         return other
 
     def _bare(self):

@@ -1,5 +1,7 @@
 """Limits of the preparation and assessment of runs; dimensionless unless a unit is named."""
 
+from ..maths.tolerances import EPS
+
 # --- choice of the method ---
 # Steps over which work is measured first; each measurement takes as many steps as there were before. Up to SETTLED
 # steps the implicit method may take (SETTLED / steps)^2 times the work of the explicit one: its steps are short until
@@ -62,3 +64,16 @@ NO_POWER = 1e-9
 AGREE, DEEPEST = 1e-11, 8
 # Segments in a row that together get on by less than a part of the run: series carry the motion past nothing there.
 PASSES, GOT_ON = 16, 1e-9
+
+# --- contacts --------------------------------------------------------------------------------------------------------
+# Of the scene's length: a gap up to which a contact takes part in an event of another, some roundings of positions; and
+# a depth that no event leaves, which tells that an event was missed.
+TOUCHING, PENETRATION = 64.0 * EPS, 1e-9
+# Roundings in a gap, of the sizes of its terms: lower flights than these are none.
+ROUNDED = 16.0
+# Height of flights, of the scene's length, below which elastic impacts (e = 1) end: others come lower by themselves.
+ENDLESS = 1e-12
+# Events in a row without progress in time, beside one for each gap: a chain of openings that follow from each other.
+MOST_AT_AN_INSTANT = 100
+# Events after which progress is judged: a run that would need CREEPING times as many more is ended.
+EVENTS_JUDGED, CREEPING = 1000, 1e3

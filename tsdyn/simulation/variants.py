@@ -16,7 +16,7 @@ from ..errors import InvalidArgument, InvalidBody
 from ..model.handles import handles_of
 from ..model.packed import classes
 from ..validation import listed
-from .scene_cache import prepared
+from .scene_cache import prepared_numbers
 
 if TYPE_CHECKING:
     from ..hints import Floats, ParameterList, Scene
@@ -250,7 +250,7 @@ def family_of(scene):
     """The `Family` of a scene as it is now, and by which values the scene differs from its template."""
     from .parameters import Family
 
-    kept = prepared(scene)
+    kept = prepared_numbers(scene)
     known = kept.packed.derived
     if known.family is None:
         _ = kept.refusal, kept.pays, kept.sharp, kept.slips, kept.sampled  # for `Prepared.like`

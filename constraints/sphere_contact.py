@@ -1,0 +1,122 @@
+"""Contact of a ball of a with a ball or a plane of b, or within a ball of b; unilateral.
+
+    d     = centre of a - centre of b
+    gap   = |d| - (R_a + R_b)         (1)  outside: Distance, Phi = (d.d - L^2) / 2 L, L = R_a + R_b
+    gap   = (R_b - R_a) - |d|         (2)  inside: the same with L = R_b - R_a, the gap is -Phi
+    gap   = n.d - R_a                 (3)  plane: PlaneContact
+
+Eq. (2) is open where the centres coincide, so the row is never singular where the gap is closed.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..plugins import InvalidConstraint, Joint, Point, Side, Unilateral, Vector, positive
+from .distance import Distance
+from .plane_contact import PlaneContact
+
+if TYPE_CHECKING:
+    from ..hints import ArrayLike, BodyLike
+
+
+class SphereContact(Unilateral, Joint):
+    """Contact without friction of a ball with another ball, with a plane, or within a hollow ball; it only pushes.
+
+    Parameters
+    ----------
+    radius_a : float, m
+        Of the ball of a.
+    radius_b : float, m; optional
+        Of the ball of b. None for a plane of b, through center_b with the normal normal_b.
+    normal_b : array_like (3,), optional
+        Of the plane, body frame of b; the ball is on this side.
+    inside : bool
+        Whether the ball of a is within the ball of b.
+    restitution : float, 0 to 1
+        Coefficient of restitution: 0 for plastic impacts, 1 for elastic ones.
+    kinetic, static : float, float or None
+        Coefficients of friction; not available yet.
+
+    Notes
+    -----
+    One row: gap. `solution.reaction(contact)` is the force on a at the centre of its ball.
+
+    Examples
+    --------
+    A ball hits a ball of the same mass at rest, elastically; they exchange their velocities:
+
+    >>> import tsdyn as ts
+    >>> scene = ts.Scene(gravity=(0, 0, 0))
+    >>> cue = scene.add_point_mass(mass=0.2, position=(-1, 0, 0), velocity=(2, 0, 0), name="cue")
+    >>> ball = scene.add_point_mass(mass=0.2, name="ball")
+    >>> scene.add(ts.constraints.SphereContact(cue, ball, radius_a=0.03, radius_b=0.03, restitution=1.0, name="hit"))
+    <SphereContact 'hit': 1 row>
+    >>> solution = ts.simulate(scene, (0, 1))
+    >>> print(f"{solution.impulses[0][0]:.3f} s", solution.velocity(ball)[-1].round(9) + 0.0)
+    0.470 s [2. 0. 0.]
+    """
+
+    markers = (Point("a", "center_a"), Point("b", "center_b"))
+
+    def __init__(
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        radius_a: float,
+        radius_b: float | None = None,
+        normal_b: ArrayLike | None = None,
+        inside: bool = False,
+        restitution: float = 0.0,
+        kinetic: float = 0.0,
+        static: float | None = None,
+        **places: Any,
+    ) -> None:
+        super().__init__(a, b, **places)
+        self.radius_a, self.radius_b, self.normal_b, self.inside = radius_a, radius_b, normal_b, bool(inside)
+        self._set_law(restitution, kinetic, static)
+        self.check()
+
+    def __setattr__(self, name, value):
+        """Set a checked attribute; a normal is of unit length."""
+        if name == "normal_b" and value is not None:
+            value = Vector("b", name).coordinates(self.b, value, self.name)
+        super().__setattr__(name, value)
+
+    def check(self):
+        """Refuse radii that are none, and two shapes of b at once."""
+        self._check_law()
+        positive(self.radius_a, f"{self.name}: radius_a (m)", InvalidConstraint)
+        if (self.radius_b is None) == (self.normal_b is None):
+            raise InvalidConstraint(
+                f"{self.name}: give radius_b for a ball of b, or normal_b for a plane of b through center_b; got "
+                f"{'neither' if self.radius_b is None else 'both'}."
+            )
+        if self.radius_b is not None:
+            positive(self.radius_b, f"{self.name}: radius_b (m)", InvalidConstraint)
+        if self.inside and not (self.radius_b is not None and self.radius_a < self.radius_b):
+            raise InvalidConstraint(
+                f"{self.name}: inside=True needs radius_b, larger than radius_a = {self.radius_a:g} m."
+            )
+
+    def compose(self):
+        """Eqs. (1) to (3)."""
+        if self.radius_b is None:
+            point = self.center_b + self.radius_a * self.normal_b
+            part = PlaneContact(self.a, self.b, point_a=self.center_a, point_b=point, normal_b=self.normal_b)
+        else:
+            length = self.radius_b - self.radius_a if self.inside else self.radius_a + self.radius_b
+            part = Distance(self.a, self.b, point_a=self.center_a, point_b=self.center_b, length=length)
+        yield "gap", part
+
+    @property
+    def sides(self):
+        """One."""
+        return (Side(self.parts[0], -1.0 if self.inside else 1.0),)
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random instance; the balls need not touch."""
+        places = {marker.argument: rng.normal(size=3) for marker in cls.markers}
+        return cls(a, b, **places, radius_a=rng.uniform(0.5, 1.0), radius_b=rng.uniform(0.5, 1.0))

@@ -1,0 +1,431 @@
+"""Unilateral contacts and stops against closed forms: impact times, rest, openings, energies, refusals."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.special import ellipk
+
+import tsdyn as ts
+from tests.helpers.tolerances import EPS
+
+C = ts.constraints
+G = 9.81
+
+
+def bouncing(e, height=1.0, vx=1.0):
+    scene = ts.Scene(gravity=(0, 0, -G))
+    ball = scene.add_point_mass(mass=0.5, position=(0, 0, height), velocity=(vx, 0, 0), name="ball")
+    contact = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": e, "name": "floor"}
+    scene.add(C.PlaneContact(ball, scene.ground, **contact))
+    return scene, np.sqrt(2 * height / G)
+
+
+def penetration(scene, solution):
+    """The deepest point of any contact at the outputs, m; negative where it penetrates."""
+    deepest = np.inf
+    for contact in scene.constraints:
+        if isinstance(contact, C.PlaneContact):
+            deepest = min(deepest, solution.position(contact.a, point=contact.point_a)[:, 2].min())
+    return deepest
+
+
+# the bouncing ball
+
+
+@pytest.mark.parametrize("e", [0.8, 0.9])
+def test_impact_times_of_a_bouncing_ball(e):
+    scene, fall = bouncing(e)
+    solution = ts.simulate(scene, (0, 8.4))
+    times = np.array([t for t, *_ in solution.impulses[:30]])
+    exact = fall * (1 + 2 * np.append(0.0, np.cumsum(e ** np.arange(1, 30))))
+    assert np.abs(times - exact).max() < 1e-12
+    strengths = np.array([impulse for *_, impulse in solution.impulses[:20]])
+    np.testing.assert_allclose(strengths, 0.5 * G * fall * (1 + e) * e ** np.arange(20), rtol=1e-10)
+    assert {name for _, name, _ in solution.impulses} == {"floor"}
+
+
+@pytest.mark.parametrize("e", [0.0, 0.3, 0.8])
+def test_a_bouncing_ball_comes_to_rest_and_slides_on(e):
+    scene, fall = bouncing(e)
+    solution = ts.simulate(scene, (0, 6.0), dense_output=True)
+    start, end, names = solution.phases[-1]
+    assert solution.success
+    assert names == ("floor",)
+    assert abs(start - fall * (1 + 2 * e / (1 - e))) < 3e-12
+    assert end == 6.0
+    np.testing.assert_allclose(solution.position("ball")[-1], [6.0, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(solution.at(5.0).reaction("floor")[0], [0.0, 0.0, 0.5 * G], atol=1e-12)
+    np.testing.assert_array_equal(solution.at(0.1).reaction("floor")[0], 0.0)
+    assert np.diff(solution.energy).max() < 4 * EPS * G
+    assert penetration(scene, solution) > -1e-13
+
+
+def test_both_sides_of_an_impact():
+    """The outputs have the instant twice; dense output has the later side at it, and the earlier one before."""
+    scene, fall = bouncing(0.5)
+    solution = ts.simulate(scene, (0, 1.0), dense_output=True)
+    t = solution.impulses[0][0]
+    (twice,) = np.nonzero(solution.t == t)
+    np.testing.assert_allclose(solution.velocity("ball")[twice, 2], [-G * fall, 0.5 * G * fall], rtol=1e-14)
+    sides = solution.at([np.nextafter(t, 0.0), t]).velocity("ball")[:, 2]
+    np.testing.assert_allclose(sides, [-G * fall, 0.5 * G * fall], rtol=1e-13)
+
+
+def test_output_times_across_impacts():
+    scene, fall = bouncing(0.5, height=G / 2)  # the first impact is at 1 s
+    times = np.array([0.0, 0.5, fall, 1.5, 2.0])
+    solution = ts.simulate(scene, (0, 2.0), t_eval=times)
+    np.testing.assert_array_equal(solution.t, times)
+    np.testing.assert_allclose(solution.position("ball")[:, 0], times, atol=1e-13)
+    np.testing.assert_allclose(solution.position("ball")[[1, 3], 2], [0.375 * G, G / 8], atol=1e-12)
+    later = solution[2:]
+    np.testing.assert_array_equal(later.multipliers, solution.multipliers[2:])
+
+
+def test_ten_thousand_impacts_leave_the_constraints_as_they_are():
+    scene = ts.Scene(gravity=(0, 0, 0))
+    bob = scene.add_point_mass(mass=1.0, position=(0, 0, 1), velocity=(500.0, 0, 0), name="bob")
+    scene.add(C.Distance(bob, scene.ground))
+    scene.add(
+        C.PlaneContact(bob, scene.ground, point_b=(0.1, 0, 0), normal_b=(-1, 0, 0), unilateral=True, restitution=1.0)
+    )
+    scene.add(
+        C.PlaneContact(bob, scene.ground, point_b=(-0.1, 0, 0), normal_b=(1, 0, 0), unilateral=True, restitution=1.0)
+    )
+    solution = ts.simulate(scene, (0, 0.4))
+    assert solution.success
+    between = 2 * np.arcsin(0.1) / 500.0
+    times = np.array([t for t, *_ in solution.impulses])
+    assert times.size == int((0.4 + between / 2) / between)
+    assert np.abs(times - between * (0.5 + np.arange(times.size))).max() < 1e-10
+    assert max(solution.constraint_error.position.max(), solution.constraint_error.velocity.max() / 500) < 1e-14
+    np.testing.assert_allclose(solution.kinetic_energy, 0.5 * 500.0**2, rtol=1e-11)
+
+
+# openings
+
+
+def test_a_particle_leaves_a_ball_where_the_normal_force_vanishes():
+    """cos(theta) = 2/3 + v0^2 / 3 g R; afterwards it flies freely."""
+    scene, v0 = ts.Scene(gravity=(0, 0, -G)), 0.5
+    globe = scene.add_body(mass=1.0, inertia=(1, 1, 1), name="globe")
+    scene.add(C.Fixed.at(globe, scene.ground, point=(0, 0, 0)))
+    bead = scene.add_point_mass(mass=0.3, position=(0, 0, 1.0), velocity=(v0, 0, 0), name="bead")
+    scene.add(C.SphereContact(bead, globe, radius_a=0.1, radius_b=0.9, name="touch"))
+    solution = ts.simulate(scene, (0, 1.0), rtol=1e-12, atol=1e-12, dense_output=True)
+    (_, t, closed), (_, _, opened) = solution.phases
+    assert (closed, opened) == (("touch",), ())
+    assert abs(solution.at(t).position(bead)[2] - (2 / 3 + v0**2 / (3 * G))) < 1e-13
+    assert solution.impulses == []
+    assert np.ptp(solution.energy) < 1e-12
+    np.testing.assert_array_equal(solution.reaction("touch")[0][-1], 0.0)
+
+
+def test_a_ball_within_a_ball():
+    """It falls to the bottom without a rebound, along a vertical through the centre, and stays."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    ball = scene.add_point_mass(mass=1.0, position=(0, 0, 0.5), name="ball")
+    shell = scene.add_body(mass=1.0, inertia=(1, 1, 1), name="shell")
+    scene.add(C.Fixed.at(shell, scene.ground, point=(0, 0, 0)))
+    scene.add(C.SphereContact(ball, shell, radius_a=0.2, radius_b=1.0, inside=True, name="wall"))
+    solution = ts.simulate(scene, (0, 1.0))
+    assert abs(solution.impulses[0][0] - np.sqrt(2 * 1.3 / G)) < 1e-14
+    np.testing.assert_allclose(solution.position(ball)[-1], [0, 0, -0.8], atol=1e-14)
+    np.testing.assert_allclose(solution.reaction("wall")[0][-1], [0, 0, G], rtol=1e-12)
+
+
+# impacts
+
+
+def test_two_balls():
+    """Velocities after a central impact by restitution and momentum."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    a = scene.add_point_mass(mass=1.0, position=(0, 0, 0), velocity=(2, 0.5, 0), name="a")
+    b = scene.add_point_mass(mass=3.0, position=(1, 0.15, 0), velocity=(-1, 0.5, 0), name="b")
+    b.position = (1, 0, 0)
+    scene.add(C.SphereContact(a, b, radius_a=0.1, radius_b=0.1, restitution=0.5, name="hit"))
+    solution = ts.simulate(scene, (0, 1.0))
+    ((t, name, impulse),) = solution.impulses
+    assert (round(t, 12), name) == (round(0.8 / 3, 12), "hit")
+    assert abs(impulse - 1.5 * 3 * 0.75) < 1e-13
+    np.testing.assert_allclose(solution.velocity(a)[-1], [2 - 3.375, 0.5, 0], atol=1e-13)
+    np.testing.assert_allclose(solution.linear_momentum, np.tile([-1.0, 2.0, 0.0], (solution.t.size, 1)), atol=1e-13)
+
+
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+def test_a_cradle_at_one_instant(law):
+    """Balls that touch are hit at once: by both laws the first of three rebounds, and the others go on together."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    balls = [scene.add_point_mass(mass=1.0, position=(0.1 * i, 0, 0), name=f"ball{i}") for i in range(3)]
+    balls[0].velocity = (1, 0, 0)
+    for i, pair in enumerate(pairwise(balls)):
+        scene.add(C.SphereContact(*pair, radius_a=0.05, radius_b=0.05, restitution=1.0, name=f"gap{i}"))
+    after, impulses = ts.impact(scene, ts.State(0.0, *scene.start), law=law)
+    np.testing.assert_allclose(after.qd[::3], [-1 / 3, 2 / 3, 2 / 3], atol=1e-15)
+    np.testing.assert_allclose([impulses["gap0"], impulses["gap1"]], [4 / 3, 2 / 3], atol=1e-15)
+    plastic, _ = ts.impact(scene, ts.State(0.0, *scene.start), restitution={"gap0": 0.0, "gap1": 0.0}, law=law)
+    np.testing.assert_allclose(plastic.qd[::3], [1 / 3, 1 / 3, 1 / 3], atol=1e-15)
+
+
+def test_a_cradle_with_gaps_hands_the_velocity_on():
+    scene = ts.Scene(gravity=(0, 0, 0))
+    balls = [scene.add_point_mass(mass=1.0, position=(0.11 * i, 0, 0), name=f"ball{i}") for i in range(5)]
+    balls[0].velocity = (1, 0, 0)
+    for pair in pairwise(balls):
+        scene.add(C.SphereContact(*pair, radius_a=0.05, radius_b=0.05, restitution=1.0))
+    solution = ts.simulate(scene, (0, 1.0))
+    np.testing.assert_allclose([t for t, *_ in solution.impulses], 0.01 * np.arange(1, 5), atol=1e-14)
+    np.testing.assert_allclose([solution.velocity(ball)[-1, 0] for ball in balls], [0, 0, 0, 0, 1], atol=1e-13)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_impacts_never_add_energy(seed):
+    """Random boxes and velocities, all corners down at once, by both laws and any coefficients."""
+    rng = np.random.default_rng(seed)
+    scene = ts.Scene()
+    box = scene.add_body(
+        mass=2.0, inertia=(1, 2, 2.5), velocity=rng.normal(size=3), angular_velocity=rng.normal(size=3)
+    )
+    other = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(2, 0, 0), velocity=rng.normal(size=3))
+    scene.add(C.SphereContact(box, other, radius_a=1.0, radius_b=1.0, restitution=rng.uniform(), name="side"))
+    for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        contact = {"point_a": (x, y, -1), "point_b": (0, 0, -1), "normal_b": (0, 0, 1)}
+        scene.add(C.PlaneContact(box, scene.ground, **contact, unilateral=True, restitution=rng.uniform()))
+    before = ts.State(0.0, *scene.start)
+    M = scene.evaluate().M
+    for law in ("newton", "poisson"):
+        after, impulses = ts.impact(scene, before, law=law)
+        assert after.qd @ M @ after.qd <= before.qd @ M @ before.qd * (1 + 1e-13)
+        assert min(impulses.values()) >= 0.0
+        again, _ = ts.impact(scene, after, restitution=0.0, law=law)
+        np.testing.assert_allclose(again.qd, after.qd, atol=1e-13)  # nothing approaches any more
+
+
+# stops
+
+
+def pendulum(e):
+    scene = ts.Scene(gravity=(0, 0, -G))
+    bar = scene.add_body(mass=2.0, inertia=(0.2, 0.2, 0.01), position=(0, 0, -1), name="bar")
+    hinge = scene.add(C.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    scene.set(hinge, angle=1.0)
+    scene.add(C.Stop(hinge, lower=0.0, restitution=e, name="stop"))
+    return scene, 4 * ellipk(np.sin(0.5) ** 2) / np.sqrt(2.0 * G / 2.2)
+
+
+def test_a_pendulum_with_a_stop_at_its_lowest_place():
+    """Half periods by the complete elliptic integral, with the amplitude that each rebound leaves."""
+    scene, period = pendulum(1.0)
+    solution = ts.simulate(scene, (0, 10.0), rtol=1e-12, atol=1e-12)
+    times = np.array([t for t, *_ in solution.impulses])
+    assert np.abs(times - period * (0.25 + 0.5 * np.arange(times.size))).max() < 1e-11
+    assert np.ptp(solution.energy) < 1e-10
+    assert solution.angle("hinge").min() > -1e-13
+    scene, period = pendulum(0.5)
+    solution = ts.simulate(scene, (0, 10.0), rtol=1e-12, atol=1e-12)
+    first, second = (t for t, *_ in solution.impulses[:2])
+    amplitude = 2 * np.arcsin(0.5 * np.sin(0.5))
+    assert abs(first - period / 4) < 1e-12
+    assert abs(second - first - 2 * ellipk(np.sin(amplitude / 2) ** 2) / np.sqrt(2.0 * G / 2.2)) < 1e-11
+
+
+@pytest.mark.parametrize("bound", [1.5, 7.0, -20.0])
+def test_a_stop_counts_turns(bound):
+    scene = ts.Scene(gravity=(0, 0, 0))
+    wheel = scene.add_body(mass=1.0, inertia=(1, 1, 2))
+    hinge = scene.add(C.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1)))
+    scene.set(hinge, rate=np.sign(bound) * 2.0)
+    scene.add(C.Stop(hinge, **{"upper" if bound > 0 else "lower": bound}, name="stop"))
+    solution = ts.simulate(scene, (0, 12.0))
+    ((t, _, impulse),) = solution.impulses
+    assert abs(t - abs(bound) / 2) < 1e-13 * abs(bound)
+    assert abs(impulse - 2.0 * 2.0) < 1e-13
+    assert abs(solution.angle(hinge)[-1] - bound) < 1e-13 * abs(bound)
+
+
+def test_a_stop_of_a_slide():
+    scene = ts.Scene(gravity=(0, 0, 0))
+    block = scene.add_body(mass=2.0, inertia=(1, 1, 1), velocity=(0.5, 0, 0))
+    slide = scene.add(C.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(C.Stop(slide, lower=-0.1, upper=0.3, restitution=1.0, name="buffers"))
+    solution = ts.simulate(scene, (0, 3.0))
+    np.testing.assert_allclose(
+        [t for t, *_ in solution.impulses], [0.6, 1.4, 2.2, 3.0][: len(solution.impulses)], atol=1e-13
+    )
+    assert -0.1 - 1e-14 < solution.displacement(slide).min() < solution.displacement(slide).max() < 0.3 + 1e-14
+
+
+# boxes: redundant contacts
+
+
+def box(tilt, e, spin=(0, 0, 0)):
+    scene, size = ts.Scene(gravity=(0, 0, -G)), np.array([1.0, 0.6, 0.4])
+    orientation = Rotation.from_euler("xyz", (tilt, 0.7 * tilt, 0.3))
+    solid = ts.shapes.box(size, mass=2.0)
+    body = scene.add_body(**solid, position=(0, 0, 1.0), orientation=orientation, angular_velocity=spin, name="box")
+    for i in range(8):
+        corner = size / 2 * [2 * (i & 1) - 1, (i & 2) - 1, (i & 4) / 2 - 1]
+        contact = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": e, "name": f"corner {i}"}
+        scene.add(C.PlaneContact(body, scene.ground, point_a=corner, **contact))
+    return scene
+
+
+@pytest.mark.parametrize(("tilt", "e", "spin"), [(0.0, 0.3, (0, 0, 0)), (0.2, 0.3, (0, 0, 0)), (0.5, 0.0, (1, 1, -2))])
+def test_a_box_falls_and_comes_to_rest_on_four_corners(tilt, e, spin):
+    scene = box(tilt, e, spin)
+    solution = ts.simulate(scene, (0, 6.0))
+    assert solution.success
+    assert len(solution.phases[-1][2]) == 4
+    reactions = sum(solution.reaction(name)[0][-1] for name in solution.phases[-1][2])
+    np.testing.assert_allclose(reactions, [0, 0, 2 * G], atol=1e-10)
+    assert np.abs(solution.velocity("box")[-1, 2]) < 1e-14
+    assert np.diff(solution.energy).max() < 1e-10 * G
+    assert penetration(scene, solution) > -1e-14
+    assert solution.constraint_error.position.max() < 1e-14
+
+
+def test_the_instant_of_a_flat_box():
+    """All corners together make the bouncing ball."""
+    solution = ts.simulate(box(0.0, 0.3), (0, 2.0))
+    fall = np.sqrt(1.6 / G)
+    assert abs(solution.phases[-1][0] - fall * (1 + 0.6 / 0.7)) < 1e-9  # rounding of a gap, over the last rate
+
+
+# beside a run without contacts
+
+
+def test_events_of_the_user_beside_contacts():
+    def top(t, state):
+        return state.velocity("ball")[2]
+
+    top.direction = -1
+    scene, fall = bouncing(0.5)
+    solution = ts.simulate(scene, (0, 1.2), events=top)
+    np.testing.assert_allclose(solution.t_events[0], fall * np.array([0, 1.5, 2.25, 2.625]), atol=1e-12)
+    top.terminal = 3
+    ended = ts.simulate(scene, (0, 3.0), events=top)
+    assert ended.status is ts.Status.EVENT
+    assert abs(ended.reached - 2.25 * fall) < 1e-12
+
+
+def test_a_run_goes_on_from_a_state_in_contact():
+    scene, _ = bouncing(0.5)
+    whole = ts.simulate(scene, (0, 4.0))
+    first = ts.simulate(scene, (0, 2.0))
+    rest = ts.simulate(scene, (2.0, 4.0), state=first.state)
+    assert rest.phases == [(2.0, 4.0, ("floor",))]
+    np.testing.assert_allclose(rest.position("ball")[-1], whole.position("ball")[-1], atol=1e-13)
+
+
+def test_the_same_bits_again():
+    one, other = (ts.simulate(box(0.3, 0.4), (0, 1.0)) for _ in range(2))
+    np.testing.assert_array_equal(one.q, other.q)
+    assert one.impulses == other.impulses
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["rk45", "nystrom4", "radau", "taylor"])
+def test_every_method(method):
+    scene, fall = bouncing(0.8)
+    options = {"rtol": 1e-10, "atol": 1e-10} if method != "nystrom4" else {}
+    solution = ts.simulate(scene, (0, 5.0), integrator=method, **options)
+    assert abs(solution.phases[-1][0] - 9 * fall) < 1e-8
+    assert solution.phases[-1][2] == ("floor",)
+
+
+def test_a_scene_without_contacts_has_one_phase():
+    scene = ts.Scene()
+    scene.add_point_mass(mass=1.0)
+    solution = ts.simulate(scene, (0, 1))
+    assert (solution.phases, solution.impulses) == ([(0.0, 1.0, ())], [])
+
+
+# refusals
+
+
+def test_a_start_that_penetrates_is_named_and_assembled():
+    scene, _ = bouncing(0.5)
+    scene.body("ball").position = (0, 0, -0.2)
+    with pytest.raises(ts.InconsistentState, match=r"floor by 0\.2"):
+        ts.simulate(scene, (0, 1))
+    scene.assemble()
+    assert abs(scene.body("ball").position[2]) < 1e-15
+    assert ts.simulate(scene, (0, 1)).phases == [(0.0, 1.0, ("floor",))]
+
+
+def test_coefficients_and_bounds():
+    scene, _ = bouncing(0.5)
+    ball = scene.body("ball")
+    for e in (-0.1, 1.1, np.nan, None):
+        with pytest.raises(ts.TsdynError, match="restitution"):
+            C.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True, restitution=e)
+    with pytest.raises(ts.InvalidConstraint, match="unilateral=True"):
+        C.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), restitution=0.5)
+    with pytest.raises(ts.InvalidConstraint, match="friction"):
+        C.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True, kinetic=0.3)
+    scene, _ = pendulum(0.0)
+    for bounds, match in (
+        ((1, 1), "lower must be below"),
+        ((2, 1), "lower must be below"),
+        ((None, None), "give lower"),
+    ):
+        with pytest.raises(ts.InvalidConstraint, match=match):
+            C.Stop(scene["hinge"], *bounds)
+    with pytest.raises(ts.InvalidConstraint, match="angle or a displacement"):
+        C.Stop(scene.body("bar"), 0.0)
+
+
+def test_radii():
+    scene, _ = bouncing(0.5)
+    ball = scene.body("ball")
+    for arguments, match in (
+        ({"radius_a": 0.1}, "neither"),
+        ({"radius_a": 0.1, "radius_b": 1.0, "normal_b": (0, 0, 1)}, "both"),
+        ({"radius_a": -0.1, "normal_b": (0, 0, 1)}, "radius_a"),
+        ({"radius_a": 0.1, "radius_b": 0.1, "inside": True}, "larger than"),
+    ):
+        with pytest.raises(ts.InvalidConstraint, match=match):
+            C.SphereContact(ball, scene.ground, **arguments)
+
+
+def test_bodies_that_are_squeezed_end_the_run_with_an_account():
+    """A ceiling that comes down on a ball on the floor."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    ball = scene.add_point_mass(mass=1.0, position=(0, 0, 0), name="ball")
+    press = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(0, 0, 1), velocity=(0, 0, -1), name="press")
+    slide = scene.add(C.Translational.at(scene.ground, press, point=(0, 0, 0), axis=(0, 0, 1)))
+    scene.add(C.TranslationMotor.of(slide, displacement=-1.0 * ts.motions.time))
+    scene.add(C.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True, name="floor"))
+    scene.add(C.PlaneContact(ball, press, normal_b=(0, 0, -1), unilateral=True, name="ram"))
+    solution = ts.simulate(scene, (0, 2.0))
+    assert solution.status is ts.Status.CONTACT_FAILED
+    assert abs(solution.reached - 1.0) < 1e-13
+    assert "floor" in solution.message
+    assert "ram" in solution.message
+
+
+def test_what_does_not_serve_contacts_yet_says_so(tmp_path):
+    scene, _ = bouncing(0.5)
+    for call in (
+        lambda: ts.simulate(scene, (0, 1), store=tmp_path / "run.zarr"),
+        lambda: ts.prepare(scene),
+        lambda: ts.ensemble(scene, {"ball.mass": [1.0, 2.0]}, (0, 1)),
+        scene.equilibrium,
+        lambda: ts.simulate(scene, (0, 1)).save(tmp_path / "run.h5"),
+    ):
+        with pytest.raises(ts.InvalidArgument, match=r"contact|unilateral|bilateral"):
+            call()
+    with pytest.raises(ts.InvalidArgument, match="law"):
+        ts.impact(scene, ts.State(0.0, *scene.start), law="stronge")
+    with pytest.raises(ts.InvalidConstraint, match="wall"):
+        ts.impact(scene, ts.State(0.0, *scene.start), contacts=["wall"])
+
+
+def test_a_scene_of_a_file(tmp_path):
+    scene, _ = pendulum(0.5)
+    read = ts.load(scene.save(tmp_path / "pendulum.toml"))
+    one, other = (ts.simulate(each, (0, 2.0)) for each in (scene, read))
+    np.testing.assert_array_equal(one.q, other.q)
+    assert len(one.impulses) > 1

@@ -39,7 +39,7 @@ def place(context, t, x):
     copy(vector(x, w.q.size), w.q)
     # B and D of Eqs. 7 and 9 at a q that need not satisfy Eq. 1
     status = tangent_map(system, w, t)
-    return reduced_mass(system, w, t) if status == OK else status
+    return reduced_mass(system, w) if status == OK else status
 
 
 @callback(ACCELERATE)

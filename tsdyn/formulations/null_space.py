@@ -271,7 +271,7 @@ MASS_SINGULAR, UNHELD = int(Status.MASS_SINGULAR), int(Status.UNHELD)
 
 
 @kernel
-def reduced_mass(system, w, t):
+def reduced_mass(system, w):
     """E and the Cholesky factor of D^T M D at the present q. Status."""
     k = w.v.size
     for i in range(k):
@@ -304,7 +304,7 @@ def reduced_mass(system, w, t):
                 for j in range(i + 1):
                     w.A[i, j] += f * x[j] + g * y[j] + h * z[j]
     # D^T M D += (h D)^T h D of the inertia rows h
-    inertia_rows(system, w.q, t, w.inertia)
+    inertia_rows(system, w.q, w.inertia)
     for e in range(w.inertia_bias.size):
         for j in range(k):
             w.inertia_D[e, j] = multiply_inertia_row(system, w.inertia, e, w.D[:, j])
@@ -393,7 +393,7 @@ def reduced_acceleration(system, w, t, vdd):
                     + s3 * w.D[at + 6, j]
                 )
     # vdd -= (h D)^T (h h_0 + gamma_h), h_0 = -U B gamma
-    inertia_bias(system, w.q, w.qd, t, w.inertia_bias)
+    inertia_bias(system, w.q, w.qd, w.inertia_bias)
     for e in range(w.inertia_bias.size):
         f = w.inertia_bias[e] + multiply_inertia_row(system, w.inertia, e, w.h)
         for j in range(k):
@@ -439,7 +439,7 @@ def place(context, t, v):
     if status == OK:
         # Eqs. 7, 9 and 28 at the new q
         status = tangent_map(system, w, t)
-    return reduced_mass(system, w, t) if status == OK else status
+    return reduced_mass(system, w) if status == OK else status
 
 
 @callback(ACCELERATE)

@@ -127,17 +127,17 @@ def acceleration_bias(s, q, qd, t, gamma):
 
 
 @kernel
-def inertia_rows(s, q, t, h):
+def inertia_rows(s, q, h):
     """h (i, 14) of the inertia rows: the mass matrix is M + h^T h."""
     for i in range(s.inertias.shape[0]):
-        _run(s, s.inertias[i], s.inertias[i].jacobian, q, q, t, h)
+        _run(s, s.inertias[i], s.inertias[i].jacobian, q, q, 0.0, h)
 
 
 @kernel
-def inertia_bias(s, q, qd, t, gamma):
+def inertia_bias(s, q, qd, gamma):
     """gamma (i,) of the inertia rows: h qdd + gamma is the acceleration of their coordinates."""
     for i in range(s.inertias.shape[0]):
-        _run(s, s.inertias[i], s.inertias[i].gamma, q, qd, t, gamma)
+        _run(s, s.inertias[i], s.inertias[i].gamma, q, qd, 0.0, gamma)
 
 
 @kernel
@@ -221,8 +221,8 @@ def evaluate_constraints(s, q, qd, t, Phi, Phi_q, Phi_t, gamma):
 def _fill_inertia_rows(s, q, qd, h, gamma):
     """h (k, 14 i) and gamma (k, i) of the inertia rows at states q, qd (k, n)."""
     for k in range(q.shape[0]):
-        inertia_rows(s, q[k], 0.0, h[k].reshape(-1, WIDTH))
-        inertia_bias(s, q[k], qd[k], 0.0, gamma[k])
+        inertia_rows(s, q[k], h[k].reshape(-1, WIDTH))
+        inertia_bias(s, q[k], qd[k], gamma[k])
 
 
 def added_inertia(system, q, qd):

@@ -293,8 +293,8 @@ def _scatter(graph, Y, lam, Z):
         a, c = fma(four(Y, at), f, a), fma(four(Y, at + 4), f, c)
         b, d = fma(four(Y, at + 8), f, b), fma(four(Y, at + 12), f, d)
     _put_pair(Z, i, a, c, j, b, d)
-    for i in range(graph.tails.shape[0]):
-        _scatter_pair(graph, Y, graph.row.shape[0] + i, splat(-lam[graph.tails[i]]), Z)
+    for n in range(graph.tails.shape[0]):
+        _scatter_pair(graph, Y, graph.row.shape[0] + n, splat(-lam[graph.tails[n]]), Z)
 
 
 @kernel

@@ -172,3 +172,19 @@ def test_linearisation_about_a_motion_is_that_of_minimal_coordinates():
     T = np.array([[1.0, 0.0], [1.0, 1.0]])  # absolute angles by the joints'
     A = np.linalg.solve(T, slopes @ np.kron(np.eye(2), T))
     assert np.abs(linear.state_space().A[2:] - A).max() < 1e-7
+
+
+def test_forms_agree_beside_rolling():
+    """A driven wheel on a free axle: rows on velocities beside the rotor."""
+    ends = []
+    for formulation in ("tangent", "null-space"):
+        scene, motion = ts.Scene(), {"position": (0, 0, 0.5), "velocity": (0.5, 0, 0)}
+        axle = scene.add_body(mass=2.0, inertia=(0.2, 0.2, 0.3), **motion)
+        wheel = scene.add_body(mass=1.0, inertia=(0.05, 0.1, 0.05), **motion, angular_velocity=(0, 1, 0))
+        hub = scene.add(C.Revolute.at(axle, wheel, point=(0, 0, 0.5), axis=(0, 1, 0)))
+        scene.add(C.RollingDisc(wheel, scene.ground, axis_a=(0, 1, 0), radius=0.5, normal_b=(0, 0, 1)))
+        scene.add(F.Armature(hub, inertia=0.3))
+        scene.add(F.Torque(wheel, torque=(0.1, 0.7, 0.2)))
+        options = {"integrator": "dop853", "formulation": formulation, "rtol": 1e-10, "atol": 1e-10}
+        ends.append(ts.simulate(scene, (0.0, 0.3), **options).state.q)
+    assert np.abs(ends[0] - ends[1]).max() < NEAR

@@ -313,7 +313,7 @@ def _points(reading, path, table, what, key):
 def _coordinates(reading, path, table, what, key):
     """The joint coordinates that a key names: "hinge", ["hinge", "angle", 0], or a list of these."""
     given = table.get(key)
-    alone = isinstance(given, list) and len(given) > 1 and given[0] in reading.items and given[1] in KINDS
+    alone = isinstance(given, list) and len(given) > 1 and isinstance(given[0], str) and given[1] in KINDS
     found = []
     for one in [given] if alone or not isinstance(given, list) else given:
         joint, *which = one if isinstance(one, list) and one else [one]

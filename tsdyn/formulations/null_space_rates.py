@@ -72,7 +72,8 @@ class MixedContext(NamedTuple):
 def mixed_context(context, of_rates, redundant):
     """A `MixedContext`; redundant: how many rows of K are."""
     own, bodies = context.work, context.system.mass.size
-    rates = allocate(own.q.size, own.u.size, bodies, 1.0, redundant=redundant)
+    inertias = own.inertia_bias.size
+    rates = allocate(own.q.size, own.u.size, bodies, 1.0, redundant=redundant, inertias=inertias)
     shared = {name: getattr(own, name) for name in ("q", "qd", "qdd", "control", "counters")}
     return MixedContext(*context, rates._replace(**shared), of_rates.astype(np.int64))
 

@@ -369,10 +369,10 @@ def check(run, known, kind, limits, table, reals, bodies, values, inverse):
         h[row, 0], _ = _summed(s, row, known, limits[TAU])
     h[0, 0] = limits[TIME]
     run_rows(head[int(head[PROGRAM]) :], h, 0)
-    row = first - 2 * int(head[COORDINATES])
+    rate = first - int(head[COORDINATES])  # the row of qd of the body
     for b in range(int(head[BODIES])):
         body, at = head[int(head[BODY_LIST]) + BODY_WIDTH * b :], 16 * table[b]
-        rate, place = row + int(head[COORDINATES]), first + 6 * int(body[2])
+        place = first + 6 * int(body[2])
         if body[2] >= 0.0:
             # Acceleration per unit of load: 1 / m, and J'^-1, bounded by the trace
             speed = max(abs(h[rate, 0]), abs(h[rate + 1, 0]), abs(h[rate + 2, 0]))
@@ -381,7 +381,7 @@ def check(run, known, kind, limits, table, reals, bodies, values, inverse):
                 return 1
             if _is_off(s, h, place + 3, known, turning, speed, limits):
                 return 1
-        row += int(body[1])
+        rate += int(body[1])
     return 0
 
 

@@ -1,7 +1,7 @@
 # Written by tools/stubs.py: do not edit.
 from typing import Any, Self
 
-from ..hints import ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Joint, Path, Points, Prescribed, Primitive, References
+from ..hints import AnyBody, ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Function, Joint, Orientation, Path, Points, Prescribed, Primitive, References
 
 class AngleDriver(References, Primitive):
     across_a: Attribute[ArrayLike, Floats]
@@ -12,16 +12,52 @@ class AngleDriver(References, Primitive):
     @property
     def opposed(self) -> tuple[Any, ...]: ...
 
+class AngleTerm(References, Primitive):
+    across_a: Attribute[ArrayLike, Floats]
+    ratio: float
+    offset: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, reference_a: ArrayLike | None = ..., across_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., ratio: float = ..., offset: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, reference: ArrayLike | None = ..., across: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., across_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., ratio: float = ..., offset: float = ..., name: str = ...) -> Self: ...
+
+class Blade(Points, Primitive):
+    axis_a: Attribute[ArrayLike, Floats]
+    along_b: Attribute[ArrayLike, Floats]
+    across_b: Attribute[ArrayLike, Floats]
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_b: ArrayLike = ..., along_b: ArrayLike | None = ..., across_b: ArrayLike | None = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., along: ArrayLike | None = ..., across: ArrayLike | None = ..., point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_b: ArrayLike = ..., along_b: ArrayLike | None = ..., across_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
+
 class ConstantAngle(Axes, Joint):
     angle: Attribute[Prescribed, Any]
     def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., angle: Prescribed | None = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., angle: Prescribed | None = ..., name: str = ...) -> Self: ...
 
+class CylinderContact(Primitive):
+    center_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    first_b: Attribute[ArrayLike, Floats]
+    second_b: Attribute[ArrayLike, Floats]
+    radius: float
+    cylinder_radius: float
+    inside: bool
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., radius: float | None = ..., cylinder_radius: float | None = ..., inside: bool = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., radius: float | None = ..., cylinder_radius: float | None = ..., inside: bool = ..., name: str = ...) -> Self: ...
+
 class Cylindrical(Points, Axes, Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
+
+class DisplacementTerm(Points, Primitive):
+    axis_a: Attribute[ArrayLike, Floats]
+    ratio: float
+    offset: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float = ..., offset: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., point: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float = ..., offset: float = ..., name: str = ...) -> Self: ...
 
 class Distance(Points, Primitive):
     length: Attribute[Prescribed, Any]
@@ -41,6 +77,14 @@ class Gear(Points, References, Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float | None = ..., offset: float | None = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point: ArrayLike = ..., axis_a: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., ratio: float | None = ..., offset: float | None = ..., name: str = ...) -> Self: ...
+
+class KnifeEdge(Joint):
+    point_a: Attribute[ArrayLike, Floats]
+    axis_a: Attribute[ArrayLike, Floats]
+    normal_b: Attribute[ArrayLike, Floats]
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., normal_b: ArrayLike | None = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., normal: ArrayLike | None = ..., point_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., normal_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
 class Parallel(Axes, Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
@@ -83,6 +127,19 @@ class Revolute(Points, Axes, Joint):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
+class SmoothContact(Primitive):
+    center_a: Attribute[ArrayLike, Floats]
+    first_a: Attribute[ArrayLike, Floats]
+    second_a: Attribute[ArrayLike, Floats]
+    third_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    normal_b: Attribute[ArrayLike, Floats]
+    semi_axes: Attribute[ArrayLike, Floats]
+    tyre_radius: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., third: ArrayLike | None = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> Self: ...
+
 class Spherical(Points, Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., name: str = ...) -> None: ...
     @classmethod
@@ -110,6 +167,41 @@ class Universal(Points, Axes, Joint):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
+class Coupler(Joint):
+    dependent: JointCoordinate
+    independents: JointCoordinate
+    ratio: ArrayLike | float
+    offset: float
+    polynomial: Attribute[ArrayLike, Floats]
+    function: Prescribed | Function
+    def __init__(self, dependent: JointCoordinate, independents: JointCoordinate, *, ratio: ArrayLike | float | None = ..., offset: float = ..., polynomial: ArrayLike | None = ..., function: Prescribed | Function | None = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, dependent: JointCoordinate, *, ratio: ArrayLike | float | None = ..., offset: float = ..., polynomial: ArrayLike | None = ..., function: Prescribed | Function | None = ..., name: str = ...) -> Self: ...
+    @property
+    def bodies(self) -> tuple[AnyBody, ...]: ...
+    @property
+    def functions(self) -> list[CoordinateFunction]: ...
+    @property
+    def plain(self) -> bool: ...
+    @property
+    def ratios(self) -> list[float]: ...
+
+class CylinderRolling(CylinderContact):
+    center_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    first_b: Attribute[ArrayLike, Floats]
+    second_b: Attribute[ArrayLike, Floats]
+    axis_b: Attribute[ArrayLike, Floats]
+    first_a: Attribute[ArrayLike, Floats]
+    second_a: Attribute[ArrayLike, Floats]
+    third_a: Attribute[ArrayLike, Floats]
+    radius: float
+    cylinder_radius: float
+    inside: bool
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., radius: float | None = ..., cylinder_radius: float | None = ..., inside: bool = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., axis: ArrayLike | None = ..., third: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., radius: float | None = ..., cylinder_radius: float | None = ..., inside: bool = ..., name: str = ...) -> Self: ...
+
 class Dot1(Axes, Primitive):
     value: Attribute[Prescribed, Any]
     def __init__(self, a: BodyLike, b: BodyLike, *, axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., value: Prescribed = ..., name: str = ...) -> None: ...
@@ -129,6 +221,66 @@ class Fixed(Points, Axes, References, Joint):
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike | None = ..., axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
     @property
     def frames(self) -> tuple[Any, ...]: ...
+
+class RollingBall(Joint):
+    center_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    normal_b: Attribute[ArrayLike, Floats]
+    radius: float
+    slip: bool
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., slip: bool = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., slip: bool = ..., name: str = ...) -> Self: ...
+
+class RollingBallOnCylinder(Joint):
+    center_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    axis_b: Attribute[ArrayLike, Floats]
+    radius: float
+    cylinder_radius: float
+    inside: bool
+    slip: bool
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_b: ArrayLike | None = ..., radius: float | None = ..., cylinder_radius: float | None = ..., inside: bool = ..., slip: bool = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., axis: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_b: ArrayLike | None = ..., radius: float | None = ..., cylinder_radius: float | None = ..., inside: bool = ..., slip: bool = ..., name: str = ...) -> Self: ...
+
+class RollingContact(SmoothContact):
+    center_a: Attribute[ArrayLike, Floats]
+    first_a: Attribute[ArrayLike, Floats]
+    second_a: Attribute[ArrayLike, Floats]
+    third_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    normal_b: Attribute[ArrayLike, Floats]
+    first_b: Attribute[ArrayLike, Floats]
+    second_b: Attribute[ArrayLike, Floats]
+    semi_axes: Attribute[ArrayLike, Floats]
+    tyre_radius: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., third: ArrayLike | None = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> Self: ...
+
+class RollingDisc(Joint):
+    center_a: Attribute[ArrayLike, Floats]
+    axis_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    normal_b: Attribute[ArrayLike, Floats]
+    radius: float
+    tyre_radius: float
+    slip: bool
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., tyre_radius: float = ..., slip: bool = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., axis: ArrayLike | None = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., tyre_radius: float = ..., slip: bool = ..., name: str = ...) -> Self: ...
+
+class RollingEllipsoid(Joint):
+    center_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    normal_b: Attribute[ArrayLike, Floats]
+    semi_axes: Attribute[ArrayLike, Floats]
+    axes_a: Orientation
+    slip: bool
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., axes_a: Orientation | None = ..., slip: bool = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., axes_a: Orientation | None = ..., slip: bool = ..., name: str = ...) -> Self: ...
 
 class RotationMotor(Points, Axes, References, Joint):
     angle: Attribute[Prescribed, Any]

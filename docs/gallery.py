@@ -140,10 +140,42 @@ SECTIONS = {
         Entry("flyball_governor", "Flyball governor", 3.0, "arms (rad)", lambda m, s: m.angle(s), shapes=GOVERNOR),
         Entry("stability_map", "Stability map of a double pendulum", draw=_map),
     ),
+    "Rolling": (
+        Entry(
+            "bicycle",
+            "The Whipple bicycle balances itself",
+            3.0,
+            "lean (rad)",
+            lambda m, s: m.lean(s),
+            (0.0, 0.15),
+        ),
+        Entry(
+            "coin",
+            "A coin in a steady turn",
+            2.5,
+            "contact point (m)",
+            lambda m, s: s.contact_point("contact")[:, :2],
+            (0.0, 0.3, 0.6),
+        ),
+        Entry(
+            "turntable", "Ball on a turntable", np.pi, "x, y (m)", lambda m, s: s.position("ball")[:, :2], (0.0, 0.5)
+        ),
+        Entry("rattleback", "A rattleback turns back", 5.0, "spin (rad/s)", lambda m, s: m.spin(s), (0.0, 0.6)),
+        Entry(
+            "two_wheeled_robot",
+            "A robot on two wheels",
+            5.0,
+            "pitch (rad)",
+            lambda m, s: np.arcsin(s.rotation("body")[:, 0, 2]),
+            (0.0, 0.1, 1.0),
+            build="controlled",
+        ),
+    ),
     "Drives": (
         Entry("hooke_joint", "Universal joint", 3.0, "speeds (rad/s)", lambda m, s: np.stack([*m.speeds(s)], axis=1)),
         Entry("cardan_shaft", "Cardan shaft", 1.0, "speeds (rad/s)", lambda m, s: m.speeds(s).T),
         Entry("geared_pair", "Gear pair", 1.5, "turn of the wheel (rad)", lambda m, s: m.turn(s, "wheel")),
+        Entry("differential", "Differential", 2.0, "cage, left, right (rad)", lambda m, s: m.turns(s).T),
         Entry("planetary_gear", "Planetary gear", 0.5, "sun, carrier (rad/s)", lambda m, s: np.stack([*m.rates(s)], 1)),
         Entry("drive_train", "Drive train with brake", 4.0, "kinetic energy (J)", lambda m, s: s.kinetic_energy),
         Entry("screw_press", "Screw press", 1.5, "platen (m)", lambda m, s: s.position("platen")[:, 2]),

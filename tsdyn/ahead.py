@@ -24,7 +24,6 @@ from .configuration import start_kernels
 from .elements import force, primitive
 from .elements.laws import SceneLaw
 from .errors import TsdynError
-from .formulations import accelerations, null_space
 from .formulations.registry import FORMULATIONS
 from .integrators import DOP853, Taylor
 from .jit import cache, compilers, stock
@@ -34,7 +33,7 @@ from .jit.interrupts import Waiting
 from .jit.target import available, portable
 from .methods.explicit import called_for
 from .model.equations import is_of_user
-from .model.packed import second_derivatives
+from .model.packed import has_rates, second_derivatives
 from .motions import program, tracing
 from .motions.signals import Signal
 from .rows.interface import ELIMINATION
@@ -58,16 +57,17 @@ def prepare_first_run(scene, method, form, within, default):
     for between the steps.
     """
     packed = scene._packed
-    key = type(method), form.name, within, packed is not None and packed.system.normals.size > 0
+    mixed = form.is_mixed(has_rates(scene))
+    key = type(method), form.name, mixed, within, packed is not None and packed.system.normals.size > 0
     if (key in _known and packed is not None) or DEBUG or not scene.bodies:
         return
     compile_ahead(kernels_of(scene, method or _default_method(scene, *default), form, within))
-    _known.add((*key[:3], _is_rough(scene)))
+    _known.add((*key[:4], _is_rough(scene)))
 
 
 def kernels_of(scene, method, form, within):
     """The kernels that a run of the scene needs, as the keys of a dict; arguments as of `prepare_first_run`."""
-    rough = _is_rough(scene)
+    rough, form = _is_rough(scene), form.serving(method, has_rates(scene))
     far = isinstance(method, Taylor) and len(scene.bodies) * room(method.orders()[2]) > FAR
     return dict.fromkeys([*of_scene(scene, method, form, far, rough), *of_method(method, form, within, far, rough)])
 
@@ -80,7 +80,7 @@ def _is_rough(scene):
 def of_scene(scene, method, form, far, rough):
     """The kernels of constraints and forces, far and rough as of `of_method`, and those for several rows."""
     series, implicit = isinstance(method, Taylor), method.implicit
-    if implicit or sum(one.rows for one in scene.primitives if not one.normalises) > 1:
+    if implicit or sum(one.all_rows for one in scene.primitives if not one.normalises) > 1:
         yield from ELIMINATION["symmetric"]
         if rough or not series:
             yield from ELIMINATION["unsymmetric"]
@@ -105,7 +105,7 @@ def of_constraint(kind, moving, series=True, far=False, second=()):
     names = ["phi", "jacobian", "gamma", *["phi_t"] * moving, *["remember"] * bool(kind.memory)]
     if not kind.normalises:
         names += ["reduced", "values", "bias", *["drift"] * moving]
-        names += ["far_" * far + "driven_" * moving + "series"] * series
+        names += ["far_" * far + "driven_" * moving + "series", "contact_rows", "contact_series"] * series
     names += second
     return [kind.kernels[name] for name in names if name in kind.kernels]
 
@@ -116,7 +116,7 @@ def of_force(kernels, series=True, implicit=False, form=FORMULATIONS["tangent"],
     names += [driven + "series", driven + "check", driven + "margin", "load_slope"] * series
     found = [kernels[name] for name in names if name in kernels]
     if "normal_load" in kernels and not series:
-        found.append((accelerations if form.basis_free else null_space).solve_friction)
+        found.append(form.friction_solver)
     return found
 
 
@@ -130,9 +130,8 @@ def of_method(method, form, within, far=False, rough=False):
         yield from (expanding(rough, far), step_parts.reach, advance_series)
         yield from (accelerating(rough), step_parts.pass_singular) if within else ()
         return
-    form = form.serving(method)
     kernels = form.kernels
-    yield from (kernels.place, kernels.accelerate, (kernels if form.basis_free else null_space).complete)
+    yield from (kernels.place, kernels.accelerate, kernels.complete)
     yield from (kernels.check, kernels.start_chart, kernels.error_norm, advance)
     if method.driver == "steps":
         yield from filter(None, called_for(method.kernel(form.first_order)[0]))

@@ -391,7 +391,7 @@ def complete_signature(cls):
 
     `**places` stands for the arguments that place the markers of the class, and for `name`.
     """
-    signature = inspect.signature(cls.__init__)
+    signature = inspect.signature(inspect.unwrap(cls.__init__))  # an inherited one has that of the base by now
     parameters = dict(signature.parameters)
     for base in cls.__mro__[1:]:
         opened = [name for name, p in parameters.items() if p.kind == OPEN]

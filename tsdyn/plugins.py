@@ -26,7 +26,7 @@ from .elements.friction import (
     slip_of,
     slip_series,
 )
-from .elements.joint import FramedJoint, Joint, across, beside, carried, turned_about
+from .elements.joint import FramedJoint, Joint, SumRow, across, beside, carried, turned_about
 from .elements.laws import Action, SceneLaw, arguments_of, instants, scene_law
 from .elements.loads import (
     STATE,
@@ -46,7 +46,7 @@ from .elements.loads import (
 )
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
-from .elements.tolerances import PARALLEL
+from .elements.tolerances import FLAT, PARALLEL, RIGHT_ANGLED
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
 from .jit.predicates import some
@@ -93,6 +93,8 @@ from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
 from .methods.interpolants import linear_second
 from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
 from .motions.expressions import Smooth
+from .motions.of_coordinates import ROWS as COORDINATE_SLOPE_ROWS
+from .motions.of_coordinates import CoordinateFunction, coordinate_function, functions_of, slope_series
 from .motions.prescribed import Motion
 from .motions.signals import Signal, numbers_of
 from .motions.tables import is_data
@@ -101,8 +103,11 @@ from .validation import finite, floats, label, not_negative, number, positive, s
 __all__ = [
     "AXIS",
     "BEARING_ROWS",
+    "COORDINATE_SLOPE_ROWS",
     "DOP853_INTERPOLANT",
+    "FLAT",
     "PARALLEL",
+    "RIGHT_ANGLED",
     "STATE",
     "Action",
     "Adaptive",
@@ -111,6 +116,7 @@ __all__ = [
     "ByState",
     "Collocation",
     "CollocationTableau",
+    "CoordinateFunction",
     "DiagonallyImplicit",
     "Displacement",
     "ExplicitNystrom",
@@ -141,6 +147,7 @@ __all__ = [
     "SceneLaw",
     "Signal",
     "Smooth",
+    "SumRow",
     "Turn",
     "Vector",
     "across",
@@ -160,6 +167,7 @@ __all__ = [
     "carried",
     "coefficient",
     "coefficient_series",
+    "coordinate_function",
     "cross",
     "direction_series",
     "displacements",
@@ -172,6 +180,7 @@ __all__ = [
     "finite",
     "fitting",
     "floats",
+    "functions_of",
     "given_series",
     "ground_point",
     "in_frame",
@@ -206,6 +215,7 @@ __all__ = [
     "slip",
     "slip_of",
     "slip_series",
+    "slope_series",
     "some",
     "specialised",
     "square",

@@ -81,7 +81,7 @@ class ChartWorkspace(NamedTuple):
     x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
     y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
     rows0: Rows  # H0, Y0, S0: the rows at q0; chart_validity.set_base_point
-    X: np.ndarray  # (m * 16,)  C Y0; chart_matrix.factorise_chart_matrix
+    X: np.ndarray  # (pairs * 16,)  C Y0; chart_matrix.factorise_chart_matrix
     lower: np.ndarray  # factors of N = H C Y0; chart_matrix.factorise_chart_matrix
     upper: np.ndarray
     drift: np.ndarray  # (m,)  Phi_t
@@ -95,7 +95,7 @@ def allocate_chart(graph):
     base[4::8] = 1.0
     return ChartWorkspace(
         base, zeros(4 * (nb + 1)), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)),
-        allocate_rows(graph), zeros(16 * m), *lu_factors(graph.pattern), zeros(m), ChartState(),
+        allocate_rows(graph), zeros(16 * len(graph.sides)), *lu_factors(graph.pattern), zeros(m), ChartState(),
     )  # fmt: skip
 
 
@@ -237,6 +237,7 @@ class StageKernels(Record):
 # The state of one run: arrays and numbers that drivers, step kernels and interpolants share, and their layout.
 
 AGAIN = 2  # Numbers.rejected_last: by a failed stage
+MIXED = 2  # Numbers.first_order: velocities have fewer coordinates than positions
 FILLED, STORED = 1, 2  # Numbers.dense: every step's block is made, and kept
 # block: what it begins with, before the interpolant's data
 B_START, B_H, B_END, B_CHART, B_DATA = range(5)
@@ -262,7 +263,7 @@ class Clock(Record):
 class RunNumbers(Record):
     """Counts, settings and states of a run; settings and states that are no numbers are 0 or 1."""
 
-    first_order: int
+    first_order: int  # whether x' is not y; MIXED: and x not q
     adaptive: int
     steps_wanted: int
     chart_interval: int  # steps between charts that are forced; 0 for none
@@ -319,7 +320,7 @@ class RunKernels(Record):
 
 
 class RunState(NamedTuple):
-    """The state of a run, and the driver's scratch. x, y are v, vd (tangent-space ODE) or q, w (Maggi/Kane)."""
+    """The state of a run, and the driver's scratch. x, y are v, vd (tangent-space ODE), v, w (mixed) or q, w."""
 
     x: np.ndarray  # (nx,)
     y: np.ndarray  # (ny,)

@@ -10,6 +10,7 @@ from examples.bead_on_surface import OnEllipsoid
 from examples.driven_pivot import DrivenPivot
 from tests.helpers.built_in import JOINTS, PRIMITIVES
 from tests.helpers.tolerances import ALGEBRA
+from tsdyn.jit.kernels import twin
 from tsdyn.testing.series_checks import check_constraint_series
 
 C = ts.constraints
@@ -85,7 +86,7 @@ def test_checker_names_a_broken_series_of_phi_t(kind):
 
 def broken(kind, name, entry):
     """The primitive with one entry of one kernel off by a thousandth."""
-    good = getattr(kind, name)
+    good = twin(getattr(kind, name))  # in Python, with the kernels that it calls
 
     def spoil(*arguments):
         good(*arguments)
@@ -97,17 +98,21 @@ def broken(kind, name, entry):
     def four(x, xd, par, t, out):
         spoil(x, xd, par, t, out)
 
-    return type("Broken", (kind,), {name: staticmethod(four if name == "gamma" else three)})
+    return type("Broken", (kind,), {name: staticmethod(four if "gamma" in name else three)})
 
 
 def entries(kind):
     size = sum(marker.size for marker in kind.markers)
     for row in range(kind.rows):
         yield kind, "gamma", row
-        if "phi_t" in kind.kernels:
+        if getattr(kind, "phi_t", None):
             yield kind, "phi_t", row
         for column in range(size):
             yield kind, "jacobian", (row, column)
+    for row in range(kind.rate_rows):
+        yield kind, "rate_gamma", row
+        for column in range(size):
+            yield kind, "rate_jacobian", (row, column)
 
 
 @pytest.mark.parametrize("kind", [*PRIMITIVES, DrivenPivot], ids=lambda kind: kind.__name__)
@@ -140,22 +145,32 @@ def test_checker_accepts_instances_made_by_a_function_only():
 
 @pytest.mark.parametrize("kind", PRIMITIVES, ids=lambda kind: kind.__name__)
 def test_moving_the_whole_scene_changes_nothing(kind):
-    """Phi between two bodies depends on their relative pose alone."""
+    """Phi and its rate between two bodies depend on their relative pose and motion alone."""
     if kind is C.EulerNormalization:
         pytest.skip("a row of one body")
     rng = np.random.default_rng(5)
     scene = ts.Scene()
     bodies = [scene.add_body(1.0, (1, 1, 1), position=rng.normal(size=3), orientation=unit(rng)) for _ in range(2)]
     constraint = scene.add(kind.example(rng, *bodies))
-    before = scene.evaluate().Phi[: constraint.rows]
+    for body in bodies:
+        body.velocity, body.angular_velocity = rng.normal(size=(2, 3))
+    before, rates = levels(scene, constraint)
     turn, shift = unit(rng), rng.normal(size=3)
     for body in bodies:
         body.position = matrix(turn) @ body.position + shift
         body.orientation = product(turn, body.orientation)
-    after = scene.evaluate().Phi[: constraint.rows]
+        body.velocity = matrix(turn) @ body.velocity
+    after, rates_after = levels(scene, constraint)
     if kind is C.Spherical:
-        before = matrix(turn) @ before
+        before, rates = matrix(turn) @ before, matrix(turn) @ rates
     np.testing.assert_allclose(after, before, atol=ALGEBRA)
+    np.testing.assert_allclose(rates_after, rates, atol=ALGEBRA * (1.0 + np.abs(rates).max()))
+
+
+def levels(scene, constraint):
+    """Phi and Phi_q qd of a constraint; of rows on velocities Phi is zero, and the other A qd."""
+    found, rows = scene.evaluate(), slice(0, constraint.all_rows)
+    return found.Phi[rows], found.Phi_q[rows] @ scene.start[1]
 
 
 def unit(rng):

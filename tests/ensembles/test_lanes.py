@@ -6,6 +6,7 @@ import pytest
 import tsdyn as ts
 from benchmarks.scenes import SCENES
 from tests.helpers.rods_on_a_spring import two_rods_on_a_spring as spring
+from tests.helpers.skates import sleigh
 from tsdyn.ensembles import runner
 
 RNG = np.random.default_rng(5)
@@ -58,6 +59,7 @@ STUDIES = {
         lambda scene: {"spring.stiffness": 20 * uniform(), "rod 1.inertia": (0.1, 0.1, 0.05) * uniform(1)},
     ),
     "damped": (damped, 0.5, damping),
+    "sleigh": (sleigh, 1.0, lambda scene: {"sleigh.mass": 2 * uniform(), "rod.mass": uniform()}),
     "loop": (loop, 0.3, lambda scene: {"a.mass": uniform(), "b.mass": 2 * uniform()}),
 }
 

@@ -9,6 +9,7 @@ import tsdyn as ts
 from benchmarks.stiff import jointed
 from examples import driven_pivot, four_bar, geared_pair, top
 from tests.helpers.refusals import refuse
+from tests.helpers.skates import sleigh
 from tsdyn.files import checkpoint
 from tsdyn.runs import driver
 from tsdyn.simulation import segments
@@ -86,6 +87,24 @@ def test_every_method(way, tmp_path):
     stopped = stop_and_go_on(top.build, 1.0, tmp_path / "run.h5", **way)
     assert stopped.status == ts.Status.INTERRUPTED
     assert 0.0 < stopped.reached < 1.0
+
+
+@pytest.mark.slow_but("dop853, null-space")
+@pytest.mark.usefixtures("short_slices")
+@pytest.mark.parametrize(
+    "way",
+    [
+        {"integrator": I.Taylor(step=0.02)},
+        {"integrator": "dop853", "formulation": "null-space"},
+        {"integrator": I.Nystrom4(1e-2), "formulation": "null-space"},
+        {"integrator": "dop853", "formulation": "null-space", "t_eval": np.linspace(0.0, 1.0, 33)},
+        {"integrator": I.Radau(1e-6, 1e-6)},
+        {"integrator": "sdirk54"},
+    ],
+    ids=["taylor", "dop853, null-space", "nystrom4, null-space", "times, null-space", "radau", "sdirk54"],
+)
+def test_rows_on_velocities(way, tmp_path):
+    stop_and_go_on(sleigh, 1.0, tmp_path / "run.h5", **way)
 
 
 @pytest.mark.slow_but("redundant-dop853", "turns-default")

@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 import tsdyn as ts
 from examples import door, four_bar
 from tests.helpers.pages import Tags, array, decoded, place
-from tsdyn.graphics.run_data import FRAMES, HOLDS_BACK, PUSHES
+from tsdyn.graphics.run_data import FRAMES, HOLDS_BACK, PUSHES, run_data
+from tsdyn.graphics.view import Painter
 
 C, S = ts.constraints, ts.shapes
 ROOT = Path(__file__).parents[2]
@@ -566,3 +567,54 @@ def test_a_notebook_shows_the_page_inline(run, page, monkeypatch, tmp_path):
     assert shown.html == page
     assert shown.save(tmp_path / "run").read_text(encoding="utf-8") == page
     assert "MB" in repr(shown)
+
+
+def rolling_scene():
+    scene = ts.Scene()
+    coin = scene.add_body(1.0, (0.08, 0.15, 0.08), position=(0, 0, 0.5), velocity=(1, 0, 0), name="coin")
+    coin.angular_velocity = (0, 2, 0)
+    places = {"axis_a": (0, 1, 0), "normal_b": (0, 0, 1)}
+    scene.add(ts.constraints.RollingDisc(coin, scene.ground, radius=0.5, name="on", **places))
+    return scene
+
+
+def test_contact_points_and_their_paths():
+    """A point after the bodies, where the surfaces touch, with a trail, a mark, and the arrow of the reaction."""
+    scene = rolling_scene()
+    data = run_data(ts.simulate(scene, (0, 1)))
+    assert [body["name"] for body in data["bodies"]] == ["coin", "contact of on"]
+    painter = Painter(data)
+    np.testing.assert_allclose(painter.position[-1, 1], (1, 0, 0), atol=1e-6)
+    assert {trail["body"] for trail in data["trails"]} == {0, 1}
+    assert [part["kind"] for part in data["parts"] if part["body"] == 1] == ["sphere"]
+    assert {arrow["body"] for arrow in data["arrows"] if arrow["name"] == "on"} == {1}
+
+
+def test_rolling_surfaces_are_drawn_with_marks():
+    """To scale, in place of the solid of the body's inertia, and a mark that turns with the body."""
+    kinds = ts.constraints.RollingDisc, ts.constraints.RollingBall
+    for kind, shape, own in zip(kinds, ("cylinder", "sphere"), ({"axis_a": (0, 1, 0)}, {}), strict=True):
+        scene = ts.Scene()
+        body = scene.add_body(1.0, (1, 1, 1), position=(0, 0, 0.3))
+        scene.add(kind(body, scene.ground, radius=0.3, normal_b=(0, 0, 1), **own))
+        surface, *marks = [part for part in run_data(ts.simulate(scene, (0, 1)))["parts"] if part["body"] == 0]
+        assert surface["kind"] == shape
+        assert surface["layer"] == "bodies"
+        np.testing.assert_allclose(np.linalg.norm(np.reshape(surface["matrix"][:9], (3, 3)), axis=1)[:2], 0.3)
+        assert marks
+        assert {mark["colour"] for mark in marks} != {surface["colour"]}
+
+
+def test_cylinders_and_ellipsoids_are_drawn(tmp_path):
+    scene = ts.Scene()
+    for i, inside in enumerate((False, True)):
+        body = scene.add_body(1.0, (1, 1, 1), position=(0, 0, 0.3))
+        places = {"axis_b": (1, 0, 0), "point_b": (0, 0, 0.8 if inside else -0.7), "radius": 0.3}
+        cylinder = ts.constraints.RollingBallOnCylinder(
+            body, scene.ground, cylinder_radius=0.8 if inside else 0.7, inside=inside, name=f"{i}", **places
+        )
+        scene.add(cylinder)
+    egg = scene.add_body(1.0, (1, 1, 1), position=(2, 0, 0.2))
+    scene.add(ts.constraints.RollingEllipsoid(egg, scene.ground, semi_axes=(0.4, 0.3, 0.2), normal_b=(0, 0, 1)))
+    page = scene.view(tmp_path / "scene.html")
+    assert page.exists()

@@ -215,9 +215,11 @@ def balance(solution):
             if body not in (item.a, item.b):
                 continue
             force, torque = solution.reaction(item, on=body)
-            place = getattr(item, "point_a" if body is item.a else "point_b", np.zeros(3))
+            arm = A @ getattr(item, "point_a" if body is item.a else "point_b", np.zeros(3))
+            if any(hasattr(type(part), "contact") for part in getattr(item, "parts", ())):
+                arm = solution.contact_point(item) - r
             forces.append(force)
-            torques += [torque, np.cross(A @ place, force)]
+            torques += [torque, np.cross(arm, force)]
         size = max(np.abs(part).max() for part in (*forces, *torques))
         worst = max(worst, *(np.abs(sum(parts)).max() / size for parts in (forces, torques)))
     return worst

@@ -177,6 +177,21 @@ def test_a_kernel_under_the_name_of_another_is_compiled_again(tmp_path):
     assert errors.endswith("3.0\n")
 
 
+@own
+def test_a_kernel_whose_module_has_moved_is_compiled_without_a_warning(tmp_path):
+    environment = {"TSDYN_CACHE_DIR": str(tmp_path / "kernels")}
+    source = "from tsdyn.jit.kernels import entry\n@entry\ndef twice(x):\n    return 2.0 * x\n"
+    found = []
+    for package in ("before", "after"):
+        home = tmp_path / package / package
+        home.mkdir(parents=True)
+        (home / "twice.py").write_text(source)
+        code = f"{REPORT}from {package}.twice import twice\nreport(value=twice(1.0))\n"
+        result, errors = run(code, environment, home.parent)
+        found.append((result["value"], result.get("damaged", 0), result["misses"], "can't be loaded" in errors))
+    assert found == [(2.0, 0, 1, False)] * 2
+
+
 @posix
 @pytest.mark.parametrize("which", ["kernels", "above"])
 def test_folders_that_others_can_write_to_are_refused(which, tmp_path):

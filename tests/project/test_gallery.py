@@ -10,9 +10,11 @@ from docs.gallery import ENTRIES
 from docs.gallery_pages import IMAGES, ROOT, index, page
 from examples import (
     andrews_squeezer,
+    bicycle,
     bricard,
     cardan_shaft,
     chebyshev_linkage,
+    coin,
     delta_robot,
     double_pendulum,
     flyball_governor,
@@ -20,9 +22,12 @@ from examples import (
     leg_with_rods,
     peaucellier,
     planetary_gear,
+    rattleback,
     scotch_yoke,
     stewart_platform,
     suspension,
+    turntable,
+    two_wheeled_robot,
 )
 
 SMALL = 60_000  # bytes
@@ -36,7 +41,8 @@ ROUGH = {  # an end that shows what a run at 1e-3 does wrong
     scotch_yoke: 1.0,
 }
 FURTHER = (
-    cardan_shaft, chebyshev_linkage, delta_robot, flyball_governor, leg_with_rods, stewart_platform, suspension,
+    bicycle, cardan_shaft, chebyshev_linkage, coin, delta_robot, flyball_governor, leg_with_rods, rattleback,
+    stewart_platform, suspension, turntable, two_wheeled_robot,
 )  # fmt: skip
 
 

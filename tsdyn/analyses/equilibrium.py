@@ -18,7 +18,7 @@ from ..observables.state import RememberingState
 from .coordinates import Variations, chosen
 from .moves import Moves
 from .nominal_motion import NominalMotion
-from .reduction import Reduced, eigenpairs, stiffnesses
+from .reduction import eigenpairs, equations, stiffnesses
 from .steady import SteadyRest, is_invariant
 from .tolerances import (
     ACCEPTED,
@@ -350,7 +350,7 @@ def _stability_of_spin(descent):
     if not motion.freedom:
         return True, float("nan"), 0, None
     descent.report(0.7, f"balanced in {descent.steps} steps, {motion.freedom} coordinates are chosen for its stability")
-    reduced = Reduced(motion, chosen(motion, Variations(motion, field.spin)))
+    reduced = equations(motion, chosen(motion.placed, Variations(motion, field.spin)))
     nothing = descent.nothing(reduced)
     descent.report(0.9, f"balanced in {descent.steps} steps, eigenvalues of {motion.freedom} coordinates")
     found, pairs = stiffnesses(reduced, nothing), eigenpairs(reduced, nothing)
@@ -468,9 +468,9 @@ def _stability(descent):
     if not motion.freedom:
         return True, float("nan"), 0, None
     descent.report(0.7, f"balanced in {descent.steps} steps, {motion.freedom} coordinates are chosen for its stability")
-    every = chosen(motion, Variations(motion, np.zeros(3)))
+    every = chosen(motion.placed, Variations(motion, np.zeros(3)))
     descent.report(0.8, f"balanced in {descent.steps} steps, the stiffness is reduced to {motion.freedom} coordinates")
-    reduced = Reduced(motion, every, descent.unbalanced <= NEGLIGIBLE)
+    reduced = equations(motion, every, descent.unbalanced <= NEGLIGIBLE)
     nothing = descent.nothing(reduced)
     descent.report(0.9, f"balanced in {descent.steps} steps, eigenvalues of {motion.freedom} coordinates")
     found = stiffnesses(reduced, nothing)

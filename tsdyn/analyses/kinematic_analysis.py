@@ -70,6 +70,17 @@ def degrees_of_freedom(packed):
     return int(system.bodies[:, 1].sum()) - len(system.segments) + len(redundant_rows(packed))
 
 
+def demand_no_rates(packed, who):
+    """Refuse rows on velocities: with them positions are no function of what drives them."""
+    for member in packed.members:
+        if member.constraint.rate_rows:
+            raise InvalidArgument(
+                f"{who}: {member.constraint.title} has rows on velocities, so positions follow from the whole motion "
+                "and not from what drives them at each time. Integrate it with ts.simulate; inverse_dynamics takes the "
+                "Solution."
+            )
+
+
 def demand_driven(packed, memory, t, q, who, remedy):
     """Refuse a scene with freedom, by the names of independent coordinates that are free; memory (slots,)."""
     k = degrees_of_freedom(packed)

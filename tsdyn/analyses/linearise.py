@@ -23,7 +23,7 @@ from ..validation import vector3
 from .coordinates import Variations, chosen, stacked, transform_e
 from .equilibrium import demand_smooth
 from .nominal_motion import NominalMotion
-from .reduction import Reduced, eigenpairs
+from .reduction import Reduced, eigenpairs, equations
 from .steady import steady_rate
 
 if TYPE_CHECKING:
@@ -312,7 +312,10 @@ def modes_of(pairs, moving, coordinates):
 
 
 class StateSpace(NamedTuple):
-    """xd = A x + B u, y = C x + D u, with the 2 k states (coordinates, rates)."""
+    """xd = A x + B u, y = C x + D u, with the 2 k states (coordinates, independent rates).
+
+    Of j coordinates with rows on velocities there are j + k states.
+    """
 
     A: Floats  # (2k, 2k)
     B: Floats  # (2k, inputs)
@@ -327,14 +330,20 @@ class StateSpace(NamedTuple):
 class Linearisation:
     """Linearised equations of motion M dxdd + C dxd + K dx = F du in k minimal coordinates x.
 
+    With rows on velocities (rolling, knife edges) the j coordinates x have k < j independent rates w:
+    M dwd + C dw + K dx = F du and dxd = W dw + V dx. Without such rows w are the rates of x, W = I and V = 0.
+
     Attributes
     ----------
-    M, C, K : ndarray (k, k)
+    M, C, K : ndarray (k, k), (k, k), (k, j)
         Mass, damping with gyroscopic terms, and stiffness; SI units of the coordinates.
+    W, V : ndarray (j, k), (j, j)
+        Rates of the coordinates by the independent ones, and by the coordinates.
     F : ndarray (k, inputs)
         Generalised forces of unit inputs.
     bodies : tuple of Body
-    coordinates, inputs, outputs : tuple of str
+    coordinates, rates, inputs, outputs : tuple of str
+        Names; rates are those that are independent.
     t : float, s
     q, qd, qdd : ndarray (n,)
         The state, projected onto the constraints, and its accelerations.
@@ -352,14 +361,19 @@ class Linearisation:
         self.M, self.C, self.K = reduced.M, reduced.C, reduced.K
         self.t, self.q, self.qd, self.qdd, self.multipliers = motion.t, motion.q, motion.qd, motion.qdd, motion.lam
         self.coordinates: tuple[str, ...] = tuple(one.name for one in every)
+        free = np.arange(len(every)) if isinstance(reduced, Reduced) else reduced.free
+        self.rates: tuple[str, ...] = tuple(every[i].name + RATE for i in free)
+        none = np.eye(len(every)), np.zeros((len(every), len(every)))
+        self.W, self.V = none if isinstance(reduced, Reduced) else (reduced.W, reduced.V)
         self.steady, self.rotation_rate = rate is not None, np.zeros(3) if rate is None else rate
         self.bodies, self._reduced = motion.packed.bodies, reduced
         self._moving = _moving(motion, reduced)
         inputs, self._outputs = ports
         self.inputs, self.outputs = tuple(one.name for one in inputs), self._outputs.names
-        self.F: Floats = np.zeros((len(every), len(inputs)))
+        self.F: Floats = np.zeros((len(self.rates), len(inputs)))
         for i, one in enumerate(inputs):
-            self.F[:, i] = one.load @ reduced.T[one.columns]
+            load = one.load @ reduced.T[one.columns]
+            self.F[:, i] = load if isinstance(reduced, Reduced) else load @ self.W
         demand_effective(inputs, self.F)
 
     @cached_property
@@ -367,7 +381,10 @@ class Linearisation:
         return eigenpairs(self._reduced)
 
     def eigenvalues(self) -> Any:
-        """Eigenvalues lambda of (M lambda^2 + C lambda + K) x = 0, 1/s, (2 k,) complex, in order of size."""
+        """Eigenvalues lambda of (M lambda^2 + C lambda + K) x = 0, 1/s, (2 k,) complex, in order of size.
+
+        With rows on velocities those of A of the `state_space`, (j + k,).
+        """
         return self._pairs.values.copy()
 
     def modes(self) -> Modes:
@@ -376,12 +393,13 @@ class Linearisation:
 
     def state_space(self) -> StateSpace:
         """A, B, C, D and the names of states, inputs and outputs, a `StateSpace`."""
-        k = len(self.M)
+        j, k = self.W.shape
         inverse = np.linalg.solve(self.M, np.concatenate((self.K, self.C, self.F), axis=1))
-        A = np.block([[np.zeros((k, k)), np.eye(k)], [-inverse[:, : 2 * k]]])
-        B = np.concatenate((np.zeros((k, len(self.inputs))), inverse[:, 2 * k :]))
-        C = np.concatenate((self._outputs.Y, self._outputs.Yd), axis=1)
-        states = (*self.coordinates, *(name + RATE for name in self.coordinates))
+        A = np.block([[self.V, self.W], [-inverse[:, : j + k]]])
+        B = np.concatenate((np.zeros((j, len(self.inputs))), inverse[:, j + k :]))
+        Y, Yd = self._outputs.Y, self._outputs.Yd
+        C = np.concatenate((Y + Yd @ self.V, Yd @ self.W) if self.V.any() or j > k else (Y, Yd), axis=1)
+        states = (*self.coordinates, *self.rates)
         D = np.zeros((len(self.outputs), len(self.inputs)))
         return StateSpace(A, B, C, D, states, self.inputs, self.outputs)
 
@@ -411,12 +429,17 @@ def linearise(scene, memory, state, inputs, outputs, report):
     motion = NominalMotion(scene.packed, memory, *state)
     demand_smooth(motion)
     rate = steady_rate(motion)
+    if rate is None and motion.rates.size:
+        raise InvalidArgument(
+            f"linearise: {scene.row_names()[motion.rates[0]]} is a row on velocities; with such rows a motion is "
+            "linearised at rest and where it is steady. Give a state of steady motion, or of an equilibrium."
+        )
     variations = Variations(motion, np.zeros(3) if rate is None else rate)
     ports = inputs_of(scene, variations, inputs)
     report(0.2, f"{motion.freedom} coordinates are chosen")
-    every = chosen(motion, variations)
+    every = chosen(motion.placed, variations)
     report(0.4, f"the equations are reduced to {motion.freedom} coordinates")
-    reduced = Reduced(motion, every)
+    reduced = equations(motion, every)
     report(0.8, "masses, damping and stiffness are multiplied out")
     ports = ports, outputs_of(scene, variations, outputs, every, reduced)
     return Linearisation(motion, every, reduced, ports, rate)

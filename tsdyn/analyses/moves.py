@@ -38,16 +38,20 @@ class SceneStructure:
     """
 
     def __init__(self, packed, t, q):
-        self.packed, self.t, self.metric = packed, t, Metric(packed, None, t)
+        self.packed, self.t, self.metric = packed, t, Metric(packed, None, t, rates=True)
         self.reach = self.metric.reach(q)
         self.system, self.pairs = with_short_rows(packed), Pairs(packed)
         self.increments = Increments(self.metric, self.reach)
         kinds = np.array([part.normalises for part in packed.constraints], bool)
         self.own = self.metric.own
-        rows = np.repeat(kinds, [part.rows for part in packed.constraints])
+        rows = np.repeat(kinds, [part.all_rows for part in packed.constraints])
         self.normals = np.flatnonzero(rows)
         at, length = places(packed)
-        self._by_rows = self.increments.bodies_at(at[self.own], length[self.own])
+        # Short rows, those of later terms of sums last; their places among those of `own`
+        tails = packed.system.tails
+        self.lines = np.concatenate((self.own, len(packed.system.segments) + np.arange(tails.size)))
+        self._line_rows = np.concatenate((np.arange(self.own.size), np.searchsorted(self.own, tails)))
+        self._by_rows = self.increments.bodies_at(at[self.lines], length[self.lines])
         self.normal_bodies = self.increments.bodies_at(at[self.normals, 0], length[self.normals, 0])
         self.parts = np.flatnonzero(~np.concatenate((kinds, np.zeros(self.pairs.counts[1], bool))))
         self.constraints = int((~kinds).sum())
@@ -65,7 +69,7 @@ class SceneStructure:
         pairs = SparsePattern.of_blocks(columns, columns, (size, size))
         self.blocks = SparsePattern.of_parts([(pairs, 0, 0), (each.own, 0, 0)], (size, size))
         self._pairs = pairs
-        self.rows = SparsePattern.of_blocks(np.arange(m)[:, None], each.columns_of(self._by_rows), (m, size))
+        self.rows = SparsePattern.of_blocks(self._line_rows[:, None], each.columns_of(self._by_rows), (m, size))
         turned = SparsePattern(self.rows.columns, self.rows.rows, (size, m))
         below = SparsePattern(np.arange(m), np.arange(m), (m, m))
         whole = size + m, size + m
@@ -91,7 +95,12 @@ class SceneStructure:
     def _rods(self):
         """Which parts hold two points at a distance: the difference of displacements rotates them."""
         kept = [self.packed.constraints[i] for i in self.parts[: self.constraints]]
-        return np.flatnonzero([part.rows == 1 and all(m.code == POINT for m in part.markers) for part in kept])
+        return np.flatnonzero(
+            [
+                part.rows == part.all_rows == 1 and not part.summed and all(m.code == POINT for m in part.markers)
+                for part in kept
+            ]
+        )
 
     def stiffness(self, pairs, own):
         """Numbers of the sum of blocks of pairs (e, 12, 12) and of bodies (b, 6, 6), for `blocks`."""
@@ -102,8 +111,8 @@ class SceneStructure:
         return pattern.matrix(pattern.sum(np.concatenate((top, A, self._turned.sum(A), below))))
 
     def transformed_rows(self, P, rows):
-        """Numbers for `rows` of rows (m', 14)."""
-        halves = rows.reshape(-1, 2, 1, WIDTH // 2) @ P[self._by_rows]
+        """Numbers for `rows` of short rows (lines, 14)."""
+        halves = rows[self.lines].reshape(-1, 2, 1, WIDTH // 2) @ P[self._by_rows]
         return self.rows.sum(halves.reshape(-1, 12))
 
     def falling(self):

@@ -1,12 +1,14 @@
 """The nominal motion: accelerations and multipliers at one state, derivatives of all constraints and forces there."""
 
+from copy import copy
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from ..configuration.mobility import divide
 from ..elements.bodies import rotation_matrix, transform_g
-from ..elements.loops.coordinate_rows import INTS, ROW, STRIDE
+from ..elements.loops.coordinate_rows import INTS, STRIDE
 from ..elements.loops.forces import FORCE_INTS as FORCE_INTS
 from ..elements.loops.template import AT
 from ..errors import InvalidForce, SingularConfiguration
@@ -25,7 +27,7 @@ from ..model.equations import (
     with_short_rows,
 )
 from ..model.laws import interrupts_answered
-from ..model.packed import no_system, with_curvatures, with_force_jacobians
+from ..model.packed import first_rows, instances_of_kinds, no_system, of_rates, with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from ..rows.constraint_graph import REDUCED, are_unequal, coordinate_scales
@@ -87,7 +89,9 @@ class Pairs:
         self.packed = packed
         system, self._size = with_force_jacobians(packed._replace(system=with_curvatures(packed)), WIDTH)
         constraints, forces = _entries(system, system.kinds, INTS), _entries(system, system.forces, FORCE_INTS)
-        constraints = constraints[np.argsort(constraints[:, 1 + ROW], kind="stable")]
+        place = {id(part): i for i, part in enumerate(packed.constraints)}
+        order = [place[id(part)] for members in instances_of_kinds(packed) for part in members]
+        constraints = constraints[np.argsort(order, kind="stable")]
         places = np.concatenate((constraints[:, 1 + AT : 5 + AT], forces[:, 1 + AT : 5 + AT]))
         table = system.table.copy()
         table[constraints[:, 0] + STRIDE] = WIDTH
@@ -124,8 +128,13 @@ def derivatives(motion):
     packed, pairs = motion.packed, Pairs(motion.packed)
     (nc, _), m, n = pairs.counts, len(motion.lam), motion.q.size
     K, rows, Q_q, Q_qd = pairs.blocks(motion, motion.lam)
-    counts = np.array([packed.constraints[i].rows for i in range(nc)], int)
-    lines = np.arange(m) + np.repeat(np.arange(nc), counts)  # of row r in G1 and G2
+    # Lines of G1 and G2: of every row, then of the later terms of sums
+    found = [
+        [row + i + r for r in range(part.all_rows or 1)] for i, (part, row) in enumerate(first_rows(packed.constraints))
+    ]
+    lines = [lines for part, lines in zip(packed.constraints, found, strict=True) if part.all_rows]
+    lines += [lines for part, lines in zip(packed.constraints, found, strict=True) if not part.all_rows]
+    lines = np.array([line for each in lines for line in each], int)
     G1, G2 = (as_csr(packed, one[: WIDTH * (m + nc)].reshape(-1, WIDTH)[lines]) for one in rows)
     K = _scatter(K, pairs.columns[:nc], pairs.used[:nc], n)
     Q_q, Q_qd = (_scatter(one, pairs.columns[nc:], pairs.used[nc:], n) for one in (Q_q, Q_qd))
@@ -193,6 +202,8 @@ class NominalMotion:
     M, H : sparse (n, n), (m', n)
     kept : ndarray (m',)
         Rows of Phi that are independent.
+    rates : ndarray (r,)
+        Those of them that are on velocities.
     """
 
     def __init__(self, packed, memory, t, q, qd, still=False):
@@ -202,7 +213,9 @@ class NominalMotion:
         self.system.reals[self.system.memory] = memory
         self.Phi, rows, self.Phi_t, gamma = constraint_arrays(self.system, q, qd, self.t, WIDTH)
         self.Phi_q = as_csr(packed, rows)
+        self._on_rates = of_rates(packed)
         self.kept = np.setdiff1d(np.arange(len(self.Phi)), self._redundant())
+        self.rates = self.kept[self._on_rates[self.kept]]
         self.H, self.M = self.Phi_q[self.kept], mass_matrix_sparse(self.system, q)
         self._factor()
         at = self.t * np.ones(1)
@@ -239,7 +252,26 @@ class NominalMotion:
             found = dependent_rows(self.packed, self.q, self.t, REDUNDANT_SHARE)
         if found is not None and found.size > known.size and self.q.size <= DENSE:
             raise SingularConfiguration(NOT_UNIQUE)
-        return known if found is None or found.size != known.size else found
+        if found is None or found.size != known.size:
+            return known
+        return self._rates_first(found) if self._on_rates.any() else found
+
+    def _rates_first(self, found):
+        """As many redundant rows, of those on velocities where rows on positions say the same."""
+        groups = np.flatnonzero(~self._on_rates), np.flatnonzero(self._on_rates)
+        _, other = divide(self.Phi_q.toarray() * coordinate_scales(self.packed), groups)
+        return np.array(other, int) if len(other) == found.size else found
+
+    @cached_property
+    def placed(self):
+        """The same motion with the rows on positions alone as constraints; those on velocities push with `lam`."""
+        if not self.rates.size:
+            return self
+        other = copy(self)
+        other.kept, other.rates = np.setdiff1d(self.kept, self.rates), self.rates[:0]
+        other.H = self.Phi_q[other.kept]
+        other._factor()
+        return other
 
     def _factor(self):
         self._factors, self._weights = self._factored(self.H)

@@ -10,9 +10,9 @@ from ..elements.bodies import transform_g
 from ..errors import SingularConfiguration
 from ..jit.interrupts import interruptible
 from ..maths.matrix_rank import interruptible_solver, sparse_lu
-from ..maths.tolerances import NEGLIGIBLE, PIVOT_ROUNDING
+from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, PIVOT_ROUNDING, TINY
 from .coordinates import stacked
-from .tolerances import STIFFNESS_ROUNDING
+from .tolerances import IN_TURN, STIFFNESS_ROUNDING
 
 # The linearised equations of motion, reduced to minimal coordinates x.
 #
@@ -132,6 +132,134 @@ class Reduced:
         return self._hats[2]
 
 
+# With rows on velocities the rates of x are not free: A dqd + G1_A dq = 0 leaves w, some of them.
+#
+#     a dxd + b dx = 0        a = A T,  b = A T1 + G1_A T
+#     dxd = W w + V dx        W^T a^T = 0, so reactions of these rows do no work on w
+#     M wd + C w + K dx = 0   M = W^T M_r W,  C = W^T (C_r + M_r V) W,  K = W^T (K_r + (C_r + M_r V) V)
+#
+# M_r, C_r and K_r are those without these rows, whose reactions are loads. W and V are constant in a steady motion.
+
+
+class Rolling:
+    """Equations `Reduced` by the rows on positions, with those on velocities: k rates w of j coordinates x.
+
+    Parameters
+    ----------
+    motion : NominalMotion
+        With all rows.
+    whole : Reduced
+        Of the motion `placed`.
+    every : list of Variation
+        The coordinates, (j,).
+
+    Attributes
+    ----------
+    free : ndarray (k,)
+        Which of the rates w are.
+    T, T1 : ndarray (n, j)
+        Those of `Reduced`.
+    W, V : ndarray (j, k), (j, j)
+    M, C, K : ndarray (k, k), (k, k), (k, j)
+    """
+
+    def __init__(self, motion, whole, every):
+        lengths = np.where([one.length for one in every], motion.packed.size or 1.0, 1.0)
+        self.whole, self.T, self.T1 = whole, whole.T, whole.T1
+        A, G1 = motion.Phi_q[motion.rates], motion.derivatives.G1[motion.rates]
+        a, b = A @ whole.T, A @ whole.T1 + G1 @ whole.T
+        bound = _last_independent(a * lengths)
+        self.free = np.setdiff1d(np.arange(len(lengths)), bound)
+        self.W, self.V = np.zeros((len(lengths), self.free.size)), np.zeros((len(lengths), len(lengths)))
+        self.W[self.free] = np.eye(self.free.size)
+        found = np.linalg.solve(a[:, bound], np.concatenate((a[:, self.free], b), axis=1))
+        self.W[bound], self.V[bound] = -found[:, : self.free.size], -found[:, self.free.size :]
+        damping = whole.C + whole.M @ self.V
+        self.M, self.C = self.W.T @ whole.M @ self.W, self.W.T @ damping @ self.W
+        self.K = self.W.T @ (whole.K + damping @ self.V)
+
+    @cached_property
+    def R(self):
+        """(k, k), an upper triangle, M = R^T R."""
+        return np.linalg.qr(self.whole.R @ self.W, mode="r")
+
+    @cached_property
+    def _hats(self):
+        """V, W, C and K of coordinates y = R_r x and rates R w with unit mass."""
+        from scipy.linalg import solve_triangular
+
+        def right(X, R):
+            return solve_triangular(R, X.T, trans="T").T
+
+        R, Q = self.whole.R, right(self.whole.R @ self.W, self.R)
+        C, K = (solve_triangular(self.R, X, trans="T") for X in (self.C, self.K))
+        return R @ right(self.V, R), Q, right(C, self.R), right(K, R)
+
+    @property
+    def C_hat(self):
+        """(k, k)."""
+        return self._hats[2]
+
+    @property
+    def K_hat(self):
+        """(k, k), of displacements that w lead to."""
+        return self._hats[3] @ self._hats[1]
+
+    @property
+    def scale(self):
+        """The size of the terms that K_hat is a sum of."""
+        return self.whole.scale
+
+    def pairs(self):
+        """Eigenvalues (j + k,) and vectors of coordinates y (j, j + k)."""
+        V, W, C, K = self._hats
+        kept = _not_ignorable(V, K, self.scale)
+        A = np.block([[kept.T @ V @ kept, kept.T @ W], [-K @ kept, -C]])
+        values, vectors = interruptible(lambda: np.linalg.eig(A))
+        values = np.where(np.abs(values) <= NEGLIGIBLE * np.abs(values).max(initial=0.0), 0.0, values)
+        places, speeds = kept @ vectors[: kept.shape[1]], W @ vectors[kept.shape[1] :]
+        shapes = np.empty((len(V), len(values)), complex)
+        for i, value in enumerate(values):
+            # value y = V y + W w; of a vanishing value the displacement, or where it leads to
+            if value != 0.0:
+                shapes[:, i] = np.linalg.solve(value * np.eye(len(V)) - V, speeds[:, i])
+            else:
+                still = np.linalg.norm(places[:, i]) > np.linalg.norm(speeds[:, i]) * HALF_DIGITS
+                shapes[:, i] = places[:, i] if still else speeds[:, i]
+        shapes /= np.linalg.norm(shapes, axis=0)
+        ignored = np.linalg.svd(kept.T)[2][kept.shape[1] :].T
+        return np.concatenate((np.zeros(ignored.shape[1]), values)), np.concatenate((ignored, shapes), axis=1)
+
+
+def _last_independent(a):
+    """As many independent columns of a (r, j) as it has rows, the last ones first: joints come first among the x."""
+    left, taken = a.copy(), []
+    for _ in range(len(a)):
+        sizes = np.linalg.norm(left, axis=0)
+        sizes[taken] = 0.0
+        column = int(np.flatnonzero(sizes >= IN_TURN * sizes.max())[-1])
+        taken.append(column)
+        unit = left[:, column] / sizes[column]
+        left = left - np.outer(unit, unit @ left)
+    return np.array(sorted(taken), int)
+
+
+def _not_ignorable(V, K, scale):
+    """An orthonormal basis (j, .) of displacements without those that act on nothing, not even on each other.
+
+    Each of those has an eigenvalue zero, which rounding would otherwise make a pair or a triple.
+    """
+    kept, nothing = np.eye(len(V)), (PIVOT_ROUNDING * max(np.abs(V).max(initial=0.0), np.sqrt(scale)))
+    while kept.shape[1]:
+        effects = np.concatenate((kept.T @ V @ kept, K @ kept / max(np.sqrt(scale), TINY)))
+        _, s, rows = np.linalg.svd(effects)
+        count = int((s > nothing).sum())
+        if count == kept.shape[1]:
+            break
+        kept = kept @ rows[:count].T
+    return kept
+
+
 def _across(T, part):
     """T^T part, of rows of the part that aren't zero."""
     rows = np.flatnonzero(part.any(axis=1))
@@ -210,6 +338,12 @@ class Stiffnesses(NamedTuple):
         return float(self.values[0]) if len(self.values) else 0.0
 
 
+def equations(motion, every, balanced=False):
+    """Return `Reduced`, or with rows on velocities `Rolling`, in coordinates `chosen` for `motion.placed`."""
+    whole = Reduced(motion.placed, every, balanced)
+    return Rolling(motion, whole, every) if motion.rates.size else whole
+
+
 def stiffnesses(reduced, nothing):
     """The `Stiffnesses` of `Reduced` equations."""
     K = reduced.K_hat
@@ -225,8 +359,8 @@ def stiffnesses(reduced, nothing):
 
 def eigenpairs(reduced, nothing=None):
     """The `EigenPairs` of `Reduced` equations."""
-    from scipy.linalg import solve_triangular
-
+    if isinstance(reduced, Rolling):
+        return _ordered(*reduced.pairs(), reduced.whole.R)
     C, K, scale = reduced.C_hat, reduced.K_hat, reduced.scale
     nothing = PIVOT_ROUNDING * scale if nothing is None else nothing
     undamped = np.abs(C).max(initial=0.0) <= NEGLIGIBLE * np.sqrt(scale)
@@ -234,10 +368,17 @@ def eigenpairs(reduced, nothing=None):
         values, vectors = _symmetric(K, nothing)
     else:
         values, vectors = _general(C, K, nothing)
+    return _ordered(values, vectors, reduced.R)
+
+
+def _ordered(values, vectors, R):
+    """The `EigenPairs` of vectors y = R x, by size."""
+    from scipy.linalg import solve_triangular
+
     values = values + 0.0
     order = np.lexsort((-values.imag, np.abs(values.imag), np.abs(values)))
     values, vectors = values[order], vectors[:, order]
-    return EigenPairs(values, interruptible(lambda: solve_triangular(reduced.R, vectors)))
+    return EigenPairs(values, interruptible(lambda: solve_triangular(R, vectors)))
 
 
 def _symmetric(K, nothing):

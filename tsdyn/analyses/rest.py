@@ -453,7 +453,7 @@ class Rest:
         self.P = frame.increments.at(q)
         self.Phi, rows, _, _ = constraint_arrays(self.system, q, np.zeros(q.size), self.t, WIDTH)
         self.rows = rows
-        A = frame.transformed_rows(self.P, rows[frame.own])
+        A = frame.transformed_rows(self.P, rows)
         self.left_out = frame.left_out(A, q)
         A = np.where(self.left_out[frame.rows.rows], 0.0, A)
         lengths = np.sqrt(np.bincount(frame.rows.rows, A * A, frame.own.size))

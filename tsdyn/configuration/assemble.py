@@ -433,9 +433,7 @@ def _released(scene, values):
 def assembled_nearby(scene, fixed, t, tol=NEGLIGIBLE, folds="free", cut=(), far=False):
     """Assemble without a way to the angles of motors, from a near or a far sketch; return the `AssemblyReport`."""
     packed, (sketch, qd) = scene.packed, scene.start
-    metric = whole = Metric(packed, None, t)
-    if fixed:
-        metric = Metric(packed, _held(packed, fixed), t)
+    metric, whole = Metric(packed, _held(packed, fixed) if fixed else None, t), Metric(packed, None, t, rates=True)
     demand_finite(scene, *metric.arrays(sketch))
     found, near = _search(scene, metric, sketch, tol, fixed, cut, far)
     links = Folds(packed) if _largest_turn(metric, sketch, found.q) > SHOWN / 4.0 else None
@@ -551,7 +549,7 @@ def _velocities(metric, q, sketch, A, Phi_q, Phi_t):
     given[metric.p] = metric.rates(q, x)[metric.p]
     exact = metric.is_bounded and not metric.sparse
     if exact:
-        metric = Metric(metric.packed, None, metric.t, lengths=True)
+        metric = Metric(metric.packed, None, metric.t, lengths=True, rates=True)
         A, x = metric.reduced(q, Phi_q[metric.own]), metric.speeds(qd[metric.r], metric.spins(*sketch))
     fitted = given
     for _ in range(3):

@@ -1,7 +1,7 @@
 """Check that the rows of a plug-in are holonomic: its jacobian is the derivative of its phi.
 
-The tangent form would run a row on velocities as it is given. The forms with a basis solve for positions with Phi and
-Phi_q together and silently give wrong results if one isn't the derivative of the other.
+The tangent form would run a row on velocities that is given as one of phi. The forms with a basis solve for positions
+with Phi and Phi_q together and silently give wrong results if one isn't the derivative of the other.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ def demand_holonomic(packed, q, t, form):
     for constraint, given, places in zip(packed.constraints, packed.parameters, packed.coordinates, strict=True):
         kind = type(constraint)
         seen[kind] = seen.get(kind, 0) + 1
-        if is_ours(kind.__module__) or seen[kind] > TRIED:
+        if is_ours(kind.__module__) or seen[kind] > TRIED or not kind.rows:
             continue
         par = [x for value in given for x in (value.value(t) if isinstance(value, Motion) else (value,))]
         par += [0.0] * kind.memory
@@ -35,8 +35,7 @@ def demand_holonomic(packed, q, t, form):
             raise InvalidConstraint(
                 f"{constraint.name}: row {row} of its jacobian is not the derivative of its phi: it is not holonomic, "
                 f"for which {form!r} with this method gives wrong results. Correct the kernels with "
-                f"ts.testing.check_primitive({kind.__name__}); a row on velocities alone is served by "
-                "formulation='tangent' with an explicit method."
+                f"ts.testing.check_primitive({kind.__name__}); make a row on velocities alone one of rate_rows."
             )
     packed.derived.holonomic = True
 

@@ -10,6 +10,7 @@ from ..jit.kernels import resident
 from ..maths.matrix_rank import dependent
 from ..maths.tolerances import LAST_PLACE
 from ..model.packed import POINT_SIZE, is_small
+from ..observables.contacts import singular_place
 from ..observables.evaluate import constraint_arrays
 from ..observables.tolerances import KEPT_FLOATS
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, by_lengths, coordinate_scales
@@ -134,6 +135,9 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     graphs of the packed scene drop them from now on.
     """
     packed = scene.packed
+    place = singular_place(packed, q)
+    if place:
+        raise SingularConfiguration(f"{place}: a singular configuration. Start from another one.")
     start = _Start(scene, system, q, qd, t, tol)
     if packed.derived.redundant is None and start.is_regular():
         release_loose_bodies(packed, start.graph, start.tangent.rows.H)
@@ -298,7 +302,7 @@ class _Start:
         p, pd = q[self.at], qd[self.at]
         Phi[rows], velocity[rows] = 0.5 * ((p * p).sum(axis=1) - 1.0), (p * pd).sum(axis=1)
         H = np.ones((self.m, 1))
-        H[graph.row[real], 0] = tangent.rows.H.reshape(-1, 16)[real].sum(axis=1)
+        H[graph.row[real], 0] = tangent.rows.H.reshape(-1, 16)[: real.size][real].sum(axis=1)
         demand_finite(scene, Phi, H, velocity)
         demand_small(scene, Phi, self.tol * (1.0 + np.abs(q).max()), "position", "Phi", (self.t, q))
         self.velocity = velocity
@@ -319,7 +323,9 @@ class _Start:
     def redundant_rows(self):
         """Return the rows that are redundant here and nearby; refuse a singular configuration."""
         names, row, H = self.scene.row_names(), self.graph.row, self.tangent.rows.H.reshape(-1, 16)
-        gone = np.flatnonzero(~H.any(axis=1) & (row >= 0))
+        present = H.any(axis=1)
+        np.logical_or.at(present, self.graph.tails, present[row.size :])
+        gone = np.flatnonzero(~present[: row.size] & (row >= 0))
         if gone.size:
             refuse_vanished(names[row[gone[0]]])
         way = np.random.default_rng(0).normal(size=(len(self.graph.bodies) + 1, 8))
@@ -420,6 +426,7 @@ def _refuse(scene, start, dependent):
         hub = scene.bodies[dict(graph.welds.tolist())[dependent]].name
         raise RedundantConstraints(f"the constraints at {hub} depend on one another: {DEPENDENT}")
     name = scene.row_names()[graph.row[dependent]]
-    if not tangent.rows.H[16 * dependent : 16 * dependent + 16].any():
+    pairs = [dependent, *(len(graph.row) + np.flatnonzero(graph.tails == dependent))]
+    if not tangent.rows.H.reshape(-1, 16)[pairs].any():
         refuse_vanished(name)
     raise RedundantConstraints(f"{name} depends on other constraint rows: {DEPENDENT}")

@@ -369,7 +369,7 @@ class Tree:
         edges, self.loops = [], []
         for member in self.packed.members:
             constraint = member.constraint
-            if getattr(constraint, "normalises", False):
+            if getattr(constraint, "normalises", False) or not constraint.rows:
                 continue
             ends = {self.of(part.body_of(marker)) for part in constraint.parts for marker in part.markers}
             edge = Edge(constraint, tuple(ends), range(member.rows.start, member.rows.stop))

@@ -23,12 +23,13 @@ _G = transform_g(np.eye(4)).reshape(4, 12)  # G is linear in p
 class Metric:
     """Constraints of a packed scene at time t as rows (m', x), dense or, of more than DENSE coordinates, sparse.
 
-    held (n,) marks coordinates that are fixed. With `lengths`, the metric is that of rows/constraint_graph.py: rank is
-    geometry. The kinetic one `is_bounded` where masses or moments of inertia are raised, so that it stays a metric: it
-    says which of many configurations is near, and no physical number. Those come of `kinetic_rows`.
+    held (n,) marks coordinates that are fixed. Rows on velocities are among the rows with `rates` alone: then Phi, zero
+    for them, is met by increments that they admit. With `lengths`, the metric is that of rows/constraint_graph.py: rank
+    is geometry. The kinetic one `is_bounded` where masses or moments of inertia are raised, so that it stays a metric:
+    it says which of many configurations is near, and no physical number. Those come of `kinetic_rows`.
     """
 
-    def __init__(self, packed, held=None, t=0.0, lengths=False):
+    def __init__(self, packed, held=None, t=0.0, lengths=False, rates=False):
         system = packed.system
         rigid = system.bodies[:, 1] == 7
         self.packed, self.t, self.n = packed, t, int(system.bodies[:, 1].sum())
@@ -50,7 +51,11 @@ class Metric:
         self.root = np.sqrt(np.maximum(masses, least))[:, None]
         self.fall = np.linalg.cholesky(J + (more * thin)[:, None, None] * np.eye(3)).swapaxes(1, 2)  # L^T
         self.rise = np.linalg.inv(self.fall)
-        own = [not part.normalises for part in packed.constraints for _ in range(part.rows)]
+        own = [
+            not part.normalises and (rates or i < part.rows)
+            for part in packed.constraints
+            for i in range(part.all_rows)
+        ]
         self.own = np.flatnonzero(np.array(own, bool))
         free = np.ones(self.size, bool)
         self.held = np.zeros(len(rigid), bool) if held is None else held[self.r[:, 0]]  # (bodies,)

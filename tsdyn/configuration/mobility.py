@@ -15,6 +15,7 @@ from ..errors import InvalidArgument, RedundantConstraints
 from ..jit.interrupts import CollectionsDeferred
 from ..maths.matrix_rank import farthest_first, rank_of, singular_values, unit_rows
 from ..maths.tolerances import RANK_TOL
+from ..model.packed import has_rates, of_rates
 from ..rows.constraint_graph import coordinate_scales
 from ..validation import counted, finite_vector, number
 from .continuation import close
@@ -152,7 +153,7 @@ def _pivots(scene, rows):
 
     Normalisations belong to the bodies, so dependence on them is attributed to the user's constraints.
     """
-    own = np.array([type(c) is EulerNormalization for c in scene.constraints for _ in range(c.rows)])
+    own = np.array([type(c) is EulerNormalization for c in scene.constraints for _ in range(c.all_rows)])
     rest, first = np.flatnonzero(~own), np.flatnonzero(own)
     basis = unit_rows(rows[first])  # of different bodies
     left = rows[rest] - (rows[rest] @ basis.T) @ basis
@@ -179,6 +180,8 @@ class Mobility:
     ----------
     degrees_of_freedom : int
         Coordinates less rank: of the velocities that the constraints leave, here.
+    position_degrees_of_freedom : int
+        The same without rows on velocities (rolling, knife edges): of the positions that can be reached.
     generic_degrees_of_freedom : int
         The same at configurations near this one; it is smaller where this one is singular.
     coordinates, rows, rank : int
@@ -192,6 +195,7 @@ class Mobility:
     """
 
     degrees_of_freedom: int
+    position_degrees_of_freedom: int
     generic_degrees_of_freedom: int
     coordinates: int
     rows: int
@@ -204,6 +208,8 @@ class Mobility:
         freedom = f"{self.degrees_of_freedom}"
         if self.singular:
             freedom += f" here, {self.generic_degrees_of_freedom} nearby: this configuration is singular"
+        if self.position_degrees_of_freedom != self.degrees_of_freedom:
+            freedom += f" of velocities, {self.position_degrees_of_freedom} of positions"
         facts = {
             "degrees of freedom": freedom,
             "coordinates": f"{self.coordinates}",
@@ -221,7 +227,7 @@ class Mobility:
             for row in found:
                 groups.setdefault(id(row.constraint), []).append(row)
             for rows in groups.values():
-                whole = len(rows) == rows[0].constraint.rows
+                whole = len(rows) == rows[0].constraint.all_rows
                 title = rows[0].constraint.title
                 said = f"all of {title}" if whole and len(rows) > 1 else ", ".join(row.name for row in rows)
                 on = dict.fromkeys(name for row in rows for name in row.depends_on)
@@ -307,7 +313,7 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
 def mobility_at(scene, q, t):
     """As `mobility`, of arguments that are checked."""
     packed = scene.packed
-    metric = Metric(packed, None, t, lengths=True)
+    metric = Metric(packed, None, t, lengths=True, rates=True)
     Phi, Phi_q, Phi_t = metric.arrays(q)
     demand_finite(scene, Phi, Phi_q, Phi_t)
     demand_small(scene, Phi, INITIAL_TOL * (1.0 + np.abs(q).max()), "position", "Phi", (float(t), q))
@@ -327,7 +333,7 @@ def mobility_at(scene, q, t):
     always = sorted(set(range(len(rows))) - set(redundant))
     names, owners = (
         scene.row_names(),
-        [member.constraint for member in packed.members for _ in range(member.constraint.rows)],
+        [member.constraint for member in packed.members for _ in range(member.constraint.all_rows)],
     )
 
     def described(found, among, matrix):
@@ -335,10 +341,11 @@ def mobility_at(scene, q, t):
             place = metric.own[rows[row]]
             yield RedundantRow(names[place], tuple(names[metric.own[rows[i]]] for i in others), owners[place])
 
-    aside = len(metric.own) - len(rows) + len(packed.system.segments) - len(metric.own)
-    n = q.size
+    n, aside = q.size, len(packed.system.segments) - len(rows)
+    free = n - aside - here
     return Mobility(
-        degrees_of_freedom=n - aside - here,
+        degrees_of_freedom=free,
+        position_degrees_of_freedom=_of_positions(packed, q, t, free),
         generic_degrees_of_freedom=n - aside - generic,
         coordinates=n,
         rows=len(packed.system.segments),
@@ -347,6 +354,16 @@ def mobility_at(scene, q, t):
         dependent_here=tuple(described(dependent, kept, A)) if dependent else (),
         singular=generic > here,
     )
+
+
+def _of_positions(packed, q, t, free):
+    """Degrees of freedom of positions; `free` are those of velocities."""
+    if not has_rates(packed):
+        return free
+    metric = Metric(packed, None, t, lengths=True)
+    rows, A = _core(metric, q, None)
+    normals = sum(constraint.normalises for constraint in packed.constraints)
+    return q.size - normals - (len(metric.own) - len(rows)) - rank_of(A)
 
 
 def _core(metric, q, rows):
@@ -380,8 +397,10 @@ def _neighbours(metric, q, A):
 
 
 def _groups(packed, metric, rows):
-    """Return the indices of `rows`, one array for each constraint."""
-    owner = np.repeat(np.arange(len(packed.members)), [member.constraint.rows for member in packed.members])
+    """Return the indices of `rows`, one array for each constraint; those on velocities come last."""
+    count = len(packed.members)
+    owner = np.repeat(np.arange(count), [member.constraint.all_rows for member in packed.members])
+    owner += count * of_rates(packed)
     whose = owner[metric.own[rows]] if len(rows) else np.zeros(0, int)
     return [np.flatnonzero(whose == member) for member in np.unique(whose)]
 

@@ -220,7 +220,7 @@ def _present(scene, handles, joint, t):
 
 def _drive(scene, joint, goals, held, t):
     """Drive a joint to its goals; return the report of the last assembly."""
-    threaded = any(isinstance(part, Thread) for part in scene.primitives)
+    threaded = any(isinstance(part, Thread) or part.counted for part in scene.primitives)
     size, steps = _size(scene), 1
     shift = RigidShift.of(scene, joint)
     for goal in goals:
@@ -248,6 +248,7 @@ def _drive(scene, joint, goals, held, t):
                 ) from error
             continue
         share, before = ahead, scene.start
+        _follow_turns(scene)
         if share == 1.0:
             return report
 
@@ -263,6 +264,17 @@ def _assembled(scene, drivers, t, motors):
         return assembled_nearby(scene, (), float(t))
     finally:
         scene._added = added
+        scene.touch()
+
+
+def _follow_turns(scene):
+    """Let joints whose angles are coupled count on from the turn that they are on now."""
+    handles = handles_of(scene.packed)
+    for joint in dict.fromkeys(part.counted[0] for part in scene.primitives if part.counted):
+        row = handles.row(joint, "angle")
+        near = np.broadcast_to(np.ravel(joint.angle_near), len(row.angles))
+        now = (joint_motion.angle(g, *handles.motions(g, scene.start[:1]), 0) for g in row.angles)
+        joint.__dict__["angle_near"] = tuple(float(joint_motion.counted(*pair)) for pair in zip(now, near, strict=True))
         scene.touch()
 
 

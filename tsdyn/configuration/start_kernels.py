@@ -10,7 +10,7 @@ import numpy as np
 
 from ..elements.loops.constraint_rows import move_bodies, place_bodies, write_positions, write_velocities
 from ..elements.tolerances import UNDIRECTED
-from ..formulations.projection import factorise, find_drift, gather_speeds, land, land_velocities, move_by
+from ..formulations.projection import UNHELD, factorise, find_drift, gather_speeds, land, land_velocities, move_by
 from ..jit.kernels import callback, entry, integers, kernel, loader, vector
 from ..maths.dense_linalg import copy, is_finite, largest
 from ..maths.tolerances import HALF_DIGITS, LAST_PLACE
@@ -24,6 +24,7 @@ from ..rows.interface import (
     keep_every_row,
     multiply_rows,
     project,
+    rates_hold_along,
     restore_selection,
     select_rows,
     singularity_indicator,
@@ -242,6 +243,8 @@ def go_near_by(context, t, way, far):
     wanted = _farthest(c)
     for _ in range(2):
         project(graph, f.rows, f.Z, f.b)
+    if not rates_hold_along(graph, f, f.Z):
+        return UNHELD
     found = _farthest(c)
     scale = far / found if found > UNDIRECTED * wanted else 0.0
     for i in range(f.Z.size):

@@ -111,16 +111,16 @@ class Joint(Attachment):
             stop_waiting(part)
             aligned += getattr(part, "opposed", ())
             parts += part.parts
-            labels += [str(label)] * part.rows
+            labels += [str(label)] * part.all_rows
         total, seen = Counter(labels), Counter()
         for i, label in enumerate(labels):
             labels[i] = f" {label}" if total[label] == 1 else f" {label}[{seen[label]}]"
             seen[label] += 1
         row = 0
         for part in parts:
-            label = labels[row] if part.rows == 1 else labels[row].partition("[")[0]
+            label = labels[row] if part.all_rows == 1 else labels[row].partition("[")[0]
             part.__dict__.update(owner=self, name=f"{self.title}{label}")
-            row += part.rows
+            row += part.all_rows
         return Composition(tuple(parts), tuple(labels), tuple(aligned))
 
     def _demand_fit(self, part, given):
@@ -144,7 +144,17 @@ class Joint(Attachment):
 
     @property
     def rows(self) -> int:
-        """Number of scalar constraints."""
+        """Number of scalar constraints on positions."""
+        return sum(part.rows for part in self.parts)
+
+    @property
+    def rate_rows(self) -> int:
+        """Number of scalar constraints on velocities."""
+        return sum(part.rate_rows for part in self.parts)
+
+    @property
+    def all_rows(self) -> int:
+        """Number of scalar constraints of both kinds."""
         return len(self._composition.labels)
 
     @property
@@ -170,7 +180,31 @@ class Joint(Attachment):
         return cls(a, b, **places)
 
     def __repr__(self) -> str:
-        return f"<{self.title}: {counted(self.rows, 'row')}>"
+        return f"<{self.title}: {counted(self.all_rows, 'row')}>"
+
+
+class SumRow(Joint):
+    """Base of constraints of one row that is a sum of terms, each on two bodies: a row on any number of bodies.
+
+    Subclass it and yield the terms in `compose`: primitives of one row with `summed = True`, on any bodies of the
+    scene. a and b are the bodies of the first term.
+    """
+
+    @cached_property
+    def _composition(self):
+        self.check()
+        parts = tuple(self.compose())
+        for i, part in enumerate(parts):
+            stop_waiting(part)
+            # The row counts once, with the first term
+            part.__dict__.update(owner=self, name=self.title, rows=int(i == 0), all_rows=int(i == 0))
+        return Composition(parts, ("",), ())
+
+    @property
+    def bodies(self) -> tuple[AnyBody, ...]:
+        """The bodies of its terms, the ground left out."""
+        found = dict.fromkeys(body for part in self.parts for body in (part.a, part.b))
+        return tuple(body for body in found if body.dimension)
 
 
 def registered() -> Mapping[str, type[Joint]]:

@@ -8,7 +8,22 @@ A primitive works on marker coordinates x (3-vectors in the ground frame) and ne
     phi_t(x, par, t, out)        out[rows]          Phi_t; only for a primitive that depends on time
     series(x, par, k, s, out)    out[rows, len(x)]  optional: coefficient k of Phi_x, zero on entry; see recurrences.py
     series_t(x, par, k, s, out)  out[rows]          and of Phi_t, where it has what is `prescribed`; after `series`
+    arm_series(n, par, k, s, out)  out[3]           optional: coefficient k of the arm of a contact, see below
     remember(x, par, t)          optional, with memory = 1: what the last of par is after each accepted step
+
+Rows on velocities, A(x, t) xd + b(x, t) = 0, follow the rows on positions; a primitive may have either or both:
+
+    rate(x, xd, par, t, out)        out[rate_rows]          A xd + b, linear in xd
+    rate_jacobian(x, par, t, out)   out[rate_rows, len(x)]  A, zero on entry
+    rate_gamma(x, xd, par, t, out)  out[rate_rows]          (A xd)_x xd + A_t xd + b_x xd + b_t
+
+A contact has rows along directions of b: derivatives of rows, and rows on velocities, are the velocities of a's
+material point at the contact along them. Its arm, from the first marker, a Point of a, follows from the normal n, both
+in components along the next three markers, Vectors of a. On the ground `arm_series` serves in place of `series`, in
+less time.
+
+`series` is of Phi_x and, below it, A; `series_t` of Phi_t and b. To the solver a row on velocities is a row of Phi that
+is zero everywhere, with A for Phi_x, b for Phi_t and rate_gamma for gamma (loops/rate_rows.py).
 
 x is the concatenation of the primitive's markers, par the floats that `parameters()` returns; a motion among them
 occupies three: value, rate and acceleration at t. The loops over all instances of a kind (loops/) apply the chain
@@ -23,12 +38,14 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Never, Self
 
+import numpy as np
+
 from ..errors import InvalidConstraint
-from ..jit.kernels import Callback, specialised
+from ..jit.kernels import Callback, specialised, twin
 from ..motions.prescribed import Motion
 from .element import Attachment, check_slots, inlined, layout, static_kernel
-from .loops import constraint_hessians, constraint_rows, constraint_series, coordinate_rows
-from .markers import PARAMETERS, TURN, Marker
+from .loops import constraint_hessians, constraint_rows, constraint_series, coordinate_rows, ground_contacts, rate_rows
+from .markers import PARAMETERS, POINT, TURN, Marker
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -37,7 +54,8 @@ if TYPE_CHECKING:
 
 _registry = {}
 _KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of arguments
-_OPTIONAL = {"phi_t": 4, "series": 5, "series_t": 5, "remember": 3}
+_RATE_KERNELS = {"rate": 5, "rate_jacobian": 4, "rate_gamma": 5}
+_OPTIONAL = {"phi_t": 4, "series": 5, "series_t": 5, "arm_series": 5, "remember": 3}
 
 
 class Primitive(Attachment):
@@ -49,7 +67,9 @@ class Primitive(Attachment):
     Attributes
     ----------
     rows : int
-        Number of scalar constraints.
+        Number of scalar constraints on positions.
+    rate_rows : int
+        Number of scalar constraints on velocities.
     markers : tuple of Point, Vector, Parameters
         What x is made of, each on body "a" or "b".
     slots : int
@@ -57,6 +77,11 @@ class Primitive(Attachment):
     prescribed : str or tuple of str, optional
         The attributes that are numbers or Motions, where nothing else makes it depend on time. With `series_t` they
         come first in `parameters()`, and their series are the rows of scratch memory from `slots` on.
+    normal : str, optional
+        Of a contact with `arm_series`: the marker of b that its first row is along, after a Point of the plane; other
+        rows are along the markers after it.
+    summed : bool
+        Whether an instance may be a term of a row that several instances add up to, each on two bodies: see `SumRow`.
     memory : int
         1 for a primitive that keeps a number from step to step, the last of par: an angle that counts turns.
     a, b : Body or ground
@@ -94,8 +119,14 @@ class Primitive(Attachment):
 
     lacks = "constraints and has no rows"
     rows = 0
+    rate_rows = 0
+    all_rows = 0  # both
     slots = 0
     memory = 0
+    normal = ""
+    normal_at = -1  # among the markers
+    summed = False
+    counted: Any = None  # (joint, index) of the angle whose turns a term counts
     normalises = False  # whether it does no more than keep the length of p
     prescribed: str | tuple[str, ...] = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind
@@ -103,8 +134,16 @@ class Primitive(Attachment):
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         where = f"primitive {cls.__name__}"
-        if isinstance(cls.rows, bool) or not isinstance(cls.rows, int) or cls.rows < 1:
-            raise InvalidConstraint(f"{where}: rows must be the number of its scalar constraints, 1 or more.")
+        for name in ("rows", "rate_rows"):
+            count = getattr(cls, name)
+            if isinstance(count, bool) or not isinstance(count, int) or count < 0:
+                raise InvalidConstraint(f"{where}: {name} must be a number of scalar constraints, 0 or more.")
+        cls.all_rows = cls.rows + cls.rate_rows
+        if cls.all_rows == 0:
+            raise InvalidConstraint(
+                f"{where}: set rows to the number of its scalar constraints, or rate_rows to that of its constraints "
+                "on velocities."
+            )
         markers = cls.markers if isinstance(cls.markers, (tuple, list)) else ()
         if not markers or not all(isinstance(m, Marker) and m.code != TURN for m in markers):
             raise InvalidConstraint(f"{where}: markers must be a tuple of Point, Vector or Parameters.")
@@ -116,14 +155,16 @@ class Primitive(Attachment):
         if cls.memory not in (0, 1) or (cls.memory == 1) != (getattr(cls, "remember", None) is not None):
             raise InvalidConstraint(f"{where}: memory = 1 needs a kernel remember, and remember needs memory = 1.")
         functions = {}
-        for name, arguments in {**_KERNELS, **_OPTIONAL}.items():
-            if getattr(cls, name, None) is None and name in _OPTIONAL:
+        required = {**(_KERNELS if cls.rows else {}), **(_RATE_KERNELS if cls.rate_rows else {})}
+        for name, arguments in {**required, **_OPTIONAL}.items():
+            if name in _OPTIONAL and (getattr(cls, name, None) is None or (name == "phi_t" and not cls.rows)):
                 continue
-            if name == "series_t" and not {"phi_t", "series"} <= functions.keys():
+            if name == "series_t" and not ({"phi_t", "rate"} & functions.keys() and "series" in functions):
                 continue  # of a subclass that has dropped one of them
             functions[name] = static_kernel(cls, name, arguments, where, InvalidConstraint)
         cls.kernels = MappingProxyType(_compile(cls, functions))
-        _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
+        if not cls.__name__.startswith("_"):  # a variant, which its public class makes
+            _registry[f"{cls.__module__}.{cls.__qualname__}"] = cls
 
     def __setattr__(self, name: str, value: Never) -> None:
         """Set an attribute, checked; a prescribed one may be a number or three functions of time."""
@@ -139,14 +180,40 @@ class Primitive(Attachment):
     @property
     def row_labels(self) -> tuple[str, ...]:
         """What follows its title in the names of its rows."""
-        return ("",) if self.rows == 1 else tuple(f"[{i}]" for i in range(self.rows))
+        return ("",) if self.all_rows == 1 else tuple(f"[{i}]" for i in range(self.all_rows))
+
+    @property
+    def first_memory(self) -> float:
+        """What it remembers at first: the angle near which its joint begins to count."""
+        joint, which = self.counted or (self, 0)
+        near = np.ravel(joint.angle_near)
+        return float(near[which if near.size > 1 else 0])
 
     @property
     def rheonomic(self) -> bool:
         """True if the constraint depends on time."""
         names = self.quantities()
         moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
+        if self.rate_rows:
+            return self._drifts() or (moves and self.rows > 0 and getattr(self, "phi_t", None) is not None)
         return moves and "phi_t" in self.kernels
+
+    def _drifts(self):
+        """Whether b, the rate at xd = 0, may be other than zero, with these or other numbers: asked at random ones."""
+        given, rng = self.parameters(), np.random.default_rng(0)
+        if any(isinstance(value, Motion) for value in given):
+            return True
+        out, par = np.zeros(self.rate_rows), np.array([*given, *[0.0] * self.memory]) + rng.uniform(0.1, 1.0)
+        for _ in range(3):
+            x = [rng.normal(size=marker.size) for marker in self.markers]
+            for part, marker in zip(x, self.markers, strict=True):  # directions of unit length
+                part /= 1.0 if marker.code == POINT else np.linalg.norm(part)
+            x = np.concatenate(x)
+            with np.errstate(all="ignore"):
+                twin(self.rate)(x, np.zeros(x.size), par, rng.uniform(0.1, 2.0), out)
+            if np.nan_to_num(out).any():
+                return True
+        return False
 
     @classmethod
     def quantities(cls) -> tuple[str, ...]:
@@ -179,6 +246,8 @@ _LOOPS = {  # name: template, whose kernel it is cached with, signature
     "bias": (constraint_rows.bias, "gamma", constraint_rows.SIGNATURE),
     "series": (constraint_series.series, "series", constraint_series.SIGNATURE),
     "far_series": (constraint_series.series, "series", constraint_series.SIGNATURE),
+    "contact_rows": (ground_contacts.reduced, "arm_series", constraint_rows.SIGNATURE),
+    "contact_series": (ground_contacts.series, "arm_series", constraint_series.SIGNATURE),
     "driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
     "far_driven_series": (constraint_series.series, "series_t", constraint_series.SIGNATURE),
 }
@@ -190,11 +259,24 @@ def _compile(cls, functions):
         inner = {f"kernel_{name}": inlined(function) for name, function in functions.items()}
     except InvalidConstraint as error:
         raise InvalidConstraint(f"primitive {cls.__name__}: {error}") from error
-    constants = {"ROWS": cls.rows, **layout(cls.markers), **inner}
+    constants = {"ROWS": cls.all_rows, "RATES_FROM": cls.rows, "SUMMED": cls.summed, "kernel_drift": rate_rows.nothing}
+    places = [marker.argument for marker in cls.markers]
+    constants["NORMAL"] = cls.normal_at = places.index(cls.normal) if cls.normal else -1
+    constants |= layout(cls.markers) | inner
+    if cls.rate_rows:
+        # One kernel of both sorts of rows in place of each
+        names = {**rate_rows.NOTHING, **constants}
+        functions = functions | {
+            name: specialised(template, f"{cls.__qualname__}.{name}", _python(functions["rate"]), **names)
+            for name, template in rate_rows.KERNELS.items()
+        }
+        constants |= {f"kernel_{name}": inlined(functions[name]) for name in rate_rows.KERNELS}
+        constants["kernel_drift"] = constants["kernel_phi_t"]
+        inner = constants
     result = {}
     for name, (template, whose, signature) in _LOOPS.items():
         if whose in functions:
-            owner, driven = getattr(functions[whose], "py_func", functions[whose]), whose == "series_t"
+            owner, driven = _python(functions[whose]), whose == "series_t"
             names = {
                 **constants,
                 "kernel_value": inner[f"kernel_{whose}"],
@@ -205,3 +287,8 @@ def _compile(cls, functions):
             names.setdefault("kernel_series_t", names.get("kernel_series"))
             result[name] = Callback(specialised(template, f"{cls.__qualname__}.{name}_loop", owner, **names), signature)
     return result
+
+
+def _python(function):
+    """A function that may be a kernel already, as it was written."""
+    return getattr(function, "py_func", function)

@@ -333,6 +333,7 @@ def _of_scene(arena):
     if not study.has_arena or arena.pen is None:
         return "the parameters are not all numbers that cases can share arrays for (docs/ensembles.md)"
     found += [f"{each.name} depends on time" for each in packed.constraints if each.rheonomic]
+    found += dict.fromkeys(f"{each.name} counts turns" for each in packed.constraints if each.memory)
     for force_load in packed.loads:
         force = force_load.force
         if any(isinstance(value, Signal) for value in force_load.parameters):
@@ -357,7 +358,7 @@ def _of_scene(arena):
         more = [f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else []
         return "; ".join(found[:SHOWN] + more)
     moved = arena.pen.moves and (study.call.state is not None or not arena.kept.handles.begin_at_zero)
-    if moved or packed.system.memory.size or (arena.pen.moves and (graph.bodies[:, 1] == 4).any()):
+    if moved or (arena.pen.moves and (graph.bodies[:, 1] == 4).any()):
         return "starts differ in a scene whose joint angles count from a given value, or with locked orientations"
     return ""
 

@@ -124,7 +124,9 @@ def _item(item, refused):
         if not found[name]:
             refused.append(f"{item.name} keeps no {name}")
     for name, argument in arguments.items():
-        if name in references:
+        if argument.kind == types.COORDINATE:
+            found[name] = _coordinate_names(vars(item)[name])
+        if argument.kind in (types.REFERENCE, types.COORDINATE):
             continue
         try:
             value = encode(_value_of(item, argument))
@@ -136,6 +138,12 @@ def _item(item, refused):
     if getattr(item, "is_idle", False):  # says so, for nothing is left out by mistake
         found |= {name: encode(vars(item)[name]) for name in item.sources if vars(item)[name] is not None}
     return found | _history(item)
+
+
+def _coordinate_names(given):
+    """[joint, kind, index] of a coordinate of a joint, or of several."""
+    joint, *which = given
+    return [joint.name, *which] if which and isinstance(which[0], str) else [_coordinate_names(each) for each in given]
 
 
 def _value_of(item, argument):
@@ -212,6 +220,7 @@ def _set(reading, scene, path, table):
 
 # Constraints and forces of a document.
 
+KINDS = ("angle", "displacement")  # of joint coordinates
 ITEM_KEYS = ("type", "name", "at", *BUILT, "angle_near")
 
 
@@ -232,7 +241,7 @@ def add_item(reading, scene, path, table, kinds):
     arguments, bodies = types.of_class(cls), types.bodies_of(cls)
     known_keys(path, table, (*ITEM_KEYS, *bodies, *arguments), reading.mistakes)
     positions = _positions(reading, path, table, what, bodies, arguments)
-    values = {n: one for n, one in arguments.items() if one.kind != types.REFERENCE}
+    values = {n: one for n, one in arguments.items() if one.kind not in (types.REFERENCE, types.COORDINATE)}
     given = arguments_in(reading, path, table, values, what)
     placed = _at(reading, path, table, cls, what, values)
     for argument in values.values():
@@ -277,7 +286,23 @@ def _positions(reading, path, table, what, bodies, arguments):
         if argument.kind == types.REFERENCE:
             found.append(referred(reading, path, table, (what, name, "constraint", reading.items)))
             complete = complete and found[-1] is not None
+        if argument.kind == types.COORDINATE:
+            found += _coordinates(reading, path, table, what, name)
+            complete = complete and None not in found
     return found if complete else None
+
+
+def _coordinates(reading, path, table, what, key):
+    """The joint coordinates that a key names: "hinge", ["hinge", "angle", 0], or a list of these."""
+    given = table.get(key)
+    alone = isinstance(given, list) and len(given) > 1 and given[0] in reading.items and given[1] in KINDS
+    found = []
+    for one in [given] if alone or not isinstance(given, list) else given:
+        joint, *which = one if isinstance(one, list) and one else [one]
+        own = table if key not in table else {**table, key: joint}
+        joint = referred(reading, path, own, (what, key, "constraint", reading.items))
+        found.append(None if joint is None else (joint, *which))
+    return found
 
 
 def _at(reading, path, table, cls, what, arguments):

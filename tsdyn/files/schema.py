@@ -47,6 +47,7 @@ BY_KIND = {
     types.MOTION_TYPE: {"$ref": "#/$defs/motion"},
     types.VECTOR: {"$ref": "#/$defs/vector motion"},
     types.REFERENCE: {"description": "the name of a constraint", "type": "string"},
+    types.COORDINATE: {"description": "the name of a joint, [name, coordinate, index], or a list of these"},
     types.NAMES: NAMES,
     types.VALUES: {"type": "object", "additionalProperties": {"$ref": "#/$defs/array"}},
     types.ANY: {},

@@ -16,6 +16,7 @@ from ..elements.element import Attachment
 from ..errors import InvalidArgument
 from ..motions.elementary import Piecewise
 from ..motions.expressions import Smooth
+from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tables import Pieces, Table, is_data
@@ -51,6 +52,8 @@ def encode(value):
         return _encode_motion(value)
     if isinstance(value, Signal):
         return _encode_signal(value)
+    if isinstance(value, CoordinateFunction):
+        value = value.smooth
     if isinstance(value, Smooth):
         return _encode_smooth(value)
     if isinstance(value, Table):
@@ -206,9 +209,9 @@ ENUMERATIONS = {  # by the aliases of hints.py
     "Redundancy": ("drop", "refuse"),
 }
 
-NUMBER, WHOLE, FLAG, TEXT, ARRAY, MOTION_TYPE, VECTOR, FUNCTION, REFERENCE, NAMES, VALUES, ANY = (
+NUMBER, WHOLE, FLAG, TEXT, ARRAY, MOTION_TYPE, VECTOR, FUNCTION, REFERENCE, NAMES, VALUES, ANY, COORDINATE = (
     "number", "integer", "boolean", "text", "array", "motion", "vector", "function", "reference", "names", "values",
-    "any",
+    "any", "coordinate",
 )  # fmt: skip
 KINDS = {
     "float": NUMBER,
@@ -225,6 +228,7 @@ KINDS = {
     "JointLaw": FUNCTION,
     "ControlLaw": FUNCTION,
     "Actuators": NAMES,
+    "JointCoordinate": COORDINATE,
 }
 
 
@@ -244,12 +248,17 @@ class Argument(NamedTuple):
 
 
 def arguments_of(function, markers=()):
-    """The `Argument`s of a class or a method of a scene, by name; bodies and the name are left out."""
+    """The `Argument`s of a class or a method of a scene, by name; bodies and the name are left out.
+
+    Of arguments by position without a number only joint coordinates are known, as one list.
+    """
     placing, found = {marker.argument for marker in markers}, {}
     for name, parameter in inspect.signature(function).parameters.items():
-        if name in (*BODIES, *OWN) or parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+        if name in (*BODIES, *OWN) or parameter.kind is parameter.VAR_KEYWORD:
             continue
         kind, options = _kind_of(parameter)
+        if parameter.kind is parameter.VAR_POSITIONAL and kind != COORDINATE:
+            continue
         required, default = parameter.default is parameter.empty, parameter.default
         found[name] = Argument(name, kind, options, required, None if required else default, name in placing)
     return found
@@ -419,6 +428,7 @@ _DECODERS = {
     FLAG: _flag,
     TEXT: _text,
     REFERENCE: _text,
+    COORDINATE: _any,
     NAMES: _names,
     VALUES: _values,
     FUNCTION: _function,

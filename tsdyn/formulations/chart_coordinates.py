@@ -5,7 +5,7 @@ import math
 from ..elements.loops.constraint_rows import OMEGA, POSE, RD, R, orient
 from ..jit.kernels import kernel, stack, stack2
 from ..jit.simd import add, cross, first, fma, four, get, lanes, larger, let, put, second, splat, third, times, total
-from ..rows.interface import factorise_chart_matrix, rotate_rate
+from ..rows.interface import clear_redundant, factorise_chart_matrix, rotate_rate
 from .tolerances import FARTHEST
 
 # Chart coordinates to body poses and velocities (the retraction), and accelerations back to chart coordinates.
@@ -42,6 +42,23 @@ def displace(graph, l, poses):
             f = 1.5 - 0.5 * (p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)  # rounding of many charts would add up
             orient(poses, at, f * p0, f * p1, f * p2, f * p3)
     return True
+
+
+@kernel
+def add_rate_residuals(graph, f, l, x):
+    """f.b = A0 (x' - x) of rows on velocities, x' being l.x: a position solve moves bodies as these rows admit at q0.
+
+    It moves by x' - x = -Y0 u. Without a residual of their own these rows would leave u to the path of the iteration.
+    """
+    for i in range(graph.rates.size):
+        e, total = graph.rates[i], 0.0
+        for side in range(2):
+            body = graph.sides[e, side]
+            for c in range(8 if body < graph.bodies.shape[0] else 0):
+                total += l.rows0.H[16 * e + 8 * side + c] * (l.x[8 * body + c] - x[8 * body + c])
+        f.b[e] = total
+    if graph.rates.size > 0:
+        clear_redundant(f, f.b)
 
 
 @kernel

@@ -15,6 +15,7 @@ from ..model.equations import is_rheonomic, set_time
 from ..rows.interface import (
     DYNAMICS,
     apply_multipliers,
+    clear_rates,
     clear_redundant,
     evaluate_bias,
     evaluate_drift,
@@ -35,7 +36,7 @@ from ..rows.interface import (
 )
 from ..workspaces import load
 from .accelerations import body_forces
-from .chart_coordinates import displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
+from .chart_coordinates import add_rate_residuals, displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
 from .chart_validity import measure_turns
 from .projection import largest_residual, velocity_floor
 from .saddle_point import add_blocks, degrees, factorise, linearise, reduce, soften, solve, take_solution, turned_back
@@ -45,6 +46,7 @@ from .tolerances import (
     LAG,
     LEAST_LAG,
     LEFT,
+    NORMAL_SWEEPS,
     REACTION_SWEEPS,
     REACTIONS_LEFT,
     REACTIONS_LEFT_COUPLED,
@@ -81,6 +83,27 @@ def find_normal_part(c):
         add_to(f.gamma, f.b)
         solve_normal(c)
     spread_normal(c, f.b)
+    if c.graph.rates.size > 0:
+        _refine_normal_part(c)
+
+
+@kernel
+def _refine_normal_part(c):
+    """The rest of f.b and s.r, which factors of an older configuration leave: it moves bodies along rows on velocities.
+
+    l.drift is scratch.
+    """
+    f, l, s = c.tangent, c.chart, c.saddle
+    for _ in range(NORMAL_SWEEPS):
+        copy(f.b, l.drift)
+        # H (a + C n) + gamma
+        to_bodies(c.graph, l, s.r, f.Z)
+        add_to(s.a, f.Z)
+        multiply_rows(c.graph, f.rows, f.Z, f.b)
+        add_to(f.gamma, f.b)
+        solve_normal(c)
+        add_to(l.drift, f.b)
+        spread_normal(c, f.b)
 
 
 @kernel
@@ -199,7 +222,7 @@ def residual(context, t, g, x, y, k):
     # x - Y0 u and xd - Y0 z
     apply_multipliers(graph, l.rows0, w.u, l.x)
     apply_multipliers(graph, l.rows0, s.z, l.y)
-    status = _solve_positions(c, t, g)
+    status = _solve_positions(c, t, g, vector(x, n))
     if status == OK:
         status = _solve_rates(c, t)
     if status != OK:
@@ -266,7 +289,7 @@ def _rate_size(c, x):
 
 
 @kernel
-def _solve_positions(c, t, g):
+def _solve_positions(c, t, g, x):
     """Newton's method for u: poses and H. Status.
 
     Stops when the position error over g is a velocity well below the tolerance of the stage.
@@ -279,6 +302,7 @@ def _solve_positions(c, t, g):
         if f.b.size == 0:
             return OK
         evaluate_rows(graph, system, f, f.rows, t)
+        add_rate_residuals(graph, f, l, x)
         worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE
@@ -338,7 +362,9 @@ def _solve_rates(c, t):
         # xd <- xd - Y0 N^-1 (H (rd, omega') + Phi_t),  z likewise
         _take_off(c, l.y)
         add_to(f.b, s.z)
-        if numbers.lag * _rate_size(c, s.r) <= LEFT:
+        # Rows on velocities turn with bodies, so their contraction is not that of positions: it is measured here
+        lag = numbers.lag if graph.rates.size == 0 else worst / before if sweep > 0 else 1.0
+        if lag * _rate_size(c, s.r) <= LEFT:
             turn_rates(graph, l, l.y, f.poses)
             return OK
         before = worst
@@ -354,6 +380,10 @@ def correct(context, g, k):
     # k += n, the normal part
     turn_accelerations(graph, l, f.poses, k, s.a)
     _correct_normal_part(c, g, k)
+    # Rows on velocities don't take off what it moves along them: its change counts
+    square = 0.0
+    if graph.rates.size > 0:
+        square = weighted_square(graph, l, s.r, w.q, c.linear.now[0], 0, numbers.rtol, numbers.atol)
     # [e, dlam] of the saddle-point matrix
     if not find_imbalance(c, REACTIONS_LEFT):
         return math.inf
@@ -368,7 +398,7 @@ def correct(context, g, k):
             put(s.r, o + 4, turned_back(l, b, s, at + 3))
             put(k, o + 4, add(four(k, o + 4), four(s.r, o + 4)))
     # Positions move by g^2 e, velocities change by g e
-    square = weighted_square(graph, l, s.r, w.q, c.linear.now[0], 0, numbers.rtol, numbers.atol)
+    square += weighted_square(graph, l, s.r, w.q, c.linear.now[0], 0, numbers.rtol, numbers.atol)
     return g * math.sqrt(square * g * g / (2 * n) + _rate_size(c, s.r) ** 2)
 
 
@@ -380,8 +410,10 @@ def _correct_normal_part(c, g, k):
     for i in range(k.size):
         k[i] += s.r[i]
     for e in range(f.b.size):
-        w.u[e] -= g * g * f.b[e]
         s.z[e] -= g * f.b[e]
+    clear_rates(c.graph, f.b)  # u takes off what rows on positions forbid
+    for e in range(f.b.size):
+        w.u[e] -= g * g * f.b[e]
 
 
 @callback(NORM, "d")
@@ -488,11 +520,19 @@ def solve_stages(context, h, tableau, memory):
         spread_normal(c, s.normal[i])
         for j in range(n):
             k[j] += s.r[j]
+        if c.graph.rates.size > 0:  # which don't take off what n_i moves along them: it counts
+            add_to(s.r, s.changes[i])
         for j in range(stages):  # what the normal parts of accelerations have moved is taken off again
-            a, square = h * tableau[p.a + stages * i + j], h * h * tableau[p.square + stages * i + j]
+            a = h * tableau[p.a + stages * i + j]
+            for e in range(m):
+                s.stages[i, m + e] -= a * s.normal[j, e]
+    # Of positions what rows on positions forbid
+    for j in range(stages):
+        clear_rates(c.graph, s.normal[j])
+        for i in range(stages):
+            square = h * h * tableau[p.square + stages * i + j]
             for e in range(m):
                 s.stages[i, e] -= square * s.normal[j, e]
-                s.stages[i, m + e] -= a * s.normal[j, e]
     return _size(c, h, tableau, p)
 
 

@@ -24,7 +24,7 @@ from ..maths.dense_linalg import (
 )
 from ..maths.tolerances import TINY
 from ..maths.vectors import matrix_a, matrix_g
-from ..model.equations import applied_forces, constraint_curvature, force_jacobian
+from ..model.equations import applied_forces, clear_rows, constraint_curvature, force_jacobian
 from ..workspaces import load
 from .null_space import find_accelerations
 from .null_space_chart import NOT_FINITE, OK, SINGULAR
@@ -194,6 +194,8 @@ def linearise(context, t, vdd):
     # Phi_q^T lam = r;    Y = U B G1,    Z = U B G2
     multiply(w.U, w.B, linear.UB)
     transposed_times(linear.UB, linear.r, linear.lam)
+    clear_rows(system, linear.G1)
+    clear_rows(system, linear.G2)
     constraint_curvature(system, w.q, w.qd, w.qdd, t, linear.lam, linear.K, linear.G1, linear.G2)
     multiply(linear.UB, linear.G1, linear.Y)
     multiply(linear.UB, linear.G2, linear.Z)

@@ -152,8 +152,8 @@ def _joints(packed):
         if holds[type(constraint)] and not any(isinstance(value, Motion) for value in given):
             pair = tuple(bodies.get(id(body), nb) for body in (constraint.a, constraint.b))
             for body in set(pair):
-                found[body].append((i, pair, range(row, row + constraint.rows)))
-        row += constraint.rows
+                found[body].append((i, pair, range(row, row + constraint.all_rows)))
+        row += constraint.all_rows
     return found
 
 
@@ -169,9 +169,9 @@ def _redundant(packed, omitted, spare):
     gone, row, left, others = set(graph_of(packed).row[whole].tolist()), 0, [], []
     for i, constraint in enumerate(packed.constraints):
         if i not in omitted and not constraint.normalises:
-            for one in range(row, row + constraint.rows):
+            for one in range(row, row + constraint.all_rows):
                 (left if one in gone else others).append(one)
-        row += constraint.rows
+        row += constraint.all_rows
     wanted = len(gone) - spare - len(left)
     if wanted < 0 or (wanted > 0 and len(left) + len(others) > MOST_ROWS):
         return None
@@ -182,6 +182,6 @@ def _holds(kind):
     """Return True if a kind of constraint is on directions alone, and depends on time through a Motion only."""
     return (
         all(marker.code in (VECTOR, PARAMETERS) for marker in kind.markers)
-        and not (kind.normalises or kind.memory)
+        and not (kind.normalises or kind.memory or kind.rate_rows)
         and ("phi_t" not in kind.kernels or bool(kind.quantities()))
     )

@@ -12,8 +12,19 @@ from ..maths.dense_linalg import copy
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import set_time
 from ..workspaces import load
-from .null_space import check_validity, frictional_acceleration, project, reduced_mass, velocities, weighted_square
+from .null_space import (
+    check_validity,
+    complete,
+    frictional_acceleration,
+    project,
+    reduced_mass,
+    solve_friction,
+    velocities,
+    weighted_square,
+)
 from .null_space_chart import NOT_FINITE, OK, new_chart, tangent_map
+
+__all__ = ["accelerate", "check", "complete", "error_norm", "place", "solve_friction", "start_chart"]
 
 
 @callback(PLACE)
@@ -37,7 +48,7 @@ def accelerate(context, t, velocity, wd, xd):
     c = load(context)
     system, w = c.system, c.work
     velocities(system, w, t, vector(velocity, w.v.size))
-    status = frictional_acceleration(context, c, t, vector(wd, w.v.size))
+    status = frictional_acceleration(context, c, w, t, vector(wd, w.v.size))
     copy(w.qd, vector(xd, w.q.size))
     return status
 

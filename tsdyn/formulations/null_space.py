@@ -177,14 +177,11 @@ def _find_load(graph, system, w, f, friction, lam, out, by_row):  # eight: as `n
             normal_load(system, f, friction, w.q, DERIVE | HERE, reaction, out)
 
 
-@callback(SOLVE_FRICTION)
-def solve_friction(context, t, vdd):
+@kernel
+def add_friction(graph, system, w, f, t, vdd):
     """Add joint friction to vdd. Status."""
-    c = load(context)
-    system, w, f, graph = c.system, c.work, c.tangent, c.graph
-    r, n, m, frictions = f.friction, w.q.size, w.Phi.size, c.graph.frictions.shape[0]
+    r, n, m, frictions = f.friction, w.q.size, w.Phi.size, graph.frictions.shape[0]
     k = w.v.size
-    vdd = vector(vdd, k)
     # lam is linear in the loads: lam_0 + sum_j l_j F_n,j
     _find_bases(graph, system, w, f, t, vdd)
     lam_0, lam, by_row = r.numbers[:m], r.numbers[m : 2 * m], w.z
@@ -231,6 +228,13 @@ def solve_friction(context, t, vdd):
         for j in range(k):
             vdd[j] += r.basis[i, j] * N
     return OK if done else JAMMED
+
+
+@callback(SOLVE_FRICTION)
+def solve_friction(context, t, vdd):
+    """As `add_friction`."""
+    c = load(context)
+    return add_friction(c.graph, c.system, c.work, c.tangent, t, vector(vdd, c.work.v.size))
 
 
 # The null-space form of the tangent-space ODE, with U, V, B and D (Haug 2018, Eqs. 19-29).
@@ -298,7 +302,7 @@ def velocities(system, w, t, vd):
 
 
 @kernel
-def _refine_velocities(system, w):
+def refine_velocities(system, w):
     """qd -= U B (Phi_q qd + Phi_t)."""
     driven = is_rheonomic(system)
     # B of Eq. 28 is exact to its tolerance: one correction leaves rounding of Eq. 2
@@ -377,13 +381,13 @@ def reduced_acceleration(system, w, t, vdd):
 
 
 @kernel
-def frictional_acceleration(context, c, t, vdd):
+def frictional_acceleration(context, c, w, t, vdd):
     """`reduced_acceleration`, then what the frictions of joints change. Status."""
     system, graph = c.system, c.graph
     frictions = graph.frictions.shape[0] > 0
     if frictions:
         forget_loads(system)
-    status = reduced_acceleration(system, c.work, t, vdd)
+    status = reduced_acceleration(system, w, t, vdd)
     return call_friction(graph.friction_solver[0], context, t, vdd) if frictions and status == OK else status
 
 
@@ -410,8 +414,8 @@ def accelerate(context, t, vd, vdd, unused):
     c = load(context)
     system, w = c.system, c.work
     velocities(system, w, t, vector(vd, w.v.size))
-    _refine_velocities(system, w)
-    return frictional_acceleration(context, c, t, vector(vdd, w.v.size))
+    refine_velocities(system, w)
+    return frictional_acceleration(context, c, w, t, vector(vdd, w.v.size))
 
 
 @callback("pp")

@@ -287,9 +287,15 @@ def update_b(w):
 @kernel
 def new_chart(graph, system, w, f, l, t):
     """Make a chart at the present q: q0, U, V by SVD, B, L; u = 0, v = 0. Status."""
-    n, m, k = w.q.size, w.u.size, w.v.size
     regular = set_base_point(graph, system, w, f, l, t, largest(w.q))  # of p, too: Phi has the normalisations
     take_selection(graph, w, f)
+    return set_bases(graph, system, w, l, t, regular)
+
+
+@kernel
+def set_bases(graph, system, w, l, t, regular):
+    """The same at the base point, for the rows of w; regular: whether all rows are independent there. Status."""
+    n, m, k = w.q.size, w.u.size, w.v.size
     evaluate_dense_rows(system, w, t)
     kept, metres = 0, unit(w.control.size)
     # Columns Phi_q0^T, positions in the unit of the scene
@@ -362,22 +368,30 @@ def _normal_space(graph, w, l):
         if graph.row[e] < 0:
             continue
         # Other rows: (r, G^T pi' / 2) of Y0 = W0 H0^T, columns scaled to Phi_q0 U with a unit diagonal
-        j, scale = graph.row[e], 1.0 / diagonal[e]
-        for side in range(2):
-            body, y = graph.sides[e, side], 16 * e + 8 * side
-            if body == graph.bodies.shape[0]:
-                continue
-            i, o = graph.bodies[body, 0], 8 * body + 4
-            for c in range(3):
-                w.U[i + c, j] = scale * l.rows0.Y[y + c]
-            if graph.bodies[body, 1] == 7:
-                e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
-                f = 0.5 * scale
-                a0, a1, a2 = f * l.rows0.Y[y + 4], f * l.rows0.Y[y + 5], f * l.rows0.Y[y + 6]
-                w.U[i + 3, j] = -e1 * a0 - e2 * a1 - e3 * a2
-                w.U[i + 4, j] = e0 * a0 - e3 * a1 + e2 * a2
-                w.U[i + 5, j] = e3 * a0 + e0 * a1 - e1 * a2
-                w.U[i + 6, j] = -e2 * a0 + e1 * a1 + e0 * a2
+        _add_normal(graph, w, l, e, graph.row[e], 1.0 / diagonal[e])
+    for i in range(graph.tails.size):
+        head = graph.tails[i]
+        _add_normal(graph, w, l, graph.row.size + i, graph.row[head], 1.0 / diagonal[head])
+
+
+@kernel
+def _add_normal(graph, w, l, e, j, scale):
+    """Column j of U += scale (r, G^T pi' / 2) of a pair of sides."""
+    for side in range(2):
+        body, y = graph.sides[e, side], 16 * e + 8 * side
+        if body == graph.bodies.shape[0]:
+            continue
+        i, o = graph.bodies[body, 0], 8 * body + 4
+        for c in range(3):
+            w.U[i + c, j] += scale * l.rows0.Y[y + c]
+        if graph.bodies[body, 1] == 7:
+            e0, e1, e2, e3 = l.base[o], l.base[o + 1], l.base[o + 2], l.base[o + 3]
+            f = 0.5 * scale
+            a0, a1, a2 = f * l.rows0.Y[y + 4], f * l.rows0.Y[y + 5], f * l.rows0.Y[y + 6]
+            w.U[i + 3, j] += -e1 * a0 - e2 * a1 - e3 * a2
+            w.U[i + 4, j] += e0 * a0 - e3 * a1 + e2 * a2
+            w.U[i + 5, j] += e3 * a0 + e0 * a1 - e1 * a2
+            w.U[i + 6, j] += -e2 * a0 + e1 * a1 + e0 * a2
 
 
 @kernel
@@ -405,10 +419,16 @@ def _copy_matrix(A, out):
 @kernel
 def tangent_map(system, w, t):
     """Phi_q, N, B, T = B Phi_q V and D = V - U T at the present q, Eqs. 7, 9, 28. Status."""
-    m, k = w.u.size, w.v.size
     evaluate_dense_rows(system, w, t)
     form_normal_matrix(system, w)
-    # N = Phi_q U, B by Eq. 28 from the B of the configuration before
+    return map_tangent(system, w)
+
+
+@kernel
+def map_tangent(system, w):
+    """The same, N = Phi_q U being known. Status."""
+    m, k = w.u.size, w.v.size
+    # B by Eq. 28 from the B of the configuration before
     made = w.counters.factorizations
     status = update_b(w)
     if status != OK:

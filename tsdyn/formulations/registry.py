@@ -3,11 +3,14 @@
 from dataclasses import dataclass, replace
 from types import ModuleType
 
+import numpy as np
+
+from ..model.packed import of_rates
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED
 from ..rows.graph_builder import graph_of, redundant_rows
 from ..rows.interface import redundancy
 from ..validation import unknown_name
-from . import accelerations, implicit_tangent, linearisation, maggi_kane, null_space, tangent
+from . import accelerations, implicit_tangent, linearisation, maggi_kane, null_space, null_space_rates, tangent
 from .locked_orientations import moving_graph
 
 
@@ -20,9 +23,29 @@ class Formulation:
     first_order: bool = False
     basis_free: bool = False
 
-    def serving(self, method):
-        """The form that a method runs a scene in."""
-        return replace(self, kernels=implicit_tangent) if self.basis_free and method.implicit else self
+    def serving(self, method, rates=False):
+        """The form that a method runs a scene in; rates: whether the scene has rows on velocities."""
+        if self.basis_free and method.implicit:
+            return replace(self, kernels=implicit_tangent)
+        return replace(self, kernels=null_space_rates, first_order=True) if self.is_mixed(rates) else self
+
+    def is_mixed(self, rates):
+        """Whether velocities have fewer coordinates than positions, in a scene with rows on velocities."""
+        return rates and not (self.basis_free or self.first_order)
+
+    @property
+    def mixed(self):
+        """Whether the form has a `MixedContext`."""
+        return self.kernels is null_space_rates
+
+    def context(self, packed, context, redundant):
+        """What the kernels get, made of a `Context`; redundant: how many rows are."""
+        return null_space_rates.mixed_context(context, of_rates(packed), redundant) if self.mixed else context
+
+    @property
+    def friction_solver(self):
+        """What solves for friction that depends on reactions."""
+        return (accelerations if self.basis_free else self.kernels).solve_friction
 
     @property
     def keeps_still(self):
@@ -35,16 +58,25 @@ class Formulation:
             graph = (moving_graph if self.keeps_still else graph_of)(packed, *self.kernels.COLUMNS)
         else:  # redundant rows are judged by sparse rows at every level
             graph = graph_of(packed, REDUCED, *((BIAS, DRIFT) if len(redundant_rows(packed)) else ()))
-        if graph.frictions.size and graph.friction_solver[0] == 0:
-            graph.friction_solver[0] = (accelerations if self.basis_free else null_space).solve_friction.address
+        if graph.frictions.size:  # another one than that of a form which shares the graph
+            graph = graph._replace(friction_solver=np.array([self.friction_solver.address]))
         return graph
 
-    def sizes(self, n, m, graph):
-        """Lengths of x and y of a graph, with n coordinates and m constraint rows."""
+    def sizes(self, packed, graph):
+        """Lengths of x and y of a scene and its graph."""
         if self.basis_free:
             return 8 * len(graph.bodies), 8 * len(graph.bodies)
+        n, m = int(packed.system.bodies[:, 1].sum()), len(packed.system.segments)
         k = n - m + redundancy(graph)
-        return n if self.first_order else k, k
+        return (n - m + self.redundancy(packed, graph) if self.mixed else n if self.first_order else k), k
+
+    def redundancy(self, packed, graph):
+        """Rows that positions don't obey: redundant ones and, in a mixed form, those on velocities."""
+        if not self.mixed:
+            return redundancy(graph)
+        unheld = of_rates(packed)
+        unheld[redundant_rows(packed)] = True
+        return int(unheld.sum())
 
     @property
     def frees_stages(self):
@@ -59,8 +91,7 @@ class Formulation:
     def addresses(self):
         """Addresses of the kernels that a driver calls, by their names in `RunKernels`; loads or compiles them."""
         k = self.kernels
-        complete = (k if self.basis_free else null_space).complete  # qdd = D vdd - U B gamma in the others
-        kernels = {"place": k.place, "accelerate": k.accelerate, "complete": complete}
+        kernels = {"place": k.place, "accelerate": k.accelerate, "complete": k.complete}
         kernels |= {"check": k.check, "start_chart": k.start_chart}
         return {name: kernel.address for name, kernel in kernels.items()}
 

@@ -13,6 +13,7 @@ from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
 from ..rows.interface import (
     DYNAMICS,
     apply_multipliers,
+    clear_rates,
     evaluate_drift,
     evaluate_residuals,
     evaluate_rows,
@@ -20,7 +21,6 @@ from ..rows.interface import (
     is_axis,
     multiply_rates,
     multiply_rows,
-    project,
     redundant_rows_hold,
     refinements,
     solve_product,
@@ -30,6 +30,7 @@ from ..rows.interface import (
 from ..workspaces import load
 from .accelerations import call_friction, refine_accelerations, solve_accelerations
 from .chart_coordinates import (
+    add_rate_residuals,
     displace,
     factorise_normal,
     turn_rates,
@@ -43,13 +44,23 @@ from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, SLOW, SLOW_FACTOR
 
 
 @kernel
-def _tangent_part(graph, f, l, e):
-    """f.Z = P0 e."""
+def _tangent_part(graph, f, l, e, of_positions):
+    """f.Z = P0 e; of positions what their solve leaves of it."""
     copy(e, f.Z)
     for i in range(e.size, f.Z.size):
         f.Z[i] = 0.0
     if f.b.size > 0:
-        project(graph, l.rows0, f.Z, f.b)
+        _normal_part(graph, l, f.Z, f.b, of_positions)
+        apply_multipliers(graph, l.rows0, f.b, f.Z)
+
+
+@kernel
+def _normal_part(graph, l, x, u, of_positions):
+    """u = S0^-1 H0 x; of positions without the part of x that violates rows on velocities alone."""
+    multiply_rows(graph, l.rows0, x, u)
+    if of_positions:
+        clear_rates(graph, u)
+    solve_rows(graph, l.rows0, u)
 
 
 @kernel
@@ -92,9 +103,9 @@ def error_norm(context, ex, ey, old, rtol, atol):
     n, k = w.q.size, l.x.size - 8
     old = vector(old, 3 * n)
     # The normal component of the error is removed by the position solve
-    _tangent_part(graph, f, l, vector(ex, k))
+    _tangent_part(graph, f, l, vector(ex, k), True)
     total = weighted_square(graph, l, f.Z, w.q, old, 0, rtol, atol)
-    _tangent_part(graph, f, l, vector(ey, k))
+    _tangent_part(graph, f, l, vector(ey, k), False)
     total += weighted_square(graph, l, f.Z, w.qd, old, n, rtol, atol)
     return math.sqrt(total / (2 * n))
 
@@ -133,11 +144,10 @@ def place(context, t, x):
         # Start: x - Y0 u with u of the position before; if that fails, the step was long
         copy(x, l.x)
         if attempt == 1:  # a long step: from the tangent plane, P0 x
-            multiply_rows(graph, l.rows0, l.x, w.u)
-            solve_rows(graph, l.rows0, w.u)
+            _normal_part(graph, l, l.x, w.u, True)
         # x - Y0 u
         apply_multipliers(graph, l.rows0, w.u, l.x)
-        status = _solve_positions(graph, system, w, f, l, t, RENEWALS * attempt)
+        status = _solve_positions(graph, system, w, f, l, t, x, RENEWALS * attempt)
         if status == OK or f.b.size == 0:
             break
     if status != OK:
@@ -183,7 +193,7 @@ def _prepare_accelerations(graph, system, w, f):
 
 
 @kernel
-def _solve_positions(graph, system, w, f, l, t, renewals):
+def _solve_positions(graph, system, w, f, l, t, x, renewals):  # eight: as of `place`, its coordinates and a limit
     """Newton's method for u with N of the start, factorised again `renewals` times at most; poses and H there. Status.
 
     Stops when |Phi|, measured or extrapolated from the convergence rate, is below u_tol^(3/2) or rounding. H is
@@ -204,6 +214,7 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
             evaluate_rows(graph, system, f, f.rows, t)
         else:
             evaluate_residuals(graph, system, f, t)
+        add_rate_residuals(graph, f, l, x)
         worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE
@@ -211,7 +222,7 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
         # Solved, or as close as rounding allows
         if worst <= goal or (slow and worst <= ROUNDING_AT_MOST * floor):
             if not with_H:
-                _add_rows(graph, system, f, t)
+                _add_rows(graph, system, f, l, t, x)
             elif sweep == 0:
                 w.counters.at_rounding += 1
             else:
@@ -223,7 +234,7 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
             if renewals < 0:
                 return NEWTON_FAILED
             if not with_H:
-                _add_rows(graph, system, f, t)
+                _add_rows(graph, system, f, l, t, x)
             l.state.factored = 0
         elif before < math.inf:
             # The first sweep with new factors measures the curvature |Phi| / |Phi before|^2, later sweeps measure the
@@ -247,9 +258,10 @@ def _solve_positions(graph, system, w, f, l, t, renewals):
 
 
 @long_kernel
-def _add_rows(graph, system, f, t):
+def _add_rows(graph, system, f, l, t, x):
     """H where only Phi was evaluated: seldom needed, so not inlined."""
     evaluate_rows(graph, system, f, f.rows, t)
+    add_rate_residuals(graph, f, l, x)
 
 
 @kernel

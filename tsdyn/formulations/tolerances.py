@@ -53,6 +53,8 @@ FARTHEST_AHEAD = 2.0
 # shows in the error of chains of 64 links at 1e-8: fourteen times as large.
 # Where all stages are solved at once every one has two iterations, and 1e-5 hardly shows in errors; 1e-3 does.
 REACTION_SWEEPS, REACTIONS_LEFT, REACTIONS_LEFT_COUPLED = 8, 1e-7, 1e-5
+# Sweeps for the normal part of accelerations where there are rows on velocities: each gains a digit.
+NORMAL_SWEEPS = 4
 
 # 1 / m: residual after a Newton step over the square of the residual before, until it is measured. One over a metre:
 # links of usual size.

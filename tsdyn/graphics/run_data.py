@@ -13,17 +13,21 @@ from ..elements.bodies import rotation_matrix
 from ..errors import InvalidArgument, StepFailure
 from ..maths.tolerances import TINY
 from ..model.handles import handles_of
+from ..observables.contacts import touching
 from ..observables.diagnostics import constraint_rows
 from ..observables.tolerances import JUMP, OTHERWISE, SMALL_RANGE
 from ..shapes import Mesh
 from ..validation import floats, sequence, vector3
 from .symbols import (
+    SURFACES,
+    SYMBOL,
     UNIT,
     Attached,
     Connector,
     Part,
     attached,
     by_body,
+    contact_mark,
     derived,
     drawn_solid,
     given,
@@ -55,6 +59,7 @@ class AnimationFrames(NamedTuple):
     position: Floats  # (k, b, 3), m
     orientation: Floats  # (k, b, 4), Euler parameters; (1, 0, 0, 0) for a point mass
     run: Any
+    q: Floats  # coordinates (k, n)
 
     def interpolated(self, values: Floats) -> Floats:
         """Values (outputs of `run`, ...) at the times of the frames, linear between outputs."""
@@ -75,7 +80,7 @@ def resample(solution: Solution, count: int) -> AnimationFrames:
         raise InvalidArgument(
             "the outputs have numbers that aren't finite, which can't be drawn: view others, solution[a:b].view()."
         )
-    return AnimationFrames(times, position, orientation, run)
+    return AnimationFrames(times, position, orientation, run, q)
 
 
 def _poses(packed, q):
@@ -105,6 +110,15 @@ def _beside(solution, times):
         return solution[:: max(1, solution.t.size // OUTPUTS)]
     after = np.clip(np.searchsorted(solution.t, times, side="right"), 1, solution.t.size - 1)
     return solution._picked(np.union1d(after - 1, after) if solution.t.size > 1 else np.arange(1))
+
+
+# Contact points of rolling surfaces: to the page they are bodies without parts of their own, after the others.
+
+
+def _contact_points(packed, frames):
+    """Constraint -> contact points (k, 3), of those that have one."""
+    found = {member.constraint: touching(packed, member, frames.q) for member in packed.members}
+    return {item: contact[0] for item, contact in found.items() if contact is not None}
 
 
 # States of contacts: whether a plane pushes on its point, or holds it back, where a one-sided contact would open.
@@ -143,16 +157,20 @@ class Arrows(NamedTuple):
     unique: bool  # False where redundant constraints may share the load in many ways
 
 
-def arrows(frames: AnimationFrames, constraints: list[Attached], forces: list[Attached], length: float) -> list[Arrows]:
+def arrows(
+    frames: AnimationFrames, constraints: list[Attached], forces: list[Attached], length: float, points: dict[int, int]
+) -> list[Arrows]:
     """All loads that are not zero throughout, at the times of the frames; NaN, of singular configurations, is zero.
 
-    length: of a usual body, m.
+    length: of a usual body, m; points: the index of a contact point by the id of its constraint.
     """
     found, redundant = [], bool(np.isnan(frames.run.multipliers).any())
     for layer, items in (("reactions", constraints), ("forces", forces)):
         for each in items:
             on_a = each.item.on is each.item.a
             index, point = (each.a, each.point("a")) if on_a else (each.b, each.point("b"))
+            if id(each.item) in points:
+                index, point = points[id(each.item)], np.zeros(3)
             unique = not redundant or bool(frames.run.reaction_unique(each.item).all())
             for unit, values in zip(UNITS, frames.run.reaction(each.item), strict=True):
                 values = np.nan_to_num(frames.interpolated(values))
@@ -192,7 +210,8 @@ def run_data(solution: Any, **choices: Any) -> dict[str, Any]:
     data["note"] = _note(frames, solution)
     data["contacts"] = [encoded(states, "<u1") for states in contact_states(frames, constraints)]  # of parts in turn
     if not getattr(solution, "_lacks", ""):
-        data |= _loads(arrows(frames, constraints, forces, float(np.median(data["reach"]))))
+        points = {id(item): len(packed.bodies) + i for i, item in enumerate(_contact_points(packed, frames))}
+        data |= _loads(arrows(frames, constraints, forces, float(np.median(data["reach"])), points))
     return data
 
 
@@ -202,7 +221,7 @@ def scene_data(scene: Scene, t: float, notes: Sequence[str] = (), **choices: Any
     violated: dict[Any, list[str]] = {}
     for constraint, said in _violated(packed, t, q, qd):
         violated.setdefault(constraint, []).append(said)
-    frames = AnimationFrames(np.array([t]), *_poses(packed, q[None]), None)
+    frames = AnimationFrames(np.array([t]), *_poses(packed, q[None]), None, q[None])
     data = _contents(scene, packed, attached(packed), frames, violated, trails=(), **choices)
     count = sum(map(len, violated.values()))
     rows = f"{count} constraint row{'s are' if count > 1 else ' is'} violated"
@@ -233,8 +252,11 @@ def _contents(scene, packed, attachments, frames, violated, *, shapes=None, trai
     made: list[list[Part]] = [[] for _ in range(len(packed.bodies) + 1)]  # by body, that of the ground last
     for part in parts:
         made[part.body].append(part)
+    surfaces = {each.a for each in constraints if type(each.item).__name__ in SURFACES}  # which its symbol draws
     for i, body in enumerate(bodies):
-        if i not in own and i not in user:
+        if i not in own and i not in user and i in surfaces:
+            parts += rods(i, points[i], reach[i])
+        elif i not in own and i not in user:
             parts += derived(i, solids[i], points[i], reach[i])
         elif i not in user and not callable(body._shape) and i not in hidden:  # in files arms have shapes of their own
             parts += rods(i, [x for x in points[i] if not any(part.holds(x) for part in made[i])], reach[i])
@@ -252,6 +274,13 @@ def _contents(scene, packed, attachments, frames, violated, *, shapes=None, trai
             index = each.a if each.a >= 0 else each.b
             labels.append(_label(each.item.name, "joints", index, each.point(letter), wrong))
         parts += drawn
+    contacts, count = _contact_points(packed, frames), len(packed.bodies)
+    sizes = [SYMBOL * float(np.median(reach))] * len(contacts)
+    parts += [contact_mark(count + i, 0.5 * size) for i, size in enumerate(sizes)]
+    paths = [{"body": count + i, "point": [0.0, 0.0, 0.0]} for i in range(len(contacts))] if trails is None else []
+    poses = np.stack([*np.moveaxis(frames.position, 1, 0), *contacts.values()], axis=1)
+    turns = np.zeros((len(frames.times), count + len(contacts), 4))
+    turns[:, :, 0], turns[:, :count] = 1.0, frames.orientation
     links = [link for link in parts if isinstance(link, Connector)]
     origin = frames.position[0].mean(axis=0)
     follow = None if follow is None else handles.bodies.index(handles.body(follow))
@@ -264,14 +293,15 @@ def _contents(scene, packed, attachments, frames, violated, *, shapes=None, trai
         "bodies": [
             {"name": body.name, "rigid": body.dimension == 7, "hidden": i in hidden}
             for i, body in enumerate(packed.bodies)
-        ],
-        "reach": rounded(reach),
-        "bulk": rounded(bulk),
+        ]
+        + [{"name": f"contact of {item.name}", "rigid": False, "hidden": True} for item in contacts],
+        "reach": rounded([*reach, *sizes]),
+        "bulk": rounded([*bulk, *sizes]),
         "labels": labels,
-        "trails": _trails(trails, handles, hidden),
+        "trails": _trails(trails, handles, hidden) + paths,
         "origin": origin.tolist(),
-        "positions": encoded(frames.position - origin, "<f4"),
-        "rotations": encoded(np.rint(FULL * np.roll(frames.orientation, -1, axis=2)), "<i2"),
+        "positions": encoded(poses - origin, "<f4"),
+        "rotations": encoded(np.rint(FULL * np.roll(turns, -1, axis=2)), "<i2"),
         "parts": [part.data() for part in parts if isinstance(part, Part)],
         "links": [link.data() for link in links],
         "meshes": [{"vertices": encoded(m.vertices, "<f4"), "faces": encoded(m.faces, "<u4")} for m in meshes],

@@ -401,6 +401,62 @@ def _contact(each, r):
     return [plate, ball._replace(contact=True)]
 
 
+THIN, MARK = 0.03, 0.06  # of a disc's radius: thickness of a thin one, and what marks it
+
+
+def _surface(each, kind, rotation, size, marks):
+    """A rolling surface on a, with dark marks that show how it turns, over its plane on b; marks: (place, size)."""
+    colour, centre, parts = COLOURS[each.a % len(COLOURS)], each.point("a"), []
+    for shape, place, widths in [(kind, np.zeros(3), size), *marks]:
+        tone = DARK if parts else colour
+        parts.append(Part("bodies", shape, each.a, tone, centre + rotation @ place, rotation, np.array(widths)))
+    return parts
+
+
+def _ellipsoid(each, axes, size):
+    """With dots at the ends of its semi-axes."""
+    dot = 2.0 * MARK * min(size)
+    marks = [("sphere", sign * np.array(size) * one, (dot, dot, dot)) for one in np.eye(3) for sign in (-1.0, 1.0)]
+    return _surface(each, "sphere", axes, size, marks)
+
+
+def _floor(each, r):
+    """The plane of a body; that of the ground is left to the grid."""
+    return [] if each.b < 0 else _plane(each, r)[:1]
+
+
+def _rolling_disc(each, r):
+    """With a spoke from the centre to the rim, on both sides."""
+    tyre, whole = each.item.tyre_radius, each.item.radius + each.item.tyre_radius
+    thick = max(2.0 * tyre, THIN * whole)
+    spoke = ("box", np.array([0.5 * whole, 0, 0]), (whole, MARK * whole, 1.5 * thick))
+    return [
+        *_floor(each, r),
+        *_surface(each, "cylinder", along(each.places["axis_a"]), (whole, whole, thick), [spoke]),
+    ]
+
+
+def _rolling_ball(each, r):
+    return [*_floor(each, r), *_ellipsoid(each, np.eye(3), (each.item.radius,) * 3)]
+
+
+def _rolling_ellipsoid(each, r):
+    return [*_floor(each, r), *_ellipsoid(each, each.item.axes_a.T, each.item.semi_axes)]
+
+
+def _ball_on_cylinder(each, r):
+    """Over its cylinder; in a hollow one, over a line along its axis."""
+    radius = 0.2 * r if each.item.inside else each.item.cylinder_radius
+    length = 30.0 * r if each.item.inside else 8.0 * each.item.cylinder_radius
+    cylinder = _part(each, "b", "cylinder", each.places["axis_b"], (radius, radius, length), PLANE)
+    return [cylinder, *_ellipsoid(each, np.eye(3), (each.item.radius,) * 3)]
+
+
+def contact_mark(index, radius):
+    """A ball where surfaces touch; index of the point, that is listed after the bodies."""
+    return Part("joints", "sphere", index, VIOLATED, np.zeros(3), np.eye(3), np.full(3, radius))
+
+
 def _line(each, r):
     """A wire on b through a ball on a."""
     return [_part(each, "b", "cylinder", each.places["axis_b"], (0.3 * r, 0.3 * r, 30.0 * r)), _ball(each, r)]
@@ -424,7 +480,12 @@ DRAWN: dict[str, Any] = {
     "PlaneContact": _contact,
     "Planar": _plane,
     "PointOnLine": _line,
+    "RollingDisc": _rolling_disc,
+    "RollingBall": _rolling_ball,
+    "RollingEllipsoid": _rolling_ellipsoid,
+    "RollingBallOnCylinder": _ball_on_cylinder,
     "Spring": _spring,
     "Bushing": _fixed,
 }
+SURFACES = ("RollingDisc", "RollingBall", "RollingEllipsoid", "RollingBallOnCylinder")  # shapes of their own
 THROUGH = ("Spherical", "Revolute")  # larger than the bodies are thick

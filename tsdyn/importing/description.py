@@ -169,13 +169,17 @@ class SpringItem:
 
 @dataclass(eq=False)
 class Coupling:
-    """q_follower = ratio q_driver + offset."""
+    """q_follower = offset + the drivers' coordinates times their ratios, or + a polynomial of one driver's.
+
+    Coordinates are named by (joint, index), the index being that of a universal joint's axis.
+    """
 
     name: str
-    driver: str
-    follower: str
-    ratio: float
-    offset: float = 0.0  # rad
+    follower: tuple
+    drivers: tuple
+    ratios: tuple
+    offset: float = 0.0  # rad or m
+    polynomial: tuple = ()  # in place of a ratio and an offset
 
 
 @dataclass(eq=False)

@@ -206,7 +206,8 @@ def _leave_limits(model, j, joint, report):
 #
 # connect    x_1 + A_1 s_1 = x_2 + A_2 s_2
 # weld       x_1 + A_1 s_1 = x_2 + A_2 s_2,  A_1 R = A_2
-# joint      q_1 - q_1(0) = a1 (q_2 - q_2(0))
+# joint      q_1 - q_1(0) = a0 + a1 (q_2 - q_2(0)) + a2 (q_2 - q_2(0))^2 + ...
+# tendon     the same of the lengths of fixed tendons, sums of joint coordinates
 
 
 def add_loops(mujoco, model, data, found, names, report):
@@ -221,8 +222,10 @@ def add_loops(mujoco, model, data, found, names, report):
             _add_loop(mujoco, model, data, i, found, names, report)
         elif kind == int(mujoco.mjtEq.mjEQ_JOINT):
             _add_coupling(model, i, found, names, report)
+        elif kind == int(mujoco.mjtEq.mjEQ_TENDON):
+            _add_tendon_coupling(mujoco, model, i, found, names, report)
         else:
-            report.leave("equality of tendons or flexible bodies", name)
+            report.leave("equality of flexible bodies", name)
 
 
 def _add_loop(mujoco, model, data, i, found, names, report):
@@ -255,19 +258,63 @@ def _add_loop(mujoco, model, data, i, found, names, report):
 
 
 def _add_coupling(model, i, found, names, report):
-    """Proportional joints; one that is held becomes fixed."""
+    """A joint that follows a polynomial of another one; one that is held becomes fixed."""
     name, follower = names.of("equality", i), names.of("joint", int(model.eq_obj1id[i]))
-    a = np.array(model.eq_data[i, :5])
-    if int(model.eq_obj2id[i]) < 0 and not a[0]:
+    a = np.trim_zeros(np.array(model.eq_data[i, :5]), "b")
+    if int(model.eq_obj2id[i]) < 0 and not model.eq_data[i, 0]:
         for joint in found.joints:
             if joint.name == follower:
                 joint.kind = "fixed"
         report.note(f"{name}: the joint {follower} is held")
-    elif int(model.eq_obj2id[i]) < 0 or a[0] or a[2:].any():
-        report.leave("polynomial of joints", name, f"({follower})")
+    elif int(model.eq_obj2id[i]) < 0:
+        report.leave("joint that is held off its start", name, f"({follower}, {model.eq_data[i, 0]:g})")
     else:
-        driver = names.of("joint", int(model.eq_obj2id[i]))
-        found.couplings.append(Coupling(name, driver, follower, float(a[1])))
+        driver = names.of("joint", int(model.eq_obj2id[i])), 0
+        polynomial = tuple(a.tolist()) if len(a) > 2 else ()
+        offset, ratio = (*a.tolist(), 0.0, 0.0)[:2]
+        found.couplings.append(Coupling(name, (follower, 0), (driver,), (ratio,), offset, polynomial))
+        _note_offset(name, offset, report)
+
+
+def _note_offset(name, offset, report):
+    if offset:
+        report.note(f"{name}: it starts {offset:g} off; scene.assemble() takes it there")
+
+
+def _add_tendon_coupling(mujoco, model, i, found, names, report):
+    """Fixed tendons in proportion: their lengths are sums of joint coordinates with constant coefficients."""
+    name, a = names.of("equality", i), np.array(model.eq_data[i, :5])
+    one, other = (_coefficients(mujoco, model, int(t[i]), names) for t in (model.eq_obj1id, model.eq_obj2id))
+    if one is None or other is None or a[2:].any():
+        report.leave("equality of tendons", name, "(of sites, or by a polynomial)")
+        return
+    # sum c q = a0 + a1 sum d q, solved for the joint of the largest coefficient
+    terms = dict(one)
+    for joint, d in other.items():
+        terms[joint] = terms.get(joint, 0.0) - a[1] * d
+    follower = max(terms, key=lambda joint: abs(terms[joint]))
+    drivers = {joint: -c / terms[follower] for joint, c in terms.items() if joint != follower and c}
+    if not terms[follower] or not drivers:
+        report.leave("equality of tendons", name, "(of one joint alone)")
+        return
+    offset = float(a[0] / terms[follower])
+    drivers, ratios = tuple((joint, 0) for joint in drivers), tuple(float(c) for c in drivers.values())
+    found.couplings.append(Coupling(name, (follower, 0), drivers, ratios, offset))
+    _note_offset(name, offset, report)
+
+
+def _coefficients(mujoco, model, tendon, names):
+    """The coefficient of each joint of a fixed tendon, {} for none; None of one through sites."""
+    if tendon < 0:
+        return {}
+    first, count = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
+    found = {}
+    for w in range(first, first + count):
+        if int(model.wrap_type[w]) != int(mujoco.mjtWrap.mjWRAP_JOINT):
+            return None
+        joint = names.of("joint", int(model.wrap_objid[w]))
+        found[joint] = found.get(joint, 0.0) + float(model.wrap_prm[w])
+    return found
 
 
 # What a model of MuJoCo has and a scene lacks, listed.

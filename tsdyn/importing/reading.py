@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from ..configuration.motor_starts import are_aligned
 from ..configuration.tolerances import INITIAL_TOL
+from ..constraints.coupler import Coupler
 from ..constraints.cylindrical import Cylindrical
 from ..constraints.dot1 import Dot1
 from ..constraints.dot2 import Dot2
 from ..constraints.fixed import Fixed
-from ..constraints.gear import Gear
 from ..constraints.parallel import Parallel
 from ..constraints.planar import Planar
 from ..constraints.revolute import Revolute
@@ -128,45 +128,43 @@ def _close(scene: Scene, report: ImportReport) -> float:
 
 # A scene of a description: bodies at their centroids in the axes of their links, joints, springs and couplings.
 
-# Joints that mimic others: gear pairs, where the wheels are hinged to a common carrier on parallel axes.
+# Joints whose coordinates depend on those of others.
 
 WHAT = "joint that mimics another one"
+COORDINATES = {"revolute": "angle", "prismatic": "displacement", "screw": "angle", "universal": "angle"}
 
 
-def couple(scene, description, bodies, report):
-    """Add what can be a gear pair; list the rest."""
-    joints = {joint.name: joint for joint in description.joints if not joint.loop}
+def couple(scene, description, made, report):
+    """Add the couplers; list those of joints without a coordinate. `made` has the constraint of each joint."""
     for coupling in description.couplings:
-        one, other = joints.get(coupling.driver), joints.get(coupling.follower)
-        reason = _reason(one, other, coupling)
+        names = [coupling.follower, *coupling.drivers]
+        reason = next(filter(None, (_reason(made.get(name)) for name, _ in names)), "")
         if not reason:
-            parallel = float(np.sign(one.axis @ other.axis))
+            joints = [(constraint, COORDINATES[kind], index) for (constraint, kind), index in _placed(made, names)]
+            given = {"polynomial": coupling.polynomial} if coupling.polynomial else {}
+            given = given or {"ratio": _plain(coupling.ratios), "offset": coupling.offset}
             try:
-                gear = Gear.at(
-                    bodies[one.b], bodies[other.b], point_a=one.point, point_b=other.point, axis_a=one.axis,
-                    ratio=coupling.ratio * parallel, name=coupling.name,
-                )  # fmt: skip
-                gear.offset += coupling.offset * parallel
-                scene.add(gear)
+                scene.add(Coupler(*joints, **given, name=unused(scene, coupling.name)))
             except InvalidConstraint as error:
                 reason = str(error)
         if reason:
-            report.leave(WHAT, coupling.name, f"(ratio {coupling.ratio:g}, offset {coupling.offset:g}: {reason})")
+            law = f"polynomial {coupling.polynomial}" if coupling.polynomial else f"ratio {_plain(coupling.ratios)}"
+            report.leave(WHAT, coupling.name, f"({law}, offset {coupling.offset:g}: {reason})")
 
 
-def _reason(one, other, coupling):
-    """Why two joints can't be a gear pair; empty if they can."""
-    if one is None or other is None:
-        return "one of them is held"
-    if one.kind != "revolute" or other.kind != "revolute":
-        return "a gear pair needs two hinges"
-    if one.a != other.a:
-        return "a gear pair needs hinges on one body"
-    if np.linalg.norm(np.cross(one.axis, other.axis)) > TYPED:
-        return "a gear pair needs parallel axes"
-    if not coupling.ratio:
-        return "a gear pair needs a ratio"
-    return ""
+def _placed(made, names):
+    return [(made[name], index) for name, index in names]
+
+
+def _plain(ratios):
+    return ratios[0] if len(ratios) == 1 else ratios
+
+
+def _reason(found):
+    """Why a joint can't be coupled; empty if it can."""
+    if found is None or found[1] == "fixed":
+        return "one of them is held" if found else "one of them isn't there, or is held"
+    return "" if found[1] in COORDINATES else f"a {found[1]} joint has no single coordinate"
 
 
 # Springs, dampers and constant loads of joints.
@@ -273,9 +271,13 @@ def build(description, make, report):
     bodies = {GROUND: scene.ground}
     for name, link in description.links.items():
         bodies[name] = _add_body(scene, link, report)
+    made = {}
     for joint in description.joints:
         if joint.kind != "free":
+            name = joint.name
             _add_joint(scene, joint, bodies)
+            if not (joint.loop and joint.frame_a is not None):
+                made[name] = scene._added[-1], joint.kind
         add_joint_forces(scene, joint, bodies, report)
     for spring in description.springs:
         scene.add(
@@ -285,7 +287,7 @@ def build(description, make, report):
                 name=unused(scene, spring.name),
             )
         )  # fmt: skip
-    couple(scene, description, bodies, report)
+    couple(scene, description, made, report)
     if any(joint.start for joint in description.joints):
         _start(description, bodies)
     for name, (owner, at) in description.frames.items():

@@ -284,7 +284,12 @@ def _least_moment(S):
 def gather(description, report):
     """Replace chains of prismatic joints."""
     joints = description.joints_by_link()
-    for first, link, second in _pairs(description, joints, _joins):
+    coupled = {name for each in description.couplings for name, _ in (each.follower, *each.drivers)}
+
+    def joins(first, second):
+        return _joins(first, second) and coupled.isdisjoint((first.name, second.name))
+
+    for first, link, second in _pairs(description, joints, joins):
         slides = [*_slides(first), *_slides(second)]
         second.kind, second.slides = "translations", slides
         second.servos = first.servos + second.servos  # without counterpart there, so listed

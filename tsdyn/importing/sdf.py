@@ -4,7 +4,18 @@ import numpy as np
 
 from ..maths.tolerances import TYPED
 from . import loops
-from .description import GROUND, HERE, Description, Frame, JointItem, Link, fresh, of_quaternion, roll_pitch_yaw
+from .description import (
+    GROUND,
+    HERE,
+    Coupling,
+    Description,
+    Frame,
+    JointItem,
+    Link,
+    fresh,
+    of_quaternion,
+    roll_pitch_yaw,
+)
 from .drawn_shapes import add_sdf_shapes
 
 # Frames of an SDF model: links, joints, frames and inner models, each given in another one.
@@ -107,6 +118,7 @@ KINDS = {
     "universal": "universal",
     "revolute2": "universal",
 }
+MIMIC = ("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0)
 UNLIMITED = 1e16  # of a limit, by the specification
 
 
@@ -160,6 +172,7 @@ def _add(found, node, joint, frames, report):
         return
     for tag in ("axis", "axis2"):
         _dynamics(node.one(tag), joint, tag, report)
+        _mimic(found, node.one(tag), joint, tag, report)
     if joint.kind == "screw":
         joint.lead = _lead(node)
     if joint.kind == "universal" and abs(joint.axis @ joint.axis_b) > TYPED:
@@ -220,6 +233,21 @@ def _dynamics(axis, joint, tag, report):
         if found:
             lower, upper = (given[what] if tag == "axis" else 0.0 for what in ("lower", "upper"))
             report.leave_limits(joint.name, lower, upper, f"[{', '.join(found)}]")
+
+
+def _mimic(found, axis, joint, tag, report):
+    """Couple a joint to the one that it mimics: q = multiplier (q' - reference) + offset, zero as posed."""
+    mimic = None if axis is None else axis.one("mimic")
+    if mimic is None:
+        return
+    leader, index = mimic.demand("joint"), int((mimic.get("axis") or "axis") == "axis2")
+    ratio, offset, reference = (mimic.scalar(what, value) for what, value in MIMIC)
+    prefix = joint.name[: joint.name.rfind("::") + 2] if "::" in joint.name else ""
+    name, offset = f"{joint.name} mimics {leader}", offset - ratio * reference
+    follower = (joint.name, int(tag == "axis2"))
+    found.couplings.append(Coupling(name, follower, ((prefix + leader, index),), (ratio,), offset))
+    if offset:
+        report.note(f"{name}: it starts {offset:g} off; scene.assemble() takes it there")
 
 
 def _lead(node):

@@ -211,7 +211,8 @@ def _couple(found, joints, report):
             continue
         if end := chains[joint.name]:
             joint.start = end[2]
-            found.couplings.append(Coupling(f"{joint.name} mimics {mimic[0]}", end[0], joint.name, *end[1:]))
+            name = f"{joint.name} mimics {mimic[0]}"
+            found.couplings.append(Coupling(name, (joint.name, 0), ((end[0], 0),), (end[1],), end[2]))
         else:
             reason = "it follows joints that mimic each other in a circle, or one that isn't there"
             reason = reason if mimic[0] in mimics else f"there is no other joint {mimic[0]!r}"

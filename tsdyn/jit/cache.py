@@ -150,8 +150,7 @@ def _prune_files():
 
 def name_of(function):
     """The name of a kernel's file: its own, and the hash of all code that it depends on."""
-    home = Path(function.__code__.co_filename).stem
-    label = f"{home}.{function.__qualname__}".translate({ord(c): "" for c in '<>:"/\\|?*'})
+    label = f"{function.__module__}.{function.__qualname__}".translate({ord(c): "" for c in '<>:"/\\|?*'})
     return f"{label[:100]}-{deep_hash(function)}"
 
 

@@ -16,6 +16,7 @@ from ..errors import InvalidArgument, Status, TsdynError
 from ..integrators import SDIRK54, Taylor
 from ..jit.cache import statistics
 from ..jit.kernels import DEBUG
+from ..model.packed import has_rates
 from ..observables.state import remembered
 from ..runs.arguments import interval, state_arrays
 from ..simulation import prepared_run
@@ -308,7 +309,7 @@ def _once(scene, method, options, state, start):
     if method.driver == "series":
         kept.series  # noqa: B018
     else:
-        form = options.form.serving(method)
+        form = options.form.serving(method, has_rates(kept.packed))
         form.graph(kept.packed)
         kept.system(method.implicit, form.basis_free)
     times.append(time.perf_counter())

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ..jit.kernels import Callback, callback, caller, kernel, vector
 from ..maths.dense_linalg import copy
-from ..workspaces import B_DATA, B_H, B_START, load_run
+from ..workspaces import B_DATA, B_H, B_START, MIXED, load_run
 from .explicit import combine, stage
 
 FILL, VALUE = "pp", "ddiiippp"
@@ -88,12 +88,19 @@ def hermite(s, h, n, nx, ny, data, x, y):
 
 @callback(FILL)
 def fill_hermite_first_order(context, run):
-    """q, qd, qdd at both ends, then y and y' at both."""
+    """x, x', x'' at both ends, then y and y' at both; x is q, or x'' is that of the cubic of x and x'."""
     r = load_run(run)
-    data, n, ny = r.block[B_DATA:], r.now.shape[1], r.y.size
-    for i in range(3):
-        copy(r.before[i], data[i * n :])
-        copy(r.now[i], data[(3 + i) * n :])
+    data, n, ny, h = r.block[B_DATA:], r.x.size, r.y.size, r.block[B_H]
+    if r.numbers.first_order == MIXED:
+        for i in range(n):
+            a, ad, b, bd = r.x_old[i], r.xd_old[i], r.x[i], r.xd[i]
+            slope = (b - a) / h
+            data[i], data[n + i], data[2 * n + i] = a, ad, (6.0 * slope - 4.0 * ad - 2.0 * bd) / h
+            data[3 * n + i], data[4 * n + i], data[5 * n + i] = b, bd, (2.0 * ad + 4.0 * bd - 6.0 * slope) / h
+    else:
+        for i in range(3):
+            copy(r.before[i], data[i * n :])
+            copy(r.now[i], data[(3 + i) * n :])
     data = data[6 * n :]
     copy(r.y_old, data)
     copy(r.yd_old, data[ny:])
@@ -104,10 +111,10 @@ def fill_hermite_first_order(context, run):
 
 @callback(VALUE)
 def hermite_first_order(s, h, n, nx, ny, data, x, y):
-    """Quintic for x = q, cubic for y, whose second derivative nothing gives."""
-    d = vector(data, 6 * n + 4 * ny)
-    quintic(s, h, n, d, vector(x, n), vector(y, 0))
-    _cubic(s, h, d[6 * n :], vector(y, ny))
+    """Quintic for x, cubic for y, whose second derivative nothing gives."""
+    d = vector(data, 6 * nx + 4 * ny)
+    quintic(s, h, nx, d, vector(x, nx), vector(y, 0))
+    _cubic(s, h, d[6 * nx :], vector(y, ny))
     return 0
 
 
@@ -134,7 +141,7 @@ def linear_second(s, h, n, nx, ny, data, x, y):
 
 
 HERMITE = Interpolant(fill_hermite, hermite, lambda n, nx, ny: 6 * nx)
-HERMITE_FIRST_ORDER = Interpolant(fill_hermite_first_order, hermite_first_order, lambda n, nx, ny: 6 * n + 4 * ny, 4)
+HERMITE_FIRST_ORDER = Interpolant(fill_hermite_first_order, hermite_first_order, lambda n, nx, ny: 6 * nx + 4 * ny, 4)
 
 POWER = 7  # rows of the polynomial of DOP853
 

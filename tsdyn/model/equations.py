@@ -15,13 +15,14 @@ from ..elements.loops.forces import JACOBIAN as FORCE_JACOBIAN_SIGNATURE
 from ..elements.loops.template import AT, DIMENSION
 from ..jit.code_hash import is_ours
 from ..jit.kernels import caller, entry, kernel
+from ..maths.dense_linalg import clear_matrix
 from ..motions.prescribed import Motion, call_motion
 from ..motions.program import HOLD, call_smooth
 from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
 from .handles import handles_of
 from .laws import demand_callable, interrupts_answered
-from .packed import no_system
+from .packed import checked_motions, instances_of_kinds, no_system
 
 call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
 call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
@@ -55,6 +56,13 @@ def set_time(s, t):
 
 
 @kernel
+def recall(s, memory):
+    """Let forces and constraints have the memory (slots,) of an output; none where it is shorter."""
+    for i in range(s.memory.size if memory.size >= s.memory.size else 0):
+        s.reals[s.memory[i]] = memory[i]
+
+
+@kernel
 def hold_pieces(s, t):
     """Let piecewise motions and signals stay with their pieces at t, whatever time is set from now on."""
     for i in range(s.motions.shape[0]):
@@ -73,8 +81,23 @@ def _run(s, kind, address, q, qd, t, out):
 
 
 @kernel
+def _clear_sums(s, out):
+    """out = 0 of rows that several instances add to."""
+    for i in range(s.sums.size):
+        out[s.sums[i]] = 0.0
+
+
+@kernel
+def clear_rows(s, Phi_q):
+    """Phi_q = 0, or its short rows, where several instances add to a row."""
+    if s.sums.size > 0:
+        clear_matrix(Phi_q)
+
+
+@kernel
 def constraints(s, q, t, Phi):
     """Phi (m,), Eq. 1; time has been set."""
+    _clear_sums(s, Phi)
     for i in range(s.kinds.shape[0]):
         _run(s, s.kinds[i], s.kinds[i].phi, q, q, t, Phi)
 
@@ -82,6 +105,7 @@ def constraints(s, q, t, Phi):
 @kernel
 def constraint_jacobian(s, q, t, Phi_q):
     """Phi_q (m, n); entries off the segments are left alone: zero them once."""
+    clear_rows(s, Phi_q)
     for i in range(s.kinds.shape[0]):
         _run(s, s.kinds[i], s.kinds[i].jacobian, q, q, t, Phi_q)
 
@@ -89,6 +113,7 @@ def constraint_jacobian(s, q, t, Phi_q):
 @kernel
 def time_derivative(s, q, t, Phi_t):
     """Phi_t (m,); rows that don't depend on time are left alone: zero them once."""
+    _clear_sums(s, Phi_t)
     for i in range(s.kinds.shape[0]):
         _run(s, s.kinds[i], s.kinds[i].phi_t, q, q, t, Phi_t)
 
@@ -96,6 +121,7 @@ def time_derivative(s, q, t, Phi_t):
 @kernel
 def acceleration_bias(s, q, qd, t, gamma):
     """gamma (m,), Eq. 3: Phi_q qdd + gamma = 0."""
+    _clear_sums(s, gamma)
     for i in range(s.kinds.shape[0]):
         _run(s, s.kinds[i], s.kinds[i].gamma, q, qd, t, gamma)
 
@@ -157,7 +183,8 @@ def evaluate_constraints(s, q, qd, t, Phi, Phi_q, Phi_t, gamma):
     acceleration_bias(s, q, qd, t, gamma)
 
 
-# Sparse Phi_q: 14 numbers a row, 7 for body a and 7 for body b; storage and products cost O(N).
+# Sparse Phi_q: 14 numbers a row, 7 for body a and 7 for body b; storage and products cost O(N). A row that is a sum has
+# 14 numbers for each of its terms: those of the first in its own place, those of the `tails` behind all rows.
 
 WIDTH = 14  # floats of a row; those of body b begin in the middle
 
@@ -167,34 +194,41 @@ def with_short_rows(packed):
     known = packed.derived
     if known.short_rows is None:
         system = packed.system
-        table = system.table.copy()
-        for kind in system.kinds:
+        table, m = system.table.copy(), len(system.segments)
+        segments = np.concatenate((system.segments, np.zeros((system.tails.size, 4), np.int64)))
+        tail = {id(part): m + i for i, part in enumerate(part for part in packed.constraints if not part.all_rows)}
+        for kind, members in zip(system.kinds, instances_of_kinds(packed), strict=True):
             first, count = kind.table, kind.count
             own = table[first : first + INTS * count].reshape(count, INTS)
-            own[:, BLOCK] = WIDTH * own[:, ROW]
-            own[:, BLOCK + 1] = WIDTH * own[:, ROW] + WIDTH // 2
+            line = own[:, ROW]
+            if members[0].summed:
+                line = np.array([tail.get(id(part), row) for part, row in zip(members, line, strict=True)])
+                segments[line] = own[:, [AT, DIMENSION, AT + 1, DIMENSION + 1]]
+            own[:, BLOCK] = WIDTH * line
+            own[:, BLOCK + 1] = WIDTH * line + WIDTH // 2
             own[:, STRIDE] = WIDTH
-        known.short_rows = system._replace(table=table)
+        known.short_rows = system._replace(table=table, segments=segments)
     return known.short_rows
 
 
 def places(packed):
-    """Where in q the two halves of each row belong, (m, 2), and their lengths, (m, 2)."""
-    segments = packed.system.segments
+    """Where in q the two halves of each short row belong, (lines, 2), and their lengths, (lines, 2)."""
+    segments = with_short_rows(packed).segments
     return segments[:, 0::2].copy(), segments[:, 1::2].copy()
 
 
 def as_csr(packed, rows):
-    """Phi_q (m, n) as a SciPy sparse array, of rows (m, 14)."""
+    """Phi_q (m, n) as a SciPy sparse array, of short rows (lines, 14)."""
     from scipy.sparse import csr_array
 
     at, length = places(packed)
     half = np.arange(WIDTH // 2)
     columns = (at[:, :, None] + half).reshape(len(at), WIDTH)
     used = (half < length[:, :, None]).reshape(len(at), WIDTH)
-    i = np.broadcast_to(np.arange(len(at))[:, None], used.shape)
-    n = int(packed.system.bodies[:, 1].sum())
-    return csr_array((rows[used], (i[used], columns[used])), shape=(len(at), n))
+    system, m = packed.system, len(packed.system.segments)
+    i = np.broadcast_to(np.concatenate((np.arange(m), system.tails))[:, None], used.shape)
+    n = int(system.bodies[:, 1].sum())
+    return csr_array((rows[used], (i[used], columns[used])), shape=(m, n))
 
 
 # Samples of forces that depend on time by a function or a law of the user's, at states that stay the same.
@@ -310,7 +344,7 @@ def demand_compilable(item):
     """
     if not isinstance(item, Force):
         for part in item.parts:
-            for value in checked_parameters(part, Motion, "Motions"):
+            for value in checked_motions(part):
                 if isinstance(value, Motion):
                     value.addresses  # noqa: B018  compiled when asked for
         return

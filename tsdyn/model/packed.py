@@ -16,6 +16,7 @@ from ..elements.markers import POINT
 from ..errors import InvalidConstraint, InvalidForce
 from ..jit.interrupts import CollectionsDeferred
 from ..jit.kernels import Record, records, row_of
+from ..motions.of_coordinates import PLACES, CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tracing import Untraceable
@@ -101,6 +102,7 @@ class Derived:
     holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
     loads: dict = None  # reactions.loads_of
     row_parts: list = field(default_factory=list)  # idle: observables.row_parts.taken
+    with_singular_places: list = None  # indices of primitives: contacts.singular_place
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts
     engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine
@@ -388,7 +390,9 @@ class System(NamedTuple):
     reals: np.ndarray  # float64: for each instance marker coordinates, then parameters
     motions: np.ndarray  # (motions,) of tables.MotionPlace
     rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
-    segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice
+    segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice; of a sum one span
+    sums: np.ndarray  # int64 (sums,): rows that several instances add to
+    tails: np.ndarray  # int64 (tails,): of every instance but the first of a sum, its row
     forces: np.ndarray  # (kinds,) of tables.ForceKind
     signals: np.ndarray  # (signals,) of tables.SignalPlace
     memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
@@ -409,6 +413,8 @@ def no_system():
         motions=records(MotionPlace),
         rheonomic=whole,
         segments=wholes,
+        sums=whole,
+        tails=whole,
         forces=records(ForceKind),
         signals=records(SignalPlace),
         memory=whole,
@@ -468,6 +474,8 @@ def _found_again(process, *parts):
     ]
     for row, motion in zip(system.motions, values, strict=True):
         row.value, row.rate, row.acceleration = motion.addresses
+    for function, begin, at in _functions(packed):
+        system.reals[at : at + PLACES] = function.addresses(begin, begin + int(system.reals[at + 1]))
     return packed._replace(loads=find_forces(system, packed.loads))
 
 
@@ -485,7 +493,7 @@ def pack(scene):
     primitives = scene.primitives
     parameters = {constraint: checked_motions(constraint) for constraint in primitives}
     table, reals = [], []
-    kinds, motions, kept = _pack_constraints(parameters, int(starts[-1]), where, table, reals)
+    kinds, motions, kept, functions = _pack_constraints(parameters, int(starts[-1]), where, table, reals)
     members, derived = tuple(_members(scene.constraints)), Derived()
     if any(isinstance(force, SceneLaw) for force in scene.forces):
         derived.handles = Handles(scene.bodies, list(where.values()), members, scene.forces)
@@ -493,6 +501,9 @@ def pack(scene):
             derived.handles.add_aliases((pairs or {}).items())
     forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals, derived.handles)
     _append_programs(motions, reals)
+    for function, begin, at in functions:
+        reals[at : at + PLACES] = function.addresses(begin, len(reals))
+        reals += function.numbers()
     inertias = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
@@ -505,6 +516,8 @@ def pack(scene):
         motions=records(MotionPlace, [row for row, _ in motions]),
         rheonomic=np.array([any(constraint.rheonomic for constraint in primitives)], np.int64),
         segments=np.array(_segments(primitives, where), np.int64).reshape(-1, 4),
+        sums=np.array([row for part, row in first_rows(primitives) if part.summed and part.all_rows], np.int64),
+        tails=np.array([row for part, row in first_rows(primitives) if not part.all_rows], np.int64),
         forces=forces,
         signals=signals,
         memory=np.array([*memory, *kept.values()], np.int64),
@@ -519,33 +532,54 @@ def pack(scene):
 
 
 def _segments(primitives, where):
-    """The two spans of columns of each row of Phi_q that are not zero."""
+    """The two spans of columns of each row of Phi_q that are not zero; of a sum, one that covers all its bodies."""
     found = []
     for constraint in primitives:
         spans = [where.get(id(body), (0, 0)) for body in (constraint.a, constraint.b)]
-        found += [[*spans[0], *spans[1]]] * constraint.rows
+        if constraint.summed:
+            begin, length = found.pop()[:2] if not constraint.all_rows else (0, 0)
+            used = [span for span in (*spans, (begin, length)) if span[1]]
+            begin, end = min(at for at, _ in used), max(at + size for at, size in used)
+            spans = (begin, end - begin), (0, 0)
+        found += [[*spans[0], *spans[1]]] * (1 if constraint.summed else constraint.all_rows)
     return found
+
+
+def instances_of_kinds(packed):
+    """The primitives of each row of System.kinds, in its order."""
+    groups = {kind: [] for kind in classes(packed)}
+    for primitive in packed.constraints:
+        groups[type(primitive)].append(primitive)
+    return list(groups.values())
+
+
+def first_rows(primitives):
+    """Yield each primitive and the first of its rows; the terms of a sum have the same."""
+    row = 0
+    for primitive in primitives:
+        yield primitive, row if primitive.all_rows else row - 1
+        row += primitive.all_rows
 
 
 def _pack_constraints(parameters, n, where, table, reals):
     """Append the instances, kind by kind, to `table` and `reals`.
 
-    Returns rows of System.kinds, of System.motions each with its Motion, and {constraint: place of what it remembers}.
+    Returns rows of System.kinds, of System.motions each with its Motion, {constraint: place of what it remembers}, and
+    of each CoordinateFunction where its parameters begin and where it is.
     """
-    groups, row = {}, 0
-    for constraint in parameters:
+    groups = {}
+    for constraint, row in first_rows(parameters):
         groups.setdefault(type(constraint), []).append((constraint, row))
-        row += constraint.rows
-    kinds, motions, kept = [], [], {}
+    kinds, motions, kept, functions = [], [], {}, []
     for kind, members in groups.items():
         first = len(table), len(reals)
         for constraint, at_row in members:
             begin = len(reals)
             table += _places(constraint, at_row, n, where)
-            _append_reals(constraint, parameters[constraint], reals, motions)
+            _append_reals(constraint, parameters[constraint], reals, motions, functions)
             if kind.memory:
                 kept[constraint] = len(reals)
-                reals.append(0.0)
+                reals.append(constraint.first_memory)
             if begin == first[1]:
                 stride = len(reals) - begin
             if len(reals) - begin != stride:
@@ -564,18 +598,34 @@ def _pack_constraints(parameters, n, where, table, reals):
                 reals=first[1],
             )
         )
-    return kinds, motions, kept
+    return kinds, motions, kept, functions
 
 
-def _append_reals(constraint, parameters, reals, motions):
+def _append_reals(constraint, parameters, reals, motions, functions):
     """Append where the markers are, then the parameters; three places for a Motion, whose row joins `motions`."""
     reals += np.concatenate(constraint.coordinates).tolist()
+    begin = len(reals)
     for value in parameters:
+        if isinstance(value, CoordinateFunction):
+            functions.append((value, begin, len(reals)))
+            value = 0.0  # its places are written when its program has one
         if isinstance(value, Motion):
             motions.append(([*value.addresses, len(reals), 0], value))
             reals += value.value(value.origin)
         else:
             reals.append(float(value))
+
+
+def _functions(packed):
+    """Yield each `CoordinateFunction`, where in System.reals the parameters of its term begin, and where it is."""
+    given = {id(part): values for part, values in zip(packed.constraints, packed.parameters, strict=True)}
+    for kind, members in zip(packed.system.kinds, instances_of_kinds(packed), strict=True):
+        for i, part in enumerate(members):
+            begin = at = int(kind.reals + i * kind.stride) + 3 * len(part.markers)
+            for value in given[id(part)]:
+                if isinstance(value, CoordinateFunction):
+                    yield value, begin, at
+                at += 3 if isinstance(value, Motion) else 1
 
 
 def _append_programs(motions, reals):
@@ -592,7 +642,7 @@ def _append_programs(motions, reals):
 def _members(constraints):
     part = row = 0
     for constraint in constraints:
-        parts, rows = slice(part, part + len(constraint.parts)), slice(row, row + constraint.rows)
+        parts, rows = slice(part, part + len(constraint.parts)), slice(row, row + constraint.all_rows)
         yield Member(constraint, constraint.coordinates, parts, rows)
         part, row = parts.stop, rows.stop
 
@@ -609,12 +659,23 @@ def member_of(packed, constraint):
     """The `Member` that a constraint, or a joint's part, is; None where it is not of that scene."""
     known = packed.derived
     if known.members is None:
-        found, row = {}, 0
-        for i, part in enumerate(packed.constraints):
-            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), slice(row, row + part.rows))
-            row += part.rows
+        found = {}
+        for i, (part, row) in enumerate(first_rows(packed.constraints)):
+            rows = slice(row, row + max(part.all_rows, 1))
+            found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), rows)
         known.members = found | {id(member.constraint): member for member in packed.members}
     return known.members.get(id(constraint))
+
+
+def has_rates(scene):
+    """Whether any constraint of a scene, or of a `Packed`, has rows on velocities."""
+    return any(constraint.rate_rows for constraint in scene.constraints)
+
+
+def of_rates(packed):
+    """Which rows of Phi are rows on velocities, bool (m,)."""
+    counts = [count for constraint in packed.constraints for count in (constraint.rows, constraint.rate_rows)]
+    return np.repeat(np.arange(len(counts)) % 2 == 1, counts)
 
 
 def classes(packed):
@@ -658,7 +719,7 @@ def with_curvatures(packed, basis_free=False):
 
 def checked_motions(constraint):
     """A primitive's parameters, checked: floats and Motions."""
-    given = checked_parameters(constraint, Motion, "Motions")
+    given = checked_parameters(constraint, (Motion, CoordinateFunction), "Motions")
     if "phi_t" not in constraint.kernels and any(isinstance(p, Motion) for p in given):
         raise InvalidConstraint(f"{constraint.name}: a Motion is among its parameters, so it needs a kernel phi_t.")
     return given

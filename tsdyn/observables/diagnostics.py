@@ -15,6 +15,8 @@ from ..elements.markers import PARAMETERS, POINT, TURN
 from ..jit.kernels import twin
 from ..maths.power_series import Jet
 from ..model.kinematics import angular_velocity
+from ..model.packed import first_rows
+from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from .generalised_forces import force_loads
@@ -43,12 +45,15 @@ def constraint_rows(packed, t, q, qd, qdd, time_rate=1.0, memory=None):
     levels = tuple(np.zeros((t.size, len(packed.system.segments))) for _ in range(3))
     for rows, part in _groups(packed, t, q, qd, qdd, time_rate, memory):
         for level, values in zip(levels, part, strict=True):
-            level[:, rows] = values
+            np.add.at(level, (slice(None), rows), values)  # a row may be a sum
     return levels
 
 
 def constraint_error(packed, t, q, qd, qdd, memory=None):
     """Maximum norms of `constraint_rows` over the rows."""
+    if packed.system.sums.size:
+        rows = constraint_rows(packed, t, q, qd, qdd, memory=memory)
+        return ConstraintError(*(np.abs(level).max(axis=1, initial=0.0) for level in rows))
     worst = np.zeros((3, t.size))
     for _, part in _groups(packed, t, q, qd, qdd, 1.0, memory):
         for level, values in zip(worst, part, strict=True):
@@ -58,9 +63,9 @@ def constraint_error(packed, t, q, qd, qdd, memory=None):
 
 def _groups(packed, t, q, qd, qdd, time_rate, memory):
     """Yield rows of Phi (r,) and their three levels, (k, r) each: for constraints of one form at a time."""
-    starts, groups, row = starts_of(packed), {}, 0
-    lists = packed.constraints, packed.parameters, packed.coordinates, packed.slots
-    for constraint, values, places, slot in zip(*lists, strict=True):
+    starts, groups = starts_of(packed), {}
+    lists = first_rows(packed.constraints), packed.parameters, packed.coordinates, packed.slots
+    for (constraint, row), values, places, slot in zip(*lists, strict=True):
         if slot >= 0:
             values = *values, np.zeros(t.size) if memory is None else memory[:, slot]
         bodies = tuple(constraint.body_of(marker) for marker in constraint.markers)
@@ -71,7 +76,6 @@ def _groups(packed, t, q, qd, qdd, time_rate, memory):
         )
         members = [starts.get(body, 0) for body in bodies], places, values, row
         groups.setdefault(form, (constraint, []))[1].append(members)
-        row += constraint.rows
     most = max(AT_ONCE // max(t.size, 1), 1)
     for constraint, members in groups.values():
         for first in range(0, len(members), most):
@@ -92,19 +96,35 @@ def _levels(constraint, members, t, q, qd, qdd, time_rate):
         at, s = starts[:, j], places[:, j].T
         x += _marker_jet(marker, constraint.body_of(marker).dimension, at, s, q, qd, qdd)
     par = [entry for given in zip(*values, strict=True) for entry in _parameter(given, t, time_rate)]
-    out = [None] * constraint.rows
-    twin(type(constraint).phi)(x, par, Jet(t[:, None], time_rate), out)
-    shape = t.size, len(members)
+    kind = type(constraint)
+    out, shape = [None] * kind.rows, (t.size, len(members))
+    if kind.rows:
+        twin(kind.phi)(x, par, Jet(t[:, None], time_rate), out)
     out = [Jet.of(row) for row in out]
+    if constraint.rate_rows:
+        out += _rates(kind, x, par, Jet(t[:, None], time_rate), time_rate)
     levels = [[np.broadcast_to(getattr(row, name), shape) for row in out] for name in ("x", "xd", "xdd")]
-    places = np.concatenate([np.array(rows) + i for i in range(constraint.rows)])
+    places = np.concatenate([np.array(rows) + i for i in range(len(out))])
     return places, [np.concatenate(level, axis=1) for level in levels]
+
+
+def _rates(kind, x, par, t, time_rate):
+    """The rows on velocities as derivatives of Jets that are zero: their rate, and its derivative."""
+    along, fixed = ([None] * kind.rate_rows for _ in range(2))
+    rate = twin(kind.rate)
+    rate(x, [Jet(each.xd, each.xdd) for each in x], par, t, along)
+    rate(x, [Jet(0.0) for _ in x], par, t, fixed)
+    # A xd, and b where the time goes on
+    both = [Jet.of(one) + (time_rate - 1.0) * Jet.of(b) for one, b in zip(along, fixed, strict=True)]
+    return [Jet(0.0, row.x, row.xd) for row in both]
 
 
 def _parameter(given, t, rate):
     """One parameter of some instances, (instances,) or one number for all, or Jets (k, instances) of Motions."""
     if isinstance(given[0], np.ndarray):  # memory of each
         return [np.transpose(given)]
+    if isinstance(given[0], CoordinateFunction) and len(set(given)) > 1:
+        raise TypeError("functions are evaluated one by one")
     if not isinstance(given[0], Motion):
         same = all(value == given[0] for value in given)
         return [given[0] if same else np.array(given)]

@@ -322,8 +322,9 @@ def equilibrated_solve(A, b):
 def constraint_arrays(system, q, qd, t, width=None):
     """Return Phi, Phi_q, Phi_t and gamma by the kernels; width: length of short rows."""
     system = system._replace(reals=system.reals.copy())  # kernels write motions there
-    m, n = system.segments.shape[0], width or q.size
-    Phi, Phi_q, Phi_t, gamma = np.zeros(m), np.zeros((m, n)), np.zeros(m), np.zeros(m)
+    lines, n = system.segments.shape[0], width or q.size
+    m = lines - (system.tails.size if width else 0)
+    Phi, Phi_q, Phi_t, gamma = np.zeros(m), np.zeros((lines, n)), np.zeros(m), np.zeros(m)
     evaluate_constraints(system, q, qd, float(t), Phi, Phi_q, Phi_t, gamma)
     return Phi, Phi_q, Phi_t, gamma
 

@@ -10,7 +10,7 @@ from ..elements.laws import SceneLaw
 from ..elements.loads import STATE, ByState
 from ..jit.kernels import entry
 from ..maths.vectors import to_ground
-from ..model.equations import applied_forces, set_time
+from ..model.equations import applied_forces, recall, set_time
 from ..model.handles import BodyMotion, angle, displacement, handles_of
 from ..model.laws import interrupts_answered
 from ..model.packed import no_system
@@ -25,8 +25,7 @@ def sum_forces(s, t, q, qd, memory, out):
     """out (k, n) += all forces but gravity; memory (k, ...): of forces at each output, then normal loads."""
     for row in range(t.size):
         set_time(s, t[row])
-        for i in range(s.memory.size):
-            s.reals[s.memory[i]] = memory[row, i]
+        recall(s, memory[row])
         for i in range(memory.shape[1] - s.memory.size):
             s.reals[s.normals[i]] = memory[row, s.memory.size + i]
         applied_forces(s, q[row], qd[row], t[row], out[row])

@@ -12,8 +12,9 @@ import numpy as np
 from ..calls import fitting_methods
 from ..elements.bodies import rotation_matrix, transform_g
 from ..elements.force import Force
+from ..elements.joint import SumRow
 from ..elements.loops.constraint_rows import place_bodies, take_loads
-from ..elements.loops.coordinate_rows import INTS
+from ..elements.loops.coordinate_rows import BLOCK, INTS
 from ..elements.loops.friction import HERE
 from ..elements.markers import POINT
 from ..errors import InvalidBody, InvalidConstraint, RedundantConstraints
@@ -21,7 +22,7 @@ from ..formulations.accelerations import find_reactions, normal_load
 from ..jit.kernels import entry, kernel, long_kernel, resident, stack
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import LAST_PLACE, RANK_TOL, TINY
-from ..model.equations import WIDTH, constraint_jacobian, set_time, with_short_rows
+from ..model.equations import WIDTH, constraint_jacobian, recall, set_time, with_short_rows
 from ..model.handles import handles_of
 from ..model.packed import classes, index_of, member_of, no_system
 from ..rows.constraint_graph import REDUCED
@@ -40,6 +41,7 @@ from ..rows.interface import (
     weigh_bodies,
 )
 from ..workspaces import arrays_of, load_parts, parts
+from .contacts import touching
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
 from .tolerances import KEPT_FLOATS
 
@@ -114,8 +116,8 @@ def factorise_at(graph, s, f, t, q):
 # Normal loads of joint friction, from positions, velocities and accelerations.
 
 
-@entry("pvmmmm")
-def _solve(context, t, q, qd, r, out):
+@entry("pvmmmmm")
+def _solve(context, t, q, qd, r, memory, out):
     """out (k, frictions): normal loads with Phi_q^T lam - sum_i g_i N_i = r (k, n); NaN if there are none.
 
     H W (H^T lam - sum_i g_i N_i(lam)) = H W r: the acceleration equation for the residual forces.
@@ -123,6 +125,7 @@ def _solve(context, t, q, qd, r, out):
     c = load_parts(context)
     graph, s, f = c.graph, c.system, c.tangent
     for k in range(t.size):
+        recall(s, memory[k])
         found = factorise_at(graph, s, f, t[k], q[k])
         take_loads(graph.bodies, q[k], r[k], f.Z)
         weigh_bodies(graph, f.Z)
@@ -147,21 +150,22 @@ def with_normal_loads(packed, t, q, qd, qdd, memory):
     own = system._replace(reals=system.reals.copy())
     context, *_keep = resident(parts(own, graph_of(packed, REDUCED), q.shape[1]))
     loads = np.zeros((t.size, system.normals.size))
-    _solve(context, t, q, qd, r, loads)
+    _solve(context, t, q, qd, r, memory, loads)
     return np.hstack((memory, loads))
 
 
-@entry("pvmmmm")
-def solve_multipliers(context, t, q, r, rows, out):
+@entry("pvmmmmm")
+def solve_multipliers(context, t, q, r, memory, rows, out):
     """out (k, m) with Phi_q^T lam = r, by least squares; r (k, n) is Q_A + Q_v - M qdd. NaN where Phi_q is singular.
 
     S lam = H W r on the graph with one step of refinement, r in terms of bodies, then the normalisations from the
-    remainder of r along p. The system is that with short rows, rows (m, 14) scratch, zero on entry.
+    remainder of r along p. The system is that with short rows, rows (lines, 14) scratch, zero on entry.
     """
     whole = load_parts(context)
     graph, s, f = whole.graph, whole.system, whole.tangent
     bodies = graph.bodies
     for k in range(t.size):
+        recall(s, memory[k])
         regular = factorise_at(graph, s, f, t[k], q[k])
         constraint_jacobian(s, q[k], t[k], rows)
         copy(r[k], f.Q)
@@ -173,11 +177,12 @@ def solve_multipliers(context, t, q, r, rows, out):
             for e in range(f.b.size):
                 if graph.row[e] >= 0:
                     out[k, graph.row[e]] += f.b[e]
-        for i in range(out.shape[1]):  # remainder of r
+        for i in range(rows.shape[0]):  # remainder of r; rows of later terms of sums are behind all others
+            row = i if i < out.shape[1] else s.tails[i - out.shape[1]]
             for half in range(2):
                 at = s.segments[i, 2 * half]
                 for c in range(s.segments[i, 2 * half + 1]):
-                    f.Q[at + c] -= rows[i, 7 * half + c] * out[k, i]
+                    f.Q[at + c] -= rows[i, 7 * half + c] * out[k, row]
         for b in range(bodies.shape[0]):
             i = graph.normals[b]
             if i >= 0:
@@ -198,11 +203,12 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
     """
     memory = with_normal_loads(packed, t, q, qd, qdd, memory)
     found = taken(packed, q.shape[1])
-    out = np.zeros((t.size, len(found.system.segments)))
+    out = np.zeros((t.size, len(packed.system.segments)))
     f = applied_loads(packed.system, t, q, qd, memory)
     f += velocity_forces(found.system, q, qd)
     f -= inertial_forces(found.system, q, qdd)
-    solve_multipliers(found.address, t, q, f, np.zeros((out.shape[1], WIDTH)), out)
+    memory = np.zeros((t.size, 0)) if memory is None else memory
+    solve_multipliers(found.address, t, q, f, memory, np.zeros((len(found.system.segments), WIDTH)), out)
     give(packed, found)
     return out
 
@@ -216,22 +222,33 @@ def particular(multipliers):
 
 
 def reaction(solution, member, body):
-    """Force and torque (k, 3) that a constraint exerts on a body, torque about its first point on it, ground frame.
+    """Force and torque (k, 3) that a constraint exerts on a body, ground frame.
 
-    -Phi_r^T lam at the centroid and the body torque -G Phi_p^T lam / 2, moved to the point. member is a system.Member.
+    -Phi_r^T lam at the centroid and the body torque -G Phi_p^T lam / 2, moved to the contact point, if there is one, or
+    to the first point on the body. member is a system.Member.
     """
     packed = solution.packed
     system = with_short_rows(packed)
-    system = system._replace(reals=system.reals.copy(), kinds=only(packed, member.parts))
+    kinds = only(packed, member.parts)
+    system = system._replace(reals=system.reals.copy(), kinds=kinds)
     load = np.zeros((solution.t.size, system.bodies[index_of(packed, body), 1]))
     rows = np.zeros((len(system.segments), WIDTH))
-    halves = []  # half of each row that belongs to the body
-    for part in packed.constraints[member.parts]:
-        halves += [0 if body is part.a else WIDTH // 2 if body is part.b else -1] * part.rows
-    lam = np.ascontiguousarray(particular(solution.multipliers)[:, member.rows])
-    first, halves = member.rows.start, np.array(halves, np.int64)
-    constraint_loads(system, solution.t, solution.q, lam, first, halves, rows, load)
-    return at_first_point(solution, body, load, member.constraint, member.coordinates)
+    lines = []  # short rows of the constraint: which, its row, and the half of it that belongs to the body
+    for part, first in zip(
+        packed.constraints[member.parts], system.table[kinds["table"] + BLOCK] // WIDTH, strict=True
+    ):
+        if body is part.a or body is part.b:
+            own = member_of(packed, part).rows
+            lines += [
+                (first + r, row, 0 if body is part.a else WIDTH // 2)
+                for r, row in enumerate(range(own.start, own.stop))
+            ]
+    lines, lam = np.array(lines, np.int64).reshape(-1, 3), particular(solution.multipliers)
+    memory = np.zeros((solution.t.size, 0)) if solution._memory is None else solution._memory
+    constraint_loads(system, solution.t, solution.q, memory, lam, *np.ascontiguousarray(lines.T), rows, load)
+    contact = touching(packed, member, solution.q)
+    place = None if contact is None else contact[0]
+    return at_first_point(solution, body, load, member.constraint, member.coordinates, place)
 
 
 def only(packed, parts):
@@ -266,8 +283,11 @@ def force_reaction(solution, load, body):
     return at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
 
 
-def at_first_point(solution, body, load, item, coordinates):
-    """Force and torque of generalised forces load (k, 7 or 3) on a body, about the first point of the item on it."""
+def at_first_point(solution, body, load, item, coordinates, place=None):
+    """Force and torque of generalised forces load (k, 7 or 3) on a body, about the first point of the item on it.
+
+    place (k, 3), m, is where the torque is taken about instead.
+    """
     at, length = solution.system.bodies[index_of(solution.packed, body)]
     force, torque = load[:, :3].copy(), np.zeros((load.shape[0], 3))
     if length == 7:
@@ -277,25 +297,26 @@ def at_first_point(solution, body, load, item, coordinates):
         letter = "a" if body is item.a else "b"
         pairs = zip(item.markers, coordinates, strict=True)
         points = [s for marker, s in pairs if marker.body == letter and marker.code == POINT]
-        if points:
+        if place is not None:
+            torque -= np.cross(place - solution.q[:, at : at + 3], force)
+        elif points:
             torque -= np.cross(A @ points[0], force)
     return force, torque
 
 
-@entry(no_system(), "vmmiwmm")
-def constraint_loads(s, t, q, lam, first, halves, rows, out):
-    """out (k, 7 or 3) = -Phi_q^T lam of one body; lam (k, rows of the constraint), which begin at first.
+@entry(no_system(), "vmmmwwwmm")
+def constraint_loads(s, t, q, memory, lam, lines, which, halves, rows, out):
+    """out (k, 7 or 3) = -Phi_q^T lam of one body, lam (k, m): over these lines of the short rows (lines, 14).
 
-    halves (rows,) is the first entry of the body in each row, negative if there is none.
+    which are their rows of Phi, halves where the entries of the body begin.
     """
     for k in range(t.size):
         set_time(s, t[k])
+        recall(s, memory[k])
         constraint_jacobian(s, q[k], t[k], rows)
-        for i in range(lam.shape[1]):
-            if halves[i] < 0:
-                continue
+        for i in range(lines.size):
             for c in range(out.shape[1]):
-                out[k, c] -= rows[first + i, halves[i] + c] * lam[k, i]
+                out[k, c] -= rows[lines[i], halves[i] + c] * lam[k, which[i]]
 
 
 # Uniqueness of reactions among redundant constraints: reactions to which no self-stress contributes.
@@ -314,7 +335,10 @@ def find_rows(graph, s, f, q, t, whole):
 
 @entry("pvmwwvv")
 def free_loads(context, t, q, rows, sides, whole, out):
-    """out (k,): the largest load on a body by these rows in a unit self-stress, relative to their size."""
+    """out (k,): the largest load on a body by these sides of H in a unit self-stress, relative to their size.
+
+    rows are those of the multipliers, sides where the eight numbers of each begin.
+    """
     c = load_parts(context)
     graph, s, f = c.graph, c.system, c.tangent
     for k in range(t.size):
@@ -324,7 +348,7 @@ def free_loads(context, t, q, rows, sides, whole, out):
             for c in range(8):
                 load = 0.0
                 for i in range(rows.size):
-                    h = whole[16 * rows[i] + 8 * sides[i] + c]
+                    h = whole[sides[i] + c]
                     size = max(size, abs(h))
                     load += f.b[rows[i]] * h
                 f.Z[c] = load
@@ -338,11 +362,13 @@ def unique(solution, rows, body):
     if not redundancy(graph):
         return np.ones(solution.t.size, bool)
     wanted = np.flatnonzero((graph.row >= rows.start) & (graph.row < rows.stop))
-    sides = np.where(graph.sides[wanted, 0] == index_of(solution.packed, body), 0, 1)
+    owner = np.concatenate((np.arange(len(graph.row)), graph.tails))
+    pairs, side = np.nonzero((graph.sides == index_of(solution.packed, body)) & np.isin(owner, wanted)[:, None])
+    wanted, sides = owner[pairs], 16 * pairs + 8 * side
     system = solution.system._replace(reals=solution.system.reals.copy())
     context, *_keep = resident(parts(system, graph, solution.q.shape[1]))
     out = np.zeros(solution.t.size)
-    free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(graph.row)), out)
+    free_loads(context, solution.t, solution.q, wanted, sides, np.zeros(16 * len(graph.sides)), out)
     return out < RANK_TOL
 
 
@@ -381,7 +407,7 @@ def demand_unique(packed, q, t):
     system = packed.system._replace(reals=packed.system.reals.copy())
     context, *_keep = resident(parts(system, graph, q.size))
     free = np.zeros(len(graph.frictions))
-    _free_loads(context, t, q, np.zeros(16 * len(graph.row)), free)
+    _free_loads(context, t, q, np.zeros(16 * len(graph.sides)), free)
     wrong = [load.force for load in packed.loads if load.normal >= 0 and free[load.normal] > RANK_TOL]
     if wrong:
         names = ", ".join(force.name for force in wrong)
@@ -410,7 +436,7 @@ def acted(packed, item, on):
         return item.on
     handles = handles_of(packed)
     on = handles.body(on) if isinstance(on, str) else handles.own(on)
-    if on is item.a or on is item.b or (isinstance(item, Force) and on in item.bodies):
+    if on is item.a or on is item.b or (isinstance(item, (Force, SumRow)) and on in item.bodies):
         if on.dimension:
             return on
         raise InvalidBody(f"{item.name}: the load on the ground is the opposite of the load on {item.on.name!r}.")
@@ -429,6 +455,34 @@ def exerted(motion, item, on):
     if load is not None:
         return force_reaction(motion, load, acted(motion.packed, item, on))
     return reaction(motion, member(motion.packed, item), acted(motion.packed, item, on))
+
+
+def contact_point(motion, item):
+    """Contact point (k, 3) of an item along a motion."""
+    return _contact(motion, handles_of(motion.packed).item(item))[0]
+
+
+def friction_demand(motion, item):
+    """Tangential over normal force (k,); infinite where the surfaces would have to pull."""
+    item = handles_of(motion.packed).item(item)
+    _, normal = _contact(motion, item)
+    force, _ = exerted(motion, item, item.on)
+    force = force if item.on is item.a else -force
+    push = np.einsum("ki,ki->k", normal, force)
+    tangential = np.linalg.norm(force - push[:, None] * normal, axis=1)
+    return np.divide(tangential, push, out=np.full(len(push), np.inf), where=push > 0.0)
+
+
+def _contact(motion, item):
+    """Contact point and normal of an item; refused where it has none."""
+    found = member_of(motion.packed, item)
+    contact = None if found is None else touching(motion.packed, found, motion.q)
+    if contact is None:
+        raise InvalidConstraint(
+            f"{item.name} has no contact point; RollingDisc, RollingBall, RollingEllipsoid and RollingBallOnCylinder "
+            "have one."
+        )
+    return contact
 
 
 @fitting_methods
@@ -455,9 +509,22 @@ class Exerting:
         As `Solution.reaction` has them: on a, or b if a is the ground; in the ground frame, the torque about the item's
         first point on that body. A state at k times gives (k, 3).
         """
+        force, torque = exerted(self._motion(), item, on)
+        return (force, torque) if np.ndim(self.t) else (force[0], torque[0])
+
+    def contact_point(self, constraint: ItemLike) -> Floats:
+        """Where a rolling or sliding surface touches, as `Solution.contact_point` has it: (3,), of k times (k, 3)."""
+        point = contact_point(self._motion(), constraint)
+        return point if np.ndim(self.t) else point[0]
+
+    def friction_demand(self, constraint: ItemLike) -> Floats:
+        """Tangential over normal force, as `Solution.friction_demand` has it: a number, of k times (k,)."""
+        demand = friction_demand(self._motion(), constraint)
+        return demand if np.ndim(self.t) else demand[0]
+
+    def _motion(self):
+        """The states as what `exerted` reads."""
         packed, levels = self.packed, (self.q, self.qd, self.qdd, self.multipliers)
         t, (q, qd, qdd, lam) = np.atleast_1d(self.t), map(np.atleast_2d, levels)
         memory = with_normal_loads(packed, t, q, qd, qdd, np.atleast_2d(self.memory))
-        motion = SimpleNamespace(packed=packed, system=packed.system, t=t, q=q, qd=qd, multipliers=lam, _memory=memory)
-        force, torque = exerted(motion, item, on)
-        return (force, torque) if np.ndim(self.t) else (force[0], torque[0])
+        return SimpleNamespace(packed=packed, system=packed.system, t=t, q=q, qd=qd, multipliers=lam, _memory=memory)

@@ -41,7 +41,7 @@ class Product(Record):
     columns: int
     target: int  # where the product goes in S
     stride: int  # length of a row there
-    same: int  # 1 for a constraint with itself
+    same: int  # 1 for a constraint with itself; 2 for a later term of a sum with itself
 
 
 class PartProduct(Record):
@@ -62,12 +62,18 @@ W_MASS, W_ROTATION, WEIGHTS = 0, 4, 16
 
 
 class ConstraintGraph(NamedTuple):
-    """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero where row is -1."""
+    """Rows are in order of elimination; sides are (row, a or b), each 8 floats of H, which are zero where row is -1.
+
+    A row that is a sum has a pair of sides for each of its terms: that of the first in its own place, those of the
+    others behind the pairs of all rows.
+    """
 
     bodies: np.ndarray  # int64 (nb, 2): where q_i begins, its length: 7, 3, or poses.STILL of what never turns
     kinds: np.ndarray  # RowKind (kinds,); more than one of a class where instances between them are left out
     table: np.ndarray  # int64: constraint_rows.INTS for each instance
-    sides: np.ndarray  # int64 (m, 2): the bodies of a row; nb is the ground
+    sides: np.ndarray  # int64 (m + tails, 2): the bodies of a row; nb is the ground
+    sums: np.ndarray  # int64 (sums,): rows that several instances add to
+    tails: np.ndarray  # int64 (tails,): the row of each pair of sides behind those of all rows
     row: np.ndarray  # int64 (m,): its place among the rows of Phi; -1 for a weld's or an axis's
     products: np.ndarray  # Product (products,): rows of sides that meet at a body, and where their product goes
     inverse: np.ndarray  # ((nb + 1) 16,): 1 / m and three zeros, columns of J'^-1; zero for the ground
@@ -75,6 +81,7 @@ class ConstraintGraph(NamedTuple):
     spins: np.ndarray  # int64 (nb,): whether omega' x J' omega' is ever other than zero
     pattern: Pattern  # of S
     turns: np.ndarray  # (m,): one for rows that are pure numbers, such as those of axes; of no size but in small scenes
+    rates: np.ndarray  # int64 (rows on velocities,): which rows of the graph they are, in order of elimination
     normals: np.ndarray  # int64 (nb,): the row of Phi that normalises a body's p, or -1
     parts: np.ndarray  # PartProduct (products,): the products at the parts of hubs, see graph_builder.py
     scales: np.ndarray  # (products,): what they are multiplied by
@@ -93,8 +100,8 @@ def no_graph():
     pairs = np.zeros((0, 2), np.int64)
     kinds, products, parts = records(RowKind), records(Product), records(PartProduct)
     return ConstraintGraph(
-        pairs, kinds, none, pairs, none, products, np.zeros(16), np.zeros(16), none, pattern, np.zeros(0), none, parts,
-        np.zeros(0), pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64),
+        pairs, kinds, none, pairs, none, none, none, products, np.zeros(16), np.zeros(16), none, pattern, np.zeros(0),
+        none, none, parts, np.zeros(0), pairs, none, none, records(FrictionPlace), pairs, np.zeros(1, np.int64),
         no_axes(),
     )  # fmt: skip
 

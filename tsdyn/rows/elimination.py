@@ -8,7 +8,7 @@ import numpy as np
 
 from ..jit.arrays import zeros
 from ..jit.kernels import DEBUG, callback, caller, kernel, loader, long_kernel, vector
-from .factorisation import factor_blocks, factor_lu_blocks, factor_lu_row, factor_row, solve_blocks
+from .factorisation import factor_blocks, factor_lu_blocks, factor_lu_row, factor_row, solve_blocks, solve_three
 from .symbolic import analyse
 
 FACTOR, FACTOR_LU, SOLVE = "ppd", "pppd", "pppp"
@@ -85,10 +85,12 @@ else:
     @kernel
     def solve_lu(pattern, lower, upper, b):
         """`factorisation.solve_lu`."""
-        if pattern.shape[0] > 1:
-            _call_solve(pattern.kernels[2], pattern, lower, upper, b)
-        elif pattern.shape[0] == 1:
+        if pattern.shape[0] == 1:
             b[0] *= lower[0]
+        elif pattern.shape[0] == 3 and pattern.heads.size == 1:
+            solve_three(lower, upper, b)
+        elif pattern.shape[0] > 1:
+            _call_solve(pattern.kernels[2], pattern, lower, upper, b)
 
     @kernel
     def solve(pattern, values, b):

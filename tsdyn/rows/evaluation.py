@@ -40,9 +40,17 @@ def clear_welds(graph, out):
 
 
 @kernel
+def clear_sums(graph, out):
+    """out = 0 of rows that several instances add to."""
+    for i in range(graph.sums.shape[0]):
+        out[graph.sums[i]] = 0.0
+
+
+@kernel
 def evaluate_without_redundant(graph, reals, f, rows, t):
     """As `evaluate_rows`, where no row is redundant; reals being System.reals."""
     # All kinds write their rows of Phi and H
+    clear_sums(graph, f.b)
     for i in range(graph.kinds.shape[0]):
         kind = graph.kinds[i]
         _run_loop(graph, reals, f, t, kind, kind.reduced, f.b, rows.H)
@@ -80,6 +88,7 @@ def evaluate_every_row(graph, system, f, rows, t):
 @kernel
 def evaluate_residuals(graph, system, f, t):
     """f.b = Phi, at the poses of f; zero at redundant rows."""
+    clear_sums(graph, f.b)
     for i in range(graph.kinds.shape[0]):
         kind = graph.kinds[i]
         _run_loop(graph, system.reals, f, t, kind, kind.values, f.b, f.rows.H)
@@ -90,6 +99,7 @@ def evaluate_residuals(graph, system, f, t):
 @kernel
 def evaluate_bias(graph, system, f, t):
     """f.gamma = gamma, with H (rdd, omega'd) + gamma = 0."""
+    clear_sums(graph, f.gamma)
     for i in range(graph.kinds.shape[0]):
         kind = graph.kinds[i]
         _run_loop(graph, system.reals, f, t, kind, kind.bias, f.gamma, f.rows.H)

@@ -268,6 +268,13 @@ def _forward(size, width, u, own):
 
 
 @kernel
+def solve_three(lower, upper, b):
+    """Solve a block of three rows that has no others."""
+    _forward(3, 3, lower, b)
+    _backward(3, 3, upper, b, 0.0, 0.0, 0.0)
+
+
+@kernel
 def _forward_rest(size, width, u, own, b, here, end, segments):
     """Take up to three unknowns from the rows after them."""
     # One unknown; segments are runs of consecutive rows in b

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.element import address
-from ..elements.loops.constraint_rows import BODY, INTS, MASK, ROW, STILL
+from ..elements.loops.constraint_rows import BODY, INTS, PAIR, ROW, STILL
 from ..errors import InvalidConstraint
 from ..jit.kernels import records, row_of
-from ..model.packed import frictions_of, has_lengths, is_small
+from ..model.packed import first_rows, frictions_of, has_lengths, is_small
 from .constraint_graph import (
     DRIFT,
     ROWS,
@@ -54,8 +54,8 @@ def cut(pairs, sizes, degrees):
 
     Parameters
     ----------
-    pairs : sequence of (int, int)
-        The bodies of each node (all rows between two bodies); one of them may be the ground, -1.
+    pairs : sequence of tuple of int
+        The bodies of each node (all rows between two bodies, or more); one of them may be the ground, -1.
     sizes : list of int
         Rows of each node; those of the welds, which are nodes too, are appended.
     degrees : sequence of int
@@ -127,7 +127,8 @@ def _tree(hub, nodes, sizes, degrees):
 # Builds the constraint graph of a packed scene, step by step.
 #
 # joints      constraints that are no normalisations, the two bodies and the first row of Phi of each
-# nodes       pairs of bodies that joints connect: the blocks of S; their rows are eliminated together
+# nodes       pairs of bodies that joints connect: the blocks of S; their rows are eliminated together. A row that is a
+#             sum connects more than two: its terms are joints of one row and one node
 # hubs        bodies with many nodes, cut into parts that welds hold together (`cut`)
 # products    where H_i W H_j^T of two joints at a body goes in S
 
@@ -188,24 +189,26 @@ class _GraphBuilder:
         self._place_rows()
 
     def _find_joints(self, omitted):
-        self.joints, row, self.normals = [], 0, np.full(self.nb, -1, np.int64)
-        for i, constraint in enumerate(self.packed.constraints):
+        self.joints, self.normals = [], np.full(self.nb, -1, np.int64)
+        for i, (constraint, row) in enumerate(first_rows(self.packed.constraints)):
             if constraint.normalises:
                 self.normals[self.bodies[id(constraint.a)]] = row
             elif i not in omitted:
                 pair = tuple(self.bodies.get(id(body), self.nb) for body in (constraint.a, constraint.b))
                 self.joints.append(_Joint(constraint, pair, row))
-            row += constraint.rows
 
     def _find_nodes(self):
         """The nodes, how many rows each has, and of every joint its node and its first row within."""
-        self.nodes, self.sizes, self.inside = {}, [], []
-        for constraint, pair, _ in self.joints:
-            node = self.nodes.setdefault(tuple(sorted(pair)), len(self.nodes))
+        self.nodes, self.sizes, self.inside, ends = {}, [], [], {}
+        for constraint, pair, row in self.joints:
+            if constraint.summed:
+                ends[row] = (*ends.get(row, ()), *pair)
+        for constraint, pair, row in self.joints:
+            node = self.nodes.setdefault(tuple(sorted(set(ends.get(row, pair)))), len(self.nodes))
             if node == len(self.sizes):
                 self.sizes.append(0)
-            self.inside.append((node, self.sizes[node]))
-            self.sizes[node] += constraint.rows
+            self.inside.append((node, self.sizes[node] - (not constraint.all_rows)))
+            self.sizes[node] += constraint.all_rows
 
     def _cut_hubs(self):
         """Parts of hubs, and the cliques: nodes that meet at a body or a part. Frictions couple a hub's rows whole."""
@@ -236,37 +239,46 @@ class _GraphBuilder:
         """Of every row, in order of elimination, its two bodies and its place in Phi; and the joints at each body."""
         m = sum(self.sizes)
         self.firsts = [int(self.starts[node]) + offset for node, offset in self.inside]
-        self.sides, self.places = np.full((m, 2), self.nb, np.int64), np.full(m, -1, np.int64)
+        self.tails = [first for (part, *_), first in zip(self.joints, self.firsts, strict=True) if not part.all_rows]
+        # Pairs of sides: those of later terms of sums follow those of the rows
+        later = iter(range(m, m + len(self.tails)))
+        self.pairs = [
+            first if part.all_rows else next(later) for (part, *_), first in zip(self.joints, self.firsts, strict=True)
+        ]
+        self.counts = [part.all_rows or 1 for part, *_ in self.joints]
+        self.sides, self.places = np.full((m + len(self.tails), 2), self.nb, np.int64), np.full(m, -1, np.int64)
         self.at_body, self.at_node = [[] for _ in range(self.nb)], [[] for _ in self.nodes]
         for i, (constraint, pair, row) in enumerate(self.joints):
-            e = np.arange(self.firsts[i], self.firsts[i] + constraint.rows)
-            self.sides[e], self.places[e] = pair, np.arange(row, row + constraint.rows)
+            e = np.arange(self.pairs[i], self.pairs[i] + self.counts[i])
+            self.sides[e] = pair
+            if constraint.all_rows:
+                self.places[e] = np.arange(row, row + constraint.all_rows)
             self.at_node[self.inside[i][0]].append(i)
             for side, body in enumerate(pair):
                 if body < self.nb and body not in self.hubs:
                     self.at_body[body].append((i, side))
 
     def _at_part(self, body, nodes):
-        """The joints of these nodes and their sides at a body."""
-        return [(i, self.joints[i].pair.index(body)) for node in nodes for i in self.at_node[node]]
+        """The joints of these nodes that are at a body, and their sides there."""
+        found = (i for node in nodes for i in self.at_node[node] if body in self.joints[i].pair)
+        return [(i, self.joints[i].pair.index(body)) for i in found]
 
     def _product(self, i, side, j, other):
         """Columns of ConstraintGraph.products, as far as the two joints say them."""
         (node, r), (other_node, c) = self.inside[i], self.inside[j]
         target, stride, _ = self.where(node, other_node)
-        left, right = 16 * self.firsts[i] + 8 * side, 16 * self.firsts[j] + 8 * other
-        return (
-            left, self.joints[i].constraint.rows, right, self.joints[j].constraint.rows,
-            target + r * stride + c, stride,
-        )  # fmt: skip
+        left, right = 16 * self.pairs[i] + 8 * side, 16 * self.pairs[j] + 8 * other
+        return left, self.counts[i], right, self.counts[j], target + r * stride + c, stride
 
     def _products(self):
-        products = [(*self._product(i, 0, i, 0), 1) for i in range(len(self.joints))]
+        heads = [i for i, joint in enumerate(self.joints) if joint.constraint.all_rows]
+        products = [(*self._product(i, 0, i, 0), 1) for i in heads]
+        products += [(*self._product(i, 0, i, 0), 2) for i in range(len(self.joints)) if i not in heads]
         for found in self.at_body:
-            # Pairs of joints at one body, above the diagonal only
+            # Pairs of joints at one body, above the diagonal only; two terms of one sum both ways
             for i, side in found:
                 for j, other in found:
-                    if self.firsts[i] < self.firsts[j]:
+                    if self.firsts[i] < self.firsts[j] or (self.firsts[i] == self.firsts[j] and i != j):
                         products.append((*self._product(i, side, j, other), 0))
         return records(Product, products)
 
@@ -288,8 +300,8 @@ class _GraphBuilder:
                     node, r = self.inside[i]
                     target, stride, after = self.where(node, weld)
                     to, kind = (target + r, WELD_ROWS) if after else (target + r * stride, ROWS_WELD)
-                    left = 16 * self.firsts[i] + 8 * side
-                    products.append((left, self.joints[i].constraint.rows, 0, count, to, stride, kind, part.body))
+                    left = 16 * self.pairs[i] + 8 * side
+                    products.append((left, self.counts[i], 0, count, to, stride, kind, part.body))
                     scales.append(sign * part.scale)
                 for other, other_sign in part.welds:
                     # Welds with welds
@@ -322,8 +334,7 @@ class _GraphBuilder:
             )
             for i, held in enumerate(self.held)
         ]
-        counts = [joint.constraint.rows for joint in self.joints]
-        axes = axes_of(shares, self.lean, counts, self.inside, self.starts, self.where)
+        axes = axes_of(shares, self.lean, self.counts, self.pairs, self.inside, self.where, self.starts)
         self.sides[axes.rows["row"], 0] = axes.rows["body"]
         return axes
 
@@ -355,16 +366,26 @@ class _GraphBuilder:
                 last = at
                 kinds[-1]["count"] += 1
                 entry = [0] * INTS
-                entry[BODY : BODY + 2], entry[ROW], entry[MASK] = self.joints[i].pair, self.firsts[i], 0
+                entry[BODY : BODY + 2], entry[ROW], entry[PAIR] = self.joints[i].pair, self.firsts[i], self.pairs[i]
                 table += entry
         return records(RowKind, [row_of(RowKind, **kind) for kind in kinds]), np.array(table, np.int64), tuple(used)
+
+    def _sums(self):
+        """The rows that are sums."""
+        return [first for (part, *_), first in zip(self.joints, self.firsts, strict=True) if part.summed]
 
     def _turns(self):
         """ConstraintGraph.turns."""
         turns = np.zeros(len(self.places))
         for (constraint, _, _), first in zip(self.joints, self.firsts, strict=True):
-            turns[first : first + constraint.rows] = not has_lengths(constraint)
+            turns[first : first + constraint.all_rows] = not has_lengths(constraint)
         return turns if is_small(self.packed.size) and turns.any() else np.zeros(0)
+
+    def _rates(self):
+        """ConstraintGraph.rates."""
+        pairs = zip(self.joints, self.firsts, strict=True)
+        found = [range(first + joint.constraint.rows, first + joint.constraint.all_rows) for joint, first in pairs]
+        return np.array(sorted(i for rows in found for i in rows), np.int64)
 
     def graph(self):
         """The `ConstraintGraph`, and the classes of its kinds."""
@@ -376,7 +397,7 @@ class _GraphBuilder:
 
         def rows_of(part):
             first = self.firsts[index[id(part)]]
-            return range(first, first + part.rows)
+            return range(first, first + part.all_rows)
 
         frictions, friction_rows = frictions_of(self.packed, self.bodies, rows_of, self.sides)
         graph = ConstraintGraph(
@@ -384,6 +405,8 @@ class _GraphBuilder:
             kinds=kinds,
             table=table,
             sides=self.sides,
+            sums=np.array(sorted(set(self._sums())), np.int64),
+            tails=np.array(self.tails, np.int64),
             row=self.places,
             products=self._products(),
             inverse=inverse,
@@ -391,6 +414,7 @@ class _GraphBuilder:
             spins=spins,
             pattern=with_kernels(self.pattern),
             turns=self._turns(),
+            rates=self._rates(),
             normals=self.normals,
             parts=parts,
             scales=scales,

@@ -7,6 +7,7 @@ from ..jit.arrays import zeros
 from .elimination import KERNELS as ELIMINATION
 from .elimination import lu_factors
 from .evaluation import (
+    clear_sums,
     evaluate_bias,
     evaluate_drift,
     evaluate_every_row,
@@ -17,11 +18,13 @@ from .evaluation import (
     solve_series,
 )
 from .redundant_rows import (
+    clear_rates,
     clear_redundant,
     keep_every_row,
     list_redundant,
     mark_redundant,
     note_selection,
+    rates_hold_along,
     restore_selection,
     return_to_selection,
     save_selection,
@@ -103,7 +106,8 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
     poses.reshape(-1, POSE)[:, [0, 5, 10, 24]] = 1.0
     tangent = TangentWorkspace(
         poses, allocate_rows(graph), zeros(m), zeros(m), zeros(8 * (nb + 1)), zeros(8 * (nb + 1)), zeros(n),
-        zeros(4), Landing(), Selection(), Indicator(), RedundantRows(*(zeros(k * left) for k in (16, 1, 1))),
+        zeros(4), Landing(), Selection(), Indicator(),
+        RedundantRows(zeros(16 * len(graph.sides) if redundant else 0), zeros(left), zeros(left)),
         np.zeros(m + 1, np.int64), zeros(left), np.zeros(m + 1, np.int64), zeros(left),
         *(np.zeros(size, np.int64) for size in (m + 1, m)),
         zeros(max(widest, m if choosing else 0) ** 2), _allocate_friction(graph, n, basis), np.zeros(2, np.int64),
@@ -114,16 +118,16 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
 
 def allocate_rows(graph):
     """Allocate `Rows`."""
-    m = len(graph.row)
-    return Rows(zeros(16 * m), zeros(16 * m), zeros(graph.pattern.shape[2]))
+    size = 16 * len(graph.sides)
+    return Rows(zeros(size), zeros(size), zeros(graph.pattern.shape[2]))
 
 
 def _allocate_friction(graph, n, basis):
     k, rows = len(graph.frictions), len(graph.row) + int((graph.normals >= 0).sum())
-    m, nb = (len(graph.row), len(graph.bodies)) if k else (0, -1)
+    m, pairs, nb = (len(graph.row), len(graph.sides), len(graph.bodies)) if k else (0, 0, -1)
     factors = lu_factors(graph.pattern) if k else (zeros(0), zeros(0))
     kept = int(graph.frictions[-1].kept + graph.frictions[-1].room) if k else 0
-    free = zeros(16 * k), zeros(7 * k), zeros(kept), zeros(m), zeros(8 * (nb + 1)), zeros(16 * m), *factors
+    free = zeros(16 * k), zeros(7 * k), zeros(kept), zeros(m), zeros(8 * (nb + 1)), zeros(16 * pairs), *factors
     if not basis:
         k = n = rows = 0
     matrices = np.zeros((k, n + rows)), np.zeros((k, k)), np.zeros(k, np.int64)
@@ -193,10 +197,11 @@ def redundancy(graph):
 #     constrain_accelerations the same with axis rows, for Z = W F and c = gamma
 #     balance_loads           lam = S^-1 H W F, F <- F - H^T lam
 #     take_reactions          F <- F - H^T lam
+#     clear_rates             b <- 0 at rows on velocities, which hold nothing in place
 #     solve_series            the same for one order of a Taylor series
 #     solve_friction_series   the same with joint friction, by N~ of accelerations.py
 # Ask:
-#     redundant_rows_hold, rates_hold, accelerations_hold       of redundant rows
+#     redundant_rows_hold, rates_hold, accelerations_hold       of redundant rows; rates_hold_along a direction
 #     mark_redundant, self_stress                               of redundant rows
 #     singularity_indicator, is_near_singular, refinements      of the distance to a singular configuration
 #
@@ -220,7 +225,9 @@ __all__ = [
     "allocate_tangent",
     "apply_multipliers",
     "balance_loads",
+    "clear_rates",
     "clear_redundant",
+    "clear_sums",
     "constrain",
     "constrain_accelerations",
     "count_self_stresses",
@@ -257,6 +264,7 @@ __all__ = [
     "pivot_loss",
     "project",
     "rates_hold",
+    "rates_hold_along",
     "redundancy",
     "redundant_of",
     "redundant_rows_hold",

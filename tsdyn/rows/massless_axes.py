@@ -143,7 +143,7 @@ def axis_of(axes, row):
     return int(axes.rows[i].body), h / np.linalg.norm(h)
 
 
-def axes_of(shares, lean, joints, inside, starts, where):
+def axes_of(shares, lean, counts, pairs, inside, where, starts):
     """The `MasslessAxes` of these shares.
 
     Parameters
@@ -151,12 +151,10 @@ def axes_of(shares, lean, joints, inside, starts, where):
     shares : list of Share
     lean : dict
         As `lean_bodies` returns it.
-    joints, inside : list
-        Of each constraint its rows' count; its node, and where its rows begin there.
-    starts : ndarray of int64
-        Where each node's rows begin.
-    where : callable
-        As `symbolic.analyse` returns it.
+    counts, pairs, inside : list
+        Of each constraint its rows' count; its first pair of sides; its node, and where its rows begin there.
+    where, starts : callable, ndarray of int64
+        As `symbolic.analyse` returns them.
     """
     rows, values, products, scales = [], [], [], []
     for share in shares:
@@ -168,8 +166,8 @@ def axes_of(shares, lean, joints, inside, starts, where):
             for i, side in share.sides:
                 node, first = inside[i]
                 target, stride, _ = where(node, share.node)
-                for r in range(first, first + joints[i]):
-                    products.append((k, 16 * (int(starts[node]) + r) + 8 * side, target + r * stride + a))
+                for r in range(counts[i]):
+                    products.append((k, 16 * (pairs[i] + r) + 8 * side, target + (first + r) * stride + a))
                     scales.append(share.scale)
             for weld, sign in share.welds:
                 target, stride, _ = where(weld, share.node)

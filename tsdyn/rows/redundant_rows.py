@@ -10,6 +10,7 @@ from ..elements.loops.constraint_rows import POSE, R
 from ..jit.kernels import kernel
 from ..jit.simd import four, put, splat
 from ..maths.dense_linalg import copy
+from ..maths.tolerances import HALF_DIGITS
 from .tolerances import HELD
 
 
@@ -18,6 +19,26 @@ def clear_redundant(f, b):
     """Zero the right-hand sides of redundant rows."""
     for i in range(f.dropped[0]):
         b[f.dropped[1 + i]] = 0.0
+
+
+@kernel
+def clear_rates(graph, b):
+    """Zero the entries of rows on velocities: they hold nothing in place."""
+    for i in range(graph.rates.size):
+        b[graph.rates[i]] = 0.0
+
+
+@kernel
+def is_rate(graph, e):
+    """Whether a row is one on velocities; their places are in ascending order."""
+    low, high = 0, graph.rates.size
+    while low < high:
+        middle = (low + high) // 2
+        if graph.rates[middle] < e:
+            low = middle + 1
+        else:
+            high = middle
+    return low < graph.rates.size and graph.rates[low] == e
 
 
 @kernel
@@ -39,21 +60,56 @@ def leave_redundant_rows(graph, f, Phi, H):
         over = abs(Phi[row]) - HELD * _position_terms(graph, f, H, row)
         if not over <= worst:
             worst = over
-        for c in range(0, 16, 4):
-            if f.redundant.H.size > 0:
-                put(f.redundant.H, 16 * i + c, four(H, 16 * row + c))
-            put(H, 16 * row + c, splat(0.0))
+        _leave_pair(f, H, row, i)
+        for j in range(graph.tails.shape[0]):
+            if graph.tails[j] == row:
+                _leave_pair(f, H, graph.row.shape[0] + j, graph.row.shape[0] + j)
     f.selection.excess = worst
     clear_redundant(f, Phi)
 
 
 @kernel
+def rates_hold_along(graph, f, Z):
+    """Whether the redundant rows on velocities vanish for Z (b, 8), which the other rows admit."""
+    for i in range(f.dropped[0]):
+        row, total, terms = f.dropped[1 + i], 0.0, 0.0
+        for side in range(2):
+            b, at = graph.sides[row, side], 16 * i + 8 * side
+            for part in range(0, 8 if b < graph.bodies.shape[0] and is_rate(graph, row) else 0, 4):
+                for c in range(part, part + 3):
+                    total += f.redundant.H[at + c] * Z[8 * b + c]
+                terms += length(f.redundant.H, at + part) * length(Z, 8 * b + part)
+        if not abs(total) <= HALF_DIGITS * terms:
+            return False
+    return True
+
+
+@kernel
+def _leave_pair(f, H, e, kept):
+    """H = 0 of a pair of sides, kept in the place `kept`."""
+    for c in range(0, 16, 4):
+        if f.redundant.H.size > 0:
+            put(f.redundant.H, 16 * kept + c, four(H, 16 * e + c))
+        put(H, 16 * e + c, splat(0.0))
+
+
+@kernel
 def _position_terms(graph, f, H, row):
     """Size of the terms of a row at the poses: |H_r| |r| + |H_pi'|."""
+    terms = _terms_of_pair(graph, f, H, row)
+    for j in range(graph.tails.shape[0]):
+        if graph.tails[j] == row:
+            terms += _terms_of_pair(graph, f, H, graph.row.shape[0] + j)
+    return terms
+
+
+@kernel
+def _terms_of_pair(graph, f, H, e):
+    """The same of a pair of sides."""
     terms = 0.0
     for side in range(2):
         # |H_r| |r| + |H_pi'|
-        b, at = graph.sides[row, side], 16 * row + 8 * side
+        b, at = graph.sides[e, side], 16 * e + 8 * side
         if b < graph.bodies.shape[0]:
             terms += math.sqrt(square(H, at) * square(f.poses, b * POSE + R)) + length(H, at + 4)
     return terms

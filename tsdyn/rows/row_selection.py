@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.loops.constraint_rows import POSE, R
-from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, vector
+from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader, long_kernel, stack, vector
 from ..jit.predicates import below, choose, either, every, most
 from ..jit.simd import get
 from ..maths.tolerances import PIVOT_ROUNDING
@@ -14,7 +14,7 @@ from .block_operations import eliminate, subtract_products
 from .constraint_graph import ConstraintGraph, no_graph
 from .evaluation import evaluate_all, evaluate_every_row
 from .factorisation import keep_diagonal, update_later_blocks
-from .redundant_rows import keep_every_row, leave_redundant_rows, length, square
+from .redundant_rows import is_rate, keep_every_row, leave_redundant_rows, length, square
 from .row_workspace import Rows, TangentWorkspace, no_tangent_workspace
 from .schur_complement import (
     factorise_selected_rows,
@@ -45,8 +45,9 @@ from .tolerances import (
 # Selection of independent rows of H among redundant ones, by rank-revealing elimination of S.
 #
 # Rows are ordered by diagonally pivoted Cholesky, pivots relative to the diagonal entry; rows with negligible pivots
-# are dropped. In large scenes pivoting is confined to the blocks of the fill-reducing order: the selection is
-# independent, but not the best conditioned.
+# are dropped. Rows on positions go first: rows on velocities in their place would let positions drift. In large scenes
+# pivoting is confined to the blocks of the fill-reducing order: the selection is independent, but not the best
+# conditioned.
 
 
 @kernel
@@ -70,6 +71,11 @@ def weakest(graph, values):
 def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
     """Select rows by global pivoting, A (m, m) scratch; return the number of rows with pivots below `least`."""
     m, count = graph.row.size, 0
+    # Rows on positions first, by pivots that are one larger: their residuals can't drift
+    lift = 1.0 if graph.rates.size > 0 else 0.0
+    dropped[1:] = 1
+    for i in range(graph.rates.size):
+        dropped[1 + graph.rates[i]] = 0
     for i in range(m):
         if graph.row[i] >= 0:
             order[count] = i
@@ -83,6 +89,7 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
                     if body == graph.sides[j, l] and body < graph.bodies.shape[0]:
                         x += inner(H, 16 * i + 8 * k, Y, 16 * j + 8 * l)
             A[i * m + j] = x
+    _add_tails(graph, H, Y, A)
     # Scaled to a unit diagonal: pivots are squared sines of angles between rows
     for i in range(m):
         for j in range(i):
@@ -95,8 +102,12 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
     for k in range(count):
         best, pivot = -1.0, k
         for i in range(k, count):
-            if A[order[i] * m + order[i]] > best:
-                best, pivot = A[order[i] * m + order[i]], i
+            part = A[order[i] * m + order[i]]
+            if part > least and dropped[1 + order[i]] == 1:
+                part += lift
+            if part > best:
+                best, pivot = part, i
+        best = A[order[pivot] * m + order[pivot]]
         if count - k <= wanted or not best > least:
             rank = k
             break
@@ -116,10 +127,26 @@ def _choose_of_all(graph, H, Y, wanted, least, dropped, A, order):
 
 
 @kernel
-def _choose(size, width, panel, kept, joints, share, A, order):
+def _add_tails(graph, H, Y, A):
+    """The products of the later terms of sums, added to the lower triangle A of H W H^T."""
+    m = graph.row.size
+    for t in range(graph.tails.size):
+        for j in range(m + t + 1):
+            x, e, o = 0.0, graph.tails[t], graph.tails[j - m] if j >= m else j
+            for k in range(2):
+                for l in range(2):
+                    body = graph.sides[m + t, k]
+                    if body == graph.sides[j, l] and body < graph.bodies.shape[0]:
+                        x += inner(H, 16 * (m + t) + 8 * k, Y, 16 * j + 8 * l)
+            # Two terms of one sum count both ways
+            A[max(e, o) * m + min(e, o)] += 2.0 * x if e == o and j != m + t else x
+
+
+@kernel
+def _choose(graph, first, size, width, panel, kept, share, A, order):
     """Order the rows of a block by pivoting, kept rows first, A (size, size) scratch; return the number of kept rows.
 
-    joints (size,) is negative for rows that are kept in any case, the welds of a hub and the rows of axes.
+    Rows that are no rows of Phi, the welds of a hub and the rows of axes, are kept in any case.
     """
     # The diagonal block, as a symmetric matrix
     for i in range(size):
@@ -132,8 +159,10 @@ def _choose(size, width, panel, kept, joints, share, A, order):
         for i in range(k, size):
             row = order[i]
             part = A[row * size + row] / kept[row] if kept[row] > 0.0 else 0.0
-            if joints[row] < 0:
+            if graph.row[first + row] < 0:
                 part += 2.0
+            elif graph.rates.size > 0 and part > share and not is_rate(graph, first + row):
+                part += 1.0
             if part > best:
                 best, pivot = part, i
         if not best > share:
@@ -163,7 +192,7 @@ def _eliminate_choosing(graph, values, share, dropped, A, order):
         # Which rows of this block are independent of each other and of earlier blocks
         first, width, panel = starts[j], widths[j], values[heads[j] :]
         size = starts[j + 1] - first
-        rank = _choose(size, width, panel, kept[first:], graph.row[first:], share, A, order)
+        rank = _choose(graph, first, size, width, panel, kept[first:], share, A, order)
         for i in range(rank, size):
             # A dropped row: zero in its row and column, one on the diagonal
             row = order[i]
@@ -380,31 +409,44 @@ def _hold(graph, f, known, q, rates, most, fastest):
 
     A body whose rates are below FAINT of the largest, `most` and `fastest`, counts as one with these.
     """
-    H = f.redundant.H
     for i in range(f.dropped[0]):
         # |H (rd, omega') + known| against the sum of its absolute terms
-        residual, terms = known[i], abs(known[i])
-        for side in range(2):
-            b, at = graph.sides[f.dropped[1 + i], side], 16 * i + 8 * side
-            if b == graph.bodies.shape[0]:
-                continue
-            # H_r rd
-            k = graph.bodies[b, 0]
-            residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
-            terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + LEAST_SHARE * most * length(H, at)
-            if graph.bodies[b, 1] == 7:
-                # H_pi' omega'
-                e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
-                d0, d1, d2, d3 = rates[k + 3], rates[k + 4], rates[k + 5], rates[k + 6]
-                x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3  # 2 (x, y, z) = omega'
-                y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
-                z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
-                residual += 2.0 * (H[at + 4] * x + H[at + 5] * y + H[at + 6] * z)
-                spin = 2.0 * math.sqrt(d0 * d0 + square(rates, k + 4))
-                terms += length(H, at + 4) * (spin + LEAST_SHARE * fastest)
+        row, residual, terms = f.dropped[1 + i], known[i], abs(known[i])
+        more, size = _pair_terms(graph, f, row, i, q, rates, most, fastest)
+        residual, terms = residual + more, terms + size
+        for j in range(graph.tails.shape[0]):
+            if graph.tails[j] == row:
+                e = graph.row.shape[0] + j
+                more, size = _pair_terms(graph, f, e, e, q, rates, most, fastest)
+                residual, terms = residual + more, terms + size
         if not abs(residual) <= HELD * terms:
             return False
     return True
+
+
+@kernel
+def _pair_terms(graph, f, e, place, q, rates, most, fastest):
+    """H (rd, omega') of a pair of sides, kept in a place of RedundantRows.H, and the sum of its absolute terms."""
+    H, residual, terms = f.redundant.H, 0.0, 0.0
+    for side in range(2):
+        b, at = graph.sides[e, side], 16 * place + 8 * side
+        if b == graph.bodies.shape[0]:
+            continue
+        # H_r rd
+        k = graph.bodies[b, 0]
+        residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
+        terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + LEAST_SHARE * most * length(H, at)
+        if graph.bodies[b, 1] == 7:
+            # H_pi' omega'
+            e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
+            d0, d1, d2, d3 = rates[k + 3], rates[k + 4], rates[k + 5], rates[k + 6]
+            x = -e1 * d0 + e0 * d1 + e3 * d2 - e2 * d3  # 2 (x, y, z) = omega'
+            y = -e2 * d0 - e3 * d1 + e0 * d2 + e1 * d3
+            z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
+            residual += 2.0 * (H[at + 4] * x + H[at + 5] * y + H[at + 6] * z)
+            spin = 2.0 * math.sqrt(d0 * d0 + square(rates, k + 4))
+            terms += length(H, at + 4) * (spin + LEAST_SHARE * fastest)
+    return residual, terms
 
 
 # Selection of redundant rows during a run: renewed where the kept rows come close to dependence.
@@ -455,8 +497,8 @@ def reselect_rows(choice, reals, t, H, Y, S, metric):
     """Call `_choose` by address, 1 or 0: few scenes need it, and its code is as long as all other row code."""
     c = load_choice(choice)
     graph, f = c.graph, c.tangent
-    m, size = graph.row.size, graph.pattern.shape[2]
-    rows = Rows(vector(H, 16 * m), vector(Y, 16 * m), vector(S, size))
+    pairs, size = 16 * graph.sides.shape[0], graph.pattern.shape[2]
+    rows = Rows(vector(H, pairs), vector(Y, pairs), vector(S, size))
     return 1 if _choose_again(graph, vector(reals, ANY), f, rows, t, metric) else 0
 
 
@@ -536,6 +578,20 @@ def count_self_stresses(f):
 
 
 @kernel
+def _weigh_tails(graph, H, row, Z):
+    """Z += W h^T of the later terms of a row."""
+    w = stack(8)
+    for j in range(graph.tails.shape[0]):
+        for side in range(2 if graph.tails[j] == row else 0):
+            e = graph.row.shape[0] + j
+            body = graph.sides[e, side]
+            if body < graph.bodies.shape[0]:
+                weigh(graph.inverse, body, H, 16 * e + 8 * side, w, 0)
+                for c in range(8):
+                    Z[8 * body + c] += w[c]
+
+
+@kernel
 def self_stress(graph, f, H, i):
     """b = z of redundant row i, H being of every row; return the largest |z|. f.rows are factorised."""
     row = f.dropped[1 + i]
@@ -546,6 +602,8 @@ def self_stress(graph, f, H, i):
         body = graph.sides[row, side]
         if body < graph.bodies.shape[0]:
             weigh(graph.inverse, body, H, 16 * row + 8 * side, f.Z, 8 * body)
+    if graph.tails.shape[0] > 0:
+        _weigh_tails(graph, H, row, f.Z)
     # z = -S^-1 H W h^T for the kept rows
     multiply_rows(graph, f.rows, f.Z, f.b)
     solve_rows(graph, f.rows, f.b)

@@ -13,8 +13,8 @@ class Rows(NamedTuple):
     Without the redundant rows: these are zero in H and Y, and have a one on the diagonal of S.
     """
 
-    H: np.ndarray  # (m * 16,)  rows of [Phi_r, Phi_pi'] of bodies a and b; constraint_rows.reduced
-    Y: np.ndarray  # (m * 16,)  W H^T; schur_complement.weigh_rows
+    H: np.ndarray  # (pairs * 16,)  [Phi_r, Phi_pi'] of the pairs of sides, m or more; constraint_rows.reduced
+    Y: np.ndarray  # (pairs * 16,)  W H^T; schur_complement.weigh_rows
     S: np.ndarray  # H W H^T, then its factors; schur_complement.multiply_rows, factorisation.factor
 
 
@@ -26,7 +26,7 @@ class Friction(NamedTuple):
     kept: np.ndarray  # markers, arm and orientation of each at the present configuration; friction.normal_load
     lam: np.ndarray  # (m,)  multipliers, from one evaluation to the next; friction_solve
     Z: np.ndarray  # ((b + 1) * 8,)  accelerations of bodies without friction and reactions; friction_solve
-    X: np.ndarray  # (m * 16,)  W (H^T - g N_lam); friction_solve
+    X: np.ndarray  # (pairs * 16,)  W (H^T - g N_lam); friction_solve
     lower: np.ndarray  # factors of S - H W g N_lam; friction_solve
     upper: np.ndarray
     basis: np.ndarray  # (k, n + rows of Phi)  by each for a load of one, vdd and multipliers; friction_basis
@@ -38,7 +38,7 @@ class Friction(NamedTuple):
 class RedundantRows(NamedTuple):
     """The redundant rows, in the order of `TangentWorkspace.dropped`; of no size where none may be redundant."""
 
-    H: np.ndarray  # (m * 16,)  as in `Rows`, at the last evaluation
+    H: np.ndarray  # (pairs * 16,)  as in `Rows`, at the last evaluation; later terms of sums in their own places
     drift: np.ndarray  # (m,)  Phi_t
     gamma: np.ndarray  # (m,)  acceleration bias
 

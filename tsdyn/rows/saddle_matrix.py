@@ -1,5 +1,6 @@
 """The saddle-point matrix of implicit methods: unknowns, order of elimination, factors and solves."""
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from ..elements.loops.template import AT, DIMENSION
 from ..jit.kernels import Record, complex_vector, data_of, kernel, records, stack
 from ..jit.simd import let
 from ..maths.tolerances import SUM_ROUNDING
-from ..model.packed import members_of
+from ..model.packed import first_rows, members_of
 from .elimination import factor_lu, solve_lu, with_kernels
 from .massless_axes import lean_bodies
 from .schur_complement import more
@@ -39,8 +40,8 @@ def order_saddle(bodies, pairs, joined, lean=()):
     ----------
     bodies : list of int
         Degrees of freedom of each body.
-    pairs : list of (int, int)
-        The two bodies, or GROUND, of each set of rows.
+    pairs : list of tuple of int
+        The two bodies, or more, or GROUND, of each set of rows.
     joined : list of (int, int)
         Pairs of bodies that forces couple.
     lean : list of int
@@ -51,7 +52,8 @@ def order_saddle(bodies, pairs, joined, lean=()):
     list of int
         Nodes: a body by its number, set i of rows as len(bodies) + i; then the sets of axis rows.
     """
-    cliques = {tuple(sorted(pair)) for pair in (*pairs, *joined) if GROUND not in pair and pair[0] != pair[1]}
+    cliques = {tuple(sorted(set(pair) - {GROUND})) for pair in (*pairs, *joined)}
+    cliques = {clique for clique in cliques if len(clique) > 1}
     sets = _Sets(pairs)
     ranks = fill_reducing_order(bodies, [set(pair) for pair in sorted(cliques)])
     sets.rank = {body: at for at, body in enumerate(ranks)} | {GROUND: -1}
@@ -218,7 +220,7 @@ class SaddleGraph(NamedTuple):
     constraints: np.ndarray  # Instance (constraints that are no normalisations,)
     body_at: np.ndarray  # int64 (nb,): where a body's unknowns begin
     row_at: np.ndarray  # int64 (m,): where a row's multiplier is; -1 for what is no row of Phi
-    sides: np.ndarray  # int64 (m, 2, 2): of a row and a body, where H begins in the factors and its stride; -1: nowhere
+    sides: np.ndarray  # int64 (pairs, 2, 2): of a side, where H begins in the factors and its stride; -1: nowhere
     diagonal: np.ndarray  # int64 (m,): where a row's diagonal entry is
     axes: np.ndarray  # LeanAxis (axes,)
 
@@ -263,10 +265,15 @@ class _SaddleBuilder:
         self.constraints = [self._instance(pair, values) for pair, values in constraints]
 
     def _find_nodes(self):
-        """Rows of the same two bodies are one node: its bodies, its rows, and of each row its node."""
+        """Rows of the same two bodies, or more, are one node: its bodies, its rows, and of each row its node."""
         nodes, self.pairs, self.rows, self.node = {}, [], [], {}
+        m, later = len(self.graph.row), {}
+        for i, e in enumerate(self.graph.tails.tolist()):
+            later.setdefault(e, []).append(m + i)
+        self.ends = {e: [e, *later.get(e, ())] for e in self.row_of.values()}  # pairs of sides
         for e in self.row_of.values():
-            pair = tuple(sorted(self._body(b) for b in self.graph.sides[e]))
+            pair = [self._body(b) for b in self.graph.sides[self.ends[e]].ravel()]
+            pair = tuple(sorted(set(pair) if len(pair) > 2 else pair))
             i = nodes.setdefault(pair, len(nodes))
             if i == len(self.pairs):
                 self.pairs.append(pair)
@@ -298,19 +305,18 @@ class _SaddleBuilder:
 
     def _constraints(self):
         """The same of every constraint that is no normalisation."""
-        found, row, taken = [], 0, {}
+        found, taken, later = [], {}, {e: iter(ends) for e, ends in self.ends.items()}
         kinds = dict(zip(dict.fromkeys(map(type, self.packed.constraints)), self.system.kinds, strict=True))
-        for constraint in self.packed.constraints:
+        for constraint, row in first_rows(self.packed.constraints):
             kind = kinds[type(constraint)]
             i = taken[type(constraint)] = taken.get(type(constraint), -1) + 1
             e = self.row_of.get(row)
-            row += constraint.rows
             if constraint.normalises or e is None:
                 continue
-            pair = tuple(self._body(b) for b in self.graph.sides[e])
+            pair = tuple(self._body(b) for b in self.graph.sides[next(later[e])])
             own, reals = self._places(kind.table + CONSTRAINT_INTS * i), kind.reals + kind.stride * i
             loops = kind.stiffness, kind.jacobian
-            found.append((pair, (1, kind.stride, SPAN, *loops, reals, *own, 0, e, constraint.rows)))
+            found.append((pair, (1, kind.stride, SPAN, *loops, reals, *own, 0, e, constraint.all_rows or 1)))
         return found
 
     def _instance(self, pair, values):
@@ -332,16 +338,17 @@ class _SaddleBuilder:
         """The `SaddleGraph`."""
         m = len(self.graph.row)
         row_at, diagonal = np.full(m, -1, np.int64), np.zeros(m, np.int64)
-        sides = np.full((m, 2, 2), -1, np.int64)
+        sides = np.full((len(self.graph.sides), 2, 2), -1, np.int64)
         for i, rows in enumerate(self.rows):
             node = self.nb + i
             own, width, _ = self.where(node, node)
             for r, e in enumerate(rows):
                 row_at[e], diagonal[e] = self.starts[node] + r, own + r * (width + 1)
-                for k, b in enumerate(self.graph.sides[e]):
+                for pair, k in product(self.ends[e], range(2)):
+                    b = int(self.graph.sides[pair, k])
                     if b < self.nb:
-                        target, stride, transposed = self.where(node, int(b))
-                        sides[e, k] = (target + r, stride) if transposed else (target + r * stride, 1)
+                        target, stride, transposed = self.where(node, b)
+                        sides[pair, k] = (target + r, stride) if transposed else (target + r * stride, 1)
         return SaddleGraph(
             with_kernels(self.pattern, unsymmetric=True), records(Block, self.blocks),
             records(SaddleInstance, self.forces), records(SaddleInstance, self.constraints),
@@ -386,9 +393,10 @@ def _write_rows(graph, f, s):
             base, step = s.graph.sides[e, k, 0], s.graph.sides[e, k, 1]
             if base >= 0:
                 for c in range(6 if graph.bodies[graph.sides[e, k], 1] == 7 else 3):
+                    # Terms of one sum may share a body
                     x = H[16 * e + 8 * k + c + c // 3]
-                    let(s.upper, base + step * c, x)
-                    let(s.lower, base + step * c, x)
+                    more(s.upper, base + step * c, x)
+                    more(s.lower, base + step * c, x)
     # A dropped row has a zero multiplier
     for i in range(f.dropped[0]):
         at = s.graph.diagonal[f.dropped[1 + i]]

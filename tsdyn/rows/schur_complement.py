@@ -239,24 +239,41 @@ def solve_rows(graph, rows, b):
 @kernel
 def _gather(graph, H, Z, out):
     """out = H Z."""
-    for e in range(graph.sides.shape[0]):
+    for e in range(graph.row.shape[0]):
         # H_a Z_a + H_b Z_b
         at, a, b = 16 * e, 8 * graph.sides[e, 0], 8 * graph.sides[e, 1]
         f = fma(four(H, at), four(Z, a), times(four(H, at + 4), four(Z, a + 4)))
         g = fma(four(H, at + 8), four(Z, b), times(four(H, at + 12), four(Z, b + 4)))
         out[e] = total(add(f, g))
+    _gather_tails(graph, H, Z, 8, 0, out)
+
+
+@kernel
+def _gather_tails(graph, H, values, width, first, out):
+    """out += H z of the later terms of sums; z of body b is at values[width b + first]."""
+    for i in range(graph.tails.shape[0]):
+        e = graph.row.shape[0] + i
+        for k in range(2):
+            out[graph.tails[i]] += inner(H, 16 * e + 8 * k, values, width * graph.sides[e, k] + first)
 
 
 @kernel
 def _scatter(graph, Y, lam, Z):
     """Z <- Z - Y^T lam."""
-    for e in range(graph.sides.shape[0]):
-        # Z_a and Z_b of each row
-        f = splat(-lam[e])
-        for k in range(2):
-            at, z = 16 * e + 8 * k, 8 * graph.sides[e, k]
-            put(Z, z, fma(four(Y, at), f, four(Z, z)))
-            put(Z, z + 4, fma(four(Y, at + 4), f, four(Z, z + 4)))
+    # Z_a and Z_b of each row, and of the later terms of sums
+    for e in range(graph.row.shape[0]):
+        _scatter_pair(graph, Y, e, splat(-lam[e]), Z)
+    for i in range(graph.tails.shape[0]):
+        _scatter_pair(graph, Y, graph.row.shape[0] + i, splat(-lam[graph.tails[i]]), Z)
+
+
+@kernel
+def _scatter_pair(graph, Y, e, f, Z):
+    """Z <- Z + f Y_e at both bodies of a pair of sides."""
+    for k in range(2):
+        at, z = 16 * e + 8 * k, 8 * graph.sides[e, k]
+        put(Z, z, fma(four(Y, at), f, four(Z, z)))
+        put(Z, z + 4, fma(four(Y, at + 4), f, four(Z, z + 4)))
 
 
 @kernel
@@ -268,20 +285,22 @@ def multiply_rows(graph, rows, Z, out):
 @kernel
 def add_products(graph, rows, Z, out):
     """out += H Z."""
-    for e in range(graph.sides.shape[0]):
+    for e in range(graph.row.shape[0]):
         at = 16 * e
         out[e] += inner(rows.H, at, Z, 8 * graph.sides[e, 0]) + inner(rows.H, at + 8, Z, 8 * graph.sides[e, 1])
+    _gather_tails(graph, rows.H, Z, 8, 0, out)
 
 
 @kernel
 def multiply_rates(graph, rows, poses, out):
     """out = H (rd, omega') of the poses."""
     H = rows.H
-    for e in range(graph.sides.shape[0]):
+    for e in range(graph.row.shape[0]):
         at, a, b = 16 * e, graph.sides[e, 0] * POSE + RD, graph.sides[e, 1] * POSE + RD
         g = fma(four(H, at), four(poses, a), times(four(H, at + 4), four(poses, a + 4)))
         g = fma(four(H, at + 8), four(poses, b), fma(four(H, at + 12), four(poses, b + 4), g))
         out[e] = total(g)
+    _gather_tails(graph, H, poses, POSE, RD, out)
 
 
 @kernel
@@ -464,7 +483,7 @@ def pivot_loss(graph, l):
     worst, axes = 0.0, graph.axes.rows
     # Primitives, then welds, then axes
     for i in range(graph.products.shape[0]):
-        if graph.products[i].same == 0:
+        if graph.products[i].same != 1:
             break  # those of a primitive with itself come first
         worst = max(worst, _loss(graph, l, graph.products[i].left // 16, graph.products[i].rows))
     for i in range(0, graph.welds.shape[0], 3):  # three displacements, three rotations

@@ -240,7 +240,7 @@ class Counts(Mapping):
 
 LAID_OUT = (  # fields that follow from scene and method, or are filled in before they are read
     "system", "graph", "kernels", "friction_solver", "reselection", "joints", "watched", "loaded", "path", "tableau",
-    "block", "own", "trial", "table",
+    "block", "own", "trial", "table", "of_rates",
 )  # fmt: skip
 OWN = {  # numbers of records, likewise
     "ChartState": ("turn_limit", "loads_left"),

@@ -226,8 +226,7 @@ class Memory:
         self._enter_start(task)
         reset_selection(self.graph, self.context.tangent)
         numbers.dense = STORED if task.dense_output else FILLED if task.events is not None else 0
-        numbers.may_pass, numbers.chart_interval = may_pass, task.interval
-        numbers.leave_when_stiff = task.choose is not None
+        numbers.may_pass, numbers.leave_when_stiff = may_pass, task.choose is not None
         self.load()
 
     def _enter_start(self, task):

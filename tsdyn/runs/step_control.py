@@ -56,7 +56,7 @@ def stretch(h, longest):
 @kernel
 def first_step(context, w, r):
     """A first step from the sizes of y, y' and y'' (Hairer, Norsett, Wanner, Solving ODEs I, II.4)."""
-    first = r.xd if r.numbers.first_order == 1 else r.y
+    first = r.xd if r.numbers.first_order != 0 else r.y
     rtol, atol = r.clock.rtol, r.clock.atol
     n = w.q.size
     # d0 = |(q, qd)|, d1 = |(x', y')|
@@ -75,7 +75,7 @@ def first_step(context, w, r):
         r.ys[i] = r.y[i] + h * r.yd[i]
     if evaluate(context, w, r, r.clock.t + h, r.xs, r.ys, r.yds, r.dx) != 0:
         return h
-    second = r.dx if r.numbers.first_order == 1 else r.ys
+    second = r.dx if r.numbers.first_order != 0 else r.ys
     for i in range(r.x.size):
         r.dx[i] = second[i] - first[i]
     for i in range(r.y.size):
@@ -102,7 +102,7 @@ def _size(context, r):
 @kernel
 def accept(context, linear, r, h):
     """Accept or reject the step h and choose the next one (Gustafsson's PI control). True if accepted."""
-    end = r.xd if r.numbers.first_order == 1 else r.y
+    end = r.xd if r.numbers.first_order != 0 else r.y
     # Error estimate, filtered by (I - g J)^-1 in stiff scenes
     _estimate(r, r.kernels.error, h, end)
     if linear.numbers.g > 0.0:

@@ -8,10 +8,10 @@ from ..maths.tolerances import LAST_PLACE
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.explicit import called_for
 from ..model.laws import calls_laws, interrupts_answered
-from ..model.packed import System
+from ..model.packed import System, has_rates
 from ..rows.interface import redundancy
 from ..rows.saddle_matrix import saddle_of
-from ..workspaces import Context, allocate, allocate_linear, basis_free_parts, divided, lay_out, words
+from ..workspaces import MIXED, Context, allocate, allocate_linear, basis_free_parts, divided, lay_out, words
 from .dense_output import TrajectoryReading, read, warm_size
 from .path_loads import watch
 from .run_memory import Memory
@@ -34,7 +34,8 @@ class StepMemory(Memory):
         Of an implicit method in a form without a basis; None for others.
     coupled : int
         Stages that the method solves at once.
-    basis_free, implicit : bool
+    form : Formulation
+    implicit : bool
     sizes : tuple
         Of x and y.
     lengths : dict
@@ -43,20 +44,21 @@ class StepMemory(Memory):
 
     advance_kernel = staticmethod(advance)
 
-    def __init__(self, prepared, graph, saddle, coupled, basis_free, implicit, sizes, lengths):
+    def __init__(self, prepared, graph, saddle, coupled, form, implicit, sizes, lengths):
         n, m, packed = prepared.n, prepared.m, prepared.packed
-        self.implicit, self.basis_free = implicit, basis_free
+        self.implicit, self.basis_free = implicit, (basis_free := form.basis_free)
         self.source, kept = prepared.system(implicit, basis_free)
         system, redundant = System(*(array.copy() for array in self.source)), redundancy(graph)
         rows = len(graph.row) if basis_free else None
-        work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=redundant)
+        unheld = form.redundancy(packed, graph)
+        work = allocate(n, m, len(packed.bodies), 0.0, joint_rows=rows, redundant=unheld)
         angles, slots = prepared.handles.count, system.memory.size
         parts = basis_free_parts(graph, n, not basis_free, saddle, coupled)
         run = lay_out(n, *sizes, angles, slots, warm=warm_size(work, *parts[1:]), **lengths)
         linear = allocate_linear(system, n, m, implicit and not basis_free, kept, redundant)
         if implicit:
             linear = linear._replace(now=run.now, before=run.before)
-        context = Context(system, work, linear, *parts)
+        context = form.context(packed, Context(system, work, linear, *parts), redundant)
         super().__init__(prepared, graph, context, run)
         self.weight = n if basis_free else n + n**3 // MATRICES
         self._laid_out.append(words(context.chart.state))
@@ -65,6 +67,8 @@ class StepMemory(Memory):
         self._scratch += [self._run_scratch, *((rest, linear.pivots) if implicit else ())]
         if saddle is not None:
             self._scratch.append(context.saddle.K.base)
+        if form.mixed:
+            self._scratch.append(context.rates.D.base)
         rest = *self._laid_out, context.tangent.rows.S, context.tangent.poses
         self.nbytes = sum(array.nbytes for array in (*self._scratch, *rest))
 
@@ -91,10 +95,10 @@ class StepEngine:
     layouts, readings = 0, (None, (None, None))
 
     def __init__(self, prepared, method, form, within):
-        self.method, self.form, self.within = method, (form := form.serving(method)), within
-        n, m, packed = prepared.n, prepared.m, prepared.packed
+        n, packed = prepared.n, prepared.packed
+        self.method, self.form, self.within = method, (form := form.serving(method, has_rates(packed))), within
         self.graph = form.graph(packed)
-        self.sizes = form.sizes(n, m, self.graph)
+        self.sizes = form.sizes(packed, self.graph)
         self.step, self.tableau, scratch = method.kernel(form.first_order)
         self.interpolant = method.interpolant(form.first_order)
         self.watched, self.loaded = prepared.watched if method.step is None else NOTHING
@@ -107,13 +111,13 @@ class StepEngine:
         self.system, kept = prepared.system(method.implicit, form.basis_free)
         self.saddle = saddle_of(packed, self.graph, self.system) if method.implicit and form.basis_free else None
         rows = len(self.graph.row) if form.basis_free else None
-        self.kind = form.name, rows, method.implicit, method.coupled, kept, *self.sizes, *lengths
+        self.kind = form.name, form.mixed, rows, method.implicit, method.coupled, kept, *self.sizes, *lengths
         still = prepared.still if form.keeps_still else 0
         self.skipped = (prepared.spheres, still, 0) if form.basis_free else (0, 0, 0)
 
     def memory(self, prepared):
         """A new `StepMemory`."""
-        given = self.method.coupled, self.form.basis_free, self.method.implicit, self.sizes, self.lengths
+        given = self.method.coupled, self.form, self.method.implicit, self.sizes, self.lengths
         return StepMemory(prepared, self.graph, self.saddle, *given)
 
     def serves(self, memory):
@@ -131,12 +135,16 @@ class StepEngine:
         given = method, form, self.step, self.interpolant
         _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=self.within))
         run.numbers.free_stages = free = form.frees_stages and interval == 0
+        # Rates of chart coordinates keep what a step leaves of them along rows on velocities, and positions follow it:
+        # where it isn't taken off, a chart lasts for one step
+        drifts = form.basis_free and not free and self.graph.rates.size > 0
+        run.numbers.chart_interval = interval or int(drifts)
         memory.context.chart.state.turn_limit = TURN_FREE if free else TURN_LIMIT
         share = LOADS_LEFT * method.step_tolerances()[0] if method.step is None else 0.0
         memory.context.chart.state.loads_left = max(share, LAST_PLACE)
         place, accelerate = form.stage_kernels(free)
         run.kernels.stage_place, run.kernels.stage_accelerate = place.address, accelerate.address
-        run.numbers.first_order = form.first_order
+        run.numbers.first_order = MIXED if form.mixed else form.first_order
         if method.step is None:
             run.clock.turn_share = run.clock.error_before = 1.0
             run.clock.exponent = 1.0 / (method.embedded_order + 1)
@@ -156,7 +164,7 @@ class StepEngine:
 
 def read_again(packed, method, name, constraint_tol):
     """A `Reading` in another process than the run's."""
-    form = formulation(name).serving(method)
+    form = formulation(name).serving(method, has_rates(packed))
     step, interpolant = method.kernel(form.first_order)[0], method.interpolant(form.first_order)
     kernels = kernels_of(method, form, step, interpolant, adaptive=False, within=True)
     return _reading(packed, form, constraint_tol, kernels)
@@ -165,16 +173,17 @@ def read_again(packed, method, name, constraint_tol):
 def _reading(packed, form, constraint_tol, kernels):
     n, m, system = int(packed.system.bodies[:, 1].sum()), len(packed.system.segments), packed.system
     graph = form.graph(packed)
-    sizes = form.sizes(n, m, graph)
-    rows, redundant = len(graph.row) if form.basis_free else None, redundancy(graph)
+    sizes = form.sizes(packed, graph)
+    rows, unheld = len(graph.row) if form.basis_free else None, form.redundancy(packed, graph)
 
     def workspace():
         own = system._replace(reals=system.reals.copy())  # the motions' places are written to
-        work = allocate(n, m, len(packed.bodies), constraint_tol, packed.size, rows, redundant)
+        work = allocate(n, m, len(packed.bodies), constraint_tol, packed.size, rows, unheld)
         parts = basis_free_parts(graph, n, not form.basis_free)
         run = lay_out(n, *sizes, 0, 0, warm=warm_size(work, *parts[1:]))
         _set(run.kernels, kernels)
-        return Context(own, work, allocate_linear(own, n, m, False), *parts), run
+        context = Context(own, work, allocate_linear(own, n, m, False), *parts)
+        return form.context(packed, context, redundancy(graph)), run
 
     kernel = interrupts_answered()(read) if calls_laws(packed) else read
     return TrajectoryReading(kernel, workspace, system, shift=1, degree=8)

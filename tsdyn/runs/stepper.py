@@ -359,8 +359,9 @@ def _keep_start(c, r, implicit):
     copy(r.yd, r.yd_old)
     if implicit:
         keep(c, r.warm)  # a stage that fails may leave u far away
-    if r.numbers.adaptive == 1:
+    if r.numbers.adaptive == 1 or r.numbers.first_order != 0:
         copy(r.xd, r.xd_old)
+    if r.numbers.adaptive == 1:
         copy(r.x_low, r.x_low_old)
         copy(r.y_low, r.y_low_old)
 

@@ -86,10 +86,12 @@ def follow(scene, times, state, who, remedy):
     from ..analyses.kinematic_analysis import (  # imported here: a run needs none of it
         analyse,
         demand_driven,
+        demand_no_rates,
         driven_rates,
     )
 
     kept = prepared(scene)
+    demand_no_rates(kept.packed, who)
     given = scene._initial() if state is None else state_arrays(state, kept.n)
     t0 = _start_time(kept, given[0], times) if state is None else float(state.t)
     every = np.append(times, t0)

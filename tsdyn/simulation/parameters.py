@@ -17,7 +17,7 @@ import numpy as np
 from ..docstrings import SECTION
 from ..elements.bodies import Attribute, Ground, PointMass
 from ..elements.element import Attachment, checked_parameters
-from ..elements.joint import Joint
+from ..elements.joint import Joint, SumRow
 from ..elements.laws import SceneLaw
 from ..errors import InvalidArgument, UnknownParameter
 from ..files.scene_text import TableNumbers
@@ -560,6 +560,7 @@ class Family:
             known = self._structural[id(owner)] = (
                 getattr(owner, "period", None) is not None
                 or (isinstance(owner, Joint) and not is_ours(type(owner).__module__))
+                or isinstance(owner, SumRow)  # its terms are where joints are
                 or any(value is owner for item in items for value in item.referred)
                 or (self._has_laws and bool(owner.joint_coordinates))
             )

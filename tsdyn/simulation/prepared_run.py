@@ -17,6 +17,7 @@ from ..errors import InvalidArgument, Status
 from ..integrators import DOP853, Taylor
 from ..jit.compiled import clock
 from ..methods.integrator import frozen, is_plain
+from ..model.packed import has_rates
 from ..observables.state import remembered
 from ..runs.arguments import adaptive, demand_steps_seen, interval, output_times, state_arrays
 from ..runs.driver import Sampling
@@ -71,7 +72,8 @@ def reason(options, prepared):
 
 def turns_of(scene, prepared, method, form, span, within):
     """What makes the `Turns` of a run by the default method; None in a form that no implicit method serves."""
-    return None if form.first_order else partial(Turns, scene, prepared, method, form, span, within)
+    served = not (form.first_order or form.is_mixed(has_rates(prepared.packed)))
+    return partial(Turns, scene, prepared, method, form, span, within) if served else None
 
 
 def instead(task, status):
@@ -162,6 +164,11 @@ class Run:
         self._start = scene._initial()
         self.method = method = first_method(options, kept)
         self._driver = DRIVERS.get(method.driver, method.driver)
+        if method.implicit and self._form.is_mixed(has_rates(kept.packed)):
+            raise InvalidArgument(
+                f"{type(method).__name__} doesn't solve for its stages in the null-space form where there are rows on "
+                "velocities: use formulation='tangent', which does, or an explicit method."
+            )
         if method.coupled and kept.rough:
             raise InvalidArgument(
                 f"{type(method).__name__} doesn't solve for reactions that friction depends on "

@@ -14,6 +14,7 @@ from ..files.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
 from ..formulations.locked_orientations import keep_turning
 from ..formulations.registry import formulation
 from ..model.handles import handles_of
+from ..model.packed import has_rates
 from ..observables.channels import channels_of, values_of
 from ..observables.diagnostics import ConstraintError
 from ..rows.graph_builder import graph_of, set_redundant
@@ -120,9 +121,9 @@ def trajectory_of(numbers, arrays, scene, packed):
     else:
         method, form = method_of(numbers["method"]), formulation(numbers["form"])
         again = step_engine.read_again, packed, method, form.name, float(numbers["constraint_tol"])
-        form = form.serving(method)
+        form = form.serving(method, has_rates(packed))
         graph = form.graph(packed)
-        width = method.interpolant(form.first_order).size(n, *form.sizes(n, len(packed.system.segments), graph))
+        width = method.interpolant(form.first_order).size(n, *form.sizes(packed, graph))
         if method.coupled and len(blocks):
             demand((blocks[:, B_DATA] == method.kernel(form.first_order)[1][0]).all(), "the stages of steps")
     width += B_DATA + handles.count + packed.system.memory.size

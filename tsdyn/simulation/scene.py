@@ -71,7 +71,7 @@ def table(scene: Scene) -> str:
 
 def summary(scene: Scene) -> str:
     """What `repr` says of a scene."""
-    rows = sum(constraint.rows for constraint in scene.constraints)
+    rows = sum(constraint.all_rows for constraint in scene.constraints)
     n = sum(body.dimension for body in scene.bodies)
     points = sum(body.dimension == PARTICLE for body in scene.bodies)
     parts = [(len(scene.bodies) - points, "rigid body", "rigid bodies"), (points, "point mass", "point masses")]

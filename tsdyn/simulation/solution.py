@@ -620,7 +620,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         -------
         force, torque : ndarray (k, 3)
             In the ground frame; the torque is about the item's first point on that body (`point_a`), or the centroid
-            where it has none.
+            where it has none; of rolling and sliding surfaces about the contact point.
 
         Examples
         --------
@@ -632,6 +632,45 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         [ 0.  0. 20.] [  0. -20.   0.]
         """
         return exerted(self, item, on)
+
+    def contact_point(self, constraint: ItemLike) -> Floats:
+        """Where a surface touches that rolls or slides, (k, 3), m, ground frame: its path on the plane.
+
+        Parameters
+        ----------
+        constraint : RollingDisc, RollingBall, RollingEllipsoid, RollingBallOnCylinder, or name of one
+
+        Raises
+        ------
+        InvalidConstraint
+            If the constraint has no contact point.
+
+        Examples
+        --------
+        >>> import tsdyn as ts
+        >>> ball = (scene := ts.Scene()).add_body(mass=1.0, inertia=(0.1, 0.1, 0.1), position=(1, 2, 0.5))
+        >>> contact = scene.add(ts.constraints.RollingBall(ball, scene.ground, radius=0.5, normal_b=(0, 0, 1)))
+        >>> print(ts.simulate(scene, (0, 1)).contact_point(contact)[-1].round(9) + 0.0)
+        [1. 2. 0.]
+        """
+        return reactions.contact_point(self, constraint)
+
+    def friction_demand(self, constraint: ItemLike) -> Floats:
+        """Tangential over normal force at a contact, (k,): the coefficient of friction that rolling needs at least.
+
+        Infinite where the surfaces would have to pull. Arguments and errors as of `contact_point`.
+
+        Examples
+        --------
+        A ball needs 2/7 of the friction of a block at rest to roll down a slope of 45 degrees:
+
+        >>> import tsdyn as ts
+        >>> ball = (scene := ts.Scene()).add_body(mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0, 0, 0.5 * 2**0.5))
+        >>> contact = scene.add(ts.constraints.RollingBall(ball, scene.ground, radius=0.5, normal_b=(1, 0, 1)))
+        >>> print(f"{ts.simulate(scene, (0, 1)).friction_demand(contact)[-1]:.6f}")
+        0.285714
+        """
+        return reactions.friction_demand(self, constraint)
 
     def reaction_unique(self, item: ItemLike, on: BodyLike | None = None) -> Bools:
         """Return True where `reaction` is unique, at each output: bool (k,).

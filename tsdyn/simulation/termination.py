@@ -9,6 +9,7 @@ from ..errors import Status, TsdynError
 from ..formulations.dependent_rows import dependent_rows
 from ..maths.root_isolation import EPS
 from ..maths.tolerances import TINY
+from ..observables.contacts import singular_place
 from ..observables.evaluate import constraint_arrays
 from ..observables.generalised_forces import NotFinite, applied_loads, jumping, not_finite
 from ..rows.constraint_graph import MASS_REMEDY, mass_ratio
@@ -216,6 +217,9 @@ def suspect(solution, scene):
     """Name the nearly singular item at the last state."""
     if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
         return ""
+    place = singular_place(solution.packed, solution._last[0])
+    if place:
+        return f"{place}: a singular configuration."
     if solution._last.shape[1] > MOST_SINGULAR:
         return _suspect_of_many(solution, scene)
     _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)

@@ -190,14 +190,17 @@ def row_terms(packed, t, q, qd, qdd, floors=0.0):
     rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, :1]
     rate = np.abs(qd[rigid + np.arange(3, 7)]).max(initial=0.0)
     levels = np.array((np.abs(q), np.abs(qd), np.abs(qdd) + rate * np.abs(qd))) + floors
-    return np.array([(rows * x[index]).sum(axis=1) for x in levels])
+    terms = np.array([(rows * x[index]).sum(axis=1) for x in levels])
+    m = len(packed.system.segments)
+    np.add.at(terms, (slice(None), packed.system.tails), terms[:, m:])  # of sums
+    return terms[:, :m]
 
 
 def _row_name(packed, row):
     for constraint in packed.constraints:
-        if row < constraint.rows:
-            return f"row {row + 1} of {constraint.name}" if constraint.rows > 1 else constraint.name
-        row -= constraint.rows
+        if row < constraint.all_rows:
+            return f"row {row + 1} of {constraint.name}" if constraint.all_rows > 1 else constraint.name
+        row -= constraint.all_rows
     return ""
 
 

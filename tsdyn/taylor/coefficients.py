@@ -9,7 +9,7 @@ from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OM
 from ..jit.kernels import kernel
 from ..jit.simd import add, cross, fetch, first, fma, four, get, lanes, put, second, splat, sub, third, times
 from ..maths.dense_linalg import copy
-from ..rows.interface import add_products, note_loads, solve_series, weigh
+from ..rows.interface import add_products, clear_sums, note_loads, solve_series, weigh
 
 # Sums with their rounding errors.
 
@@ -160,6 +160,8 @@ def inverses(k, exact):
 @kernel
 def run_loops(graph, reals, mode, k, x, f):
     """One mode of the series loops of every kind; x is an `Expansion`, f a `TangentWorkspace`."""
+    if mode == RESIDUAL:
+        clear_sums(graph, f.b)
     for i in range(graph.kinds.shape[0]):
         kind, series = graph.kinds[i], x.places[i]
         call_series(

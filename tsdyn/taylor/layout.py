@@ -11,6 +11,7 @@ from ..elements.loops import force_series
 from ..elements.loops.constraint_rows import BODY, INTS, MASK, STILL
 from ..elements.loops.constraint_series import BODY_ROW, GROUND, UNTURNED, force_at, instance_width, scratch_at
 from ..elements.loops.friction import FRICTION_ROWS, REACTION
+from ..elements.loops.ground_contacts import is_ground_contact
 from ..elements.markers import POINT
 from ..errors import InvalidConstraint, InvalidForce
 from ..formulations.locked_orientations import instances
@@ -18,6 +19,7 @@ from ..jit.arrays import zeros
 from ..jit.kernels import Record, loader, records, twin
 from ..model.equations import changes_with_state
 from ..model.packed import System, coupled_loads, members_of
+from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.program import run_program
 from ..motions.signals import Signal
@@ -355,7 +357,12 @@ def _instances(packed, graph, places):
 def _sources(part, body, number, series, reals, orders):
     """Rows of Expansion.sources of the markers that a primitive has on a body."""
     return [
-        [series + force_at(j, len(part.markers), part.rows, orders), reals + 3 * j, int(marker.code == POINT), number]
+        [
+            series + force_at(j, len(part.markers), part.all_rows, orders),
+            reals + 3 * j,
+            int(marker.code == POINT),
+            number,
+        ]
         for j, marker in enumerate(part.markers)
         if part.body_of(marker) is body
     ]
@@ -397,6 +404,9 @@ def lacking(packed):
             constraint.rheonomic or any(isinstance(value, Motion) for value in given)
         ):
             found.append((constraint, "it depends on time"))
+        elif any(isinstance(value, CoordinateFunction) and value.no_series for value in given):
+            why = next(value.no_series for value in given if isinstance(value, CoordinateFunction) and value.no_series)
+            found.append((constraint, why))
         elif "series" not in constraint.kernels:
             found.append((constraint, f"{constraint._kind()} has no kernel `series`"))
     for load in packed.loads:
@@ -467,14 +477,15 @@ def allocate_expansion(graph, kinds, packed, highest):
     bodies.reshape(nb + 1, -1)[:, [0, 5, 10]] = 1.0  # A_0 of what never turns
     rows, total = [], 0
     for i, kind in enumerate(kinds):
-        first, count = graph.kinds[i].table, int(graph.kinds[i].count)
+        count = int(graph.kinds[i].count)
         # Columns of Phi_x that vary in no instance need no series
-        masks = graph.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
+        masks = masks_of(graph, i)
         varies = bool((masks & ((1 << GROUND) - 1)).any())
         driven = bool(graph.kinds[i].drift)
         slots = kind.slots + (len(kind.quantities()) if driven else 0)
-        width = instance_width(len(kind.markers), kind.rows, slots, orders, varies, driven)
-        loop = address(kind.kernels, loops[driven], kind.__name__, InvalidConstraint)
+        width = instance_width(len(kind.markers), kind.all_rows, slots, orders, varies, driven)
+        name = "contact_series" if is_ground_contact(kind, masks) else loops[driven]
+        loop = address(kind.kernels, name, kind.__name__, InvalidConstraint)
         rows.append([count, graph.kinds[i].stride, width, orders, loop, total])
         total += count * width
     places = records(ConstraintSeries, rows)
@@ -500,7 +511,7 @@ def _motions(graph, packed, orders, places, constraints):
     motions, rows = iter(packed.system.motions), []
     for i, (kind, members) in enumerate(instances(packed, graph)):
         for at, (_, given) in enumerate(members if graph.kinds[i].drift != 0 else ()):
-            first = places[i].values + at * places[i].width + scratch_at(len(kind.markers), kind.rows, orders, True)
+            first = places[i].values + at * places[i].width + scratch_at(len(kind.markers), kind.all_rows, orders, True)
             entry = 0
             for j in range(len(kind.quantities())):
                 row = first + (kind.slots + j) * orders
@@ -532,7 +543,7 @@ def masks(graph, packed):
                 isinstance(constraint.body_of(marker), Ground) or (size == STILL and marker.code != POINT)
                 for marker, size in zip(kind.markers, length, strict=True)
             )
-            key = grounded, tuple(Motion.numbers(par))
+            key = grounded, (*Motion.numbers(par), *[0.0] * kind.memory)
             if key not in patterns:
                 if grounded not in motions:
                     motions[grounded] = _random_motion(grounded)
@@ -542,6 +553,20 @@ def masks(graph, packed):
             entry[MASK] = mask | sum(int(size != 7) << (UNTURNED + j) for j, size in enumerate(length))
             constant += len(kind.markers) - (mask & ((1 << GROUND) - 1)).bit_count()
     return constant
+
+
+def masks_of(graph, i):
+    """Those of the instances of kind i."""
+    first, count = graph.kinds[i].table, int(graph.kinds[i].count)
+    return graph.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
+
+
+def with_ground_contacts(graph, kinds):
+    """The graph with the quicker loops of contacts with the ground, where all of a kind are."""
+    for i, kind in enumerate(kinds):
+        if is_ground_contact(kind, masks_of(graph, i)):
+            graph.kinds["reduced"][i] = address(kind.kernels, "contact_rows", kind.__name__, InvalidConstraint)
+    return graph
 
 
 def _random_motion(grounded):
@@ -557,7 +582,7 @@ def _mask(kind, series, par, grounded, motion):
     varies = np.zeros(len(motion[0]), bool)
     # A random motion shows which columns have coefficients beyond order zero
     for k, x in enumerate(motion):
-        out = np.zeros((kind.rows, len(x)))
+        out = np.zeros((kind.all_rows, len(x)))
         series(x, par, k, scratch, out)
         if k > 0:
             varies |= out.any(axis=0)

@@ -27,6 +27,7 @@ from .layout import (
     masks,
     refusal,
     room,
+    with_ground_contacts,
 )
 from .step_end import keep_start
 from .step_parts import (
@@ -104,7 +105,7 @@ class Series:
             raise InvalidArgument(found)
         graph, self.kinds = moving_parts(packed)
         self.constant_columns = _masks_once(graph, packed)
-        self.graph = with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT)
+        self.graph = with_ground_contacts(with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT), self.kinds)
         self.refined = int(len(graph.bodies) > MANY_BODIES or are_unequal(packed.system))
 
 

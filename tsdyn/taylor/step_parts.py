@@ -13,7 +13,7 @@ from ..formulations.projection import find_drift, land
 from ..jit.kernels import callback, caller, kernel, stack
 from ..jit.simd import fma, four, put, splat, times
 from ..maths.dense_linalg import copy, is_finite
-from ..model.equations import set_time
+from ..model.equations import is_rheonomic, set_time
 from ..motions.program import call_smooth
 from ..rows.interface import (
     accelerations_hold,
@@ -115,17 +115,11 @@ def write_qdd(c):
 
 
 @kernel
-def is_driven(system):
-    """Whether a constraint of a scene that Taylor serves depends on time."""
-    return system.motions.shape[0] > 0
-
-
-@kernel
 def _land_rates(c, t):
-    driven = is_driven(c.system)
-    if driven:
+    drifting = is_rheonomic(c.system)
+    if drifting:
         find_drift(c.graph, c.system, c.tangent, t)
-    project_rates(c.graph, c.tangent, c.expansion.low_end, driven)
+    project_rates(c.graph, c.tangent, c.expansion.low_end, drifting)
 
 
 @callback("pdd")

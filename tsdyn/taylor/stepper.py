@@ -93,7 +93,7 @@ def lower_order(order, rho, tol, h):
 # the rounding of time is reached, a step of first order crosses it (`_hop`); the next series have the law beyond.
 
 STEP_COLLAPSED, PASSAGE, UNHELD = int(Status.STEP_COLLAPSED), int(Status.PASSAGE), int(Status.UNHELD)
-SERIES_ENDED = int(Status.SERIES_ENDED)
+SERIES_ENDED, CHART_LOST = int(Status.SERIES_ENDED), int(Status.CHART_LOST)
 
 
 @kernel
@@ -293,6 +293,9 @@ def make_step(context, c, r, log, stop):
             return UNHELD if s.failed == UNHELD else _hop(context, c, r, log, stop)
         # Fixed steps end the run where the series leaves a law, adaptive ones are shortened
         note_try(r, log, r.clock.t, s.t1 - r.clock.t)
+        # Turns are counted where two bodies together turn by less than half of one
+        if not adaptive and c.system.memory.size > 0 and (s.t1 - r.clock.t) * _fastest(c) > 0.5 * math.pi:
+            return CHART_LOST
         if not adaptive and s.check != 0:
             call_laws(s.check, context, r.clock.t, s.t1 - r.clock.t, SHARP_TOL, SHARP_TOL)
             if s.good < 1.0:

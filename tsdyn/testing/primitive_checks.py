@@ -14,6 +14,7 @@ from ..errors import CheckFailed, InvalidCall, TsdynError
 from ..jit.kernels import NumbaError, twin
 from ..maths.power_series import Jet
 from ..maths.tolerances import COMPLEX_STEP
+from ..model.packed import member_of
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
@@ -26,15 +27,17 @@ if TYPE_CHECKING:
     from ..hints import AnyBody
 
 NOT_HOLONOMIC = (
-    " A row on velocities that is the rate of no phi is not holonomic; constraints are functions of positions and time."
+    " A row on velocities that is the rate of no phi is not holonomic: make it one of rate_rows, with the kernels "
+    "rate, rate_jacobian and rate_gamma."
 )
 _AXES = "xyz"
+WITH_VELOCITIES = "gamma", "rate", "rate_gamma"  # kernels that are given xd
 
 
 def check_primitive(
     kind: type[Primitive | Joint] | Callable[[AnyBody, AnyBody], Primitive | Joint], *, seed: int = 0, states: int = 3
 ) -> None:
-    """Check a primitive's kernels against complex steps of its phi; return None, or raise naming the wrong entry.
+    """Check a primitive's kernels against complex steps of its phi and its rate; return None, or name the wrong entry.
 
     Parameters
     ----------
@@ -52,13 +55,19 @@ def check_primitive(
     CheckFailed
         If an entry of jacobian, phi_t or gamma, or of the assembled Phi_q, Phi_t or gamma, is not the derivative that
         it should be, the compiled kernel differs from the Python one, or a kernel compares or leaves its arrays. A row
-        whose jacobian is of no phi is not holonomic, and refused too.
+        whose jacobian is of no phi is not holonomic, and refused too; so is a rate that is not linear in velocities.
+
+    Warns
+    -----
+    UserWarning
+        If a row on velocities is the derivative of a function of positions, which belongs in phi.
 
     Notes
     -----
     jacobian is compared with Phi_x by complex steps in x, phi_t with Phi_t by complex steps in t (motions with
     difference quotients of the complex-step kind too), gamma with the complex step of Phi_x xd + Phi_t along (xd, 1):
-    (Phi_x xd)_x xd + 2 Phi_xt xd + Phi_tt (Haug 2018, Eq. 3). Then the compiled, assembled arrays are compared with
+    (Phi_x xd)_x xd + 2 Phi_xt xd + Phi_tt (Haug 2018, Eq. 3). rate_jacobian is compared with the complex steps of rate
+    in xd, rate_gamma with that of rate along (x, t) = (xd, 1). Then the compiled, assembled arrays are compared with
     phi carried along the motion as a truncated Taylor series, which uses neither jacobian nor gamma.
 
     Examples
@@ -109,40 +118,51 @@ def _check_perturbed(constraint, name, rng):
 
 
 def _check_kernels(constraint, name, rng, par):
-    kind = type(constraint)
-    written = [kernel for kernel in ("phi", "jacobian", "gamma", "phi_t") if kernel in kind.kernels]
-    f = SimpleNamespace(**{kernel: _python(constraint, kernel, name, par) for kernel in written})
-    size = sum(m.size for m in kind.markers)
+    kind, size = type(constraint), sum(m.size for m in constraint.markers)
     x, xd, t = rng.normal(size=size), 10.0 * rng.normal(size=size), rng.uniform(0.1, 2.0)
+    written = [kernel for kernel in ("phi", "jacobian", "gamma", "phi_t") if kind.rows and getattr(kind, kernel, None)]
+    rates = ["rate", "rate_jacobian", "rate_gamma"] if kind.rate_rows else []
+    f = SimpleNamespace(**{kernel: _python(constraint, kernel, name, par) for kernel in (*written, *rates)})
     for kernel in written:
         _demand_no_comparison(getattr(f, kernel), kernel, name, kind.rows, x, xd, t)
+    for kernel in rates:
+        _demand_no_comparison(getattr(f, kernel), kernel, name, kind.rate_rows, x, xd, t)
     # entries are named by the argument that places their marker
     labels = [
         f"{m.argument}, component {_AXES[i] if m.size == 3 else f'e{i}'}" for m in kind.markers for i in range(m.size)
     ]
+    if kind.rows:
+        _check_positions(f, name, kind.rows, (x, xd, t), labels)
+    if kind.rate_rows:
+        _check_rates(f, name, kind.rate_rows, (x, xd, t), labels)
 
-    Phi_x = np.zeros((kind.rows, size))
+
+def _check_positions(f, name, rows, motion, labels):
+    """jacobian, phi_t and gamma against phi."""
+    x, xd, t = motion
+    size = x.size
+    Phi_x = np.zeros((rows, size))
     f.jacobian(x, t, Phi_x)
-    fixed = _vector(f.phi, kind.rows, x, t) == _vector(f.phi, kind.rows, x + xd, t)
+    fixed = _vector(f.phi, rows, x, t) == _vector(f.phi, rows, x + xd, t)
     for j in range(size):
         step = np.zeros(size, complex)
         step[j] = 1j * COMPLEX_STEP
-        expected = _vector(f.phi, kind.rows, x + step, t).imag / COMPLEX_STEP
+        expected = _vector(f.phi, rows, x + step, t).imag / COMPLEX_STEP
         h = REAL_STEP * step.imag / COMPLEX_STEP
-        quotient = (_vector(f.phi, kind.rows, x + h, t) - _vector(f.phi, kind.rows, x - h, t)).real / (2.0 * REAL_STEP)
+        quotient = (_vector(f.phi, rows, x + h, t) - _vector(f.phi, rows, x - h, t)).real / (2.0 * REAL_STEP)
         if not np.allclose(quotient, expected, rtol=NOT_ANALYTIC, atol=NOT_ANALYTIC * (1.0 + np.abs(Phi_x).max())):
             raise CheckFailed(
                 f"{name}: phi is not analytic, so its complex steps say nothing: it compares, or takes abs or norm of, "
                 "x. Write np.sqrt(x[0] ** 2 + ...) for a norm."
             )
-        for i in range(kind.rows):
+        for i in range(rows):
             entry = f"jacobian[{i}, {j}] (d phi[{i}] / d {labels[j]})"
             _compare(name, entry, Phi_x[i, j], expected[i], Phi_x, NOT_HOLONOMIC if fixed[i] else "")
 
-    expected = _vector(f.phi, kind.rows, x, t + 1j * COMPLEX_STEP).imag / COMPLEX_STEP
+    expected = _vector(f.phi, rows, x, t + 1j * COMPLEX_STEP).imag / COMPLEX_STEP
     if hasattr(f, "phi_t"):
-        Phi_t = _vector(f.phi_t, kind.rows, x, t)
-        for i in range(kind.rows):
+        Phi_t = _vector(f.phi_t, rows, x, t)
+        for i in range(rows):
             _compare(name, f"phi_t[{i}]", Phi_t[i], expected[i], expected)
     elif expected.any():
         raise CheckFailed(
@@ -150,17 +170,63 @@ def _check_kernels(constraint, name, rng, par):
         )
 
     def rate(s):
-        jacobian = np.zeros((kind.rows, size), complex)
+        jacobian = np.zeros((rows, size), complex)
         f.jacobian(x + s * xd, t + s, jacobian)
         total = jacobian @ xd
-        return total + _vector(f.phi_t, kind.rows, x + s * xd, t + s) if hasattr(f, "phi_t") else total
+        return total + _vector(f.phi_t, rows, x + s * xd, t + s) if hasattr(f, "phi_t") else total
 
     expected = rate(1j * COMPLEX_STEP).imag / COMPLEX_STEP
-    gamma = np.zeros(kind.rows)
-    f.gamma(x, t, gamma, xd)
+    gamma = _vector(f.gamma, rows, x, t, xd).real
     scale = np.abs(np.abs(Phi_x) @ xd**2)
-    for i in range(kind.rows):
+    for i in range(rows):
         _compare(name, f"gamma[{i}]", gamma[i], expected[i], scale)
+
+
+def _check_rates(f, name, rows, motion, labels):
+    """Whether rate is linear in xd; rate_jacobian and rate_gamma against it."""
+    x, xd, t = motion
+    size, step = x.size, 1j * COMPLEX_STEP
+
+    def rate(xd, x=x, t=t):
+        return _vector(f.rate, rows, x, t, xd)
+
+    # rate(xd) - rate(0) doubles with xd
+    b, A = rate(0.0 * xd).real, np.zeros((rows, size))
+    f.rate_jacobian(x, t, A)
+    once, twice, terms = rate(xd).real - b, rate(2.0 * xd).real - b, np.abs(A) @ np.abs(xd) + np.abs(b)
+    for i in range(rows):
+        if not abs(twice[i] - 2.0 * once[i]) <= ROUNDED * max(1.0, terms[i], abs(twice[i])):
+            raise CheckFailed(
+                f"{name}: rate[{i}] is not linear in xd: twice the velocities make it {twice[i]:.6g} in place of "
+                f"{2.0 * once[i]:.6g}. A row on velocities is A(x, t) xd + b(x, t)."
+            )
+    slopes, drifts = np.empty((size, rows, size)), np.empty((rows, size))  # A_x, b_x
+    for j in range(size):
+        unit = np.zeros(size, complex)
+        unit[j] = step
+        expected = rate(xd + unit).imag / COMPLEX_STEP
+        for i in range(rows):
+            _compare(name, f"rate_jacobian[{i}, {j}] (d rate[{i}] / d rate of {labels[j]})", A[i, j], expected[i], A)
+        near = np.zeros((rows, size), complex)
+        f.rate_jacobian(x + unit, t, near)
+        slopes[j], drifts[:, j] = near.imag / COMPLEX_STEP, rate(0.0 * xd, x + unit).imag / COMPLEX_STEP
+    # Along (xd, 1): (A xd)_x xd + A_t xd + b_x xd + b_t
+    expected = rate(xd, x + step * xd, t + step).imag / COMPLEX_STEP
+    gamma = _vector(f.rate_gamma, rows, x, t, xd).real
+    for i in range(rows):
+        _compare(name, f"rate_gamma[{i}]", gamma[i], expected[i], np.abs(A) @ xd**2)
+    # A dx + b dt is exact where A_x is symmetric and A_t = b_x
+    later = np.zeros((rows, size), complex)
+    f.rate_jacobian(x, t + step, later)
+    curl = np.abs(slopes - slopes.transpose(2, 1, 0)).max(axis=(0, 2))
+    curl = np.maximum(curl, np.abs(later.imag / COMPLEX_STEP - drifts).max(axis=1))
+    for i in np.flatnonzero(curl <= ROUNDED * np.maximum(1.0, np.abs(slopes).max(axis=(0, 2)))):
+        warnings.warn(
+            f"{name}: rate[{i}] is the derivative of a function of positions. Write that function as a row of phi: "
+            "positions then hold to rounding, too, in place of drifting by what velocities lack.",
+            UserWarning,
+            stacklevel=4,
+        )
 
 
 def _python(constraint, kernel, name, given):
@@ -192,9 +258,9 @@ def _python(constraint, kernel, name, given):
 def _demand_no_comparison(function, kernel, name, rows, x, xd, t):
     """Refuse a kernel that compares x or xd, or takes its absolute value: Jets have no order."""
     x, xd = ([Jet(value) for value in part] for part in (x, xd))
-    out = np.full((rows, len(x)) if kernel == "jacobian" else rows, 0.0, object)
+    out = np.full((rows, len(x)) if "jacobian" in kernel else rows, 0.0, object)
     try:
-        function(x, t, out, *([xd] if kernel == "gamma" else []))
+        function(x, t, out, *([xd] if kernel in WITH_VELOCITIES else []))
     except NumbaError:
         return  # compiled kernels that a closure calls take numbers alone
     except CheckFailed as error:
@@ -210,9 +276,9 @@ def _parts(value, t):
     return [f(t) for f in value.functions] if isinstance(value, Motion) else [value]
 
 
-def _vector(function, rows, x, t):
+def _vector(function, rows, x, t, *xd):
     out = np.zeros(rows, complex)
-    function(x, t, out)
+    function(x, t, out, *xd)
     return out
 
 
@@ -222,7 +288,7 @@ def _check_assembled(scene, constraint, name, rng):
     for body in scene.bodies:
         body.angular_velocity, body.velocity = 10.0 * rng.normal(size=3), rng.normal(size=3)
     _, qd = scene.start
-    rows = slice(0, constraint.rows)
+    rows = member_of(scene.packed, constraint).rows
     Phi, Phi_q, Phi_t, gamma = (array[rows] for array in constraint_arrays(scene.system, q, qd, t))
     zero = np.zeros_like(q)
 
@@ -231,7 +297,7 @@ def _check_assembled(scene, constraint, name, rng):
         return [level[0, rows] for level in levels]
 
     value, _, second = along(qd, 1.0)
-    for i in range(constraint.rows):
+    for i in range(constraint.all_rows):
         _compare(name, f"compiled Phi[{i}]", Phi[i], value[i], np.append(q, 1.0))
         _compare(name, f"compiled Phi_t[{i}]", Phi_t[i], along(zero, 1.0)[1][i], Phi_t)
         _compare(name, f"compiled gamma[{i}]", gamma[i], second[i], np.abs(Phi_q) @ qd**2)
@@ -240,7 +306,7 @@ def _check_assembled(scene, constraint, name, rng):
         direction = zero.copy()
         direction[j] = 1.0
         expected = along(direction, 0.0)[1]
-        for i in range(constraint.rows):
+        for i in range(constraint.all_rows):
             _compare(name, f"compiled Phi_q[{i}, {j}] ({coordinate})", Phi_q[i, j], expected[i], Phi_q)
 
 

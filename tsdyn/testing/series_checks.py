@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..elements.force import Force
-from ..elements.joint import Joint
+from ..elements.joint import Joint, SumRow
 from ..elements.loops.constraint_rows import POSE, P
 from ..elements.loops.constraint_series import ADVANCE, BODY_ROW, RESIDUAL, S_OMEGA, S_R
 from ..elements.loops.template import state
@@ -15,6 +15,7 @@ from ..maths.power_series import Truncated
 from ..maths.vectors import rotate
 from ..methods.integrator import Integrator
 from ..model.equations import set_time
+from ..model.packed import member_of
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal, numbers_of
 from ..motions.tracing import retold
@@ -147,18 +148,20 @@ def check_constraint_series(scene, constraint, name, rng):
     if any(isinstance(p, Motion) and p.smooth is None for part in moved for p in part.parameters()):
         return
     q, t = random_motion(scene, rng), random_time(rng)
-    Phi = np.concatenate([_check_rows(scene, part, name, q, t) for part in parts])
+    found = [_check_rows(scene, part, name, q, t) for part in parts]
+    Phi = sum(found) if isinstance(constraint, SumRow) else np.concatenate(found)
     packed = scene.packed
-    graph, kinds = build(packed)
-    Phi = Phi[graph.row]
+    own, (graph, kinds) = member_of(packed, constraint).rows, build(packed)
+    places = np.flatnonzero((graph.row >= own.start) & (graph.row < own.stop))
+    Phi = Phi[graph.row[places] - own.start]
     masks(graph, packed)
     context, (where, *_keep) = series_context(packed, graph, kinds)
     write_bodies(scene, q, context.expansion)
     begin_motions(where, t.c[0])
     for k in range(ORDER - 1):
         constraint_coefficients(where, k)
-        value = context.tangent.b / ((k + 1) * (k + 2))
-        compare(name, k + 2, [f"compiled Phi[{i}]" for i in graph.row], value, Phi)
+        value = context.tangent.b[places] / ((k + 1) * (k + 2))
+        compare(name, k + 2, [f"compiled Phi[{i}]" for i in graph.row[places]], value, Phi)
 
 
 def _check_rows(scene, primitive, name, q, t):
@@ -167,21 +170,34 @@ def _check_rows(scene, primitive, name, q, t):
     par = [entry for value in given for entry in _entries(value, t)] + [0.0] * kind.memory
     numbers = [entry.c[0] if isinstance(entry, Truncated) else entry for entry in par]
     rows = [_series(par[3 * i]).c for i in range(len(kind.quantities()) if "driven_series" in kind.kernels else 0)]
-    x, _ = along(scene, primitive, primitive.coordinates, q)
-    Phi, Phi_x = zeros(kind.rows), zeros((kind.rows, len(x)))
-    run_truncated(kind, "phi", name, x, par, t, Phi)
-    run_truncated(kind, "jacobian", name, x, par, t, Phi_x)
-    columns = labels_of(kind)
+    x, xd = along(scene, primitive, primitive.coordinates, q)
+    m = kind.all_rows
+    Phi, Phi_x, Phi_t, columns = zeros(m), zeros((m, len(x))), zeros(m), labels_of(kind)
     labels = [[f"jacobian[{i}, {j}] (d phi[{i}] / d {c})" for j, c in enumerate(columns)] for i in range(kind.rows)]
-    Phi_t = zeros(kind.rows)
-    if rows:
-        run_truncated(kind, "phi_t", name, x, par, t, Phi_t)
-    for k, f, scratch in coefficients_of(kind, name, (x,), numbers, (kind.rows, len(x)), rows):
-        compare(name, k, labels, f, Phi_x)
+    if kind.rows:
+        run_truncated(kind, "phi", name, x, par, t, Phi)
+        run_truncated(kind, "jacobian", name, x, par, t, Phi_x)
+        if rows and getattr(kind, "phi_t", None):
+            run_truncated(kind, "phi_t", name, x, par, t, Phi_t)
+    if kind.rate_rows:
+        # A, b, and for Phi the integral of the rate
+        labels += [
+            [f"rate_jacobian[{i}, {j}] (d rate[{i}] / d rate of {c})" for j, c in enumerate(columns)]
+            for i in range(kind.rate_rows)
+        ]
+        rates = zeros(kind.rate_rows)
+        run_truncated(kind, "rate_jacobian", name, x, par, t, Phi_x[kind.rows :])
+        run_truncated(kind, "rate", name, x, zeros(len(x)), par, t, Phi_t[kind.rows :])
+        run_truncated(kind, "rate", name, x, xd, par, t, rates)
+        Phi[kind.rows :] = [t.of(rate).integral(0.0) for rate in rates]
+    moving = np.repeat([primitive.body_of(marker).dimension > 0 for marker in kind.markers], [3] * len(kind.markers))
+    labels = np.array(labels, object)[:, moving]  # columns of the ground are used by nobody
+    for k, f, scratch in coefficients_of(kind, name, (x,), numbers, (m, len(x)), rows):
+        compare(name, k, labels, f[:, moving], Phi_x[:, moving])
         if rows:
-            drift = np.zeros(kind.rows)
+            drift = np.zeros(m)
             twin(kind.series_t)(np.array([c.c[k] for c in x]), numbers, k, scratch, drift)
-            compare(name, k, [f"phi_t[{i}], by series_t," for i in range(kind.rows)], drift, Phi_t)
+            compare(name, k, [f"phi_t[{i}], by series_t," for i in range(m)], drift, Phi_t)
     return Phi
 
 

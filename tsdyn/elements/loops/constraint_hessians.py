@@ -23,10 +23,13 @@ from .template import (
     DIMENSION,
     MARKERS,
     OWNERS,
+    RATES_FROM,
     ROWS,
     SIZE,
     STARTS,
+    SUMMED,
     differentiate,
+    kernel_drift,
     kernel_gamma,
     kernel_jacobian,
     move_markers,
@@ -42,7 +45,7 @@ class Slopes(NamedTuple):
     """Derivatives of one instance with respect to its markers, each (ROWS, SIZE)."""
 
     J: np.ndarray  # Phi_x
-    a1: np.ndarray  # Phi_xx xd + Phi_xt
+    a1: np.ndarray  # Phi_xx xd + Phi_xt = (Phi_x xd + Phi_t)_x
     a2: np.ndarray  # Phi_xx xdd + gamma_x
     g_xd: np.ndarray  # gamma_xd
 
@@ -82,11 +85,12 @@ def _slope_of_jacobian(z, x, c, par, t, zJ):
 def _derive_rates(x, xd, xdd, par, t, slopes):
     """The `Slopes`, by complex steps along x_c and xd_c.
 
-    gamma_xd = 2 (Phi_xx xd + Phi_xt), since gamma is quadratic in xd.
+    gamma_xd = 2 (Phi_xx xd + Phi_xt), since gamma is quadratic in xd. Of a row on velocities A_x isn't symmetric, and
+    a1 = (A xd + b)_x.
     """
     J, a1, a2, g_xd = slopes
     z, zd = complex_stack(SIZE), complex_stack(SIZE)
-    zJ, zg = complex_stack2(ROWS, SIZE), complex_stack(ROWS)
+    zJ, zg, zb = complex_stack2(ROWS, SIZE), complex_stack(ROWS), complex_stack(ROWS)
     for c in range(SIZE):
         z[c], zd[c] = x[c], xd[c]
     differentiate(x, par, t, J)
@@ -94,7 +98,12 @@ def _derive_rates(x, xd, xdd, par, t, slopes):
         # Along x_c: a2 = Phi_xx xdd + gamma_x
         _slope_of_jacobian(z, x, c, par, t, zJ)
         kernel_gamma(z, zd, par, t, zg)
+        kernel_drift(z, par, t, zb)
         z[c] = x[c]
+        for r in range(RATES_FROM, ROWS):
+            a1[r, c] = zb[r].imag / CONSTRAINT_STEP
+            for d in range(SIZE):
+                a1[r, c] += zJ[r, d].imag / CONSTRAINT_STEP * xd[d]
         for r in range(ROWS):
             total = zg[r].imag / CONSTRAINT_STEP
             for d in range(SIZE):
@@ -106,6 +115,7 @@ def _derive_rates(x, xd, xdd, par, t, slopes):
         zd[c] = xd[c]
         for r in range(ROWS):
             g_xd[r, c] = zg[r].imag / CONSTRAINT_STEP
+        for r in range(RATES_FROM):
             a1[r, c] = 0.5 * g_xd[r, c]
 
 
@@ -128,7 +138,7 @@ def _derive_reaction(x, par, t, lam, J, H):
 
 @part
 def _fill_row(q, qd, own, real, along_x, along_second, out):
-    """out (n,) = along_x x_q + along_second x_qq qd, for one row of G1 or G2, at its two bodies."""
+    """out (n,) = along_x x_q + along_second x_qq qd, for one row of G1 or G2, at its two bodies; added to a sum."""
     row = stack(SPAN)
     for i in range(SPAN):
         row[i] = 0.0
@@ -140,7 +150,8 @@ def _fill_row(q, qd, own, real, along_x, along_second, out):
         _chain_second(code, dimension, at, qd, s, along_second[c:], row[7 * k :])
     for side in range(2):
         for i in range(own[DIMENSION + side]):
-            out[own[AT + side] + i] = row[7 * side + i]
+            at = own[AT + side] + i
+            out[at] = out[at] + row[7 * side + i] if SUMMED else row[7 * side + i]
 
 
 @part
@@ -198,7 +209,7 @@ def geometric_stiffness(count, stride, table, reals, q, t, lam, K):
     lam, K = vector(lam, ANY), vector(K, ANY)
     x, J, H, XHX = stack(SIZE), stack2(ROWS, SIZE), stack2(SIZE, SIZE), stack2(SPAN, SPAN)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride :]
         own_lam, n = lam[own[ROW] :], own[STRIDE]
         place_markers(q, own, real, x)
         _derive_reaction(x, real[3 * MARKERS :], t, own_lam, J, H)
@@ -222,7 +233,7 @@ def rate_slopes(count, stride, table, reals, q, qd, qdd, t, G1, G2):
     slopes = Slopes(J, a1, a2, g_xd)
     for i in range(count):
         # Markers at q and qd, and their accelerations with qdd
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride :]
         move_markers(q, qd, own, real, x, xd, xdd)
         _accelerate_markers(q, qdd, own, real, xdd)
         _derive_rates(x, xd, xdd, real[3 * MARKERS :], t, slopes)

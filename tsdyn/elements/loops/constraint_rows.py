@@ -11,6 +11,7 @@ from .template import (
     ROWS,
     SIZE,
     STARTS,
+    SUMMED,
     acceleration_bias,
     differentiate,
     kernel_phi,
@@ -247,8 +248,9 @@ def add_gradient(code, poses, at, reals, s, f, i, H, h):  # nine: the pose, the 
 
 SIGNATURE = "iippppdpp"  # count, reals per instance, table, reals, poses, unused, t, out, H
 call_body_loop = caller(SIGNATURE)
-# of the graph's table for each instance: places of its two bodies among the poses, its first row, a mask of markers
-BODY, ROW, MASK, INTS = 0, 2, 3, 4
+# of the graph's table for each instance: places of its two bodies among the poses, its first row, a mask of markers,
+# and its first pair of sides in H, which is the row's unless several instances add to one row
+BODY, ROW, MASK, PAIR, INTS = 0, 2, 3, 4, 5
 
 
 @part
@@ -268,7 +270,7 @@ def values(count, stride, table, reals, poses, unused, t, out, H):
         kernel_value(x, reals[real + 3 * MARKERS :], t, f)
         row = get(table, own + ROW)
         for r in range(ROWS):
-            let(out, row + r, f[r])
+            let(out, row + r, get(out, row + r) + f[r] if SUMMED else f[r])
     return 0
 
 
@@ -284,11 +286,11 @@ def reduced(count, stride, table, reals, poses, unused, t, out, H):
         # Phi and Phi_x of the primitive
         kernel_phi(x, par, t, f)
         differentiate(x, par, t, g)
-        row = get(table, own + ROW)
+        row, pair = get(table, own + ROW), get(table, own + (PAIR if SUMMED else ROW))
         for r in range(ROWS):
-            let(out, row + r, f[r])
+            let(out, row + r, get(out, row + r) + f[r] if SUMMED else f[r])
             # H = Phi_x x_(r, pi'), marker by marker
-            h = 16 * (row + r)
+            h = 16 * (pair + r)
             for c in range(0, 16, 4):
                 put(H, h + c, splat(0.0))
             for j in range(MARKERS):

@@ -37,6 +37,7 @@ from .template import (
     SIZE,
     SLOTS,
     STARTS,
+    SUMMED,
     extent,
     kernel_series,
     kernel_series_t,
@@ -107,7 +108,7 @@ def torque(bodies, at, k, forces, first):
 
 
 @part
-def _offsets(orders):
+def offsets(orders):
     """Where the series f, lam, x, Phi_x and the scratch of an instance begin."""
     wide = 4 * orders
     F = 4 * MARKERS * (1 + ROWS)
@@ -128,7 +129,7 @@ def _marker_coefficient(j, k, one):
 @part
 def _fetch_next(mode, k, orders, table, own, bodies, values, at):
     """Bring the numbers of the next instance into the cache; its table and its series are given."""
-    wide, (F, _L, _X, _J, _scratch) = 4 * orders, _offsets(orders)
+    wide, (F, _L, _X, _J, _scratch) = 4 * orders, offsets(orders)
     fetch(values, at, F)
     for j in range(MARKERS):
         body = get(table, own + OWNERS[j]) * BODY_ROW * orders
@@ -144,7 +145,7 @@ def _fetch_next(mode, k, orders, table, own, bodies, values, at):
 def _differentiate(k, one, x, f, g):
     """Store x_k, and (Phi_x)_k where columns of it vary."""
     orders, table, own, reals, real, _, values, at = one
-    wide, (_F, _L, X, J, own_scratch), mask = 4 * orders, _offsets(orders), get(table, own + MASK)
+    wide, (_F, _L, X, J, own_scratch), mask = 4 * orders, offsets(orders), get(table, own + MASK)
     places, gradients, step = at, at + 4 * MARKERS, 4
     if k > 0:
         places, gradients, step = at + X + 4 * k, at + J + 4 * k, wide
@@ -175,7 +176,7 @@ def _differentiate(k, one, x, f, g):
 def _push(k, one, b, Z):
     """f_{k-1} whole, by lam_{k-1} of b; f_k without lam_k, Eq. (2), and its torque, Eq. (3), onto the bodies' Z."""
     orders, table, own, reals, real, bodies, values, at = one
-    wide, (F, L, _X, J, _scratch), mask = 4 * orders, _offsets(orders), get(table, own + MASK)
+    wide, (F, L, _X, J, _scratch), mask = 4 * orders, offsets(orders), get(table, own + MASK)
     row = get(table, own + ROW)
     for j in range(MARKERS):
         if mask >> (GROUND + j) & 1:
@@ -207,7 +208,7 @@ def _push(k, one, b, Z):
 def _residual(k, one, b, x):
     """b = (k + 1)(k + 2) Phi_{k+2}, Eq. (1)."""
     orders, table, own, _, _, _, values, at = one
-    wide, (_F, _L, X, J, own_scratch), mask = 4 * orders, _offsets(orders), get(table, own + MASK)
+    wide, (_F, _L, X, J, own_scratch), mask = 4 * orders, offsets(orders), get(table, own + MASK)
     # x_{k+2} as the bodies have it
     for j in range(MARKERS):
         if mask >> (GROUND + j) & 1 == 0:
@@ -225,7 +226,8 @@ def _residual(k, one, b, x):
                     gradient = times(four(values, gradients - 4 * l), splat(float(l)))
                     lower = fma(gradient, four(values, places + 4 * l), lower)
         drift = get(values, at + own_scratch + SLOTS * orders + r) if DRIVEN else 0.0
-        let(b, get(table, own + ROW) + r, (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift))
+        row, residual = get(table, own + ROW) + r, (k + 1.0) * ((k + 2.0) * total(highest) + total(lower) + drift)
+        let(b, row, get(b, row) + residual if SUMMED else residual)
 
 
 def series(mode, k, kind, table, reals, bodies, values, b, Z):
@@ -249,7 +251,7 @@ def series(mode, k, kind, table, reals, bodies, values, b, Z):
         # Multipliers of the last order are kept where later orders need them
         varies = get(table, own + MASK) & ((1 << GROUND) - 1) != 0
         for r in range(ROWS if k > 0 and varies else 0):
-            let(values, at + _offsets(orders)[1] + r * orders + k - 1, get(b, get(table, own + ROW) + r))
+            let(values, at + offsets(orders)[1] + r * orders + k - 1, get(b, get(table, own + ROW) + r))
         # Orders zero and one at first, then one more each time
         for now in range(0 if k == 0 else k + 1, k + 2 if varies or DRIVEN else 1):
             _differentiate(now, one, x, f, g)

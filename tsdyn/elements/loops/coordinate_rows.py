@@ -16,6 +16,7 @@ from .template import (
     ROWS,
     SIZE,
     STARTS,
+    SUMMED,
     acceleration_bias,
     differentiate,
     kernel_value,
@@ -35,11 +36,11 @@ def values(count, stride, table, reals, q, qd, t, out):
     table, reals, q, out = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(out, ANY)
     x, f = stack(SIZE), stack(ROWS)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride :]
         place_markers(q, own, real, x)
         kernel_value(x, real[3 * MARKERS :], t, f)
         for r in range(ROWS):
-            out[own[ROW] + r] = f[r]
+            out[own[ROW] + r] = out[own[ROW] + r] + f[r] if SUMMED else f[r]
     return 0
 
 
@@ -48,7 +49,7 @@ def remembers(count, stride, table, reals, q, qd, t, out):
     table, reals, q = integers(table, ANY), vector(reals, ANY), vector(q, ANY)
     x = stack(SIZE)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride :]
         place_markers(q, own, real, x)
         real[stride - 1] = kernel_value(x, real[3 * MARKERS :], t)
     return 0
@@ -59,7 +60,7 @@ def jacobian(count, stride, table, reals, q, qd, t, out):
     table, reals, q, out = integers(table, ANY), vector(reals, ANY), vector(q, ANY), vector(out, ANY)
     x, f = stack(SIZE), stack2(ROWS, SIZE)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride :]
         place_markers(q, own, real, x)
         differentiate(x, real[3 * MARKERS :], t, f)
         for r in range(ROWS):
@@ -68,7 +69,8 @@ def jacobian(count, stride, table, reals, q, qd, t, out):
                 k = OWNERS[j]
                 block = own[BLOCK + k] + r * own[STRIDE]
                 s, row = real[3 * j : 3 * j + 3], f[r, STARTS[j] :]
-                chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, row, FIRST[j], out[block:])
+                fresh = 0 if SUMMED else FIRST[j]
+                chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, row, fresh, out[block:])
     return 0
 
 
@@ -79,7 +81,7 @@ def bias(count, stride, table, reals, q, qd, t, out):
     x, xd, xdd = stack(SIZE), stack(SIZE), stack(SIZE)
     f, g = stack2(ROWS, SIZE), stack(ROWS)
     for i in range(count):
-        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride : (i + 1) * stride]
+        own, real = table[i * INTS : (i + 1) * INTS], reals[i * stride :]
         # xdd holds (x_q qd)_q qd
         move_markers(q, qd, own, real, x, xd, xdd)
         acceleration_bias(x, xd, xdd, real[3 * MARKERS :], t, f, g, out[own[ROW] :])

@@ -140,6 +140,7 @@ def carry_back_derivative(code, dimension, at, s, f, n, Q_q):
 # there; a loop is given each array by its address.
 
 ROWS = MARKERS = 1  # scalar constraints, and markers, of an instance
+RATES_FROM = 1  # number of rows on positions, which those on velocities follow
 SIZE = ROOM = 1  # length of x, the concatenated marker coordinates; and with room for a store of four at its end
 CODES = OWNERS = STARTS = FIRST = (
     0,
@@ -147,15 +148,18 @@ CODES = OWNERS = STARTS = FIRST = (
 SLOTS = 1  # rows of scratch memory of `series`
 AHEAD = False  # whether each instance has the next one's numbers brought into the cache
 DRIVEN = False  # whether the series depend on time
+SUMMED = False  # whether a row is the sum of several instances, zero before their loops run
 TRACED = False  # whether a force is given by a program
 SHARP = False  # whether the series of a force are checked against its law
 POSITIVE = ()  # rows of the scratch of `series` that are positive where the law of a force is analytic
 FRICTIONAL = False  # whether a force is in proportion to a normal load
 KEPT = 1  # floats of a force's derivatives kept from step to step
 ALONG = -1  # where in x the direction ends that a force's frame follows, or -1: the frame of a body
+kernel_drift = kernel_rate = kernel_rate_jacobian = kernel_rate_gamma = kernel_phi_t = None
 kernel_phi = kernel_value = kernel_jacobian = kernel_gamma = kernel_series = kernel_series_t = None
 kernel_law = kernel_derivatives = kernel_remember = kernel_inputs = None
-kernel_normal_load = kernel_normal_series = None
+kernel_normal_load = kernel_normal_series = kernel_arm_series = None
+NORMAL = -1  # of a contact: the rows are along this marker and those after it
 
 # what the table of a kind holds for each instance: where its two bodies' coordinates begin, and how many they are
 AT, DIMENSION = 0, 2
@@ -200,14 +204,14 @@ def differentiate(x, par, t, Phi_x):
 
 @part
 def acceleration_bias(x, xd, xdd, par, t, Phi_x, gamma, out):
-    """Set out (ROWS,) = gamma + Phi_x xdd, the bias of Phi_q qdd + out = 0."""
+    """Set out (ROWS,) = gamma + Phi_x xdd, the bias of Phi_q qdd + out = 0; add it where rows are sums."""
     differentiate(x, par, t, Phi_x)
     kernel_gamma(x, xd, par, t, gamma)
     for r in range(ROWS):
         total = gamma[r]
         for c in range(SIZE):
             total += Phi_x[r, c] * xdd[c]
-        out[r] = total
+        out[r] = out[r] + total if SUMMED else total
 
 
 @part

@@ -1,0 +1,185 @@
+"""Rows on velocities by every method in every form: closed forms, agreement, orders, levels between the steps."""
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tests.helpers import skates
+from tests.helpers.refusals import refuse
+from tests.helpers.tolerances import FINE, HELD, NEAR, TIGHT
+
+I = ts.integrators
+WAVE = ts.motions.Sine(amplitude=0.5, frequency=3.0, offset=1.0)
+SCENES = {
+    "skate": skates.skate,
+    "sleigh": skates.sleigh,
+    "blades in a line": lambda: skates.sleigh(3),
+    "blade on a rail": skates.guided,
+    "on a table": skates.on_a_table,
+    "belt": lambda: skates.belt(2.0),
+    "belt of time": lambda: skates.belt(WAVE),
+}
+WAYS = {  # options, largest error
+    "dop853": ({"integrator": I.DOP853(1e-12, 1e-12)}, TIGHT),
+    "dop853, placed": ({"integrator": I.DOP853(1e-12, 1e-12), "chart_interval": 3}, TIGHT),
+    "dop853, null-space": ({"integrator": I.DOP853(1e-12, 1e-12), "formulation": "null-space"}, TIGHT),
+    "dop853, maggi-kane": ({"integrator": I.DOP853(1e-12, 1e-12), "formulation": "maggi-kane"}, TIGHT),
+    "nystrom4": ({"integrator": I.Nystrom4(step=2e-3)}, FINE),
+    "nystrom4, null-space": ({"integrator": I.Nystrom4(step=2e-3), "formulation": "null-space"}, FINE),
+    "rk45, null-space": ({"integrator": I.RK45(1e-11, 1e-11), "formulation": "null-space"}, FINE),
+    "radau": ({"integrator": I.Radau(1e-11, 1e-11)}, FINE),
+    "sdirk54": ({"integrator": I.SDIRK54(1e-9, 1e-9)}, NEAR),
+    "trapezoid": ({"integrator": I.ImplicitTrapezoid(1e-7, 1e-7)}, 1e-5),
+}
+SPAN = 2.0
+
+
+def off(one, other):
+    return max(np.abs(one.q[-1] - other.q[-1]).max(), np.abs(one.qd[-1] - other.qd[-1]).max())
+
+
+def by_series(scene, **options):
+    return ts.simulate(scene, (0, SPAN), integrator=I.Taylor(tol=1e-15), **options).raise_if_failed()
+
+
+@pytest.mark.slow_but("*sleigh-dop853*", "*belt-nystrom4*", "*table-dop853, null-space", "*skate-radau")
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+@pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
+def test_methods_and_forms_agree_with_series(make, way):
+    """The three levels hold to rounding, the motion is that of the series, by methods and forms of every kind."""
+    scene, (options, tol) = make(), way
+    solution = ts.simulate(scene, (0, SPAN), **options).raise_if_failed()
+    assert off(solution, by_series(scene)) < tol
+    errors = solution.constraint_error
+    drifts = options.get("formulation") == "maggi-kane"
+    assert max(errors.velocity.max(), errors.acceleration.max()) < HELD
+    assert errors.position.max() < (NEAR if drifts else HELD)
+
+
+@pytest.mark.parametrize("formulation", ["tangent", "null-space", "maggi-kane"])
+def test_skate_on_a_slope(formulation):
+    """Without rows on positions: Maggi's equations, in closed form."""
+    integrator = I.DOP853(1e-12, 1e-12)
+    solution = ts.simulate(skates.skate(), (0, 5), integrator=integrator, formulation=formulation)
+    x, y, xd, yd = skates.skate_at(solution.t)
+    np.testing.assert_allclose(solution.position("skate")[:, :2], np.stack([x, y], 1), atol=TIGHT)
+    np.testing.assert_allclose(solution.velocity("skate")[:, :2], np.stack([xd, yd], 1), atol=TIGHT)
+    # The blade's push across turns the path: m (speed w + g sin(w t)) = 2 m g sin(w t)
+    push = 2.0 * skates.SLOPE * np.sin(skates.TURN * solution.t)
+    force, _ = solution.reaction("edge")
+    np.testing.assert_allclose(np.linalg.norm(force, axis=1), np.abs(push), atol=FINE)
+
+
+@pytest.mark.parametrize("formulation", ["tangent", "null-space", "maggi-kane"])
+@pytest.mark.parametrize("name", ["sleigh", "on a table"])
+def test_a_blade_does_no_work(name, formulation):
+    solution = ts.simulate(SCENES[name](), (0, SPAN), integrator=I.DOP853(1e-12, 1e-12), formulation=formulation)
+    assert np.ptp(solution.energy) < TIGHT
+
+
+def test_the_table_keeps_its_angular_momentum():
+    """The hinge has no torque about its axis, whatever the blade does between table and skate."""
+    momentum = by_series(skates.on_a_table()).angular_momentum[:, 2]
+    assert np.ptp(momentum) < HELD
+
+
+ORDERS = {  # method, options, steps, least order observed
+    "nystrom4": (I.Nystrom4, {}, (0.04, 0.02, 0.01), 3.9),
+    "nystrom4, placed": (I.Nystrom4, {"chart_interval": 4}, (0.04, 0.02, 0.01), 3.9),
+    "nystrom4, null-space": (I.Nystrom4, {"formulation": "null-space"}, (0.04, 0.02, 0.01), 3.9),
+    "nystrom4, maggi-kane": (I.Nystrom4, {"formulation": "maggi-kane"}, (0.04, 0.02, 0.01), 3.9),
+    "rk45": (I.RK45, {}, (0.04, 0.02, 0.01), 4.6),
+    "rk45, placed": (I.RK45, {"chart_interval": 4}, (0.04, 0.02, 0.01), 4.6),
+    "rk45, null-space": (I.RK45, {"formulation": "null-space"}, (0.04, 0.02, 0.01), 4.6),
+    "sdirk54": (I.SDIRK54, {}, (0.04, 0.02, 0.01), 3.8),
+    "trapezoid": (I.ImplicitTrapezoid, {}, (0.04, 0.02, 0.01), 1.95),
+    "radau": (I.Radau, {}, (0.2, 0.1), 4.6),
+}
+
+
+@pytest.mark.slow_but("nystrom4, null-space", "rk45, placed", "radau")
+@pytest.mark.parametrize("case", ORDERS.values(), ids=ORDERS)
+def test_order(case):
+    """Errors fall with the order of the method, on a sleigh with rows of both sorts."""
+    kind, options, steps, order = case
+    scene, errors = skates.sleigh(), []
+    reference = by_series(scene)
+    for h in steps:
+        errors.append(off(ts.simulate(scene, (0, SPAN), integrator=kind(step=h), **options), reference))
+    assert np.log2(errors[0] / errors[-1]) / (len(steps) - 1) > order, errors
+
+
+BETWEEN = {  # options of coarse runs, how far between the steps from the series
+    "taylor": ({"integrator": I.Taylor(tol=1e-13)}, FINE),
+    "dop853": ({"integrator": I.DOP853(1e-9, 1e-9)}, NEAR),
+    "dop853, null-space": ({"integrator": I.DOP853(1e-9, 1e-9), "formulation": "null-space"}, NEAR),
+    "rk45, null-space": ({"integrator": I.RK45(1e-8, 1e-8), "formulation": "null-space"}, 1e-6),
+    "nystrom4, null-space": ({"integrator": I.Nystrom4(step=0.01), "formulation": "null-space"}, 1e-6),
+    "radau": ({"integrator": I.Radau(1e-8, 1e-8)}, 1e-6),
+}
+
+
+@pytest.mark.slow_but("taylor", "dop853*", "nystrom4*")
+@pytest.mark.parametrize("way", BETWEEN.values(), ids=BETWEEN)
+def test_dense_output(way):
+    """Between the steps positions, velocities and rows are those of the motion."""
+    (options, tol), scene, t = way, skates.sleigh(), np.linspace(0.01, SPAN, 97)
+    solution = ts.simulate(scene, (0, SPAN), dense_output=True, **options)
+    at, right = solution.at(t), by_series(scene, dense_output=True).at(t)
+    np.testing.assert_allclose(at.q, right.q, atol=tol)
+    np.testing.assert_allclose(at.qd, right.qd, atol=tol)
+    outputs = ts.simulate(scene, (0, SPAN), t_eval=t, **options)
+    errors = outputs.constraint_error
+    assert max(errors.position.max(), errors.velocity.max(), errors.acceleration.max()) < HELD
+
+
+def test_a_dropped_row_is_one_on_velocities():
+    """A row on velocities that follows from rows on positions is dropped, and not one of those."""
+    solution = by_series(skates.guided())
+    dropped = np.flatnonzero(np.isnan(solution.multipliers[-1]))
+    assert [solution.scene.row_names()[i] for i in dropped] == ["KnifeEdge 'edge' across"]
+
+
+@pytest.mark.parametrize("method", ["SDIRK54", "ImplicitTrapezoid"])
+def test_implicit_methods_are_refused_in_the_null_space_form(method):
+    integrator = getattr(I, method)(1e-6, 1e-6)
+    refuse(
+        lambda: ts.simulate(skates.skate(), (0, 1), integrator=integrator, formulation="null-space"),
+        ts.InvalidArgument,
+        (method, "rows on velocities", "null-space", "formulation='tangent'"),
+    )
+
+
+def test_series_against_differences():
+    """The motion within a step of series, against central differences of order eight of its own values."""
+    solution = by_series(skates.sleigh(), dense_output=True)
+    weights, h, t = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]), 0.01, 0.73
+    at = solution.at(t + h * np.arange(-4, 5))
+    rates, accelerations = weights @ at.q / h, weights @ at.qd / h
+    middle = solution.at(t)
+    np.testing.assert_allclose(rates, middle.qd, atol=TIGHT)
+    np.testing.assert_allclose(accelerations, middle.qdd, atol=TIGHT)
+
+
+@pytest.mark.parametrize("order", [6, 11])
+def test_order_of_series(order):
+    """Errors of steps of fixed length fall with h^(order + 1) in velocities."""
+    scene, errors = skates.sleigh(), []
+    reference = by_series(scene)
+    for h in (0.1, 0.05):
+        errors.append(off(ts.simulate(scene, (0, SPAN), integrator=I.Taylor(step=h, order=order)), reference))
+    assert np.log2(errors[0] / errors[1]) > order - 0.3, errors
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("options", [{"integrator": I.Taylor(step=0.05)}, {"integrator": I.RK45(step=0.005)}])
+def test_rows_hold_over_many_steps(options):
+    """Rows on velocities stay at rounding, without growth, over 10^5 steps; so does the energy by series."""
+    scene, h = skates.sleigh(), options["integrator"].step
+    end = 1e5 * h
+    solution = ts.simulate(scene, (0, end), t_eval=np.linspace(0, end, 2001), history=False, **options)
+    error = solution.raise_if_failed().constraint_error.velocity
+    assert error.max() < HELD
+    assert error[1001:].max() < 2.0 * error[:1001].max() + HELD / 100
+    if isinstance(options["integrator"], I.Taylor):
+        assert np.ptp(solution.energy) < FINE

@@ -14,8 +14,10 @@ NAMED = 5  # contacts in a message
 
 
 def has_contacts(scene):
-    """Whether a scene has unilateral constraints; of a phase none are left."""
-    return "_closed" not in vars(scene) and bool(contacts_of(scene._added))
+    """Whether a scene has unilateral constraints; looked up once until the scene changes."""
+    if scene._opens is None:
+        scene._opens = bool(contacts_of(scene._added))
+    return scene._opens
 
 
 def phase_of(scene, rows):
@@ -31,7 +33,7 @@ def phase_of(scene, rows):
         vars(phase).update(vars(scene))
         vars(phase).update(
             _added=others + list(rows), _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={},
-            _closed=tuple(rows),
+            _opens=False,
         )  # fmt: skip
     return known[key]
 

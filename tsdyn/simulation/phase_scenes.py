@@ -2,6 +2,7 @@
 
 from functools import wraps
 
+from ..calls import fitting
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument
 from ..model.handles import handles_of
@@ -60,16 +61,18 @@ def demand_bilateral(scene):
 
 def where_it_stands(function):
     """Decorate a method of scenes: contacts that are closed at the start hold, the others are left out."""
+    own = getattr(function, "__wrapped__", function)  # `fitting` names the method that is called
 
     @wraps(function)
     def call(scene, *arguments, **keywords):
-        return function(at_start(scene), *arguments, **keywords)
+        return own(at_start(scene), *arguments, **keywords)
 
-    return call
+    return fitting(call)
 
 
 def without_contacts(function):
     """Decorate a method of scenes that takes constraints as bilateral: refuse scenes with contacts."""
+    own = getattr(function, "__wrapped__", function)
 
     @wraps(function)
     def call(scene, *arguments, **keywords):
@@ -79,6 +82,6 @@ def without_contacts(function):
                 f"{function.__name__} is for bilateral constraints, and {names} open{'s' * (',' not in names)}. Remove "
                 "these from a copy of the scene, or hold them closed by unilateral=False."
             )
-        return function(scene, *arguments, **keywords)
+        return own(scene, *arguments, **keywords)
 
-    return call
+    return fitting(call)

@@ -390,12 +390,12 @@ class _ContactRun:
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
             self.opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
-            found = settle(inertia, resting, self.qd, [i for i in fired if i in self.closed])
+            leaving = [i for i in fired if i in self.closed]
+            self.closed, self.idle = settle(inertia, resting, self.qd, leaving)[:2] if resting else ([], [])
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
-        self.closed, self.idle = found.closed, found.idle
         return None
 
     def _hit(self, inertia, touching, rates):
@@ -410,15 +410,16 @@ class _ContactRun:
             self.rest = float(max([self.rest, *(self.t + T for T in flights)]))
             e[last] = 0.0
             p, qd, after = self._jump(inertia, touching, before, e)
+            a = self._lowering(inertia, touching, qd, after)
         # Contacts that another impact lifts by less than rounding stay closed
         for _ in touching:
-            a = self._lowering(inertia, touching, qd, after)
             if not a.any():
                 break
             qd, after = held(inertia, qd, [i for i in touching if a[i] > 0.0 or after[i] == 0.0], after)
             if (after[touching] < 0.0).any():
                 more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
                 p = p + more
+            a = self._lowering(inertia, touching, qd, after)
         self.qd = qd
         named = zip(touching, p, strict=True)
         self.phases.impulses += [(self.t, self.gaps.names[i], float(x)) for i, x in named if x > 0.0]

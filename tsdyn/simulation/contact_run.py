@@ -479,7 +479,7 @@ def jumped(inertia, qd, which, before, e, p, law="newton"):
 
 
 def held(inertia, qd, which, rates):
-    """Velocities (n,) and rates (count,) after the least change, by kinetic energy, that ends the rates of some gaps."""
+    """Velocities (n,) and rates (count,) after the least change, by kinetic energy, that ends rates of gaps."""
     change = inertia.hold(which, rates[which])
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = 0.0

@@ -579,7 +579,7 @@ class Scene:
     inverse_dynamics = without_contacts(_inverse_dynamics)
     parameters = _parameters
     with_parameters = _with_parameters
-    set = where_it_stands(set_joint)
+    set = where_it_stands(fitting(set_joint))
     set_start = _set_start
     remove = _remove
     copy = _copy

@@ -158,9 +158,9 @@ def _kind(owner):
 
 
 def _method(owner, function):
-    """The name by which a class, or a base of it, has a function as a method; None if it hasn't."""
+    """The name by which a class, or a base of it, has a function as a method, decorated or not; None if it hasn't."""
     held = (item for cls in owner.__mro__ for item in vars(cls).items())
-    return next((name for name, value in held if value is function), None)
+    return next((name for name, value in held if inspect.unwrap(value, stop=lambda f: f is function) is function), None)
 
 
 def lacking(owner, name):

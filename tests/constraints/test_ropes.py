@@ -57,6 +57,27 @@ def test_a_tackle_divides_the_load_by_its_parts(parts):
     assert np.abs(solution.multipliers[:, 5] - (G - carried * a)).max() < NEAR
 
 
+@pytest.mark.parametrize("formulation", ["tangent", "null-space"])
+def test_a_loop_of_rope_locks_a_hinge(formulation):
+    """Two spans between the bodies of a hinge: they swing as one rigid body."""
+
+    def swing(lash):
+        scene = ts.Scene()
+        arm = scene.add_body(1.0, (0.2, 0.3, 0.4), angular_velocity=(0, 0, 1), name="arm")
+        scene.add(C.Spherical.at(scene.ground, arm, point=(0, 0, 0)))
+        flap = scene.add_body(1.0, (0.2, 0.3, 0.4), (1, 0, 0), velocity=(0, 1, 0), angular_velocity=(0, 0, 1))
+        lash(scene, arm, flap)
+        return ts.simulate(scene, (0, 1), formulation=formulation, rtol=1e-11, atol=1e-11).raise_if_failed()
+
+    def by_rope(scene, arm, flap):
+        scene.add(C.Revolute.at(arm, flap, point=(0.5, 0, 0), axis=(0, 1, 0)))
+        scene.add(C.Rope([(arm, (0.1, 0.2, 0.6)), (flap, (0.2, 0.1, 0.1)), (arm, (0, 0, 0.3))], always_taut=True))
+
+    one, other = swing(by_rope), swing(lambda scene, arm, flap: scene.add(C.Fixed.at(arm, flap, point=(0.5, 0, 0))))
+    assert np.abs(one.q[-1] - other.q[-1]).max() < NEAR
+    assert max(level.max() for level in one.constraint_error) < FINE
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_a_swinging_atwood_machine(method):
     """(m + M) rdd = m r w^2 + g (m cos - M), r wd = -2 rd w - g sin: Tufillaro's machine."""

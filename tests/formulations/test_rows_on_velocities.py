@@ -20,6 +20,7 @@ SCENES = {
     "belt": lambda: skates.belt(2.0),
     "belt of time": lambda: skates.belt(WAVE),
     "rough hinge": skates.rough,
+    "beside redundant hinges": skates.beside_hinges,
     "coin": coin.build,
     "turntable": turntable.build,
     "bicycle": bicycle.build,
@@ -47,7 +48,7 @@ def by_series(scene, **options):
     return ts.simulate(scene, (0, SPAN), integrator=I.Taylor(tol=1e-15), **options).raise_if_failed()
 
 
-@pytest.mark.slow_but("*sleigh-dop853*", "*belt-nystrom4*", "*table-dop853, null-space", "*skate-radau")
+@pytest.mark.slow_but("*sleigh-dop853*", "*belt-nystrom4*", "*table-dop*null*", "*hinges-dop*null*", "*skate-radau")
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 @pytest.mark.parametrize("name", SCENES)
 def test_methods_and_forms_agree_with_series(name, way):

@@ -113,6 +113,20 @@ def belt(speed):
     return scene
 
 
+def beside_hinges():
+    """A ball that rolls, beside a pendulum of three links, the second of which has its hinge twice."""
+    scene = ts.Scene()
+    links = [scene.ground]
+    for i in range(3):
+        places = {"position": (i + 0.5, 0, 0), "velocity": (0, 0, -0.5 - i), "angular_velocity": (0, 1, 0)}
+        links.append(scene.add_body(1.0, (0.2, 0.3, 0.4), **places))
+        for y in (0.0, 1.0) if i == 1 else (0.0,):
+            scene.add(C.Revolute.at(links[i], links[i + 1], point=(i, y, 0), axis=(0, 1, 0)))
+    ball = scene.add_body(1.0, (0.1, 0.1, 0.1), (0, 5, 0.5), velocity=(1, 0, 0), angular_velocity=(0, 2, 0))
+    scene.add(C.RollingBall(ball, scene.ground, radius=0.5, normal_b=(0, 0, 1)))
+    return scene
+
+
 def rough():
     """A sleigh on three points and a blade; a rod swings below it on a hinge whose friction depends on its reaction."""
     scene = ts.Scene()

@@ -266,6 +266,15 @@ def test_wrong_calls_of_public_classes(call, words):
         call()
 
 
+METHODS = [name for name, value in vars(ts.Scene).items() if callable(value) and not name.startswith("_")]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_methods_of_scenes_refuse_unknown_arguments_by_their_name(name):
+    with pytest.raises(ts.InvalidCall, match=rf"Scene\.{name}\(\) has no argument pointt"):
+        getattr(ts.Scene(), name)(pointt=3)
+
+
 def test_a_state_to_start_from_needs_no_accelerations():
     scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
     scene.add_point_mass(1.0, name="stone")

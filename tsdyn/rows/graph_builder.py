@@ -293,14 +293,17 @@ class _GraphBuilder:
         return records(Product, products)
 
     def _runs(self, found):
-        """Joints and their sides at a body, in lists whose rows follow one another within a node, on one side."""
+        """Joints and their sides at a body, in lists whose rows follow one another within a node, on one side.
+
+        A term of a sum is a list of its own: its row is that of other terms, too.
+        """
         runs, end = [], None
         for i, side in sorted(found, key=lambda one: self.firsts[one[0]]):
-            node, count = self.inside[i][0], self.counts[i]
-            if (node, self.firsts[i], self.pairs[i], side) != end:
+            node, count, summed = self.inside[i][0], self.counts[i], self.joints[i].constraint.summed
+            if summed or (node, self.firsts[i], self.pairs[i], side) != end:
                 runs.append([])
             runs[-1].append((i, side))
-            end = node, self.firsts[i] + count, self.pairs[i] + count, side
+            end = None if summed else (node, self.firsts[i] + count, self.pairs[i] + count, side)
         return runs
 
     def _products_at_hubs(self):

@@ -14,6 +14,8 @@ from ..elements.force import Force
 from ..elements.markers import POINT
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, ROUNDING_AT_MOST, SUM_ROUNDING
 from ..model.equations import WIDTH, places, with_short_rows
+from ..model.packed import member_of
+from ..observables.contacts import touching
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
 from ..simulation.prepared_run import Run, simulate
@@ -264,7 +266,7 @@ def _loads(solution, body, items):
         turning = np.linalg.norm(gain, axis=1) + np.linalg.norm(omega, axis=1) * np.linalg.norm(momentum, axis=1)
     for item in items:
         load, moment = solution.reaction(item, on=body)
-        arm = _first_point(solution, item, body)
+        arm = _arm(solution, item, body)
         amount = np.linalg.norm(load, axis=1)
         force, size = force + load, size + amount
         torque = torque + moment + np.cross(arm, load)
@@ -276,10 +278,14 @@ def _neighbours(scene):
     """Constraints and forces of each body, by its id."""
     around = {id(body): [] for body in scene.bodies}
     for item in (*scene.constraints, *scene.forces):
-        bodies = item.bodies if isinstance(item, Force) else (item.a, item.b)
-        for body in {id(body): body for body in bodies}.values():
+        for body in {id(body): body for body in bodies_of(item)}.values():
             around.get(id(body), []).append(item)
     return around
+
+
+def bodies_of(item):
+    """The bodies of a constraint or force, the ground among them."""
+    return item.bodies if isinstance(item, Force) else [body for part in item.parts for body in (part.a, part.b)]
 
 
 def extent(solution):
@@ -322,11 +328,17 @@ def _balance(law, left, shaken, sizes, largest, limit, body):
     return Finding(law, float(share.max(initial=0.0)), limit, body.name)
 
 
-def _first_point(solution, item, body):
-    """Return the first point of an item on a body, from the centroid, (k, 3), ground frame."""
-    letter = "a" if body is item.a else "b"
+def _arm(solution, item, body):
+    """Where the torque of an item is about: its contact point, or its first point on a body; from the centroid, (k, 3).
+
+    In the ground frame.
+    """
+    letter, found = "a" if body is item.a else "b", member_of(solution.packed, item)
     if body.dimension != 7:
         return np.zeros((solution.t.size, 3))
+    contact = None if found is None else touching(solution.packed, found, solution.q)
+    if contact is not None:
+        return contact[0] - solution.position(body)
     pairs = zip(item.markers, item.coordinates, strict=True)
     points = [s for marker, s in pairs if marker.body == letter and marker.code == POINT]
     return solution.rotation(body) @ (points[0] if points else np.zeros(3))

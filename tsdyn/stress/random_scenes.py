@@ -1,4 +1,4 @@
-"""Random scenes, whole and broken: trees, loops, nets, driven, rough, past places where laws aren't analytic."""
+"""Random scenes, whole and broken: trees, loops, nets, driven, rolling, past places where laws aren't analytic."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from ..motions import Sine, time
 from ..motions.tables import Table
 from ..simulation.scene import Scene
 
-# Bodies, joints, motors, springs and friction of the random scenes, in random units.
+# Bodies, joints, motors, springs, ropes, rollers and friction of the random scenes, in random units.
 
 PINS = ("Revolute", "Spherical", "Universal", "Cylindrical", "Translational", "Fixed", "PlaneContact", "Distance")
 WEIGHTS = np.array((8, 5, 3, 2, 1, 1, 2, 3)) / 25.0
@@ -119,6 +119,45 @@ def joint_friction(d):
     if body.dimension != 3:
         damping = 0.1 * d.mass / d.time
         d.scene.add(forces.ViscousFriction(d.scene.ground, body, damping=damping))
+
+
+def coupled_joints(d):
+    """Couple hinges to others, and give some a rotor."""
+    hinges = [joint for joint in d.scene.constraints if isinstance(joint, joints.Revolute)]
+    for one, other in zip(hinges[::4], hinges[1::4], strict=False):
+        d.scene.add(joints.Coupler(one, other, ratio=d.rng.uniform(-2.0, 2.0)))
+    for hinge in hinges[::3]:
+        inertia = d.rng.uniform(0.001, 0.1) * d.mass * d.length**2
+        d.scene.add(forces.Armature(hinge, inertia=inertia, ratio=d.rng.uniform(1.0, 3.0)))
+
+
+def rope(d):
+    """Run a rope from the ground through some bodies and back, or an elastic cable."""
+    through = d.rng.choice(d.scene.bodies, min(len(d.scene.bodies), int(d.rng.integers(1, 4))), replace=False)
+    arms = [(0.0 if body.dimension == 3 else 0.1 * d.length) * d.rng.normal(size=3) for body in through]
+    ends = [(d.scene.ground, d.place(2.0 * d.unit())) for _ in range(2)]
+    points = [ends[0], *zip(through, arms, strict=True), ends[1]]
+    if d.rng.random() < 0.5:
+        d.scene.add(joints.Rope(points, always_taut=True))
+    else:
+        stiffness = 10.0 ** d.rng.uniform(0.0, 3.0) * d.mass / d.time**2
+        d.scene.add(forces.Cable(points, stiffness=stiffness, free_length=3.0 * d.length))
+
+
+def roller(d, base, normal, place):
+    """A ball, a disc or a skate on a plane of a body; its velocities fit when it is at rest."""
+    body, radius = d.body(place, rigid=True), 0.5 * d.length
+    way, axis = d.rng.integers(3), d.unit()
+    if way == 0:
+        point = body.position - radius * normal
+        d.scene.add(joints.RollingBall.at(body, base, center=body.position, point=point, normal=normal, radius=radius))
+    elif way == 1:
+        point = body.position - radius * np.linalg.norm(np.cross(axis, normal)) * normal
+        given = {"center": body.position, "axis": axis, "point": point, "normal": normal, "radius": radius}
+        d.scene.add(joints.RollingDisc.at(body, base, **given))
+    else:
+        d.scene.add(joints.KnifeEdge.at(body, base, point=body.position, axis=axis, normal=normal))
+    return body
 
 
 # Random scenes, whole and broken: trees, loops, nets, driven, rough, redundant, degenerate, far away, in any units.
@@ -263,33 +302,57 @@ def rough(d, n):
     joint_friction(d)
 
 
+def coupled(d, n):
+    """A tree with couplers, rotors, ropes and cables."""
+    tree(d, n)
+    coupled_joints(d)
+    for _ in range(int(d.rng.integers(1, 3))):
+        rope(d)
+
+
+def rolling(d, n):
+    """Balls, discs and skates on a plane of the ground and on each other, with a joint here and there."""
+    normal, bases = d.unit(), [d.scene.ground]
+    for i in range(n):
+        base = bases[int(d.rng.integers(len(bases)))]
+        bases.append(roller(d, base, normal, np.array((2.0 * i, 0.0, 0.0))))
+        if d.rng.random() < 0.4:
+            other = d.body(np.array((2.0 * i, 1.0, 0.0)))
+            join(d, bases[-1], other)
+
+
 def lopsided(d, n):
     """A tree, whose masses differ by up to twelve decades."""
     d.spread = d.rng.uniform(1.0, 12.0)
     tree(d, n)
 
 
-KINDS = {
+FIRST = {
     each.__name__: each
     for each in (
         tree, lean_tree, floating, loops, net, planar, star, crowd, degenerate, far, driven, rough, lopsided,
     )
 }  # fmt: skip
+LATER = {each.__name__: each for each in (coupled, rolling)}
+KINDS = FIRST | LATER
 
 
 def generate(seed, least=None, most=None):
-    """Return the `DrawnCase` of a seed; of so many bodies, about, where that is given."""
-    return drawn(np.random.default_rng(seed), least, most)
+    """Return the `DrawnCase` of a seed; of so many bodies, about, where that is given.
+
+    Kinds that were added later have seeds of their own, so that scenes of known seeds stay the same.
+    """
+    return drawn(np.random.default_rng(seed), least, most, LATER if seed % 10 in (0, 4) else FIRST)
 
 
-def drawn(rng, least=None, most=None):
+def drawn(rng, least=None, most=None, kinds=KINDS):
     """Return the `DrawnCase` that a generator of random numbers draws."""
     share = rng.random()
     if least is None:
         least, most = next(sizes for limit, *sizes in SIZES if share < limit)
-    name, n = str(rng.choice(list(KINDS))), int(np.exp(rng.uniform(np.log(least), np.log(most))))
+    name, n = str(rng.choice(list(kinds))), int(np.exp(rng.uniform(np.log(least), np.log(most))))
     d = Draw(rng)
-    KINDS[name](d, n)
+    kinds[name](d, n)
     if rng.random() < 0.3:
         for body in d.scene.bodies[:: max(n // 5, 1)]:
             spring(d, body)

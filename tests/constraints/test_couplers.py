@@ -367,6 +367,23 @@ def test_a_start_beyond_a_turn():
     assert abs(state.angle(fast) - 9.0) < 1e-13
 
 
+@pytest.mark.parametrize("angle", [4.0, -9.0, 25.0])
+def test_coupled_joints_follow_one_that_is_set(angle):
+    """A differential in a car: bodies at the end of a tree are moved over turns, and the coupled ones with them."""
+    scene, hinges = ts.Scene(gravity=(0, 0, 0)), []
+    car = scene.add_body(100.0, (1, 1, 1), name="car")
+    scene.add(C.Translational.at(scene.ground, car, point=(0, 0, 0), axis=(1, 0, 0)))
+    for y in (0.0, 1.0, -1.0):
+        wheel = scene.add_body(1.0, (1, 1, 1), position=(0, y, 0))
+        hinges.append(scene.add(C.Revolute.at(car, wheel, point=(0, y, 0), axis=(0, 1, 0))))
+    scene.add(C.Coupler(*hinges, ratio=(0.5, 1.5)))
+    scene.set(hinges[1], angle=angle)
+    cage, left, right = (ts.simulate(scene, (0.0, 0.1)).state.angle(hinge) for hinge in hinges)
+    assert abs(left - angle) < 1e-12
+    assert abs(cage - 0.5 * left - 1.5 * right) < 1e-12
+    assert abs(cage) + abs(right) > 0.1 * abs(angle)
+
+
 def test_coordinates_of_joints_with_several():
     """A nut of a cylindrical joint moves by its own turn; one arm of a universal joint follows the other."""
     scene = ts.Scene(gravity=(0, 0, -10.0))
@@ -416,3 +433,23 @@ def test_beside_a_row_on_velocities(options):
     assert np.abs(solution.angle(slow) - 2.0 * solution.angle(fast)).max() < TIGHT
     known = ts.simulate(scene, (0.0, 1.5), rtol=1e-12, atol=1e-12)
     assert np.abs(solution.q[-1] - known.q[-1]).max() < 1e-8 * loose(options)
+
+
+def test_ratios_of_a_differential_are_a_parameter():
+    """A torque of 1 N m on the cage: with r = (r_1, r_2), all inertias 1 kg m^2, q_0'' = r.r / (1 + r.r)."""
+    scene, hinges = ts.Scene(gravity=(0, 0, 0)), []
+    for name, x, axis in (("cage", 0, (0, 1, 0)), ("left", -1, (1, 0, 0)), ("right", 1, (1, 0, 0))):
+        body = scene.add_body(1.0, (1, 1, 1), position=(x, 0, 0), name=name)
+        hinges.append(scene.add(ts.constraints.Revolute.at(scene.ground, body, point=(x, 0, 0), axis=axis)))
+    scene.add(ts.constraints.Coupler(*hinges, ratio=(0.5, 0.5), name="differential"))
+    scene.add(ts.forces.Torque(scene["cage"], torque=(0, 1, 0)))
+    assert scene.parameters()["differential.ratio"].tolist() == [0.5, 0.5]
+    ratios = np.array([(0.5, 0.5), (0.5, 0.7), (1.0, 2.0)])
+    table = ts.ensemble(scene, {"differential.ratio": ratios}, (0, 1))
+    for i, r in enumerate(ratios):
+        goal = 0.5 * (r @ r) / (1.0 + r @ r)
+        one = ts.simulate(scene.with_parameters({"differential.ratio": r}), (0, 1))
+        assert abs(one.angle(hinges[0].name)[-1] - goal) < 1e-9
+        assert abs(table.case(i).angle(hinges[0].name)[-1] - goal) < 1e-9
+    with pytest.raises(ts.InvalidConstraint, match="3 ratios are given for 2"):
+        scene.with_parameters({"differential.ratio": (1, 2, 3)})

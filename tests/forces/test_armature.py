@@ -188,3 +188,21 @@ def test_forms_agree_beside_rolling():
         options = {"integrator": "dop853", "formulation": formulation, "rtol": 1e-10, "atol": 1e-10}
         ends.append(ts.simulate(scene, (0.0, 0.3), **options).state.q)
     assert np.abs(ends[0] - ends[1]).max() < NEAR
+
+
+@pytest.mark.parametrize("name", ["rotor.inertia", "rotor.ratio"])
+@pytest.mark.parametrize("beside", [False, True], ids=["alone", "beside a mass"])
+def test_ensembles_vary_it(name, beside):
+    """A torque of 6 N m on a wheel of 2 kg m^2: 6 / (2 + I r^2) rad/s after a second."""
+    scene = ts.Scene()
+    wheel = scene.add_body(1.0, (1, 1, 2), name="wheel")
+    hinge = scene.add(ts.constraints.Revolute.at(scene.ground, wheel, point=(0, 0, 0), axis=(0, 0, 1), name="hinge"))
+    scene.add(F.Armature(hinge, inertia=0.01, ratio=10.0, name="rotor"))
+    scene.add(F.Torque(wheel, torque=(0, 0, 6.0)))
+    values = np.array([1.0, 2.0, 3.0]) * scene.parameters()[name]
+    table = {name: values} | ({"wheel.mass": np.array([1.0, 2.0, 3.0])} if beside else {})
+    for options in ({}, {"t_eval": np.linspace(0, 1, 5)}, {"integrator": "dop853"}):
+        found = ts.ensemble(scene, table, (0, 1), **options)
+        for i, value in enumerate(values):
+            added = 100.0 * value if name == "rotor.inertia" else 0.01 * value**2
+            assert abs(found.case(i).angle_rate("hinge")[-1] - 6.0 / (2.0 + added)) < 1e-8

@@ -1,6 +1,7 @@
 """Checks of a start against constraints and motors: violated rows, mirrored branches, angles of motors."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -93,10 +94,11 @@ def _beyond(scene, stays, goes):
     """Return the bodies on one side when the links between two are cut; in a loop, the other is among them."""
     links = {}
     for constraint in scene.constraints:
-        a, b = constraint.a, constraint.b
-        if b is not None and {a, b} != {stays, goes}:
-            links.setdefault(a, []).append(b)
-            links.setdefault(b, []).append(a)
+        bodies = dict.fromkeys(body for part in constraint.parts for body in (part.a, part.b) if body is not None)
+        if bodies.keys() != {stays, goes}:
+            for a, b in pairwise(bodies):
+                links.setdefault(a, []).append(b)
+                links.setdefault(b, []).append(a)
     found, waiting = {goes}, [goes]
     while waiting:
         for body in links.get(waiting.pop(), ()):

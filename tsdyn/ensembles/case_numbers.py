@@ -484,6 +484,9 @@ def pen_of(arena, names):
             return None
         owners.setdefault(id(field.owner), (field.owner, {}))[1][field.attribute] = name
     constraints = [(owner, changed) for owner, changed in owners.values() if id(owner) in family.members]
+    forces = [(owner, changed) for owner, changed in owners.values() if id(owner) in family.loads]
+    if any(family.is_structural(owner, changed) for owner, changed in forces):
+        return None
     if not owners or (constraints and not _are_numbers(arena, constraints)):
         return None
     pen = Pen(arena, owners.values())

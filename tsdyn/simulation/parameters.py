@@ -28,7 +28,7 @@ from ..model.packed import Derived, checked_motions, classes, reaches_of, size_o
 from ..motions.elementary import Constant
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal, numbers_of, with_number
-from ..validation import close, counted, nearest, number
+from ..validation import close, counted, floats, nearest, number
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -95,6 +95,10 @@ class Field(NamedTuple):
             return numbers_of(function_of(value))[self.keyword]
         if isinstance(value, Motion) and isinstance(value.smooth, Constant):
             return value.value(0.0)[0]
+        if isinstance(value, (list, tuple)):  # as given: ratios, coefficients
+            numbers = floats(value)
+            numbers.flags.writeable = False
+            return numbers
         return float(value) if isinstance(value, np.floating) else value
 
     def entered(self, value, present):

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import Point, Primitive, Unilateral, Vector
+from ..plugins import InvalidConstraint, Point, Primitive, Unilateral, Vector
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
@@ -77,7 +77,9 @@ class PlaneContact(Unilateral, Primitive):
         **places: Any,
     ) -> None:
         super().__init__(a, b, **places)
-        self.unilateral = bool(unilateral)
+        if not isinstance(unilateral, bool):
+            raise InvalidConstraint(f"{self.name}: unilateral must be True or False, got {unilateral!r}.")
+        self.unilateral = unilateral
         self._set_law(restitution, kinetic, static)
 
     def check(self):

@@ -100,3 +100,8 @@ class Span(Primitive):
         d0, d1, d2 = scaled(s, 0, 4, k)
         out[0, 0], out[0, 1], out[0, 2] = -d0, -d1, -d2
         out[0, 3], out[0, 4], out[0, 5] = d0, d1, d2
+
+    @classmethod
+    def example(cls, rng, a, b):
+        """A random instance: a distance other than zero."""
+        return cls(a, b, point_a=rng.normal(size=3), point_b=rng.normal(size=3), offset=-rng.uniform(0.5, 2.0))

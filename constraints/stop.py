@@ -121,8 +121,8 @@ class Stop(Unilateral, Joint):
 
     @classmethod
     def example(cls, rng, a, b):
-        """A random instance, on a hinge."""
+        """A random instance, on a hinge that it adds to the scene."""
         from .revolute import Revolute
 
         places = {marker.argument: rng.normal(size=3) for marker in Revolute.markers}
-        return cls(Revolute(a, b, **places), *np.sort(rng.normal(size=2)))
+        return cls(a.scene.add(Revolute(a, b, **places)), *np.sort(rng.normal(size=2)).tolist())

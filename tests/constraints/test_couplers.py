@@ -267,6 +267,10 @@ def test_parameters_files_and_ensembles(tmp_path):
     scene, fast, slow, gear = crossed(0.5, 2.0, offset=0.0)
     again = ts.load(scene.save(tmp_path / "gear.toml"))
     assert (ts.simulate(again, (0, 1)).q == ts.simulate(scene, (0, 1)).q).all()
+    _, third = wheel(again, again.ground, (2, 0, 0), Y, name="three")
+    again.add(C.Coupler(third, again["hinge one"], again["hinge two"], ratio=(1.0, 2.0)))
+    twin = ts.load(again.save(tmp_path / "three.toml"))
+    assert (ts.simulate(twin, (0, 1)).q == ts.simulate(again, (0, 1)).q).all()
     ratios = np.array([0.5, -2.0, 0.1])
     found = ts.ensemble(scene, {"gear.ratio": ratios}, (0.0, 1.0))
     for i, ratio in enumerate(ratios):

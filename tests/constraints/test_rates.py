@@ -551,3 +551,14 @@ def test_kinematics_refuses_them():
     scene = sleigh()
     with pytest.raises(ts.InvalidArgument, match=r"edge.*rows on velocities"):
         scene.kinematics([0.0, 1.0])
+
+
+def test_a_ball_on_its_head_rolls_over():
+    """0.05 m of the centroid from the centre: m g c / (J + m (R - c)^2) about the stable pose, reached from the top."""
+    scene = ts.Scene()
+    scene.add_body(2.0, (0.02, 0.02, 0.02), position=(0, 0, 0.25), name="ball")
+    scene.add(ts.constraints.RollingBall("ball", scene.ground, center_a=(0, 0, -0.05), radius=0.2, normal_b=(0, 0, 1)))
+    found = scene.equilibrium()
+    assert found.stable
+    assert abs(found.state.rotation("ball")[2, 2] + 1.0) < 1e-9
+    assert abs(found.smallest_stiffness - 2.0 * 9.81 * 0.05 / (0.02 + 2.0 * 0.15**2)) < 1e-6

@@ -1,6 +1,6 @@
 """Ropes that are always taut: Atwood's machine, tackles, hoists, swinging loads; ropes that can't be."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -144,6 +144,22 @@ def test_a_run_ends_where_a_span_vanishes():
         assert not solution.success
         assert abs(solution.state.t - 1.0) < 1e-6
         assert "The span of 'line' between 'bead' and 'ground' shrinks to length zero" in solution.message
+
+
+@pytest.mark.slow_but("9")
+@pytest.mark.parametrize("order", [5, 9, 13])
+def test_no_implicit_step_leads_past_a_span_that_vanishes(order):
+    """The bead of 1 kg meets its pulley head-on, from which no motion goes on: N of its row reversed is rounding."""
+    for v, tol in product((1.0, 2.5, 7.3), (1e-4, 1e-6, 1e-8)):
+        for g in (0.0, 10.0):
+            scene = ts.Scene(gravity=(0, 0, -g))
+            bead = scene.add_point_mass(mass=1.0, position=(0, 0, -1), velocity=(0, 0, v))
+            other = scene.add_point_mass(mass=1.0, position=(2, 0, -1), velocity=(0, 0, -v))
+            points = [(bead, ORIGIN), (scene.ground, ORIGIN), (scene.ground, (2, 0, 0)), (other, ORIGIN)]
+            scene.add(C.Rope(points, always_taut=True))
+            solution = ts.simulate(scene, (0.0, 2.0), integrator=ts.integrators.Radau(tol, tol, order=order))
+            assert not solution.success
+            assert abs(solution.state.t - 1.0 / v) < 1e-6
 
 
 def test_ropes_that_cant_be():

@@ -149,6 +149,23 @@ def test_a_dropped_row_is_one_on_velocities():
     assert [solution.scene.row_names()[i] for i in dropped] == ["KnifeEdge 'edge' across"]
 
 
+@pytest.mark.parametrize("doubled", [False, True], ids=["one axle", "two axles"])
+@pytest.mark.parametrize("formulation", ["tangent", "null-space", "maggi-kane"])
+def test_redundant_rows_beside_rows_on_velocities(formulation, doubled):
+    """A force of 10 N on a carriage of 3 kg and a rolling wheel of 1 kg, J / R^2 = 1 kg: the rail holds it already."""
+    scene, place = ts.Scene(), (0, 0, 0.2)
+    car = scene.add_body(3.0, (0.2, 0.2, 0.2), position=place, name="car")
+    wheel = scene.add_body(1.0, (0.02, 0.04, 0.02), position=place, name="wheel")
+    scene.add(ts.constraints.Translational.at(scene.ground, car, point=place, axis=(1, 0, 0)))
+    for y in (0.0, 0.1)[: 1 + doubled]:
+        scene.add(ts.constraints.Revolute.at(car, wheel, point=(0, y, 0.2), axis=(0, 1, 0)))
+    scene.add(ts.constraints.RollingDisc(wheel, scene.ground, axis_a=(0, 1, 0), radius=0.2, normal_b=(0, 0, 1)))
+    scene.add(ts.forces.PointForce(car, force=(10, 0, 0)))
+    solution = ts.simulate(scene, (0, 1), integrator=I.DOP853(1e-12, 1e-12), formulation=formulation)
+    solution.raise_if_failed()
+    assert abs(solution.position("car")[-1, 0] - 1.0) < TIGHT
+
+
 @pytest.mark.parametrize("method", ["SDIRK54", "ImplicitTrapezoid"])
 def test_implicit_methods_are_refused_in_the_null_space_form(method):
     integrator = getattr(I, method)(1e-6, 1e-6)

@@ -81,8 +81,12 @@ def test_other_forms_are_refused(form):
     scene.add_point_mass(1.0)
     with pytest.raises(
         ts.InvalidArgument, match=f"Radau solves its stages .* formulation='{form}' is served by .*dop853"
-    ):
+    ) as refused:
         ts.simulate(scene, (0.0, 1.0), integrator="radau", formulation=form)
+    for name in re.findall("'(.*?)'", str(refused.value).partition("is served by")[2]):  # and so it is
+        assert ts.simulate(scene, (0.0, 1.0), integrator=name, formulation=form).success
+    with pytest.raises(ts.InvalidArgument, match="Taylor series are of the motion itself"):
+        ts.prepare(scene, integrator="taylor", formulation=form)
 
 
 def test_friction_by_reactions_is_refused_by_name():

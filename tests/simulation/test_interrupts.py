@@ -122,8 +122,8 @@ def test_dense_output_is_read_again_after_an_interrupt(interrupt):
 
 def test_no_garbage_is_collected_while_a_scene_is_packed(monkeypatch):
     """A collection of the objects of many bodies takes longer than Ctrl-C may wait."""
-    pack, seen = packed._pack_constraints, []
-    monkeypatch.setattr(packed, "_pack_constraints", lambda *given: seen.append(gc.isenabled()) or pack(*given))
+    pack, seen = packed.pack_forces, []
+    monkeypatch.setattr(packed, "pack_forces", lambda *given: seen.append(gc.isenabled()) or pack(*given))
     for look in (lambda scene: ts.simulate(scene, (0.0, 0.1)), ts.Scene.evaluate, ts.Scene.assemble, ts.Scene.mobility):
         look(top.build())
     assert seen == 4 * [False]

@@ -210,7 +210,6 @@ class Settled(NamedTuple):
 
     closed: list  # of gaps: independent rows, with reactions
     idle: list  # those that stay closed by themselves, as a fourth leg does
-    opening: list
     accelerations: np.ndarray  # (count,) of all gaps
 
 
@@ -243,17 +242,15 @@ def settle(inertia, resting, qd, fired=()):
         resting = [i for i in resting if i not in gone]
         fired = [i for i in fired if i not in gone]
     closed = [i for i, held in zip(resting, basic, strict=True) if held]
-    idle, opening = [], [i for i in range(c.size) if i not in resting]
+    idle = []
     for i in resting:
-        if i in closed:
+        if i in closed or gdd[i] > small[i]:
             continue
-        if gdd[i] > small[i]:
-            opening.append(i)
-        elif _depends(inertia, closed, i):
+        if _depends(inertia, closed, i):
             idle.append(i)
         else:
             closed.append(i)
-    return Settled(sorted(closed), idle, opening, gdd)
+    return Settled(sorted(closed), idle, gdd)
 
 
 def _depends(inertia, closed, i):

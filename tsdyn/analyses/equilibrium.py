@@ -487,12 +487,11 @@ def _stability(descent):
         return bool(values.real.max() <= HALF_DIGITS * np.abs(values).max()), smallest, found.neutral, None
     if smallest >= 0.0:
         return True, smallest, found.neutral, None
-    from scipy.linalg import eigh, solve_triangular
+    from scipy.linalg import eigh
 
     K_s = 0.5 * (reduced.K_hat + reduced.K_hat.T)
     softest = interruptible(lambda: eigh(K_s, subset_by_index=[0, 0])[1])
-    way = reduced.T @ solve_triangular(reduced.R, softest[:, 0])
-    return False, smallest, found.neutral, way
+    return False, smallest, found.neutral, reduced.way(softest[:, 0])
 
 
 def _demand_held(frame):

@@ -133,6 +133,12 @@ class Reduced:
         """The size of the terms that K_hat is a sum of."""
         return self._hats[2]
 
+    def way(self, y):
+        """The displacement dq (n,) of coordinates y of unit mass."""
+        from scipy.linalg import solve_triangular
+
+        return self.T @ solve_triangular(self.R, y)
+
 
 # With rows on velocities the rates of x are not free: A dqd + G1_A dq = 0 leaves w, some of them.
 #
@@ -211,6 +217,12 @@ class Rolling:
     def scale(self):
         """The size of the terms that K_hat is a sum of."""
         return self.whole.scale
+
+    def way(self, y):
+        """The displacement dq (n,) that rates y of unit mass lead to."""
+        from scipy.linalg import solve_triangular
+
+        return self.T @ self.W @ solve_triangular(self.R, y)
 
     def pairs(self):
         """Eigenvalues (j + k,) and vectors of coordinates y (j, j + k)."""

@@ -136,6 +136,7 @@ def set_joint(  # by name: a value and a rate of each coordinate
     turns = tuple(goal.new_value for goal in goals if goal.turns)
     if turns:
         joint.__dict__["angle_near"] = turns
+        scene.touch()
     return report
 
 
@@ -248,7 +249,8 @@ def _drive(scene, joint, goals, held, t):
                 ) from error
             continue
         share, before = ahead, scene.start
-        _follow_turns(scene)
+        if threaded:
+            _follow_turns(scene)
         if share == 1.0:
             return report
 

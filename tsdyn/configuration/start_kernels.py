@@ -153,7 +153,8 @@ def _failing_row(c, q, t):
     set_time(c.system, t)
     place_bodies(graph.bodies, q, f.poses)
     evaluate_rows(graph, c.system, f, f.rows, t)
-    return factorise_selected_rows(graph, f, f.rows, DYNAMICS)
+    failed = factorise_selected_rows(graph, f, f.rows, DYNAMICS)
+    return failed if failed >= 0 else factorise_selected_rows(graph, f, f.rows, METRIC)
 
 
 @callback("pppppidd")

@@ -13,7 +13,6 @@ from ..observables.channels import channels_of, values_of
 from ..runs.arguments import state_arrays
 from ..simulation.parameters import fields_of, unknown_field
 from ..simulation.variants import start_names, start_of
-from ..taylor.series_engine import SeriesEngine
 from ..validation import counted, floats, shown, whole
 
 # Functions of a user that an ensemble calls: whether they take what they are given, and what they raise.
@@ -319,9 +318,6 @@ def demand_whole(study):
         demand_arguments(event.function, event.name, ("t", "state"))
     if state is not None:
         _demand_state(study, state)
-    form = study.options.form
-    if study.method.driver == "series" and form.name != "tangent":
-        SeriesEngine(study.kept, study.method, form, study.within)  # says which methods serve the form
     if cases.names is not None:
         table = (*cases.columns.values(), *cases.fixed.values())
         is_of_numbers = all(np.asarray(values).dtype.kind == "f" for values in table)

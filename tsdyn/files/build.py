@@ -313,9 +313,9 @@ def _points(reading, path, table, what, key):
 def _coordinates(reading, path, table, what, key):
     """The joint coordinates that a key names: "hinge", ["hinge", "angle", 0], or a list of these."""
     given = table.get(key)
-    alone = isinstance(given, list) and len(given) > 1 and isinstance(given[0], str) and given[1] in KINDS
-    found = []
-    for one in [given] if alone or not isinstance(given, list) else given:
+    alone = isinstance(given, list) and given[1:2] in [[kind] for kind in KINDS]
+    found, several = [], isinstance(given, list) and bool(given) and key != "dependent"  # of which there is one
+    for one in given if several and not alone else [given]:
         joint, *which = one if isinstance(one, list) and one else [one]
         own = table if key not in table else {**table, key: joint}
         joint = referred(reading, path, own, (what, key, "constraint", reading.items))

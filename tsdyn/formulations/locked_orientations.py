@@ -168,7 +168,7 @@ def _redundant(packed, omitted, spare):
     whole = redundant_rows(packed)
     if not len(whole):
         return () if spare == 0 else None
-    gone, row, left, others = set(graph_of(packed).row[whole].tolist()), 0, [], []
+    gone, row, left, others = set(whole.tolist()), 0, [], []
     for i, constraint in enumerate(packed.constraints):
         if i not in omitted and not constraint.normalises:
             for one in range(row, row + constraint.all_rows):

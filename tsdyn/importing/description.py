@@ -279,6 +279,10 @@ class ImportReport:
             self.limits[joint] = lower, upper
         self.leave("limits of a joint", joint, shown or f"[{lower:g}, {upper:g}]")
 
+    def carry_limits(self, joint: str) -> None:
+        """Note that the limits of a joint are stops."""
+        self._left = {entry: None for entry in self._left if (entry.what, entry.where) != ("limits of a joint", joint)}
+
     def note(self, text: str) -> None:
         """Note what is carried over in another way, once."""
         self._notes[text] = None

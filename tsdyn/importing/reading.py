@@ -23,6 +23,7 @@ from ..constraints.revolute import Revolute
 from ..constraints.rope import Rope
 from ..constraints.screw import Screw
 from ..constraints.spherical import Spherical
+from ..constraints.stop import Stop
 from ..constraints.translational import Translational
 from ..constraints.universal import Universal
 from ..elements.bodies import rotation_matrix
@@ -50,7 +51,9 @@ if TYPE_CHECKING:
 FORMATS = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF", "gazebo": "SDF"}
 
 
-def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool, given: Any = ()) -> Scene:
+def load(
+    path: Place, make: Callable[..., Scene], free_base: bool, outside: bool, given: Any = (), limits: bool = False
+) -> Scene:
     """The scene of a URDF, MJCF or SDF file; arguments and errors as of `ts.load`.
 
     Parameters
@@ -64,6 +67,8 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool
         Whether files outside the folder of this one may be read.
     given : sequence of (frame_a, frame_b, kind)
         Loops to be closed.
+    limits : bool
+        Whether limits of joints become stops.
     """
     root, mistakes = read(path)
     kind, path = FORMATS.get(root.tag), Path(path)
@@ -95,10 +100,10 @@ def load(path: Place, make: Callable[..., Scene], free_base: bool, outside: bool
             mistakes.add((1, 1), f"joint {joint.name!r}: its place or its offset is beyond {HUGE:g}.")
     mistakes.demand_none()
     loops.add_given(description, given)
-    return _scene(description, make, report, mistakes)
+    return _scene(description, make, report, mistakes, limits)
 
 
-def _scene(description: Any, make: Any, report: ImportReport, mistakes: Any) -> Scene:
+def _scene(description: Any, make: Any, report: ImportReport, mistakes: Any, limits: bool) -> Scene:
     """Merge, complete and build; a body or joint that can't be built is a mistake of the file."""
     merge(description, report)
     gather(description, report)
@@ -111,7 +116,14 @@ def _scene(description: Any, make: Any, report: ImportReport, mistakes: Any) -> 
     except TsdynError as error:
         mistakes.add((1, 1), str(error))
         mistakes.demand_none()
-    report.warn(_close(scene, report) if any(joint.loop for joint in description.joints) else 0.0)
+    gap = _close(scene, report) if any(joint.loop for joint in description.joints) else 0.0
+    if limits:
+        joints = {joint.name: joint for joint in scene.constraints if joint.joint_coordinates}
+        for name, (lower, upper) in report.limits.items():
+            if name in joints:
+                scene.add(Stop(joints[name], lower, upper, name=f"limits of {name}"))
+                report.carry_limits(name)
+    report.warn(gap)
     return scene
 
 

@@ -480,8 +480,7 @@ def friction_demand(motion, item):
 
 def _contact(motion, item):
     """Contact point and normal of an item; refused where it has none."""
-    found = member_of(motion.packed, item)
-    contact = None if found is None else touching(motion.packed, found, motion.q)
+    contact = None if isinstance(item, Force) else touching(motion.packed, member(motion.packed, item), motion.q)
     if contact is None:
         raise InvalidConstraint(
             f"{item.name} has no contact point; RollingDisc, RollingBall, RollingEllipsoid and RollingBallOnCylinder "

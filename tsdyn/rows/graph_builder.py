@@ -510,9 +510,9 @@ def set_redundant(packed, rows):
 
 
 def redundant_rows(packed):
-    """Redundant rows of a scene's graphs, int64 (k,)."""
-    rows = packed.derived.redundant
-    return np.zeros(0, np.int64) if rows is None else rows
+    """Redundant rows of Phi, int64 (k,)."""
+    places = packed.derived.redundant
+    return np.zeros(0, np.int64) if places is None else graph_of(packed).row[places]
 
 
 def with_loops(graph, kinds, *columns):

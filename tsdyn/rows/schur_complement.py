@@ -3,7 +3,7 @@
 from ..elements.loops.constraint_rows import POSE, RD
 from ..jit.kernels import kernel, long_kernel, stack
 from ..jit.simd import add, cross, fma, four, get, lanes, let, put, splat, sub, times, total
-from ..maths.tolerances import PIVOT_ROUNDING
+from ..maths.tolerances import HALF_DIGITS, PIVOT_ROUNDING
 from .constraint_graph import ROWS, ROWS_WELD, W_MASS, W_ROTATION, WEIGHTS, WELD_ROWS, WELDS
 from .elimination import factor, factor_and_solve, factor_lu, solve, solve_lu
 from .inertia_rows import (
@@ -505,7 +505,13 @@ def factorise_chart_matrix(graph, f, l):
     for values in (l.lower, l.upper):
         set_redundant_diagonal(graph, f, values)
         leave_axes_out(graph, values)
-    return factor_lu(graph.pattern, l.lower, l.upper, PIVOT_ROUNDING) < 0
+    if factor_lu(graph.pattern, l.lower, l.upper, PIVOT_ROUNDING) >= 0:
+        return False
+    # A pivot that vanishes beside that of S0, as its own diagonal does: its row points the other way
+    least = 1.0
+    for at in graph.diagonal:
+        least = min(least, abs(get(l.rows0.S, at) / get(l.upper, at)))  # reciprocals of s and n
+    return least > HALF_DIGITS
 
 
 @kernel

@@ -114,57 +114,62 @@ class Phases:
         Time (s), name, impulse (N s, or N m s of an angle).
     """
 
-    def __init__(self, rows):
-        self.list, self.impulses, self.starts, self.packed, self._columns, self._rows = [], [], [], [], [], rows
+    def __init__(self, packed):
+        self.list, self.impulses, self.starts, self.of = [], [], [], []
+        self.packed, self._columns = [], []  # of each set of closed gaps
+        self._rows, self._kinds = _rows_of(packed), {}
 
-    def begin(self, t, packed, names):
-        """A phase begins at t."""
-        index = {id(part): i for i, part in enumerate(packed.constraints)}
-        first = np.cumsum([0, *(part.all_rows for part in packed.constraints)])
-        pairs = [(row, first[index[key]] + i) for key, row, i in self._rows if key in index]
-        self.starts.append(t)
-        self.packed.append(packed)
-        self._columns.append(np.array(pairs, int).reshape(-1, 2).T)
-        self.list.append((t, t, names))
-
-    def end(self, t):
-        """The present phase has ended."""
-        self.list[-1] = (self.list[-1][0], t, self.list[-1][2])
+    def add(self, begin, rest, end, packed, names):
+        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
+        kind = self._kinds.setdefault(id(packed), len(self.packed))
+        if kind == len(self.packed):
+            own = _rows_of(packed)
+            pairs = [(self._rows[part] + i, own[part] + i) for part, i in _numbered(packed) if part in self._rows]
+            self.packed.append(packed)
+            self._columns.append(np.array(pairs, int).reshape(-1, 2).T)
+        if self.list:
+            self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
+        self.starts.append(begin)
+        self.of.append(kind)
+        self.list.append((rest, max(rest, end), names))
 
     def at(self, t):
         """Numbers of the phases at times t (k,); where one begins, the later one."""
         return np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
 
-    def gathered(self, function, numbers, *arrays):
-        """What a function of a packed scene and arrays gives, asked of each phase for its own entries, (k, ...)."""
-        out = None
-        for number in np.unique(numbers):
-            mine = numbers == number
-            found = function(number, *(None if array is None else array[mine] for array in arrays))
-            out = np.zeros((len(numbers), *found.shape[1:])) if out is None else out
-            out[mine] = found
-        return out
-
     def multipliers(self, numbers, m, *arrays):
         """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
-
-        def of(number, *some):
-            found = reactions.multipliers(self.packed[number], *some)
-            every, (rows, columns) = np.zeros((len(found), m)), self._columns[number]
-            every[:, rows] = found[:, columns]
-            return every
-
-        found = self.gathered(of, numbers, *arrays)
-        return np.zeros((0, m)) if found is None else found
+        out = np.zeros((len(numbers), m))
+        for kind, mine, some in self._gathered(numbers, arrays):
+            rows, columns = self._columns[kind]
+            out[np.ix_(mine, rows)] = reactions.multipliers(self.packed[kind], *some)[:, columns]
+        return out
 
     def constraint_error(self, numbers, *arrays):
         """The `ConstraintError` of the rows that hold."""
+        out = np.zeros((3, len(numbers)))
+        for kind, mine, some in self._gathered(numbers, arrays):
+            out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
+        return diagnostics.ConstraintError(*out)
 
-        def of(number, *some):
-            return np.stack(diagnostics.constraint_error(self.packed[number], *some), axis=1)
+    def _gathered(self, numbers, arrays):
+        """Yield each set of closed gaps, the entries (j,) of arrays in its phases, and these parts of the arrays."""
+        kinds = np.array(self.of)[numbers]
+        for kind in np.unique(kinds).tolist():
+            mine = np.flatnonzero(kinds == kind)
+            yield kind, mine, [None if array is None else array[mine] for array in arrays]
 
-        found = self.gathered(of, numbers, *arrays)
-        return diagnostics.ConstraintError(*(np.zeros((0, 3)) if found is None else found).T)
+
+def _rows_of(packed):
+    """The first row of each primitive, by its id."""
+    firsts = np.cumsum([0, *(part.all_rows for part in packed.constraints)]).tolist()
+    return {id(part): first for part, first in zip(packed.constraints, firsts, strict=False)}
+
+
+def _numbered(packed):
+    """Yield the id of the primitive of each row, and which of its rows it is."""
+    for part in packed.constraints:
+        yield from ((id(part), i) for i in range(part.all_rows))
 
 
 class _Pieces(StepPieces):
@@ -210,7 +215,7 @@ class _ContactRun:
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
         self.gaps = gaps = Gaps(scene.packed)
-        self.n, self.count = kept.n, kept.handles.count
+        self.count = kept.handles.count
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
@@ -219,10 +224,7 @@ class _ContactRun:
         self.users = prepared_events(options.events) or []
         self.closed, self.idle, self.rest = [], [], self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
-        firsts = np.cumsum([0, *(part.all_rows for part in scene.packed.constraints)])
-        self.phases = Phases(
-            [(id(p), firsts[k] + i, i) for k, p in enumerate(scene.packed.constraints) for i in range(p.all_rows)]
-        )
+        self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
         self.reason, self.method, self.at_once, self.judged = "", "", 0, (self.t, 0)
 
     def _demand_served(self, kept):
@@ -269,7 +271,6 @@ class _ContactRun:
         gaps, end = self.gaps, self.span[1]
         phase = phase_of(self.scene, [gaps.list[i].side.row for i in self.closed])
         names = [gaps.names[i] for i in sorted([*self.closed, *self.idle])]
-        self.phases.begin(self.rest, phase.packed, tuple(dict.fromkeys(names)))
         call, plain = RunCall((self.t, end)), replace(self.options, events=None)
         run = self.run_of(phase, plain, call)
         run._prepare_kernels(True)
@@ -282,13 +283,13 @@ class _ContactRun:
             outcome = self.run_task(task, phase, self.options.initial_tol)
             other = self.instead(task, outcome.status)
             if other is None:
+                self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, tuple(dict.fromkeys(names)))
                 return task, outcome
             run = run._by(other)
 
     def _events(self, phase):
-        gaps, found = self.gaps, []
-        for event, known in zip(self.users, self.found, strict=True):
-            found.append(event._replace(limit=event.limit - sum(len(times) for times, *_ in known)))
+        gaps, pairs = self.gaps, zip(self.users, self.counts, strict=True)
+        found = [event._replace(limit=event.limit - count) for event, count in pairs]
         self.watched, pushes = [None] * len(found), {}
         first = {id(member.constraint): member.rows.start for member in phase.packed.members}
         for i in range(gaps.count):
@@ -307,17 +308,14 @@ class _ContactRun:
         left = self.times[self.taken :]
         return left if left.size or self.per_step else np.array([np.inf])  # an empty array would ask for every step
 
-    def _steps(self):
-        return sum(part.end.counts["steps"] for part in self.parts)
-
     def _steps_left(self):
         most = self.options.max_steps
-        return None if most is None else max(most - self._steps(), 0)
+        return None if most is None else max(most - self.steps, 0)
 
     def _reporting(self):
         if self.report is silent:
             return silent
-        (start, end), t, done = self.span, self.t, self._steps()
+        (start, end), t, done = self.span, self.t, self.steps
 
         def report(fraction, at=0.0, steps=0):
             if fraction is not None:
@@ -331,12 +329,13 @@ class _ContactRun:
         """Take the end of a phase; the Status of the run, None if it goes on."""
         end, gaps = outcome.end, self.gaps
         self.reason, self.method = outcome.reason, outcome.method or self.method
+        self.steps += end.counts["steps"]
         times, *states = outcome.events
-        for known, *mine in zip(self.found, times, *states, strict=False):
-            known.append(mine)
+        for i, mine in enumerate(list(zip(times, *states, strict=True))[: len(self.users)]):
+            self.found[i].append(mine)
+            self.counts[i] += len(mine[0])
         self.t, (self.q, self.qd, _) = end.reached, (x.copy() for x in end.last)
         self.remembered = end.remembered
-        self.phases.end(self.t)
         fired = [i for i, at in zip(self.watched, times, strict=True) if i is not None and at.size]
         goes_on = outcome.status is Status.EVENT and fired and self.t < self.span[1]
         rows = outcome.rows
@@ -391,12 +390,12 @@ class _ContactRun:
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
             self.opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
-            found = settle(inertia, resting, self.qd, [i for i in fired if i in self.closed])
+            leaving = [i for i in fired if i in self.closed]
+            self.closed, self.idle = settle(inertia, resting, self.qd, leaving)[:2] if resting else ([], [])
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
-        self.closed, self.idle = found.closed, found.idle
         return None
 
     def _hit(self, inertia, touching, rates):
@@ -411,15 +410,16 @@ class _ContactRun:
             self.rest = float(max([self.rest, *(self.t + T for T in flights)]))
             e[last] = 0.0
             p, qd, after = self._jump(inertia, touching, before, e)
+            a = self._lowering(inertia, touching, qd, after)
         # Contacts that another impact lifts by less than rounding stay closed
         for _ in touching:
-            a = self._lowering(inertia, touching, qd, after)
             if not a.any():
                 break
             qd, after = held(inertia, qd, [i for i in touching if a[i] > 0.0 or after[i] == 0.0], after)
             if (after[touching] < 0.0).any():
                 more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
                 p = p + more
+            a = self._lowering(inertia, touching, qd, after)
         self.qd = qd
         named = zip(touching, p, strict=True)
         self.phases.impulses += [(self.t, self.gaps.names[i], float(x)) for i, x in named if x > 0.0]
@@ -479,7 +479,7 @@ def jumped(inertia, qd, which, before, e, p, law="newton"):
 
 
 def held(inertia, qd, which, rates):
-    """Velocities (n,) and rates (count,) after the least change, by kinetic energy, that ends the rates of some gaps."""
+    """Velocities (n,) and rates (count,) after the least change, by kinetic energy, that ends some rates."""
     change = inertia.hold(which, rates[which])
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = 0.0
@@ -537,7 +537,7 @@ def impact(
 
     Examples
     --------
-    A row of three equal balls in contact is hit from the left. Poisson's law of elastic impacts gives Newton's cradle:
+    The first of three equal balls in contact is hit; plastic impacts leave all with the same velocity:
 
     >>> import tsdyn as ts
     >>> scene = ts.Scene(gravity=(0, 0, 0))

@@ -34,6 +34,7 @@ def load(
     free_base: bool = False,
     outside: bool = False,
     loops: Sequence[Sequence[Any]] = (),
+    limits: bool = False,
 ) -> Any:
     """Return the scene, solution or ensemble of a file; nothing in it is executed.
 
@@ -60,6 +61,8 @@ def load(
         they are held together. "weld": they coincide; "ball": their origins do; "hinge": their origins and z axes do,
         or an axis in both frames that a fourth entry gives, such as (0, 1, 0). The scene is assembled;
         a warning and `scene.imported` say so where it can't be.
+    limits : bool
+        Whether limits of the joints of a URDF, MJCF or SDF file become stops, plastic ones named "limits of ...".
 
     Returns
     -------
@@ -96,6 +99,8 @@ def load(
         raise InvalidArgument(f"free_base must be True or False, got {free_base!r}.")
     if not isinstance(outside, bool):
         raise InvalidArgument(f"outside must be True or False, got {outside!r}.")
+    if not isinstance(limits, bool):
+        raise InvalidArgument(f"limits must be True or False, got {limits!r}.")
     loops = validation.sequence(
         loops, 'loops must be a sequence such as [("link_a", "link_b", "weld")]', InvalidArgument
     )
@@ -103,8 +108,8 @@ def load(
     if suffix in SCENES:
         if scene is not None:
             raise InvalidArgument("scene= is for solutions; a scene file holds its own.")
-        return scene_file(path, allow_code, free_base, outside, loops)[0]
-    _demand_robot(free_base, outside, loops)
+        return scene_file(path, allow_code, free_base, outside, loops, limits)[0]
+    _demand_robot(free_base, outside, loops, limits)
     if suffix == ".xacro":
         raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
     from ..files.formats import SUFFIXES
@@ -123,23 +128,30 @@ def load(
 
 
 def scene_file(
-    path: Place, allow_code: bool = False, free_base: bool = False, outside: bool = False, loops: Any = ()
+    path: Place,
+    allow_code: bool = False,
+    free_base: bool = False,
+    outside: bool = False,
+    loops: Any = (),
+    limits: bool = False,
 ) -> tuple[Scene, dict[str, Any]]:
     """Return the scene of a file, and the arguments of `simulate` that the table `run` of a TOML file asks for."""
     if Path(path).suffix.lower() != ".toml":
         from ..importing.reading import load as imported
 
-        return imported(path, Scene, free_base, outside, loops), {}
-    _demand_robot(free_base, outside, loops)
+        return imported(path, Scene, free_base, outside, loops, limits), {}
+    _demand_robot(free_base, outside, loops, limits)
     return document_of(path, allow_code)[:2]
 
 
-def _demand_robot(free_base, outside, loops):
+def _demand_robot(free_base, outside, loops, limits):
     """Refuse options of the files of other programs."""
     if free_base:
         raise InvalidArgument("free_base= is for URDF files.")
     if outside:
         raise InvalidArgument("outside= is for URDF, MJCF and SDF files.")
+    if limits:
+        raise InvalidArgument("limits= is for URDF, MJCF and SDF files; other scenes have stops, ts.constraints.Stop.")
     if loops:
         raise InvalidArgument("loops= is for URDF, MJCF and SDF files; other scenes close loops by scene.add.")
 

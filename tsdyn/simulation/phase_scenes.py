@@ -2,6 +2,7 @@
 
 from functools import wraps
 
+from ..calls import fitting
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument
 from ..model.handles import handles_of
@@ -14,8 +15,10 @@ NAMED = 5  # contacts in a message
 
 
 def has_contacts(scene):
-    """Whether a scene has unilateral constraints; of a phase none are left."""
-    return "_closed" not in vars(scene) and bool(contacts_of(scene._added))
+    """Whether a scene has unilateral constraints; looked up once until the scene changes."""
+    if scene._opens is None:
+        scene._opens = bool(contacts_of(scene._added))
+    return scene._opens
 
 
 def phase_of(scene, rows):
@@ -31,7 +34,7 @@ def phase_of(scene, rows):
         vars(phase).update(vars(scene))
         vars(phase).update(
             _added=others + list(rows), _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={},
-            _closed=tuple(rows),
+            _opens=False,
         )  # fmt: skip
     return known[key]
 
@@ -58,16 +61,18 @@ def demand_bilateral(scene):
 
 def where_it_stands(function):
     """Decorate a method of scenes: contacts that are closed at the start hold, the others are left out."""
+    own = getattr(function, "__wrapped__", function)  # `fitting` names the method that is called
 
     @wraps(function)
     def call(scene, *arguments, **keywords):
-        return function(at_start(scene), *arguments, **keywords)
+        return own(at_start(scene), *arguments, **keywords)
 
-    return call
+    return fitting(call)
 
 
 def without_contacts(function):
     """Decorate a method of scenes that takes constraints as bilateral: refuse scenes with contacts."""
+    own = getattr(function, "__wrapped__", function)
 
     @wraps(function)
     def call(scene, *arguments, **keywords):
@@ -77,6 +82,6 @@ def without_contacts(function):
                 f"{function.__name__} is for bilateral constraints, and {names} open{'s' * (',' not in names)}. Remove "
                 "these from a copy of the scene, or hold them closed by unilateral=False."
             )
-        return function(scene, *arguments, **keywords)
+        return own(scene, *arguments, **keywords)
 
-    return call
+    return fitting(call)

@@ -251,7 +251,7 @@ def from_names(given: dict[str, Any]) -> tuple[RunOptions, RunCall]:
 
 def demand_arguments_of_file(given: dict[str, Any]) -> None:
     """Raise InvalidArgument unless arguments of a file, without functions, are such as `simulate` takes."""
-    named = "taylor" if given["integrator"] is None else given["integrator"]  # the tolerances are checked with it
+    named = "dop853" if given["integrator"] is None else given["integrator"]  # the tolerances are checked with it
     _, call = from_names({**given, "integrator": named, "events": None})
     output_times(call.t_eval, *interval(call.t_span))
 
@@ -269,12 +269,18 @@ def documented(*names: str) -> Callable[[Function], Function]:
     return decorate
 
 
+def _serves(method, form):
+    """Whether a method, or a class of methods, runs scenes in a form."""
+    if method.coupled or method.driver == "series":
+        return form.basis_free
+    return not (method.implicit and form.first_order)
+
+
 def _demand_served(method, form):
-    """Refuse a method that solves its stages in another form."""
-    if (method.implicit and form.first_order) or (method.coupled and not form.basis_free):
-        kinds = {name: kind for name, kind in registered().items() if not kind.coupled}
-        others = ", ".join(repr(name) for name, kind in kinds.items() if not (kind.implicit and form.first_order))
-        raise InvalidArgument(
-            f"{type(method).__name__} solves its stages in the tangent-space form only; formulation={form.name!r} is "
-            f"served by {others}."
-        )
+    """Refuse a method that runs scenes in another form only."""
+    if not _serves(method, form):
+        others = ", ".join(repr(name) for name, kind in registered().items() if _serves(kind, form))
+        why = f"{type(method).__name__} solves its stages in the tangent-space form only"
+        if method.driver == "series":
+            why = "Taylor series are of the motion itself and need no other form than 'tangent'"
+        raise InvalidArgument(f"{why}; formulation={form.name!r} is served by {others}.")

@@ -212,7 +212,7 @@ class Scene:
     ground: AnyBody
     imported: ImportReport | None = None
     _named = None  # of a file with a table `parameters`: its `NamedNumbers`
-    _phases = None  # of a scene with contacts: see phase_scenes.py
+    _phases = _opens = None  # of a scene with contacts: see phase_scenes.py
     _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:
@@ -417,7 +417,7 @@ class Scene:
         """Discard the packed numbers after a change."""
         if "_later" in self.__dict__:
             make_handles(self)
-        self._packed = self._start = self._prepared = self._phases = None
+        self._packed = self._start = self._prepared = self._phases = self._opens = None
 
     def touch_start(self) -> None:
         """Discard what depends on the start, after a change of it: redundant rows, bodies that turn, a local origin."""

@@ -33,8 +33,9 @@ FEW_LAYOUTS = 2  # of memories that other engines have used
 
 def prepared(scene):
     """Return the `Prepared` of the present scene, which is to be run."""
+    kept = prepared_numbers(scene)
     demand_bilateral(scene)
-    return prepared_numbers(scene)
+    return kept
 
 
 def prepared_numbers(scene):

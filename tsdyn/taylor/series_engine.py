@@ -170,11 +170,6 @@ class SeriesEngine:
     layouts, readings = 0, (None, (None, None))
 
     def __init__(self, prepared, method, form, within):
-        if form.name != "tangent":
-            raise InvalidArgument(
-                "Taylor series are of the motion itself and need no other form than 'tangent'; formulation="
-                f"{form.name!r} is served by 'dop853', 'rk45' and 'nystrom4'."
-            )
         self.method, self.form, self.within = method, form, within
         self.series, self.orders = prepared.series, method.orders()
         self.highest = self.orders[2]

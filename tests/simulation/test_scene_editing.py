@@ -79,9 +79,9 @@ def test_what_is_referred_to_stays():
     scene, links = chain()
     scene.add(F.RevoluteFriction(scene["hinge0"], kinetic=0.1, radius=0.1, name="rub"))
     for item, words in (
-        (links[1], "'link1' can't be removed: hinge1, hinge2 refer to it"),
+        (links[1], "'link1' can't be removed before what refers to it: hinge1, hinge2"),
         ("link2", "hinge2, spring"),
-        (scene["hinge0"], "rub refer"),
+        (scene["hinge0"], "rub"),
     ):
         with pytest.raises(ts.InvalidArgument, match=words):
             scene.remove(item)

@@ -60,8 +60,7 @@ def remove(scene: Scene, item: Any) -> Any:
     users = _users(scene, item)
     if users:
         raise InvalidArgument(
-            f"{item.name!r} can't be removed: {listed([user.name for user in users], SHOWN)} refer to it. "
-            "Remove these first."
+            f"{item.name!r} can't be removed before what refers to it: {listed([user.name for user in users], SHOWN)}."
         )
     if isinstance(item, PointMass):
         scene._bodies.remove(item)

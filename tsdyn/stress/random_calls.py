@@ -260,7 +260,7 @@ def deadline(seconds):
 def leaks(result):
     """Which number of what a call gave is not finite; empty where none is."""
     numbers = {}
-    if isinstance(result, (Primitive, Joint, Force)):
+    if isinstance(result, (Primitive, Joint, Force)) and "coordinates" in vars(result):  # all but unplaced Controls
         numbers = {"coordinates": np.ravel(result.coordinates)}
         numbers["parameters"] = [p for p in result.parameters() if isinstance(p, (int, float))]
     elif isinstance(result, PointMass):

@@ -38,7 +38,9 @@ def files(folder):
     return sorted(file.name.partition("-")[0] for file in folder.rglob("*") if ".kernel" in file.name[:-5])
 
 
-LOOPS = [f"euler_normalization.EulerNormalization.{name}_loop" for name in ("gamma", "jacobian", "phi")]
+LOOPS = [
+    f"tsdyn.constraints.euler_normalization.EulerNormalization.{name}_loop" for name in ("gamma", "jacobian", "phi")
+]
 BY_WORKERS, IN_PROCESS = "{} 2 0 3 False", "3 0 False"
 
 

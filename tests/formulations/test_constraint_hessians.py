@@ -19,7 +19,11 @@ from tsdyn.model.packed import with_curvatures, with_force_jacobians
 from tsdyn.observables.evaluate import constraint_arrays
 from tsdyn.testing.force_checks import evaluate_force_jacobian
 
-TRANSCENDENTAL, SMOOTH = ("Thread", "Gear"), 2e-3  # constraints with sines and angles in them; their differences
+# Constraints that are no polynomials of the positions, and the step of their differences
+TRANSCENDENTAL = (
+    "Thread", "Gear", "AngleTerm", "Span", "SmoothContact", "RollingContact", "CylinderContact", "CylinderRolling",
+)  # fmt: skip
+SMOOTH = 2e-3
 POLYNOMIAL = 0.05  # of differences of polynomials of degree six and less, which they are exact for
 C, F = ts.constraints, ts.forces
 WAVE = (lambda t: 0.5 + 0.3 * np.sin(2.0 * t), lambda t: 0.6 * np.cos(2.0 * t), lambda t: -1.2 * np.sin(2.0 * t))
@@ -169,7 +173,8 @@ def test_turn_block(code_row, code_column, rng):
     assert np.isfinite(out).sum() == n * m
 
 
-INTERNAL = [kind for kind in built_in.FORCES if kind not in (F.PointForce, F.Torque, F.UserForce, F.Control)]
+NOT_INTERNAL = F.PointForce, F.Torque, F.UserForce, F.Control, F.Cable  # loads in space; laws of the whole scene
+INTERNAL = [kind for kind in built_in.FORCES if kind not in NOT_INTERNAL]
 INTERNAL = [k for k in INTERNAL if k.__module__.startswith("tsdyn.") and not issubclass(k, JointLoad)]
 
 

@@ -61,7 +61,7 @@ class SceneStructure:
         self.no_pairs = np.zeros((len(self.parts), 12, 12))
         self._make_patterns()
         self.weights = self._weights()
-        self._known = graph_of(packed, REDUCED).row[redundant_rows(packed)]
+        self._known = redundant_rows(packed)
 
     def _make_patterns(self):
         each, m, size = self.increments, self.own.size, self.increments.size

@@ -243,7 +243,7 @@ class NominalMotion:
 
     def _redundant(self):
         """Redundant rows of Phi at this state: as many as at the start, reselected."""
-        known = graph_of(self.packed, REDUCED).row[redundant_rows(self.packed)]
+        known = redundant_rows(self.packed)
         if not known.size:
             return known
         if self.q.size <= DENSE:

@@ -75,7 +75,7 @@ class Formulation:
         if not self.mixed:
             return redundancy(graph)
         unheld = of_rates(packed)
-        unheld[graph.row[redundant_rows(packed)]] = True
+        unheld[redundant_rows(packed)] = True
         return int(unheld.sum())
 
     @property

@@ -14,8 +14,7 @@ from ..maths.tolerances import PIVOT_ROUNDING, TINY
 from ..model.equations import WIDTH, places, remember, set_time, with_short_rows
 from ..model.handles import all_angles, counted
 from ..model.packed import no_system
-from ..rows.constraint_graph import REDUCED
-from ..rows.graph_builder import graph_of, redundant_rows
+from ..rows.graph_builder import redundant_rows
 from .nominal_motion import NominalMotion, Pairs
 from .rest import Increments, Rest, SparsePattern
 from .tolerances import ACCEPTED, DENSE, FINAL, GOOD, HALVINGS, REDUNDANT_SHARE, REGULARISED, SHORT, SHORTER, WORTH

@@ -30,8 +30,8 @@ from ..model.laws import interrupts_answered
 from ..model.packed import first_rows, instances_of_kinds, no_system, of_rates, with_curvatures, with_force_jacobians
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
-from ..rows.constraint_graph import REDUCED, are_unequal, coordinate_scales
-from ..rows.graph_builder import graph_of, redundant_rows
+from ..rows.constraint_graph import are_unequal, coordinate_scales
+from ..rows.graph_builder import redundant_rows
 from .tolerances import DENSE, REDUNDANT_SHARE
 
 # Derivatives of all constraints and forces, each as a block of the 14 coordinates of its two bodies.

@@ -28,6 +28,7 @@ from ..plugins import (
     coordinate_function,
     dot,
     finite,
+    kernel,
     product,
     quotient,
     scaled,
@@ -38,6 +39,22 @@ from .angle_driver import sine_cosine_rates
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
+
+
+@kernel
+def _sine_cosine(x):
+    """E = f.h and F = g.h."""
+    return x[0] * x[6] + x[1] * x[7] + x[2] * x[8], x[3] * x[6] + x[4] * x[7] + x[5] * x[8]
+
+
+@kernel
+def _write_gradient(x, E, F, factor, out):
+    """out = factor S theta_(f, g, h), Eq. (3)."""
+    E, F = factor * E, factor * F
+    for i in range(3):
+        out[0, i] = -F * x[6 + i]
+        out[0, 3 + i] = E * x[6 + i]
+        out[0, 6 + i] = E * x[3 + i] - F * x[i]
 
 
 class AngleTerm(Primitive):
@@ -97,21 +114,14 @@ class AngleTerm(Primitive):
     @staticmethod
     def phi(x, par, t, out):
         """Eq. (2)."""
-        E = x[0] * x[6] + x[1] * x[7] + x[2] * x[8]
-        F = x[3] * x[6] + x[4] * x[7] + x[5] * x[8]
+        E, F = _sine_cosine(x)
         out[0] = par[0] * angle_near(F, E, par[2]) + par[1]
 
     @staticmethod
     def jacobian(x, par, t, out):
         """By Eq. (3)."""
-        E = x[0] * x[6] + x[1] * x[7] + x[2] * x[8]
-        F = x[3] * x[6] + x[4] * x[7] + x[5] * x[8]
-        factor = par[0] / (E * E + F * F)
-        E, F = factor * E, factor * F
-        for i in range(3):
-            out[0, i] = -F * x[6 + i]
-            out[0, 3 + i] = E * x[6 + i]
-            out[0, 6 + i] = E * x[3 + i] - F * x[i]
+        E, F = _sine_cosine(x)
+        _write_gradient(x, E, F, par[0] / (E * E + F * F), out)
 
     @staticmethod
     def gamma(x, xd, par, t, out):
@@ -123,8 +133,7 @@ class AngleTerm(Primitive):
     @staticmethod
     def remember(x, par, t):
         """theta."""
-        E = x[0] * x[6] + x[1] * x[7] + x[2] * x[8]
-        F = x[3] * x[6] + x[4] * x[7] + x[5] * x[8]
+        E, F = _sine_cosine(x)
         return angle_near(F, E, par[2])
 
     @staticmethod
@@ -166,21 +175,15 @@ class _AngleFunctionTerm(AngleTerm):
     @staticmethod
     def phi(x, par, t, out):
         """Eq. (5)."""
-        E = x[0] * x[6] + x[1] * x[7] + x[2] * x[8]
-        F = x[3] * x[6] + x[4] * x[7] + x[5] * x[8]
+        E, F = _sine_cosine(x)
         out[0] = par[0] * coordinate_function(par, 2, angle_near(F, E, par[6]), 0) + par[1]
 
     @staticmethod
     def jacobian(x, par, t, out):
         """By Eq. (6)."""
-        E = x[0] * x[6] + x[1] * x[7] + x[2] * x[8]
-        F = x[3] * x[6] + x[4] * x[7] + x[5] * x[8]
+        E, F = _sine_cosine(x)
         factor = par[0] * coordinate_function(par, 2, angle_near(F, E, par[6]), 1) / (E * E + F * F)
-        E, F = factor * E, factor * F
-        for i in range(3):
-            out[0, i] = -F * x[6 + i]
-            out[0, 3 + i] = E * x[6 + i]
-            out[0, 6 + i] = E * x[3 + i] - F * x[i]
+        _write_gradient(x, E, F, factor, out)
 
     @staticmethod
     def gamma(x, xd, par, t, out):
@@ -195,8 +198,7 @@ class _AngleFunctionTerm(AngleTerm):
     @staticmethod
     def remember(x, par, t):
         """theta."""
-        E = x[0] * x[6] + x[1] * x[7] + x[2] * x[8]
-        F = x[3] * x[6] + x[4] * x[7] + x[5] * x[8]
+        E, F = _sine_cosine(x)
         return angle_near(F, E, par[6])
 
     @staticmethod

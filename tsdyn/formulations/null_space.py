@@ -429,6 +429,13 @@ def frictional_acceleration(context, c, w, t, vdd):
 def place(context, t, v):
     """Set positions from v: q, Phi_q, B, D and the factor of D^T M D. Status."""
     c = load(context)
+    status = set_positions(c, t, v)
+    return reduced_mass(c.system, c.work) if status == OK else status
+
+
+@kernel
+def set_positions(c, t, v):
+    """Set q, Phi_q, B and D from v. Status."""
     system, w = c.system, c.work
     w.counters.placements += 1
     c.chart.state.time = t
@@ -436,10 +443,8 @@ def place(context, t, v):
         return NOT_FINITE
     # Eqs. 19, 20 and 29
     status = solve_positions(system, w, t, vector(v, w.v.size))
-    if status == OK:
-        # Eqs. 7, 9 and 28 at the new q
-        status = tangent_map(system, w, t)
-    return reduced_mass(system, w) if status == OK else status
+    # Eqs. 7, 9 and 28 at the new q
+    return tangent_map(system, w, t) if status == OK else status
 
 
 @callback(ACCELERATE)

@@ -33,11 +33,11 @@ from .null_space import (
     project,
     reduced_mass,
     refine_velocities,
+    set_positions,
     velocities,
     weighted_square,
 )
 from .null_space_chart import (
-    NOT_FINITE,
     OK,
     SINGULAR,
     evaluate_dense_rows,
@@ -46,8 +46,6 @@ from .null_space_chart import (
     map_tangent,
     new_chart,
     set_bases,
-    solve_positions,
-    tangent_map,
 )
 
 __all__ = ["accelerate", "check", "complete", "error_norm", "place", "solve_friction", "start_chart"]
@@ -112,15 +110,7 @@ def _map_velocities(c, t):
 def place(context, t, v):
     """Set positions from v: q, then D_K, B_K and the factor of D_K^T M D_K. Status."""
     c = load_mixed(context)
-    system, w = c.system, c.work
-    w.counters.placements += 1
-    c.chart.state.time = t
-    if not set_time(system, t):
-        return NOT_FINITE
-    # Eqs. 19, 20 and 29, and B and T with which the next solve starts
-    status = solve_positions(system, w, t, vector(v, w.v.size))
-    if status == OK:
-        status = tangent_map(system, w, t)
+    status = set_positions(c, t, v)  # B and T are those with which the next solve starts
     return _map_velocities(c, t) if status == OK else status
 
 

@@ -12,6 +12,7 @@ from ..calls import fitting
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
 from ..jit.compiled import clock
 from ..maths.tolerances import EPS
+from ..model.packed import first_rows
 from ..observables import diagnostics, reactions
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import interval, output_times, state_arrays
@@ -162,8 +163,7 @@ class Phases:
 
 def _rows_of(packed):
     """The first row of each primitive, by its id."""
-    firsts = np.cumsum([0, *(part.all_rows for part in packed.constraints)]).tolist()
-    return {id(part): first for part, first in zip(packed.constraints, firsts, strict=False)}
+    return {id(part): first for part, first in first_rows(packed.constraints)}
 
 
 def _numbered(packed):

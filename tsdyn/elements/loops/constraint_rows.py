@@ -49,14 +49,8 @@ def largest_coordinate(bodies, q, size):
 
 
 @kernel
-def set_pose(poses, at, p):
-    """A(p) and p of the pose that begins at poses[at]; p (4,)."""
-    orient(poses, at, p[0], p[1], p[2], p[3])
-
-
-@kernel
 def orient(poses, at, e0, e1, e2, e3):
-    """The same of p = (e0, e1, e2, e3)."""
+    """A(p) and p = (e0, e1, e2, e3) of the pose that begins at poses[at]."""
     # A = (e0^2 - e.e) I + 2 e e^T + 2 e0 e~, column by column
     a = e0 * e0 - e1 * e1 - e2 * e2 - e3 * e3
     e, twice = lanes(e1, e2, e3), 2.0 * e0

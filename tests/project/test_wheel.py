@@ -96,12 +96,12 @@ def by_another_numba(folder):
 
 def by_one_that_fails(folder):
     by_another_numba(folder)
-    for file in folder.glob("backend._probe_arguments*"):
+    for file in folder.glob("*.backend._probe_arguments*"):
         file.write_bytes(file.read_bytes()[:-9])
 
 
 def damaged(folder):
-    for file in folder.glob("distance.Distance.phi_loop*"):
+    for file in folder.glob("*.distance.Distance.phi_loop*"):
         file.write_bytes(file.read_bytes()[:-9])
 
 

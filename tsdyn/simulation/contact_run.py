@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, values_of
+from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
+from ..elements.unilateral import contacts_of
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
 from ..jit.compiled import clock
 from ..maths.tolerances import EPS
@@ -22,7 +25,7 @@ from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import floats, listed
-from .phase_scenes import NAMED, has_contacts, phase_of
+from .phase_scenes import NAMED, first_row_of, has_contacts, phase_of, rows_of_hold
 from .progress import reporter, silent
 from .run_options import RunCall
 from .scene_cache import Prepared, prepared
@@ -75,36 +78,108 @@ class _Closing:
         return np.where(t > begun, (gap - first) / since, rate)
 
 
+class _Loads:
+    """Multipliers and normal loads of a phase, shared by its events."""
+
+    def __init__(self, packed):
+        self.packed, self._last = packed, (None, None)
+
+    def at(self, states):
+        """Multipliers (k, m), NaN of redundant rows, and normal loads (k, frictions) of one state or of several."""
+        t, q, qd, qdd = np.atleast_1d(states.t), *map(np.atleast_2d, (states.q, states.qd, states.qdd))
+        key, (last, found) = (t.tobytes(), q.tobytes()), self._last
+        if key != last:
+            memory = np.tile(states.memory, (t.size, 1))
+            wide = reactions.with_normal_loads(self.packed, t, q, qd, qdd, memory)
+            found = reactions.multipliers(self.packed, t, q, qd, qdd, wide), wide[:, memory.shape[1] :]
+            self._last = key, found
+        return found
+
+
 class _Leaving:
     """The reaction of a closed contact, positive where it pushes, as an event function.
 
     Parameters
     ----------
-    packed : Packed
-        Of the phase.
+    loads : _Loads
     row : int
     sign : float
         Of the gap over Phi.
-    seen : dict
-        What is shared with the other contacts of the phase.
     """
 
-    def __init__(self, packed, row, sign, seen):
-        self.packed, self.row, self.sign, self.seen = packed, row, sign, seen
+    def __init__(self, loads, row, sign):
+        self.loads, self.row, self.sign = loads, row, sign
 
     def over(self, states):
         """Values (k,) of states at k times."""
-        key = states.t.tobytes(), states.q.tobytes()
-        if key not in self.seen:  # those of other contacts at the same times are found with it
-            self.seen.clear()
-            memory = np.tile(states.memory, (states.t.size, 1))
-            levels = states.t, states.q, states.qd, states.qdd, memory
-            self.seen[key] = reactions.multipliers(self.packed, *levels)
-        return -self.sign * self.seen[key][:, self.row]
+        return -self.sign * self.loads.at(states)[0][:, self.row]
 
     def __call__(self, t, state):
         """The value at one state."""
-        return -self.sign * state.multipliers[self.row]
+        return float(self.over(state)[0])
+
+
+class _Breaking:
+    """What the reaction of a friction that sticks is below its bound, as an event function.
+
+    Parameters
+    ----------
+    loads : _Loads
+    unit : friction_problem.Unit
+    rows : ndarray of int
+        That hold it.
+    """
+
+    def __init__(self, loads, unit, rows):
+        self.loads, self.unit, self.rows = loads, unit, rows
+
+    def over(self, states):
+        """Values (k,) of states at k times."""
+        lam, loads = self.loads.at(states)
+        held = np.linalg.norm(reactions.particular(lam)[:, self.rows], axis=1)
+        share, bound = self.unit.bound
+        return bound - held + (share * loads[:, self.unit.load.normal] if share else 0.0)
+
+    def __call__(self, t, state):
+        """The value at one state."""
+        return float(self.over(state)[0])
+
+
+class _Slowing:
+    """The velocity of a friction that slides, along its direction, as an event function.
+
+    In a plane half of the speed is taken off: where the direction has turned by 60 degrees, it is taken anew. The
+    velocity of one that has just begun to slide is divided by the time since.
+
+    Parameters
+    ----------
+    frictions : Frictions
+    i : int
+    start : tuple
+        Time and acceleration where it has begun to slide; else empty.
+    """
+
+    def __init__(self, frictions, i, start):
+        self.frictions, self.i, self.start = frictions, i, start
+
+    def over(self, states):
+        """Values (k,) of states at k times."""
+        t, q, qd = np.atleast_1d(states.t), *map(np.atleast_2d, (states.q, states.qd))
+        frictions, unit = self.frictions, self.frictions.units[self.i]
+        v, _ = frictions.velocity(self.i, q, qd)
+        if unit.slide.directions == 1:
+            speed = states.memory[unit.slot] * frictions.along(self.i, q, v)
+        else:
+            speed = v @ states.memory[unit.way] - 0.5 * np.linalg.norm(v, axis=1)
+        if not self.start:
+            return speed
+        begun, first = self.start
+        since = np.where(t > begun, t - begun, 1.0)
+        return np.where(t > begun, speed / since, first)
+
+    def __call__(self, t, state):
+        """The value at one state."""
+        return float(self.over(state)[0])
 
 
 class Phases:
@@ -195,11 +270,14 @@ def demand_apart(gaps, q, angles, tol):
 
 @dataclass
 class Modes:
-    """The modes of the units of a scene: numbers of gaps."""
+    """The modes of the units of a scene: numbers of gaps, and of frictions. All others are open, or slide."""
 
     closed: list = field(default_factory=list)  # independent rows, with reactions
     idle: list = field(default_factory=list)  # closed by what others hold
     opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+    sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
+    blocked: list = field(default_factory=list)  # frictions without motion that others hold
+    begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
 
 
 class _ContactRun:
@@ -226,13 +304,13 @@ class _ContactRun:
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        self.gaps = gaps = Gaps(scene.packed)
+        self.gaps, self.frictions = Gaps(scene.packed), Frictions(scene)
         self.count = kept.handles.count
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
-        demand_apart(gaps, self.q, self.remembered[: self.count], options.initial_tol)
+        demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
         self.modes, self.rest = Modes(), self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
@@ -247,17 +325,18 @@ class _ContactRun:
             raise InvalidArgument(
                 "sampled controllers don't serve scenes with contacts yet: leave out period, for a continuous one."
             )
-        if kept.rough:
+        rough = [load.force.title for load in kept.packed.loads if load.normal >= 0 and load.force.slips]
+        if rough and contacts_of(self.scene._added):
             raise InvalidArgument(
-                f"friction that depends on reactions ({', '.join(kept.rough)}) doesn't serve scenes with contacts yet: "
-                "use friction of given magnitude, such as ViscousFriction."
+                f"regularised friction that depends on reactions ({', '.join(rough)}) doesn't serve scenes with "
+                "contacts: leave out slip_velocity, for the exact law."
             )
 
     def run(self):
         """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
         began, first = clock(), None
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
-        status = self._settle(touching, ())
+        status = self._settle(touching, ()) or self._settle_frictions(Modes(), ())
         while status is None:
             try:
                 task, outcome = self._phase()
@@ -300,34 +379,53 @@ class _ContactRun:
 
     def _scene(self):
         """The scene of the present modes."""
-        return phase_of(self.scene, [self.gaps.list[i].side.row for i in self.modes.closed])
+        return phase_of(self.scene, self._closed_rows(), [self._hold(i, r) for i, r in self.modes.sticking.items()])
+
+    def _closed_rows(self):
+        return [self.gaps.list[i].side.row for i in self.modes.closed]
+
+    def _hold(self, i, rank):
+        """The rows that hold a friction, with the numbers that the run remembers."""
+        unit = self.frictions.units[i]
+        places = [self.count + np.array(unit.held(k)) for k in range(rank)]
+        return Hold(unit, rank, self.remembered[np.array(places, int)])
 
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
-        return tuple(dict.fromkeys(self.gaps.names[i] for i in held))
+        names = [self.gaps.names[i] for i in held] + [self.frictions.names[i] for i in sorted(self.modes.sticking)]
+        return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""
         pairs = zip(self.users, self.counts, strict=True)
         found = [event._replace(limit=event.limit - count) for event, count in pairs]
-        watches = list(self._watches(phase.packed))
+        watches = list(self._watches(phase))
         self.watched = [None] * len(found) + [unit for unit, _ in watches]
         return found + [event for _, event in watches]
 
-    def _watches(self, packed):
-        """Yield the units that may end a phase, each with its event."""
-        gaps, modes, pushes = self.gaps, self.modes, {}
-        first = {id(member.constraint): member.rows.start for member in packed.members}
+    def _watches(self, phase):
+        """Yield the units that may end a phase, gaps and then frictions, each with its event."""
+        gaps, frictions, modes, loads = self.gaps, self.frictions, self.modes, _Loads(phase.packed)
+        first = first_row_of(phase.packed)
         for i in range(gaps.count):
             if i in modes.idle:
                 continue
             row, sign = gaps.list[i].side.row, gaps.list[i].side.sign
             if i in modes.closed:
-                event = _Leaving(packed, first[id(row)], sign, pushes)
+                event = _Leaving(loads, first[id(row)], sign)
             else:
                 event = _Closing(gaps, i, modes.opened.get(i, ()))
             yield i, Event(event, gaps.names[i], 1.0, -1.0, i not in modes.closed)
+        for i in range(frictions.count):
+            if i in modes.blocked:
+                continue
+            if i in modes.sticking:
+                unit = frictions.units[i]
+                event = _Breaking(loads, unit, rows_of_hold(phase, unit.slot, modes.sticking[i]))
+            else:
+                event = _Slowing(frictions, i, modes.begun.get(i, ()))
+            yield gaps.count + i, Event(event, frictions.names[i], 1.0, -1.0)
 
     def _times(self):
         left = self.times[self.taken :]
@@ -380,7 +478,9 @@ class _ContactRun:
         if self._is_stuck():
             return Status.CONTACT_FAILED
         near = [i for i in range(gaps.count) if values[i] <= TOUCHING * self.length]
-        return self._settle(sorted({*near, *fired, *self.modes.closed, *self.modes.idle}), fired)
+        before, hit = self.modes, [i for i in fired if i < gaps.count]
+        status = self._settle(sorted({*near, *hit, *before.closed, *before.idle}), hit)
+        return status or self._settle_frictions(before, [i - gaps.count for i in fired if i >= gaps.count])
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -388,7 +488,7 @@ class _ContactRun:
         length = self.t - self.phases.starts[-1]
         self.at_once = self.at_once + 1 if length <= 16.0 * EPS * max(abs(self.t), EPS) else 0
         self.judged = since, count + 1
-        if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count:
+        if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count + self.frictions.count:
             self.reason = f"There are {self.at_once} events at t = {self.t:.9g} s."
             return True
         if count + 1 >= EVENTS_JUDGED:
@@ -422,6 +522,74 @@ class _ContactRun:
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         return None
+
+    def _settle_frictions(self, before, fired):
+        """Which frictions stick; the Status if there is no way on, else None."""
+        frictions, memory = self.frictions, self.remembered[self.count :].copy()
+        resting, guess = [], {}
+        for i, unit in enumerate(frictions.units):
+            v, size = frictions.velocity(i, self.q[None], self.qd[None])
+            speed, single = np.linalg.norm(v[0]), unit.slide.directions == 1
+            if i in before.blocked and memory[unit.way].any():
+                guess[i] = frictions.read(i, self.q, memory)
+            if speed <= max(AT_REST * size[0], 0.0 if single else STOPPED) or (single and i in fired):
+                resting.append(i)
+                memory[unit.way] = 0.0
+            else:
+                memory[unit.way] = frictions.written(i, self.q, v[0] / speed)
+        self.remembered = np.concatenate((self.remembered[: self.count], memory))
+        if not resting:
+            return None
+        try:
+            rest, ranks = self._rest(before, resting, {i: way for i, way in guess.items() if i in resting}, fired)
+        except NoRest as error:
+            names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
+            self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
+            return Status.CONTACT_FAILED
+        for i, way in rest.ways.items():
+            unit = frictions.units[i]
+            self.remembered[self.count + unit.slot : self.count + unit.way.stop] = frictions.written(i, self.q, way)
+        self.modes.sticking = {i: ranks[i] for i in rest.sticking}
+        self.modes.blocked = sorted([*rest.blocked, *(i for i in resting if not ranks[i])])
+        self.modes.begun = {i: (self.t, rest.rates[i]) for i in rest.ways}
+        return None
+
+    def _rest(self, before, resting, guess, fired):
+        """The `Rest` of the frictions that are at rest, and how many rows hold each."""
+        frictions, ranks = self.frictions, {}
+        for i in resting:
+            if i in before.sticking:
+                ranks[i] = before.sticking[i]
+                continue
+            basis = frictions.basis(i, self.q, self._motions_of)
+            ranks[i] = len(basis)
+            numbers = frictions.numbers(i, self.q, basis)
+            for k in range(len(basis)):
+                self.remembered[self.count + np.array(frictions.units[i].held(k))] = numbers[k]
+        free = [i for i in resting if ranks[i]]
+        phase = phase_of(self.scene, self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
+        rows = {i: rows_of_hold(phase, frictions.units[i].slot, ranks[i]) for i in free}
+        memory = self.remembered[self.count :]
+        fresh = [i for i in free if i not in before.sticking]
+        if fresh:  # their rows hold to the last bit where they are
+            Phi = values_of(phase.packed, self.t, self.q, memory)
+            for i in fresh:
+                for k, row in enumerate(rows[i]):
+                    memory[frictions.units[i].held(k)[-1]] = Phi[row]
+        bases = {i: frictions.directions(i, self.q, self._hold(i, ranks[i]).numbers) for i in free}
+        problem = RestProblem(frictions, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
+        sticking = [i for i in free if i not in guess]
+        return problem.settle(sticking, guess, fired), ranks
+
+    def _motions_of(self, i):
+        """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
+        frictions, unit = self.frictions, self.frictions.units[i]
+        hold = Hold(unit, 3, frictions.numbers(i, self.q, np.eye(3)))
+        phase = phase_of(self.scene, self._closed_rows(), [hold])
+        memory = self.remembered[self.count :].copy()
+        for k in range(3):
+            memory[np.array(unit.held(k))] = hold.numbers[k]
+        return free_motions(phase.packed, self.t, self.q, memory, rows_of_hold(phase, unit.slot, 3))
 
     def _hit(self, inertia, touching, rates):
         """Jump of velocities at an impact; the rates (count,) afterwards."""

@@ -22,6 +22,7 @@ from ..elements.friction import GUIDE, PIN, PLANE, slip
 from ..errors import SingularConfiguration
 from ..jit.kernels import twin
 from ..maths.tolerances import RANK_TOL
+from ..model.packed import first_rows
 from ..observables.diagnostics import marker_states
 from ..observables.evaluate import balance, constraint_arrays, mass_matrix
 from ..observables.generalised_forces import applied_loads, velocity_forces
@@ -83,12 +84,10 @@ class Hold(NamedTuple):
             found.append(row)
         return found
 
-    def places(self, rows) -> list[tuple[int, Any, int]]:
-        """(slot, row, place among its reals) of all numbers; the markers' coordinates come first."""
+    def places(self) -> list[list[tuple[int, int]]]:
+        """Of each row the (slot, place among its reals) of all numbers; the markers' coordinates come first."""
         at = (0, 1, 2, 3, 4, 5, 6) if self.unit.slide.turns else (0, 1, 2, 9)
-        return [
-            (slot, row, place) for i, row in enumerate(rows) for slot, place in zip(self.unit.held(i), at, strict=True)
-        ]
+        return [list(zip(self.unit.held(i), at, strict=True)) for i in range(self.rank)]
 
 
 class Frictions:
@@ -206,15 +205,37 @@ def values_of(packed, t, q, memory):
 def free_motions(packed, t, q, memory, rows):
     """Velocities (rows, motions) of some rows of all motions that the others leave free."""
     _, Phi_q, _, _ = constraint_arrays(_remembering(packed.system, memory), q, np.zeros_like(q), t)
-    from scipy.linalg import null_space
-
-    return Phi_q[rows] @ null_space(np.delete(Phi_q, rows, axis=0), RANK_TOL)
+    return Phi_q[rows] @ _null_space(np.delete(Phi_q, rows, axis=0))
 
 
 def _remembering(system, memory):
     system = system._replace(reals=system.reals.copy())
     system.reals[system.memory] = memory
     return system
+
+
+def immobile(packed, t, q, memory):
+    """Coordinates of the bodies that rows without time leave no motion, whatever others do."""
+    _, Phi_q, _, _ = constraint_arrays(_remembering(packed.system, memory), q, np.zeros_like(q), t)
+    steady, spans = [], packed.system.bodies.tolist()
+    for part, row in first_rows(packed.constraints):
+        steady += [] if part.rheonomic else range(row, row + part.rows)
+    Phi_q, columns = Phi_q[steady], np.arange(q.size)
+    while columns.size:
+        mine = ~np.delete(Phi_q, columns, axis=1).any(axis=1)
+        moved = _null_space(Phi_q[np.ix_(mine, columns)])
+        moves = np.isin(np.arange(q.size), columns[np.abs(moved).max(axis=1, initial=0.0) > RANK_TOL])
+        if not moves.any():
+            break
+        still = [np.arange(at, at + length) for at, length in spans if not moves[at : at + length].any()]
+        columns = np.intersect1d(columns, np.concatenate([*still, np.zeros(0, int)]))
+    return columns.astype(int)
+
+
+def _null_space(rows):
+    from scipy.linalg import null_space
+
+    return null_space(rows, RANK_TOL) if len(rows) else np.eye(rows.shape[1])
 
 
 class Rest(NamedTuple):

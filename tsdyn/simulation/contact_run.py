@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
-from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, values_of
+from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
 from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
 from ..elements.unilateral import contacts_of
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
+from ..integrators import DOP853
 from ..jit.compiled import clock
 from ..maths.tolerances import EPS
 from ..model.packed import first_rows
@@ -25,12 +26,21 @@ from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import floats, listed
-from .phase_scenes import NAMED, first_row_of, has_contacts, phase_of, rows_of_hold
+from .phase_scenes import NAMED, first_row_of, has_contacts, phase_of
 from .progress import reporter, silent
 from .run_options import RunCall
 from .scene_cache import Prepared, prepared
 from .segments import summed
-from .tolerances import CREEPING, ENDLESS, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
+from .tolerances import (
+    CREEPING,
+    ENDLESS,
+    EVENTS_JUDGED,
+    MOST_AT_AN_INSTANT,
+    MOST_PINNED,
+    PENETRATION,
+    ROUNDED,
+    TOUCHING,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -362,7 +372,9 @@ class _ContactRun:
         end = self.span[1]
         phase, names = self._scene(), self._names()
         call, plain = RunCall((self.t, end)), replace(self.options, events=None)
-        run = self.run_of(phase, plain, call)
+        run, still = self.run_of(phase, plain, call), self._still(phase)
+        if still.size == self.q.size and self.options.method is None:
+            run = run._by(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
         run._prepare_kernels(True)
         while True:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
@@ -373,6 +385,7 @@ class _ContactRun:
             outcome = self.run_task(task, phase, self.options.initial_tol)
             other = self.instead(task, outcome.status)
             if other is None:
+                outcome = pinned(outcome, self.q if self.parts else task.q, still)
                 self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, names)
                 return task, outcome
             run = run._by(other)
@@ -422,10 +435,16 @@ class _ContactRun:
                 continue
             if i in modes.sticking:
                 unit = frictions.units[i]
-                event = _Breaking(loads, unit, rows_of_hold(phase, unit.slot, modes.sticking[i]))
+                event = _Breaking(loads, unit, phase.packed.derived.holds[unit.slot])
             else:
                 event = _Slowing(frictions, i, modes.begun.get(i, ()))
             yield gaps.count + i, Event(event, frictions.names[i], 1.0, -1.0)
+
+    def _still(self, phase):
+        """Coordinates of the bodies that rest where frictions stick."""
+        if not self.modes.sticking or self.q.size > MOST_PINNED:
+            return np.zeros(0, int)
+        return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
 
     def _times(self):
         left = self.times[self.taken :]
@@ -568,7 +587,7 @@ class _ContactRun:
                 self.remembered[self.count + np.array(frictions.units[i].held(k))] = numbers[k]
         free = [i for i in resting if ranks[i]]
         phase = phase_of(self.scene, self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
-        rows = {i: rows_of_hold(phase, frictions.units[i].slot, ranks[i]) for i in free}
+        rows = {i: phase.packed.derived.holds[frictions.units[i].slot] for i in free}
         memory = self.remembered[self.count :]
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
@@ -589,7 +608,7 @@ class _ContactRun:
         memory = self.remembered[self.count :].copy()
         for k in range(3):
             memory[np.array(unit.held(k))] = hold.numbers[k]
-        return free_motions(phase.packed, self.t, self.q, memory, rows_of_hold(phase, unit.slot, 3))
+        return free_motions(phase.packed, self.t, self.q, memory, phase.packed.derived.holds[unit.slot])
 
     def _hit(self, inertia, touching, rates):
         """Jump of velocities at an impact; the rates (count,) afterwards."""
@@ -677,6 +696,34 @@ def held(inertia, qd, which, rates):
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = 0.0
     return qd + change, after
+
+
+class _Pinned:
+    """A trajectory with bodies that rest: to the last bit."""
+
+    def __init__(self, trajectory, q, still):
+        self.trajectory, self.q, self.still = trajectory, q, still
+        self.start, self.end, self.edges, self.anchors = (
+            trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
+        )  # fmt: skip
+
+    def __call__(self, t):
+        """As of a `Trajectory`."""
+        states, memory, status = self.trajectory(t)
+        states[:, 0, self.still], states[:, 1:, self.still] = self.q[self.still], 0.0
+        return states, memory, status
+
+
+def pinned(outcome, q, still):
+    """The outcome of a phase with bodies that rest at q (n,), to the last bit; still: their coordinates."""
+    if not still.size:
+        return outcome
+    n, last = q.size, outcome.end.last
+    outcome.rows[:, 1 + still] = q[still]
+    outcome.rows[:, 1 + n + still] = outcome.rows[:, 1 + 2 * n + still] = 0.0
+    last[0, still], last[1:, still] = q[still], 0.0
+    trajectory = outcome.trajectory and _Pinned(outcome.trajectory, q, still)
+    return outcome._replace(trajectory=trajectory)
 
 
 def run_contacts(scene, options, call, run_of, run_task, instead):

@@ -41,38 +41,36 @@ def phase_of(scene, rows, holds=(), without=()):
     key = frozenset((*map(id, (*rows, *without)), *(hold.key for hold in holds)))
     if key not in known:
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
-        held = {hold.key: hold.rows() for hold in holds}
+        held = [hold.rows() for hold in holds]
         phase = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
-            _added=[each for each in scene._added if id(each) not in gone] + [*rows, *chain(*held.values())],
-            _forces=[each for each in scene._forces if id(each) not in gone], _held=held,
-            _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
+            _added=[each for each in scene._added if id(each) not in gone] + [*rows, *chain(*held)],
+            _forces=[each for each in scene._forces if id(each) not in gone], _packed=None, _start=None,
+            _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
         )  # fmt: skip
         if holds:
-            places = chain(*(hold.places(held[hold.key]) for hold in holds))
-            phase._packed = _remembering(phase.packed, places)
+            phase._packed = _holding(phase.packed, holds, held)
         known[key] = phase
     return known[key]
 
 
-def _remembering(packed, places):
-    """Packed with the memory of the run at these places, (slot, row, place among its reals)."""
-    system, begins, memory = packed.system, begins_of(packed), packed.system.memory.copy()
-    for slot, row, at in places:
-        memory[slot] = begins[id(row)] + at
+def _holding(packed, holds, held):
+    """Packed with the numbers of the rows of holds among what the run remembers."""
+    system, begins, first = packed.system, begins_of(packed), first_row_of(packed)
+    memory = system.memory.copy()
+    for hold, rows in zip(holds, held, strict=True):
+        packed.derived.holds[hold.unit.slot] = np.array([first[id(row)] for row in rows], int)
+        for row, places in zip(rows, hold.places(), strict=True):
+            packed.derived.places[id(row)] = places
+            for slot, at in places:
+                memory[slot] = begins[id(row)] + at
     return packed._replace(system=system._replace(memory=memory))
 
 
 def first_row_of(packed):
     """The first row of each constraint, by its id."""
     return {id(member.constraint): member.rows.start for member in packed.members}
-
-
-def rows_of_hold(phase, *key):
-    """The rows of Phi (rank,) of a hold with this key in a phase."""
-    first = first_row_of(phase.packed)
-    return np.array([first[id(row)] for row in phase._held[key]])
 
 
 def at_start(scene):

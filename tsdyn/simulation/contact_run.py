@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
 from ..calls import fitting
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
 from ..jit.compiled import clock
@@ -22,7 +22,7 @@ from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import floats, listed
-from .phase_scenes import NAMED, has_contacts, phase_of
+from .phase_scenes import NAMED, gaps_of, has_contacts, phase_of
 from .progress import reporter, silent
 from .run_options import RunCall
 from .scene_cache import Prepared, prepared
@@ -64,7 +64,7 @@ class _Closing:
 
     def __call__(self, t, state):
         """The value at a state, or values at several."""
-        gap = self.gaps.value(self.i, state.q, state.angles if self.gaps.are_counted else None)
+        gap = self.gaps.value(self.i, t, state.q, state.angles if self.gaps.are_counted else None)
         if not self.start:
             return gap
         begun, first, rate = self.start
@@ -214,7 +214,7 @@ class _ContactRun:
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        self.gaps = gaps = Gaps(scene.packed)
+        self.gaps = gaps = gaps_of(scene)
         self.count = kept.handles.count
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
@@ -381,7 +381,7 @@ class _ContactRun:
             self.closed, self.idle = [], []
             return None
         try:
-            inertia = Inertia(self.gaps, self.t, self.q, self.qd, slots)
+            inertia = Inertia(self.gaps, self.t, self.q, slots)
             rates = inertia.rates(self.qd)
             noise = [i for i in fired if i not in self.closed and rates[i] > 0.0]
             if noise:  # a gap that closes with a rate of rounding
@@ -468,7 +468,7 @@ class _ContactRun:
 
 def jumped(inertia, qd, which, before, e, p, law="newton"):
     """Velocities (n,) after impulses p (k,) of the gaps `which`, and the rates (count,) of all gaps then."""
-    change = inertia.free(inertia.J[which].T @ p)
+    change = inertia.pushed(which, p)
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = np.maximum(after[which], 0.0)  # but for rounding
     if law == "newton":  # without rounding where the impact acts
@@ -555,7 +555,7 @@ def impact(
         raise InvalidArgument(f"law must be 'newton' or 'poisson', got {law!r}.")
     if not has_contacts(scene):
         raise InvalidArgument("impact: the scene has no unilateral constraints, such as PlaneContact(unilateral=True).")
-    gaps, kept = Gaps(scene.packed), prepared(phase_of(scene, []))
+    gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
     q, qd = state_arrays(state, kept.n)
     t = float(getattr(state, "t", 0.0))
     memory = remembered(state, kept, t, q)
@@ -568,7 +568,7 @@ def impact(
             e[_chosen(gaps, [item], None)] = _coefficient(value)
     elif restitution is not None:
         e[:] = _coefficient(restitution)
-    inertia = Inertia(gaps, t, q, qd, slots)
+    inertia = Inertia(gaps, t, q, slots)
     before = inertia.rates(qd)[which]
     try:
         p = impulses(inertia, which, before, e[which], law)

@@ -21,31 +21,42 @@ def has_contacts(scene):
     return scene._opens
 
 
-def phase_of(scene, rows):
-    """The scene with these rows of its contacts, primitives, for all of them; kept until the scene changes."""
+def phase_of(scene, rows, alone=False):
+    """The scene with these rows of its contacts, primitives, for all of them; kept until the scene changes.
+
+    alone: without all other constraints and forces.
+    """
     known = scene._phases
     if known is None:
         known = scene._phases = {}
-    key = frozenset(map(id, rows))
+    key = alone or frozenset(map(id, rows))
     if key not in known:
         contacts = contacts_of(scene._added)
-        others = [each for each in scene._added if not any(each is contact for contact in contacts)]
+        others = [] if alone else [each for each in scene._added if not any(each is contact for contact in contacts)]
         phase = known[key] = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
-            _added=others + list(rows), _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={},
+            _added=others + list(rows), **({"_forces": [], "_normalisations": {}} if alone else {}), _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={},
             _opens=False,
         )  # fmt: skip
     return known[key]
+
+
+def gaps_of(scene):
+    """The `Gaps` of a scene with contacts."""
+    from ..analyses.contact_problem import Gaps
+
+    rows = [side.row for contact in contacts_of(scene._added) for side in contact.sides]
+    return Gaps(scene.packed, phase_of(scene, rows, alone=True).packed, phase_of(scene, []).packed)
 
 
 def at_start(scene):
     """The scene with those contacts closed that are so at its start; a scene without contacts as it is."""
     if not has_contacts(scene):
         return scene
-    from ..analyses.contact_problem import Gaps, closed_gaps
+    from ..analyses.contact_problem import closed_gaps
 
-    gaps, (q, _) = Gaps(scene.packed), scene.start
+    gaps, (q, _) = gaps_of(scene), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
     return phase_of(scene, [gaps.list[i].side.row for i in closed_gaps(gaps, q, angles)])
 

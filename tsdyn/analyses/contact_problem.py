@@ -88,12 +88,6 @@ class Gaps:
             found[:, i] = value(q, angles)
         return found
 
-    def value(self, i, t, q, angles):
-        """One gap at t, q (n,), or values at several."""
-        t, q = np.atleast_1d(t), np.ascontiguousarray(np.atleast_2d(q))
-        found = self.values(t, q, None if angles is None else np.atleast_2d(angles))[:, i]
-        return found if t.size > 1 else found[0]
-
     def at(self, q, angles, t=0.0):
         """Gaps (count,) at one state."""
         return self.values(np.array([t]), q[None], angles[None])[0]
@@ -127,7 +121,7 @@ class Inertia:
         J, drift = gaps.workspace.rows(t, q)
         self.J, self.drift = gaps.sign[:, None] * J[: gaps.count], gaps.sign * drift[: gaps.count]
         self.response = gaps.workspace.respond(t, q, slots, self.J)  # M~ J^T, transposed
-        self.G = J @ self.response.T
+        self.G = self.J @ self.response.T
 
     def free(self, loads):
         """M~ loads: the accelerations (n, ...) that loads (n, ...) make where the bilateral rows hold."""

@@ -1,12 +1,13 @@
 """Events: users' functions of time and state, and their zeros inside every step, on states of the manifold."""
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidArgument, Status
-from ..maths.root_isolation import LARGEST, Search, TooFast
+from ..maths.root_isolation import LARGEST, Search, TooFast, survey
 from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import handles_of
 from ..model.kinematics import Anchor, Kinematics
@@ -41,6 +42,26 @@ class Event(NamedTuple):
         if not math.isfinite(value):
             raise EventFailed(f"{self.name} must return a finite number; at t = {t:.9g} s it gave {given!r}.", t)
         return value
+
+
+class Member:
+    """One of several event functions that are evaluated together.
+
+    Parameters
+    ----------
+    over : function
+        Values (k, members) at a state of k times.
+    which : int
+        The function's number.
+    """
+
+    def __init__(self, over, which):
+        self.over, self.which = over, which
+
+    def __call__(self, t, instant):
+        """The value at one state."""
+        arrays = np.array([t]), *(np.array([part]) for part in (instant.q, instant.qd, instant.qdd))
+        return self.over(RememberingState.of(instant.packed, instant.memory, instant.anchor, *arrays, None))[0, self.which]
 
 
 class EventFailed(Exception):
@@ -174,6 +195,12 @@ class Occurrence(NamedTuple):
     state: np.ndarray  # (3, n)
 
 
+@cache
+def _signs(n):
+    """Random signs (3, 3, n)."""
+    return np.random.default_rng(0).choice([-1.0, 1.0], (3, 3, n))
+
+
 class Track:
     """What is known of one function up to the last step's end."""
 
@@ -206,7 +233,13 @@ class Watch:
         self.list = [[] for _ in events]
         rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
         self._p = rigid[:, None] + np.arange(3, 7)
-        self._signs = np.random.default_rng(0).choice([-1.0, 1.0], (3, 3, packed.system.bodies[:, 1].sum()))
+        self._n = int(packed.system.bodies[:, 1].sum())
+        groups = {}  # numbers of events and of members, by the function that evaluates them together
+        for i, event in enumerate(events):
+            if isinstance(event.function, Member):
+                groups.setdefault(event.function.over, []).append((i, event.function.which))
+        self._groups = [(over, *map(list, zip(*pairs, strict=True))) for over, pairs in groups.items()]
+        self._degrees = [0] * len(self._groups)
         self.read_by(reader)
 
     def read_by(self, reader):
@@ -265,7 +298,7 @@ class Watch:
     def restore(self, numbers, arrays):
         """As it was when it was saved."""
         self.t, self.state, self.memory = numbers["t"], arrays["watch.state"], arrays["watch.memory"]
-        demand(self.state.shape == (3, self._signs.shape[2]) and len(self.memory) >= self.angles, "the state of events")
+        demand(self.state.shape == (3, self._n) and len(self.memory) >= self.angles, "the state of events")
         self.tracks = [Track(0.0) for _ in self.events]
         for track, known in zip(self.tracks, numbers["tracks"], strict=True):
             if known["significant"] is not None:
@@ -298,7 +331,16 @@ class Watch:
         return RememberingState.of(self.packed, self.memory[self.angles :], anchor, t, *parts, None)
 
     def _value(self, i, t, state):
-        return self.events[i].value(t, self._instant(t, state))
+        event = self.events[i]
+        if isinstance(event.function, Member):
+            return float(self._values(event.function.over, np.array([t]), [state])[0, event.function.which])
+        return event.value(t, self._instant(t, state))
+
+    def _values(self, over, times, states):
+        """Values (k, members) of a group at times (k,) with their states; NaN where there is none."""
+        none = np.full_like(self.state, np.nan)
+        known = np.reshape([none if state is None else state for state in states], (-1, *none.shape))
+        return over(self._instants(times, known))
 
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
@@ -313,7 +355,10 @@ class Watch:
     def _locate(self, run, log, step):
         found, failure, end = [], None, step.t1
         step.degree = self._degree(step)
+        calm = self._survey(step)
         for i in range(len(self.events)):
+            if i in calm:
+                continue
             # Times that bracket the zeros of event i
             points, failed = self._points(i, step, end)
             if failed is not None:
@@ -343,15 +388,34 @@ class Watch:
             raise failure
         return None
 
+    def _survey(self, step):
+        """The numbers of events whose functions are clear of zero within the step, of those that come in groups."""
+        calm = set()
+        for k, (over, numbers, which) in enumerate(self._groups):
+            tracks = [self.tracks[i] for i in numbers]
+            first, noise = np.array([[track.value, track.noise] for track in tracks]).T
+
+            def sample(times, over=over, which=which):
+                return self._values(over, times, step.states(times))[:, which]
+
+            degree = max(step.degree, self._degrees[k] // 2)
+            clear, last, self._degrees[k] = survey(sample, step.t0, first, step.t1, degree, noise)
+            for i, track, held, value in zip(numbers, tracks, clear.tolist(), last.tolist(), strict=True):
+                sign = math.copysign(1.0, value)
+                if held and track.zero is None and track.sign in (0.0, sign) and abs(value) > track.noise:
+                    track.value = track.end = value
+                    track.sign, track.significant = sign, (step.t1, value)
+                    calm.add(i)
+        return calm
+
     def _points(self, i, step, end):
         """Times up to `end`, and values of event i, between which its sign changes once at most; what `EventFailed`."""
         track, good, failure = self.tracks[i], [step.t0], None
 
         def sample(times):
-            values = np.full(times.size, np.nan)
-            states, over = step.states(times), getattr(self.events[i].function, "over", None)
-            if over is not None and states and not any(state is None for state in states):
-                return over(self._instants(times, np.array(states)))
+            values, function, states = np.full(times.size, np.nan), self.events[i].function, step.states(times)
+            if isinstance(function, Member):
+                return self._values(function.over, times, states)[:, function.which]
             for k, (t, state) in enumerate(zip(times.tolist(), states, strict=True)):
                 if state is not None:
                     values[k] = self._value(i, t, state)
@@ -421,7 +485,7 @@ class Watch:
             # Rounding of the state, in three random directions
             state, value = step.at(t), self._at(i, step, t)
             size = SHAKEN * np.abs(state).max(axis=1, keepdims=True)
-            shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
+            shaken = [self._value(i, t, state + size * sign) for sign in _signs(self._n)]
         except EventFailed:
             return 0.0
         return NOISE * max(abs(each - value) for each in shaken)

@@ -17,7 +17,7 @@ from ..observables import diagnostics, reactions
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.dense_output import StepPieces
-from ..runs.events import Event
+from ..runs.events import Event, Member
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 class _Closing:
-    """The gap of an open contact, as an event function.
+    """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
     however soon it comes.
@@ -50,58 +50,46 @@ class _Closing:
     Parameters
     ----------
     gaps : Gaps
-    i : int
-    start : tuple
-        Time, gap and rate where the contact has opened with a rate; else empty.
+    opened : dict
+        Of contacts that have opened with a rate: time, gap and rate there, by their numbers.
     """
 
-    def __init__(self, gaps, i, start):
-        self.gaps, self.i, self.start = gaps, i, start
+    def __init__(self, gaps, opened):
+        self.gaps, self.which = gaps, list(opened)
+        self.start = np.array(list(opened.values())).reshape(-1, 3).T
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        return self(states.t, states)
-
-    def __call__(self, t, state):
-        """The value at a state, or values at several."""
-        gap = self.gaps.value(self.i, t, state.q, state.angles if self.gaps.are_counted else None)
-        if not self.start:
-            return gap
-        begun, first, rate = self.start
-        since = np.where(t > begun, t - begun, 1.0)
-        return np.where(t > begun, (gap - first) / since, rate)
+        """Values (k, count) of states at k times."""
+        values = self.gaps.values(states.t, states.q, states.angles if self.gaps.are_counted else None)
+        if self.which:
+            begun, first, rate = self.start
+            since = states.t[:, None] - begun
+            later = since > 0.0
+            divided = (values[:, self.which] - first) / np.where(later, since, 1.0)
+            values[:, self.which] = np.where(later, divided, rate)
+        return values
 
 
 class _Leaving:
-    """The reaction of a closed contact, positive where it pushes, as an event function.
+    """The reactions of closed contacts, positive where they push, as event functions.
 
     Parameters
     ----------
     packed : Packed
         Of the phase.
-    row : int
-    sign : float
-        Of the gap over Phi.
-    seen : dict
-        What is shared with the other contacts of the phase.
+    rows : list of int
+    signs : list of float
+        Of the gaps over Phi.
     """
 
-    def __init__(self, packed, row, sign, seen):
-        self.packed, self.row, self.sign, self.seen = packed, row, sign, seen
+    def __init__(self, packed, rows, signs):
+        self.packed, self.rows, self.signs = packed, rows, np.array(signs)
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        key = states.t.tobytes(), states.q.tobytes()
-        if key not in self.seen:  # those of other contacts at the same times are found with it
-            self.seen.clear()
-            memory = np.tile(states.memory, (states.t.size, 1))
-            levels = states.t, states.q, states.qd, states.qdd, memory
-            self.seen[key] = reactions.multipliers(self.packed, *levels)
-        return -self.sign * self.seen[key][:, self.row]
-
-    def __call__(self, t, state):
-        """The value at one state."""
-        return -self.sign * state.multipliers[self.row]
+        """Values (k, closed) of states at k times."""
+        memory = np.tile(states.memory, (states.t.size, 1))
+        lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        return -self.signs * lam[:, self.rows]
 
 
 class Phases:
@@ -290,17 +278,17 @@ class _ContactRun:
     def _events(self, phase):
         gaps, pairs = self.gaps, zip(self.users, self.counts, strict=True)
         found = [event._replace(limit=event.limit - count) for event, count in pairs]
-        self.watched, pushes = [None] * len(found), {}
+        self.watched = [None] * len(found)
         first = {id(member.constraint): member.rows.start for member in phase.packed.members}
+        sides = [gaps.list[i].side for i in self.closed]
+        leaving = _Leaving(phase.packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
+        closing = _Closing(gaps, self.opened).over
         for i in range(gaps.count):
             if i in self.idle:
                 continue
-            row, sign = gaps.list[i].side.row, gaps.list[i].side.sign
-            if i in self.closed:
-                event = _Leaving(phase.packed, first[id(row)], sign, pushes)
-            else:
-                event = _Closing(gaps, i, self.opened.get(i, ()))
-            found.append(Event(event, gaps.names[i], 1.0, -1.0, i not in self.closed))
+            is_open = i not in self.closed
+            function = Member(closing, i) if is_open else Member(leaving, self.closed.index(i))
+            found.append(Event(function, gaps.names[i], 1.0, -1.0, is_open))
             self.watched.append(i)
         return found
 

@@ -223,8 +223,8 @@ class Watch:
         The time up to which events have been searched.
     """
 
-    def __init__(self, events, packed, reader, start):
-        self.events, self.packed = events, packed
+    def __init__(self, events, packed, reader, start, resume=None):
+        self.events, self.packed, self.resume, self.begins_again = events, packed, resume, False
         self.start = self.t = start
         self.state = self.memory = None  # at t, and what is remembered of it: joints' angles, and what forces do
         self.angles = handles_of(packed).count
@@ -261,19 +261,18 @@ class Watch:
             status = memory.advance(log, -1)
             if not run.numbers.begun:
                 return status, ""
-            self.state, self.memory = run.now.copy(), run.remembered.copy()
-            self._note_start()
-            if self.tracks is None:
-                try:
-                    self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
-                except EventFailed as failure:
-                    raise InvalidArgument(f"events: {failure}") from failure.__cause__
-                for event, track in zip(self.events, self.tracks, strict=True):
-                    if event.exact and track.value > 0.0:
-                        track.sign, track.significant = 1.0, (self.t, track.value)
+            try:
+                self._begin(run, self.tracks is None)
+            except EventFailed as failure:
+                raise InvalidArgument(f"events: {failure}") from failure.__cause__
         stiff = run.numbers.stiff
         # One step at a time, searched before the next one
         for _ in range(most):
+            if self.begins_again:
+                status, reason = self._begin_again(memory, log)
+                if status != Status.SLICE_DONE:
+                    return status, reason
+                continue  # it has written an output
             done = run.numbers.steps
             status = memory.advance(log, 1)
             if run.numbers.steps > done:
@@ -281,11 +280,52 @@ class Watch:
                     last = self._search_step(run, log)
                 except EventFailed as failure:
                     return Status.EVENT_FAILED, str(failure)
-                if last is not None:
+                if last is not None and not self._is_resumed(memory, last):
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
+                status = Status.SLICE_DONE if self.begins_again else status
             full = run.numbers.chart_rows + 2 >= len(log.charts)
             if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
+        return status, ""
+
+    def _begin(self, run, anew):
+        """Take the values at the start of a run, or where it begins `anew` after a jump."""
+        self.state, self.memory = run.now.copy(), run.remembered.copy()
+        self._note_start()
+        if not anew:
+            return
+        values = dict.fromkeys(range(len(self.events)))
+        for over, numbers, which in self._groups:
+            found = self._values(over, np.array([self.t]), [self.state])[0]
+            values.update(zip(numbers, found[which].tolist(), strict=True))
+        self.tracks = [Track(self._value(i, self.t, self.state) if x is None else x) for i, x in values.items()]
+        for event, track in zip(self.events, self.tracks, strict=True):
+            if event.exact and track.value > 0.0:
+                track.sign, track.significant = 1.0, (self.t, track.value)
+
+    def _is_resumed(self, memory, last):
+        """Whether the run goes on from the event that ends it, in the same memory, with other velocities."""
+        run, members = memory.run, [i for _, numbers, _ in self._groups for i in numbers]
+        if self.resume is None or last.index not in members or not memory.begins_again or last.t >= run.clock.t_end:
+            return False
+        self.begins_again = self.resume(last.t, run, [i for i in members if self.list[i]])
+        return self.begins_again
+
+    def _begin_again(self, memory, log):
+        """Begin the run again where it is; the Status, and what there is to say of it."""
+        run, t = memory.run, memory.run.clock.t
+        self.begins_again, self.start = False, t
+        for _, numbers, _ in self._groups:
+            for i in numbers:
+                self.list[i].clear()
+        status = memory.begin_again(log)
+        if not run.numbers.begun:
+            run.numbers.begun = 1  # there is a run so far
+            return status, ""
+        try:
+            self._begin(run, True)
+        except EventFailed as failure:
+            return Status.EVENT_FAILED, str(failure)
         return status, ""
 
     def saved(self):

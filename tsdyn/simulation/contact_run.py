@@ -55,7 +55,12 @@ class _Closing:
     """
 
     def __init__(self, gaps, opened):
-        self.gaps, self.which = gaps, list(opened)
+        self.gaps = gaps
+        self.open(opened)
+
+    def open(self, opened):
+        """Take other contacts that have just opened."""
+        self.which = list(opened)
         self.start = np.array(list(opened.values())).reshape(-1, 3).T
 
     def over(self, states):
@@ -125,6 +130,11 @@ class Phases:
     def at(self, t):
         """Numbers of the phases at times t (k,); where one begins, the later one."""
         return np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
+
+    def of_outputs(self, t):
+        """Numbers of the phases of outputs at times t (k,): of several at one time each is of a phase of its own."""
+        same = np.searchsorted(t, t, side="right") - 1 - np.arange(t.size)
+        return np.maximum(self.at(t) - same, 0)
 
     def multipliers(self, numbers, m, *arrays):
         """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
@@ -233,6 +243,7 @@ class _ContactRun:
         """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
         began, first = clock(), None
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
+        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         status = self._settle(touching, ())
         while status is None:
             try:
@@ -243,7 +254,6 @@ class _ContactRun:
                 status, self.reason = Status.SINGULAR, str(error)
                 break
             first = first or task
-            self.parts.append(outcome)
             status = self._after(outcome)
         if first is None:  # nothing could begin
             raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
@@ -258,7 +268,7 @@ class _ContactRun:
         """Run the next phase: its task and outcome."""
         gaps, end = self.gaps, self.span[1]
         phase = phase_of(self.scene, [gaps.list[i].side.row for i in self.closed])
-        names = [gaps.names[i] for i in sorted([*self.closed, *self.idle])]
+        names = tuple(dict.fromkeys(gaps.names[i] for i in sorted([*self.closed, *self.idle])))
         call, plain = RunCall((self.t, end)), replace(self.options, events=None)
         run = self.run_of(phase, plain, call)
         run._prepare_kernels(True)
@@ -266,14 +276,35 @@ class _ContactRun:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(),
+                max_steps=self._steps_left(), resume=self._resume,
             )  # fmt: skip
+            self.names, self.packed, self.settled, self.again = names, phase.packed, None, []
             outcome = self.run_task(task, phase, self.options.initial_tol)
             other = self.instead(task, outcome.status)
             if other is None:
-                self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, tuple(dict.fromkeys(names)))
+                if self.settled is None:
+                    self._end_phase(outcome.end.reached)
                 return task, outcome
             run = run._by(other)
+
+    def _end_phase(self, t):
+        self.phases.add(self.t, self.rest, t, self.packed, self.names)
+
+    def _resume(self, t, run, numbers):
+        """After events of these numbers: whether the run of the phase goes on, with other velocities.
+
+        It does where the same gaps are closed as before.
+        """
+        self._end_phase(t)
+        before = self.closed, self.idle
+        self.t, (self.q, self.qd, _), self.remembered = t, run.now.copy(), run.remembered.copy()
+        self.settled = (self._transit([self.watched[i] for i in numbers]),)
+        if self.settled[0] is not None or before != (self.closed, self.idle):
+            return False
+        run.now[1], self.settled = self.qd, None
+        self.closing.open(self.opened)
+        self.again.append(t)
+        return True
 
     def _events(self, phase):
         gaps, pairs = self.gaps, zip(self.users, self.counts, strict=True)
@@ -282,12 +313,12 @@ class _ContactRun:
         first = {id(member.constraint): member.rows.start for member in phase.packed.members}
         sides = [gaps.list[i].side for i in self.closed]
         leaving = _Leaving(phase.packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
-        closing = _Closing(gaps, self.opened).over
+        self.closing = _Closing(gaps, self.opened)
         for i in range(gaps.count):
             if i in self.idle:
                 continue
             is_open = i not in self.closed
-            function = Member(closing, i) if is_open else Member(leaving, self.closed.index(i))
+            function = Member(self.closing.over, i) if is_open else Member(leaving, self.closed.index(i))
             found.append(Event(function, gaps.names[i], 1.0, -1.0, is_open))
             self.watched.append(i)
         return found
@@ -315,34 +346,47 @@ class _ContactRun:
 
     def _after(self, outcome):
         """Take the end of a phase; the Status of the run, None if it goes on."""
-        end, gaps = outcome.end, self.gaps
-        self.reason, self.method = outcome.reason, outcome.method or self.method
+        end, part = outcome.end, outcome
+        self.method = outcome.method or self.method
         self.steps += end.counts["steps"]
         times, *states = outcome.events
         for i, mine in enumerate(list(zip(times, *states, strict=True))[: len(self.users)]):
             self.found[i].append(mine)
             self.counts[i] += len(mine[0])
-        self.t, (self.q, self.qd, _) = end.reached, (x.copy() for x in end.last)
-        self.remembered = end.remembered
         fired = [i for i, at in zip(self.watched, times, strict=True) if i is not None and at.size]
-        goes_on = outcome.status is Status.EVENT and fired and self.t < self.span[1]
-        rows = outcome.rows
-        if not self.per_step and goes_on and len(rows) and rows[-1, 0] == self.t:  # that of the next phase counts
-            self.parts[-1] = outcome._replace(rows=rows[:-1])
-        self.taken += len(self.parts[-1].rows)
-        values = gaps.at(self.q, self.remembered[: self.count])
-        deep = [i for i in range(gaps.count) if values[i] < -PENETRATION * self.length]
-        if deep:
-            self.reason = (
-                f"Penetration was not noticed: {listed([gaps.names[i] for i in deep], NAMED)}. Give a max_step."
-            )
+        ends = outcome.status is Status.EVENT and bool(fired)
+        goes_on = ends and end.reached < self.span[1]
+        if not self.per_step and goes_on and len(part.rows) and part.rows[-1, 0] == end.reached:
+            part = part._replace(rows=part.rows[:-1])  # that of the next phase counts
+        if self.again and part.trajectory is not None:
+            part.trajectory.begin_at(self.again)
+        self.parts.append(part)
+        self.taken += len(part.rows)
+        if self.settled is not None:  # within the run of the phase
+            return self.settled[0]
+        self.t, (self.q, self.qd, _), self.remembered = end.reached, (x.copy() for x in end.last), end.remembered
+        if goes_on:
+            return self._transit(fired)
+        self.reason = outcome.reason
+        if self._is_deep():
             return Status.CONTACT_FAILED
-        if not goes_on:
-            return Status.SUCCESS if outcome.status is Status.EVENT and fired else outcome.status
+        return Status.SUCCESS if ends else outcome.status
+
+    def _is_deep(self):
+        """Whether contacts penetrate; says so."""
+        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
+        deep = np.flatnonzero(self.gap < -PENETRATION * self.length)
+        if deep.size:
+            found = listed([self.gaps.names[i] for i in deep], NAMED)
+            self.reason = f"Penetration was not noticed: {found}. Give a max_step."
+        return deep.size > 0
+
+    def _transit(self, fired):
+        """From one phase to the next one, after events of the gaps `fired`; the Status if there is no way on."""
         self.reason = ""
-        if self._is_stuck():
+        if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        near = [i for i in range(gaps.count) if values[i] <= TOUCHING * self.length]
+        near = np.flatnonzero(self.gap <= TOUCHING * self.length).tolist()
         return self._settle(sorted({*near, *fired, *self.closed, *self.idle}), fired)
 
     def _is_stuck(self):
@@ -363,7 +407,7 @@ class _ContactRun:
 
     def _settle(self, touching, fired):
         """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
-        slots, values = self.remembered[self.count :], self.gaps.at(self.q, self.remembered[: self.count])
+        slots, values = self.remembered[self.count :], self.gap
         self.rest, self.opened = self.t, {}
         if not touching:
             self.closed, self.idle = [], []
@@ -436,13 +480,13 @@ class _ContactRun:
         ends = [part.end for part in parts]
         last = ends[-1]
         logs = self.options.history is not False
-        numbers = np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts])
+        rows = np.concatenate([part.rows for part in parts])
         events = None
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
             events = tuple([np.concatenate(column[k]) for column in columns] for k in range(3))
         return Outcome(
-            status, self.reason, np.concatenate([part.rows for part in parts]),
+            status, self.reason, rows,
             RunEnd(
                 last.reached, last.last, last.remembered,
                 summed([end.counts for end in ends]),
@@ -450,7 +494,7 @@ class _ContactRun:
                 ChartLog([end.charts for end in ends]) if logs else None,
             ),
             _Pieces([part.trajectory for part in parts]) if self.options.dense_output else None,
-            events, began, self.method, (self.phases, numbers),
+            events, began, self.method, (self.phases, self.phases.of_outputs(rows[:, 0])),
         )  # fmt: skip
 
 

@@ -140,8 +140,21 @@ def _judged(degree, samples, noise):
     return fine, off, clear, scale, resolved
 
 
+class Survey(NamedTuple):
+    """Several functions on one interval, by interpolants: which have no zero, and where others cross zero first."""
+
+    calm: np.ndarray  # (m,)  bool: clear of zero
+    since: np.ndarray  # (m,)  times up to which functions are clear; inf for calm ones
+    until: np.ndarray  # (m,)  by when those have the other sign that cross zero once from `since` on; else NaN
+    last: np.ndarray  # (m,)  values at the end
+    degree: int  # that resolves the functions
+
+
 def survey(sample, a, first, b, degree, noise):
     """Look at several functions at once: most have no zero between a and b, and need no search.
+
+    A function is clear of zero at a point of the fine grid if its value exceeds the second difference there, by which
+    the function may bend between the points, and the errors.
 
     Parameters
     ----------
@@ -157,20 +170,32 @@ def survey(sample, a, first, b, degree, noise):
 
     Returns
     -------
-    calm : ndarray (m,), bool
-        Whether a function is clear of zero.
-    last : ndarray (m,)
-        Values at b.
-    degree : int
-        That resolves the functions.
+    Survey
     """
-    samples = np.vstack((first, sample(_points(degree, a, b)[1:])))
+    samples = np.concatenate((first[None], sample(_points(degree, a, b)[1:])))
     while True:
-        _, off, clear, scale, resolved = _judged(degree, samples, noise)
+        fine, off, _, scale, resolved = _judged(degree, samples, noise)
         if degree == LARGEST or resolved.all() or np.isnan(off).any():
-            return resolved & (clear > NEAR_ZERO * scale) & (scale >= UNDERFLOWING), samples[-1], degree
+            break
         degree *= 2
         _, samples = _refined(degree, a, b, samples, sample)
+    grid, sign = a + 0.5 * (b - a) * (table(degree).fine + 1.0), np.sign(first)
+    height, bend = sign * fine, np.empty_like(fine)
+    np.abs(fine[2:] - 2.0 * fine[1:-1] + fine[:-2], out=bend[1:-1])
+    bend[0], bend[-1] = bend[1], bend[-2]
+    bend += np.maximum(CLEAR * off, noise)
+    usable = resolved & (scale >= UNDERFLOWING)
+    clear, beyond = (height > bend) & usable, (height < -bend) & usable
+    calm, columns = clear.all(axis=0), np.arange(first.size)
+    doubt = clear.argmin(axis=0)
+    before = np.maximum(doubt - 1, 0)
+    later = np.arange(len(fine))[:, None] >= doubt
+    across = (beyond & later).argmax(axis=0)
+    within = later[1:] & (np.arange(1, len(fine))[:, None] <= across)
+    falls = ((np.diff(height, axis=0) < 0.0) | ~within).all(axis=0)
+    once = (doubt > 0) & beyond[across, columns] & falls
+    since = np.where(calm, np.inf, grid[before])
+    return Survey(calm, since, np.where(once & ~calm, grid[across], np.nan), samples[-1], degree)
 
 
 class Search:

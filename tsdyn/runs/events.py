@@ -395,10 +395,12 @@ class Watch:
     def _locate(self, run, log, step):
         found, failure, end = [], None, step.t1
         step.degree = self._degree(step)
-        calm = self._survey(step)
-        for i in range(len(self.events)):
-            if i in calm:
-                continue
+        left = {i for i in range(len(self.events)) if not isinstance(self.events[i].function, Member)}
+        for k in range(len(self._groups)):
+            first, more, end = self._first_of_group(k, step, end)
+            found += first
+            left |= more
+        for i in sorted(left):
             # Times that bracket the zeros of event i
             points, failed = self._points(i, step, end)
             if failed is not None:
@@ -428,25 +430,46 @@ class Watch:
             raise failure
         return None
 
-    def _survey(self, step):
-        """The numbers of events whose functions are clear of zero within the step, of those that come in groups."""
-        calm = set()
-        for k, (over, numbers, which) in enumerate(self._groups):
-            tracks = [self.tracks[i] for i in numbers]
+    def _first_of_group(self, k, step, end):
+        """Of a group up to `end`: the first event that ends the run, those to be searched one by one, the new end."""
+        (over, numbers, which), found, alone = self._groups[k], [], set()
+        left = np.arange(len(numbers))
+        while left.size:
+            members, columns = [numbers[i] for i in left], [which[i] for i in left]
+            tracks = [self.tracks[i] for i in members]
             first, noise = np.array([[track.value, track.noise] for track in tracks]).T
 
-            def sample(times, over=over, which=which):
-                return self._values(over, times, step.states(times))[:, which]
+            def sample(times, columns=columns):
+                return self._values(over, times, step.states(times))[:, columns]
 
             degree = max(step.degree, self._degrees[k] // 2)
-            clear, last, self._degrees[k] = survey(sample, step.t0, first, step.t1, degree, noise)
-            for i, track, held, value in zip(numbers, tracks, clear.tolist(), last.tolist(), strict=True):
-                sign = math.copysign(1.0, value)
-                if held and track.zero is None and track.sign in (0.0, sign) and abs(value) > track.noise:
+            seen = survey(sample, step.t0, first, end, degree, noise)
+            self._degrees[k] = seen.degree
+            crossing, since, until = [], seen.since.tolist(), seen.until.tolist()
+            for j, (i, track, value) in enumerate(zip(members, tracks, seen.last.tolist(), strict=True)):
+                event, sign = self.events[i], math.copysign(1.0, track.value)
+                plain = track.zero is None and track.sign in (0.0, sign)
+                if plain and seen.calm[j]:
                     track.value = track.end = value
-                    track.sign, track.significant = sign, (step.t1, value)
-                    calm.add(i)
-        return calm
+                    track.sign, track.significant = sign, (end, value)
+                elif plain and until[j] == until[j] and event.direction * sign < 0.0 and event.limit == 1.0:
+                    crossing.append(j)
+                elif self.list[i] or since[j] < end:
+                    alone.add(i)
+            if not crossing:
+                break
+            # The earliest one; what is clear up to it needs no look
+            j = min(crossing, key=since.__getitem__)
+            first = (since[j], self._value(members[j], since[j], step.at(since[j])))
+            last = (until[j], self._value(members[j], until[j], step.at(until[j])))
+            if not first[1] * last[1] < 0.0:
+                return found, alone | {members[i] for i in crossing}, end
+            t = self._between(members[j], step, first, last)
+            if t <= end:
+                end = t
+                found = [Occurrence(t, members[j], step.at(t))]
+            left = left[[i for i in crossing if i != j and since[i] <= end]]
+        return found, alone, end
 
     def _points(self, i, step, end):
         """Times up to `end`, and values of event i, between which its sign changes once at most; what `EventFailed`."""
@@ -557,14 +580,14 @@ class Watch:
         if a == 0.0 or (a < 0.0) == (b < 0.0):
             return [Occurrence(t0, i, step.at(t0))]
         root = self._between(i, step, (t0, a), (t1, b))
-        at_start = not self.events[i].exact and self._is_start(i, step, root, a)
+        at_start = not self.events[i].exact and self._is_start(i, step, root, (t0, a))
         return [] if at_start else [Occurrence(root, i, step.at(root))]
 
     def _is_start(self, i, step, t, before):
-        """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before."""
+        """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before, there."""
         if t - self.start <= START_ZERO * max(abs(self.start), step.t1 - step.t0):
             return True
-        return step.t0 == self.start and abs(before) <= self._shaken(i, step, step.t0)
+        return before[0] == self.start and abs(before[1]) <= self._shaken(i, step, self.start)
 
     def _between(self, i, step, first, last):
         """Where event i changes its sign between two times with values."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,11 +34,14 @@ if TYPE_CHECKING:
 
     from ..hints import ItemLike, Scene
 
-# A run with contacts is a sequence of phases. Each is a run of the scene with the closed gaps as bilateral rows, and
-# ends at the first zero of an open gap, from above, or of the reaction of a closed one. Then velocities jump by the
-# impulses of an impact, where gaps close; those that are closed and at rest stay so as the complementarity problem of
-# accelerations says; and the next phase begins. Closed gaps whose rows depend on others, such as that of a fourth leg,
-# are left out of the rows: the others hold them.
+# A run with contacts is a sequence of phases. A scene has units: gaps, each open or closed. A phase is a run of the
+# scene with the units in their modes, the closed gaps as bilateral rows, and ends at the first zero of what a unit
+# watches: of an open gap, from above, or of the reaction of a closed one. Then velocities jump by the impulses of an
+# impact, where gaps close; those that are closed and at rest stay so as the complementarity problem of accelerations
+# says; and the next phase begins. Closed gaps whose rows depend on others, such as that of a fourth leg, are left out
+# of the rows: the others hold them.
+#
+# `Modes` has all that a phase follows from, beside t, q, qd and what the run remembers: a checkpoint needs no more.
 
 
 class _Closing:
@@ -188,6 +191,19 @@ def demand_apart(gaps, q, angles, tol):
         )
 
 
+@dataclass
+class Modes:
+    """The modes of the units of a scene: numbers of gaps."""
+
+    closed: list = field(default_factory=list)  # independent rows, with reactions
+    idle: list = field(default_factory=list)  # closed by what others hold
+    opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+
+    def same(self, other):
+        """Whether the units are in the same modes, whatever has just opened."""
+        return replace(self, opened={}) == replace(other, opened={})
+
+
 class _ContactRun:
     """One run in the making.
 
@@ -220,7 +236,7 @@ class _ContactRun:
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
-        self.closed, self.idle, self.rest = [], [], self.t
+        self.modes, self.rest = Modes(), self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
         self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
         self.reason, self.method, self.at_once, self.judged = "", "", 0, (self.t, 0)
@@ -266,9 +282,8 @@ class _ContactRun:
 
     def _phase(self):
         """Run the next phase: its task and outcome."""
-        gaps, end = self.gaps, self.span[1]
-        phase = phase_of(self.scene, [gaps.list[i].side.row for i in self.closed])
-        names = tuple(dict.fromkeys(gaps.names[i] for i in sorted([*self.closed, *self.idle])))
+        end = self.span[1]
+        phase, names = self._scene(), self._names()
         call, plain = RunCall((self.t, end)), replace(self.options, events=None)
         run = self.run_of(phase, plain, call)
         run._prepare_kernels(True)
@@ -296,32 +311,46 @@ class _ContactRun:
         It does where the same gaps are closed as before.
         """
         self._end_phase(t)
-        before = self.closed, self.idle
+        before = self.modes
         self.t, (self.q, self.qd, _), self.remembered = t, run.now.copy(), run.remembered.copy()
         self.settled = (self._transit([self.watched[i] for i in numbers]),)
-        if self.settled[0] is not None or before != (self.closed, self.idle):
+        if self.settled[0] is not None or not self.modes.same(before):
             return False
         run.now[1], self.settled = self.qd, None
-        self.closing.open(self.opened)
+        self.closing.open(self.modes.opened)
         self.again.append(t)
         return True
 
+    def _scene(self):
+        """The scene of the present modes."""
+        return phase_of(self.scene, [self.gaps.list[i].side.row for i in self.modes.closed])
+
+    def _names(self):
+        """Names of the units whose rows hold."""
+        held = sorted([*self.modes.closed, *self.modes.idle])
+        return tuple(dict.fromkeys(self.gaps.names[i] for i in held))
+
     def _events(self, phase):
-        gaps, pairs = self.gaps, zip(self.users, self.counts, strict=True)
+        """Events of a phase: the user's, then one for each of the units `watched`."""
+        pairs = zip(self.users, self.counts, strict=True)
         found = [event._replace(limit=event.limit - count) for event, count in pairs]
-        self.watched = [None] * len(found)
-        first = {id(member.constraint): member.rows.start for member in phase.packed.members}
-        sides = [gaps.list[i].side for i in self.closed]
-        leaving = _Leaving(phase.packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
-        self.closing = _Closing(gaps, self.opened)
+        watches = list(self._watches(phase.packed))
+        self.watched = [None] * len(found) + [unit for unit, _ in watches]
+        return found + [event for _, event in watches]
+
+    def _watches(self, packed):
+        """Yield the units that may end a phase, each with its event."""
+        gaps, modes = self.gaps, self.modes
+        first = {id(member.constraint): member.rows.start for member in packed.members}
+        sides = [gaps.list[i].side for i in modes.closed]
+        leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
+        self.closing = _Closing(gaps, modes.opened)
         for i in range(gaps.count):
-            if i in self.idle:
+            if i in modes.idle:
                 continue
-            is_open = i not in self.closed
-            function = Member(self.closing.over, i) if is_open else Member(leaving, self.closed.index(i))
-            found.append(Event(function, gaps.names[i], 1.0, -1.0, is_open))
-            self.watched.append(i)
-        return found
+            is_open = i not in modes.closed
+            function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
+            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
 
     def _times(self):
         left = self.times[self.taken :]
@@ -387,7 +416,7 @@ class _ContactRun:
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
         near = np.flatnonzero(self.gap <= TOUCHING * self.length).tolist()
-        return self._settle(sorted({*near, *fired, *self.closed, *self.idle}), fired)
+        return self._settle(sorted({*near, *fired, *self.modes.closed, *self.modes.idle}), fired)
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -408,22 +437,22 @@ class _ContactRun:
     def _settle(self, touching, fired):
         """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
         slots, values = self.remembered[self.count :], self.gap
-        self.rest, self.opened = self.t, {}
+        before, self.modes, self.rest = self.modes, Modes(), self.t
         if not touching:
-            self.closed, self.idle = [], []
             return None
         try:
             inertia = Inertia(self.gaps, self.t, self.q, slots)
             rates = inertia.rates(self.qd)
-            noise = [i for i in fired if i not in self.closed and rates[i] > 0.0]
+            noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
             if noise:  # a gap that closes with a rate of rounding
                 self.qd, rates = held(inertia, self.qd, noise, rates)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
-            self.opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
-            leaving = [i for i in fired if i in self.closed]
-            self.closed, self.idle = settle(inertia, resting, self.qd, leaving)[:2] if resting else ([], [])
+            opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
+            leaving = [i for i in fired if i in before.closed]
+            stay = settle(inertia, resting, self.qd, leaving)[:2] if resting else ([], [])
+            self.modes = Modes(*stay, opened)
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."

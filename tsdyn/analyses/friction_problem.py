@@ -130,6 +130,14 @@ class Frictions:
         x, _ = marker_states(self.packed, self.units[i].load, q, np.zeros_like(q))
         return sum(np.broadcast_to(part.x, len(q)) * v[:, c] for c, part in enumerate(x[12:15]))
 
+    def speed(self, i, q, qd, memory):
+        """Of one that slides, (k,): the velocity along its direction, in a plane less half of the speed."""
+        v, _ = self.velocity(i, q, qd)
+        unit = self.units[i]
+        if unit.slide.directions == 1:
+            return memory[unit.slot] * self.along(i, q, v)
+        return v @ memory[unit.way] - 0.5 * np.linalg.norm(v, axis=1)
+
     def axis(self, i, q):
         """The axis or the normal (3,) of a joint at q (n,), ground frame."""
         x, _ = marker_states(self.packed, self.units[i].load, q[None], np.zeros((1, q.size)))

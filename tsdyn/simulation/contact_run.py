@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
 from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
@@ -21,12 +21,12 @@ from ..observables import diagnostics, reactions
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.dense_output import StepPieces
-from ..runs.events import Event
+from ..runs.events import Event, Member
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import floats, listed
-from .phase_scenes import NAMED, first_row_of, has_contacts, phase_of
+from .phase_scenes import NAMED, first_row_of, gaps_of, has_contacts, phase_of
 from .progress import reporter, silent
 from .run_options import RunCall
 from .scene_cache import Prepared, prepared
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 
 class _Closing:
-    """The gap of an open contact, as an event function.
+    """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
     however soon it comes.
@@ -66,26 +66,29 @@ class _Closing:
     Parameters
     ----------
     gaps : Gaps
-    i : int
-    start : tuple
-        Time, gap and rate where the contact has opened with a rate; else empty.
+    opened : dict
+        Of contacts that have opened with a rate: time, gap and rate there, by their numbers.
     """
 
-    def __init__(self, gaps, i, start):
-        self.gaps, self.i, self.start = gaps, i, start
+    def __init__(self, gaps, opened):
+        self.gaps = gaps
+        self.open(opened)
+
+    def open(self, opened):
+        """Take other contacts that have just opened."""
+        self.which = list(opened)
+        self.start = np.array(list(opened.values())).reshape(-1, 3).T
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        return self(states.t, states)
-
-    def __call__(self, t, state):
-        """The value at a state, or values at several."""
-        gap = self.gaps.value(self.i, state.q, state.angles if self.gaps.are_counted else None)
-        if not self.start:
-            return gap
-        begun, first, rate = self.start
-        since = np.where(t > begun, t - begun, 1.0)
-        return np.where(t > begun, (gap - first) / since, rate)
+        """Values (k, count) of states at k times."""
+        values = self.gaps.values(states.t, states.q, states.angles if self.gaps.are_counted else None)
+        if self.which:
+            begun, first, rate = self.start
+            since = states.t[:, None] - begun
+            later = since > 0.0
+            divided = (values[:, self.which] - first) / np.where(later, since, 1.0)
+            values[:, self.which] = np.where(later, divided, rate)
+        return values
 
 
 class _Loads:
@@ -107,56 +110,57 @@ class _Loads:
 
 
 class _Leaving:
-    """The reaction of a closed contact, positive where it pushes, as an event function.
+    """The reactions of closed contacts, positive where they push, as event functions.
 
     Parameters
     ----------
-    loads : _Loads
-    row : int
-    sign : float
-        Of the gap over Phi.
+    packed : Packed
+        Of the phase.
+    rows : list of int
+    signs : list of float
+        Of the gaps over Phi.
     """
 
-    def __init__(self, loads, row, sign):
-        self.loads, self.row, self.sign = loads, row, sign
+    def __init__(self, packed, rows, signs):
+        self.packed, self.rows, self.signs = packed, rows, np.array(signs)
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        return -self.sign * self.loads.at(states)[0][:, self.row]
-
-    def __call__(self, t, state):
-        """The value at one state."""
-        return float(self.over(state)[0])
+        """Values (k, closed) of states at k times."""
+        memory = np.tile(states.memory, (states.t.size, 1))
+        lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        return -self.signs * lam[:, self.rows]
 
 
 class _Breaking:
-    """What the reaction of a friction that sticks is below its bound, as an event function.
+    """What the reactions of frictions that stick are below their bounds, as event functions.
 
     Parameters
     ----------
-    loads : _Loads
-    unit : friction_problem.Unit
-    rows : ndarray of int
-        That hold it.
+    packed : Packed
+        Of the phase.
+    units : list of friction_problem.Unit
     """
 
-    def __init__(self, loads, unit, rows):
-        self.loads, self.unit, self.rows = loads, unit, rows
+    def __init__(self, packed, units):
+        self.packed, self.units = packed, units
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        lam, loads = self.loads.at(states)
-        held = np.linalg.norm(reactions.particular(lam)[:, self.rows], axis=1)
-        share, bound = self.unit.bound
-        return bound - held + (share * loads[:, self.unit.load.normal] if share else 0.0)
-
-    def __call__(self, t, state):
-        """The value at one state."""
-        return float(self.over(state)[0])
+        """Values (k, units) of states at k times."""
+        memory = np.tile(states.memory, (states.t.size, 1))
+        motion = states.t, states.q, states.qd, states.qdd
+        wide = reactions.with_normal_loads(self.packed, *motion, memory)
+        lam = reactions.particular(reactions.multipliers(self.packed, *motion, wide))
+        values = np.zeros((states.t.size, len(self.units)))
+        for unit, value in zip(self.units, values.T, strict=True):
+            share, bound = unit.bound
+            value += bound - np.linalg.norm(lam[:, self.packed.derived.holds[unit.slot]], axis=1)
+            if share:
+                value += share * wide[:, memory.shape[1] + unit.load.normal]
+        return values
 
 
 class _Slowing:
-    """The velocity of a friction that slides, along its direction, as an event function.
+    """The velocities of frictions that slide, along their directions, as event functions.
 
     In a plane half of the speed is taken off: where the direction has turned by 60 degrees, it is taken anew. The
     velocity of one that has just begun to slide is divided by the time since.
@@ -164,32 +168,24 @@ class _Slowing:
     Parameters
     ----------
     frictions : Frictions
-    i : int
-    start : tuple
-        Time and acceleration where it has begun to slide; else empty.
+    which : list of int
+    begun : dict
+        Of those that have just begun to slide: time and acceleration there, by their numbers.
     """
 
-    def __init__(self, frictions, i, start):
-        self.frictions, self.i, self.start = frictions, i, start
+    def __init__(self, frictions, which, begun):
+        self.frictions, self.which, self.begun = frictions, which, begun
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        t, q, qd = np.atleast_1d(states.t), *map(np.atleast_2d, (states.q, states.qd))
-        frictions, unit = self.frictions, self.frictions.units[self.i]
-        v, _ = frictions.velocity(self.i, q, qd)
-        if unit.slide.directions == 1:
-            speed = states.memory[unit.slot] * frictions.along(self.i, q, v)
-        else:
-            speed = v @ states.memory[unit.way] - 0.5 * np.linalg.norm(v, axis=1)
-        if not self.start:
-            return speed
-        begun, first = self.start
-        since = np.where(t > begun, t - begun, 1.0)
-        return np.where(t > begun, speed / since, first)
-
-    def __call__(self, t, state):
-        """The value at one state."""
-        return float(self.over(state)[0])
+        """Values (k, which) of states at k times."""
+        values = np.empty((states.t.size, len(self.which)))
+        for i, value in zip(self.which, values.T, strict=True):
+            value[:] = self.frictions.speed(i, states.q, states.qd, states.memory)
+            if i in self.begun:
+                begun, first = self.begun[i]
+                later = states.t > begun
+                value[:] = np.where(later, value / np.where(later, states.t - begun, 1.0), first)
+        return values
 
 
 class Phases:
@@ -225,6 +221,11 @@ class Phases:
     def at(self, t):
         """Numbers of the phases at times t (k,); where one begins, the later one."""
         return np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
+
+    def of_outputs(self, t):
+        """Numbers of the phases of outputs at times t (k,): of several at one time each is of a phase of its own."""
+        same = np.searchsorted(t, t, side="right") - 1 - np.arange(t.size)
+        return np.maximum(self.at(t) - same, 0)
 
     def multipliers(self, numbers, m, *arrays):
         """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
@@ -289,6 +290,10 @@ class Modes:
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
 
+    def same(self, other):
+        """Whether the units are in the same modes, whatever has just opened."""
+        return replace(self, opened={}) == replace(other, opened={})
+
 
 class _ContactRun:
     """One run in the making.
@@ -314,7 +319,7 @@ class _ContactRun:
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        self.gaps, self.frictions = Gaps(scene.packed), Frictions(scene)
+        self.gaps, self.frictions = gaps_of(scene), Frictions(scene)
         self.count = kept.handles.count
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
@@ -346,6 +351,7 @@ class _ContactRun:
         """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
         began, first = clock(), None
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
+        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         status = self._settle(touching, ()) or self._settle_frictions(Modes(), ())
         while status is None:
             try:
@@ -356,7 +362,6 @@ class _ContactRun:
                 status, self.reason = Status.SINGULAR, str(error)
                 break
             first = first or task
-            self.parts.append(outcome)
             status = self._after(outcome)
         if first is None:  # nothing could begin
             raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
@@ -380,15 +385,38 @@ class _ContactRun:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(),
+                max_steps=self._steps_left(), resume=self._resume,
             )  # fmt: skip
+            self.names, self.packed, self.settled, self.again = names, phase.packed, None, []
             outcome = self.run_task(task, phase, self.options.initial_tol)
             other = self.instead(task, outcome.status)
             if other is None:
                 outcome = pinned(outcome, self.q if self.parts else task.q, still)
-                self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, names)
+                if self.settled is None:
+                    self._end_phase(outcome.end.reached)
                 return task, outcome
             run = run._by(other)
+
+    def _end_phase(self, t):
+        self.phases.add(self.t, self.rest, t, self.packed, self.names)
+
+    def _resume(self, t, run, numbers):
+        """After events of these numbers: whether the run of the phase goes on, with other velocities.
+
+        It does where the same gaps are closed as before.
+        """
+        self._end_phase(t)
+        before = self.modes
+        self.t, (self.q, self.qd, _), self.remembered = t, run.now.copy(), run.remembered.copy()
+        remembered = self.remembered
+        self.settled = (self._transit([self.watched[i] for i in numbers]),)
+        changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
+        if self.settled[0] is not None or changed:
+            return False
+        run.now[1], self.settled = self.qd, None
+        self.closing.open(self.modes.opened)
+        self.again.append(t)
+        return True
 
     def _scene(self):
         """The scene of the present modes."""
@@ -419,26 +447,24 @@ class _ContactRun:
 
     def _watches(self, phase):
         """Yield the units that may end a phase, gaps and then frictions, each with its event."""
-        gaps, frictions, modes, loads = self.gaps, self.frictions, self.modes, _Loads(phase.packed)
-        first = first_row_of(phase.packed)
+        gaps, frictions, modes, packed = self.gaps, self.frictions, self.modes, phase.packed
+        first = first_row_of(packed)
+        sides = [gaps.list[i].side for i in modes.closed]
+        leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
+        self.closing = _Closing(gaps, modes.opened)
         for i in range(gaps.count):
             if i in modes.idle:
                 continue
-            row, sign = gaps.list[i].side.row, gaps.list[i].side.sign
-            if i in modes.closed:
-                event = _Leaving(loads, first[id(row)], sign)
-            else:
-                event = _Closing(gaps, i, modes.opened.get(i, ()))
-            yield i, Event(event, gaps.names[i], 1.0, -1.0, i not in modes.closed)
-        for i in range(frictions.count):
-            if i in modes.blocked:
-                continue
-            if i in modes.sticking:
-                unit = frictions.units[i]
-                event = _Breaking(loads, unit, phase.packed.derived.holds[unit.slot])
-            else:
-                event = _Slowing(frictions, i, modes.begun.get(i, ()))
-            yield gaps.count + i, Event(event, frictions.names[i], 1.0, -1.0)
+            is_open = i not in modes.closed
+            function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
+            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
+        sticking = list(modes.sticking)
+        sliding = [i for i in range(frictions.count) if i not in sticking and i not in modes.blocked]
+        breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
+        slowing = _Slowing(frictions, sliding, modes.begun).over
+        for function, which in ((breaking, sticking), (slowing, sliding)):
+            for k, i in enumerate(which):
+                yield gaps.count + i, Event(Member(function, k), frictions.names[i], 1.0, -1.0)
 
     def _still(self, phase):
         """Coordinates of the bodies that rest where frictions stick."""
@@ -469,37 +495,51 @@ class _ContactRun:
 
     def _after(self, outcome):
         """Take the end of a phase; the Status of the run, None if it goes on."""
-        end, gaps = outcome.end, self.gaps
-        self.reason, self.method = outcome.reason, outcome.method or self.method
+        end, part = outcome.end, outcome
+        self.method = outcome.method or self.method
         self.steps += end.counts["steps"]
         times, *states = outcome.events
         for i, mine in enumerate(list(zip(times, *states, strict=True))[: len(self.users)]):
             self.found[i].append(mine)
             self.counts[i] += len(mine[0])
-        self.t, (self.q, self.qd, _) = end.reached, (x.copy() for x in end.last)
-        self.remembered = end.remembered
         fired = [i for i, at in zip(self.watched, times, strict=True) if i is not None and at.size]
-        goes_on = outcome.status is Status.EVENT and fired and self.t < self.span[1]
-        rows = outcome.rows
-        if not self.per_step and goes_on and len(rows) and rows[-1, 0] == self.t:  # that of the next phase counts
-            self.parts[-1] = outcome._replace(rows=rows[:-1])
-        self.taken += len(self.parts[-1].rows)
-        values = gaps.at(self.q, self.remembered[: self.count])
-        deep = [i for i in range(gaps.count) if values[i] < -PENETRATION * self.length]
-        if deep:
-            self.reason = (
-                f"Penetration was not noticed: {listed([gaps.names[i] for i in deep], NAMED)}. Give a max_step."
-            )
+        ends = outcome.status is Status.EVENT and bool(fired)
+        goes_on = ends and end.reached < self.span[1]
+        if not self.per_step and goes_on and len(part.rows) and part.rows[-1, 0] == end.reached:
+            part = part._replace(rows=part.rows[:-1])  # that of the next phase counts
+        if self.again and part.trajectory is not None:
+            part.trajectory.begin_at(self.again)
+        self.parts.append(part)
+        self.taken += len(part.rows)
+        if self.settled is not None:  # within the run of the phase
+            return self.settled[0]
+        self.t, (self.q, self.qd, _), self.remembered = end.reached, (x.copy() for x in end.last), end.remembered
+        if goes_on:
+            return self._transit(fired)
+        self.reason = outcome.reason
+        if self._is_deep():
             return Status.CONTACT_FAILED
-        if not goes_on:
-            return Status.SUCCESS if outcome.status is Status.EVENT and fired else outcome.status
+        return Status.SUCCESS if ends else outcome.status
+
+    def _is_deep(self):
+        """Whether contacts penetrate; says so."""
+        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
+        deep = np.flatnonzero(self.gap < -PENETRATION * self.length)
+        if deep.size:
+            found = listed([self.gaps.names[i] for i in deep], NAMED)
+            self.reason = f"Penetration was not noticed: {found}. Give a max_step."
+        return deep.size > 0
+
+    def _transit(self, fired):
+        """From one phase to the next one, after events of the units `fired`; the Status if there is no way on."""
         self.reason = ""
-        if self._is_stuck():
+        if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        near = [i for i in range(gaps.count) if values[i] <= TOUCHING * self.length]
-        before, hit = self.modes, [i for i in fired if i < gaps.count]
+        near = np.flatnonzero(self.gap <= TOUCHING * self.length).tolist()
+        count, before = self.gaps.count, self.modes
+        hit = [i for i in fired if i < count]
         status = self._settle(sorted({*near, *hit, *before.closed, *before.idle}), hit)
-        return status or self._settle_frictions(before, [i - gaps.count for i in fired if i >= gaps.count])
+        return status or self._settle_frictions(before, [i - count for i in fired if i >= count])
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -519,12 +559,12 @@ class _ContactRun:
 
     def _settle(self, touching, fired):
         """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
-        slots, values = self.remembered[self.count :], self.gaps.at(self.q, self.remembered[: self.count])
+        slots, values = self.remembered[self.count :], self.gap
         before, self.modes, self.rest = self.modes, Modes(), self.t
         if not touching:
             return None
         try:
-            inertia = Inertia(self.gaps, self.t, self.q, self.qd, slots)
+            inertia = Inertia(self.gaps, self.t, self.q, slots)
             rates = inertia.rates(self.qd)
             noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
             if noise:  # a gap that closes with a rate of rounding
@@ -660,13 +700,13 @@ class _ContactRun:
         ends = [part.end for part in parts]
         last = ends[-1]
         logs = self.options.history is not False
-        numbers = np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts])
+        rows = np.concatenate([part.rows for part in parts])
         events = None
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
             events = tuple([np.concatenate(column[k]) for column in columns] for k in range(3))
         return Outcome(
-            status, self.reason, np.concatenate([part.rows for part in parts]),
+            status, self.reason, rows,
             RunEnd(
                 last.reached, last.last, last.remembered,
                 summed([end.counts for end in ends]),
@@ -674,13 +714,13 @@ class _ContactRun:
                 ChartLog([end.charts for end in ends]) if logs else None,
             ),
             _Pieces([part.trajectory for part in parts]) if self.options.dense_output else None,
-            events, began, self.method, (self.phases, numbers),
+            events, began, self.method, (self.phases, self.phases.of_outputs(rows[:, 0])),
         )  # fmt: skip
 
 
 def jumped(inertia, qd, which, before, e, p, law="newton"):
     """Velocities (n,) after impulses p (k,) of the gaps `which`, and the rates (count,) of all gaps then."""
-    change = inertia.free(inertia.J[which].T @ p)
+    change = inertia.pushed(which, p)
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = np.maximum(after[which], 0.0)  # but for rounding
     if law == "newton":  # without rounding where the impact acts
@@ -795,7 +835,7 @@ def impact(
         raise InvalidArgument(f"law must be 'newton' or 'poisson', got {law!r}.")
     if not has_contacts(scene):
         raise InvalidArgument("impact: the scene has no unilateral constraints, such as PlaneContact(unilateral=True).")
-    gaps, kept = Gaps(scene.packed), prepared(phase_of(scene, []))
+    gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
     q, qd = state_arrays(state, kept.n)
     t = float(getattr(state, "t", 0.0))
     memory = remembered(state, kept, t, q)
@@ -808,7 +848,7 @@ def impact(
             e[_chosen(gaps, [item], None)] = _coefficient(value)
     elif restitution is not None:
         e[:] = _coefficient(restitution)
-    inertia = Inertia(gaps, t, q, qd, slots)
+    inertia = Inertia(gaps, t, q, slots)
     before = inertia.rates(qd)[which]
     try:
         p = impulses(inertia, which, before, e[which], law)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -241,6 +242,19 @@ class Phases:
         for kind, mine, some in self._gathered(numbers, arrays):
             out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
         return diagnostics.ConstraintError(*out)
+
+    def exerted(self, solution, item, on):
+        """Force and torque (k, 3) as of `reactions.exerted`, of frictions that slide and stick in turn."""
+        out = np.zeros((2, solution.t.size, 3))
+        arrays = solution.t, solution.q, solution.qd, solution.qdd, solution._memory
+        for kind, mine, some in self._gathered(solution._phase_of_rows, arrays):
+            packed, (t, q, qd, qdd, memory) = self.packed[kind], some
+            lam = reactions.multipliers(packed, t, q, qd, qdd, memory)
+            motion = SimpleNamespace(
+                packed=packed, system=packed.system, t=t, q=q, qd=qd, qdd=qdd, multipliers=lam, _memory=memory
+            )
+            out[:, mine] = reactions.exerted(motion, item, on)
+        return out[0], out[1]
 
     def _gathered(self, numbers, arrays):
         """Yield each set of closed gaps, the entries (j,) of arrays in its phases, and these parts of the arrays."""

@@ -264,9 +264,13 @@ def immobile(packed, t, q, memory):
 
 
 def _null_space(rows):
-    from scipy.linalg import null_space
+    from scipy.linalg import qr
 
-    return null_space(rows, RANK_TOL) if len(rows) else np.eye(rows.shape[1])
+    if not len(rows):
+        return np.eye(rows.shape[1])
+    Q, R, _ = qr(rows.T, pivoting=True)
+    size = np.abs(np.diag(R))
+    return Q[:, int((size > RANK_TOL * size.max(initial=0.0)).sum()) :]
 
 
 class Rest(NamedTuple):

@@ -28,11 +28,11 @@ from ..taylor.series_engine import SeriesEngine
 from ..validation import damaged
 from . import stored_runs
 from .local_origin import origin_of, run_near, within_rounding
-from .phase_scenes import demand_bilateral, has_contacts
+from .phase_scenes import at_start, has_contacts
 from .progress import reporter
 from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented, from_names
 from .scene import Scene
-from .scene_cache import prepared
+from .scene_cache import prepared, prepared_numbers
 from .segments import Turns, run_segments
 from .solution import Solution
 
@@ -172,13 +172,13 @@ class Run:
 
     @fitting
     def __init__(self, scene: Scene, options: RunOptions) -> None:
-        demand_bilateral(scene)
         self.scene, self.options, self._form = scene, options, options.form
+        self._first = at_start(scene)  # whose method and kernels are those of the first phase
         self._compiled = set()  # with outputs between steps, or not
         self._last = self._seen = None  # the last `_Last`, and state
         self._prepare_kernels(options.dense_output or options.events is not None)
-        self._prepared = kept = prepared(scene)
-        self._start = scene._initial()
+        self._prepared = kept = prepared(self._first)
+        self._packed, self._start = scene.packed, scene._initial()
         self.method = method = first_method(options, kept)
         self._driver = DRIVERS.get(method.driver, method.driver)
 
@@ -215,7 +215,7 @@ class Run:
         scene = self.scene
         if scene._users:
             scene.refresh()
-        if scene._prepared is not self._prepared or scene._start is not self._start:
+        if scene._packed is not self._packed or scene._start is not self._start:
             raise InvalidArgument(
                 "the scene has changed since it was prepared: prepare it again, by ts.prepare(scene, ...), or leave "
                 "the scene as it is and change numbers by run.with_parameters({...})."
@@ -253,6 +253,8 @@ class Run:
         found: numbers and arrays of a checkpoint to go on from. archive: that of a run which begins again by another
         method.
         """
+        if self._first is not self.scene:
+            return self._solve_phases(call)
         started, is_stored = clock(), call.store is not None or call.checkpoint is not None
         if is_stored and archive is None and found[0] is None:
             stored_runs.demand_storable(call, self.options)
@@ -270,6 +272,15 @@ class Run:
             if other is not None:
                 return self._by(other)._solve(call)
         return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
+
+    def _solve_phases(self, call):
+        """The same of a scene with unilateral constraints."""
+        from .contact_run import run_contacts
+
+        started = clock()
+        task, outcome = run_contacts(self.scene, self.options, call, _run_of, run_task, instead)
+        seconds = {"prepare": outcome.began - started, "run": clock() - outcome.began}
+        return Solution(self.scene, task, outcome, seconds)
 
     def _check(self, call: RunCall) -> None:
         """Raise what a call raises before anything is run."""
@@ -334,7 +345,7 @@ class Run:
         if within not in self._compiled:
             options = self.options
             default = options.rtol, options.atol, options.may_use_series
-            prepare_first_run(self.scene, options.method, self._form, within, default)
+            prepare_first_run(self._first, options.method, self._form, within, default)
             self._compiled.add(within)
 
     def _by(self, method):
@@ -380,7 +391,7 @@ class Run:
                 f"rtol={method.rtol:g}, atol={method.atol:g} of the run; each step is held to rtol={rtol:.2g}, "
                 f"atol={atol:.2g} (safety factor {method.rtol / rtol:.3g})"
             )
-        kernels = kernels_of(self.scene, method, self._form, True in self._compiled)
+        kernels = kernels_of(self._first, method, self._form, True in self._compiled)
         laws = {load.force.name: load.law for load in self._prepared.packed.loads if load.law is not None}
         said = [f"{name} {law.said}" for name, law in laws.items()]
         return {
@@ -574,18 +585,7 @@ def simulate(  # many arguments, by name: each is an option of a run
         max_step, history, chart_interval,
     )  # fmt: skip
     call = RunCall(t_span, t_eval, store, checkpoint, progress, state)
-    if has_contacts(scene):
-        return _solve_contacts(scene, options, call)
     return _run_of(scene, options, call)._solve(call)
-
-
-def _solve_contacts(scene, options, call):
-    """Run a scene with unilateral constraints."""
-    from .contact_run import run_contacts
-
-    started = clock()
-    task, outcome = run_contacts(scene, options, call, _run_of, run_task, instead)
-    return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": clock() - outcome.began})
 
 
 def _run_of(scene, options, call):
@@ -602,7 +602,7 @@ def _run_of(scene, options, call):
     output_times(call.t_eval, *interval(call.t_span))
     run = Run(scene, options)
     if options.events is None and is_plain(run.method):
-        kept = run._prepared
+        kept = prepared_numbers(scene)
         kept.runs = (run, *kept.runs[: KEPT - 1])  # and not written to: other threads may be reading
     return run
 

@@ -24,7 +24,7 @@ from ..runs.task import Outcome
 from ..validation import floats, listed
 from .phase_scenes import NAMED, has_contacts, phase_of
 from .progress import reporter, silent
-from .run_options import RunCall
+from .run_options import RunCall, RunOptions
 from .scene_cache import Prepared, prepared
 from .segments import summed
 from .tolerances import CREEPING, ENDLESS, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
@@ -118,16 +118,14 @@ class Phases:
     def __init__(self, packed):
         self.list, self.impulses, self.starts, self.of = [], [], [], []
         self.packed, self._columns = [], []  # of each set of closed gaps
-        self._rows, self._kinds = _rows_of(packed), {}
+        self.whole, self._kinds = packed, {}
 
     def add(self, begin, rest, end, packed, names):
         """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
         kind = self._kinds.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
-            own = _rows_of(packed)
-            pairs = [(self._rows[part] + i, own[part] + i) for part, i in _numbered(packed) if part in self._rows]
             self.packed.append(packed)
-            self._columns.append(np.array(pairs, int).reshape(-1, 2).T)
+            self._columns.append(shared_rows(self.whole, packed))
         if self.list:
             self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
         self.starts.append(begin)
@@ -161,15 +159,12 @@ class Phases:
             yield kind, mine, [None if array is None else array[mine] for array in arrays]
 
 
-def _rows_of(packed):
-    """The first row of each primitive, by its id."""
-    return {id(part): first for part, first in first_rows(packed.constraints)}
-
-
-def _numbered(packed):
-    """Yield the id of the primitive of each row, and which of its rows it is."""
-    for part in packed.constraints:
-        yield from ((id(part), i) for i in range(part.all_rows))
+def shared_rows(whole, packed):
+    """Rows of a scene that one of its phases has, and where they are among those of the phase: (2, rows)."""
+    of_whole, own = ({id(part): first for part, first in first_rows(each.constraints)} for each in (whole, packed))
+    mine = [(id(part), i) for part in packed.constraints for i in range(part.all_rows)]
+    pairs = [(of_whole[part] + i, own[part] + i) for part, i in mine if part in of_whole]
+    return np.array(pairs, int).reshape(-1, 2).T
 
 
 class _Pieces(StepPieces):
@@ -244,8 +239,7 @@ class _ContactRun:
     def run(self):
         """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
         began, first = clock(), None
-        touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
-        status = self._settle(touching, ())
+        status = self.begin()
         while status is None:
             try:
                 task, outcome = self._phase()
@@ -264,12 +258,20 @@ class _ContactRun:
             status, began
         )
 
+    def begin(self):
+        """Impact and closed contacts at the start; the Status if there is no way on, else None."""
+        touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
+        return self._settle(touching, ())
+
     # One phase
+
+    def present(self):
+        """The scene of the present phase."""
+        return phase_of(self.scene, [self.gaps.list[i].side.row for i in self.closed])
 
     def _phase(self):
         """Run the next phase: its task and outcome."""
-        gaps, end = self.gaps, self.span[1]
-        phase = phase_of(self.scene, [gaps.list[i].side.row for i in self.closed])
+        gaps, end, phase = self.gaps, self.span[1], self.present()
         names = [gaps.names[i] for i in sorted([*self.closed, *self.idle])]
         call, plain = RunCall((self.t, end)), replace(self.options, events=None)
         run = self.run_of(phase, plain, call)
@@ -484,6 +486,21 @@ def held(inertia, qd, which, rates):
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = 0.0
     return qd + change, after
+
+
+def begun(scene, t, state=None):
+    """A `_ContactRun` from a state (None for the start) at t, with the contacts that stay closed there.
+
+    Raises
+    ------
+    InconsistentState
+        If contacts penetrate, or no reactions keep them from penetrating.
+    """
+    run = _ContactRun(scene, RunOptions(), RunCall((t, t + 1.0), state=state), None, None, None)
+    status = run.begin()
+    if status is not None:
+        raise InconsistentState(f"{status.sentence} {run.reason} {status.remedy}")
+    return run
 
 
 def run_contacts(scene, options, call, run_of, run_task, instead):

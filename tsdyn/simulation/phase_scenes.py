@@ -59,29 +59,34 @@ def demand_bilateral(scene):
         )
 
 
+def serving(name):
+    """Decorate a method of scenes: where there are contacts, the function of this name in standing.py serves it.
+
+    That is given the scene and the method, and the arguments of the call.
+    """
+
+    def decorate(function):
+        own = getattr(function, "__wrapped__", function)  # `fitting` names the method that is called
+
+        @wraps(function)
+        def call(scene, *arguments, **keywords):
+            if not has_contacts(scene):
+                return own(scene, *arguments, **keywords)
+            from . import standing
+
+            return getattr(standing, name)(scene, own, *arguments, **keywords)
+
+        return fitting(call)
+
+    return decorate
+
+
 def where_it_stands(function):
     """Decorate a method of scenes: contacts that are closed at the start hold, the others are left out."""
-    own = getattr(function, "__wrapped__", function)  # `fitting` names the method that is called
-
-    @wraps(function)
-    def call(scene, *arguments, **keywords):
-        return own(at_start(scene), *arguments, **keywords)
-
-    return fitting(call)
-
-
-def without_contacts(function):
-    """Decorate a method of scenes that takes constraints as bilateral: refuse scenes with contacts."""
     own = getattr(function, "__wrapped__", function)
 
     @wraps(function)
     def call(scene, *arguments, **keywords):
-        if has_contacts(scene):
-            names = listed([each.name for each in contacts_of(scene._added)], NAMED)
-            raise InvalidArgument(
-                f"{function.__name__} is for bilateral constraints, and {names} open{'s' * (',' not in names)}. Remove "
-                "these from a copy of the scene, or hold them closed by unilateral=False."
-            )
-        return own(scene, *arguments, **keywords)
+        return own(at_start(scene), *arguments, **keywords)
 
     return fitting(call)

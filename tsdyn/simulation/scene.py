@@ -39,7 +39,7 @@ from .analyses import linearise as _linearise
 from .analyses import set_start as _set_start
 from .given_motion import inverse_dynamics as _inverse_dynamics
 from .given_motion import kinematics as _kinematics
-from .phase_scenes import where_it_stands, without_contacts
+from .phase_scenes import serving, where_it_stands
 from .scene_cache import preparing
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
 from .variants import copy as _copy
@@ -573,14 +573,14 @@ class Scene:
     evaluate = where_it_stands(_evaluate)
     assemble = where_it_stands(_assemble)
     mobility = where_it_stands(_mobility)
-    linearise = where_it_stands(_linearise)
-    equilibrium = without_contacts(_equilibrium)
-    kinematics = without_contacts(_kinematics)
-    inverse_dynamics = without_contacts(_inverse_dynamics)
+    linearise = serving("linearise")(_linearise)
+    equilibrium = serving("equilibrium")(_equilibrium)
+    kinematics = serving("along")(_kinematics)
+    inverse_dynamics = serving("along")(_inverse_dynamics)
     parameters = _parameters
     with_parameters = _with_parameters
     set = where_it_stands(fitting(set_joint))
-    set_start = _set_start
+    set_start = serving("set_start")(_set_start)
     remove = _remove
     copy = _copy
     save = save

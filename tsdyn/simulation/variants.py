@@ -137,6 +137,8 @@ def copy(scene: Scene) -> Scene:
         _freeze(vars(item), vars(memo[id(item)]))
         if isinstance(item, PointMass):
             _freeze(item.values, memo[id(item)].values)
+    for body in (twin.ground, *twin._bodies):
+        vars(body)["scene"] = twin  # of the scene of a phase, too
     twin.gravity = scene.gravity
     twin._twins = WeakKeyDictionary((item, memo[id(item)]) for item in own)
     return twin

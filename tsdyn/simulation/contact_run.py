@@ -251,8 +251,8 @@ class _ContactRun:
             first = first or task
             self.parts.append(outcome)
             status = self._after(outcome)
-        if first is None:  # nothing could begin
-            raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
+        if first is None:
+            self.refuse(status)
         self.report(None)
         return first._replace(prepared=Prepared(self.scene, self.scene.packed), span=self.span), self._outcome(
             status, began
@@ -263,6 +263,18 @@ class _ContactRun:
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         return self._settle(touching, ())
 
+    def check(self):
+        """Raise what a run raises before its first step."""
+        status = self.begin()
+        if status is not None:
+            self.refuse(status)
+        run, call = self._run_of(self.present())
+        run._new_task(call, (self.q, self.qd), self.remembered)
+
+    def refuse(self, status):
+        """Raise that nothing can begin."""
+        raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
+
     # One phase
 
     def present(self):
@@ -271,10 +283,9 @@ class _ContactRun:
 
     def _phase(self):
         """Run the next phase: its task and outcome."""
-        gaps, end, phase = self.gaps, self.span[1], self.present()
-        names = [gaps.names[i] for i in sorted([*self.closed, *self.idle])]
-        call, plain = RunCall((self.t, end)), replace(self.options, events=None)
-        run = self.run_of(phase, plain, call)
+        phase = self.present()
+        names = [self.gaps.names[i] for i in sorted([*self.closed, *self.idle])]
+        run, call = self._run_of(phase)
         run._prepare_kernels(True)
         while True:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
@@ -288,6 +299,11 @@ class _ContactRun:
                 self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, tuple(dict.fromkeys(names)))
                 return task, outcome
             run = run._by(other)
+
+    def _run_of(self, phase):
+        """The `Run` of a phase, and the call of it."""
+        call = RunCall((self.t, self.span[1]))
+        return self.run_of(phase, replace(self.options, events=None), call), call
 
     def _events(self, phase):
         gaps, pairs = self.gaps, zip(self.users, self.counts, strict=True)
@@ -499,8 +515,13 @@ def begun(scene, t, state=None):
     run = _ContactRun(scene, RunOptions(), RunCall((t, t + 1.0), state=state), None, None, None)
     status = run.begin()
     if status is not None:
-        raise InconsistentState(f"{status.sentence} {run.reason} {status.remedy}")
+        run.refuse(status)
     return run
+
+
+def demand_startable(scene, options, call, run_of):
+    """Raise what `run_contacts` raises before the first step."""
+    _ContactRun(scene, options, call, run_of, None, None).check()
 
 
 def run_contacts(scene, options, call, run_of, run_task, instead):

@@ -50,12 +50,13 @@ def at_start(scene):
     return phase_of(scene, [gaps.list[i].side.row for i in closed_gaps(gaps, q, angles)])
 
 
-def demand_bilateral(scene):
-    """Raise InvalidArgument where a scene has contacts: a run has phases then."""
+def demand_bilateral(scene, who="this analysis"):
+    """Raise InvalidArgument where a scene has contacts."""
     if has_contacts(scene):
+        names = listed([each.name for each in contacts_of(scene._added)], NAMED)
         raise InvalidArgument(
-            "a scene with unilateral constraints is run by ts.simulate: prepared runs, ensembles, benchmarks, profiles "
-            "and analyses along a motion don't serve contacts yet."
+            f"{who} is of one phase of a run, along which {names} may open and close. In a copy of the scene, hold those "
+            "that are closed by unilateral=False, and remove the others."
         )
 
 

@@ -28,7 +28,7 @@ from ..taylor.series_engine import SeriesEngine
 from ..validation import damaged
 from . import stored_runs
 from .local_origin import origin_of, run_near, within_rounding
-from .phase_scenes import at_start, has_contacts
+from .phase_scenes import at_start
 from .progress import reporter
 from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented, from_names
 from .scene import Scene
@@ -284,7 +284,12 @@ class Run:
 
     def _check(self, call: RunCall) -> None:
         """Raise what a call raises before anything is run."""
-        self._task(call)
+        if self._first is self.scene:
+            self._task(call)
+            return
+        from . import contact_run
+
+        contact_run.demand_startable(self.scene, self.options, call, _run_of)
 
     def _task(self, call):
         """The `Task` of a call, its start consistent with the constraints.

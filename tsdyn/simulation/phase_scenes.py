@@ -55,31 +55,9 @@ def demand_bilateral(scene, who="this analysis"):
     if has_contacts(scene):
         names = listed([each.name for each in contacts_of(scene._added)], NAMED)
         raise InvalidArgument(
-            f"{who} is of one phase of a run, along which {names} may open and close. In a copy of the scene, hold those "
-            "that are closed by unilateral=False, and remove the others."
+            f"{who} is of one phase of a run, along which {names} may open and close. In a copy of the scene, hold "
+            "those that are closed by unilateral=False, and remove the others."
         )
-
-
-def serving(name):
-    """Decorate a method of scenes: where there are contacts, the function of this name in standing.py serves it.
-
-    That is given the scene and the method, and the arguments of the call.
-    """
-
-    def decorate(function):
-        own = getattr(function, "__wrapped__", function)  # `fitting` names the method that is called
-
-        @wraps(function)
-        def call(scene, *arguments, **keywords):
-            if not has_contacts(scene):
-                return own(scene, *arguments, **keywords)
-            from . import standing
-
-            return getattr(standing, name)(scene, own, *arguments, **keywords)
-
-        return fitting(call)
-
-    return decorate
 
 
 def where_it_stands(function):

@@ -46,8 +46,8 @@ def along(scene, own, *arguments, **keywords):
         if met:
             names = listed(list(dict.fromkeys(gaps.names[i] for i in met)), NAMED)
             raise InvalidArgument(
-                f"{who} takes contacts as open, and at t = {motion.t[k]:.9g} s this motion meets {names}. Keep the motion "
-                "off them, or hold them closed, in a scene with unilateral=False."
+                f"{who} takes contacts as open, and at t = {motion.t[k]:.9g} s this motion meets {names}. Keep the "
+                "motion off them, or hold them closed, in a scene with unilateral=False."
             )
     return motion
 
@@ -80,7 +80,8 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
             raise NoEquilibrium(
                 f"{error} Open contacts don't count: {listed(list(dict.fromkeys(others)), NAMED)}. Start where those "
                 "that carry are closed, such as from the state of a run that has come to rest."
-                if others else str(error)
+                if others
+                else str(error)
             ) from None
         state = found.state
         values, before = gaps.at(state.q, state.angles), gaps.at(q, _angles(kept, guess, t, q))

@@ -30,7 +30,7 @@ def standing(scene: Any, state: Any, who: str) -> Any:
             f"{who}: velocities jump at this state, by the impact of {names}. Take the state after it, as "
             "ts.impact(scene, state) returns it."
         )
-    return run.present()
+    return run._scene()
 
 
 def linearise(scene, own, state=None, *arguments, **keywords):

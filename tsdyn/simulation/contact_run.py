@@ -9,23 +9,32 @@ import numpy as np
 
 from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
 from ..calls import fitting
-from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
+from ..errors import (
+    InconsistentState,
+    InvalidArgument,
+    InvalidConstraint,
+    InvalidForce,
+    SingularConfiguration,
+    Status,
+    TsdynError,
+)
 from ..jit.compiled import clock
+from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS
-from ..model.packed import first_rows
-from ..observables import diagnostics, reactions
+from ..observables import reactions
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import interval, output_times, state_arrays
-from ..runs.dense_output import StepPieces
+from ..runs.driver import Sampling
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
-from ..validation import floats, listed
+from ..validation import damaged, demand, floats, listed
 from .phase_scenes import NAMED, has_contacts, phase_of
+from .phases import PhasePieces, Phases
 from .progress import reporter, silent
 from .run_options import RunCall, RunOptions
-from .scene_cache import Prepared, prepared
+from .scene_cache import prepared, prepared_numbers
 from .segments import summed
 from .tolerances import CREEPING, ENDLESS, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
 
@@ -107,75 +116,6 @@ class _Leaving:
         return -self.sign * state.multipliers[self.row]
 
 
-class Phases:
-    """The phases of a run that has ended: when, with which gaps closed, and where their rows are in those of the scene.
-
-    Attributes
-    ----------
-    list : list of (float, float, tuple of str)
-        Start, end (s) and names of the closed contacts.
-    impulses : list of (float, str, float)
-        Time (s), name, impulse (N s, or N m s of an angle).
-    """
-
-    def __init__(self, packed):
-        self.list, self.impulses, self.starts, self.of = [], [], [], []
-        self.packed, self._columns = [], []  # of each set of closed gaps
-        self.whole, self._kinds = packed, {}
-
-    def add(self, begin, rest, end, packed, names):
-        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
-        kind = self._kinds.setdefault(id(packed), len(self.packed))
-        if kind == len(self.packed):
-            self.packed.append(packed)
-            self._columns.append(shared_rows(self.whole, packed))
-        if self.list:
-            self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
-        self.starts.append(begin)
-        self.of.append(kind)
-        self.list.append((rest, max(rest, end), names))
-
-    def at(self, t):
-        """Numbers of the phases at times t (k,); where one begins, the later one."""
-        return np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
-
-    def multipliers(self, numbers, m, *arrays):
-        """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
-        out = np.zeros((len(numbers), m))
-        for kind, mine, some in self._gathered(numbers, arrays):
-            rows, columns = self._columns[kind]
-            out[np.ix_(mine, rows)] = reactions.multipliers(self.packed[kind], *some)[:, columns]
-        return out
-
-    def constraint_error(self, numbers, *arrays):
-        """The `ConstraintError` of the rows that hold."""
-        out = np.zeros((3, len(numbers)))
-        for kind, mine, some in self._gathered(numbers, arrays):
-            out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
-        return diagnostics.ConstraintError(*out)
-
-    def _gathered(self, numbers, arrays):
-        """Yield each set of closed gaps, the entries (j,) of arrays in its phases, and these parts of the arrays."""
-        kinds = np.array(self.of)[numbers]
-        for kind in np.unique(kinds).tolist():
-            mine = np.flatnonzero(kinds == kind)
-            yield kind, mine, [None if array is None else array[mine] for array in arrays]
-
-
-def shared_rows(whole, packed):
-    """Rows of a scene that one of its phases has, and where they are among those of the phase: (2, rows)."""
-    of_whole, own = ({id(part): first for part, first in first_rows(each.constraints)} for each in (whole, packed))
-    mine = [(id(part), i) for part in packed.constraints for i in range(part.all_rows)]
-    pairs = [(of_whole[part] + i, own[part] + i) for part, i in mine if part in of_whole]
-    return np.array(pairs, int).reshape(-1, 2).T
-
-
-class _Pieces(StepPieces):
-    """Dense output of phases: where one begins, its own."""
-
-    side = "right"
-
-
 def demand_apart(gaps, q, angles, tol):
     """Raise InconsistentState where contacts penetrate."""
     values = gaps.at(q, angles)
@@ -196,6 +136,25 @@ class Modes:
     idle: list = field(default_factory=list)  # closed by what others hold
     opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
 
+    def saved(self):
+        """Lists of numbers, for JSON: one for each field, of a dict its items."""
+        return [list(value.items()) if isinstance(value, dict) else value for value in vars(self).values()]
+
+    @classmethod
+    def of(cls, record):
+        """As it was when it was saved."""
+        pairs = zip(vars(cls()).items(), record, strict=True)
+        return cls(*(dict(known) if isinstance(value, dict) else known for (_, value), known in pairs))
+
+
+# Numbers of a run that a checkpoint holds as they are, and the names of its arrays
+KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", "again", "written", "totals"
+PREFIX = "phase "
+# What a phase raises that can't begin, after others: whose fault it is
+FAILURES = {
+    InvalidArgument: Status.EVENT_FAILED, InvalidForce: Status.SAMPLING_FAILED, SingularConfiguration: Status.SINGULAR,
+}  # fmt: skip
+
 
 class _ContactRun:
     """One run in the making.
@@ -211,37 +170,39 @@ class _ContactRun:
     run_task : function of a task, a scene and the tolerance of its start
     instead : function of a task and a status
         Returns the method that begins again, or None.
+    archive : Archive, optional
+        What outputs and histories go to.
     """
 
-    def __init__(self, scene, options, call, run_of, run_task, instead):
-        self.scene, self.options, self.call = scene, options, call
+    def __init__(self, scene, options, call, run_of=None, run_task=None, instead=None, archive=None):
+        self._take_scene(scene)
+        self.options, self.call, self.archive = options, call, archive
         self.run_of, self.run_task, self.instead = run_of, run_task, instead
         self.span = interval(call.t_span)
         self.times = output_times(call.t_eval, *self.span)
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        self.gaps = gaps = Gaps(scene.packed)
-        self.count = kept.handles.count
+        gaps, self.count = self.gaps, kept.handles.count
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
-        self.modes, self.rest = Modes(), self.t
+        self.rest = self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
         self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
-        self.reason, self.method, self.at_once, self.judged = "", "", 0, (self.t, 0)
+        self.reason, self.methods, self.at_once, self.judged = "", [], 0, (self.t, 0)
+        self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
+        self.goes_on = False  # whether a checkpoint is gone on with
+        self.again, self.written = False, {}  # whether the phase is by the other method; rows in the archive before it
+
+    def _take_scene(self, scene):
+        """What follows from the scene alone, and makes the scenes of its phases."""
+        self.scene, self.gaps, self.modes = scene, Gaps(scene.packed), Modes()
 
     def _demand_served(self, kept):
-        names = [gap for gap, given in (("store", self.call.store), ("checkpoint", self.call.checkpoint)) if given]
-        if names:
-            raise InvalidArgument(f"{names[0]} doesn't serve scenes with contacts yet: keep the outputs in memory.")
-        if kept.sampled:
-            raise InvalidArgument(
-                "sampled controllers don't serve scenes with contacts yet: leave out period, for a continuous one."
-            )
         if kept.rough:
             raise InvalidArgument(
                 f"friction that depends on reactions ({', '.join(kept.rough)}) doesn't serve scenes with contacts yet: "
@@ -249,26 +210,32 @@ class _ContactRun:
             )
 
     def run(self):
-        """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
-        began, first = clock(), None
-        status = self.begin()
-        while status is None:
-            try:
+        """Run to the end; the `Task` of the last phase, of the whole scene, and the `Outcome` of all."""
+        began, task, status = clock(), None, None if self.goes_on else self.begin()
+        try:
+            while status is None:
                 task, outcome = self._phase()
-            except TsdynError as error:
-                if not self.parts:
-                    raise
-                status, self.reason = Status.SINGULAR, str(error)
-                break
-            first = first or task
-            self.parts.append(outcome)
-            status = self._after(outcome)
-        if first is None:
+                with deferred_interrupts():
+                    status = self._after(outcome)
+                if outcome.interrupted and status is None:
+                    raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            if self.end is None:
+                raise
+            status = Status.INTERRUPTED
+        except TsdynError as error:
+            if self.end is None:
+                raise
+            status, self.reason = FAILURES.get(type(error), Status.CONTACT_FAILED), str(error)
+        finally:
+            self.report(None)
+        if self.end is None:
             self.refuse(status)
-        self.report(None)
-        return first._replace(prepared=Prepared(self.scene, self.scene.packed), span=self.span), self._outcome(
-            status, began
-        )
+        return self._whole(task or self._first_task()), self._outcome(status, began)
+
+    def _whole(self, task):
+        """A task as that of the whole run."""
+        return task._replace(prepared=prepared_numbers(self.scene), span=self.span)
 
     def begin(self):
         """Impact and closed contacts at the start; the Status if there is no way on, else None."""
@@ -276,12 +243,15 @@ class _ContactRun:
         return self._settle(touching, ())
 
     def check(self):
-        """Raise what a run raises before its first step."""
+        """Raise what a run raises before its first step; its `Task`, of the whole scene."""
         status = self.begin()
         if status is not None:
             self.refuse(status)
+        return self._whole(self._first_task())
+
+    def _first_task(self):
         run, call = self._run_of(self._scene())
-        run._new_task(call, (self.q, self.qd), self.remembered)
+        return run._new_task(call, (self.q, self.qd), self.remembered)
 
     def refuse(self, status):
         """Raise that nothing can begin."""
@@ -292,20 +262,46 @@ class _ContactRun:
     def _phase(self):
         """Run the next phase: its task and outcome."""
         phase, names = self._scene(), self._names()
+        kind = self.phases.kind(phase.packed, self.modes.saved())
         run, call = self._run_of(phase)
         run._prepare_kernels(True)
+        self._enter_archive()
         while True:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(),
+                max_steps=self._steps_left(), archive=self.archive, sampling=self._sampling(task.prepared),
             )  # fmt: skip
-            outcome = self.run_task(task, phase, self.options.initial_tol)
-            other = self.instead(task, outcome.status)
+            other = self.instead(task, Status.STEP_COLLAPSED) if self.again else None
             if other is None:
-                self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, names)
+                outcome = self.run_task(task, phase, self.options.initial_tol)
+                other = self.instead(task, outcome.status)
+            if other is None:
+                self.phases.add(kind, self.t, self.rest, outcome.end.reached, names)
+                said = (outcome.method or repr(task.method)).split(" and ")
+                self.methods += [method for method in said if method not in self.methods]
                 return task, outcome
-            run = run._by(other)
+            run, self.again = run._by(other), True
+            if self.archive is not None and self.archive.resumed is None:
+                self.archive.go_back(self.written)
+
+    def _enter_archive(self):
+        """Let the archive know that a phase begins; readers, and a checkpoint that is due."""
+        archive = self.archive
+        if archive is None:
+            return
+        archive.before = self.saved
+        if archive.resumed is None:
+            archive.shift, archive.skips, archive.passed = 0.0, False, []
+            self.written = dict(archive.counts)
+            archive.look_up(lambda: ({"t": self.t, "between": True}, {}))
+
+    def _sampling(self, kept):
+        """The sampled loads of a phase, which go on from those of the one before."""
+        if kept.sampled:
+            known = self.sampling
+            self.sampling = known.of(kept) if known else Sampling(kept, self.goes_on or self.call.state is not None)
+        return self.sampling
 
     def _run_of(self, phase):
         """The `Run` of a phase, and the call of it."""
@@ -315,6 +311,12 @@ class _ContactRun:
     def _scene(self):
         """The scene of the present modes."""
         return phase_of(self.scene, [self.gaps.list[i].side.row for i in self.modes.closed])
+
+    def scene_of(self, record):
+        """The scene of modes as they are saved."""
+        present, self.modes = self.modes, Modes.of(record)
+        scene, self.modes = self._scene(), present
+        return scene
 
     def _names(self):
         """Names of the units whose rows hold."""
@@ -366,8 +368,8 @@ class _ContactRun:
 
     def _after(self, outcome):
         """Take the end of a phase; the Status of the run, None if it goes on."""
-        end, gaps = outcome.end, self.gaps
-        self.reason, self.method = outcome.reason, outcome.method or self.method
+        self.end, gaps = outcome.end, self.gaps
+        end, archive, self.reason, self.again = self.end, self.archive, outcome.reason, False
         self.steps += end.counts["steps"]
         times, *states = outcome.events
         for i, mine in enumerate(list(zip(times, *states, strict=True))[: len(self.users)]):
@@ -377,10 +379,18 @@ class _ContactRun:
         self.remembered = end.remembered
         fired = [i for i, at in zip(self.watched, times, strict=True) if i is not None and at.size]
         goes_on = outcome.status is Status.EVENT and fired and self.t < self.span[1]
-        rows = outcome.rows
-        if not self.per_step and goes_on and len(rows) and rows[-1, 0] == self.t:  # that of the next phase counts
-            self.parts[-1] = outcome._replace(rows=rows[:-1])
-        self.taken += len(self.parts[-1].rows)
+        count = len(outcome.rows) if archive is None else archive.counts["outputs"] - self.written["outputs"]
+        if not self.per_step and goes_on and count and self.times[self.taken + count - 1] == self.t:
+            count -= 1  # the output of the next phase counts
+            outcome = outcome._replace(rows=outcome.rows[:count])
+            if archive is not None:
+                archive.go_back({**archive.counts, "outputs": self.written["outputs"] + count})
+        self.taken += count
+        self.phases.rows.append(count)
+        if archive is None:
+            self.parts.append(outcome)
+        else:
+            self.totals = summed([end.counts] if self.totals is None else [self.totals, end.counts])
         values = gaps.at(self.q, self.remembered[: self.count])
         deep = [i for i in range(gaps.count) if values[i] < -PENETRATION * self.length]
         if deep:
@@ -483,26 +493,57 @@ class _ContactRun:
     # The whole
 
     def _outcome(self, status, began):
-        parts = self.parts
+        parts, end, archive, events = self.parts, self.end, self.archive, None
         ends = [part.end for part in parts]
-        last = ends[-1]
-        logs = self.options.history is not False
-        numbers = np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts])
-        events = None
+        logs = self.options.history is not False and archive is None
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
             events = tuple([np.concatenate(column[k]) for column in columns] for k in range(3))
         return Outcome(
-            status, self.reason, np.concatenate([part.rows for part in parts]),
+            status, self.reason,
+            range(archive.counts["outputs"]) if archive else np.concatenate([part.rows for part in parts]),
             RunEnd(
-                last.reached, last.last, last.remembered,
-                summed([end.counts for end in ends]),
+                end.reached, end.last, end.remembered, self.totals or summed([end.counts for end in ends]),
                 StepLog([end.steps for end in ends]) if logs else None,
                 ChartLog([end.charts for end in ends]) if logs else None,
             ),
-            _Pieces([part.trajectory for part in parts]) if self.options.dense_output else None,
-            events, began, self.method, (self.phases, numbers),
+            PhasePieces([part.trajectory for part in parts]) if self.options.dense_output else None,
+            events, began, " and ".join(self.methods), (self.phases, self.phases.of_rows),
         )  # fmt: skip
+
+    # Checkpoints: what a run goes on with, where its present phase begins
+
+    def saved(self):
+        """Numbers and arrays by name."""
+        phases, arrays = self.phases.saved()
+        numbers = {name: getattr(self, name) for name in KEPT} | {"modes": self.modes.saved(), "phases": phases}
+        arrays |= {"q": self.q, "qd": self.qd, "remembered": self.remembered}
+        if self.end is not None:
+            arrays |= {"last": self.end.last, "ended": self.end.remembered}
+            numbers["reached"] = self.end.reached
+        for i, found in enumerate(self.found):
+            columns = zip(*found, strict=True) if found else (np.empty(0), *2 * [np.empty((0, self.q.size))])
+            for name, column in zip(("t", "q", "qd"), columns, strict=True):
+                arrays[f"event {i}.{name}"] = np.concatenate(column) if found else column
+        return {"phases": numbers}, {f"{PREFIX}{name}": array for name, array in arrays.items()}
+
+    def restore(self, numbers, arrays):
+        """As it was when it was saved."""
+        with damaged("the checkpoint"):
+            known, n, self.goes_on = numbers["phases"], self.q.size, True
+            arrays = _own(arrays)
+            vars(self).update({name: known[name] for name in KEPT})
+            self.modes = Modes.of(known["modes"])
+            self.phases.restore(known["phases"], arrays, self.scene_of)
+            shapes, self.q, self.qd = (n,), arrays["q"], arrays["qd"]
+            demand(self.q.shape == self.qd.shape == shapes, "the start of a phase")
+            demand(arrays["remembered"].shape == self.remembered.shape, "what is remembered")
+            self.remembered = arrays["remembered"]
+            if "reached" in known:
+                demand(arrays["last"].shape == (3, n), "the end of a phase")
+                self.end = RunEnd(known["reached"], arrays["last"], arrays["ended"], self.totals, None, None)
+            for i, found in enumerate(self.found):
+                found.append(tuple(arrays[f"event {i}.{name}"] for name in ("t", "q", "qd")))
 
 
 def jumped(inertia, qd, which, before, e, p, law="newton"):
@@ -533,21 +574,41 @@ def begun(scene, t, state=None):
     InconsistentState
         If contacts penetrate, or no reactions keep them from penetrating.
     """
-    run = _ContactRun(scene, RunOptions(), RunCall((t, t + 1.0), state=state), None, None, None)
+    run = _ContactRun(scene, RunOptions(), RunCall((t, t + 1.0), state=state))
     status = run.begin()
     if status is not None:
         run.refuse(status)
     return run
 
 
-def demand_startable(scene, options, call, run_of):
-    """Raise what `run_contacts` raises before the first step."""
-    _ContactRun(scene, options, call, run_of, None, None).check()
+def first_task(scene, options, call, run_of):
+    """The `Task` of a run of the scene, with what `run_contacts` raises before the first step."""
+    return _ContactRun(scene, options, call, run_of).check()
 
 
-def run_contacts(scene, options, call, run_of, run_task, instead):
+def run_contacts(scene, options, call, run_of, run_task, instead, archive=None):
     """The `Task` and the `Outcome` of a run of a scene with contacts; the functions are those of `prepared_run`."""
-    return _ContactRun(scene, options, call, run_of, run_task, instead).run()
+    run = _ContactRun(scene, options, call, run_of, run_task, instead, archive)
+    if archive is not None and archive.known is not None:
+        run.restore(*archive.known)
+    return run.run()
+
+
+def recorded(numbers, arrays):
+    """Numbers and arrays of the `Phases` in a checkpoint."""
+    return numbers["phases"]["phases"], _own(arrays)
+
+
+def _own(arrays):
+    return {name.removeprefix(PREFIX): array for name, array in arrays.items() if name.startswith(PREFIX)}
+
+
+def phases_of(scene, numbers, arrays):
+    """The `Phases` of a file, of a run of this scene; raises KeyError, TypeError or ValueError if they are none."""
+    run, phases = object.__new__(_ContactRun), Phases(scene.packed)
+    run._take_scene(scene)
+    phases.restore(numbers, arrays, run.scene_of)
+    return phases
 
 
 @fitting

@@ -253,11 +253,11 @@ class Run:
         found: numbers and arrays of a checkpoint to go on from. archive: that of a run which begins again by another
         method.
         """
-        if self._first is not self.scene:
-            return self._solve_phases(call)
         started, is_stored = clock(), call.store is not None or call.checkpoint is not None
         if is_stored and archive is None and found[0] is None:
             stored_runs.demand_storable(call, self.options)
+        if self._first is not self.scene:
+            return self._solve_phases(call, found, is_stored)
         task = self._task(call)
         if is_stored:
             return self._stored(task, call, found, archive)
@@ -273,14 +273,34 @@ class Run:
                 return self._by(other)._solve(call)
         return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
-    def _solve_phases(self, call):
+    def _solve_phases(self, call, found, is_stored):
         """The same of a scene with unilateral constraints."""
-        from .contact_run import run_contacts
+        from . import contact_run
 
-        started = clock()
-        task, outcome = run_contacts(self.scene, self.options, call, _run_of, run_task, instead)
-        seconds = {"prepare": outcome.began - started, "run": clock() - outcome.began}
-        return Solution(self.scene, task, outcome, seconds)
+        started, scene, options, archive, goes_on = clock(), self.scene, self.options, None, ""
+        if is_stored:
+            archive = stored_runs.archive_of(
+                {"scene": scene, **by_name(options, call)}, prepared_numbers(scene), bool(options.history), *found
+            )
+        if archive is not None and found[0] is not None and found[0].get("ended"):
+            task = contact_run.first_task(scene, options, call, _run_of)
+            outcome = self._ended(task, *found, archive)
+            with damaged("the checkpoint"):
+                phases = contact_run.phases_of(scene, *contact_run.recorded(*found))
+            outcome = outcome._replace(phases=(phases, phases.of_rows))
+            return Solution(scene, task, outcome, {"prepare": 0.0, "run": found[0]["seconds"]})
+        try:
+            task, outcome = contact_run.run_contacts(scene, options, call, _run_of, run_task, instead, archive)
+            task, seconds = task._replace(method=self.method), clock() - started
+            outcome = outcome._replace(method=outcome.method if outcome.method != repr(self.method) else "")
+            if archive is not None:
+                outcome = stored_runs.ended(archive, outcome, seconds, task)
+                goes_on = stored_runs.call_to_go_on(archive)
+        finally:
+            if archive is not None:
+                archive.close()
+        timed = {"prepare": outcome.began - started, "run": seconds}
+        return Solution(scene, task, outcome, timed, goes_on)
 
     def _check(self, call: RunCall) -> None:
         """Raise what a call raises before anything is run."""
@@ -289,7 +309,7 @@ class Run:
             return
         from . import contact_run
 
-        contact_run.demand_startable(self.scene, self.options, call, _run_of)
+        contact_run.first_task(self.scene, self.options, call, _run_of)
 
     def _task(self, call):
         """The `Task` of a call, its start consistent with the constraints.
@@ -329,13 +349,14 @@ class Run:
         within = options.dense_output or options.events is not None or between(times, span)
         self._prepare_kernels(within)
         stops = kept.stops(*span, method.step is None)
+        begins = memory is None and state is None
         memory = remembered(state, kept, span[0], start[0]) if memory is None else memory
         q, qd = kept.start(self.scene, start, span[0], options.initial_tol, memory, options.redundancy == "drop")
         if not self._form.basis_free or method.implicit:
             demand_holonomic(kept.packed, q, span[0], options.formulation)
         choose = sampling = None
         if kept.sampled:  # a sampled controller can't be run again: no turns
-            sampling = Sampling(kept, state is not None)
+            sampling = Sampling(kept, not begins)
         elif options.method is None:
             choose = turns_of(self.scene, kept, method, self._form, span, within)
         history = call.store is None if options.history is None else options.history
@@ -364,9 +385,7 @@ class Run:
         archive = archive or stored_runs.archive_of(given, kept, task.history, numbers, arrays)
         started = clock()
         if numbers is not None and numbers.get("ended"):
-            with damaged("the checkpoint"):
-                slots = kept.handles.count + kept.packed.system.memory.size
-                outcome = stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
+            outcome = self._ended(task, numbers, arrays, archive)
             return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
         try:
             outcome = run_task(task._replace(archive=archive), scene, self.options.initial_tol)
@@ -381,6 +400,14 @@ class Run:
             archive.close()
         timed = {"prepare": outcome.began - started, "run": seconds}
         return Solution(scene, task, outcome, timed, stored_runs.call_to_go_on(archive))
+
+    @staticmethod
+    def _ended(task, numbers, arrays, archive):
+        """The `Outcome` of a stored run that has ended."""
+        kept = task.prepared
+        with damaged("the checkpoint"):
+            slots = kept.handles.count + kept.packed.system.memory.size
+            return stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
 
     def __reduce__(self):
         """A Run that is pickled is prepared anew where it is read."""

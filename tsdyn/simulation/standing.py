@@ -13,8 +13,9 @@ from ..observables import reactions
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import state_arrays
 from ..validation import listed, number
-from .contact_run import begun, demand_apart, shared_rows
+from .contact_run import begun, demand_apart
 from .phase_scenes import NAMED, phase_of
+from .phases import shared_rows
 from .scene_cache import prepared
 
 # What happens at a state is decided as a run from it does: contacts that are closed, at rest and push hold, the others

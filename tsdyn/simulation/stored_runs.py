@@ -29,7 +29,7 @@ from ..runs.arguments import state_arrays
 from ..runs.run_log import RunEnd
 from ..runs.task import Outcome
 from ..validation import clipped, damaged, demand, demand_numbers, demand_record, is_count, number, shown
-from .scene_cache import prepared
+from .scene_cache import prepared_numbers
 
 if TYPE_CHECKING:
     from ..hints import Floats, Scene
@@ -77,7 +77,7 @@ def request_of(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
         except InvalidArgument as error:
             numbers["lacks"] = str(error)
     if "scene" not in arrays:
-        found, text = outline_of(scene, prepared(scene).packed)
+        found, text = outline_of(scene, prepared_numbers(scene).packed)
         numbers, arrays = numbers | found, arrays | text
     return numbers, arrays
 
@@ -92,7 +92,7 @@ def arguments_of(numbers: dict[str, Any], arrays: dict[str, Any], scene: Scene) 
         nothing = np.empty(0)
         q, qd, qdd, lam = (nothing if found[name] is None else found[name] for name in STATE[:4])
         parts = numbers["t"], q, qd, qdd, lam
-        anchor, kept = None if found["angles"] is None else Anchor(found["angles"]), prepared(scene)
+        anchor, kept = None if found["angles"] is None else Anchor(found["angles"]), prepared_numbers(scene)
         bare = found["memory"] is None and anchor is None
         state = State(*parts) if bare else RememberingState.of(kept.handles, found["memory"], anchor, *parts)
         given["state"], start = state, state_arrays(state, kept.n)
@@ -215,6 +215,8 @@ class RunOutputs:
             return self._picked(part)
         other, found = self._bare(), range(self._stored.count)[self._slice][part]
         other._slice = slice(found.start, max(found.stop, found.start), found.step)
+        if self._phase_of_rows is not None:
+            other._phase_of_rows = self._phase_of_rows[part]
         return other
 
     def _picked(self, part):

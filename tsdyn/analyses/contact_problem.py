@@ -9,6 +9,7 @@ M~ f are the accelerations that loads f make where the bilateral rows hold. lam 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -76,21 +77,22 @@ class Gaps:
 
         return value
 
-    @property
-    def are_counted(self):
-        """Whether angles of joints are counted for them."""
-        return bool(self._stops)
+    def values(self, t, levels, counted):
+        """Gaps (k, count) at times t (k,).
 
-    def values(self, t, q, angles):
-        """Gaps (k, count) at t (k,), q (k, n); angles (k, angles): counted ones of joints, where they are counted."""
-        found = self.sign * self.workspace.gaps(t, q)[:, : self.count]
-        for i, value in self._stops:
-            found[:, i] = value(q, angles)
+        levels (k, ...) begin with q (n,); counted is a function that returns the counted angles (k, angles) of joints.
+        """
+        rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
+        found = self.sign * self.workspace.gaps(t, rows)[:, : self.count]
+        if self._stops:
+            q, angles = rows[:, : self.workspace.n], counted()
+            for i, value in self._stops:
+                found[:, i] = value(q, angles)
         return found
 
     def at(self, q, angles, t=0.0):
         """Gaps (count,) at one state."""
-        return self.values(np.array([t]), q[None], angles[None])[0]
+        return self.values(np.array([t]), q[None], lambda: angles[None])[0]
 
 
 def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):

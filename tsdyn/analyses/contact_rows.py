@@ -51,7 +51,7 @@ load_contacts = loader(ContactParts(no_parts(), no_system()))
 
 @entry("pvmm")
 def find_gaps(context, t, q, out):
-    """out (k, m) = Phi of the rows of contacts at times t (k,), positions q (k, n)."""
+    """out (k, m) = Phi of the rows of contacts at times t (k,), positions q (k, n), rows of which may go on."""
     s = load_contacts(context).rows
     for k in range(t.size):
         set_time(s, t[k])
@@ -130,7 +130,7 @@ class ContactWorkspace:
         self._accelerate = interrupts_answered()(accelerate) if calls_laws(free) else accelerate
 
     def gaps(self, t, q):
-        """Phi (k, m) of the rows at times t (k,), positions q (k, n)."""
+        """Phi (k, m) of the rows at times t (k,), positions q (k, n), rows of which may go on."""
         out = np.zeros((t.size, self.m))
         find_gaps(self.address, t, q, out)
         return out

@@ -60,6 +60,8 @@ CLEAR = 10.0
 # Share of the interval on which roughness is rounding; the least interval, in roundings of the time; the least share of
 # the whole.
 ROUGH_SHARE, SHORTEST_INTERVAL, DEEPEST = 1e-7, 1e4 * EPS, 2.0**-24
+# Steps of Newton's method or of bisection to a zero of an interpolant.
+MOST_BISECTIONS = 64
 # Noise is measured on intervals of the share ROUGH_SHARE, then this many times as long, up to the second share.
 NOISE_RATIO, WIDEST_NOISE = 1e-3, 1e-3
 # Values are multiplied by a power of two: by SAFE, so that no sum of them is infinite; by one that makes the largest

@@ -17,7 +17,8 @@ from ..observables import diagnostics, reactions
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.dense_output import StepPieces
-from ..runs.events import Event, Member
+from ..runs.event_groups import Member
+from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
@@ -67,8 +68,8 @@ class _Closing:
         self.start = np.array(list(opened.values())).reshape(-1, 3).T
 
     def over(self, states):
-        """Values (k, count) of states at k times."""
-        values = self.gaps.values(states.t, states.q, states.angles if self.gaps.are_counted else None)
+        """Values (k, count) of `States`."""
+        values = self.gaps.values(states.t, states.levels, states.counted)
         if self.which:
             begun, first, rate = self.start
             since = states.t[:, None] - begun
@@ -94,9 +95,9 @@ class _Leaving:
         self.packed, self.rows, self.signs = packed, rows, np.array(signs)
 
     def over(self, states):
-        """Values (k, closed) of states at k times."""
-        memory = np.tile(states.memory, (states.t.size, 1))
-        lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        """Values (k, closed) of `States`."""
+        memory, levels = np.tile(states.slots, (states.t.size, 1)), states.levels.swapaxes(0, 1)
+        lam = reactions.multipliers(self.packed, states.t, *map(np.ascontiguousarray, levels), memory)
         return -self.signs * lam[:, self.rows]
 
 

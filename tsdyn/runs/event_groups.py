@@ -18,8 +18,10 @@ class States(NamedTuple):
 
     t: np.ndarray  # (k,)
     levels: np.ndarray  # (k, 3, n)  q, qd, qdd
-    slots: np.ndarray  # what forces remember
+    memory: np.ndarray  # what forces remember
     counted: object  # a function that returns the counted angles (k, angles) of joints
+
+    q, qd, qdd = (property(lambda self, i=i: np.ascontiguousarray(self.levels[:, i])) for i in range(3))
 
 
 class Member:

@@ -128,8 +128,8 @@ class _Leaving:
 
     def over(self, states):
         """Values (k, closed) of `States`."""
-        memory, levels = np.tile(states.slots, (states.t.size, 1)), states.levels.swapaxes(0, 1)
-        lam = reactions.multipliers(self.packed, states.t, *map(np.ascontiguousarray, levels), memory)
+        memory = np.tile(states.memory, (states.t.size, 1))
+        lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
         return -self.signs * lam[:, self.rows]
 
 

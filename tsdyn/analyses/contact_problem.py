@@ -111,6 +111,8 @@ class Inertia:
     q : ndarray (n,)
     slots : ndarray
         What forces remember.
+    which : list of int
+        Gaps that are looked at; all else is zero of others.
 
     Attributes
     ----------
@@ -118,12 +120,20 @@ class Inertia:
     G : ndarray (count, count)
     """
 
-    def __init__(self, gaps, t, q, slots):
-        self.gaps, self.t, self.q, self.slots = gaps, t, q, slots
-        J, drift = gaps.workspace.rows(t, q)
-        self.J, self.drift = gaps.sign[:, None] * J[: gaps.count], gaps.sign * drift[: gaps.count]
-        self.response = gaps.workspace.respond(t, q, slots, self.J)  # M~ J^T, transposed
-        self.G = self.J @ self.response.T
+    def __init__(self, gaps, t, q, slots, which):
+        self.gaps, self.t, self.q, self.slots, self.which = gaps, t, q, slots, np.array(which, int)
+        rows, drift = gaps.workspace.rows(t, q, self.which)
+        self._rows, self._drift = gaps.sign[self.which, None] * rows, (gaps.sign * drift[: gaps.count])[self.which]
+        self.J, self.response, self.G = (np.zeros((gaps.count, size)) for size in (q.size, q.size, gaps.count))
+        response = gaps.workspace.respond(t, q, slots, self._rows)
+        self.J[self.which], self.response[self.which] = self._rows, response  # M~ J^T, transposed
+        self.G[self.which[:, None], self.which] = self._rows @ response.T
+        self._sizes = np.abs(self._rows)
+
+    def _of_all(self, values):
+        out = np.zeros(self.gaps.count)
+        out[self.which] = values
+        return out
 
     def free(self, loads):
         """M~ loads: the accelerations (n, ...) that loads (n, ...) make where the bilateral rows hold."""
@@ -134,10 +144,15 @@ class Inertia:
         """The change of velocities (n,) by impulses p (k,) of the gaps `which`."""
         return p @ self.response[which]
 
+    def sizes(self, x):
+        """|J| |x| (count,): the sizes of terms."""
+        return self._of_all(self._sizes @ np.abs(x))
+
     def rates(self, qd, sizes=None):
         """Rates of the gaps (count,), zero where they are so to rounding of velocities of these `sizes` (n,)."""
-        rates, sizes = self.J @ qd + self.drift, np.abs(qd) if sizes is None else sizes
-        return np.where(np.abs(rates) <= AT_REST * (np.abs(self.J) @ sizes + np.abs(self.drift)), 0.0, rates)
+        rates, terms = self._rows @ qd + self._drift, self._sizes @ (np.abs(qd) if sizes is None else sizes)
+        rates[np.abs(rates) <= AT_REST * (terms + np.abs(self._drift))] = 0.0
+        return self._of_all(rates)
 
     def hold(self, which, rates):
         """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
@@ -145,10 +160,10 @@ class Inertia:
         return self.pushed(which, -own)
 
     def accelerations(self, qd):
-        """Accelerations of all gaps (count,) where all are open, at velocities qd (n,); and their terms (count,)."""
+        """Accelerations of the gaps (count,) where all are open, at velocities qd (n,); and their terms (count,)."""
         qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
-        bias = self.gaps.sign * gamma[: self.gaps.count]
-        return self.J @ qdd + bias, np.abs(self.J) @ np.abs(qdd) + np.abs(bias)
+        bias = (self.gaps.sign * gamma[: self.gaps.count])[self.which]
+        return self._of_all(self._rows @ qdd + bias), self._of_all(self._sizes @ np.abs(qdd) + np.abs(bias))
 
 
 class NoSolution(Exception):

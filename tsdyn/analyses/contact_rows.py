@@ -16,6 +16,7 @@ from ..formulations.accelerations import refine_accelerations, solve_acceleratio
 from ..jit.kernels import entry, loader, resident
 from ..maths.dense_linalg import copy
 from ..model.equations import (
+    WIDTH,
     acceleration_bias,
     constraint_jacobian,
     constraints,
@@ -58,13 +59,22 @@ def find_gaps(context, t, q, out):
         constraints(s, q[k], t[k], out[k])
 
 
-@entry("pdvmv")
-def find_rows(context, t, q, J, drift):
-    """J (m, n) and Phi_t (m,) of the rows of contacts; both zero on entry."""
+@entry("pdvwmmv")
+def find_rows(context, t, q, place, short, J, drift):
+    """Rows J (k, n) of contacts, and Phi_t (m,) of all; zero on entry.
+
+    place (m,): which row of J is that of a contact, -1 for none; short (lines, 14): scratch, zero on entry.
+    """
     s = load_contacts(context).rows
     set_time(s, t)
-    constraint_jacobian(s, q, t, J)
+    constraint_jacobian(s, q, t, short)
     time_derivative(s, q, t, drift)
+    for i in range(short.shape[0]):
+        k = place[i if i < place.size else s.tails[i - place.size]]
+        for half in range(2 if k >= 0 else 0):
+            at = s.segments[i, 2 * half]
+            for c in range(s.segments[i, 2 * half + 1]):
+                J[k, at + c] += short[i, 7 * half + c]
 
 
 @entry("pdvvmm")
@@ -121,11 +131,11 @@ class ContactWorkspace:
     """
 
     def __init__(self, contacts, free):
-        rows, system = contacts.system, with_short_rows(free)
-        self.n, self.m = int(rows.bodies[:, 1].sum()), len(rows.segments)
+        self.n, self.m = int(contacts.system.bodies[:, 1].sum()), len(contacts.system.segments)
         graph = graph_of(free, REDUCED, BIAS)
-        own = (each._replace(reals=each.reals.copy()) for each in (system, rows))
-        system, rows = own
+        own = (each._replace(reals=each.reals.copy()) for each in map(with_short_rows, (free, contacts)))
+        (system, rows), self._all = own, np.arange(self.m)
+        self._short = np.zeros((len(rows.segments), WIDTH))
         self.address, *self._keep = resident(ContactParts(parts(system, graph, self.n), rows))
         self._accelerate = interrupts_answered()(accelerate) if calls_laws(free) else accelerate
 
@@ -135,10 +145,14 @@ class ContactWorkspace:
         find_gaps(self.address, t, q, out)
         return out
 
-    def rows(self, t, q):
-        """J (m, n) and Phi_t (m,)."""
-        J, drift = np.zeros((self.m, self.n)), np.zeros(self.m)
-        find_rows(self.address, t, q, J, drift)
+    def rows(self, t, q, which=None):
+        """J (k, n) of the rows `which`, or of all, and Phi_t (m,) of all."""
+        place = self._all
+        if which is not None:
+            place = np.full(self.m, -1)
+            place[which] = np.arange(len(which))
+        J, drift = np.zeros((self.m if which is None else len(which), self.n)), np.zeros(self.m)
+        find_rows(self.address, t, q, place, self._short, J, drift)
         return J, drift
 
     def respond(self, t, q, memory, loads):

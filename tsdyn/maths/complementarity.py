@@ -32,6 +32,8 @@ def lemke(M, q):
     z, basic = np.zeros(n), np.zeros(n, bool)
     if n == 0 or q.min() >= 0.0:
         return z, basic
+    if n == 1:
+        return (-q / M[0], ~basic) if M[0, 0] > 0.0 else (None, basic)
     # Rows and columns scaled to a unit diagonal, q to one
     scale = np.sqrt(np.where(np.diag(M) > 0.0, np.diag(M), 1.0))
     size = np.abs(q / scale).max()

@@ -579,7 +579,7 @@ class _ContactRun:
         if not touching:
             return None
         try:
-            inertia = Inertia(self.gaps, self.t, self.q, slots)
+            inertia = Inertia(self.gaps, self.t, self.q, slots, touching)
             rates = inertia.rates(self.qd)
             noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
             if noise:  # a gap that closes with a rate of rounding
@@ -699,14 +699,14 @@ class _ContactRun:
 
     def _lowering(self, inertia, touching, qd, rates):
         """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""
-        opening = [i for i in touching if rates[i] > 0.0]
-        if not opening:
+        opening = np.zeros(self.gaps.count, bool)
+        opening[touching] = rates[touching] > 0.0
+        if not opening.any():
             return np.zeros(self.gaps.count)
         a = -settle(inertia, [i for i in touching if rates[i] == 0.0], qd).accelerations
-        rounding = EPS * np.maximum(self.length, ROUNDED * (np.abs(inertia.J) @ np.abs(self.q)))
+        rounding = EPS * np.maximum(self.length, ROUNDED * inertia.sizes(self.q))
         rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
-        mine = np.isin(np.arange(a.size), opening)
-        return np.where(mine & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
+        return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
 
     # The whole
 
@@ -863,7 +863,7 @@ def impact(
             e[_chosen(gaps, [item], None)] = _coefficient(value)
     elif restitution is not None:
         e[:] = _coefficient(restitution)
-    inertia = Inertia(gaps, t, q, slots)
+    inertia = Inertia(gaps, t, q, slots, which)
     before = inertia.rates(qd)[which]
     try:
         p = impulses(inertia, which, before, e[which], law)

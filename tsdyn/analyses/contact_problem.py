@@ -130,6 +130,10 @@ class Inertia:
         self.G[self.which[:, None], self.which] = self._rows @ response.T
         self._sizes = np.abs(self._rows)
 
+    def among(self, which):
+        """G of some gaps."""
+        return self.G[which][:, which]
+
     def _of_all(self, values):
         out = np.zeros(self.gaps.count)
         out[self.which] = values
@@ -156,7 +160,7 @@ class Inertia:
 
     def hold(self, which, rates):
         """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
-        own = np.linalg.lstsq(self.G[np.ix_(which, which)], rates, rcond=RANK_TOL**2)[0]
+        own = np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
         return self.pushed(which, -own)
 
     def accelerations(self, qd):
@@ -176,7 +180,7 @@ def impulses(inertia, which, rates, restitution, law="newton"):
     rates (k,) before the impact, restitution (k,). Where Poisson's law would add energy, as it can with different
     coefficients, they are lowered together.
     """
-    G = inertia.G[np.ix_(which, which)]
+    G = inertia.among(which)
     if law == "newton":
         return _solved(G, rates + restitution * np.minimum(rates, 0.0))[0]
     compressed = _solved(G, rates)[0]
@@ -225,9 +229,11 @@ def settle(inertia, resting, qd, fired=()):
     NoSolution
     """
     c, terms = inertia.accelerations(qd)
+    if not resting:
+        return Settled([], [], c)
     resting, fired = list(resting), [i for i in fired if i in resting]
     while True:
-        lam, basic = _solved(inertia.G[np.ix_(resting, resting)], c[resting])
+        lam, basic = _solved(inertia.among(resting), c[resting])
         gdd = c + inertia.G[:, resting] @ lam
         small = LEVEL * (terms + np.abs(inertia.G[:, resting]) @ lam)
         # A reaction that has just vanished doesn't come back by rounding
@@ -253,6 +259,6 @@ def _depends(inertia, closed, i):
     own, alone = inertia.response[i], inertia.J[i]
     if not closed:
         return not inertia.G[i, i] > DEPENDENT**2 * np.linalg.norm(alone) * np.linalg.norm(own)
-    share = np.linalg.lstsq(inertia.G[np.ix_(closed, closed)], inertia.G[closed, i], rcond=None)[0]
+    share = np.linalg.lstsq(inertia.among(closed), inertia.G[closed, i], rcond=None)[0]
     left = own - share @ inertia.response[closed]
     return bool(np.linalg.norm(left) <= DEPENDENT * np.linalg.norm(own))

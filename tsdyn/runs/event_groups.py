@@ -67,6 +67,7 @@ class Group:
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
         # Those that survey and Newton's method serve: changes in one direction end the run
+        self._exact = [event.exact for event in own]
         self._falls = np.array([event.direction if event.limit == 1.0 else 0.0 for event in own])
 
     def begin(self, values):
@@ -77,14 +78,27 @@ class Group:
     def lend(self, track, i, t):
         """Let the `Track` of member i know what is known at t, the start of the step that has been searched."""
         if not self._odd[i]:
-            track.value = track.end = float(self._first[i])
-            if not self._was_new and track.value != 0.0:
-                track.sign, track.significant = math.copysign(1.0, track.value), (t, track.value)
+            value = float(self._first[i])
+            track.begin(t, value, not self._was_new or (self._exact[i] and value > 0.0))
+            track.noise = float(self.noise[i])
 
     def take_back(self, track, i):
         """Take what a `Track` knows at the end of a step."""
         self.value[i], self.noise[i] = track.value, track.noise
         self._odd[i] = track.zero is not None or not track.sign * track.value > 0.0
+
+    def lend_all(self, tracks, t):
+        """Let all tracks know what is known at t, the end of a step."""
+        self._first, self._was_new = self.value, self._is_new
+        for i, number in enumerate(self.numbers):
+            self.lend(tracks[number], i, t)
+
+    def take_all(self, tracks):
+        """Take what all tracks know at the end of a step."""
+        self.begin(np.zeros(len(self.numbers)))
+        self._is_new = False
+        for i, number in enumerate(self.numbers):
+            self.take_back(tracks[number], i)
 
     def search(self, step, sample):
         """The first event that ends the run, (number, t) or None; members to be searched one by one, up to there.
@@ -97,7 +111,7 @@ class Group:
         """
         self._first, self._was_new, self._is_new = self.value, self._is_new, False
         found, end, last = None, step.t1, self.value.copy()
-        alone, left = dict.fromkeys(np.flatnonzero(self._odd).tolist(), step.t0), np.flatnonzero(~self._odd)
+        alone, left = dict.fromkeys(self._odd.nonzero()[0].tolist(), step.t0), (~self._odd).nonzero()[0]
         while left.size:
             values, noise = self.value[left], self.noise[left]
             degree = max(step.degree, self.degree // 2)

@@ -146,10 +146,14 @@ class Inside:
         return [known[t] for t in times]
 
     def levels(self, times):
-        """The same as an array (k, 3, n), NaN where there is none."""
-        none = np.full_like(self._known[self.t0], np.nan)
-        found = [none if state is None else state for state in self.states(times)]
-        return np.reshape(found, (-1, *none.shape))
+        """The same as an array (k, 3, n), NaN where there is none; not kept."""
+        ends = times.size > 0 and times[-1] == self.t1
+        inside = times[:-1] if ends else times
+        found, status = self._reader(inside, np.zeros(inside.size, int), self._block, self._log.charts, self._log.points)
+        if status != Status.SUCCESS:
+            none = np.full_like(self._known[self.t0], np.nan)
+            return np.reshape([none if state is None else state for state in self.states(times)], (-1, *none.shape))
+        return np.concatenate((found, self._known[self.t1][None])) if ends else found
 
     def _read(self, times):
         rows = np.zeros(times.size, int)
@@ -191,10 +195,13 @@ def _signs(n):
 class Track:
     """What is known of one function up to the last step's end."""
 
-    def __init__(self, value):
+    def begin(self, t, value, has_sign):
+        """Take the value at t, the start of a run; has_sign: whether it is no rounding of zero where it is positive."""
         self.value = self.end = value  # at that time, and at the end of the present step
         self.sign = 0.0  # the last it had; 0 for none yet
         self.significant = None  # time and value at which it had that sign
+        if has_sign and value != 0.0:
+            self.sign, self.significant = math.copysign(1.0, value), (t, value)
         self.zero = None  # time of the last zero, if it has had no sign since
         self.passed = self.pending = False  # that zero is a start within rounding; may become an event on being left
         self.noise = 0.0  # rounding error of the values, once measured
@@ -226,7 +233,8 @@ class Watch:
             if isinstance(event.function, Member):
                 groups.setdefault(event.function.over, []).append(i)
         self._groups = [Group(over, events, numbers) for over, numbers in groups.items()]
-        self._single = [i for i, event in enumerate(events) if not isinstance(event.function, Member)]
+        self._members = [i for numbers in groups.values() for i in numbers]
+        self._single = [i for i in range(len(events)) if i not in set(self._members)]
         self.read_by(reader)
 
     def read_by(self, reader):
@@ -281,32 +289,26 @@ class Watch:
         self._note_start()
         if not anew:
             return
-        self.tracks = [Track(0.0) for _ in self.events]
+        self.tracks = self.tracks or [Track() for _ in self.events]
         for group in self._groups:
             group.begin(self._sample(group, np.array([self.t]), self.state[None])[0])
-            for i, value in zip(group.numbers, group.value.tolist(), strict=True):
-                self.tracks[i].value = self.tracks[i].end = value
         for i in self._single:
-            self.tracks[i] = Track(self._value(i, self.t, self.state))
-        for event, track in zip(self.events, self.tracks, strict=True):
-            if event.exact and track.value > 0.0:
-                track.sign, track.significant = 1.0, (self.t, track.value)
+            self.tracks[i].begin(self.t, self._value(i, self.t, self.state), False)
 
     def _is_resumed(self, memory, last):
         """Whether the run goes on from the event that ends it, in the same memory, with other velocities."""
-        run, members = memory.run, [i for group in self._groups for i in group.numbers]
-        if self.resume is None or last.index not in members or not memory.begins_again or last.t >= run.clock.t_end:
+        run, is_member = memory.run, isinstance(self.events[last.index].function, Member)
+        if self.resume is None or not is_member or not memory.begins_again or last.t >= run.clock.t_end:
             return False
-        self.begins_again = self.resume(last.t, run, [i for i in members if self.list[i]])
+        self.begins_again = self.resume(last.t, run, [i for i in self._members if self.list[i]])
         return self.begins_again
 
     def _begin_again(self, memory, log):
         """Begin the run again where it is; the Status, and what there is to say of it."""
         run, t = memory.run, memory.run.clock.t
         self.begins_again, self.start = False, t
-        for group in self._groups:
-            for i in group.numbers:
-                self.list[i].clear()
+        for i in self._members:
+            self.list[i].clear()
         status = memory.begin_again(log)
         if not run.numbers.begun:
             run.numbers.begun = 1  # there is a run so far
@@ -319,6 +321,8 @@ class Watch:
 
     def saved(self):
         """What is known and found between two steps: numbers, and arrays by name."""
+        for group in self._groups:
+            group.lend_all(self.tracks, self.t)
         found = [each for mine in self.list for each in mine]
         numbers = {"t": self.t, "tracks": [vars(track) for track in self.tracks], "found": [each[:2] for each in found]}
         states = np.array([each.state for each in found]).reshape(-1, *self.state.shape)
@@ -328,13 +332,16 @@ class Watch:
         """As it was when it was saved."""
         self.t, self.state, self.memory = numbers["t"], arrays["watch.state"], arrays["watch.memory"]
         demand(self.state.shape == (3, self._n) and len(self.memory) >= self.angles, "the state of events")
-        self.tracks = [Track(0.0) for _ in self.events]
+        self.tracks = [Track() for _ in self.events]
         for track, known in zip(self.tracks, numbers["tracks"], strict=True):
+            track.begin(0.0, 0.0, False)
             if known["significant"] is not None:
                 t, value = map(float, known["significant"])
                 known = known | {"significant": (t, value)}
             demand_numbers(known | {"significant": None}, vars(track), ("significant", "zero"))
             vars(track).update(known)
+        for group in self._groups:
+            group.take_all(self.tracks)
         self.list = [[] for _ in self.events]
         for (t, index), state in zip(numbers["found"], arrays["watch.found"], strict=True):
             demand(is_count(index), "the number of an event")
@@ -398,7 +405,7 @@ class Watch:
             for i in alone:
                 members[group.numbers[i]] = group, i
                 group.lend(self.tracks[group.numbers[i]], i, step.t0)
-        for i in sorted([*self._single, *members]):
+        for i in sorted([*self._single, *members]) if members else self._single:
             # Times that bracket the zeros of event i
             points, failed = self._points(i, step, end)
             if failed is not None:
@@ -421,7 +428,8 @@ class Watch:
                 break
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
-                run.remembered[: self.angles] = self._instant(each.t, each.state).angles
+                if self.angles:
+                    run.remembered[: self.angles] = self._instant(each.t, each.state).angles
                 self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
                 return each
@@ -465,8 +473,8 @@ class Watch:
 
     def _degree(self, step):
         """The degree that the interpolant and the fastest turn of a body ask for."""
-        squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
-        turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
+        pd = np.array([step.at(t)[1, self._p] for t in (step.t0, step.t1)])
+        turn = 2.0 * math.sqrt(np.einsum("kbi,kbi->kb", pd, pd).max(initial=0.0)) * (step.t1 - step.t0)
         return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
 
     def _walk(self, i, step, points):

@@ -78,14 +78,13 @@ class _Closing:
 
     def open(self, opened):
         """Take other contacts that have just opened."""
-        self.which = list(opened)
-        self.start = np.array(list(opened.values())).reshape(-1, 3).T
+        self.which, self.start = list(opened), tuple(zip(*opened.values(), strict=True))
 
     def over(self, states):
         """Values (k, count) of `States`."""
         values = self.gaps.values(states.t, states.levels, states.counted)
         if self.which:
-            begun, first, rate = self.start
+            begun, first, rate = map(np.array, self.start)
             since = states.t[:, None] - begun
             later = since > 0.0
             divided = (values[:, self.which] - first) / np.where(later, since, 1.0)
@@ -539,21 +538,22 @@ class _ContactRun:
     def _is_deep(self):
         """Whether contacts penetrate; says so."""
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        deep = np.flatnonzero(self.gap < -PENETRATION * self.length)
-        if deep.size:
-            found = listed([self.gaps.names[i] for i in deep], NAMED)
-            self.reason = f"Penetration was not noticed: {found}. Give a max_step."
-        return deep.size > 0
+        deep = self.gap < -PENETRATION * self.length
+        if not deep.any():
+            return False
+        found = listed([self.gaps.names[i] for i in np.flatnonzero(deep)], NAMED)
+        self.reason = f"Penetration was not noticed: {found}. Give a max_step."
+        return True
 
     def _transit(self, fired):
         """From one phase to the next one, after events of the units `fired`; the Status if there is no way on."""
         self.reason = ""
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        near = np.flatnonzero(self.gap <= TOUCHING * self.length).tolist()
+        (near,) = (self.gap <= TOUCHING * self.length).nonzero()
         count, before = self.gaps.count, self.modes
         hit = [i for i in fired if i < count]
-        status = self._settle(sorted({*near, *hit, *before.closed, *before.idle}), hit)
+        status = self._settle(sorted({*near.tolist(), *hit, *before.closed, *before.idle}), hit)
         return status or self._settle_frictions(before, [i - count for i in fired if i >= count])
 
     def _is_stuck(self):

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
 from ..elements.unilateral import contacts_of
-from ..maths.complementarity import lemke
+from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import angle as angle_of
 from ..model.handles import counted, handles_of
@@ -198,7 +198,7 @@ def energy_gain(G, rates, p):
 
 
 def _solved(G, q):
-    p, basic = lemke(G, q)
+    p, basic = complement(G, q)
     if p is None:
         raise NoSolution
     return p, basic

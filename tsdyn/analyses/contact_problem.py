@@ -113,6 +113,8 @@ class Inertia:
         What forces remember.
     which : list of int
         Gaps that are looked at; all else is zero of others.
+    held : sequence of int
+        Those that may be held closed, independent: a guess.
 
     Attributes
     ----------
@@ -120,8 +122,8 @@ class Inertia:
     G : ndarray (count, count)
     """
 
-    def __init__(self, gaps, t, q, slots, which):
-        self.gaps, self.t, self.q, self.slots, self.which = gaps, t, q, slots, np.array(which, int)
+    def __init__(self, gaps, t, q, slots, which, held=()):
+        self.gaps, self.t, self.q, self.slots, self.which, self.held = gaps, t, q, slots, np.array(which, int), held
         rows, drift = gaps.workspace.rows(t, q, self.which)
         self._rows, self._drift = gaps.sign[self.which, None] * rows, (gaps.sign * drift[: gaps.count])[self.which]
         self.J, self.response, self.G = (np.zeros((gaps.count, size)) for size in (q.size, q.size, gaps.count))
@@ -180,14 +182,13 @@ def impulses(inertia, which, rates, restitution, law="newton"):
     rates (k,) before the impact, restitution (k,). Where Poisson's law would add energy, as it can with different
     coefficients, they are lowered together.
     """
-    G = inertia.among(which)
     if law == "newton":
-        return _solved(G, rates + restitution * np.minimum(rates, 0.0))[0]
-    compressed = _solved(G, rates)[0]
+        return _solved(inertia, which, rates + restitution * np.minimum(rates, 0.0))[0]
+    G, compressed = inertia.among(which), _solved(inertia, which, rates)[0]
     share, released = 1.0, None
     while released is None or energy_gain(G, rates, released) > LEVEL * (np.abs(rates) @ np.abs(released)):
         given = (1.0 + share * restitution) * compressed
-        released = given + _solved(G, rates + G @ given)[0]
+        released = given + _solved(inertia, which, rates + G @ given)[0]
         share = share / 2.0 if share > LEVEL else 0.0
     return released
 
@@ -197,11 +198,13 @@ def energy_gain(G, rates, p):
     return p @ rates + 0.5 * p @ G @ p
 
 
-def _solved(G, q):
-    p, basic = complement(G, q)
+def _solved(inertia, which, q):
+    """Solution (k,) of the gaps `which`, and which of them are held; those held at last are a first guess."""
+    p, held = complement(inertia.among(which), q, [k for k, i in enumerate(which) if i in inertia.held])
     if p is None:
         raise NoSolution
-    return p, basic
+    inertia.held = {i for i, own in zip(which, held, strict=True) if own}
+    return p, held
 
 
 class Settled(NamedTuple):
@@ -233,7 +236,7 @@ def settle(inertia, resting, qd, fired=()):
         return Settled([], [], c)
     resting, fired = list(resting), [i for i in fired if i in resting]
     while True:
-        lam, basic = _solved(inertia.among(resting), c[resting])
+        lam, basic = _solved(inertia, resting, c[resting])
         gdd = c + inertia.G[:, resting] @ lam
         small = LEVEL * (terms + np.abs(inertia.G[:, resting]) @ lam)
         # A reaction that has just vanished doesn't come back by rounding

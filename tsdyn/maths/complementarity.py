@@ -40,9 +40,7 @@ def complement(M, q, guess=()):
     # Rows and columns scaled to a unit diagonal, q to one
     scale = 1.0 / np.sqrt(np.where(np.diag(M) > 0.0, np.diag(M), 1.0))
     size = np.abs(q * scale).max()
-    rows = _Rows(scale[:, None] * M * scale, scale * q / size)
-    if not rows.begin(list(guess)):
-        rows.begin([])
+    rows = _Rows(scale[:, None] * M * scale, scale * q / size, list(guess))
     for _ in range(MOST_ENTRIES * (q.size + 1)):
         i = rows.least()
         if i is None:
@@ -57,23 +55,22 @@ def complement(M, q, guess=()):
 class _Rows:
     """The state of the method."""
 
-    def __init__(self, M, q):
-        self.M, self.q, self.z, self.held, self.passed = M, q, np.zeros(q.size), [], set()
-
-    def begin(self, held):
-        """Begin with these rows held; whether that is possible."""
-        self.held = held
+    def __init__(self, M, q, held):
+        self.M, self.q, self.held, self.passed = M, q, held, set()
         try:
             self._solve()
         except np.linalg.LinAlgError:
-            return False
-        return bool((self.z[held] >= 0.0).all() and np.isfinite(self.z).all())
+            held.clear()
 
     def _solve(self):
-        """z of the held rows."""
+        """z of the held rows; without those where it is negative."""
         h, self.z = self.held, np.zeros(self.q.size)
-        if h:
-            self.z[h] = np.linalg.solve(self.M[h][:, h], -self.q[h])
+        while h:
+            self.z[h] = z = np.linalg.solve(self.M[h][:, h], -self.q[h])
+            k = int(z.argmin())
+            if z[k] >= 0.0:
+                break
+            self.z[h.pop(k)] = 0.0
 
     def least(self):
         """The row with the least w, below rounding; None where there is none."""
@@ -103,9 +100,5 @@ class _Rows:
             self.passed.add(i)
             return w > -WITHOUT_SOLUTION
         h.append(i)
-        self._solve()
-        # Rounding may leave less than nothing
-        while h and self.z[h].min() < 0.0:
-            h.pop(int(self.z[h].argmin()))
-            self._solve()
+        self._solve()  # rounding may leave less than nothing of one
         return True

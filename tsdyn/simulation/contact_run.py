@@ -579,7 +579,7 @@ class _ContactRun:
         if not touching:
             return None
         try:
-            inertia = Inertia(self.gaps, self.t, self.q, slots, touching)
+            inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
             noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
             if noise:  # a gap that closes with a rate of rounding

@@ -2,7 +2,7 @@
 
 Balls bounce without loss, alone, as one of ten bodies, and ten at once; a stack of ten boxes with 40 contacts falls and
 comes to rest. Steps of a driven slide of ten boxes follow: without contacts, with 40 open ones, and with 30 closed ones,
-three corners of each, that take the place of ten planar joints. Runs of a group are interleaved; least times of rounds.
+three points of each, in place of planar joints. Runs of a group are interleaved; least times of rounds.
 
 Run it: python -m benchmarks.events
 """
@@ -37,7 +37,8 @@ def _boxes(scene, count, apart, height):
 
 def _corners(scene, box, other, top, corners=4, **law):
     for k in range(corners):
-        corner = BOX * [2 * (k & 1) - 1, (k & 2) - 1, -1]
+        x, y = ((-1, -1), (1, -1), (-1, 1), (1, 1))[k] if corners == 4 else ((-1, -1), (1, -1), (0, 1))[k]
+        corner = BOX * [x, y, -1]
         scene.add(ts.constraints.PlaneContact(box, other, point_a=corner, point_b=(0, 0, top), **FLOOR, **law))
 
 

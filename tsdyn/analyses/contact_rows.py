@@ -6,6 +6,7 @@ H W H^T lam = H W f,  a = W (f - H^T lam)       H: bilateral rows               
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +38,7 @@ from ..rows.interface import (
     factorise_rows,
     weigh_bodies,
 )
-from ..workspaces import Parts, no_parts, parts
+from ..workspaces import Parts, load_parts, no_parts, parts
 
 
 class ContactParts(NamedTuple):
@@ -117,6 +118,47 @@ def accelerate(context, t, q, qd, out, gamma):
     refine_accelerations(graph, f)
     write_accelerations(graph.bodies, f.poses, f.Z, out)
     acceleration_bias(c.rows, q, qd, t, gamma)
+
+
+@entry("pvmvm")
+def find_multipliers(context, t, levels, memory, out):
+    """out (k, m): multipliers at times t (k,) and states on the manifold, levels (k, 3 n), by the equations of motion.
+
+    Zero of dropped rows, NaN where there are none.
+    """
+    c = load_parts(context)
+    graph, s, w, f = c.graph, c.system, c.work, c.tangent
+    n = w.q.size
+    recall(s, memory)
+    for k in range(t.size):
+        copy(levels[k, :n], w.q)
+        copy(levels[k, n : 2 * n], w.qd)
+        set_time(s, t[k])
+        place_bodies(graph.bodies, w.q, f.poses)
+        move_bodies(graph.bodies, w.q, w.qd, f.poses)
+        evaluate_rows(graph, s, f, f.rows, t[k])
+        regular = factorise_rows(graph, s, f, f.rows, t[k], DYNAMICS)
+        solve_accelerations(graph, s, w, f, t[k])
+        for e in range(f.b.size):
+            if graph.row[e] >= 0:
+                out[k, graph.row[e]] = f.b[e] if regular else math.nan
+
+
+class ReactionWorkspace:
+    """Multipliers of a packed scene without friction that depends on reactions; one evaluation at a time."""
+
+    def __init__(self, packed):
+        system = with_short_rows(packed)
+        self.n, self.m = int(system.bodies[:, 1].sum()), len(packed.system.segments)
+        whole = parts(system._replace(reals=system.reals.copy()), graph_of(packed, REDUCED, BIAS), self.n)
+        self.address, *self._keep = resident(whole)
+        self._find = interrupts_answered()(find_multipliers) if calls_laws(packed) else find_multipliers
+
+    def multipliers(self, t, levels, memory):
+        """Multipliers (k, m) at times t (k,), levels (k, 3, n); of normalisations zero."""
+        out = np.zeros((t.size, self.m))
+        self._find(self.address, t, levels.reshape(t.size, 3 * self.n), memory, out)
+        return out
 
 
 class ContactWorkspace:

@@ -140,7 +140,6 @@ class Frictions:
         return A
 
     def motions(self, q, qd):
-    XX
         spans, A = self.packed.system.bodies, self.frames(q)
         places = spans[self.rigid, :1] + np.arange(3, 7)
         w, r, rd = np.zeros((3, len(q), len(spans) + 1, 3))

@@ -77,8 +77,10 @@ class Group:
 
     def lend(self, track, i, t):
         """Let the `Track` of member i know what is known at t, the start of the step that has been searched."""
-        if not self._odd[i]:
-            value = float(self._first[i])
+        value = float(self._first[i])
+        if self._odd[i]:
+            track.value = track.end = value
+        else:
             track.begin(t, value, not self._was_new or (self._exact[i] and value > 0.0))
             track.noise = float(self.noise[i])
 
@@ -111,17 +113,24 @@ class Group:
         """
         self._first, self._was_new, self._is_new = self.value, self._is_new, False
         found, end, last = None, step.t1, self.value.copy()
-        alone, left = dict.fromkeys(self._odd.nonzero()[0].tolist(), step.t0), (~self._odd).nonzero()[0]
+        alone, left = {}, np.arange(len(last))
         while left.size:
             values, noise = self.value[left], self.noise[left]
             degree = max(step.degree, self.degree // 2)
             seen = survey(lambda times, left=left: sample(times)[:, left], step.t0, values, end, degree, noise)
             self.degree, last[left] = seen.degree, seen.samples[-1]
             unclear = {j: since for j, since in enumerate(seen.since) if since < math.inf}
+            for j in self._odd[left].nonzero()[0].tolist():  # what they know of zeros is past on the side they fall from
+                self._odd[left[j]] = odd = j in unclear or not self._falls[left[j]] * last[left[j]] < 0.0
+                if odd and j not in unclear:
+                    unclear[j] = step.t0
+            if unclear and noise.any():  # values of rounding alone have no zero
+                quiet = (np.abs(seen.samples).max(axis=0) <= noise).tolist()
+                unclear = {j: since for j, since in unclear.items() if not quiet[j]}
             roots = {
                 j: seen.root(j)
                 for j, since in unclear.items()
-                if seen.until[j] > since and self._falls[left[j]] * values[j] < 0.0
+                if seen.until[j] > since and self._falls[left[j]] * values[j] < 0.0 and not self._odd[left[j]]
             }
             first = roots and _earliest(lambda t, left=left: sample(np.array([t]))[0, left], seen, roots)
             alone |= {int(left[j]): since for j, since in unclear.items() if j not in roots or first is None}
@@ -130,9 +139,7 @@ class Group:
             # What was unclear may be clear up to there
             j, end = first
             found = self.numbers[left[j]], end
-            left, alone = np.array([i for i, since in alone.items() if since < end and not self._odd[i]], int), {
-                i: since for i, since in alone.items() if self._odd[i]
-            }
+            left, alone = np.array([i for i, since in alone.items() if since < end], int), {}
         self.value = last
         return found, [i for i, since in alone.items() if since < end]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.contact_rows import ReactionWorkspace
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
 from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
@@ -126,10 +128,18 @@ class _Leaving:
     def __init__(self, packed, rows, signs):
         self.packed, self.rows, self.signs = packed, rows, np.array(signs)
 
+    @cached_property
+    def workspace(self):
+        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
+        return None if self.packed.system.normals.size else ReactionWorkspace(self.packed)
+
     def over(self, states):
         """Values (k, closed) of `States`."""
-        memory = np.tile(states.memory, (states.t.size, 1))
-        lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        if self.workspace is not None:
+            lam = self.workspace.multipliers(states.t, states.levels, states.memory)
+        else:
+            memory = np.tile(states.memory, (states.t.size, 1))
+            lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
         return -self.signs * lam[:, self.rows]
 
 

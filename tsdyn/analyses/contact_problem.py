@@ -1,29 +1,26 @@
 """Gaps of unilateral constraints, impacts, and which contacts stay closed: complementarity problems at one state.
 
-    J, G = J M~ J^T     rows of the closed gaps, and their Schur complement, the bilateral rows B eliminated
+    J, G = J M~ J^T     rows of the gaps, and their Schur complement, the bilateral rows eliminated
     impact              gd+ = gd- + G p,   0 <= gd+ + e min(gd-, 0),  p >= 0, complementary (Newton's law)
     accelerations       gdd = c + G lam,   0 <= gdd,  lam >= 0, complementary;  c: gdd of open gaps
 
-M~ = Z (Z^T M Z)^-1 Z^T with a basis Z of the motions that B leaves free. lam and p push: the opposite of multipliers.
+M~ f are the accelerations that loads f make where the bilateral rows hold. lam and p push: the opposite of multipliers.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
-from ..elements.markers import POINT
 from ..elements.unilateral import contacts_of
-from ..errors import SingularConfiguration
-from ..jit.kernels import twin
-from ..maths.complementarity import lemke
+from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
-from ..model.handles import BodyMotion, counted, handles_of
 from ..model.handles import angle as angle_of
-from ..observables.evaluate import constraint_arrays, mass_matrix
-from ..observables.generalised_forces import applied_loads, velocity_forces
+from ..model.handles import counted, handles_of
+from .contact_rows import ContactWorkspace
 from .tolerances import AT_REST, DEPENDENT, LEVEL
 
 LAWS = "newton", "poisson"
@@ -38,7 +35,14 @@ class Gap(NamedTuple):
 
 
 class Gaps:
-    """The inequalities of a packed scene whose unilateral constraints are all among its rows.
+    """The inequalities of a scene; one evaluation at a time.
+
+    Parameters
+    ----------
+    packed : Packed
+        Of the scene, whose unilateral constraints are all among its rows.
+    contacts, free : Packed
+        Of its contacts' rows alone, in the order of the gaps; of the scene with all contacts open.
 
     Attributes
     ----------
@@ -50,7 +54,7 @@ class Gaps:
     restitution : ndarray (count,)
     """
 
-    def __init__(self, packed):
+    def __init__(self, packed, contacts, free):
         self.packed, self.list = packed, []
         first = {id(member.constraint): member.rows.start for member in packed.members}
         for contact in contacts_of(member.constraint for member in packed.members):
@@ -59,45 +63,36 @@ class Gaps:
         self.rows = np.array([gap.row for gap in self.list], int)
         self.sign = np.array([gap.side.sign for gap in self.list])
         self.restitution = np.array([gap.contact.restitution for gap in self.list], float)
-        self.bilateral = np.setdiff1d(np.arange(len(packed.system.segments)), self.rows)
-        self.are_counted = any(gap.side.joint is not None for gap in self.list)
-        handles, parts = handles_of(packed), {id(part): i for i, part in enumerate(packed.constraints)}
-        self._values = [self._value_of(handles, parts[id(gap.side.row)], gap.side) for gap in self.list]
+        self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
+        self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
 
-    def _value_of(self, handles, part, side):
-        """A function of q (..., n) and counted angles (..., angles) that returns a gap (...)."""
-        if side.joint is not None:
-            place = handles.row(side.joint, "angle")
-            geometry, at = place.angles[side.which], place.first + side.which
-
-            def value(q, angles):
-                found = angle_of(geometry, *handles.motions(geometry, (q,)), 0)
-                return side.sign * (counted(found, angles[..., at]) - side.bound)
-
-            return value
-        row, given, coordinates = (
-            getattr(self.packed, name)[part] for name in ("constraints", "parameters", "coordinates")
-        )
-        phi, markers = twin(type(row).phi), list(zip(row.markers, coordinates, strict=True))
-        markers = [(m.code == POINT, handles.where(row.body_of(m)), tuple(s.tolist())) for m, s in markers]
+    def _stop(self, handles, side):
+        """A function of q (..., n) and counted angles (..., angles) that returns the gap (...) of a joint's angle."""
+        place = handles.row(side.joint, "angle")
+        geometry, at = place.angles[side.which], place.first + side.which
 
         def value(q, angles):
-            x, out = [], [0.0]
-            for is_point, place, s in markers:
-                body = BodyMotion(*place, (q,))
-                x += body.point(s, 0) if is_point else body.arm(s, 0)
-            phi(x, given, 0.0, out)
-            return side.sign * out[0]
+            found = angle_of(geometry, *handles.motions(geometry, (q,)), 0)
+            return side.sign * (counted(found, angles[..., at]) - side.bound)
 
         return value
 
-    def value(self, i, q, angles):
-        """One gap (...) at q (..., n); angles (..., angles): counted ones of joints."""
-        return self._values[i](q, angles)
+    def values(self, t, levels, counted):
+        """Gaps (k, count) at times t (k,).
 
-    def at(self, q, angles):
-        """Gaps (count,) at q (n,)."""
-        return np.array([value(q, angles) for value in self._values], float)
+        levels (k, ...) begin with q (n,); counted is a function that returns the counted angles (k, angles) of joints.
+        """
+        rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
+        found = self.sign * self.workspace.gaps(t, rows)[:, : self.count]
+        if self._stops:
+            q, angles = rows[:, : self.workspace.n], counted()
+            for i, value in self._stops:
+                found[:, i] = value(q, angles)
+        return found
+
+    def at(self, q, angles, t=0.0):
+        """Gaps (count,) at one state."""
+        return self.values(np.array([t]), q[None], lambda: angles[None])[0]
 
 
 def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):
@@ -107,68 +102,74 @@ def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):
 
 
 class Inertia:
-    """Rows, masses and motions that the bilateral rows leave free, at one state.
+    """What pushes at gaps do where the bilateral rows hold, at one state.
 
     Parameters
     ----------
     gaps : Gaps
     t : float, s
-    q, qd : ndarray (n,)
+    q : ndarray (n,)
     slots : ndarray
         What forces remember.
+    which : list of int
+        Gaps that are looked at; all else is zero of others.
+    held : sequence of int
+        Those that may be held closed, independent: a guess.
+
+    Attributes
+    ----------
+    J : ndarray (count, n)
+    G : ndarray (count, count)
     """
 
-    def __init__(self, gaps, t, q, qd, slots):
-        from scipy.linalg import cho_factor, qr
+    def __init__(self, gaps, t, q, slots, which, held=()):
+        self.gaps, self.t, self.q, self.slots, self.which, self.held = gaps, t, q, slots, np.array(which, int), held
+        rows, drift = gaps.workspace.rows(t, q, self.which)
+        self._rows, self._drift = gaps.sign[self.which, None] * rows, (gaps.sign * drift[: gaps.count])[self.which]
+        self.J, self.response, self.G = (np.zeros((gaps.count, size)) for size in (q.size, q.size, gaps.count))
+        response = gaps.workspace.respond(t, q, slots, self._rows)
+        self.J[self.which], self.response[self.which] = self._rows, response  # M~ J^T, transposed
+        self.G[self.which[:, None], self.which] = self._rows @ response.T
+        self._sizes = np.abs(self._rows)
 
-        self.gaps, self.t, self.q, self.qd, self.slots = gaps, t, q, qd, slots
-        system = gaps.packed.system
-        with np.errstate(over="ignore", invalid="ignore"):
-            _, Phi_q, self.Phi_t, self.gamma = constraint_arrays(system, q, qd, t)
-        self.J, self.B = gaps.sign[:, None] * Phi_q[gaps.rows], Phi_q[gaps.bilateral]
-        self.M = mass_matrix(system, q)
-        # Z of the bilateral rows; Q1 R^T of their independent ones
-        Q, R, order = qr(self.B.T, pivoting=True)
-        size = np.abs(np.diag(R))
-        rank = int((size > RANK_TOL * size.max(initial=0.0)).sum())
-        self.own, self.R, self.order = Q[:, :rank], R[:rank, :rank], order[:rank]
-        self.Z = Z = Q[:, rank:]
-        try:
-            self.factor = cho_factor(Z.T @ self.M @ Z) if Z.size else None
-        except np.linalg.LinAlgError as error:
-            raise SingularConfiguration("a direction that the constraints leave free carries no inertia.") from error
-        self.G = self.J @ self.free(self.J.T)
+    def among(self, which):
+        """G of some gaps."""
+        return self.G[which][:, which]
 
-    def free(self, load):
-        """M~ load: the accelerations (n, ...) that a load makes where the bilateral rows hold."""
-        from scipy.linalg import cho_solve
+    def _of_all(self, values):
+        out = np.zeros(self.gaps.count)
+        out[self.which] = values
+        return out
 
-        return self.Z @ cho_solve(self.factor, self.Z.T @ load) if self.Z.size else np.zeros_like(load)
+    def free(self, loads):
+        """M~ loads: the accelerations (n, ...) that loads (n, ...) make where the bilateral rows hold."""
+        rows = np.ascontiguousarray(loads.T).reshape(-1, loads.shape[0])
+        return self.gaps.workspace.respond(self.t, self.q, self.slots, rows).T.reshape(loads.shape)
+
+    def pushed(self, which, p):
+        """The change of velocities (n,) by impulses p (k,) of the gaps `which`."""
+        return p @ self.response[which]
+
+    def sizes(self, x):
+        """|J| |x| (count,): the sizes of terms."""
+        return self._of_all(self._sizes @ np.abs(x))
 
     def rates(self, qd, sizes=None):
         """Rates of the gaps (count,), zero where they are so to rounding of velocities of these `sizes` (n,)."""
-        drift = self.gaps.sign * self.Phi_t[self.gaps.rows]
-        rates, sizes = self.J @ qd + drift, np.abs(qd) if sizes is None else sizes
-        return np.where(np.abs(rates) <= AT_REST * (np.abs(self.J) @ sizes + np.abs(drift)), 0.0, rates)
+        rates, terms = self._rows @ qd + self._drift, self._sizes @ (np.abs(qd) if sizes is None else sizes)
+        rates[np.abs(rates) <= AT_REST * (terms + np.abs(self._drift))] = 0.0
+        return self._of_all(rates)
 
     def hold(self, which, rates):
         """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
-        own = np.linalg.lstsq(self.G[np.ix_(which, which)], rates, rcond=RANK_TOL**2)[0]
-        return -self.free(self.J[which].T @ own)
+        own = np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
+        return self.pushed(which, -own)
 
     def accelerations(self, qd):
-        """Accelerations of all gaps (count,) where all are open, at velocities qd (n,); and their terms (count,)."""
-        from scipy.linalg import solve_triangular
-
-        system, t, q = self.gaps.packed.system, np.array([self.t]), self.q[None]
-        _, _, _, gamma = constraint_arrays(system, self.q, qd, self.t)
-        loads = applied_loads(system, t, q, qd[None], self.slots[None])[0] + velocity_forces(system, q, qd[None])[0]
-        qdd = np.zeros(qd.size)
-        if self.order.size:
-            qdd = self.own @ solve_triangular(self.R, -gamma[self.gaps.bilateral][self.order], trans="T")
-        qdd = qdd + self.free(loads - self.M @ qdd)
-        bias = self.gaps.sign * gamma[self.gaps.rows]
-        return self.J @ qdd + bias, np.abs(self.J) @ np.abs(qdd) + np.abs(bias)
+        """Accelerations of the gaps (count,) where all are open, at velocities qd (n,); and their terms (count,)."""
+        qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
+        bias = (self.gaps.sign * gamma[: self.gaps.count])[self.which]
+        return self._of_all(self._rows @ qdd + bias), self._of_all(self._sizes @ np.abs(qdd) + np.abs(bias))
 
 
 class NoSolution(Exception):
@@ -181,14 +182,13 @@ def impulses(inertia, which, rates, restitution, law="newton"):
     rates (k,) before the impact, restitution (k,). Where Poisson's law would add energy, as it can with different
     coefficients, they are lowered together.
     """
-    G = inertia.G[np.ix_(which, which)]
     if law == "newton":
-        return _solved(G, rates + restitution * np.minimum(rates, 0.0))[0]
-    compressed = _solved(G, rates)[0]
+        return _solved(inertia, which, rates + restitution * np.minimum(rates, 0.0))[0]
+    G, compressed = inertia.among(which), _solved(inertia, which, rates)[0]
     share, released = 1.0, None
     while released is None or energy_gain(G, rates, released) > LEVEL * (np.abs(rates) @ np.abs(released)):
         given = (1.0 + share * restitution) * compressed
-        released = given + _solved(G, rates + G @ given)[0]
+        released = given + _solved(inertia, which, rates + G @ given)[0]
         share = share / 2.0 if share > LEVEL else 0.0
     return released
 
@@ -198,11 +198,13 @@ def energy_gain(G, rates, p):
     return p @ rates + 0.5 * p @ G @ p
 
 
-def _solved(G, q):
-    p, basic = lemke(G, q)
+def _solved(inertia, which, q):
+    """Solution (k,) of the gaps `which`, and which of them are held; those held at last are a first guess."""
+    p, held = complement(inertia.among(which), q, [k for k, i in enumerate(which) if i in inertia.held])
     if p is None:
         raise NoSolution
-    return p, basic
+    inertia.held = {i for i, own in zip(which, held, strict=True) if own}
+    return p, held
 
 
 class Settled(NamedTuple):
@@ -230,9 +232,11 @@ def settle(inertia, resting, qd, fired=()):
     NoSolution
     """
     c, terms = inertia.accelerations(qd)
+    if not resting:
+        return Settled([], [], c)
     resting, fired = list(resting), [i for i in fired if i in resting]
     while True:
-        lam, basic = _solved(inertia.G[np.ix_(resting, resting)], c[resting])
+        lam, basic = _solved(inertia, resting, c[resting])
         gdd = c + inertia.G[:, resting] @ lam
         small = LEVEL * (terms + np.abs(inertia.G[:, resting]) @ lam)
         # A reaction that has just vanished doesn't come back by rounding
@@ -255,9 +259,9 @@ def settle(inertia, resting, qd, fired=()):
 
 def _depends(inertia, closed, i):
     """Whether the row of a gap depends on those of closed ones and on the bilateral rows."""
-    rows = inertia.J @ inertia.Z
-    own, others = rows[i], rows[closed]
+    own, alone = inertia.response[i], inertia.J[i]
     if not closed:
-        return not np.linalg.norm(own) > DEPENDENT * np.linalg.norm(inertia.J[i])
-    left = own - np.linalg.lstsq(others.T, own, rcond=None)[0] @ others
+        return not inertia.G[i, i] > DEPENDENT**2 * np.linalg.norm(alone) * np.linalg.norm(own)
+    share = np.linalg.lstsq(inertia.among(closed), inertia.G[closed, i], rcond=None)[0]
+    left = own - share @ inertia.response[closed]
     return bool(np.linalg.norm(left) <= DEPENDENT * np.linalg.norm(own))

@@ -84,6 +84,7 @@ class Archive:
         self._interval, self.request, self.facts = interval, request, facts
         self._format = format_of(path)
         self.shift, self.skips, self.passed = 0.0, False, []  # of positions; a first row; segments that have ended
+        self.resting = None  # coordinates of bodies that rest in the present phase, and where
         self.known = self.resumed = None  # what a run that goes on begins with: numbers, arrays; its present phase
         self.before = None  # makes numbers and arrays of the phases that have ended, and of how the present one begins
         self._store = None
@@ -150,9 +151,19 @@ class Archive:
         if self.skips and name == OUTPUTS and len(rows):
             rows, self.skips = rows[1:], False
         if len(rows):
-            self._waiting[name].append(rows.copy())
+            self._waiting[name].append(self._placed(rows) if name == OUTPUTS else rows.copy())
             self.counts[name] += len(rows)
             self._size += rows.size
+
+    def _placed(self, rows):
+        """A copy of outputs: in the scene's coordinates, bodies that rest where they are to the last bit."""
+        rows, n = rows.copy(), len(self._tables[OUTPUTS].labels["coordinate"])
+        if not np.isscalar(self.shift):
+            rows[:, 1 : 1 + n] += self.shift
+        if self.resting is not None:
+            still, q = self.resting
+            rows[:, 1 + still], rows[:, 1 + n + still], rows[:, 1 + 2 * n + still] = q, 0.0, 0.0
+        return rows
 
     def look_up(self, state):
         """Between slices: let readers see what is new, and write a checkpoint if one is due; `state()` makes it."""
@@ -206,8 +217,6 @@ class Archive:
             return found | {columns[0]: rows[:, 0]}
         n = len(self._tables[OUTPUTS].labels["coordinate"])
         found = {level: rows[:, 1 + i * n : 1 + (i + 1) * n] for i, level in enumerate(_LEVELS)}
-        if not np.isscalar(self.shift):
-            found["q"] = found["q"] + self.shift
         if rows.shape[1] > 1 + 3 * n:
             found["remembered"] = rows[:, 1 + 3 * n :]
         return found | {"time": rows[:, 0]}

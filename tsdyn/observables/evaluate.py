@@ -42,10 +42,10 @@ def balance(packed, t, q, qd, Phi_q, solve):
     """
     system, n = packed.system, q.size
     frictions = coupled_loads(packed)
-    units = [_unit(system, load, t, q, qd) for load in frictions]
+    units = [unit_force(system, load, t, q, qd) for load in frictions]
     first = solve(np.zeros(n))
     parts = np.array([solve(unit) - first for unit in units])
-    reactions = [_reaction(packed, load, q, qd, Phi_q) for load in frictions]
+    reactions = [normal_reaction(packed, load, q, qd, Phi_q) for load in frictions]
     N = np.zeros(len(frictions))
     for _ in range(ITERATIONS):
         lam = np.nan_to_num((first + N @ parts)[n:])
@@ -64,18 +64,20 @@ def balance(packed, t, q, qd, Phi_q, solve):
 def normal_loads(packed, t, q, qd, Phi_q, lam):
     """Return the normal loads (frictions,) by multipliers (m,), and the friction forces of unit ones (frictions, n)."""
     frictions = coupled_loads(packed)
-    loads = np.array([_reaction(packed, load, q, qd, Phi_q)(lam)[0] for load in frictions])
-    return loads, np.array([_unit(packed.system, load, t, q, qd) for load in frictions])
+    loads = np.array([normal_reaction(packed, load, q, qd, Phi_q)(lam)[0] for load in frictions])
+    return loads, np.array([unit_force(packed.system, load, t, q, qd) for load in frictions])
 
 
-def _unit(system, load, t, q, qd):
+def unit_force(system, load, t, q, qd, remembered=None):
     """Return the generalised forces g (n,) of one friction for unit normal load."""
     memory = np.zeros((1, system.memory.size + system.normals.size))
+    if remembered is not None:
+        memory[0, : system.memory.size] = remembered
     memory[0, system.memory.size + load.normal] = 1.0
     return force_loads(system._replace(forces=load.alone), np.array([t]), q[None], qd[None], memory)[0]
 
 
-def _reaction(packed, load, q, qd, Phi_q):
+def normal_reaction(packed, load, q, qd, Phi_q):
     """Return a normal load as a function of multipliers (m,), with its derivative (m,)."""
     force, member = load.force, next(m for m in packed.members if m.constraint is load.force.joint)
     rows = Phi_q[member.rows]

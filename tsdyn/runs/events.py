@@ -1,6 +1,7 @@
 """Events: users' functions of time and state, and their zeros inside every step, on states of the manifold."""
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..observables.reactions import Exerting
 from ..observables.state import RememberingState
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
+from .event_groups import Group, Member, States
 from .tolerances import FAST_TURN, LEAST_TIME, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
 
 # Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp.
@@ -143,6 +145,18 @@ class Inside:
             known.update(found)
         return [known[t] for t in times]
 
+    def levels(self, times):
+        """The same as an array (k, 3, n), NaN where there is none; not kept."""
+        ends = times.size > 0 and times[-1] == self.t1
+        inside = times[:-1] if ends else times
+        found, status = self._reader(
+            inside, np.zeros(inside.size, int), self._block, self._log.charts, self._log.points
+        )
+        if status != Status.SUCCESS:
+            none = np.full_like(self._known[self.t0], np.nan)
+            return np.reshape([none if state is None else state for state in self.states(times)], (-1, *none.shape))
+        return np.concatenate((found, self._known[self.t1][None])) if ends else found
+
     def _read(self, times):
         rows = np.zeros(times.size, int)
         states, status = self._reader(times, rows, self._block, self._log.charts, self._log.points)
@@ -174,13 +188,22 @@ class Occurrence(NamedTuple):
     state: np.ndarray  # (3, n)
 
 
+@cache
+def _signs(n):
+    """Random signs (3, 3, n)."""
+    return np.random.default_rng(0).choice([-1.0, 1.0], (3, 3, n))
+
+
 class Track:
     """What is known of one function up to the last step's end."""
 
-    def __init__(self, value):
+    def begin(self, t, value, has_sign):
+        """Take the value at t, the start of a run; has_sign: whether it is no rounding of zero where it is positive."""
         self.value = self.end = value  # at that time, and at the end of the present step
         self.sign = 0.0  # the last it had; 0 for none yet
         self.significant = None  # time and value at which it had that sign
+        if has_sign and value != 0.0:
+            self.sign, self.significant = math.copysign(1.0, value), (t, value)
         self.zero = None  # time of the last zero, if it has had no sign since
         self.passed = self.pending = False  # that zero is a start within rounding; may become an event on being left
         self.noise = 0.0  # rounding error of the values, once measured
@@ -196,8 +219,8 @@ class Watch:
         The time up to which events have been searched.
     """
 
-    def __init__(self, events, packed, reader, start):
-        self.events, self.packed = events, packed
+    def __init__(self, events, packed, reader, start, resume=None):
+        self.events, self.packed, self.resume, self.begins_again = events, packed, resume, False
         self.start = self.t = start
         self.state = self.memory = None  # at t, and what is remembered of it: joints' angles, and what forces do
         self.angles = handles_of(packed).count
@@ -206,7 +229,14 @@ class Watch:
         self.list = [[] for _ in events]
         rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
         self._p = rigid[:, None] + np.arange(3, 7)
-        self._signs = np.random.default_rng(0).choice([-1.0, 1.0], (3, 3, packed.system.bodies[:, 1].sum()))
+        self._n = int(packed.system.bodies[:, 1].sum())
+        groups = {}  # numbers of events, by the function that evaluates them together
+        for i, event in enumerate(events):
+            if isinstance(event.function, Member):
+                groups.setdefault(event.function.over, []).append(i)
+        self._groups = [Group(over, events, numbers) for over, numbers in groups.items()]
+        self._members = [i for numbers in groups.values() for i in numbers]
+        self._single = [i for i in range(len(events)) if i not in set(self._members)]
         self.read_by(reader)
 
     def read_by(self, reader):
@@ -228,19 +258,18 @@ class Watch:
             status = memory.advance(log, -1)
             if not run.numbers.begun:
                 return status, ""
-            self.state, self.memory = run.now.copy(), run.remembered.copy()
-            self._note_start()
-            if self.tracks is None:
-                try:
-                    self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
-                except EventFailed as failure:
-                    raise InvalidArgument(f"events: {failure}") from failure.__cause__
-                for event, track in zip(self.events, self.tracks, strict=True):
-                    if event.exact and track.value > 0.0:
-                        track.sign, track.significant = 1.0, (self.t, track.value)
+            try:
+                self._begin(run, self.tracks is None)
+            except EventFailed as failure:
+                raise InvalidArgument(f"events: {failure}") from failure.__cause__
         stiff = run.numbers.stiff
         # One step at a time, searched before the next one
         for _ in range(most):
+            if self.begins_again:
+                status, reason = self._begin_again(memory, log)
+                if status != Status.SLICE_DONE:
+                    return status, reason
+                continue  # it has written an output
             done = run.numbers.steps
             status = memory.advance(log, 1)
             if run.numbers.steps > done:
@@ -248,31 +277,79 @@ class Watch:
                     last = self._search_step(run, log)
                 except EventFailed as failure:
                     return Status.EVENT_FAILED, str(failure)
-                if last is not None:
+                if last is not None and not self._is_resumed(memory, last):
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
+                status = Status.SLICE_DONE if self.begins_again else status
+                if self.begins_again and log.t_eval.size:  # outputs of the slice may have to be taken back
+                    status, reason = self._begin_again(memory, log)
+                    if status != Status.SLICE_DONE:
+                        return status, reason
             full = run.numbers.chart_rows + 2 >= len(log.charts)
             if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
         return status, ""
 
+    def _begin(self, run, anew):
+        """Take the values at the start of a run, or where it begins `anew` after a jump."""
+        self.state, self.memory = run.now.copy(), run.remembered.copy()
+        self._note_start()
+        if not anew:
+            return
+        self.tracks = self.tracks or [Track() for _ in self.events]
+        for group in self._groups:
+            group.begin(self._sample(group, np.array([self.t]), self.state[None])[0])
+        for i in self._single:
+            self.tracks[i].begin(self.t, self._value(i, self.t, self.state), False)
+
+    def _is_resumed(self, memory, last):
+        """Whether the run goes on from the event that ends it, in the same memory, with other velocities."""
+        run, is_member = memory.run, isinstance(self.events[last.index].function, Member)
+        if self.resume is None or not is_member or not memory.begins_again or last.t >= run.clock.t_end:
+            return False
+        self.begins_again = self.resume(last.t, run, [i for i in self._members if self.list[i]])
+        return self.begins_again
+
+    def _begin_again(self, memory, log):
+        """Begin the run again where it is; the Status, and what there is to say of it."""
+        run, t = memory.run, memory.run.clock.t
+        self.begins_again, self.start = False, t
+        for i in self._members:
+            self.list[i].clear()
+        status = memory.begin_again(log)
+        if not run.numbers.begun:
+            run.numbers.begun = 1  # there is a run so far
+            return status, ""
+        try:
+            self._begin(run, True)
+        except EventFailed as failure:
+            return Status.EVENT_FAILED, str(failure)
+        return status, ""
+
     def saved(self):
         """What is known and found between two steps: numbers, and arrays by name."""
+        for group in self._groups:
+            group.lend_all(self.tracks, self.t)
         found = [each for mine in self.list for each in mine]
         numbers = {"t": self.t, "tracks": [vars(track) for track in self.tracks], "found": [each[:2] for each in found]}
+        numbers |= {"start": self.start, "begins_again": self.begins_again}
         states = np.array([each.state for each in found]).reshape(-1, *self.state.shape)
         return numbers, {"watch.state": self.state, "watch.memory": self.memory, "watch.found": states}
 
     def restore(self, numbers, arrays):
         """As it was when it was saved."""
         self.t, self.state, self.memory = numbers["t"], arrays["watch.state"], arrays["watch.memory"]
-        demand(self.state.shape == (3, self._signs.shape[2]) and len(self.memory) >= self.angles, "the state of events")
-        self.tracks = [Track(0.0) for _ in self.events]
+        self.start, self.begins_again = float(numbers["start"]), bool(numbers["begins_again"])
+        demand(self.state.shape == (3, self._n) and len(self.memory) >= self.angles, "the state of events")
+        self.tracks = [Track() for _ in self.events]
         for track, known in zip(self.tracks, numbers["tracks"], strict=True):
+            track.begin(0.0, 0.0, False)
             if known["significant"] is not None:
                 t, value = map(float, known["significant"])
                 known = known | {"significant": (t, value)}
             demand_numbers(known | {"significant": None}, vars(track), ("significant", "zero"))
             vars(track).update(known)
+        for group in self._groups:
+            group.take_all(self.tracks)
         self.list = [[] for _ in self.events]
         for (t, index), state in zip(numbers["found"], arrays["watch.found"], strict=True):
             demand(is_count(index), "the number of an event")
@@ -298,7 +375,19 @@ class Watch:
         return RememberingState.of(self.packed, self.memory[self.angles :], anchor, t, *parts, None)
 
     def _value(self, i, t, state):
-        return self.events[i].value(t, self._instant(t, state))
+        event = self.events[i]
+        if isinstance(event.function, Member):
+            over, which = event.function.over, event.function.which
+            return float(over(self._states(np.array([t]), state[None]))[0, which])
+        return event.value(t, self._instant(t, state))
+
+    def _states(self, times, levels):
+        """What groups are given: times t (k,), levels (k, 3, n)."""
+        return States(times, levels, self.memory[self.angles :], lambda: self._instants(times, levels).angles)
+
+    def _sample(self, group, times, levels):
+        """Values (k, members) of a group."""
+        return group.over(self._states(times, levels))[:, group.which]
 
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
@@ -313,7 +402,18 @@ class Watch:
     def _locate(self, run, log, step):
         found, failure, end = [], None, step.t1
         step.degree = self._degree(step)
-        for i in range(len(self.events)):
+        members = {}
+        for group in self._groups:
+            first, alone = group.search(step, lambda times, group=group: self._sample(group, times, step.levels(times)))
+            if first is not None:
+                i, t = first
+                t = self._beyond(i, step, t, ROOT * abs(t), end, self.events[i].direction)
+                found.append(Occurrence(t, i, step.at(t)))
+                end = min(end, t)
+            for i in alone:
+                members[group.numbers[i]] = group, i
+                group.lend(self.tracks[group.numbers[i]], i, step.t0)
+        for i in sorted([*self._single, *members]) if members else self._single:
             # Times that bracket the zeros of event i
             points, failed = self._points(i, step, end)
             if failed is not None:
@@ -324,6 +424,8 @@ class Watch:
             except EventFailed as failed:
                 mine, failure, end = [], failed, min(end, failed.t)
             found += mine
+            if i in members:
+                members[i][0].take_back(self.tracks[i], members[i][1])
             # The run ends with the event that reaches its limit
             last = self.events[i].limit - len(self.list[i])
             if len(mine) >= last:
@@ -334,7 +436,8 @@ class Watch:
                 break
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
-                run.remembered[: self.angles] = self._instant(each.t, each.state).angles
+                if self.angles:
+                    run.remembered[: self.angles] = self._instant(each.t, each.state).angles
                 self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
                 return each
@@ -348,10 +451,10 @@ class Watch:
         track, good, failure = self.tracks[i], [step.t0], None
 
         def sample(times):
-            values = np.full(times.size, np.nan)
-            states, over = step.states(times), getattr(self.events[i].function, "over", None)
-            if over is not None and states and not any(state is None for state in states):
-                return over(self._instants(times, np.array(states)))
+            values, function = np.full(times.size, np.nan), self.events[i].function
+            if isinstance(function, Member):
+                return function.over(self._states(times, step.levels(times)))[:, function.which]
+            states = step.states(times)
             for k, (t, state) in enumerate(zip(times.tolist(), states, strict=True)):
                 if state is not None:
                     values[k] = self._value(i, t, state)
@@ -378,8 +481,8 @@ class Watch:
 
     def _degree(self, step):
         """The degree that the interpolant and the fastest turn of a body ask for."""
-        squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
-        turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
+        pd = np.array([step.at(t)[1, self._p] for t in (step.t0, step.t1)])
+        turn = 2.0 * math.sqrt(np.einsum("kbi,kbi->kb", pd, pd).max(initial=0.0)) * (step.t1 - step.t0)
         return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
 
     def _walk(self, i, step, points):
@@ -421,7 +524,7 @@ class Watch:
             # Rounding of the state, in three random directions
             state, value = step.at(t), self._at(i, step, t)
             size = SHAKEN * np.abs(state).max(axis=1, keepdims=True)
-            shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
+            shaken = [self._value(i, t, state + size * sign) for sign in _signs(self._n)]
         except EventFailed:
             return 0.0
         return NOISE * max(abs(each - value) for each in shaken)
@@ -453,14 +556,14 @@ class Watch:
         if a == 0.0 or (a < 0.0) == (b < 0.0):
             return [Occurrence(t0, i, step.at(t0))]
         root = self._between(i, step, (t0, a), (t1, b))
-        at_start = not self.events[i].exact and self._is_start(i, step, root, a)
+        at_start = not self.events[i].exact and self._is_start(i, step, root, (t0, a))
         return [] if at_start else [Occurrence(root, i, step.at(root))]
 
     def _is_start(self, i, step, t, before):
-        """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before."""
+        """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before, there."""
         if t - self.start <= START_ZERO * max(abs(self.start), step.t1 - step.t0):
             return True
-        return step.t0 == self.start and abs(before) <= self._shaken(i, step, step.t0)
+        return before[0] == self.start and abs(before[1]) <= self._shaken(i, step, self.start)
 
     def _between(self, i, step, first, last):
         """Where event i changes its sign between two times with values."""
@@ -476,10 +579,15 @@ class Watch:
         # Brent's method, as near as numbers of this size allow
         least = max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
         root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
-        shift = least + ROOT * abs(root)
-        # a run that continues from a terminal event must not find it again
+        return self._beyond(i, step, root, least + ROOT * abs(root), t1, b)
+
+    def _beyond(self, i, step, root, shift, t1, b):
+        """A root, or a time after it up to t1 where event i has the sign of b.
+
+        A run that continues from a terminal event must not find it again.
+        """
         ends, side = self.events[i].limit < math.inf and not self.events[i].exact, math.copysign(1.0, b)
-        while ends and root + shift < t1 and side * value(root) <= 0.0:
+        while ends and root + shift < t1 and side * self._at(i, step, root) <= 0.0:
             root, shift = root + shift, 2.0 * shift
         return root
 

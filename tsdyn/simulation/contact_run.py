@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.contact_rows import ReactionWorkspace
+from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
+from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
+from ..elements.unilateral import contacts_of
 from ..errors import (
     InconsistentState,
     InvalidArgument,
@@ -18,25 +23,37 @@ from ..errors import (
     Status,
     TsdynError,
 )
+from ..integrators import DOP853
 from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS
-from ..observables import reactions
+from ..model.handles import handles_of
+from ..observables import diagnostics, reactions
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
+from ..runs.event_groups import Member
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import damaged, demand, floats, listed
-from .phase_scenes import NAMED, has_contacts, phase_of
+from .phase_scenes import NAMED, first_row_of, gaps_of, has_contacts, phase_of
 from .phases import PhasePieces, Phases
 from .progress import reporter, silent
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
-from .tolerances import CREEPING, ENDLESS, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
+from .tolerances import (
+    CREEPING,
+    ENDLESS,
+    EVENTS_JUDGED,
+    MOST_AT_AN_INSTANT,
+    MOST_PINNED,
+    PENETRATION,
+    ROUNDED,
+    TOUCHING,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -54,7 +71,7 @@ if TYPE_CHECKING:
 
 
 class _Closing:
-    """The gap of an open contact, as an event function.
+    """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
     however soon it comes.
@@ -62,58 +79,129 @@ class _Closing:
     Parameters
     ----------
     gaps : Gaps
-    i : int
-    start : tuple
-        Time, gap and rate where the contact has opened with a rate; else empty.
+    opened : dict
+        Of contacts that have opened with a rate: time, gap and rate there, by their numbers.
     """
 
-    def __init__(self, gaps, i, start):
-        self.gaps, self.i, self.start = gaps, i, start
+    def __init__(self, gaps, opened):
+        self.gaps = gaps
+        self.open(opened)
+
+    def open(self, opened):
+        """Take other contacts that have just opened."""
+        self.which, self.start = list(opened), tuple(zip(*opened.values(), strict=True))
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        return self(states.t, states)
+        """Values (k, count) of `States`."""
+        values = self.gaps.values(states.t, states.levels, states.counted)
+        if self.which:
+            begun, first, rate = map(np.array, self.start)
+            since = states.t[:, None] - begun
+            later = since > 0.0
+            divided = (values[:, self.which] - first) / np.where(later, since, 1.0)
+            values[:, self.which] = np.where(later, divided, rate)
+        return values
 
-    def __call__(self, t, state):
-        """The value at a state, or values at several."""
-        gap = self.gaps.value(self.i, state.q, state.angles if self.gaps.are_counted else None)
-        if not self.start:
-            return gap
-        begun, first, rate = self.start
-        since = np.where(t > begun, t - begun, 1.0)
-        return np.where(t > begun, (gap - first) / since, rate)
+
+class _Loads:
+    """Multipliers and normal loads of a phase, shared by its events."""
+
+    def __init__(self, packed):
+        self.packed, self._last = packed, (None, None)
+
+    def at(self, states):
+        """Multipliers (k, m), NaN of redundant rows, and normal loads (k, frictions) of one state or of several."""
+        t, q, qd, qdd = np.atleast_1d(states.t), *map(np.atleast_2d, (states.q, states.qd, states.qdd))
+        key, (last, found) = (t.tobytes(), q.tobytes()), self._last
+        if key != last:
+            memory = np.tile(states.memory, (t.size, 1))
+            wide = reactions.with_normal_loads(self.packed, t, q, qd, qdd, memory)
+            found = reactions.multipliers(self.packed, t, q, qd, qdd, wide), wide[:, memory.shape[1] :]
+            self._last = key, found
+        return found
 
 
 class _Leaving:
-    """The reaction of a closed contact, positive where it pushes, as an event function.
+    """The reactions of closed contacts, positive where they push, as event functions.
 
     Parameters
     ----------
     packed : Packed
         Of the phase.
-    row : int
-    sign : float
-        Of the gap over Phi.
-    seen : dict
-        What is shared with the other contacts of the phase.
+    rows : list of int
+    signs : list of float
+        Of the gaps over Phi.
     """
 
-    def __init__(self, packed, row, sign, seen):
-        self.packed, self.row, self.sign, self.seen = packed, row, sign, seen
+    def __init__(self, packed, rows, signs):
+        self.packed, self.rows, self.signs = packed, rows, np.array(signs)
+
+    @cached_property
+    def workspace(self):
+        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
+        return None if self.packed.system.normals.size else ReactionWorkspace(self.packed)
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        key = states.t.tobytes(), states.q.tobytes()
-        if key not in self.seen:  # those of other contacts at the same times are found with it
-            self.seen.clear()
+        """Values (k, closed) of `States`."""
+        if self.workspace is not None:
+            lam = self.workspace.multipliers(states.t, states.levels, states.memory)
+        else:
             memory = np.tile(states.memory, (states.t.size, 1))
-            levels = states.t, states.q, states.qd, states.qdd, memory
-            self.seen[key] = reactions.multipliers(self.packed, *levels)
-        return -self.sign * self.seen[key][:, self.row]
+            lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        return -self.signs * lam[:, self.rows]
 
-    def __call__(self, t, state):
-        """The value at one state."""
-        return -self.sign * state.multipliers[self.row]
+
+class _Breaking:
+    """What the reactions of frictions that stick are below their bounds, as event functions.
+
+    Parameters
+    ----------
+    packed : Packed
+        Of the phase.
+    units : list of friction_problem.Unit
+    """
+
+    def __init__(self, packed, units):
+        self.packed, self.units = packed, units
+
+    def over(self, states):
+        """Values (k, units) of states at k times."""
+        memory = np.tile(states.memory, (states.t.size, 1))
+        motion = states.t, states.q, states.qd, states.qdd
+        wide = reactions.with_normal_loads(self.packed, *motion, memory)
+        lam = reactions.particular(reactions.multipliers(self.packed, *motion, wide))
+        values = np.zeros((states.t.size, len(self.units)))
+        for unit, value in zip(self.units, values.T, strict=True):
+            share, bound = unit.bound
+            value += bound - np.linalg.norm(lam[:, self.packed.derived.holds[unit.slot]], axis=1)
+            if share:
+                value += share * wide[:, memory.shape[1] + unit.load.normal]
+        return values
+
+
+class _Slowing:
+    """The velocities of frictions, along the directions in which they slide, as event functions.
+
+    In a plane half of the speed is taken off: where the direction has turned by 60 degrees, it is taken anew. The
+    velocity of one that has just begun to slide is divided by the time since.
+
+    Parameters
+    ----------
+    frictions : Frictions
+    begun : dict
+        Of those that have just begun to slide: time and acceleration there, by their numbers.
+    """
+
+    def __init__(self, frictions, begun):
+        self.frictions, self.begun = frictions, begun
+
+    def over(self, states):
+        """Values (k, frictions) of states at k times."""
+        values = self.frictions.speeds(states.q, states.qd, states.memory)
+        for i, (begun, first) in self.begun.items():
+            later = states.t > begun
+            values[:, i] = np.where(later, values[:, i] / np.where(later, states.t - begun, 1.0), first)
+        return values
 
 
 def demand_apart(gaps, q, angles, tol):
@@ -130,15 +218,22 @@ def demand_apart(gaps, q, angles, tol):
 
 @dataclass
 class Modes:
-    """The modes of the units of a scene: numbers of gaps."""
+    """The modes of the units of a scene: numbers of gaps, and of frictions. All others are open, or slide."""
 
     closed: list = field(default_factory=list)  # independent rows, with reactions
     idle: list = field(default_factory=list)  # closed by what others hold
     opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+    sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
+    blocked: list = field(default_factory=list)  # frictions without motion that others hold
+    begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
+
+    def same(self, other):
+        """Whether the units are in the same modes, whatever has just opened."""
+        return replace(self, opened={}) == replace(other, opened={})
 
     def saved(self):
         """Lists of numbers, for JSON: one for each field, of a dict its items."""
-        return [list(value.items()) if isinstance(value, dict) else value for value in vars(self).values()]
+        return [plain(value) for value in vars(self).values()]
 
     @classmethod
     def of(cls, record):
@@ -147,9 +242,18 @@ class Modes:
         return cls(*(dict(known) if isinstance(value, dict) else known for (_, value), known in pairs))
 
 
+def plain(value):
+    """A value of modes as JSON has it."""
+    if isinstance(value, dict):
+        return [[plain(key), plain(each)] for key, each in value.items()]
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
 # Numbers of a run that a checkpoint holds as they are, and the names of its arrays
-KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", "again", "written", "totals"
-PREFIX = "phase "
+KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", "replaced", "written", "totals"
+START, PREFIX = ("q", "qd", "remembered"), "phase "
 # What a phase raises that can't begin, after others: whose fault it is
 FAILURES = {
     InvalidArgument: Status.EVENT_FAILED, InvalidForce: Status.SAMPLING_FAILED, SingularConfiguration: Status.SINGULAR,
@@ -183,35 +287,36 @@ class _ContactRun:
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        gaps, self.count = self.gaps, kept.handles.count
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
-        demand_apart(gaps, self.q, self.remembered[: self.count], options.initial_tol)
+        demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
         self.rest = self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
         self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
         self.reason, self.methods, self.at_once, self.judged = "", [], 0, (self.t, 0)
         self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
-        self.goes_on = False  # whether a checkpoint is gone on with
-        self.again, self.written = False, {}  # whether the phase is by the other method; rows in the archive before it
+        self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
+        self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
 
     def _take_scene(self, scene):
         """What follows from the scene alone, and makes the scenes of its phases."""
-        self.scene, self.gaps, self.modes = scene, Gaps(scene.packed), Modes()
+        self.scene, self.gaps, self.frictions, self.modes = scene, gaps_of(scene), Frictions(scene), Modes()
+        self.count = handles_of(scene.packed).count
 
     def _demand_served(self, kept):
-        if kept.rough:
+        rough = [load.force.title for load in kept.packed.loads if load.normal >= 0 and load.force.slips]
+        if rough and contacts_of(self.scene._added):
             raise InvalidArgument(
-                f"friction that depends on reactions ({', '.join(kept.rough)}) doesn't serve scenes with contacts yet: "
-                "use friction of given magnitude, such as ViscousFriction."
+                f"regularised friction that depends on reactions ({', '.join(rough)}) doesn't serve scenes with "
+                "contacts: leave out slip_velocity, for the exact law."
             )
 
     def run(self):
         """Run to the end; the `Task` of the last phase, of the whole scene, and the `Outcome` of all."""
-        began, task, status = clock(), None, None if self.goes_on else self.begin()
+        began, task, status = clock(), None, None if self.known else self.begin()
         try:
             while status is None:
                 task, outcome = self._phase()
@@ -240,7 +345,8 @@ class _ContactRun:
     def begin(self):
         """Impact and closed contacts at the start; the Status if there is no way on, else None."""
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
-        return self._settle(touching, ())
+        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
+        return self._settle(touching, ()) or self._settle_frictions(Modes(), ())
 
     def check(self):
         """Raise what a run raises before its first step; its `Task`, of the whole scene."""
@@ -261,33 +367,45 @@ class _ContactRun:
 
     def _phase(self):
         """Run the next phase: its task and outcome."""
-        phase, names = self._scene(), self._names()
-        kind = self.phases.kind(phase.packed, self.modes.saved())
+        phase, names, known = self._scene(), self._names(), self.known
         run, call = self._run_of(phase)
+        still = self._still(phase)
+        if still.size == self.q.size and self.options.method is None:
+            run = run._by(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
         run._prepare_kernels(True)
         self._enter_archive()
         while True:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
+            if known is not None:  # the checkpoint is of an event later on
+                self.t, self.q, self.qd, self.remembered = known
+            other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(), archive=self.archive, sampling=self._sampling(task.prepared),
+                max_steps=self._steps_left(), resume=None if other else self._resume, archive=self.archive,
+                sampling=self._sampling(task.prepared),
             )  # fmt: skip
-            other = self.instead(task, Status.STEP_COLLAPSED) if self.again else None
-            if other is None:
+            self.names, self.packed, self.settled, self.again, self.known = names, phase.packed, None, [], None
+            if self.archive is not None:
+                self.archive.resting = still, resting[still]
+            if not (other and self.replaced):
                 outcome = self.run_task(task, phase, self.options.initial_tol)
                 other = self.instead(task, outcome.status)
             if other is None:
-                self.phases.add(kind, self.t, self.rest, outcome.end.reached, names)
+                outcome = pinned(outcome, resting, still)
+                if self.settled is None:
+                    self._end_phase(outcome.end.reached)
                 said = (outcome.method or repr(task.method)).split(" and ")
                 self.methods += [method for method in said if method not in self.methods]
                 return task, outcome
-            run, self.again = run._by(other), True
+            run, self.replaced = run._by(other), True
             if self.archive is not None and self.archive.resumed is None:
                 self.archive.go_back(self.written)
 
     def _enter_archive(self):
-        """Let the archive know that a phase begins; readers, and a checkpoint that is due."""
+        """Note how the run of a phase begins; let the archive know, and readers, and write a checkpoint that is due."""
         archive = self.archive
+        if self.known is None:
+            self.first = self.t, self.q, self.qd, self.remembered
         if archive is None:
             return
         archive.before = self.saved
@@ -299,8 +417,8 @@ class _ContactRun:
     def _sampling(self, kept):
         """The sampled loads of a phase, which go on from those of the one before."""
         if kept.sampled:
-            known = self.sampling
-            self.sampling = known.of(kept) if known else Sampling(kept, self.goes_on or self.call.state is not None)
+            goes_on = self.known is not None or self.call.state is not None
+            self.sampling = self.sampling.of(kept) if self.sampling else Sampling(kept, goes_on)
         return self.sampling
 
     def _run_of(self, phase):
@@ -308,42 +426,91 @@ class _ContactRun:
         call = RunCall((self.t, self.span[1]))
         return self.run_of(phase, replace(self.options, events=None), call), call
 
+    def _end_phase(self, t):
+        self.phases.add(self.phases.kind(self.packed, self._record()), self.t, self.rest, t, self.names)
+
+    def _record(self):
+        """What the scene of the present phase is made of, for files."""
+        return [self.modes.saved(), self.remembered.tolist()]
+
+    def _recorded_scene(self, record):
+        """The scene that such a record tells."""
+        self.modes, self.remembered = Modes.of(record[0]), np.array(record[1], float)
+        demand(self.remembered.shape == (self.count + self.scene.system.memory.size,), "what is remembered")
+        return self._scene()
+
+    def _resume(self, t, run, numbers):
+        """After events of these numbers: whether the run of the phase goes on, with other velocities.
+
+        It does where the same gaps are closed as before.
+        """
+        self._end_phase(t)
+        before = self.modes
+        self.t, (self.q, self.qd, _), self.remembered = t, run.now.copy(), run.remembered.copy()
+        remembered = self.remembered
+        self.settled = (self._transit([self.watched[i] for i in numbers]),)
+        changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
+        if self.settled[0] is not None or changed:
+            return False
+        run.now[1], self.settled = self.qd, None
+        self.closing.open(self.modes.opened)
+        self.again.append(t)
+        return True
+
     def _scene(self):
         """The scene of the present modes."""
-        return phase_of(self.scene, [self.gaps.list[i].side.row for i in self.modes.closed])
+        return phase_of(self.scene, self._closed_rows(), [self._hold(i, r) for i, r in self.modes.sticking.items()])
 
-    def scene_of(self, record):
-        """The scene of modes as they are saved."""
-        present, self.modes = self.modes, Modes.of(record)
-        scene, self.modes = self._scene(), present
-        return scene
+    def _closed_rows(self):
+        return [self.gaps.list[i].side.row for i in self.modes.closed]
+
+    def _hold(self, i, rank):
+        """The rows that hold a friction, with the numbers that the run remembers."""
+        unit = self.frictions.units[i]
+        places = [self.count + np.array(unit.held(k)) for k in range(rank)]
+        return Hold(unit, rank, self.remembered[np.array(places, int)])
 
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
-        return tuple(dict.fromkeys(self.gaps.names[i] for i in held))
+        names = [self.gaps.names[i] for i in held] + [self.frictions.names[i] for i in sorted(self.modes.sticking)]
+        return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""
         pairs = zip(self.users, self.counts, strict=True)
         found = [event._replace(limit=event.limit - count) for event, count in pairs]
-        watches = list(self._watches(phase.packed))
+        watches = list(self._watches(phase))
         self.watched = [None] * len(found) + [unit for unit, _ in watches]
         return found + [event for _, event in watches]
 
-    def _watches(self, packed):
-        """Yield the units that may end a phase, each with its event."""
-        gaps, modes, pushes = self.gaps, self.modes, {}
-        first = {id(member.constraint): member.rows.start for member in packed.members}
+    def _watches(self, phase):
+        """Yield the units that may end a phase, gaps and then frictions, each with its event."""
+        gaps, frictions, modes, packed = self.gaps, self.frictions, self.modes, phase.packed
+        first = first_row_of(packed)
+        sides = [gaps.list[i].side for i in modes.closed]
+        leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
+        self.closing = _Closing(gaps, modes.opened)
         for i in range(gaps.count):
             if i in modes.idle:
                 continue
-            row, sign = gaps.list[i].side.row, gaps.list[i].side.sign
-            if i in modes.closed:
-                event = _Leaving(packed, first[id(row)], sign, pushes)
-            else:
-                event = _Closing(gaps, i, modes.opened.get(i, ()))
-            yield i, Event(event, gaps.names[i], 1.0, -1.0, i not in modes.closed)
+            is_open = i not in modes.closed
+            function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
+            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
+        sticking = list(modes.sticking)
+        breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
+        slowing = _Slowing(frictions, modes.begun).over
+        for i in range(frictions.count):
+            if i in modes.blocked:
+                continue
+            function = Member(breaking, sticking.index(i)) if i in modes.sticking else Member(slowing, i)
+            yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
+
+    def _still(self, phase):
+        """Coordinates of the bodies that rest where frictions stick."""
+        if not self.modes.sticking or self.q.size > MOST_PINNED:
+            return np.zeros(0, int)
+        return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
 
     def _times(self):
         left = self.times[self.taken :]
@@ -356,7 +523,7 @@ class _ContactRun:
     def _reporting(self):
         if self.report is silent:
             return silent
-        (start, end), t, done = self.span, self.t, self.steps
+        (start, end), t, done = self.span, self.first[0], self.steps
 
         def report(fraction, at=0.0, steps=0):
             if fraction is not None:
@@ -368,43 +535,60 @@ class _ContactRun:
 
     def _after(self, outcome):
         """Take the end of a phase; the Status of the run, None if it goes on."""
-        self.end, gaps = outcome.end, self.gaps
-        end, archive, self.reason, self.again = self.end, self.archive, outcome.reason, False
+        self.end, archive, self.replaced = outcome.end, self.archive, False
+        end = self.end
         self.steps += end.counts["steps"]
         times, *states = outcome.events
         for i, mine in enumerate(list(zip(times, *states, strict=True))[: len(self.users)]):
             self.found[i].append(mine)
             self.counts[i] += len(mine[0])
-        self.t, (self.q, self.qd, _) = end.reached, (x.copy() for x in end.last)
-        self.remembered = end.remembered
         fired = [i for i, at in zip(self.watched, times, strict=True) if i is not None and at.size]
-        goes_on = outcome.status is Status.EVENT and fired and self.t < self.span[1]
+        ends = outcome.status is Status.EVENT and bool(fired)
+        goes_on = ends and end.reached < self.span[1]
         count = len(outcome.rows) if archive is None else archive.counts["outputs"] - self.written["outputs"]
-        if not self.per_step and goes_on and count and self.times[self.taken + count - 1] == self.t:
+        if not self.per_step and goes_on and count and self.times[self.taken + count - 1] == end.reached:
             count -= 1  # the output of the next phase counts
-            outcome = outcome._replace(rows=outcome.rows[:count])
-            if archive is not None:
-                archive.go_back({**archive.counts, "outputs": self.written["outputs"] + count})
         self.taken += count
-        self.phases.rows.append(count)
         if archive is None:
-            self.parts.append(outcome)
+            if self.again and outcome.trajectory is not None:
+                outcome.trajectory.begin_at(self.again)
+            self.parts.append(outcome._replace(rows=outcome.rows[:count]))
         else:
+            archive.go_back({**archive.counts, "outputs": self.written["outputs"] + count})
             self.totals = summed([end.counts] if self.totals is None else [self.totals, end.counts])
-        values = gaps.at(self.q, self.remembered[: self.count])
-        deep = [i for i in range(gaps.count) if values[i] < -PENETRATION * self.length]
-        if deep:
-            self.reason = (
-                f"Penetration was not noticed: {listed([gaps.names[i] for i in deep], NAMED)}. Give a max_step."
-            )
+        if self.settled is not None:  # within the run of the phase
+            return self.settled[0]
+        self.t, (self.q, self.qd, _), self.remembered = end.reached, (x.copy() for x in end.last), end.remembered
+        if goes_on:
+            return self._transit(fired)
+        self.reason = outcome.reason
+        if self._is_deep():
             return Status.CONTACT_FAILED
-        if not goes_on:
-            return Status.SUCCESS if outcome.status is Status.EVENT and fired else outcome.status
-        self.reason = ""
-        if self._is_stuck():
+        return Status.SUCCESS if ends else outcome.status
+
+    def _is_deep(self):
+        """Whether contacts penetrate; says so."""
+        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
+        deep = self.gap < -PENETRATION * self.length
+        if not deep.any():
+            return False
+        found = listed([self.gaps.names[i] for i in np.flatnonzero(deep)], NAMED)
+        self.reason = f"Penetration was not noticed: {found}. Give a max_step."
+        return True
+
+    def _transit(self, fired):
+        """From one phase to the next one, after events of the units `fired`; the Status if there is no way on."""
+        self.reason, qd = "", self.qd
+        if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        near = [i for i in range(gaps.count) if values[i] <= TOUCHING * self.length]
-        return self._settle(sorted({*near, *fired, *self.modes.closed, *self.modes.idle}), fired)
+        (near,) = (self.gap <= TOUCHING * self.length).nonzero()
+        count, before = self.gaps.count, self.modes
+        hit = [i for i in fired if i < count]
+        status = self._settle(sorted({*near.tolist(), *hit, *before.closed, *before.idle}), hit)
+        if self.qd is not qd:
+            energy = diagnostics.kinetic_energy(self.scene.system, np.stack((self.q, self.q)), np.stack((qd, self.qd)))
+            self.phases.gain(energy[1] - energy[0])
+        return status or self._settle_frictions(before, [i - count for i in fired if i >= count])
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -412,7 +596,7 @@ class _ContactRun:
         length = self.t - self.phases.starts[-1]
         self.at_once = self.at_once + 1 if length <= 16.0 * EPS * max(abs(self.t), EPS) else 0
         self.judged = since, count + 1
-        if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count:
+        if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count + self.frictions.count:
             self.reason = f"There are {self.at_once} events at t = {self.t:.9g} s."
             return True
         if count + 1 >= EVENTS_JUDGED:
@@ -424,12 +608,12 @@ class _ContactRun:
 
     def _settle(self, touching, fired):
         """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
-        slots, values = self.remembered[self.count :], self.gaps.at(self.q, self.remembered[: self.count])
+        slots, values = self.remembered[self.count :], self.gap
         before, self.modes, self.rest = self.modes, Modes(), self.t
         if not touching:
             return None
         try:
-            inertia = Inertia(self.gaps, self.t, self.q, self.qd, slots)
+            inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
             noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
             if noise:  # a gap that closes with a rate of rounding
@@ -446,6 +630,71 @@ class _ContactRun:
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         return None
+
+    def _settle_frictions(self, before, fired):
+        """Which frictions stick; the Status if there is no way on, else None."""
+        frictions, count = self.frictions, self.count
+        if not frictions.count:
+            return None
+        place, (v, sizes, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
+        self.remembered, resting, guess = self.remembered.copy(), [], {}
+        memory = self.remembered[count:]  # a part of it
+        for i, unit in enumerate(frictions.units):
+            speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
+            if i in before.blocked and memory[unit.way].any():
+                guess[i] = place.read(i, memory)
+            if speed <= max(AT_REST * sizes[0, i], 0.0 if signed else STOPPED) or (signed and i in fired):
+                resting.append(i)
+                memory[unit.way] = 0.0
+            else:
+                memory[unit.way] = place.written(i, v[0, i] / speed)
+        if not resting:
+            return None
+        try:
+            rest, ranks = self._rest(place, before, resting, guess, fired)
+        except NoRest as error:
+            names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
+            self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
+            return Status.CONTACT_FAILED
+        for i, way in rest.ways.items():
+            memory[frictions.units[i].way] = place.written(i, way)
+        self.modes.sticking = {i: ranks[i] for i in rest.sticking}
+        self.modes.blocked = sorted([*rest.blocked, *(i for i in resting if not ranks[i])])
+        self.modes.begun = {i: (self.t, rate) for i, rate in rest.rates.items()}
+        return None
+
+    def _rest(self, place, before, resting, guess, fired):
+        """The `Rest` of the frictions that are at rest, and how many rows hold each."""
+        units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
+        for i in resting:
+            ranks[i] = before.sticking.get(i, -1)
+            if ranks[i] < 0:
+                basis = place.basis(i, partial(self._motions_of, place))
+                ranks[i] = len(basis)
+                for k, numbers in enumerate(place.numbers(i, basis)):
+                    memory[np.array(units[i].held(k))] = numbers
+        free = [i for i in resting if ranks[i]]
+        phase = phase_of(self.scene, self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
+        rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
+        fresh = [i for i in free if i not in before.sticking]
+        if fresh:  # their rows hold to the last bit where they are
+            Phi = values_of(phase.packed, self.t, self.q, memory)
+            for i in fresh:
+                for k, row in enumerate(rows[i]):
+                    memory[units[i].held(k)[-1]] = Phi[row]
+        bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
+        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
+        return problem.settle({i: way for i, way in guess.items() if i in free}, fired), ranks
+
+    def _motions_of(self, place, i):
+        """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
+        unit = self.frictions.units[i]
+        hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
+        phase = phase_of(self.scene, self._closed_rows(), [hold])
+        memory = self.remembered[self.count :].copy()
+        for k in range(3):
+            memory[np.array(unit.held(k))] = hold.numbers[k]
+        return free_motions(phase.packed, self.t, self.q, memory, phase.packed.derived.holds[unit.slot])
 
     def _hit(self, inertia, touching, rates):
         """Jump of velocities at an impact; the rates (count,) afterwards."""
@@ -481,14 +730,14 @@ class _ContactRun:
 
     def _lowering(self, inertia, touching, qd, rates):
         """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""
-        opening = [i for i in touching if rates[i] > 0.0]
-        if not opening:
+        opening = np.zeros(self.gaps.count, bool)
+        opening[touching] = rates[touching] > 0.0
+        if not opening.any():
             return np.zeros(self.gaps.count)
         a = -settle(inertia, [i for i in touching if rates[i] == 0.0], qd).accelerations
-        rounding = EPS * np.maximum(self.length, ROUNDED * (np.abs(inertia.J) @ np.abs(self.q)))
+        rounding = EPS * np.maximum(self.length, ROUNDED * inertia.sizes(self.q))
         rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
-        mine = np.isin(np.arange(a.size), opening)
-        return np.where(mine & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
+        return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
 
     # The whole
 
@@ -508,7 +757,7 @@ class _ContactRun:
                 ChartLog([end.charts for end in ends]) if logs else None,
             ),
             PhasePieces([part.trajectory for part in parts]) if self.options.dense_output else None,
-            events, began, " and ".join(self.methods), (self.phases, self.phases.of_rows),
+            events, began, " and ".join(self.methods), self.phases,
         )  # fmt: skip
 
     # Checkpoints: what a run goes on with, where its present phase begins
@@ -517,7 +766,10 @@ class _ContactRun:
         """Numbers and arrays by name."""
         phases, arrays = self.phases.saved()
         numbers = {name: getattr(self, name) for name in KEPT} | {"modes": self.modes.saved(), "phases": phases}
-        arrays |= {"q": self.q, "qd": self.qd, "remembered": self.remembered}
+        starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
+        for where, (_, *parts) in starts.items():
+            arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
+        numbers["first"] = self.first[0]
         if self.end is not None:
             arrays |= {"last": self.end.last, "ended": self.end.remembered}
             numbers["reached"] = self.end.reached
@@ -530,15 +782,15 @@ class _ContactRun:
     def restore(self, numbers, arrays):
         """As it was when it was saved."""
         with damaged("the checkpoint"):
-            known, n, self.goes_on = numbers["phases"], self.q.size, True
-            arrays = _own(arrays)
+            known, n, arrays = numbers["phases"], self.q.size, _own(arrays)
             vars(self).update({name: known[name] for name in KEPT})
+            self.phases.restore(known["phases"], arrays, self._recorded_scene)
             self.modes = Modes.of(known["modes"])
-            self.phases.restore(known["phases"], arrays, self.scene_of)
-            shapes, self.q, self.qd = (n,), arrays["q"], arrays["qd"]
-            demand(self.q.shape == self.qd.shape == shapes, "the start of a phase")
-            demand(arrays["remembered"].shape == self.remembered.shape, "what is remembered")
-            self.remembered = arrays["remembered"]
+            starts = [[arrays[f"{where}{name}"] for name in START] for where in ("first.", "")]
+            for q, qd, memory in starts:
+                demand(q.shape == qd.shape == (n,) and memory.shape == self.remembered.shape, "the start of a phase")
+            self.known = self.t, *starts[1]
+            self.t, self.q, self.qd, self.remembered = self.first = known["first"], *starts[0]
             if "reached" in known:
                 demand(arrays["last"].shape == (3, n), "the end of a phase")
                 self.end = RunEnd(known["reached"], arrays["last"], arrays["ended"], self.totals, None, None)
@@ -548,7 +800,7 @@ class _ContactRun:
 
 def jumped(inertia, qd, which, before, e, p, law="newton"):
     """Velocities (n,) after impulses p (k,) of the gaps `which`, and the rates (count,) of all gaps then."""
-    change = inertia.free(inertia.J[which].T @ p)
+    change = inertia.pushed(which, p)
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = np.maximum(after[which], 0.0)  # but for rounding
     if law == "newton":  # without rounding where the impact acts
@@ -564,6 +816,35 @@ def held(inertia, qd, which, rates):
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = 0.0
     return qd + change, after
+
+
+class _Pinned:
+    """A trajectory with bodies that rest: to the last bit."""
+
+    def __init__(self, trajectory, q, still):
+        self.trajectory, self.q, self.still = trajectory, q, still
+        self.start, self.end, self.edges, self.anchors = (
+            trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
+        )  # fmt: skip
+
+    def __call__(self, t):
+        """As of a `Trajectory`."""
+        states, memory, status = self.trajectory(t)
+        states[:, 0, self.still], states[:, 1:, self.still] = self.q[self.still], 0.0
+        return states, memory, status
+
+
+def pinned(outcome, q, still):
+    """The outcome of a phase with bodies that rest at q (n,), to the last bit; still: their coordinates."""
+    if not still.size:
+        return outcome
+    n, last = q.size, outcome.end.last
+    if isinstance(outcome.rows, np.ndarray):  # else the archive has done so
+        outcome.rows[:, 1 + still] = q[still]
+        outcome.rows[:, 1 + n + still] = outcome.rows[:, 1 + 2 * n + still] = 0.0
+    last[0, still], last[1:, still] = q[still], 0.0
+    trajectory = outcome.trajectory and _Pinned(outcome.trajectory, q, still)
+    return outcome._replace(trajectory=trajectory)
 
 
 def begun(scene, t, state=None):
@@ -607,7 +888,7 @@ def phases_of(scene, numbers, arrays):
     """The `Phases` of a file, of a run of this scene; raises KeyError, TypeError or ValueError if they are none."""
     run, phases = object.__new__(_ContactRun), Phases(scene.packed)
     run._take_scene(scene)
-    phases.restore(numbers, arrays, run.scene_of)
+    phases.restore(numbers, arrays, run._recorded_scene)
     return phases
 
 
@@ -675,7 +956,7 @@ def impact(
         raise InvalidArgument(f"law must be 'newton' or 'poisson', got {law!r}.")
     if not has_contacts(scene):
         raise InvalidArgument("impact: the scene has no unilateral constraints, such as PlaneContact(unilateral=True).")
-    gaps, kept = Gaps(scene.packed), prepared(phase_of(scene, []))
+    gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
     q, qd = state_arrays(state, kept.n)
     t = float(getattr(state, "t", 0.0))
     memory = remembered(state, kept, t, q)
@@ -688,7 +969,7 @@ def impact(
             e[_chosen(gaps, [item], None)] = _coefficient(value)
     elif restitution is not None:
         e[:] = _coefficient(restitution)
-    inertia = Inertia(gaps, t, q, qd, slots)
+    inertia = Inertia(gaps, t, q, slots, which)
     before = inertia.rates(qd)[which]
     try:
         p = impulses(inertia, which, before, e[which], law)

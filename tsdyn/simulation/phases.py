@@ -1,5 +1,7 @@
 """The phases of a run with contacts: what its solution asks of them, and what files hold of them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from ..formulations.locked_orientations import keep_turning
@@ -28,13 +30,13 @@ class Phases:
         Time (s), name, impulse (N s, or N m s of an angle).
     starts : list of float
         s; before those of `list` where flights below rounding are left out.
-    rows : list of int
-        Outputs of each phase.
+    gains : dict of int to float
+        Change of the kinetic energy (J) at the beginning of phases, by their numbers: what impacts took.
     """
 
     def __init__(self, packed):
         self.whole, self.list, self.impulses = packed, [], []
-        self.starts, self.rows, self.of = [], [], []
+        self.starts, self.of, self.gains = [], [], {}
         self.packed, self.modes, self._columns, self._known = [], [], [], {}  # of each kind of phase
         self.scenes = []  # of each kind, of phases that were restored
 
@@ -55,14 +57,26 @@ class Phases:
         self.of.append(kind)
         self.list.append((rest, max(rest, end), names))
 
-    @property
-    def of_rows(self):
-        """The number of the phase of each output (k,)."""
-        return np.repeat(np.arange(len(self.rows)), self.rows)
+    def gain(self, energy):
+        """Add kinetic energy, J, that is gained where the next phase begins."""
+        number = len(self.list)
+        self.gains[number] = self.gains.get(number, 0.0) + float(energy)
+
+    def gained(self):
+        """Kinetic energy (phases,), J, gained where phases begin, up to each of them."""
+        gains = np.zeros(len(self.list))
+        for number, energy in self.gains.items():
+            gains[min(number, gains.size - 1)] += energy
+        return np.cumsum(gains)
 
     def at(self, t):
         """Numbers of the phases at times t (k,); where one begins, the later one."""
         return np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
+
+    def of_outputs(self, t):
+        """Numbers of the phases of outputs at times t (k,): of several at one time each is of a phase of its own."""
+        same = np.searchsorted(t, t, side="right") - 1 - np.arange(t.size)
+        return np.maximum(self.at(t) - same, 0)
 
     def multipliers(self, numbers, m, *arrays):
         """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
@@ -78,6 +92,19 @@ class Phases:
         for kind, mine, some in self._gathered(numbers, arrays):
             out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
         return diagnostics.ConstraintError(*out)
+
+    def exerted(self, solution, item, on):
+        """Force and torque (k, 3) as of `reactions.exerted`, of frictions that slide and stick in turn."""
+        out = np.zeros((2, solution.t.size, 3))
+        arrays = solution.t, solution.q, solution.qd, solution.qdd, solution._memory
+        for kind, mine, some in self._gathered(solution._phase_of_rows, arrays):
+            packed, (t, q, qd, qdd, memory) = self.packed[kind], some
+            lam = reactions.multipliers(packed, t, q, qd, qdd, memory)
+            motion = SimpleNamespace(
+                packed=packed, system=packed.system, t=t, q=q, qd=qd, qdd=qdd, multipliers=lam, _memory=memory
+            )
+            out[:, mine] = reactions.exerted(motion, item, on)
+        return out[0], out[1]
 
     def _gathered(self, numbers, arrays):
         """Yield each kind of phases, the entries (j,) of arrays in its phases, and these parts of the arrays."""
@@ -96,7 +123,8 @@ class Phases:
         phases = [(*span, place[named]) for *span, named in self.list]
         impulses = [(t, number[name], p) for t, name, p in self.impulses]
         return numbers, {
-            "phases": np.column_stack((self.starts, self.of, self.rows, phases)) if phases else np.zeros((0, 6)),
+            "phases": np.column_stack((self.starts, self.of, phases)) if phases else np.zeros((0, 5)),
+            "gains": np.array(list(self.gains.items())).reshape(-1, 2),
             "impulses": np.array(impulses, float).reshape(-1, 3),
         }
 
@@ -111,13 +139,14 @@ class Phases:
         demand_record(numbers, RECORD)
         phases, impulses = arrays["phases"].astype(float), arrays["impulses"].astype(float)
         names, contacts = [tuple(map(str, named)) for named in numbers["names"]], list(map(str, numbers["contacts"]))
-        demand(phases.ndim == impulses.ndim == 2 and phases.shape[1] == 6 and impulses.shape[1] == 3, "the phases")
-        (of, rows, named), which = phases[:, [1, 2, 5]].T.astype(int), impulses[:, 1]
+        demand(phases.ndim == impulses.ndim == 2 and phases.shape[1] == 5 and impulses.shape[1] == 3, "the phases")
+        (of, named), which = phases[:, [1, 4]].T.astype(int), impulses[:, 1]
         for places, known in ((of, numbers["modes"]), (named, names), (which, contacts)):
             demand(np.isin(places, np.arange(len(known))).all(), "the numbers of phases")
-        demand((rows >= 0).all() and len(numbers["derived"]) == len(numbers["modes"]), "the outputs of phases")
-        self.starts, self.of, self.rows = phases[:, 0].tolist(), of.tolist(), rows.tolist()
-        self.list = [(t, end, names[i]) for t, end, i in zip(*phases[:, 3:5].T.tolist(), named, strict=True)]
+        demand(len(numbers["derived"]) == len(numbers["modes"]), "the kinds of phases")
+        self.starts, self.of = phases[:, 0].tolist(), of.tolist()
+        self.list = [(t, end, names[i]) for t, end, i in zip(*phases[:, 2:4].T.tolist(), named, strict=True)]
+        self.gains = {int(number): energy for number, energy in arrays["gains"].astype(float).reshape(-1, 2).tolist()}
         self.impulses = [(t, contacts[int(i)], p) for t, i, p in impulses.tolist()]
         for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True) if scene_of else ():
             scene = scene_of(modes)
@@ -132,14 +161,6 @@ class PhasePieces(StepPieces):
     """Dense output of phases: where one begins, its own."""
 
     side = "right"
-
-    def changes_of_energy(self, system):
-        """Of the kinetic energy at the beginning of each phase (k,), J: what its impacts took; zero at the first."""
-        sides = [(part(np.array([part.end]))[0][0], other(np.array([other.start]))[0][0])
-                 for part, other in zip(self.parts, self.parts[1:], strict=False)]  # fmt: skip
-        states = np.array(sides).reshape(-1, 2, *self.parts[0].first.shape)
-        before, after = (diagnostics.kinetic_energy(system, *states[:, i, :2].swapaxes(0, 1)) for i in (0, 1))
-        return np.append(0.0, after - before)
 
 
 def shared_rows(whole, packed):

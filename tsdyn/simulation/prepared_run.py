@@ -287,7 +287,7 @@ class Run:
             outcome = self._ended(task, *found, archive)
             with damaged("the checkpoint"):
                 phases = contact_run.phases_of(scene, *contact_run.recorded(*found))
-            outcome = outcome._replace(phases=(phases, phases.of_rows))
+            outcome = outcome._replace(phases=phases)
             return Solution(scene, task, outcome, {"prepare": 0.0, "run": found[0]["seconds"]})
         try:
             task, outcome = contact_run.run_contacts(scene, options, call, _run_of, run_task, instead, archive)

@@ -405,7 +405,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
         t_events=events[0], q_events=events[1], qd_events=events[2],
         _method=record["method"], _trajectory=trajectory, _end=run_end, _turned="", _seconds=record["seconds"],
         _energy_error=record["energy_error"], _reason=record["reason"], _message=record["message"],
-        _phases=phases, _phase_of_rows=None if phases is None else phases.of_rows,
+        _phases=phases,
         _provenance=record["provenance"],
     )  # fmt: skip
     found._take(outputs, n)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analyses.contact_problem import Gaps, Inertia, NoSolution, closed_gaps, settle
+from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
 from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InconsistentState, InvalidArgument, NoEquilibrium
 from ..observables import reactions
@@ -14,7 +14,7 @@ from ..observables.state import RememberingState, remembered
 from ..runs.arguments import state_arrays
 from ..validation import listed, number
 from .contact_run import begun, demand_apart
-from .phase_scenes import NAMED, phase_of
+from .phase_scenes import NAMED, gaps_of, phase_of
 from .phases import shared_rows
 from .scene_cache import prepared
 
@@ -41,7 +41,7 @@ def linearise(scene, own, state=None, *arguments, **keywords):
 
 def along(scene, own, *arguments, **keywords):
     """`kinematics` or `inverse_dynamics` of the scene with open contacts; refuses a motion along which one is met."""
-    motion, who, gaps = own(phase_of(scene, []), *arguments, **keywords), own.__name__, Gaps(scene.packed)
+    motion, who, gaps = own(phase_of(scene, []), *arguments, **keywords), own.__name__, gaps_of(scene)
     for k, q in enumerate(motion.q):
         met = closed_gaps(gaps, q, motion.anchor.angles[k])
         if met:
@@ -68,7 +68,7 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
     From the contacts that are closed at the guess on: of those that the way to the equilibrium meets the first one is
     closed, and those that would have to pull are opened.
     """
-    gaps, kept = Gaps(scene.packed), prepared(phase_of(scene, []))
+    gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
     q = scene.start[0] if guess is None else np.asarray(getattr(guess, "q", guess), float)
     closed, seen = closed_gaps(gaps, q, _angles(kept, guess, t, q)), set()
     while frozenset(closed) not in seen:
@@ -91,7 +91,7 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
             met = deep[np.argmin(before[deep] / (before[deep] - values[deep]))]
             closed = sorted([*closed, int(met)])
             continue
-        inertia = Inertia(gaps, float(t), state.q, state.qd, state.memory)
+        inertia = Inertia(gaps, float(t), state.q, state.memory, closed)
         try:
             settled = settle(inertia, closed, state.qd)
         except NoSolution:
@@ -125,4 +125,4 @@ def _angles(kept, state, t, q):
 
 def _demand_apart(scene, state, q):
     kept = prepared(phase_of(scene, []))
-    demand_apart(Gaps(scene.packed), q, _angles(kept, state, getattr(state, "t", 0.0), q), INITIAL_TOL)
+    demand_apart(gaps_of(scene), q, _angles(kept, state, getattr(state, "t", 0.0), q), INITIAL_TOL)

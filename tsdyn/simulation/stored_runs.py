@@ -9,6 +9,7 @@ import json
 import os
 import platform
 import time
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -197,6 +198,12 @@ class RunOutputs:
             self._set_remembered(np.empty((self._length(), 0)) if found is None else found)
         return self.__dict__[name]
 
+    @cached_property
+    def _phase_of_rows(self):
+        """The number of the phase of each output (k,), of a run with phases."""
+        t = self.t if self._stored is None else self._stored.read(_COLUMNS["t"], slice(None))
+        return self._phases.of_outputs(t)[self._slice]
+
     def _length(self):
         """How many outputs there are; of a store without a look at them."""
         return self.t.size if self._stored is None else len(range(self._stored.count)[self._slice])
@@ -215,8 +222,6 @@ class RunOutputs:
             return self._picked(part)
         other, found = self._bare(), range(self._stored.count)[self._slice][part]
         other._slice = slice(found.start, max(found.stop, found.start), found.step)
-        if self._phase_of_rows is not None:
-            other._phase_of_rows = self._phase_of_rows[part]
         return other
 
     def _picked(self, part):
@@ -226,7 +231,7 @@ class RunOutputs:
         for name in ("t", "q", "qd", "qdd", "_remembers"):
             setattr(other, name, getattr(self, name)[part])
         other.anchor = Anchor(self.anchor.angles[part])
-        if self._phase_of_rows is not None:
+        if self._phases is not None:
             other._phase_of_rows = self._phase_of_rows[part]
         return other
 

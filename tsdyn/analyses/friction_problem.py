@@ -1,0 +1,440 @@
+"""Exact friction at one state: where bodies stick, where they begin to slide, and which way.
+
+    sticking    rows J of the slide hold, |lam| <= mu_s N      lam: their multipliers, force or torque
+    sliding     force mu N against v, or, from rest, against the direction d of its acceleration, J qdd + gamma ~ d
+
+The normal loads N follow from reactions and these from the friction (`observables.evaluate.balance`). Of those that are
+at rest, which stick is found by pivoting: those beyond their bounds slide against what held them, those that would
+slide backwards stick.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..constraints.dot1 import Dot1
+from ..constraints.dot2 import Dot2
+from ..elements.bodies import rotation_matrix
+from ..elements.element import stop_waiting
+from ..elements.friction import GUIDE, PIN, PLANE
+from ..errors import SingularConfiguration
+from ..maths.tolerances import RANK_TOL, ROUNDING
+from ..model.kinematics import angular_velocity
+from ..model.packed import coupled_loads, first_rows
+from ..observables.evaluate import ITERATIONS, constraint_arrays, mass_matrix, normal_reaction, unit_force
+from ..observables.generalised_forces import applied_loads, velocity_forces
+from .tolerances import ASIDE, BROKEN, LEVEL, PIVOTS
+
+if TYPE_CHECKING:
+    from ..elements.friction import Slide
+
+
+class Unit(NamedTuple):
+    """One slide of a friction of a packed scene."""
+
+    load: Any  # a packed.Load
+    force: Any  # its force, with the bodies of the scene
+    slide: Slide
+    slot: int  # of the memory of the run, where its numbers begin
+
+    @property
+    def way(self) -> slice:
+        """Where the direction of sliding is in the memory of the run."""
+        return slice(self.slot, self.slot + self.slide.directions)
+
+    def held(self, i: int) -> range:
+        """Where the numbers of row i are."""
+        first = self.slot + self.slide.directions + i * self.slide.row_numbers
+        return range(first, first + self.slide.row_numbers)
+
+    @property
+    def sliding(self) -> tuple[float, float]:
+        """The multiplier with which it begins to slide: of a normal load of one, and by itself."""
+        par = self.load.parameters
+        if self.load.normal >= 0:
+            return par[1 if par[2] else 0] * (par[5] if self.slide is PIN else 1.0), 0.0
+        return 0.0, par[1] if self.slide.turns else par[0]
+
+    @property
+    def bound(self) -> tuple[float, float]:
+        """The largest multiplier at rest: of a normal load of one, and by itself."""
+        par = self.load.parameters
+        if self.load.normal >= 0:
+            return par[1] * (par[5] if self.slide is PIN else 1.0), 0.0
+        return 0.0, par[5] if self.slide.turns else par[4]
+
+
+class Hold(NamedTuple):
+    """The rows that hold a unit, in the directions in which it may slide: of `phase_scenes.phase_of`."""
+
+    unit: Unit
+    rank: int
+    numbers: Any  # (rank, row numbers), for the rows that are packed
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """The same for the same rows."""
+        return self.unit.slot, self.rank
+
+    def rows(self) -> list[Any]:
+        """Primitives, one for each direction."""
+        force, found = self.unit.force, []
+        for one in self.numbers.tolist():
+            if self.unit.slide.turns:
+                row = Dot1(force.a, force.b, axis_a=one[:3], axis_b=one[3:6], value=one[6])
+            else:
+                ends = {"point_a": (0.0, 0.0, 0.0), "point_b": force.point_a}
+                row = Dot2(force.b, force.a, axis_a=one[:3], value=one[3], **ends)
+            stop_waiting(row)
+            found.append(row)
+        return found
+
+    def places(self) -> list[list[tuple[int, int]]]:
+        """Of each row the (slot, place among its reals) of all numbers; the markers' coordinates come first."""
+        at = (0, 1, 2, 3, 4, 5, 6) if self.unit.slide.turns else (0, 1, 2, 9)
+        return [list(zip(self.unit.held(i), at, strict=True)) for i in range(self.rank)]
+
+
+class Frictions:
+    """The frictions of a scene that follow the exact law.
+
+    Attributes
+    ----------
+    units : list of Unit
+    names : list of str
+    """
+
+    def __init__(self, scene):
+        self.packed, self.units = scene.packed, []
+        for force, load in zip(scene._forces, self.packed.loads, strict=True):
+            slot = load.slot + force.memory
+            for slide in getattr(force, "slides", ()):
+                self.units.append(Unit(load, force, slide, slot))
+                slot += slide.count
+        self.count, self.names = len(self.units), [unit.force.name for unit in self.units]
+        # Of each unit the bodies a and b, numbers of rows of System.bodies; the ground is behind them
+        spans = self.packed.system.bodies
+        self.rigid = np.flatnonzero(spans[:, 1] == 7)
+        ends = [(unit.force.a, unit.force.b) for unit in self.units]
+        self.ends = np.array([[body.index if body.dimension else len(spans) for body in pair] for pair in ends], int)
+        self.ends = self.ends.reshape(-1, 2)
+        # The point of a, and the axis or normal: of a, or of b
+        self.points = np.array([unit.load.coordinates[0] for unit in self.units]).reshape(-1, 3)
+        slides = [unit.slide for unit in self.units]
+        self.axes = np.array([unit.load.coordinates[4] if unit.slide in AXIAL else (0, 0, 0) for unit in self.units])
+        self.axes = self.axes.reshape(-1, 3).astype(float)
+        self.side = np.array([int(slide is PLANE) for slide in slides], int)
+        self.turns = np.array([slide.turns for slide in slides], bool)
+        self.signed = np.array([slide.directions == 1 for slide in slides], bool)
+        self.plane = np.array([slide is PLANE for slide in slides], bool)
+        self.ways = np.array([range(unit.way.start, unit.way.start + 3) for unit in self.units], int).reshape(-1, 3)
+        self.ways = np.where(self.signed[:, None], self.ways[:, :1], self.ways)
+
+    def frames(self, q):
+        """Rotation matrices (k, bodies, 3, 3), that of the ground last, at q (k, n)."""
+        spans = self.packed.system.bodies
+        A = np.broadcast_to(np.eye(3), (len(q), len(spans) + 1, 3, 3)).copy()
+        A[:, self.rigid] = rotation_matrix(q[:, spans[self.rigid, :1] + np.arange(3, 7)])
+        return A
+
+    def motions(self, q, qd):
+        spans, A = self.packed.system.bodies, self.frames(q)
+        places = spans[self.rigid, :1] + np.arange(3, 7)
+        w, r, rd = np.zeros((3, len(q), len(spans) + 1, 3))
+        w[:, self.rigid] = np.einsum("kbij,kbj->kbi", A[:, self.rigid], angular_velocity(q[:, places], qd[:, places]))
+        r[:, :-1], rd[:, :-1] = (x[:, spans[:, :1] + np.arange(3)] for x in (q, qd))
+        a, b = self.ends.T
+        s = np.einsum("kuij,uj->kui", A[:, a], self.points)
+        parts = rd[:, a], np.cross(w[:, a], s), rd[:, b], np.cross(w[:, b], r[:, a] + s - r[:, b])
+        turns = self.turns[:, None]
+        v = np.where(turns, w[:, a] - w[:, b], parts[0] + parts[1] - parts[2] - parts[3])
+        sizes = np.where(turns, np.abs(w[:, a]) + np.abs(w[:, b]), sum(map(np.abs, parts))).sum(axis=2)
+        units = np.arange(self.count)
+        axes = np.einsum("kuij,uj->kui", A[:, self.ends[units, self.side]], self.axes)
+        along = (v * axes).sum(axis=2, keepdims=True) * axes
+        return np.where(self.signed[:, None], along, v - along), sizes, axes
+
+    def speeds(self, q, qd, memory):
+        """Of those that slide (k, units): velocities along their directions, in a plane less half of the speed."""
+        v, _, axes = self.motions(q, qd)
+        ways = memory[self.ways] * np.where(self.signed[:, None], axes, 1.0)
+        return (v * ways).sum(axis=2) - np.where(self.signed, 0.0, 0.5) * np.linalg.norm(v, axis=2)
+
+    def at(self, q):
+        """The `Place` at q (n,)."""
+        A, (_, _, axes) = self.frames(q[None])[0], self.motions(q[None], np.zeros((1, q.size)))
+        return Place(self, axes[0], A)
+
+
+AXIAL = PIN, GUIDE, PLANE
+
+
+class Place:
+    """The frictions of a scene in one configuration: axes (units, 3) and rotation matrices (bodies, 3, 3)."""
+
+    def __init__(self, frictions, axes, A):
+        self.frictions, self.axes, self.A = frictions, axes, A
+
+    def written(self, i, way):
+        """The numbers of a direction (3,), ground frame: a sign where there is an axis."""
+        return np.sign(way @ self.axes[i]) if self.frictions.signed[i] else way
+
+    def read(self, i, memory):
+        """The direction (3,), ground frame, of a unit that slides; zeros while it sticks."""
+        numbers = memory[self.frictions.units[i].way]
+        return numbers[0] * self.axes[i] if numbers.size == 1 else numbers
+
+    def basis(self, i, free):
+        """Orthonormal directions (r, 3), ground frame, in which a unit may slide.
+
+        free: function of a unit that returns its velocities (3, motions), of all motions that the rows leave free.
+        """
+        slide = self.frictions.units[i].slide
+        if slide in (PIN, GUIDE):
+            return self.axes[i][None]
+        if slide is PLANE:
+            return np.array(perpendiculars(self.axes[i]))
+        U, size, _ = np.linalg.svd(free(i))
+        return U[:, : int((size > RANK_TOL * max(size.max(initial=0.0), 1.0)).sum())].T
+
+    def numbers(self, i, basis):
+        """Numbers (r, numbers) of rows that hold a unit as it is, but for their values, which are zero."""
+        A, B = self.A[self.frictions.ends[i]]
+        found = np.zeros((len(basis), self.frictions.units[i].slide.row_numbers))
+        for row, t in zip(found, basis, strict=True):
+            if self.frictions.turns[i]:
+                s, h = perpendiculars(t)  # t = s x h
+                row[:3], row[3:6] = s @ A, h @ B
+            else:
+                row[:3] = t @ B
+        return found
+
+    def directions(self, i, numbers):
+        """Directions (r, 3), ground frame, of rows with these numbers (r, numbers)."""
+        A, B = self.A[self.frictions.ends[i]]
+        if self.frictions.turns[i]:
+            return np.cross(numbers[:, :3] @ A.T, numbers[:, 3:6] @ B.T)
+        return numbers[:, :3] @ B.T
+
+
+def perpendiculars(t):
+    """Unit vectors s, h with t = s x h, a unit vector (3,)."""
+    e = np.eye(3)[np.argmin(np.abs(t))]
+    s = np.cross(t, e)
+    s /= np.linalg.norm(s)
+    return s, np.cross(t, s)
+
+
+def values_of(packed, t, q, memory):
+    """Phi (m,) with what a run remembers, memory (slots,)."""
+    return constraint_arrays(_remembering(packed.system, memory), q, np.zeros_like(q), t)[0]
+
+
+def free_motions(packed, t, q, memory, rows):
+    """Velocities (rows, motions) of some rows of all motions that the others leave free."""
+    _, Phi_q, _, _ = constraint_arrays(_remembering(packed.system, memory), q, np.zeros_like(q), t)
+    return Phi_q[rows] @ _null_space(np.delete(Phi_q, rows, axis=0))
+
+
+def _remembering(system, memory):
+    system = system._replace(reals=system.reals.copy())
+    system.reals[system.memory] = memory
+    return system
+
+
+def immobile(packed, t, q, memory):
+    """Coordinates of the bodies that rows without time leave no motion, whatever others do."""
+    _, Phi_q, _, _ = constraint_arrays(_remembering(packed.system, memory), q, np.zeros_like(q), t)
+    steady, spans = [], packed.system.bodies.tolist()
+    for part, row in first_rows(packed.constraints):
+        steady += [] if part.rheonomic else range(row, row + part.rows)
+    Phi_q, columns = Phi_q[steady], np.arange(q.size)
+    while columns.size:
+        mine = ~np.delete(Phi_q, columns, axis=1).any(axis=1)
+        moved = _null_space(Phi_q[np.ix_(mine, columns)])
+        moves = np.isin(np.arange(q.size), columns[np.abs(moved).max(axis=1, initial=0.0) > RANK_TOL])
+        if not moves.any():
+            break
+        still = [np.arange(at, at + length) for at, length in spans if not moves[at : at + length].any()]
+        columns = np.intersect1d(columns, np.concatenate([*still, np.zeros(0, int)]))
+    return columns.astype(int)
+
+
+def _null_space(rows):
+    from scipy.linalg import null_space
+
+    return null_space(rows, RANK_TOL) if len(rows) else np.eye(rows.shape[1])
+
+
+class Rest(NamedTuple):
+    """What becomes of the units that are at rest."""
+
+    sticking: list  # units whose rows hold
+    ways: dict  # direction (3,), ground frame, of each that slides
+    blocked: list  # of these, those that others hold
+    loads: Any  # normal loads (frictions,)
+    rates: dict  # what the event of each that slides begins with: its acceleration, zero within rounding
+
+
+class NoRest(Exception):
+    """No way in which units at rest go on has been found; `units` are those that it is about."""
+
+    def __init__(self, units):
+        super().__init__()
+        self.units = units
+
+
+class RestProblem:
+    """Rows, masses and loads at one state, with rows for all units that are at rest.
+
+        x                  multipliers of these rows; N: normal loads
+        J qdd + gamma      c + G x + D N       D: of the frictions that slide already
+        multipliers        l + L x + K N       of the other rows, of which the normal loads follow
+
+    Parameters
+    ----------
+    place : Place
+    packed : Packed
+        Of a phase with the rows of these units.
+    rows : dict of int to ndarray
+        Unit -> its rows of Phi.
+    bases : dict of int to ndarray (r, 3)
+        Unit -> the directions of its rows, ground frame.
+    t, q, qd, memory
+        The state; memory has the directions of the units that slide already.
+    """
+
+    def __init__(self, place, packed, rows, bases, t, q, qd, memory):
+        from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
+
+        self.place, self.units, self.rows, self.bases = place, place.frictions.units, rows, bases
+        system = _remembering(packed.system, memory)
+        _, Phi_q, _, gamma = constraint_arrays(system, q, qd, t)
+        M = mass_matrix(system, q)
+        mine = np.concatenate([*rows.values(), np.zeros(0, int)])
+        others = np.setdiff1d(np.arange(len(gamma)), mine)
+        Q, R, order = qr(Phi_q[others].T, pivoting=True)
+        size = np.abs(np.diag(R))
+        rank = int((size > RANK_TOL * size.max(initial=0.0)).sum())
+        Z, own, R, order = Q[:, rank:], Q[:, :rank], R[:rank, :rank], others[order[:rank]]
+        try:
+            factor = cho_factor(Z.T @ M @ Z) if Z.size else None
+        except np.linalg.LinAlgError as error:
+            raise SingularConfiguration("a direction that the constraints leave free carries no inertia.") from error
+        fixed = own @ solve_triangular(R, -gamma[order], trans="T") if rank else np.zeros(q.size)
+        known = applied_loads(system, np.array([t]), q[None], qd[None], memory[None])[0]
+        known += velocity_forces(system, q[None], qd[None])[0] - M @ fixed
+        self.normals = packed.system.normals.size
+        frictions = coupled_loads(packed)
+        sliding = [unit_force(packed.system, load, t, q, qd, memory) for load in frictions]
+        loads = np.column_stack([known, -Phi_q[mine].T, *sliding])
+        free = Z @ cho_solve(factor, Z.T @ loads) if Z.size else np.zeros_like(loads)
+        lam = np.zeros((len(gamma), loads.shape[1]))
+        if rank:
+            lam[order] = solve_triangular(R, own.T @ (loads - M @ free))
+        count = 1 + mine.size
+        self.J, self.gamma, self.qdd = Phi_q[mine], gamma[mine], free
+        self.qdd[:, 0] += fixed
+        G = self.J @ self.qdd
+        self.c, self.G, self.D = G[:, 0] + self.gamma, G[:, 1:count], G[:, count:]
+        self.l, self.L, self.K = lam[:, 0], lam[:, 1:count], lam[:, count:]
+        self.reactions = [normal_reaction(packed, load, q, qd, Phi_q) for load in frictions]
+        places = np.cumsum([0, *(len(each) for each in rows.values())])
+        self.at = {i: np.arange(*places[k : k + 2]) for k, i in enumerate(rows)}
+
+    def solve(self, ways):
+        """Multipliers x of the rows, and normal loads, where units slide in these directions and the others stick."""
+        stick = np.concatenate([*(self.at[i] for i in self.rows if i not in ways), np.zeros(0, int)]).astype(int)
+        x, P = np.zeros(len(self.c)), np.zeros((len(self.c), self.normals))
+        for i, way in ways.items():
+            share, force = self.units[i].sliding
+            x[self.at[i]] = force * (self.bases[i] @ way)
+            if share:
+                P[self.at[i], self.units[i].load.normal] = share * (self.bases[i] @ way)
+        if stick.size:  # of rows that depend on one another, the least
+            right = np.column_stack([self.c + self.G @ x, self.D + self.G @ P])[stick]
+            held = -np.linalg.lstsq(self.G[np.ix_(stick, stick)], right, rcond=RANK_TOL**2)[0]
+            x[stick], P[stick] = held[:, 0], held[:, 1:]
+        # N = N(l + L x + K N), by Newton's method
+        lam, slopes, N = self.l + self.L @ x, self.L @ P + self.K, np.zeros(self.normals)
+        for _ in range(ITERATIONS if N.size else 0):
+            values, changes = zip(*(reaction(lam + slopes @ N) for reaction in self.reactions), strict=True)
+            try:
+                step = np.linalg.solve(np.eye(N.size) - np.array(changes) @ slopes, np.array(values) - N)
+            except np.linalg.LinAlgError:
+                raise NoRest(list(self.rows)) from None
+            N = N + step
+            if not np.abs(step).max() > ROUNDING * np.abs(N).max():
+                break
+        else:
+            if N.size:
+                raise NoRest(list(self.rows))
+        return x + P @ N, N
+
+    def settle(self, ways, fired):
+        """The `Rest` of the units, by pivoting from a guess: directions of those that slide.
+
+        fired: units whose reactions have just reached their bounds. Raises `NoRest`.
+        """
+        ways, fired, seen = dict(ways), set(fired), set()
+        for count in range(PIVOTS * (1 + len(self.rows))):
+            x, N = self.solve(ways)
+            a = self.c + self.G @ x + self.D @ N
+            small = self._rounding(x, N)
+            wrong = self._wrong(ways, x, N, a, small, fired)
+            if not wrong:
+                sticking = [i for i in self.rows if i not in ways]
+                blocked = [i for i in ways if self._is_blocked(i, sticking)]
+                return Rest(sticking, ways, blocked, N, self._rates(ways, a, small))
+            known = tuple((i, *np.sign(np.round(d, 3))) for i, d in sorted(ways.items()))
+            one_by_one = known in seen or count >= PIVOTS
+            seen.add(known)
+            for i in sorted(wrong)[: 1 if one_by_one else None]:
+                if wrong[i] is None:
+                    del ways[i]
+                    fired.discard(i)
+                else:
+                    ways[i] = wrong[i]
+        raise NoRest(sorted(wrong))
+
+    def _rounding(self, x, N):
+        """Accelerations of the rows that are zero to rounding."""
+        qdd = self.qdd @ np.concatenate(([1.0], x, N))
+        return LEVEL * (np.abs(self.J) @ np.abs(qdd) + np.abs(self.gamma))
+
+    def _wrong(self, ways, x, N, a, small, fired):
+        """Units that can't be as they are, with the way in which they slide instead; None if they stick."""
+        found = {}
+        for i, at in self.at.items():
+            basis = self.bases[i]
+            if i not in ways:
+                (share, bound), force = self.units[i].bound, np.linalg.norm(x[at])
+                bound += share * N[self.units[i].load.normal] if share else 0.0
+                if force > bound * (BROKEN if i in fired else 1.0 + LEVEL):
+                    found[i] = x[at] @ basis / force
+                continue
+            along, size = a[at] @ basis @ ways[i], np.linalg.norm(a[at])
+            if along < -small[at].max():
+                found[i] = None
+            elif len(at) > 1 and size > small[at].max() and along < size * (1.0 - ASIDE):
+                found[i] = a[at] @ basis / size
+        return found
+
+    def _rates(self, ways, a, small):
+        """Accelerations along the directions of sliding, in a plane less half of their size; zero within rounding."""
+        found = {}
+        for i, way in ways.items():
+            at, part = self.at[i], 0.0 if self.place.frictions.signed[i] else 0.5
+            rate = a[at] @ self.bases[i] @ way - part * np.linalg.norm(a[at])
+            found[i] = float(rate) if rate > small[at].max() else 0.0
+        return found
+
+    def _is_blocked(self, i, sticking):
+        """Whether a unit can't move where others stick, or at all."""
+        stick = np.concatenate([*(self.at[k] for k in sticking), np.zeros(0, int)]).astype(int)
+        own = self.G[np.ix_(self.at[i], self.at[i])]
+        held = np.linalg.lstsq(self.G[np.ix_(stick, stick)], self.G[np.ix_(stick, self.at[i])], rcond=RANK_TOL**2)[0]
+        left = np.diag(own - self.G[np.ix_(self.at[i], stick)] @ held)
+        return bool(np.abs(left).max() <= RANK_TOL * np.abs(np.diag(own)).max())

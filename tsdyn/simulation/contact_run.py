@@ -39,7 +39,7 @@ from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import damaged, demand, floats, listed
 from .phase_scenes import NAMED, first_row_of, gaps_of, has_contacts, phase_of
-from .phases import PhasePieces, Phases
+from .phases import PhasePieces, Phases, Pinned
 from .progress import reporter, silent
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
@@ -294,7 +294,7 @@ class _ContactRun:
         demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
         self.rest = self.t
-        self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
+        self.kinds, self.parts, self.found, self.report = [], [], [[] for _ in self.users], reporter(call.progress)
         self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
         self.reason, self.methods, self.at_once, self.judged = "", [], 0, (self.t, 0)
         self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
@@ -553,6 +553,7 @@ class _ContactRun:
             if self.again and outcome.trajectory is not None:
                 outcome.trajectory.begin_at(self.again)
             self.parts.append(outcome._replace(rows=outcome.rows[:count]))
+            self.kinds.append(self.phases.of[-1])
         else:
             archive.go_back({**archive.counts, "outputs": self.written["outputs"] + count})
             self.totals = summed([end.counts] if self.totals is None else [self.totals, end.counts])
@@ -756,7 +757,7 @@ class _ContactRun:
                 StepLog([end.steps for end in ends]) if logs else None,
                 ChartLog([end.charts for end in ends]) if logs else None,
             ),
-            PhasePieces([part.trajectory for part in parts]) if self.options.dense_output else None,
+            PhasePieces([part.trajectory for part in parts], self.kinds) if self.options.dense_output else None,
             events, began, " and ".join(self.methods), self.phases,
         )  # fmt: skip
 
@@ -818,22 +819,6 @@ def held(inertia, qd, which, rates):
     return qd + change, after
 
 
-class _Pinned:
-    """A trajectory with bodies that rest: to the last bit."""
-
-    def __init__(self, trajectory, q, still):
-        self.trajectory, self.q, self.still = trajectory, q, still
-        self.start, self.end, self.edges, self.anchors = (
-            trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
-        )  # fmt: skip
-
-    def __call__(self, t):
-        """As of a `Trajectory`."""
-        states, memory, status = self.trajectory(t)
-        states[:, 0, self.still], states[:, 1:, self.still] = self.q[self.still], 0.0
-        return states, memory, status
-
-
 def pinned(outcome, q, still):
     """The outcome of a phase with bodies that rest at q (n,), to the last bit; still: their coordinates."""
     if not still.size:
@@ -843,7 +828,7 @@ def pinned(outcome, q, still):
         outcome.rows[:, 1 + still] = q[still]
         outcome.rows[:, 1 + n + still] = outcome.rows[:, 1 + 2 * n + still] = 0.0
     last[0, still], last[1:, still] = q[still], 0.0
-    trajectory = outcome.trajectory and _Pinned(outcome.trajectory, q, still)
+    trajectory = outcome.trajectory and Pinned(outcome.trajectory, q, still)
     return outcome._replace(trajectory=trajectory)
 
 

@@ -158,9 +158,29 @@ class Phases:
 
 
 class PhasePieces(StepPieces):
-    """Dense output of phases: where one begins, its own."""
+    """Dense output of phases: where one begins, its own. kinds: of the phases of each part, as `Phases` has them."""
 
     side = "right"
+
+    def __init__(self, parts, kinds):
+        super().__init__(parts)
+        self.kinds = kinds
+
+
+class Pinned:
+    """A trajectory with bodies that rest: to the last bit."""
+
+    def __init__(self, trajectory, q, still):
+        self.trajectory, self.q, self.still = trajectory, q, still
+        self.start, self.end, self.edges, self.anchors = (
+            trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
+        )  # fmt: skip
+
+    def __call__(self, t):
+        """As of a `Trajectory`."""
+        states, memory, status = self.trajectory(t)
+        states[:, 0, self.still], states[:, 1:, self.still] = self.q[self.still], 0.0
+        return states, memory, status
 
 
 def shared_rows(whole, packed):

@@ -23,10 +23,10 @@ from ..runs.dense_output import StepPieces, Trajectory
 from ..runs.run_log import NAMES, RunEnd, demand_noted
 from ..taylor import series_engine
 from ..taylor.layout import series_width
-from ..validation import damaged, demand, demand_numbers, demand_record, text_cell
+from ..validation import damaged, demand, demand_numbers, demand_record, is_count, text_cell
 from ..workspaces import B_CHART, B_DATA, B_END
 from . import local_origin
-from .phases import PhasePieces, Phases, derived_record, take_derived
+from .phases import PhasePieces, Phases, Pinned, derived_record, take_derived
 from .scene_cache import prepared
 from .stored_runs import (
     Lacking,
@@ -57,8 +57,13 @@ def record_of(trajectory):
     if isinstance(trajectory, StepPieces):
         parts = [record_of(part) for part in trajectory.parts]
         arrays = {f"{i}_{name}": array for i, (_, found) in enumerate(parts) for name, array in found.items()}
-        kind = "phases" if isinstance(trajectory, PhasePieces) else "parts"
-        return {"kind": kind, "parts": [numbers for numbers, _ in parts]}, arrays
+        numbers = {"kind": "parts", "parts": [numbers for numbers, _ in parts]}
+        if isinstance(trajectory, PhasePieces):
+            numbers |= {"kind": "phases", "kinds": trajectory.kinds}
+        return numbers, arrays
+    if isinstance(trajectory, Pinned):
+        numbers, arrays = record_of(trajectory.trajectory)
+        return {"kind": "pinned", "inner": numbers}, {**arrays, "still": trajectory.still, "resting": trajectory.q}
     if isinstance(trajectory, local_origin._Moved):
         numbers, arrays = record_of(trajectory.trajectory)
         return {"kind": "moved", "inner": numbers}, {**arrays, "shift": trajectory.shift}
@@ -73,7 +78,7 @@ def record_of(trajectory):
 
 
 def trajectory_of(numbers, arrays, scenes):
-    """The trajectory of a record; scenes: that of the run, or of each phase.
+    """The trajectory of a record; scenes: that of the run, or of each kind of its phases.
 
     Raises
     ------
@@ -85,11 +90,18 @@ def trajectory_of(numbers, arrays, scenes):
         parts = numbers["parts"]
         own = [{name[len(f"{i}_") :]: array for name, array in arrays.items() if name.startswith(f"{i}_")}
                for i in range(len(parts))]  # fmt: skip
-        every = [[scene] for scene in scenes] if kind == "phases" else [scenes] * len(parts)
-        found = [trajectory_of(*part) for part in zip(parts, own, every, strict=True)]
-        return (PhasePieces if kind == "phases" else StepPieces)(found)
+        if kind == "parts":
+            return StepPieces([trajectory_of(part, found, scenes) for part, found in zip(parts, own, strict=True)])
+        kinds = numbers["kinds"]
+        demand(all(is_count(each) and each < len(scenes) for each in kinds), "the kinds of phases")
+        every = zip(parts, own, [[scenes[each]] for each in kinds], strict=True)
+        return PhasePieces([trajectory_of(*part) for part in every], kinds)
     (scene,) = scenes
     packed = scene.packed
+    if kind == "pinned":
+        q, still = arrays["resting"], arrays["still"].astype(int)
+        demand(q.ndim == 1 and np.isin(still, np.arange(q.size)).all(), "the bodies at rest")
+        return Pinned(trajectory_of(numbers["inner"], arrays, scenes), q, still)
     if kind == "moved":
         shift = arrays["shift"]
         demand(shift.shape == (int(packed.system.bodies[:, 1].sum()),), "the origin")
@@ -393,7 +405,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
         phases = _phases(scene, record["phases"], own)
     if record.get("trajectory") is not None:
         dense = {name.removeprefix("dense_"): array for name, array in arrays.items() if name.startswith("dense_")}
-        scenes = [scene] if phases is None else [phases.scenes[kind] for kind in phases.of]
+        scenes = [scene] if phases is None else phases.scenes
         trajectory = trajectory_of(record["trajectory"], dense, scenes)
     run_end = RunEnd(
         record["reached"], arrays["last"], np.concatenate((arrays["angles"], arrays["memory"])), record["counts"],

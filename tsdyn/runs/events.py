@@ -262,7 +262,7 @@ class Watch:
                 self._begin(run, self.tracks is None)
             except EventFailed as failure:
                 raise InvalidArgument(f"events: {failure}") from failure.__cause__
-        stiff = run.numbers.stiff
+        stiff, answer = run.numbers.stiff, getattr(memory, "answer", None)  # of sampled loads
         # One step at a time, searched before the next one
         for _ in range(most):
             if self.begins_again:
@@ -271,7 +271,7 @@ class Watch:
                     return status, reason
                 continue  # it has written an output
             done = run.numbers.steps
-            status = memory.advance(log, 1)
+            status = memory.advance(log, 1) if answer is None else memory.step(log)
             if run.numbers.steps > done:
                 try:
                     last = self._search_step(run, log)
@@ -284,6 +284,8 @@ class Watch:
                     status, reason = self._begin_again(memory, log)
                     if status != Status.SLICE_DONE:
                         return status, reason
+            if answer is not None and status == Status.SLICE_DONE:
+                status = answer(log)
             full = run.numbers.chart_rows + 2 >= len(log.charts)
             if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""

@@ -24,7 +24,9 @@ def balls(bodies, bouncing, falls=60.0):
         spin = (0.1, 0.2 * i, 0.3)
         ball = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(2 * i, 0, 1 + 0.013 * i), angular_velocity=spin)
         if i < bouncing:
-            scene.add(ts.constraints.SphereContact(ball, scene.ground, radius_a=0.1, normal_b=(0, 0, 1), restitution=1.0))
+            scene.add(
+                ts.constraints.SphereContact(ball, scene.ground, radius_a=0.1, normal_b=(0, 0, 1), restitution=1.0)
+            )
     return scene, (0.0, falls / bouncing)
 
 

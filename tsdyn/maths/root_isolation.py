@@ -9,7 +9,6 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from ..jit.kernels import entry, kernel
-
 from .tolerances import (
     AT_ZERO,
     CLEAR,
@@ -223,6 +222,9 @@ def _cross(c, x0, x1, out):
             break
         x = to if x0 < to < x1 else 0.5 * (x0 + x1)
     out[0], out[1] = x, slope
+
+
+SURVEYING = _look, _cross
 
 
 class Survey(NamedTuple):

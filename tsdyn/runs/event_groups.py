@@ -120,7 +120,9 @@ class Group:
             seen = survey(lambda times, left=left: sample(times)[:, left], step.t0, values, end, degree, noise)
             self.degree, last[left] = seen.degree, seen.samples[-1]
             unclear = {j: since for j, since in enumerate(seen.since) if since < math.inf}
-            for j in self._odd[left].nonzero()[0].tolist():  # what they know of zeros is past on the side they fall from
+            for j in (
+                self._odd[left].nonzero()[0].tolist()
+            ):  # what they know of zeros is past on the side they fall from
                 self._odd[left[j]] = odd = j in unclear or not self._falls[left[j]] * last[left[j]] < 0.0
                 if odd and j not in unclear:
                     unclear[j] = step.t0

@@ -149,7 +149,9 @@ class Inside:
         """The same as an array (k, 3, n), NaN where there is none; not kept."""
         ends = times.size > 0 and times[-1] == self.t1
         inside = times[:-1] if ends else times
-        found, status = self._reader(inside, np.zeros(inside.size, int), self._block, self._log.charts, self._log.points)
+        found, status = self._reader(
+            inside, np.zeros(inside.size, int), self._block, self._log.charts, self._log.points
+        )
         if status != Status.SUCCESS:
             none = np.full_like(self._known[self.t0], np.nan)
             return np.reshape([none if state is None else state for state in self.states(times)], (-1, *none.shape))

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from functools import partial
+from functools import cached_property, partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..ahead import compile_ahead
 from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
-from ..analyses.contact_rows import ReactionWorkspace
+from ..analyses.contact_rows import KERNELS, ReactionWorkspace
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
 from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
@@ -340,6 +340,7 @@ class _ContactRun:
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
+        compile_ahead(KERNELS)
         self.gaps, self.frictions = gaps_of(scene), Frictions(scene)
         self.count = kept.handles.count
         self.t = self.span[0]

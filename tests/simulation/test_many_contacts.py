@@ -43,7 +43,7 @@ def test_a_stack_of_boxes_falls_and_comes_to_rest(count):
     state = solution.state
     for i in range(count):
         # Rest, each box on the one below
-        np.testing.assert_allclose(state.position(f"box {i}"), [0, 0, BOX[2] * (2 * i + 1)], atol=1e-3)
+        assert abs(state.position(f"box {i}")[2] - BOX[2] * (2 * i + 1)) < 1e-12
         assert np.abs(state.velocity(f"box {i}")[2]) < 1e-12
         corners = [contact.name for contact in scene.constraints if contact.name.endswith(f"of {i}")]
         force = sum(solution.reaction(name)[0][-1] for name in corners)
@@ -66,7 +66,7 @@ def chain(links):
     return scene
 
 
-@pytest.mark.parametrize(("links", "end"), [(6, 0.6), pytest.param(100, 0.15, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("links", "end"), [(6, 0.6), pytest.param(100, 0.4, marks=pytest.mark.slow)])
 def test_a_chain_falls_on_a_floor(links, end):
     """Momentum changes at impacts by their impulses alone, and the floor never pulls."""
     scene = chain(links)

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
-from ..model.handles import handles_of
+from ..model.handles import all_angles, counted, handles_of
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import reactions
 from ..observables.reactions import Exerting
@@ -368,6 +368,14 @@ class Watch:
         parts = (np.ascontiguousarray(states[:, i]) for i in range(3))
         return RememberingState.of(self.packed, self.memory[self.angles :], anchor, t, *parts, None)
 
+    def _angles(self, t, state):
+        """Counted angles (angles,) at a state within the step, by the rates at its start and here."""
+        t0, (q, qd, _), angles = self.beside
+        handles = handles_of(self.packed)
+        found, rates = all_angles(handles, *state[:2])
+        before, others = all_angles(handles, q, qd)
+        return counted(found, counted(before, angles) + 0.5 * (t - t0) * (others + rates))
+
     def _value(self, i, t, state):
         event = self.events[i]
         if isinstance(event.function, Member):
@@ -431,7 +439,7 @@ class Watch:
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
                 if self.angles:
-                    run.remembered[: self.angles] = self._instant(each.t, each.state).angles
+                    run.remembered[: self.angles] = self._angles(each.t, each.state)
                 self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
                 return each

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..ahead import compile_ahead
 from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
-from ..analyses.contact_rows import ReactionWorkspace
+from ..analyses.contact_rows import KERNELS, ReactionWorkspace
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
 from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
@@ -303,6 +304,7 @@ class _ContactRun:
 
     def _take_scene(self, scene):
         """What follows from the scene alone, and makes the scenes of its phases."""
+        compile_ahead(KERNELS)
         self.scene, self.gaps, self.frictions, self.modes = scene, gaps_of(scene), Frictions(scene), Modes()
         self.count = handles_of(scene.packed).count
 

@@ -27,8 +27,8 @@ MU, SIDE, AXES, TYRE, BALLS, STRAIGHT, SLIP = 0, 1, 2, 5, 6, 7, 8  # where these
 A, B, Z, E = 0, 6, 12, 15  # where x_a, x_b, z and e_1 begin in x; a Turn follows each point
 
 
-class Sliding(Force):
-    """Friction on a contact's row, of a phase in which it slides.
+class _Sliding(Force):
+    """Friction on a contact's row, of a phase in which it slides: of a ball or a point.
 
     Parameters
     ----------
@@ -42,8 +42,6 @@ class Sliding(Force):
         a_j and R; zero semi-axes for a ball or a point.
     balls : float
         s of two balls, 0 for a plane.
-    straight : array_like (3,), optional
-        d, ground frame.
     """
 
     markers = (
@@ -52,7 +50,6 @@ class Sliding(Force):
         Point("b"),
         Turn("b"),
         Vector("b", "normal_b"),
-        *(Vector("a", name) for name in ("first_a", "second_a", "third_a")),
     )
     particles = True
     slots = 52
@@ -60,18 +57,16 @@ class Sliding(Force):
     sharp = True
     quantities: MappingProxyType[str, Any] = MappingProxyType({})
 
-    def __init__(self, row, *, kinetic, semi_axes=(0.0, 0.0, 0.0), tyre_radius=0.0, balls=0.0, sign=1.0, **places):
+    def __init__(self, row, *, kinetic, semi_axes=(0.0, 0.0, 0.0), tyre_radius=0.0, balls=0.0, **places):
         self.__dict__["joint"] = row
         super().__init__(row.a, row.b, **places)
-        self.kinetic, self.sign, self.balls = kinetic, sign, balls
-        self.semi_axes, self.tyre_radius, self.straight = semi_axes, tyre_radius, None
+        self.kinetic, self.semi_axes, self.tyre_radius, self.balls = kinetic, semi_axes, tyre_radius, balls
 
     def parameters(self):
-        """(mu, side of the reaction, a_j^2, R, s, whether straight, d)."""
+        """(mu, side of the reaction, a_j^2, R, s, whether straight, d): the last four are set in a run."""
         side = 1.0 if self.on is self.a else -1.0
-        direction = (0.0, 0.0, 0.0, 0.0) if self.straight is None else (1.0, *self.straight)
-        squares = (np.asarray(self.semi_axes) ** 2).tolist()
-        return self.kinetic, side, *squares, self.tyre_radius, self.balls, *direction
+        squares = (np.asarray(self.semi_axes, float) ** 2).tolist()
+        return self.kinetic, side, *squares, self.tyre_radius, self.balls, 0.0, 0.0, 0.0, 0.0
 
     @staticmethod
     def law(x, xd, par, t, out):
@@ -152,6 +147,12 @@ class Sliding(Force):
         off = n0 * v0 + n1 * v1 + n2 * v2
         v0, v1, v2 = v0 - off * n0, v1 - off * n1, v2 - off * n2
         return par[-1] * par[MU] * np.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
+
+
+class _SlidingSurface(_Sliding):
+    """The same of an ellipsoid, or a disc or torus."""
+
+    markers = (*_Sliding.markers, *(Vector("a", name) for name in ("first_a", "second_a", "third_a")))
 
 
 @kernel

@@ -121,3 +121,6 @@ LEVEL = 1e-11
 # Part of a row that is independent of others, up to which it depends on them: sines of angles, squares of which are
 # found to 1e-14.
 DEPENDENT = 1e-7
+# Share of the bound of friction by which a contact has reached it: reactions are right to ten digits at an event. Of the
+# bound that decides then whether it slides, and where: it does, though accelerations are zero but for rounding.
+AT_BOUND, WITHIN_BOUND = 1e-9, 1.0 - 1e-10

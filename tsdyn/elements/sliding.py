@@ -3,11 +3,13 @@
     n      normal towards a: z of the plane of b, or s (x_a - x_b) / |x_a - x_b| between balls, s = -1 within b
     k      = sum c_j e_j - R n,  c_j = -a_j^2 (e_j.n) / sqrt(sum a_i^2 (e_i.n)^2)                (1)
     v      = xd_a + omega_a x k - xd_b - omega_b x (x_a - x_b + k), less its part along n        (2)
-    force  = -mu N v / |v|, or -mu N d where slip of the direction d begins or ends              (3)
-    dissipation = mu N |v|                                                                       (4)
+    force  = -mu N e,  e = u / |u|,  u = d + (v - d d.v) d.v / ((d.v)^2 + v_0^2)                 (3)
+    dissipation = mu N e.v                                                                       (4)
 
 k is the contact point from x_a: an ellipsoid of semi-axes a_j along e_j, thickened by R. The force acts on a there, the
-opposite on b. N is the normal reaction, with its sign: a step beyond an opening is regular.
+opposite on b. N is the normal reaction, with its sign: a step beyond an opening is regular. e is v / |v| while v is
+within 90 degrees of d, a direction of the slip that a run sets, and d where |v| is far below v_0: so the force is
+analytic where the slip begins and ends.
 """
 
 from __future__ import annotations
@@ -19,11 +21,13 @@ import numpy as np
 
 from ..jit.kernels import kernel
 from ..jit.predicates import some
-from ..maths.recurrences import cross, dot, inverse_root, product, scaled
+from ..maths.recurrences import cross, dot, inverse_root, product, quotient, scaled, square
+from ..maths.tolerances import TINY
 from .force import Force
 from .markers import Point, Turn, Vector
+from .tolerances import SLIP
 
-MU, SIDE, AXES, TYRE, BALLS, STRAIGHT, SLIP = 0, 1, 2, 5, 6, 7, 8  # where these begin in par
+MU, SIDE, AXES, TYRE, BALLS, WAY = 0, 1, 2, 5, 6, 7  # where these begin in par; d is the last
 A, B, Z, E = 0, 6, 12, 15  # where x_a, x_b, z and e_1 begin in x; a Turn follows each point
 
 
@@ -52,8 +56,8 @@ class _Sliding(Force):
         Vector("b", "normal_b"),
     )
     particles = True
-    slots = 52
-    positive = (26,)
+    slots = 63
+    positive = (53,)
     sharp = True
     quantities: MappingProxyType[str, Any] = MappingProxyType({})
 
@@ -63,10 +67,10 @@ class _Sliding(Force):
         self.kinetic, self.semi_axes, self.tyre_radius, self.balls = kinetic, semi_axes, tyre_radius, balls
 
     def parameters(self):
-        """(mu, side of the reaction, a_j^2, R, s, whether straight, d): the last four are set in a run."""
+        """(mu, side of the reaction, a_j^2, R, s, d): d is set in a run."""
         side = 1.0 if self.on is self.a else -1.0
         squares = (np.asarray(self.semi_axes, float) ** 2).tolist()
-        return self.kinetic, side, *squares, self.tyre_radius, self.balls, 0.0, 0.0, 0.0, 0.0
+        return self.kinetic, side, *squares, self.tyre_radius, self.balls, 0.0, 0.0, 0.0
 
     @staticmethod
     def law(x, xd, par, t, out):
@@ -74,15 +78,11 @@ class _Sliding(Force):
         n0, n1, n2 = normal(x, par)
         k0, k1, k2 = arm(x, par, n0, n1, n2)
         l0, l1, l2 = x[0] - x[6] + k0, x[1] - x[7] + k1, x[2] - x[8] + k2
+        v0, v1, v2 = slip_at(xd, k0, k1, k2, l0, l1, l2)
+        off = n0 * v0 + n1 * v1 + n2 * v2
+        e0, e1, e2 = heading(v0 - off * n0, v1 - off * n1, v2 - off * n2, par[WAY:])
         f = -par[-1] * par[MU]
-        if some(par[STRAIGHT]):
-            F0, F1, F2 = f * par[SLIP], f * par[SLIP + 1], f * par[SLIP + 2]
-        else:
-            v0, v1, v2 = slip_at(xd, k0, k1, k2, l0, l1, l2)
-            off = n0 * v0 + n1 * v1 + n2 * v2
-            v0, v1, v2 = v0 - off * n0, v1 - off * n1, v2 - off * n2
-            f = f / np.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
-            F0, F1, F2 = f * v0, f * v1, f * v2
+        F0, F1, F2 = f * e0, f * e1, f * e2
         out[0], out[1], out[2] = F0, F1, F2
         out[3], out[4], out[5] = k1 * F2 - k2 * F1, k2 * F0 - k0 * F2, k0 * F1 - k1 * F0
         out[6], out[7], out[8] = -F0, -F1, -F2
@@ -97,7 +97,7 @@ class _Sliding(Force):
     @staticmethod
     def series(x, xd, par, k, s, out):
         """Of Eq. (3) for N = 1."""
-        # x_a - x_b, n (3), omega_a (6), omega_b (9), k (12), l (15), v (18), n.v, v.v, 1 / |v| (26), F (27)
+        # x_a - x_b, n (3), omega_a (6), omega_b (9), k (12), l (15), v (18), n.v, v less its part along n (22), F (27)
         for i in range(3):
             s[i, k] = x[i] - x[6 + i]
             s[6 + i, k], s[9 + i, k] = xd[3 + i], xd[9 + i]
@@ -105,24 +105,17 @@ class _Sliding(Force):
         arm_rows(x, par, k, s)
         for i in range(3):
             s[15 + i, k] = s[i, k] + s[12 + i, k]
-        if some(par[STRAIGHT]):
-            for i in range(3):
-                s[27 + i, k] = -par[MU] * par[SLIP + i] if k == 0 else 0.0
-        else:
-            u0, u1, u2 = cross(s, 6, 12, k)
-            w0, w1, w2 = cross(s, 9, 15, k)
-            s[18, k] = xd[0] - xd[6] + u0 - w0
-            s[19, k] = xd[1] - xd[7] + u1 - w1
-            s[20, k] = xd[2] - xd[8] + u2 - w2
-            s[21, k] = dot(s, 3, 18, k)
-            off = scaled(s, 3, 21, k)
-            for i in range(3):
-                s[22 + i, k] = s[18 + i, k] - off[i]
-            s[25, k] = dot(s, 22, 22, k)
-            s[26, k] = inverse_root(s[25], s[26], k)
-            f = scaled(s, 22, 26, k)
-            for i in range(3):
-                s[27 + i, k] = -par[MU] * f[i]
+        u0, u1, u2 = cross(s, 6, 12, k)
+        w0, w1, w2 = cross(s, 9, 15, k)
+        s[18, k] = xd[0] - xd[6] + u0 - w0
+        s[19, k] = xd[1] - xd[7] + u1 - w1
+        s[20, k] = xd[2] - xd[8] + u2 - w2
+        s[21, k] = dot(s, 3, 18, k)
+        off = scaled(s, 3, 21, k)
+        for i in range(3):
+            s[22 + i, k] = s[18 + i, k] - off[i]
+        e0, e1, e2 = heading_series(s, 22, 52, par[WAY:], k)
+        s[27, k], s[28, k], s[29, k] = -par[MU] * e0, -par[MU] * e1, -par[MU] * e2
         n0, n1, n2 = cross(s, 12, 27, k)
         m0, m1, m2 = cross(s, 15, 27, k)
         for i in range(3):
@@ -146,7 +139,8 @@ class _Sliding(Force):
         v0, v1, v2 = slip_at(xd, k0, k1, k2, x[0] - x[6] + k0, x[1] - x[7] + k1, x[2] - x[8] + k2)
         off = n0 * v0 + n1 * v1 + n2 * v2
         v0, v1, v2 = v0 - off * n0, v1 - off * n1, v2 - off * n2
-        return par[-1] * par[MU] * np.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
+        e0, e1, e2 = heading(v0, v1, v2, par[WAY:])
+        return par[-1] * par[MU] * (e0 * v0 + e1 * v1 + e2 * v2)
 
 
 class _SlidingSurface(_Sliding):
@@ -224,3 +218,28 @@ def arm_rows(x, par, k, s):
             s[12, k] += c0
             s[13, k] += c1
             s[14, k] += c2
+
+
+@kernel
+def heading(v0, v1, v2, d):
+    """e of Eq. (3), a tuple of three."""
+    a = v0 * d[0] + v1 * d[1] + v2 * d[2]
+    c = a / (a * a + SLIP * SLIP)
+    u0, u1, u2 = d[0] + c * (v0 - a * d[0]), d[1] + c * (v1 - a * d[1]), d[2] + c * (v2 - a * d[2])
+    size = np.sqrt(u0 * u0 + u1 * u1 + u2 * u2 + TINY)
+    return u0 / size, u1 / size, u2 / size
+
+
+@kernel
+def heading_series(s, v, first, d, k):
+    """Coefficient k, a tuple of three, of `heading`; v in rows v to v + 2 of s, eleven rows are its own."""
+    a, u, zero = first, first + 3, 1.0 if k == 0 else 0.0
+    s[a, k] = s[v, k] * d[0] + s[v + 1, k] * d[1] + s[v + 2, k] * d[2]
+    s[a + 1, k] = square(s[a], k) + SLIP * SLIP * zero
+    s[a + 2, k] = quotient(s[a], s[a + 1], s[a + 2], k)
+    for i in range(3):
+        s[first + 6 + i, k] = s[v + i, k] - s[a, k] * d[i]
+        s[u + i, k] = d[i] * zero + product(s[first + 6 + i], s[a + 2], k)
+    s[first + 9, k] = dot(s, u, u, k) + TINY * zero
+    s[first + 10, k] = inverse_root(s[first + 9], s[first + 10], k)
+    return scaled(s, u, first + 10, k)

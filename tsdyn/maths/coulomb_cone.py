@@ -17,7 +17,7 @@ from .tolerances import CONE_FACTORS, CONE_ROUNDING, CONE_STALLED, CONE_STEPS, C
 OPEN, STICKS, SLIDES = 0, 1, 2
 
 
-def solve_cone(G, b, mu, slip=None):
+def solve_cone(G, b, mu, slip=None, given=None):
     """Solve for contacts with Coulomb friction.
 
     Parameters
@@ -28,6 +28,8 @@ def solve_cone(G, b, mu, slip=None):
     mu : ndarray (k,)
     slip : ndarray (k, 2), optional
         Directions of slip where they are known; NaN elsewhere.
+    given : ndarray (k,), optional
+        Normal parts beside N, of which b has the effect already: |T| <= mu (N + given).
 
     Returns
     -------
@@ -44,7 +46,8 @@ def solve_cone(G, b, mu, slip=None):
     size = np.abs(b * scale).max()
     if size == 0.0:
         return np.zeros(3 * k), np.full(k, OPEN)
-    problem = _Problem(G * scale[:, None] * scale, b * scale / size, mu, slip)
+    given = np.zeros(k) if given is None else given / (scale[::3] * size)
+    problem = _Problem(G * scale[:, None] * scale, b * scale / size, mu, slip, given)
     p = np.zeros(3 * k)
     for sweeps in CONE_SWEEPS:
         p = problem.swept(p, sweeps)
@@ -58,8 +61,8 @@ def solve_cone(G, b, mu, slip=None):
 class _Problem:
     """One problem in scaled units; arguments as of `solve_cone`."""
 
-    def __init__(self, G, b, mu, slip):
-        self.G, self.b, self.mu = G, b, mu
+    def __init__(self, G, b, mu, slip, given):
+        self.G, self.b, self.mu, self.given = G, b, mu, given
         known = np.zeros(mu.size, bool) if slip is None else np.isfinite(slip).all(axis=1)
         self.known = known | (mu == 0.0)  # T follows from N
         self.direction = np.zeros((mu.size, 2))
@@ -70,7 +73,7 @@ class _Problem:
         """Right-hand sides of Eqs. (1), (2) (k, 3) for y (k, 3)."""
         mu, known, d = self.mu[contacts], self.known[contacts], self.direction[contacts]
         N = np.maximum(0.0, y[:, 0])
-        bound, length = mu * N, np.hypot(y[:, 1], y[:, 2])
+        bound, length = mu * (N + self.given[contacts]), np.hypot(y[:, 1], y[:, 2])
         share = np.where(length > bound, bound / np.where(length > 0.0, length, 1.0), 1.0)
         T = np.where(known[:, None], -bound[:, None] * d, share[:, None] * y[:, 1:])
         return np.column_stack([N, T])
@@ -84,19 +87,17 @@ class _Problem:
         """The derivative (3 k, 3 k) of the right-hand sides by y, of one branch at a kink."""
         D = np.zeros((y.size, y.size))
         for i, (n, *t) in enumerate(y):
-            o, mu = 3 * i, self.mu[i]
-            if not n > 0.0:
-                continue
-            D[o, o] = 1.0
-            length = np.hypot(*t)
+            o, mu, pushes = 3 * i, self.mu[i], float(n > 0.0)
+            D[o, o] = pushes
+            length, bound = np.hypot(*t), mu * (max(n, 0.0) + self.given[i])
             if self.known[i]:
-                D[o + 1 : o + 3, o] = -mu * self.direction[i]
-            elif length <= mu * n:
+                D[o + 1 : o + 3, o] = -mu * pushes * self.direction[i]
+            elif length <= bound:
                 D[o + 1, o + 1] = D[o + 2, o + 2] = 1.0
             else:
                 e = np.array(t) / length
-                D[o + 1 : o + 3, o] = mu * e
-                D[o + 1 : o + 3, o + 1 : o + 3] = mu * n / length * (np.eye(2) - np.outer(e, e))
+                D[o + 1 : o + 3, o] = mu * pushes * e
+                D[o + 1 : o + 3, o + 1 : o + 3] = bound / length * (np.eye(2) - np.outer(e, e))
         return D
 
     def newton(self, p, factor):
@@ -138,5 +139,5 @@ class _Problem:
         """Whether each contact is open, sticks or slides at a solution."""
         y = self.residual(p)[1]
         N, length = np.maximum(0.0, y[:, 0]), np.hypot(y[:, 1], y[:, 2])
-        slides = self.known | (length > self.mu * N)
+        slides = self.known | (length > self.mu * (N + self.given))
         return np.where(N > 0.0, np.where(slides, SLIDES, STICKS), OPEN)

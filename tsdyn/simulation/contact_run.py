@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
 from ..calls import fitting
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
 from ..jit.compiled import clock
@@ -17,12 +17,12 @@ from ..observables import diagnostics, reactions
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.dense_output import StepPieces
-from ..runs.events import Event
+from ..runs.events import Event, Member
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import floats, listed
-from .phase_scenes import NAMED, has_contacts, phase_of
+from .phase_scenes import NAMED, gaps_of, has_contacts, phase_of
 from .progress import reporter, silent
 from .run_options import RunCall
 from .scene_cache import Prepared, prepared
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 
 class _Closing:
-    """The gap of an open contact, as an event function.
+    """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
     however soon it comes.
@@ -53,58 +53,51 @@ class _Closing:
     Parameters
     ----------
     gaps : Gaps
-    i : int
-    start : tuple
-        Time, gap and rate where the contact has opened with a rate; else empty.
+    opened : dict
+        Of contacts that have opened with a rate: time, gap and rate there, by their numbers.
     """
 
-    def __init__(self, gaps, i, start):
-        self.gaps, self.i, self.start = gaps, i, start
+    def __init__(self, gaps, opened):
+        self.gaps = gaps
+        self.open(opened)
+
+    def open(self, opened):
+        """Take other contacts that have just opened."""
+        self.which = list(opened)
+        self.start = np.array(list(opened.values())).reshape(-1, 3).T
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        return self(states.t, states)
-
-    def __call__(self, t, state):
-        """The value at a state, or values at several."""
-        gap = self.gaps.value(self.i, state.q, state.angles if self.gaps.are_counted else None)
-        if not self.start:
-            return gap
-        begun, first, rate = self.start
-        since = np.where(t > begun, t - begun, 1.0)
-        return np.where(t > begun, (gap - first) / since, rate)
+        """Values (k, count) of states at k times."""
+        values = self.gaps.values(states.t, states.q, states.angles if self.gaps.are_counted else None)
+        if self.which:
+            begun, first, rate = self.start
+            since = states.t[:, None] - begun
+            later = since > 0.0
+            divided = (values[:, self.which] - first) / np.where(later, since, 1.0)
+            values[:, self.which] = np.where(later, divided, rate)
+        return values
 
 
 class _Leaving:
-    """The reaction of a closed contact, positive where it pushes, as an event function.
+    """The reactions of closed contacts, positive where they push, as event functions.
 
     Parameters
     ----------
     packed : Packed
         Of the phase.
-    row : int
-    sign : float
-        Of the gap over Phi.
-    seen : dict
-        What is shared with the other contacts of the phase.
+    rows : list of int
+    signs : list of float
+        Of the gaps over Phi.
     """
 
-    def __init__(self, packed, row, sign, seen):
-        self.packed, self.row, self.sign, self.seen = packed, row, sign, seen
+    def __init__(self, packed, rows, signs):
+        self.packed, self.rows, self.signs = packed, rows, np.array(signs)
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        key = states.t.tobytes(), states.q.tobytes()
-        if key not in self.seen:  # those of other contacts at the same times are found with it
-            self.seen.clear()
-            memory = np.tile(states.memory, (states.t.size, 1))
-            levels = states.t, states.q, states.qd, states.qdd, memory
-            self.seen[key] = reactions.multipliers(self.packed, *levels)
-        return -self.sign * self.seen[key][:, self.row]
-
-    def __call__(self, t, state):
-        """The value at one state."""
-        return -self.sign * state.multipliers[self.row]
+        """Values (k, closed) of states at k times."""
+        memory = np.tile(states.memory, (states.t.size, 1))
+        lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        return -self.signs * lam[:, self.rows]
 
 
 class Phases:
@@ -140,6 +133,11 @@ class Phases:
     def at(self, t):
         """Numbers of the phases at times t (k,); where one begins, the later one."""
         return np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
+
+    def of_outputs(self, t):
+        """Numbers of the phases of outputs at times t (k,): of several at one time each is of a phase of its own."""
+        same = np.searchsorted(t, t, side="right") - 1 - np.arange(t.size)
+        return np.maximum(self.at(t) - same, 0)
 
     def multipliers(self, numbers, m, *arrays):
         """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
@@ -201,6 +199,10 @@ class Modes:
     idle: list = field(default_factory=list)  # closed by what others hold
     opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
 
+    def same(self, other):
+        """Whether the units are in the same modes, whatever has just opened."""
+        return replace(self, opened={}) == replace(other, opened={})
+
 
 class _ContactRun:
     """One run in the making.
@@ -226,7 +228,7 @@ class _ContactRun:
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        self.gaps = gaps = Gaps(scene.packed)
+        self.gaps = gaps = gaps_of(scene)
         self.count = kept.handles.count
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
@@ -257,6 +259,7 @@ class _ContactRun:
         """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
         began, first = clock(), None
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
+        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         status = self._settle(touching, ())
         while status is None:
             try:
@@ -267,7 +270,6 @@ class _ContactRun:
                 status, self.reason = Status.SINGULAR, str(error)
                 break
             first = first or task
-            self.parts.append(outcome)
             status = self._after(outcome)
         if first is None:  # nothing could begin
             raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
@@ -289,14 +291,35 @@ class _ContactRun:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(),
+                max_steps=self._steps_left(), resume=self._resume,
             )  # fmt: skip
+            self.names, self.packed, self.settled, self.again = names, phase.packed, None, []
             outcome = self.run_task(task, phase, self.options.initial_tol)
             other = self.instead(task, outcome.status)
             if other is None:
-                self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, names)
+                if self.settled is None:
+                    self._end_phase(outcome.end.reached)
                 return task, outcome
             run = run._by(other)
+
+    def _end_phase(self, t):
+        self.phases.add(self.t, self.rest, t, self.packed, self.names)
+
+    def _resume(self, t, run, numbers):
+        """After events of these numbers: whether the run of the phase goes on, with other velocities.
+
+        It does where the same gaps are closed as before.
+        """
+        self._end_phase(t)
+        before = self.modes
+        self.t, (self.q, self.qd, _), self.remembered = t, run.now.copy(), run.remembered.copy()
+        self.settled = (self._transit([self.watched[i] for i in numbers]),)
+        if self.settled[0] is not None or not self.modes.same(before):
+            return False
+        run.now[1], self.settled = self.qd, None
+        self.closing.open(self.modes.opened)
+        self.again.append(t)
+        return True
 
     def _scene(self):
         """The scene of the present modes."""
@@ -317,17 +340,17 @@ class _ContactRun:
 
     def _watches(self, packed):
         """Yield the units that may end a phase, each with its event."""
-        gaps, modes, pushes = self.gaps, self.modes, {}
+        gaps, modes = self.gaps, self.modes
         first = {id(member.constraint): member.rows.start for member in packed.members}
+        sides = [gaps.list[i].side for i in modes.closed]
+        leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
+        self.closing = _Closing(gaps, modes.opened)
         for i in range(gaps.count):
             if i in modes.idle:
                 continue
-            row, sign = gaps.list[i].side.row, gaps.list[i].side.sign
-            if i in modes.closed:
-                event = _Leaving(packed, first[id(row)], sign, pushes)
-            else:
-                event = _Closing(gaps, i, modes.opened.get(i, ()))
-            yield i, Event(event, gaps.names[i], 1.0, -1.0, i not in modes.closed)
+            is_open = i not in modes.closed
+            function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
+            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
 
     def _times(self):
         left = self.times[self.taken :]
@@ -352,34 +375,47 @@ class _ContactRun:
 
     def _after(self, outcome):
         """Take the end of a phase; the Status of the run, None if it goes on."""
-        end, gaps = outcome.end, self.gaps
-        self.reason, self.method = outcome.reason, outcome.method or self.method
+        end, part = outcome.end, outcome
+        self.method = outcome.method or self.method
         self.steps += end.counts["steps"]
         times, *states = outcome.events
         for i, mine in enumerate(list(zip(times, *states, strict=True))[: len(self.users)]):
             self.found[i].append(mine)
             self.counts[i] += len(mine[0])
-        self.t, (self.q, self.qd, _) = end.reached, (x.copy() for x in end.last)
-        self.remembered = end.remembered
         fired = [i for i, at in zip(self.watched, times, strict=True) if i is not None and at.size]
-        goes_on = outcome.status is Status.EVENT and fired and self.t < self.span[1]
-        rows = outcome.rows
-        if not self.per_step and goes_on and len(rows) and rows[-1, 0] == self.t:  # that of the next phase counts
-            self.parts[-1] = outcome._replace(rows=rows[:-1])
-        self.taken += len(self.parts[-1].rows)
-        values = gaps.at(self.q, self.remembered[: self.count])
-        deep = [i for i in range(gaps.count) if values[i] < -PENETRATION * self.length]
-        if deep:
-            self.reason = (
-                f"Penetration was not noticed: {listed([gaps.names[i] for i in deep], NAMED)}. Give a max_step."
-            )
+        ends = outcome.status is Status.EVENT and bool(fired)
+        goes_on = ends and end.reached < self.span[1]
+        if not self.per_step and goes_on and len(part.rows) and part.rows[-1, 0] == end.reached:
+            part = part._replace(rows=part.rows[:-1])  # that of the next phase counts
+        if self.again and part.trajectory is not None:
+            part.trajectory.begin_at(self.again)
+        self.parts.append(part)
+        self.taken += len(part.rows)
+        if self.settled is not None:  # within the run of the phase
+            return self.settled[0]
+        self.t, (self.q, self.qd, _), self.remembered = end.reached, (x.copy() for x in end.last), end.remembered
+        if goes_on:
+            return self._transit(fired)
+        self.reason = outcome.reason
+        if self._is_deep():
             return Status.CONTACT_FAILED
-        if not goes_on:
-            return Status.SUCCESS if outcome.status is Status.EVENT and fired else outcome.status
+        return Status.SUCCESS if ends else outcome.status
+
+    def _is_deep(self):
+        """Whether contacts penetrate; says so."""
+        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
+        deep = np.flatnonzero(self.gap < -PENETRATION * self.length)
+        if deep.size:
+            found = listed([self.gaps.names[i] for i in deep], NAMED)
+            self.reason = f"Penetration was not noticed: {found}. Give a max_step."
+        return deep.size > 0
+
+    def _transit(self, fired):
+        """From one phase to the next one, after events of the gaps `fired`; the Status if there is no way on."""
         self.reason = ""
-        if self._is_stuck():
+        if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        near = [i for i in range(gaps.count) if values[i] <= TOUCHING * self.length]
+        near = np.flatnonzero(self.gap <= TOUCHING * self.length).tolist()
         return self._settle(sorted({*near, *fired, *self.modes.closed, *self.modes.idle}), fired)
 
     def _is_stuck(self):
@@ -400,12 +436,12 @@ class _ContactRun:
 
     def _settle(self, touching, fired):
         """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
-        slots, values = self.remembered[self.count :], self.gaps.at(self.q, self.remembered[: self.count])
+        slots, values = self.remembered[self.count :], self.gap
         before, self.modes, self.rest = self.modes, Modes(), self.t
         if not touching:
             return None
         try:
-            inertia = Inertia(self.gaps, self.t, self.q, self.qd, slots)
+            inertia = Inertia(self.gaps, self.t, self.q, slots)
             rates = inertia.rates(self.qd)
             noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
             if noise:  # a gap that closes with a rate of rounding
@@ -473,13 +509,13 @@ class _ContactRun:
         ends = [part.end for part in parts]
         last = ends[-1]
         logs = self.options.history is not False
-        numbers = np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts])
+        rows = np.concatenate([part.rows for part in parts])
         events = None
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
             events = tuple([np.concatenate(column[k]) for column in columns] for k in range(3))
         return Outcome(
-            status, self.reason, np.concatenate([part.rows for part in parts]),
+            status, self.reason, rows,
             RunEnd(
                 last.reached, last.last, last.remembered,
                 summed([end.counts for end in ends]),
@@ -487,13 +523,13 @@ class _ContactRun:
                 ChartLog([end.charts for end in ends]) if logs else None,
             ),
             _Pieces([part.trajectory for part in parts]) if self.options.dense_output else None,
-            events, began, self.method, (self.phases, numbers),
+            events, began, self.method, (self.phases, self.phases.of_outputs(rows[:, 0])),
         )  # fmt: skip
 
 
 def jumped(inertia, qd, which, before, e, p, law="newton"):
     """Velocities (n,) after impulses p (k,) of the gaps `which`, and the rates (count,) of all gaps then."""
-    change = inertia.free(inertia.J[which].T @ p)
+    change = inertia.pushed(which, p)
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = np.maximum(after[which], 0.0)  # but for rounding
     if law == "newton":  # without rounding where the impact acts
@@ -580,7 +616,7 @@ def impact(
         raise InvalidArgument(f"law must be 'newton' or 'poisson', got {law!r}.")
     if not has_contacts(scene):
         raise InvalidArgument("impact: the scene has no unilateral constraints, such as PlaneContact(unilateral=True).")
-    gaps, kept = Gaps(scene.packed), prepared(phase_of(scene, []))
+    gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
     q, qd = state_arrays(state, kept.n)
     t = float(getattr(state, "t", 0.0))
     memory = remembered(state, kept, t, q)
@@ -593,7 +629,7 @@ def impact(
             e[_chosen(gaps, [item], None)] = _coefficient(value)
     elif restitution is not None:
         e[:] = _coefficient(restitution)
-    inertia = Inertia(gaps, t, q, qd, slots)
+    inertia = Inertia(gaps, t, q, slots)
     before = inertia.rates(qd)[which]
     try:
         p = impulses(inertia, which, before, e[which], law)

@@ -57,6 +57,15 @@ def phase_of(scene, rows, places=(), without=()):
     return known[key]
 
 
+def gaps_of(scene):
+    """The `Gaps` of a scene with contacts."""
+    from ..analyses.contact_problem import Gaps
+
+    rows = [side.row for contact in contacts_of(scene._added) for side in contact.sides]
+    alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
+    return Gaps(scene.packed, alone.packed, phase_of(scene, []).packed)
+
+
 def _remembering(packed, places):
     """Packed with the memory of these places in numbers of its rows."""
     system, begins = packed.system, begins_of(packed)
@@ -70,9 +79,9 @@ def at_start(scene):
     """The scene with those contacts closed that are so at its start; a scene without contacts as it is."""
     if not has_contacts(scene):
         return scene
-    from ..analyses.contact_problem import Gaps, closed_gaps
+    from ..analyses.contact_problem import closed_gaps
 
-    gaps, (q, _) = Gaps(scene.packed), scene.start
+    gaps, (q, _) = gaps_of(scene), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
     return phase_of(scene, [gaps.list[i].side.row for i in closed_gaps(gaps, q, angles)])
 

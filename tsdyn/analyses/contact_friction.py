@@ -86,7 +86,7 @@ def settle_grips(inertia, resting, qd, fired=()):
     rows = rows_of(inertia, resting)
     response = inertia.free(rows.T)
     G, k = rows @ response, len(resting)
-    c, terms, slipping = inertia.accelerations(qd, tangents=True)
+    c, terms, slipping = inertia.accelerations(qd)
     b = np.column_stack([c[resting], slipping[resting]]).ravel()
     slips = inertia.slips(qd)[resting]
     speeds = np.hypot(*slips.T)

@@ -78,9 +78,8 @@ class _Sliding(Force):
         n0, n1, n2 = normal(x, par)
         k0, k1, k2 = arm(x, par, n0, n1, n2)
         l0, l1, l2 = x[0] - x[6] + k0, x[1] - x[7] + k1, x[2] - x[8] + k2
-        v0, v1, v2 = slip_at(xd, k0, k1, k2, l0, l1, l2)
-        off = n0 * v0 + n1 * v1 + n2 * v2
-        e0, e1, e2 = heading(v0 - off * n0, v1 - off * n1, v2 - off * n2, par[WAY:])
+        v0, v1, v2 = slip_velocity(x, xd, par)
+        e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3])
         f = -par[-1] * par[MU]
         F0, F1, F2 = f * e0, f * e1, f * e2
         out[0], out[1], out[2] = F0, F1, F2
@@ -114,7 +113,7 @@ class _Sliding(Force):
         off = scaled(s, 3, 21, k)
         for i in range(3):
             s[22 + i, k] = s[18 + i, k] - off[i]
-        e0, e1, e2 = heading_series(s, 22, 52, par[WAY:], k)
+        e0, e1, e2 = heading_series(s, 22, 52, par[WAY : WAY + 3], k)
         s[27, k], s[28, k], s[29, k] = -par[MU] * e0, -par[MU] * e1, -par[MU] * e2
         n0, n1, n2 = cross(s, 12, 27, k)
         m0, m1, m2 = cross(s, 15, 27, k)
@@ -134,12 +133,8 @@ class _Sliding(Force):
     @staticmethod
     def dissipation(x, xd, par, t):
         """Eq. (4)."""
-        n0, n1, n2 = normal(x, par)
-        k0, k1, k2 = arm(x, par, n0, n1, n2)
-        v0, v1, v2 = slip_at(xd, k0, k1, k2, x[0] - x[6] + k0, x[1] - x[7] + k1, x[2] - x[8] + k2)
-        off = n0 * v0 + n1 * v1 + n2 * v2
-        v0, v1, v2 = v0 - off * n0, v1 - off * n1, v2 - off * n2
-        e0, e1, e2 = heading(v0, v1, v2, par[WAY:])
+        v0, v1, v2 = slip_velocity(x, xd, par)
+        e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3])
         return par[-1] * par[MU] * (e0 * v0 + e1 * v1 + e2 * v2)
 
 
@@ -177,13 +172,16 @@ def arm(x, par, n0, n1, n2):
 
 
 @kernel
-def slip_at(xd, k0, k1, k2, l0, l1, l2):
-    """Velocity of a's material point at the contact over that of b, a tuple of three."""
-    return (
-        xd[0] - xd[6] + xd[4] * k2 - xd[5] * k1 - (xd[10] * l2 - xd[11] * l1),
-        xd[1] - xd[7] + xd[5] * k0 - xd[3] * k2 - (xd[11] * l0 - xd[9] * l2),
-        xd[2] - xd[8] + xd[3] * k1 - xd[4] * k0 - (xd[9] * l1 - xd[10] * l0),
-    )
+def slip_velocity(x, xd, par):
+    """v of Eq. (2), a tuple of three."""
+    n0, n1, n2 = normal(x, par)
+    k0, k1, k2 = arm(x, par, n0, n1, n2)
+    l0, l1, l2 = x[0] - x[6] + k0, x[1] - x[7] + k1, x[2] - x[8] + k2
+    v0 = xd[0] - xd[6] + xd[4] * k2 - xd[5] * k1 - (xd[10] * l2 - xd[11] * l1)
+    v1 = xd[1] - xd[7] + xd[5] * k0 - xd[3] * k2 - (xd[11] * l0 - xd[9] * l2)
+    v2 = xd[2] - xd[8] + xd[3] * k1 - xd[4] * k0 - (xd[9] * l1 - xd[10] * l0)
+    off = n0 * v0 + n1 * v1 + n2 * v2
+    return v0 - off * n0, v1 - off * n1, v2 - off * n2
 
 
 @kernel

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analyses.contact_friction import halted, settle_grips, strike
 from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
 from ..calls import fitting
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
@@ -22,6 +23,7 @@ from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import floats, listed
+from .grips import Halting, Reactions, add_friction, phase_with_friction, renewed
 from .phase_scenes import NAMED, gaps_of, has_contacts, phase_of
 from .progress import reporter, silent
 from .run_options import RunCall
@@ -111,24 +113,32 @@ class Phases:
         Time (s), name, impulse (N s, or N m s of an angle).
     """
 
-    def __init__(self, packed):
+    def __init__(self, packed, gaps):
         self.list, self.impulses, self.starts, self.of = [], [], [], []
-        self.packed, self._columns = [], []  # of each set of closed gaps
+        self.packed, self._columns, self.modes, self.gaps = [], [], [], gaps  # of each set of closed gaps
         self._rows, self._kinds = _rows_of(packed), {}
 
-    def add(self, begin, rest, end, packed, names):
-        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
+    def add(self, begin, rest, end, packed, names, modes):
+        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end.
+
+        In the list phases are one that differ in directions of slips alone.
+        """
         kind = self._kinds.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
             own = _rows_of(packed)
             pairs = [(self._rows[part] + i, own[part] + i) for part, i in _numbered(packed) if part in self._rows]
             self.packed.append(packed)
+            self.modes.append(modes)
             self._columns.append(np.array(pairs, int).reshape(-1, 2).T)
         if self.list:
             self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
+        is_new = not (self.list and modes.turned(self.modes[self.of[-1]]))
         self.starts.append(begin)
         self.of.append(kind)
-        self.list.append((rest, max(rest, end), names))
+        if is_new:
+            self.list.append((rest, max(rest, end), names))
+        else:
+            self.list[-1] = (self.list[-1][0], max(rest, end), names)
 
     def at(self, t):
         """Numbers of the phases at times t (k,); where one begins, the later one."""
@@ -144,8 +154,18 @@ class Phases:
         out = np.zeros((len(numbers), m))
         for kind, mine, some in self._gathered(numbers, arrays):
             rows, columns = self._columns[kind]
-            out[np.ix_(mine, rows)] = reactions.multipliers(self.packed[kind], *some)[:, columns]
+            lam, own = reactions.multipliers(self.packed[kind], *some), np.zeros((mine.size, m))
+            own[:, rows] = lam[:, columns]
+            if self.modes[kind].grips:
+                add_friction(self.gaps, self.modes[kind], self.packed[kind], *some[:3], lam, own)
+            out[mine] = own
         return out
+
+    def sticking(self, numbers, contact):
+        """Whether a contact with friction sticks (k,)."""
+        mine = {i for i, gap in enumerate(self.gaps.list) if gap.contact is contact}
+        found = [any(modes.grips.get(i, ()) is None for i in mine) for modes in self.modes]
+        return np.array(found)[np.array(self.of)[numbers]]
 
     def constraint_error(self, numbers, *arrays):
         """The `ConstraintError` of the rows that hold."""
@@ -199,6 +219,16 @@ class Modes:
     idle: list = field(default_factory=list)  # closed by what others hold
     opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
 
+    grips: dict = field(default_factory=dict)  # of closed ones with friction: see grips.py
+    held: dict = field(default_factory=dict)
+
+    def turned(self, other):
+        """Whether these are the modes of another but for directions of slips."""
+        stick = [[i for i, d in modes.grips.items() if d is None] for modes in (self, other)]
+        return bool(self.grips) and not self.opened and stick[0] == stick[1] and (
+            (self.closed, self.idle, self.held) == (other.closed, other.idle, other.held)
+        )
+
     def same(self, other):
         """Whether the units are in the same modes, whatever has just opened."""
         return replace(self, opened={}) == replace(other, opened={})
@@ -238,7 +268,7 @@ class _ContactRun:
         self.users = prepared_events(options.events) or []
         self.modes, self.rest = Modes(), self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
-        self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
+        self.phases, self.counts, self.steps = Phases(scene.packed, gaps), [0] * len(self.users), 0
         self.reason, self.method, self.at_once, self.judged = "", "", 0, (self.t, 0)
 
     def _demand_served(self, kept):
@@ -303,7 +333,7 @@ class _ContactRun:
             run = run._by(other)
 
     def _end_phase(self, t):
-        self.phases.add(self.t, self.rest, t, self.packed, self.names)
+        self.phases.add(self.t, self.rest, t, self.packed, self.names, self.modes)
 
     def _resume(self, t, run, numbers):
         """After events of these numbers: whether the run of the phase goes on, with other velocities.
@@ -323,12 +353,16 @@ class _ContactRun:
 
     def _scene(self):
         """The scene of the present modes."""
+        if self.modes.grips:
+            return phase_with_friction(self.scene, self.gaps, self.modes)
         return phase_of(self.scene, [self.gaps.list[i].side.row for i in self.modes.closed])
 
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
-        return tuple(dict.fromkeys(self.gaps.names[i] for i in held))
+        names = [self.gaps.names[i] for i in held]
+        names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
+        return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""
@@ -343,14 +377,27 @@ class _ContactRun:
         gaps, modes = self.gaps, self.modes
         first = {id(member.constraint): member.rows.start for member in packed.members}
         sides = [gaps.list[i].side for i in modes.closed]
+        if modes.grips:
+            yield from self._frictions(packed)
         leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
         self.closing = _Closing(gaps, modes.opened)
         for i in range(gaps.count):
-            if i in modes.idle:
+            if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
             is_open = i not in modes.closed
             function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
+
+    def _frictions(self, packed):
+        """The same of closed contacts where there is friction: their reactions, their bounds, their slips."""
+        gaps, modes = self.gaps, self.modes
+        pushing = Reactions(gaps, modes, packed)
+        for k, i in enumerate([*pushing.closed, *pushing.sticks]):
+            yield i, Event(Member(pushing.over, k), gaps.names[i], 1.0, -1.0, False)
+        slides = [i for i in modes.closed if modes.grips.get(i) is not None]
+        halting = Halting(packed, [gaps.list[i].side.grip.sliding for i in slides])
+        for k, i in enumerate(slides):
+            yield i, Event(Member(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 
     def _times(self):
         left = self.times[self.taken :]
@@ -450,9 +497,15 @@ class _ContactRun:
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
             opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
-            leaving = [i for i in fired if i in before.closed]
-            stay = settle(inertia, resting, self.qd, leaving)[:2] if resting else ([], [])
-            self.modes = Modes(*stay, opened)
+            self.modes = Modes(opened=opened)
+            if self.gaps.rubs[resting].any():
+                self.qd = halted(inertia, self.qd, resting)
+                settled = settle_grips(inertia, resting, self.qd)
+                grips = renewed(self.gaps, before, settled, self.q)
+                self.modes = Modes(settled.closed, settled.idle, opened, *grips)
+            elif resting:
+                leaving = [i for i in fired if i in before.closed]
+                self.modes = Modes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
@@ -488,15 +541,17 @@ class _ContactRun:
 
     def _jump(self, inertia, touching, before, e, qd=None):
         """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
-        p = impulses(inertia, touching, before, e)
-        return p, *jumped(inertia, self.qd if qd is None else qd, touching, before, e, p)
+        qd = self.qd if qd is None else qd
+        p, change, share = impact_of(inertia, touching, qd, before, e)
+        return p, *jumped(inertia, qd, change, touching, before, share * e, p)
 
     def _lowering(self, inertia, touching, qd, rates):
         """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""
         opening = [i for i in touching if rates[i] > 0.0]
         if not opening:
             return np.zeros(self.gaps.count)
-        a = -settle(inertia, [i for i in touching if rates[i] == 0.0], qd).accelerations
+        resting = [i for i in touching if rates[i] == 0.0]
+        a = -(settle_grips if self.gaps.rubs[resting].any() else settle)(inertia, resting, qd).accelerations
         rounding = EPS * np.maximum(self.length, ROUNDED * (np.abs(inertia.J) @ np.abs(self.q)))
         rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
         mine = np.isin(np.arange(a.size), opening)
@@ -527,9 +582,16 @@ class _ContactRun:
         )  # fmt: skip
 
 
-def jumped(inertia, qd, which, before, e, p, law="newton"):
-    """Velocities (n,) after impulses p (k,) of the gaps `which`, and the rates (count,) of all gaps then."""
-    change = inertia.pushed(which, p)
+def impact_of(inertia, which, qd, before, e, law="newton"):
+    """Normal impulses (k,) of the gaps `which`, the change of velocities (n,), and the share of e that acts."""
+    if inertia.gaps.rubs[which].any():
+        return strike(inertia, which, qd, before, e, law)
+    p = impulses(inertia, which, before, e, law)
+    return p, inertia.pushed(which, p), 1.0
+
+
+def jumped(inertia, qd, change, which, before, e, p, law="newton"):
+    """Velocities (n,) after the impulses p (k,) of the gaps `which`, and the rates (count,) of all gaps then."""
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = np.maximum(after[which], 0.0)  # but for rounding
     if law == "newton":  # without rounding where the impact acts
@@ -632,11 +694,11 @@ def impact(
     inertia = Inertia(gaps, t, q, slots)
     before = inertia.rates(qd)[which]
     try:
-        p = impulses(inertia, which, before, e[which], law)
+        p, change, share = impact_of(inertia, which, qd, before, e[which], law)
     except NoSolution as error:
         names = listed(list(dict.fromkeys(gaps.names[i] for i in which)), NAMED)
         raise InconsistentState(f"impact: no impulses keep these contacts from penetrating: {names}.") from error
-    after, _ = jumped(inertia, qd, which, before, e[which], p, law)
+    after, _ = jumped(inertia, qd, change, which, before, share * e[which], p, law)
     found = {gaps.names[i]: 0.0 for i in which}
     for i, x in zip(which, p, strict=True):
         found[gaps.names[i]] += float(x)

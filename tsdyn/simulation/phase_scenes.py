@@ -4,6 +4,7 @@ from functools import wraps
 from typing import NamedTuple
 
 from ..calls import fitting
+from ..elements.force import Force
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument
 from ..model.handles import handles_of
@@ -35,7 +36,7 @@ class Place(NamedTuple):
 
 
 def phase_of(scene, rows, places=(), without=()):
-    """The scene with these rows, primitives, in place of its contacts; kept until the scene changes.
+    """The scene with these rows, primitives, and forces in place of its contacts; kept until the scene changes.
 
     places: `Place` of what the rows take from the memory of the run. without: constraints and forces left out.
     """
@@ -45,11 +46,12 @@ def phase_of(scene, rows, places=(), without=()):
     key = frozenset(map(id, (*rows, *without)))
     if key not in known:
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
+        constraints, forces = ([each for each in rows if isinstance(each, Force) is given] for given in (False, True))
         phase = known[key] = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
-            _added=[each for each in scene._added if id(each) not in gone] + list(rows),
-            _forces=[each for each in scene._forces if id(each) not in gone],
+            _added=[*(each for each in scene._added if id(each) not in gone), *constraints],
+            _forces=[*(each for each in scene._forces if id(each) not in gone), *forces],
             _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
         )  # fmt: skip
         if places:
@@ -61,7 +63,10 @@ def gaps_of(scene):
     """The `Gaps` of a scene with contacts."""
     from ..analyses.contact_problem import Gaps
 
-    rows = [side.row for contact in contacts_of(scene._added) for side in contact.sides]
+    sides = [(contact, side) for contact in contacts_of(scene._added) for side in contact.sides]
+    rows = [side.grip.gap if side.grip else side.row for _, side in sides]
+    rubbing = [part for contact, side in sides if side.grip for part in contact.parts]
+    rows += [part for part in rubbing if not any(part is row for row in rows)]
     alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
     return Gaps(scene.packed, alone.packed, phase_of(scene, []).packed)
 

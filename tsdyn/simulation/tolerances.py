@@ -77,3 +77,5 @@ ENDLESS = 1e-12
 MOST_AT_AN_INSTANT = 100
 # Events after which progress is judged: a run that would need CREEPING times as many more is ended.
 EVENTS_JUDGED, CREEPING = 1000, 1e3
+# Cosine of the turn of a slip since its phase began, above which the next one keeps its direction.
+SAME_WAY = 0.9

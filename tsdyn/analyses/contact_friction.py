@@ -69,7 +69,7 @@ def strike(inertia, which, qd, rates, restitution, law="newton"):
 def settle_grips(inertia, resting, qd, fired=()):
     """Which of the gaps that are closed and at rest stay so, and which stick or slide; arguments as of `settle`.
 
-    The slips of contacts that are at rest are exactly zero in qd, see `halted`.
+    Slips that are rounding have been ended in qd, see `halted`.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def settle_grips(inertia, resting, qd, fired=()):
     b = np.column_stack([c[resting], slipping[resting]]).ravel()
     slips = inertia.slips(qd)[resting]
     speeds = np.hypot(*slips.T)
-    slides = speeds > 0.0
+    slides = speeds > LEAST_SLIP
     d = np.full((k, 2), np.nan)
     d[slides] = slips[slides] / speeds[slides, None]
     mu = np.where(slides, gaps.kinetic[resting], gaps.static[resting])

@@ -375,11 +375,12 @@ class _ContactRun:
     def _watches(self, packed):
         """Yield the units that may end a phase, each with its event."""
         gaps, modes = self.gaps, self.modes
-        first = {id(member.constraint): member.rows.start for member in packed.members}
-        sides = [gaps.list[i].side for i in modes.closed]
         if modes.grips:
             yield from self._frictions(packed)
-        leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
+        else:
+            first = {id(member.constraint): member.rows.start for member in packed.members}
+            sides = [gaps.list[i].side for i in modes.closed]
+            leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
         self.closing = _Closing(gaps, modes.opened)
         for i in range(gaps.count):
             if i in modes.idle or (modes.grips and i in modes.closed):

@@ -105,8 +105,8 @@ class SphereContact(Unilateral, Joint):
         if self.rubs and self.radius_b is not None and 3 in (self.a.dimension, self.b.dimension):
             body = self.a if self.a.dimension == 3 else self.b
             raise InvalidConstraint(
-                f"{self.name}: the point mass {body.name!r} can't be turned by friction between balls; use add_body, or "
-                "leave out kinetic and static."
+                f"{self.name}: friction between balls can't turn the point mass {body.name!r}; use add_body, or leave "
+                "out kinetic and static."
             )
         if self.inside and not (self.radius_b is not None and self.radius_a < self.radius_b):
             raise InvalidConstraint(

@@ -4,8 +4,8 @@
     impact         b = (gd- + e min(gd-, 0), v-): Newton's law along normals, in tangents the cone of kinetic friction
     accelerations  b = (gdd, vd) of open contacts; a contact that slides has T = -mu N v / |v|, one at rest the cone
 
-See maths/coulomb_cone.py for the cone. Newton's law can add energy with friction: coefficients of restitution are lowered
-together until it doesn't; without restitution it never does.
+See maths/coulomb_cone.py for the cone. With friction Newton's law can add energy: coefficients of restitution are
+lowered together until it doesn't; without restitution it never does.
 """
 
 from __future__ import annotations
@@ -106,7 +106,6 @@ def settle_grips(inertia, resting, qd, fired=()):
             break
         mu = np.where(leave, gaps.kinetic[resting] * WITHIN_BOUND, mu)
     _demand_unique(G, d, mu, mode)
-    u = (b + G @ p).reshape(-1, 3)
     gdd = c + inertia.J @ (response @ p)
     small = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p))
     closed, idle, grips = [], [], {}

@@ -75,7 +75,7 @@ class Gaps:
         self.static = np.array([grip.static if grip else 0.0 for grip in grips], float)
         self.slip_rows = np.where(self.rubs, self.rows, 0)[:, None] + [1, 2]
         own = {id(part): first for part, first in first_rows(contacts.constraints)}
-        self._slips = np.array([slip_rows(gap.contact, own) for gap, rubs in zip(self.list, self.rubs, strict=True) if rubs], int)
+        self._slips = np.array([slip_rows(self.list[i].contact, own) for i in np.flatnonzero(self.rubs)], int)
         self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
 

@@ -1,7 +1,7 @@
 """Gaps of contacts, their rows, and what loads do where the bilateral rows hold: kernels, and their workspace.
 
-    J, gd = J qd + Phi_t, gdd = J qdd + gamma       rows of Phi that are gaps, times their signs
-    H W H^T lam = H W f,  a = W (f - H^T lam)       H: bilateral rows                                           (1)
+J, gd = J qd + Phi_t, gdd = J qdd + gamma       rows of Phi that are gaps, times their signs
+H W H^T lam = H W f,  a = W (f - H^T lam)       H: bilateral rows                                           (1)
 """
 
 from __future__ import annotations

@@ -121,6 +121,17 @@ LEVEL = 1e-11
 # Part of a row that is independent of others, up to which it depends on them: sines of angles, squares of which are
 # found to 1e-14.
 DEPENDENT = 1e-7
-# Share of the bound of friction by which a contact has reached it: reactions are right to ten digits at an event. Of the
-# bound that decides then whether it slides, and where: it does, though accelerations are zero but for rounding.
+# What the friction of a contact lacks of its bound, of that, where it has reached it: reactions are right to ten digits
+# at an event. Share of the bound that decides then: the contact slides, though its acceleration is rounding.
 AT_BOUND, WITHIN_BOUND = 1e-9, 1.0 - 1e-10
+
+# --- friction at rest ------------------------------------------------------------------------------------------------
+# m/s or rad/s: a body that slides in a plane, more slowly, has come to rest where its direction turns: ten times the
+# velocity below which its direction is kept.
+STOPPED = 1e-8
+# Rounds of pivoting over those for all units at once; after as many, or where modes come back, one unit at a time.
+PIVOTS = 30
+# Reaction over the bound from which on a unit whose event has come slides.
+BROKEN = 1.0 - 1e-7
+# What the cosine of the angle between the direction and the acceleration of a beginning slide may lack of one.
+ASIDE = 1e-12

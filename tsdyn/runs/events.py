@@ -61,7 +61,9 @@ class Member:
     def __call__(self, t, instant):
         """The value at one state."""
         arrays = np.array([t]), *(np.array([part]) for part in (instant.q, instant.qd, instant.qdd))
-        return self.over(RememberingState.of(instant.packed, instant.memory, instant.anchor, *arrays, None))[0, self.which]
+        return self.over(RememberingState.of(instant.packed, instant.memory, instant.anchor, *arrays, None))[
+            0, self.which
+        ]
 
 
 class EventFailed(Exception):

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..analyses.contact_friction import halted, settle_grips, strike
 from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
+from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
+from ..elements.unilateral import contacts_of
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
+from ..integrators import DOP853
 from ..jit.compiled import clock
 from ..maths.tolerances import EPS
 from ..model.packed import first_rows
@@ -24,12 +29,21 @@ from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import floats, listed
 from .grips import Halting, Reactions, add_friction, phase_with_friction, renewed
-from .phase_scenes import NAMED, gaps_of, has_contacts, phase_of
+from .phase_scenes import NAMED, first_row_of, gaps_of, has_contacts, phase_of
 from .progress import reporter, silent
 from .run_options import RunCall
 from .scene_cache import Prepared, prepared
 from .segments import summed
-from .tolerances import CREEPING, ENDLESS, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
+from .tolerances import (
+    CREEPING,
+    ENDLESS,
+    EVENTS_JUDGED,
+    MOST_AT_AN_INSTANT,
+    MOST_PINNED,
+    PENETRATION,
+    ROUNDED,
+    TOUCHING,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -80,6 +94,24 @@ class _Closing:
         return values
 
 
+class _Loads:
+    """Multipliers and normal loads of a phase, shared by its events."""
+
+    def __init__(self, packed):
+        self.packed, self._last = packed, (None, None)
+
+    def at(self, states):
+        """Multipliers (k, m), NaN of redundant rows, and normal loads (k, frictions) of one state or of several."""
+        t, q, qd, qdd = np.atleast_1d(states.t), *map(np.atleast_2d, (states.q, states.qd, states.qdd))
+        key, (last, found) = (t.tobytes(), q.tobytes()), self._last
+        if key != last:
+            memory = np.tile(states.memory, (t.size, 1))
+            wide = reactions.with_normal_loads(self.packed, t, q, qd, qdd, memory)
+            found = reactions.multipliers(self.packed, t, q, qd, qdd, wide), wide[:, memory.shape[1] :]
+            self._last = key, found
+        return found
+
+
 class _Leaving:
     """The reactions of closed contacts, positive where they push, as event functions.
 
@@ -100,6 +132,63 @@ class _Leaving:
         memory = np.tile(states.memory, (states.t.size, 1))
         lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
         return -self.signs * lam[:, self.rows]
+
+
+class _Breaking:
+    """What the reactions of frictions that stick are below their bounds, as event functions.
+
+    Parameters
+    ----------
+    packed : Packed
+        Of the phase.
+    units : list of friction_problem.Unit
+    """
+
+    def __init__(self, packed, units):
+        self.packed, self.units = packed, units
+
+    def over(self, states):
+        """Values (k, units) of states at k times."""
+        memory = np.tile(states.memory, (states.t.size, 1))
+        motion = states.t, states.q, states.qd, states.qdd
+        wide = reactions.with_normal_loads(self.packed, *motion, memory)
+        lam = reactions.particular(reactions.multipliers(self.packed, *motion, wide))
+        values = np.zeros((states.t.size, len(self.units)))
+        for unit, value in zip(self.units, values.T, strict=True):
+            share, bound = unit.bound
+            value += bound - np.linalg.norm(lam[:, self.packed.derived.holds[unit.slot]], axis=1)
+            if share:
+                value += share * wide[:, memory.shape[1] + unit.load.normal]
+        return values
+
+
+class _Slowing:
+    """The velocities of frictions that slide, along their directions, as event functions.
+
+    In a plane half of the speed is taken off: where the direction has turned by 60 degrees, it is taken anew. The
+    velocity of one that has just begun to slide is divided by the time since.
+
+    Parameters
+    ----------
+    frictions : Frictions
+    which : list of int
+    begun : dict
+        Of those that have just begun to slide: time and acceleration there, by their numbers.
+    """
+
+    def __init__(self, frictions, which, begun):
+        self.frictions, self.which, self.begun = frictions, which, begun
+
+    def over(self, states):
+        """Values (k, which) of states at k times."""
+        values = np.empty((states.t.size, len(self.which)))
+        for i, value in zip(self.which, values.T, strict=True):
+            value[:] = self.frictions.speed(i, states.q, states.qd, states.memory)
+            if i in self.begun:
+                begun, first = self.begun[i]
+                later = states.t > begun
+                value[:] = np.where(later, value / np.where(later, states.t - begun, 1.0), first)
+        return values
 
 
 class Phases:
@@ -174,6 +263,19 @@ class Phases:
             out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
         return diagnostics.ConstraintError(*out)
 
+    def exerted(self, solution, item, on):
+        """Force and torque (k, 3) as of `reactions.exerted`, of frictions that slide and stick in turn."""
+        out = np.zeros((2, solution.t.size, 3))
+        arrays = solution.t, solution.q, solution.qd, solution.qdd, solution._memory
+        for kind, mine, some in self._gathered(solution._phase_of_rows, arrays):
+            packed, (t, q, qd, qdd, memory) = self.packed[kind], some
+            lam = reactions.multipliers(packed, t, q, qd, qdd, memory)
+            motion = SimpleNamespace(
+                packed=packed, system=packed.system, t=t, q=q, qd=qd, qdd=qdd, multipliers=lam, _memory=memory
+            )
+            out[:, mine] = reactions.exerted(motion, item, on)
+        return out[0], out[1]
+
     def _gathered(self, numbers, arrays):
         """Yield each set of closed gaps, the entries (j,) of arrays in its phases, and these parts of the arrays."""
         kinds = np.array(self.of)[numbers]
@@ -213,11 +315,14 @@ def demand_apart(gaps, q, angles, tol):
 
 @dataclass
 class Modes:
-    """The modes of the units of a scene: numbers of gaps."""
+    """The modes of the units of a scene: numbers of gaps, and of frictions. All others are open, or slide."""
 
     closed: list = field(default_factory=list)  # independent rows, with reactions
     idle: list = field(default_factory=list)  # closed by what others hold
     opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+    sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
+    blocked: list = field(default_factory=list)  # frictions without motion that others hold
+    begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
 
     grips: dict = field(default_factory=dict)  # of closed ones with friction: see grips.py
     held: dict = field(default_factory=dict)
@@ -225,8 +330,11 @@ class Modes:
     def turned(self, other):
         """Whether these are the modes of another but for directions of slips."""
         stick = [[i for i, d in modes.grips.items() if d is None] for modes in (self, other)]
-        return bool(self.grips) and not self.opened and stick[0] == stick[1] and (
-            (self.closed, self.idle, self.held) == (other.closed, other.idle, other.held)
+        return (
+            bool(self.grips)
+            and not self.opened
+            and stick[0] == stick[1]
+            and ((self.closed, self.idle, self.held) == (other.closed, other.idle, other.held))
         )
 
     def same(self, other):
@@ -258,17 +366,17 @@ class _ContactRun:
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        self.gaps = gaps = gaps_of(scene)
+        self.gaps, self.frictions = gaps_of(scene), Frictions(scene)
         self.count = kept.handles.count
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
-        demand_apart(gaps, self.q, self.remembered[: self.count], options.initial_tol)
+        demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
         self.modes, self.rest = Modes(), self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
-        self.phases, self.counts, self.steps = Phases(scene.packed, gaps), [0] * len(self.users), 0
+        self.phases, self.counts, self.steps = Phases(scene.packed, self.gaps), [0] * len(self.users), 0
         self.reason, self.method, self.at_once, self.judged = "", "", 0, (self.t, 0)
 
     def _demand_served(self, kept):
@@ -279,10 +387,11 @@ class _ContactRun:
             raise InvalidArgument(
                 "sampled controllers don't serve scenes with contacts yet: leave out period, for a continuous one."
             )
-        if kept.rough:
+        rough = [load.force.title for load in kept.packed.loads if load.normal >= 0 and load.force.slips]
+        if rough and contacts_of(self.scene._added):
             raise InvalidArgument(
-                f"friction that depends on reactions ({', '.join(kept.rough)}) doesn't serve scenes with contacts yet: "
-                "use friction of given magnitude, such as ViscousFriction."
+                f"regularised friction that depends on reactions ({', '.join(rough)}) doesn't serve scenes with "
+                "contacts: leave out slip_velocity, for the exact law."
             )
 
     def run(self):
@@ -290,7 +399,7 @@ class _ContactRun:
         began, first = clock(), None
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        status = self._settle(touching, ())
+        status = self._settle(touching, ()) or self._settle_frictions(Modes(), ())
         while status is None:
             try:
                 task, outcome = self._phase()
@@ -315,7 +424,9 @@ class _ContactRun:
         end = self.span[1]
         phase, names = self._scene(), self._names()
         call, plain = RunCall((self.t, end)), replace(self.options, events=None)
-        run = self.run_of(phase, plain, call)
+        run, still = self.run_of(phase, plain, call), self._still(phase)
+        if still.size == self.q.size and self.options.method is None:
+            run = run._by(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
         run._prepare_kernels(True)
         while True:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
@@ -327,6 +438,7 @@ class _ContactRun:
             outcome = self.run_task(task, phase, self.options.initial_tol)
             other = self.instead(task, outcome.status)
             if other is None:
+                outcome = pinned(outcome, self.q if self.parts else task.q, still)
                 if self.settled is None:
                     self._end_phase(outcome.end.reached)
                 return task, outcome
@@ -343,8 +455,10 @@ class _ContactRun:
         self._end_phase(t)
         before = self.modes
         self.t, (self.q, self.qd, _), self.remembered = t, run.now.copy(), run.remembered.copy()
+        remembered = self.remembered
         self.settled = (self._transit([self.watched[i] for i in numbers]),)
-        if self.settled[0] is not None or not self.modes.same(before):
+        changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
+        if self.settled[0] is not None or changed:
             return False
         run.now[1], self.settled = self.qd, None
         self.closing.open(self.modes.opened)
@@ -353,32 +467,43 @@ class _ContactRun:
 
     def _scene(self):
         """The scene of the present modes."""
+        holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
         if self.modes.grips:
-            return phase_with_friction(self.scene, self.gaps, self.modes)
-        return phase_of(self.scene, [self.gaps.list[i].side.row for i in self.modes.closed])
+            return phase_with_friction(self.scene, self.gaps, self.modes, holds)
+        return phase_of(self.scene, self._closed_rows(), holds)
+
+    def _closed_rows(self):
+        return [self.gaps.list[i].side.row for i in self.modes.closed]
+
+    def _hold(self, i, rank):
+        """The rows that hold a friction, with the numbers that the run remembers."""
+        unit = self.frictions.units[i]
+        places = [self.count + np.array(unit.held(k)) for k in range(rank)]
+        return Hold(unit, rank, self.remembered[np.array(places, int)])
 
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
         names = [self.gaps.names[i] for i in held]
         names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
+        names += [self.frictions.names[i] for i in sorted(self.modes.sticking)]
         return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""
         pairs = zip(self.users, self.counts, strict=True)
         found = [event._replace(limit=event.limit - count) for event, count in pairs]
-        watches = list(self._watches(phase.packed))
+        watches = list(self._watches(phase))
         self.watched = [None] * len(found) + [unit for unit, _ in watches]
         return found + [event for _, event in watches]
 
-    def _watches(self, packed):
-        """Yield the units that may end a phase, each with its event."""
-        gaps, modes = self.gaps, self.modes
+    def _watches(self, phase):
+        """Yield the units that may end a phase, gaps and then frictions, each with its event."""
+        gaps, frictions, modes, packed = self.gaps, self.frictions, self.modes, phase.packed
         if modes.grips:
-            yield from self._frictions(packed)
+            yield from self._rubbing(packed)
         else:
-            first = {id(member.constraint): member.rows.start for member in packed.members}
+            first = first_row_of(packed)
             sides = [gaps.list[i].side for i in modes.closed]
             leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
         self.closing = _Closing(gaps, modes.opened)
@@ -388,8 +513,22 @@ class _ContactRun:
             is_open = i not in modes.closed
             function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
+        sticking = list(modes.sticking)
+        sliding = [i for i in range(frictions.count) if i not in sticking and i not in modes.blocked]
+        breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
+        slowing = _Slowing(frictions, sliding, modes.begun).over
+        for function, which in ((breaking, sticking), (slowing, sliding)):
+            for k, i in enumerate(which):
+                yield gaps.count + i, Event(Member(function, k), frictions.names[i], 1.0, -1.0)
 
-    def _frictions(self, packed):
+    def _still(self, phase):
+        """Coordinates of the bodies that rest where frictions stick."""
+        grip = any(d is None for d in self.modes.grips.values())
+        if not (self.modes.sticking or grip) or self.q.size > MOST_PINNED:
+            return np.zeros(0, int)
+        return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
+
+    def _rubbing(self, packed):
         """The same of closed contacts where there is friction: their reactions, their bounds, their slips."""
         gaps, modes = self.gaps, self.modes
         pushing = Reactions(gaps, modes, packed)
@@ -459,12 +598,15 @@ class _ContactRun:
         return deep.size > 0
 
     def _transit(self, fired):
-        """From one phase to the next one, after events of the gaps `fired`; the Status if there is no way on."""
+        """From one phase to the next one, after events of the units `fired`; the Status if there is no way on."""
         self.reason = ""
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
         near = np.flatnonzero(self.gap <= TOUCHING * self.length).tolist()
-        return self._settle(sorted({*near, *fired, *self.modes.closed, *self.modes.idle}), fired)
+        count, before = self.gaps.count, self.modes
+        hit = [i for i in fired if i < count]
+        status = self._settle(sorted({*near, *hit, *before.closed, *before.idle}), hit)
+        return status or self._settle_frictions(before, [i - count for i in fired if i >= count])
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -472,7 +614,7 @@ class _ContactRun:
         length = self.t - self.phases.starts[-1]
         self.at_once = self.at_once + 1 if length <= 16.0 * EPS * max(abs(self.t), EPS) else 0
         self.judged = since, count + 1
-        if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count:
+        if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count + self.frictions.count:
             self.reason = f"There are {self.at_once} events at t = {self.t:.9g} s."
             return True
         if count + 1 >= EVENTS_JUDGED:
@@ -512,6 +654,74 @@ class _ContactRun:
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         return None
+
+    def _settle_frictions(self, before, fired):
+        """Which frictions stick; the Status if there is no way on, else None."""
+        frictions, memory = self.frictions, self.remembered[self.count :].copy()
+        resting, guess = [], {}
+        for i, unit in enumerate(frictions.units):
+            v, size = frictions.velocity(i, self.q[None], self.qd[None])
+            speed, single = np.linalg.norm(v[0]), unit.slide.directions == 1
+            if i in before.blocked and memory[unit.way].any():
+                guess[i] = frictions.read(i, self.q, memory)
+            if speed <= max(AT_REST * size[0], 0.0 if single else STOPPED) or (single and i in fired):
+                resting.append(i)
+                memory[unit.way] = 0.0
+            else:
+                memory[unit.way] = frictions.written(i, self.q, v[0] / speed)
+        self.remembered = np.concatenate((self.remembered[: self.count], memory))
+        if not resting:
+            return None
+        try:
+            rest, ranks = self._rest(before, resting, {i: way for i, way in guess.items() if i in resting}, fired)
+        except NoRest as error:
+            names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
+            self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
+            return Status.CONTACT_FAILED
+        for i, way in rest.ways.items():
+            unit = frictions.units[i]
+            self.remembered[self.count + unit.slot : self.count + unit.way.stop] = frictions.written(i, self.q, way)
+        self.modes.sticking = {i: ranks[i] for i in rest.sticking}
+        self.modes.blocked = sorted([*rest.blocked, *(i for i in resting if not ranks[i])])
+        self.modes.begun = {i: (self.t, rest.rates[i]) for i in rest.ways}
+        return None
+
+    def _rest(self, before, resting, guess, fired):
+        """The `Rest` of the frictions that are at rest, and how many rows hold each."""
+        frictions, ranks = self.frictions, {}
+        for i in resting:
+            if i in before.sticking:
+                ranks[i] = before.sticking[i]
+                continue
+            basis = frictions.basis(i, self.q, self._motions_of)
+            ranks[i] = len(basis)
+            numbers = frictions.numbers(i, self.q, basis)
+            for k in range(len(basis)):
+                self.remembered[self.count + np.array(frictions.units[i].held(k))] = numbers[k]
+        free = [i for i in resting if ranks[i]]
+        phase = phase_of(self.scene, self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
+        rows = {i: phase.packed.derived.holds[frictions.units[i].slot] for i in free}
+        memory = self.remembered[self.count :]
+        fresh = [i for i in free if i not in before.sticking]
+        if fresh:  # their rows hold to the last bit where they are
+            Phi = values_of(phase.packed, self.t, self.q, memory)
+            for i in fresh:
+                for k, row in enumerate(rows[i]):
+                    memory[frictions.units[i].held(k)[-1]] = Phi[row]
+        bases = {i: frictions.directions(i, self.q, self._hold(i, ranks[i]).numbers) for i in free}
+        problem = RestProblem(frictions, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
+        sticking = [i for i in free if i not in guess]
+        return problem.settle(sticking, guess, fired), ranks
+
+    def _motions_of(self, i):
+        """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
+        frictions, unit = self.frictions, self.frictions.units[i]
+        hold = Hold(unit, 3, frictions.numbers(i, self.q, np.eye(3)))
+        phase = phase_of(self.scene, self._closed_rows(), [hold])
+        memory = self.remembered[self.count :].copy()
+        for k in range(3):
+            memory[np.array(unit.held(k))] = hold.numbers[k]
+        return free_motions(phase.packed, self.t, self.q, memory, phase.packed.derived.holds[unit.slot])
 
     def _hit(self, inertia, touching, rates):
         """Jump of velocities at an impact; the rates (count,) afterwards."""
@@ -608,6 +818,34 @@ def held(inertia, qd, which, rates):
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = 0.0
     return qd + change, after
+
+
+class _Pinned:
+    """A trajectory with bodies that rest: to the last bit."""
+
+    def __init__(self, trajectory, q, still):
+        self.trajectory, self.q, self.still = trajectory, q, still
+        self.start, self.end, self.edges, self.anchors = (
+            trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
+        )  # fmt: skip
+
+    def __call__(self, t):
+        """As of a `Trajectory`."""
+        states, memory, status = self.trajectory(t)
+        states[:, 0, self.still], states[:, 1:, self.still] = self.q[self.still], 0.0
+        return states, memory, status
+
+
+def pinned(outcome, q, still):
+    """The outcome of a phase with bodies that rest at q (n,), to the last bit; still: their coordinates."""
+    if not still.size:
+        return outcome
+    n, last = q.size, outcome.end.last
+    outcome.rows[:, 1 + still] = q[still]
+    outcome.rows[:, 1 + n + still] = outcome.rows[:, 1 + 2 * n + still] = 0.0
+    last[0, still], last[1:, still] = q[still], 0.0
+    trajectory = outcome.trajectory and _Pinned(outcome.trajectory, q, still)
+    return outcome._replace(trajectory=trajectory)
 
 
 def run_contacts(scene, options, call, run_of, run_task, instead):

@@ -1,7 +1,9 @@
 """Scenes of the phases of a run: what of a scene stays, and what its contacts and frictions are in their modes."""
 
 from functools import wraps
-from typing import NamedTuple
+from itertools import chain
+
+import numpy as np
 
 from ..calls import fitting
 from ..elements.force import Force
@@ -21,41 +23,37 @@ NAMED = 5  # contacts in a message
 
 
 def has_contacts(scene):
-    """Whether a scene has unilateral constraints; looked up once until the scene changes."""
+    """Whether runs of a scene have phases, by contacts or exact friction; looked up once until the scene changes."""
     if scene._opens is None:
-        scene._opens = bool(contacts_of(scene._added))
+        slides = any(getattr(force, "slides", ()) for force in scene._forces)
+        scene._opens = slides or bool(contacts_of(scene._added))
     return scene._opens
 
 
-class Place(NamedTuple):
-    """Where a number that the run remembers is among the numbers of a row."""
-
-    slot: int  # of System.memory
-    row: object  # a primitive of the phase
-    at: int  # behind where its reals begin
-
-
-def phase_of(scene, rows, places=(), without=()):
+def phase_of(scene, rows, holds=(), without=()):
     """The scene with these rows, primitives, and forces in place of its contacts; kept until the scene changes.
 
-    places: `Place` of what the rows take from the memory of the run. without: constraints and forces left out.
+    holds: rows with numbers that the run remembers, as `friction_problem.Hold`. without: constraints and forces left
+    out.
     """
     known = scene._phases
     if known is None:
         known = scene._phases = {}
-    key = frozenset(map(id, (*rows, *without)))
+    key = frozenset((*map(id, (*rows, *without)), *(hold.key for hold in holds)))
     if key not in known:
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
         constraints, forces = ([each for each in rows if isinstance(each, Force) is given] for given in (False, True))
-        phase = known[key] = object.__new__(type(scene))
+        held = [hold.rows() for hold in holds]
+        phase = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
-            _added=[*(each for each in scene._added if id(each) not in gone), *constraints],
-            _forces=[*(each for each in scene._forces if id(each) not in gone), *forces],
-            _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
+            _added=[each for each in scene._added if id(each) not in gone] + [*constraints, *chain(*held)],
+            _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None, _start=None,
+            _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
         )  # fmt: skip
-        if places:
-            phase._packed = _remembering(phase.packed, places)
+        if holds:
+            phase._packed = _holding(phase.packed, holds, held)
+        known[key] = phase
     return known[key]
 
 
@@ -71,13 +69,22 @@ def gaps_of(scene):
     return Gaps(scene.packed, alone.packed, phase_of(scene, []).packed)
 
 
-def _remembering(packed, places):
-    """Packed with the memory of these places in numbers of its rows."""
-    system, begins = packed.system, begins_of(packed)
+def _holding(packed, holds, held):
+    """Packed with the numbers of the rows of holds among what the run remembers."""
+    system, begins, first = packed.system, begins_of(packed), first_row_of(packed)
     memory = system.memory.copy()
-    for slot, row, at in places:
-        memory[slot] = begins[id(row)] + at
+    for hold, rows in zip(holds, held, strict=True):
+        packed.derived.holds[hold.unit.slot] = np.array([first[id(row)] for row in rows], int)
+        for row, places in zip(rows, hold.places(), strict=True):
+            packed.derived.places[id(row)] = places
+            for slot, at in places:
+                memory[slot] = begins[id(row)] + at
     return packed._replace(system=system._replace(memory=memory))
+
+
+def first_row_of(packed):
+    """The first row of each constraint, by its id."""
+    return {id(member.constraint): member.rows.start for member in packed.members}
 
 
 def at_start(scene):

@@ -561,7 +561,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
 
     @property
     def phases(self) -> list[tuple[float, float, tuple[str, ...]]]:
-        """Start and end (s) of each phase, and names of the contacts that are closed in it; one without contacts."""
+        """Start and end (s) of each phase, and names of the contacts that are closed and of the frictions that stick."""
         return [(self.span[0], self.reached, ())] if self._phases is None else list(self._phases.list)
 
     @property
@@ -652,7 +652,47 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> print(force[-1].round(6) + 0.0, torque[-1].round(6) + 0.0)
         [ 0.  0. 20.] [  0. -20.   0.]
         """
-        return exerted(self, item, on)
+        if self._phases is None or not getattr(self.handles.item(item), "slides", ()):
+            return exerted(self, item, on)
+        return self._phases.exerted(self, item, on)
+
+    def sticking(self, friction: ItemLike) -> Bools:
+        """Whether a friction of the exact law sticks: (k,).
+
+        Parameters
+        ----------
+        friction : friction, or name of one
+            A joint friction or CoulombFriction whose slip velocity is zero.
+
+        Raises
+        ------
+        InvalidForce
+            If it is none of these.
+
+        Examples
+        --------
+        A block of 2 kg comes to rest after 0.5 s:
+
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene(gravity=(0, 0, 0))
+        >>> block = scene.add_point_mass(mass=2.0, velocity=(1, 0, 0))
+        >>> brake = scene.add(ts.forces.CoulombFriction(block, scene.ground, force=4.0, name="brake"))
+        >>> solution = ts.simulate(scene, (0, 1), t_eval=[0.25, 0.75])
+        >>> print(solution.sticking("brake"), solution.phases[-1])
+        [False  True] (0.5, 1.0, ('brake',))
+        """
+        item = self.handles.item(friction)
+        load = reactions.loads_of(self.packed).get(id(item))
+        if load is None or not getattr(item, "slides", ()):
+            raise InvalidForce(
+                f"sticking: {friction!r} is no friction of the exact law: RevoluteFriction, TranslationalFriction, "
+                "ContactFriction and CoulombFriction are, with slip_velocity=0."
+            )
+        slot, rests = load.slot + item.memory, np.ones(self.t.size, bool)
+        for slide in item.slides:
+            rests &= ~self._memory[:, slot : slot + slide.directions].any(axis=1)
+            slot += slide.count
+        return rests
 
     def contact_point(self, constraint: ItemLike) -> Floats:
         """Where a surface touches that rolls or slides, (k, 3), m, ground frame: its path on the plane.

@@ -79,3 +79,6 @@ MOST_AT_AN_INSTANT = 100
 EVENTS_JUDGED, CREEPING = 1000, 1e3
 # Cosine of the turn of a slip since its phase began, above which the next one keeps its direction.
 SAME_WAY = 0.9
+
+# Coordinates of a scene up to which bodies that rest, where frictions stick, are found, by dense matrices.
+MOST_PINNED = 1000

@@ -323,7 +323,6 @@ class Modes:
     sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
-
     grips: dict = field(default_factory=dict)  # of closed ones with friction: see grips.py
     held: dict = field(default_factory=dict)
 
@@ -644,8 +643,8 @@ class _ContactRun:
             if self.gaps.rubs[resting].any():
                 self.qd = halted(inertia, self.qd, resting)
                 settled = settle_grips(inertia, resting, self.qd)
-                grips = renewed(self.gaps, before, settled, self.q)
-                self.modes = Modes(settled.closed, settled.idle, opened, *grips)
+                grips, places = renewed(self.gaps, before, settled, self.q)
+                self.modes = Modes(settled.closed, settled.idle, opened, grips=grips, held=places)
             elif resting:
                 leaving = [i for i in fired if i in before.closed]
                 self.modes = Modes(*settle(inertia, resting, self.qd, leaving)[:2], opened)

@@ -83,10 +83,8 @@ def held_point(packed, part, q):
 def renewed(gaps, before, settled, q):
     """`grips` and `held` of the next phase: as before where a contact goes on as it was."""
     grips, held = {}, {}
-    for i in settled.closed:
-        if not gaps.rubs[i]:
-            continue
-        d, old = settled.grips[i], before.grips.get(i, ())
+    for i, d in settled.grips.items():
+        old = before.grips.get(i, ())
         parts = gaps.list[i].contact.parts
         if d is None:
             if len(parts) > 1:

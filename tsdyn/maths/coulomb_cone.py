@@ -108,7 +108,7 @@ class _Problem:
             size = np.abs(F).max()
             terms = 1.0 + (np.abs(self.G) @ np.abs(p)).max()
             if size <= CONE_ROUNDING * terms:
-                return p
+                return self.image(y).ravel()  # without the rounding of zeros
             stalled = 0 if size < 0.5 * best else stalled + 1
             best = min(best, size)
             if stalled > CONE_STALLED:

@@ -531,12 +531,13 @@ class _ContactRun:
         """The same of closed contacts where there is friction: their reactions, their bounds, their slips."""
         gaps, modes = self.gaps, self.modes
         pushing = Reactions(gaps, modes, packed)
-        for k, i in enumerate([*pushing.closed, *pushing.sticks]):
-            yield i, Event(Member(pushing.over, k), gaps.names[i], 1.0, -1.0, False)
+        grips = gaps.count + self.frictions.count
+        for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
+            yield i, Event(Member(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.grips.get(i) is not None]
         halting = Halting(packed, [gaps.list[i].side.grip.sliding for i in slides])
         for k, i in enumerate(slides):
-            yield i, Event(Member(halting.over, k), gaps.names[i], 1.0, -1.0, False)
+            yield grips + i, Event(Member(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 
     def _times(self):
         left = self.times[self.taken :]
@@ -605,7 +606,7 @@ class _ContactRun:
         count, before = self.gaps.count, self.modes
         hit = [i for i in fired if i < count]
         status = self._settle(sorted({*near, *hit, *before.closed, *before.idle}), hit)
-        return status or self._settle_frictions(before, [i - count for i in fired if i >= count])
+        return status or self._settle_frictions(before, [i - count for i in fired if 0 <= i - count < self.frictions.count])
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -639,14 +640,14 @@ class _ContactRun:
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
             opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
+            leaving = [i for i in fired if i in before.closed]
             self.modes = Modes(opened=opened)
             if self.gaps.rubs[resting].any():
                 self.qd = halted(inertia, self.qd, resting)
-                settled = settle_grips(inertia, resting, self.qd)
+                settled = settle_grips(inertia, resting, self.qd, leaving)
                 grips, places = renewed(self.gaps, before, settled, self.q)
                 self.modes = Modes(settled.closed, settled.idle, opened, grips=grips, held=places)
             elif resting:
-                leaving = [i for i in fired if i in before.closed]
                 self.modes = Modes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)

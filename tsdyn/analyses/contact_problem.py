@@ -102,6 +102,10 @@ class Gaps:
             found[:, i] = value(q, angles)
         return found
 
+    def of_contact(self, contact):
+        """The numbers of the gaps of a constraint."""
+        return [i for i, gap in enumerate(self.list) if gap.contact is contact]
+
     def slopes(self, t, q):
         """Rows (count, 2, n) of the slips; zero without friction."""
         return self._slip(self.workspace.rows(t, q)[0])

@@ -25,7 +25,7 @@ from ..maths.recurrences import cross, dot, inverse_root, product, quotient, sca
 from ..maths.tolerances import TINY
 from .force import Force
 from .markers import Point, Turn, Vector
-from .tolerances import SLIP
+from .tolerances import AHEAD
 
 MU, SIDE, AXES, TYRE, BALLS, WAY = 0, 1, 2, 5, 6, 7  # where these begin in par; d is the last
 A, B, Z, E = 0, 6, 12, 15  # where x_a, x_b, z and e_1 begin in x; a Turn follows each point
@@ -222,7 +222,7 @@ def arm_rows(x, par, k, s):
 def heading(v0, v1, v2, d):
     """e of Eq. (3), a tuple of three."""
     a = v0 * d[0] + v1 * d[1] + v2 * d[2]
-    c = a / (a * a + SLIP * SLIP)
+    c = a / (a * a + AHEAD * AHEAD)
     u0, u1, u2 = d[0] + c * (v0 - a * d[0]), d[1] + c * (v1 - a * d[1]), d[2] + c * (v2 - a * d[2])
     size = np.sqrt(u0 * u0 + u1 * u1 + u2 * u2 + TINY)
     return u0 / size, u1 / size, u2 / size
@@ -233,7 +233,7 @@ def heading_series(s, v, first, d, k):
     """Coefficient k, a tuple of three, of `heading`; v in rows v to v + 2 of s, eleven rows are its own."""
     a, u, zero = first, first + 3, 1.0 if k == 0 else 0.0
     s[a, k] = s[v, k] * d[0] + s[v + 1, k] * d[1] + s[v + 2, k] * d[2]
-    s[a + 1, k] = square(s[a], k) + SLIP * SLIP * zero
+    s[a + 1, k] = square(s[a], k) + AHEAD * AHEAD * zero
     s[a + 2, k] = quotient(s[a], s[a + 1], s[a + 2], k)
     for i in range(3):
         s[first + 6 + i, k] = s[v + i, k] - s[a, k] * d[i]

@@ -28,7 +28,7 @@ from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import floats, listed
-from .grips import Halting, Reactions, add_friction, phase_with_friction, renewed
+from .grips import Halting, Reactions, add_friction, losses, phase_with_friction, renewed
 from .phase_scenes import NAMED, first_row_of, gaps_of, has_contacts, phase_of
 from .progress import reporter, silent
 from .run_options import RunCall
@@ -250,11 +250,23 @@ class Phases:
             out[mine] = own
         return out
 
-    def sticking(self, numbers, contact):
-        """Whether a contact with friction sticks (k,)."""
-        mine = {i for i, gap in enumerate(self.gaps.list) if gap.contact is contact}
-        found = [any(modes.grips.get(i, ()) is None for i in mine) for modes in self.modes]
-        return np.array(found)[np.array(self.of)[numbers]]
+    @property
+    def lose(self):
+        """Whether energy is lost by impacts or friction of contacts."""
+        return bool(self.impulses) or bool(self.gaps.rubs.any())
+
+    def sticking(self, numbers, i):
+        """Whether a contact with friction sticks (k,); i: the number of its gap."""
+        return np.array([modes.grips.get(i, ()) is None for modes in self.modes])[np.array(self.of)[numbers]]
+
+    def losses(self, numbers, lam, t, q, qd):
+        """Power (k, gaps), W, that contacts with friction dissipate; lam (k, m) of the scene."""
+        out = np.zeros((len(numbers), self.gaps.count))
+        for kind, mine, (own, *some) in self._gathered(numbers, (lam, t, q, qd)):
+            which = [i for i, d in self.modes[kind].grips.items() if d is not None]
+            if which:
+                out[np.ix_(mine, which)] = losses(self.gaps, which, own, *some)
+        return out
 
     def constraint_error(self, numbers, *arrays):
         """The `ConstraintError` of the rows that hold."""

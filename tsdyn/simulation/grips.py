@@ -170,6 +170,12 @@ class Halting:
         return np.array(found).T
 
 
+def losses(gaps, which, lam, t, q, qd):
+    """Power (k, c), W, that contacts which slide dissipate; lam (k, m) of the scene."""
+    slips = np.array([gaps.slopes(*pair)[which] @ v for *pair, v in zip(t, q, qd, strict=True)])
+    return (lam[:, gaps.slip_rows[which]] * slips).sum(axis=2)
+
+
 def add_friction(gaps, modes, packed, t, q, qd, lam, out):
     """Write the multipliers of the slips in a phase into out (k, m): those of contacts that slide, and redundant ones.
 

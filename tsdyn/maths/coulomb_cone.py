@@ -49,12 +49,13 @@ def solve_cone(G, b, mu, slip=None, given=None):
     given = np.zeros(k) if given is None else given / (scale[::3] * size)
     problem = _Problem(G * scale[:, None] * scale, b * scale / size, mu, slip, given)
     p = np.zeros(3 * k)
-    for sweeps in CONE_SWEEPS:
-        p = problem.swept(p, sweeps)
-        for factor in CONE_FACTORS:
-            found = problem.newton(p, factor)
-            if found is not None:
-                return found * scale * size, problem.modes(found)
+    with np.errstate(over="ignore", invalid="ignore"):  # where there is no solution
+        for sweeps in CONE_SWEEPS:
+            p = problem.swept(p, sweeps)
+            for factor in CONE_FACTORS if np.isfinite(p).all() else ():
+                found = problem.newton(p, factor)
+                if found is not None:
+                    return found * scale * size, problem.modes(found)
     return None, np.zeros(k, int)
 
 
@@ -106,6 +107,8 @@ class _Problem:
         eye, best, stalled = np.eye(p.size), np.inf, 0
         for _ in range(CONE_STEPS):
             size = np.abs(F).max()
+            if not size < np.inf:
+                return None
             terms = 1.0 + (np.abs(self.G) @ np.abs(p)).max()
             if size <= CONE_ROUNDING * terms:
                 return self.image(y).ravel()  # without the rounding of zeros

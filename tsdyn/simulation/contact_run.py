@@ -664,6 +664,11 @@ class _ContactRun:
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
+            if self.gaps.rubs[touching].any():
+                self.reason += (
+                    " With much friction rigid bodies that slide may have no reactions, or several (Painleve's paradox): "
+                    "lower kinetic, or use a compliant contact."
+                )
             return Status.CONTACT_FAILED
         return None
 

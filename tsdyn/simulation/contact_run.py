@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -163,7 +164,7 @@ class _Breaking:
 
 
 class _Slowing:
-    """The velocities of frictions that slide, along their directions, as event functions.
+    """The velocities of frictions, along the directions in which they slide, as event functions.
 
     In a plane half of the speed is taken off: where the direction has turned by 60 degrees, it is taken anew. The
     velocity of one that has just begun to slide is divided by the time since.
@@ -171,23 +172,19 @@ class _Slowing:
     Parameters
     ----------
     frictions : Frictions
-    which : list of int
     begun : dict
         Of those that have just begun to slide: time and acceleration there, by their numbers.
     """
 
-    def __init__(self, frictions, which, begun):
-        self.frictions, self.which, self.begun = frictions, which, begun
+    def __init__(self, frictions, begun):
+        self.frictions, self.begun = frictions, begun
 
     def over(self, states):
-        """Values (k, which) of states at k times."""
-        values = np.empty((states.t.size, len(self.which)))
-        for i, value in zip(self.which, values.T, strict=True):
-            value[:] = self.frictions.speed(i, states.q, states.qd, states.memory)
-            if i in self.begun:
-                begun, first = self.begun[i]
-                later = states.t > begun
-                value[:] = np.where(later, value / np.where(later, states.t - begun, 1.0), first)
+        """Values (k, frictions) of states at k times."""
+        values = self.frictions.speeds(states.q, states.qd, states.memory)
+        for i, (begun, first) in self.begun.items():
+            later = states.t > begun
+            values[:, i] = np.where(later, values[:, i] / np.where(later, states.t - begun, 1.0), first)
         return values
 
 
@@ -525,12 +522,13 @@ class _ContactRun:
             function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
         sticking = list(modes.sticking)
-        sliding = [i for i in range(frictions.count) if i not in sticking and i not in modes.blocked]
         breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
-        slowing = _Slowing(frictions, sliding, modes.begun).over
-        for function, which in ((breaking, sticking), (slowing, sliding)):
-            for k, i in enumerate(which):
-                yield gaps.count + i, Event(Member(function, k), frictions.names[i], 1.0, -1.0)
+        slowing = _Slowing(frictions, modes.begun).over
+        for i in range(frictions.count):
+            if i in modes.blocked:
+                continue
+            function = Member(breaking, sticking.index(i)) if i in modes.sticking else Member(slowing, i)
+            yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
 
     def _still(self, phase):
         """Coordinates of the bodies that rest where frictions stick."""
@@ -674,66 +672,63 @@ class _ContactRun:
 
     def _settle_frictions(self, before, fired):
         """Which frictions stick; the Status if there is no way on, else None."""
-        frictions, memory = self.frictions, self.remembered[self.count :].copy()
-        resting, guess = [], {}
+        frictions, count = self.frictions, self.count
+        if not frictions.count:
+            return None
+        place, (v, sizes, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
+        self.remembered, resting, guess = self.remembered.copy(), [], {}
+        memory = self.remembered[count:]  # a part of it
         for i, unit in enumerate(frictions.units):
-            v, size = frictions.velocity(i, self.q[None], self.qd[None])
-            speed, single = np.linalg.norm(v[0]), unit.slide.directions == 1
+            speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
             if i in before.blocked and memory[unit.way].any():
-                guess[i] = frictions.read(i, self.q, memory)
-            if speed <= max(AT_REST * size[0], 0.0 if single else STOPPED) or (single and i in fired):
+                guess[i] = place.read(i, memory)
+            if speed <= max(AT_REST * sizes[0, i], 0.0 if signed else STOPPED) or (signed and i in fired):
                 resting.append(i)
                 memory[unit.way] = 0.0
             else:
-                memory[unit.way] = frictions.written(i, self.q, v[0] / speed)
-        self.remembered = np.concatenate((self.remembered[: self.count], memory))
+                memory[unit.way] = place.written(i, v[0, i] / speed)
         if not resting:
             return None
         try:
-            rest, ranks = self._rest(before, resting, {i: way for i, way in guess.items() if i in resting}, fired)
+            rest, ranks = self._rest(place, before, resting, guess, fired)
         except NoRest as error:
             names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
             self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         for i, way in rest.ways.items():
-            unit = frictions.units[i]
-            self.remembered[self.count + unit.slot : self.count + unit.way.stop] = frictions.written(i, self.q, way)
+            memory[frictions.units[i].way] = place.written(i, way)
         self.modes.sticking = {i: ranks[i] for i in rest.sticking}
         self.modes.blocked = sorted([*rest.blocked, *(i for i in resting if not ranks[i])])
-        self.modes.begun = {i: (self.t, rest.rates[i]) for i in rest.ways}
+        self.modes.begun = {i: (self.t, rate) for i, rate in rest.rates.items()}
         return None
 
-    def _rest(self, before, resting, guess, fired):
+    def _rest(self, place, before, resting, guess, fired):
         """The `Rest` of the frictions that are at rest, and how many rows hold each."""
-        frictions, ranks = self.frictions, {}
+        units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
         for i in resting:
-            if i in before.sticking:
-                ranks[i] = before.sticking[i]
-                continue
-            basis = frictions.basis(i, self.q, self._motions_of)
-            ranks[i] = len(basis)
-            numbers = frictions.numbers(i, self.q, basis)
-            for k in range(len(basis)):
-                self.remembered[self.count + np.array(frictions.units[i].held(k))] = numbers[k]
+            ranks[i] = before.sticking.get(i, -1)
+            if ranks[i] < 0:
+                basis = place.basis(i, partial(self._motions_of, place))
+                ranks[i] = len(basis)
+                for k, numbers in enumerate(place.numbers(i, basis)):
+                    memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
         phase = phase_of(self.scene, self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
-        rows = {i: phase.packed.derived.holds[frictions.units[i].slot] for i in free}
-        memory = self.remembered[self.count :]
+        rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
             Phi = values_of(phase.packed, self.t, self.q, memory)
             for i in fresh:
                 for k, row in enumerate(rows[i]):
-                    memory[frictions.units[i].held(k)[-1]] = Phi[row]
-        bases = {i: frictions.directions(i, self.q, self._hold(i, ranks[i]).numbers) for i in free}
-        problem = RestProblem(frictions, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
-        sticking = [i for i in free if i not in guess]
-        return problem.settle(sticking, guess, fired), ranks
+                    memory[units[i].held(k)[-1]] = Phi[row]
+        bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
+        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
+        return problem.settle({i: way for i, way in guess.items() if i in free}, fired), ranks
 
-    def _motions_of(self, i):
+    def _motions_of(self, place, i):
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
-        frictions, unit = self.frictions, self.frictions.units[i]
-        hold = Hold(unit, 3, frictions.numbers(i, self.q, np.eye(3)))
+        unit = self.frictions.units[i]
+        hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
         phase = phase_of(self.scene, self._closed_rows(), [hold])
         memory = self.remembered[self.count :].copy()
         for k in range(3):

@@ -140,7 +140,7 @@ class Frictions:
         return A
 
     def motions(self, q, qd):
-    XX
+        """Rotations and velocities of the bodies."""
         spans, A = self.packed.system.bodies, self.frames(q)
         places = spans[self.rigid, :1] + np.arange(3, 7)
         w, r, rd = np.zeros((3, len(q), len(spans) + 1, 3))

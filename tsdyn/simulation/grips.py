@@ -14,12 +14,12 @@ from ..observables.diagnostics import marker_states
 from .parameters import KEPT
 from .phase_scenes import phase_of
 from .scene_cache import prepared_numbers
-from .tolerances import SAME_WAY
+from .tolerances import SAME_WAY, SLOW
 
 # A closed contact with friction sticks or slides. Where it sticks, all its rows hold; those of the slip of a point are
 # rows on positions, which hold it where it came to rest. Where it slides, the row of the gap holds, and a force in
-# proportion to its reaction acts (elements/sliding.py), with a direction d from which the slip may turn by sixty
-# degrees before the next phase takes another one. `grips` has for each such contact, by the number of its gap, None
+# proportion to its reaction acts (elements/sliding.py), with a direction d near the slip; the next phase takes another
+# one where the slip has turned too far. `grips` has for each such contact, by the number of its gap, None
 # where it sticks, else d (3,), ground frame; `held` where in b, m, the point of a is that sticks.
 
 
@@ -146,7 +146,9 @@ def carried(gaps, which, t, q, N, T):
 
 
 class Halting:
-    """d.v - |v| / 2 of sliding contacts, as event functions: zero where the slip ends or has turned by 60 degrees.
+    """Slips of contacts, as event functions: d.v - c v, c = (v + 1.98 V) / 2 (v + V), zero where one ends or has turned.
+
+    It turns by 60 degrees at v >> V, and by 8 degrees at v << V, so that it ends in a direction near d.
 
     Parameters
     ----------
@@ -166,7 +168,9 @@ class Halting:
             x, xd = marker_states(self.packed, load, states.q, states.qd)
             v = twin(slip_velocity)([jet.x for jet in x], xd, load.parameters)
             d = load.parameters[WAY:]
-            found.append(sum(a * b for a, b in zip(v, d, strict=True)) - 0.5 * np.sqrt(sum(a * a for a in v)))
+            speed = np.sqrt(sum(a * a for a in v))
+            along = sum(a * b for a, b in zip(v, d, strict=True))
+            found.append(along - 0.5 * (speed + 1.98 * SLOW) / (speed + SLOW) * speed)
         return np.array(found).T
 
 

@@ -110,7 +110,7 @@ class _Problem:
             if not size < np.inf:
                 return None
             terms = 1.0 + (np.abs(self.G) @ np.abs(p)).max()
-            if size <= CONE_ROUNDING * terms:
+            if size <= CONE_ROUNDING * terms and size >= 0.5 * best:  # as far as rounding lets it
                 return self.image(y).ravel()  # without the rounding of zeros
             stalled = 0 if size < 0.5 * best else stalled + 1
             best = min(best, size)

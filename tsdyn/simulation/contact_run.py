@@ -825,6 +825,10 @@ class _Pinned:
             trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
         )  # fmt: skip
 
+    def begin_at(self, times):
+        """As of a `Trajectory`."""
+        self.trajectory.begin_at(times)
+
     def __call__(self, t):
         """As of a `Trajectory`."""
         states, memory, status = self.trajectory(t)

@@ -146,7 +146,7 @@ def carried(gaps, which, t, q, N, T):
 
 
 class Halting:
-    """Slips of contacts, as event functions: d.v - c v, c = (v + 1.98 V) / 2 (v + V), zero where one ends or has turned.
+    """Slips of contacts, as event functions: d.v - c v, c = (v + 1.98 V) / 2 (v + V), zero where one ends or turns.
 
     It turns by 60 degrees at v >> V, and by 8 degrees at v << V, so that it ends in a direction near d.
 

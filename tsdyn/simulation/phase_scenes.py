@@ -88,14 +88,15 @@ def first_row_of(packed):
 
 
 def at_start(scene):
-    """The scene with those contacts closed that are so at its start; a scene without contacts as it is."""
+    """The scene with those contacts closed, without friction, that are so at its start; without contacts as it is."""
     if not has_contacts(scene):
         return scene
     from ..analyses.contact_problem import closed_gaps
 
     gaps, (q, _) = gaps_of(scene), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
-    return phase_of(scene, [gaps.list[i].side.row for i in closed_gaps(gaps, q, angles)])
+    closed = [gaps.list[i].side for i in closed_gaps(gaps, q, angles)]
+    return phase_of(scene, [side.grip.gap if side.grip else side.row for side in closed])
 
 
 def demand_bilateral(scene):

@@ -140,7 +140,7 @@ def carried(gaps, which, t, q, N, T):
     rows = np.isnan(T).any(axis=(1, 2))
     if rows.any():
         T = np.nan_to_num(T)
-        tangents = np.array([gaps.slopes(t[k], q[k])[which] for k in np.flatnonzero(rows)])
+        tangents = np.array([gaps.slopes(t[k], q[k], which) for k in np.flatnonzero(rows)])
         T[rows] = spread(N[rows], tangents, T[rows])
     return T
 
@@ -176,7 +176,7 @@ class Halting:
 
 def losses(gaps, which, lam, t, q, qd):
     """Power (k, c), W, that contacts which slide dissipate; lam (k, m) of the scene."""
-    slips = np.array([gaps.slopes(*pair)[which] @ v for *pair, v in zip(t, q, qd, strict=True)])
+    slips = np.array([gaps.slopes(*pair, which) @ v for *pair, v in zip(t, q, qd, strict=True)])
     return (lam[:, gaps.slip_rows[which]] * slips).sum(axis=2)
 
 
@@ -190,7 +190,7 @@ def add_friction(gaps, modes, packed, t, q, qd, lam, out):
         return
     first = _first(packed)
     N = np.array([-gaps.sign[i] * lam[:, first[id(_gap_row(gaps, modes, i))]] for i in rubbing]).T
-    tangents = np.array([gaps.slopes(*pair)[rubbing] for pair in zip(t, q, strict=True)])  # (k, c, 2, n)
+    tangents = np.array([gaps.slopes(*pair, rubbing) for pair in zip(t, q, strict=True)])  # (k, c, 2, n)
     rows = gaps.slip_rows[rubbing]
     sticks = [j for j, i in enumerate(rubbing) if modes.grips[i] is None]
     if sticks:

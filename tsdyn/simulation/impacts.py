@@ -126,7 +126,7 @@ def impact(
             e[_chosen(gaps, [item], None)] = _coefficient(value)
     elif restitution is not None:
         e[:] = _coefficient(restitution)
-    inertia = Inertia(gaps, t, q, slots)
+    inertia = Inertia(gaps, t, q, slots, which)
     before = inertia.rates(qd)[which]
     try:
         p, change, share = impact_of(inertia, which, qd, before, e[which], law)

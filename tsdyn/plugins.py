@@ -94,8 +94,17 @@ from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
 from .methods.interpolants import linear_second
 from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
 from .motions.expressions import Smooth
+from .motions.of_coordinates import MOST as MOST_COORDINATES
 from .motions.of_coordinates import ROWS as COORDINATE_SLOPE_ROWS
-from .motions.of_coordinates import CoordinateFunction, coordinate_function, functions_of, slope_series
+from .motions.of_coordinates import (
+    CoordinateFunction,
+    JointFunction,
+    coordinate_function,
+    functions_of,
+    joint_function,
+    joint_slope,
+    slope_series,
+)
 from .motions.prescribed import Motion
 from .motions.signals import Signal, numbers_of
 from .motions.tables import is_data
@@ -108,6 +117,7 @@ __all__ = [
     "COORDINATE_SLOPE_ROWS",
     "DOP853_INTERPOLANT",
     "FLAT",
+    "MOST_COORDINATES",
     "PARALLEL",
     "RIGHT_ANGLED",
     "STATE",
@@ -137,6 +147,7 @@ __all__ = [
     "InvalidForce",
     "Joint",
     "JointFriction",
+    "JointFunction",
     "JointLoad",
     "Motion",
     "NystromTableau",
@@ -192,6 +203,8 @@ __all__ = [
     "instants",
     "inverse_root",
     "is_data",
+    "joint_function",
+    "joint_slope",
     "kernel",
     "label",
     "linear_second",

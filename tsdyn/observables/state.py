@@ -141,8 +141,6 @@ def remembered(state, prepared, t, q):
             row = prepared.handles.row(load.force.joint, "angle")
             memory[load.slot] = angles[row.first + load.force.which]
     for part, slot in zip(prepared.packed.constraints, prepared.packed.slots, strict=True) if fresh and slots else ():
-        if slot >= 0:
-            joint, which = part.counted or (None, 0)
-            if joint is not None:
-                memory[slot] = angles[prepared.handles.row(joint, "angle").first + which]
+        for i, (joint, which) in enumerate(part.counted if slot >= 0 else ()):
+            memory[slot + i] = angles[prepared.handles.row(joint, "angle").first + which]
     return np.concatenate((angles, memory))

@@ -29,6 +29,7 @@ from ..plugins import (
     functions_of,
     label,
     shown,
+    shown_for_handle,
 )
 from .angle_term import AngleTerm, _AngleFunctionTerm
 from .displacement_term import DisplacementTerm, _DisplacementFunctionTerm
@@ -252,8 +253,8 @@ def _chosen(where, given):
     declared = getattr(joint, "joint_coordinates", ())
     if not declared or getattr(joint, "drives", ""):
         raise InvalidConstraint(
-            f"{where}: {shown(joint)} has no angle or displacement to couple; give a joint such as Revolute or "
-            "Translational."
+            f"{where}: couple joints with an angle or a displacement, such as Revolute or Translational, got "
+            f"{shown_for_handle(joint)}."
         )
     kinds = ["angle" if isinstance(each, Angle) else "displacement" for each in declared]
     choices = [(kind, kinds[:i].count(kind)) for i, kind in enumerate(kinds)]

@@ -109,7 +109,7 @@ from .motions.prescribed import Motion
 from .motions.signals import Signal, numbers_of
 from .motions.tables import is_data
 from .motions.tracing import gate
-from .validation import finite, floats, label, not_negative, number, positive, shown, vector3, whole
+from .validation import finite, floats, label, not_negative, number, positive, shown, shown_for_handle, vector3, whole
 
 __all__ = [
     "AXIS",
@@ -230,6 +230,7 @@ __all__ = [
     "scene_load",
     "second_embedded_error",
     "shown",
+    "shown_for_handle",
     "sine_cosine",
     "slip",
     "slip_of",

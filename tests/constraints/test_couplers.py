@@ -419,7 +419,7 @@ def test_a_run_resumes_to_the_bit(tmp_path, monkeypatch):
         (lambda j, k, o: ((j, k), {"ratio": np.nan}), "ratio must be a finite number"),
         (lambda j, k, o: ((j, k), {"offset": np.inf}), "offset must be a finite number"),
         (lambda j, k, o: ((j, o), {}), "another scene"),
-        (lambda j, k, o: ((j, 3.0), {}), "3.0 has no angle or displacement"),
+        (lambda j, k, o: ((j, 3.0), {}), "joints with an angle or a displacement, .* got 3.0"),
         (lambda j, k, o: (((j, "displacement"), k), {}), "say which coordinate"),
         (lambda j, k, o: ((j, k), {"polynomial": ()}), "polynomial must be finite coefficients"),
         (lambda j, k, o: ((j, k), {"polynomial": (1.0, np.nan)}), "polynomial must be finite coefficients"),
@@ -435,6 +435,23 @@ def test_what_is_refused(give, said):
     joints, others = give(slow, fast, stranger)
     with pytest.raises(ts.InvalidConstraint, match=said):
         C.Coupler(*joints, **others)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda joint: C.Coupler("hinge one", joint),
+        lambda joint: C.Coupler(joint, ("hinge one", "angle")),
+        lambda joint: C.Stop("hinge one", lower=0.0),
+        lambda joint: ts.forces.Armature("hinge one", inertia=1.0),
+        lambda joint: ts.forces.JointTorque("hinge one", function=lambda t, q, rate: 1.0),
+        lambda joint: ts.forces.RevoluteFriction("hinge one", radius=0.1, kinetic=0.1),
+    ],
+)
+def test_a_name_in_place_of_a_joint(make):
+    _, fast, *_ = crossed(1.0, 0.0)
+    with pytest.raises(ts.TsdynError, match=r"the name 'hinge one'; pass the object itself, scene\['hinge one'\]"):
+        make(fast)
 
 
 def test_couplers_in_a_circle_and_products():

@@ -127,6 +127,7 @@ class Primitive(Attachment):
     normal = ""
     normal_at = -1  # among the markers
     summed = False
+    begins_anew = False  # whether a run may begin at a state that doesn't say what it remembers
     counted: Any = ()  # (joint, index) of each angle whose turns a term counts
     others: tuple[AnyBody, ...] = ()  # bodies beyond a and b that a term of a sum reads
     others_at = 0  # their first parameter; pack() fills in three for each

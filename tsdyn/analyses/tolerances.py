@@ -121,3 +121,7 @@ LEVEL = 1e-11
 # Part of a row that is independent of others, up to which it depends on them: sines of angles, squares of which are
 # found to 1e-14.
 DEPENDENT = 1e-7
+
+# --- kinematics with rows on velocities ----------------------------------------------------------------------------
+# Tolerance of the run that integrates the velocities: hundreds of roundings.
+FOLLOWED = 1e-12

@@ -70,17 +70,6 @@ def degrees_of_freedom(packed):
     return int(system.bodies[:, 1].sum()) - len(system.segments) + len(redundant_rows(packed))
 
 
-def demand_no_rates(packed, who):
-    """Refuse rows on velocities: with them positions are no function of what drives them."""
-    for member in packed.members:
-        if member.constraint.rate_rows:
-            raise InvalidArgument(
-                f"{who}: {member.constraint.title} has rows on velocities, so positions follow from the whole motion "
-                "and not from what drives them at each time. Integrate it with ts.simulate; inverse_dynamics takes the "
-                "Solution."
-            )
-
-
 def demand_driven(packed, memory, t, q, who, remedy):
     """Refuse a scene with freedom, by the names of independent coordinates that are free; memory (slots,)."""
     k = degrees_of_freedom(packed)
@@ -96,7 +85,7 @@ def demand_driven(packed, memory, t, q, who, remedy):
 def driven_rates(scene, t, q, who):
     """The smallest velocities qd (n,), in the metric of lengths, with Phi_q qd + Phi_t = 0."""
     packed = scene.packed
-    metric = Metric(packed, None, t, lengths=True)
+    metric = Metric(packed, None, t, lengths=True, rates=True)
     _, Phi_q, Phi_t = metric.arrays(q)
     A, drift = metric.reduced(q, Phi_q[metric.own]), Phi_t[metric.own]
     x = least_step(A, drift)

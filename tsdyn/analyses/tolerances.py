@@ -135,3 +135,7 @@ PIVOTS = 30
 BROKEN = 1.0 - 1e-7
 # What the cosine of the angle between the direction and the acceleration of a beginning slide may lack of one.
 ASIDE = 1e-12
+
+# --- kinematics with rows on velocities ----------------------------------------------------------------------------
+# Tolerance of the run that integrates the velocities: hundreds of roundings.
+FOLLOWED = 1e-12

@@ -503,7 +503,9 @@ class Attachment:
 
     def body_of(self, marker: Marker) -> AnyBody:
         """The body that a marker is on."""
-        return self.a if marker.body == "a" else self.b
+        if marker.body in ("a", "b"):
+            return self.a if marker.body == "a" else self.b
+        return self.others[marker.body - 2]
 
     def counted_from(self, t: float, *displacements: float) -> float:
         """The angle, or angles, near which a run that begins at t counts turns: zero, or what `Scene.set` has set."""
@@ -532,12 +534,15 @@ def in_frame(body, marker, value):
 
 def layout(markers):
     """Constants of the loops over all instances of a kind: where each marker is in x, and on which body."""
-    owners = [0 if m.body == "a" else 1 for m in markers]
+    owners = [{"a": 0, "b": 1}.get(m.body, m.body) for m in markers]
+    others = max(1, *owners) - 1
     sizes = [m.size for m in markers]
     return {
         "MARKERS": len(markers),
         "CODES": tuple(m.code for m in markers),
         "OWNERS": tuple(owners),
+        "OTHERS": others,
+        "SPAN": 14 + 7 * others,
         "STARTS": tuple(sum(sizes[:i]) for i in range(len(sizes))),
         "FIRST": tuple(int(owner not in owners[:i]) for i, owner in enumerate(owners)),
         "SIZE": sum(sizes),

@@ -616,23 +616,6 @@ def _size(c, h, tableau, p):
 #
 # Newton's methods for its stages stand above; the matrices are those of saddle_point.py.
 
-__all__ = [  # parts of the form
-    "COLUMNS",
-    "accelerate",
-    "check",
-    "correct",
-    "distance",
-    "error_norm",
-    "factorise",
-    "linearise",
-    "place",
-    "reduce",
-    "residual",
-    "soften",
-    "solve",
-    "start_chart",
-]
-
 
 @callback("p")
 def check(context):

@@ -21,6 +21,7 @@ from .elements.joint import Joint
 from .elements.primitive import Primitive
 from .ensembles.results import Ensemble
 from .errors import TsdynError
+from .importing.description import ImportReport
 from .measuring.benchmark import Benchmark, Reference
 from .measuring.phase_times import Phase
 from .measuring.profile import Profile

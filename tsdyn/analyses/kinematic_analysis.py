@@ -45,8 +45,7 @@ from ..rows.interface import TangentWorkspace, allocate_tangent, constrain, eval
 from ..validation import listed, nearest, vector3
 from ..workspaces import Work, parts, plain_context
 from . import tolerances as limits
-from .coordinates import Variations, chosen, named_coordinates
-from .linearise import AXES, item_of
+from .coordinates import AXES, Variations, chosen, item_of, named_coordinates
 from .moves import update_memory
 from .nominal_motion import NominalMotion
 

@@ -64,27 +64,31 @@ class UnitLoads:
 
     def force(self, body, s, F):
         """F (k, 3) at a point s."""
-        at, dimension = self.handles.where(body)
+        at, dimension = self._where(body)
         arm = arm_by_parameters(self._parameters(body), np.asarray(s, float))
         values = np.concatenate((F, np.einsum("ki,kij->kj", F, arm)), axis=1)
         return np.arange(at, at + dimension), values[:, :dimension]
 
     def torque(self, body, n):
         """A torque (k, 3)."""
-        at, dimension = self.handles.where(body)
+        at, dimension = self._where(body)
         if dimension != 7:
             return np.zeros(0, int), np.zeros((len(n), 0))
         return np.arange(at + 3, at + 7), 2.0 * np.einsum("ki,kij->kj", n, transform_e(self._parameters(body)))
 
+    def _where(self, body):
+        """Where the coordinates of a body are; of a handle of another scene of the family, too."""
+        return self.handles.where(self.handles.own(body))
+
     def _parameters(self, body):
-        at, dimension = self.handles.where(body)
+        at, dimension = self._where(body)
         return self.q[:, at + 3 : at + 7] if dimension == 7 else np.tile(IDENTITY, (len(self.q), 1))
 
     def _direction(self, body, s):
         return rotation_matrix(self._parameters(body)) @ np.asarray(s, float)
 
     def _position(self, body, s):
-        at, dimension = self.handles.where(body)
+        at, dimension = self._where(body)
         if dimension == 3:
             return self.q[:, at : at + 3]
         return self._direction(body, s) + (self.q[:, at : at + 3] if dimension else 0.0)
@@ -129,12 +133,13 @@ def actuators_of(scene, handles, given, q, what="actuator"):
             found.append(_of_coordinate(units, one, item, geometry))
             continue
         item, axis = item_of(scene, one, [*scene.forces, *scene.constraints], "force or joint")
-        every = _of_item(units, coordinates, handles.own(item), what)
+        every = _of_item(units, coordinates, item, what)
         same = [each for each in every if axis is None or each.name.endswith(axis)]
         if not same:
             names = ", ".join(repr(each.name) for each in every)
             raise InvalidArgument(f"{item.name!r} has no component {axis[1:]!r}: its {what} is {names}.")
-        found += [each._replace(whole=item.name) for each in same] if len(same) > 1 else same
+        own = {"item": handles.own(item), "whole": item.name if len(same) > 1 else ""}
+        found += [each._replace(**own) for each in same]
     for name, count in Counter(each.name for each in found).items():
         if count > 1:
             raise InvalidArgument(f"{what}s: {name} is given more than once, or several have this name.")
@@ -156,7 +161,7 @@ def _of_item(units, coordinates, item, what):
         unit = NEWTON if isinstance(item, PointForce) else NEWTON_METRE
         axes = zip(AXES, np.eye(3), strict=True)
         return [Actuator(item.name + axis, unit, item, *units.component(item, e)) for axis, e in axes]
-    found = [] if isinstance(item, Force) else coordinates.get(id(item), [])
+    found = [] if isinstance(item, Force) else coordinates.get(id(units.handles.own(item)), [])
     if not found:
         raise InvalidArgument(
             f"{item.name}: a {type(item).__name__} is no {what}. There are JointTorque and JointForce, PointForce and "

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..calls import fitting_methods
-from ..elements.bodies import PointMass, named, rotation_matrix
+from ..elements.bodies import PointMass, rotation_matrix
 from ..elements.primitive import Primitive
-from ..errors import InvalidArgument, InvalidBody
+from ..errors import InvalidArgument
 from ..maths.tolerances import NEGLIGIBLE
+from ..model.handles import handles_of
 from ..validation import vector3
 from .actuator_loads import actuators_of
 from .coordinates import Variations, chosen, item_of, stacked, transform_e
@@ -80,13 +81,13 @@ def _of(scene, variations, given, coordinates):
     if isinstance(given, (tuple, list)) and len(given) == 2:
         body, _ = item_of(scene, given[0], scene.bodies, "body")
         point = vector3(given[1], f"{body.name}: point (m, body frame)", InvalidArgument)
-        return variations.point(body, point, f"{body.name}{tuple(point.tolist())}")
+        return variations.point(variations.handles.own(body), point, f"{body.name}{tuple(point.tolist())}")
     joints = [item for item in scene.constraints if not (isinstance(item, Primitive) and item.normalises)]
     item, axis = item_of(scene, given, [*scene.bodies, *joints], "body or joint")
-    if isinstance(item, PointMass):
-        found = variations.of_body(item)[:3]
+    own = variations.handles.own(item)  # of the scene whose numbers vary
+    if isinstance(own, PointMass):
+        found = variations.of_body(own)[:3]
     else:
-        own = variations.handles.own(item)
         found = [one for row in variations.handles.rows if row.item is own for one in variations.of_row(row)]
     if not found:
         raise InvalidArgument(
@@ -104,9 +105,9 @@ NAMED, LEAST_SHARE = 4, 0.05  # directions of bodies that are named at most; sha
 
 
 class Moving(NamedTuple):
-    """Bodies, and what takes variations of the coordinates to their motion."""
+    """What takes variations of the coordinates to the motion of the bodies."""
 
-    bodies: tuple
+    handles: Any  # `Handles` of the scene
     twists: np.ndarray  # (b, 6, k)
     mass: np.ndarray  # (b,)
     inertia: np.ndarray  # (b, 3, 3), ground frame
@@ -174,12 +175,8 @@ class Modes:
 
     def _index(self, body):
         """The number of a body."""
-        bodies = self._moving.bodies
-        if isinstance(body, str):
-            body = named(bodies, body, "body", InvalidBody)
-        if not any(body is one for one in bodies):
-            raise InvalidBody(f"{body!r} is not a body of this scene.")
-        return [one is body for one in bodies].index(True)
+        own = self._moving.handles.body(body)
+        return [one is own for one in self._moving.handles.bodies].index(True)
 
     @cached_property
     def _shares(self):
@@ -201,7 +198,7 @@ class Modes:
     def _motion(self, shares):
         first = np.argsort(-shares, kind="stable")[:NAMED]
         return ", ".join(
-            f"{self._moving.bodies[i // 6].name}.{DIRECTIONS[i % 6]} {100.0 * shares[i]:.0f} %"
+            f"{self._moving.handles.bodies[i // 6].name}.{DIRECTIONS[i % 6]} {100.0 * shares[i]:.0f} %"
             for i in first
             if i == first[0] or shares[i] >= LEAST_SHARE
         )
@@ -381,4 +378,4 @@ def _moving(motion, reduced):
     twists[rigid, 3:] = 2.0 * transform_e(p) @ T[bodies[rigid, :1] + np.arange(3, 7)]
     A, inertia = rotation_matrix(p), np.zeros((len(bodies), 3, 3))
     inertia[rigid] = A @ system.inertia[rigid].reshape(-1, 3, 3) @ A.swapaxes(1, 2)
-    return Moving(motion.packed.bodies, twists, system.mass.copy(), inertia)
+    return Moving(handles_of(motion.packed), twists, system.mass.copy(), inertia)

@@ -14,8 +14,6 @@ R is the radius of the ball, negative outside, c that of the cylinder, S = c - R
 Never singular.
 """
 
-from __future__ import annotations
-
 from ..plugins import Vector, dot, scaled
 from .cylinder_contact import B, CylinderContact, F, G, across_axis, cylinder_series
 from .smooth_contact import along

@@ -61,7 +61,6 @@ class RollingBall(Rolls, Joint):
         super().__init__(a, b, **places)
         self.radius = radius
         self.slip = slip
-        self.check()
 
     def check(self):
         """Refuse a radius that is not positive."""

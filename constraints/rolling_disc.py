@@ -71,7 +71,6 @@ class RollingDisc(Rolls, Joint):
         self.radius = radius
         self.tyre_radius = tyre_radius
         self.slip = slip
-        self.check()
 
     def check(self):
         """Refuse a radius that is not positive."""

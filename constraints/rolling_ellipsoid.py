@@ -73,7 +73,6 @@ class RollingEllipsoid(Rolls, Joint):
         self.semi_axes = semi_axes
         self.axes_a = np.eye(3) if axes_a is None else axes_a
         self.slip = slip
-        self.check()
 
     def __setattr__(self, name, value):
         """Set a checked attribute; axes_a of a Rotation are its rows."""

@@ -51,7 +51,7 @@ def test_a_class_without_init_is_called_by_its_signature(pin_in_slot):
     scene = ts.Scene()
     body = scene.add_body(1.0, (1, 1, 1))
     assert list(inspect.signature(pin_in_slot).parameters) == ["a", "b", "point_a", "point_b", "slot_b", "name"]
-    with pytest.raises(ts.InvalidCall, match="missing a required argument: 'b'. Its arguments are a, b, point_a"):
+    with pytest.raises(ts.InvalidCall, match="missing a required argument: 'b'"):
         pin_in_slot(body)
     with pytest.raises(
         ts.InvalidCall, match="takes a, b by position, got 3 arguments there; name the others: point_a="

@@ -223,18 +223,6 @@ class Modes:
         return f"<table><caption>Modes of {len(self.coordinates)} coordinates</caption>{body}</table>"
 
 
-def modes_of(pairs, moving, coordinates):
-    """The `Modes` of eigenpairs of bodies that are `Moving`."""
-    if not len(coordinates):
-        raise InvalidArgument("modes: the scene has no degrees of freedom.")
-    first, zero = np.flatnonzero(pairs.values.imag >= 0.0), int((pairs.values == 0.0).sum())
-    first = first[zero // 2 :] if zero else first
-    first[: zero - zero // 2] = np.arange(zero - zero // 2)  # zeros are first, and a pair of them is one mode, too
-    values, shapes = pairs.values[first], pairs.vectors[:, first].T
-    lead = shapes[np.arange(len(first)), np.abs(shapes).argmax(axis=1)]
-    return Modes(values, shapes * (np.abs(lead) / lead)[:, None], moving, coordinates)
-
-
 class StateSpace(NamedTuple):
     """xd = A x + B u, y = C x + D u, with the 2 k states (coordinates, independent rates).
 
@@ -313,7 +301,14 @@ class Linearisation:
 
     def modes(self) -> Modes:
         """Frequencies, damping ratios, shapes, and what moves in each, a `Modes`."""
-        return modes_of(self._pairs, self._moving, self.coordinates)
+        if not len(self.coordinates):
+            raise InvalidArgument("modes: the scene has no degrees of freedom.")
+        first, zero = np.flatnonzero(self._pairs.values.imag >= 0.0), int((self._pairs.values == 0.0).sum())
+        first = first[zero // 2 :] if zero else first
+        first[: zero - zero // 2] = np.arange(zero - zero // 2)  # zeros are first, and a pair of them is one mode, too
+        values, shapes = self._pairs.values[first], self._pairs.vectors[:, first].T
+        lead = shapes[np.arange(len(first)), np.abs(shapes).argmax(axis=1)]
+        return Modes(values, shapes * (np.abs(lead) / lead)[:, None], self._moving, self.coordinates)
 
     def state_space(self) -> StateSpace:
         """A, B, C, D and the names of states, inputs and outputs, a `StateSpace`."""

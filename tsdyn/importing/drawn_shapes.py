@@ -216,7 +216,7 @@ def drop_missing_meshes(mujoco, spec, sources, root, report):
     missing = {
         mesh.name or Path(mesh.file).stem: mesh
         for mesh in spec.meshes
-        if mesh.file and (mesh.file in sources.hidden or not _is_there(mesh, folder))
+        if mesh.file and (mesh.file in sources.hidden or not (exists(folder / mesh.file) or exists(Path(mesh.file))))
     }
     if not missing:
         return
@@ -233,10 +233,6 @@ def drop_missing_meshes(mujoco, spec, sources, root, report):
     for mesh in missing.values():
         mesh.file, mesh.content_type, mesh.uservert = "", "", TETRAHEDRON
     root.mistakes.demand_none()
-
-
-def _is_there(mesh, folder):
-    return exists(folder / mesh.file) or exists(Path(mesh.file))
 
 
 def add_geoms(mujoco, model, found, names, report):

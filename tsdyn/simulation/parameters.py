@@ -161,15 +161,13 @@ def function_of(value):
 def attributes_of(cls):
     """The names of the attributes of a class that may be set: those checked, and arguments that are kept."""
     if issubclass(cls, PointMass):
-        return tuple(name for base in reversed(cls.__mro__) for name, it in vars(base).items() if _is_attribute(it))
+        return tuple(
+            name for base in reversed(cls.__mro__) for name, it in vars(base).items() if isinstance(it, Attribute)
+        )
     checked = getattr(cls, "quantities", ())
     checked = checked() if callable(checked) else checked
     known = dict.fromkeys([*inspect.signature(cls).parameters, *checked])
     return tuple(name for name in known if name not in ("a", "b", "name", *cls.permanent))
-
-
-def _is_attribute(value):
-    return isinstance(value, Attribute)
 
 
 def _is_own(owner, attribute):
@@ -293,7 +291,7 @@ class Edit:
         if isinstance(owner, TableNumbers):
             return False
         if owner is self.family.template:
-            self._array("gravity")[:] = with_gravity(owner, changes)
+            self._array("gravity")[:] = type(owner)(changes["gravity"]).gravity
             return True
         if isinstance(owner, PointMass):
             self._enter_body(owner, changes)
@@ -449,11 +447,6 @@ def with_attributes(item, changes):
     return other
 
 
-def with_gravity(scene, changes):
-    """Return a checked acceleration of free fall."""
-    return type(scene)(changes["gravity"]).gravity
-
-
 # A scene of a file with other numbers of its table `parameters`: made of the file again, then edited as the scene was.
 
 
@@ -532,17 +525,14 @@ class Family:
         self._bodies = {id(body): own for body, own in bodies}
         self.loads = {id(force): i for i, force in enumerate(template._forces)}
         self._structural, self._has_laws = {}, any(load.law is not None for load in packed.loads)
-        self.begins = self._find_begins()
-        self.reaches = [reaches_of(*pair) for pair in zip(packed.constraints, packed.coordinates, strict=True)]
-
-    def _find_begins(self):
-        """Where the reals of each primitive begin."""
+        # Where the reals of each primitive begin
         taken, rows, found = {}, dict(zip(classes(self.packed), self.packed.system.kinds, strict=True)), []
         for primitive in self.packed.constraints:
             row, at = rows[type(primitive)], taken.get(type(primitive), 0)
             found.append(int(row.reals + at * row.stride))
             taken[type(primitive)] = at + 1
-        return found
+        self.begins = found
+        self.reaches = [reaches_of(*pair) for pair in zip(packed.constraints, packed.coordinates, strict=True)]
 
     def field(self, name):
         """The `Field` of a name; raises InvalidArgument."""

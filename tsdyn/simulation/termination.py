@@ -150,7 +150,12 @@ def account(solution, scene, reason, goes_on=""):
     if not found and solution.status in (Status.STEP_COLLAPSED, Status.MAX_STEPS):
         found = _jump(solution)
     if not found and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
-        found = _growth(solution)
+        # Report that the motion is stiff, or that its velocities diverge
+        said = "The motion is stiff: an implicit method, such as SDIRK54, may succeed. " if solution.stats.stiff else ""
+        first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (solution[:1].qd, solution._last[1]))
+        if last > limits.BLOW_UP * (1.0 + first):
+            said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion diverges."
+        found = said.strip()
     parts = (limit.sentence or solution.status.sentence, reason, where, found, remedy)
     return " ".join(part for part in parts if part)
 
@@ -222,15 +227,6 @@ def _jump(solution):
         f"The motion comes to rest where the law of {', '.join(map(repr, names[:FEW]))} changes at once: at zero "
         "length a spring has no direction. Hold the bodies apart there, or let the load change within a short distance."
     )
-
-
-def _growth(solution):
-    """Report that the motion is stiff, or that its velocities diverge."""
-    said = "The motion is stiff: an implicit method, such as SDIRK54, may succeed. " if solution.stats.stiff else ""
-    first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (solution[:1].qd, solution._last[1]))
-    if last > limits.BLOW_UP * (1.0 + first):
-        said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion diverges."
-    return said.strip()
 
 
 def suspect(solution, scene):

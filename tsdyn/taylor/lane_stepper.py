@@ -231,7 +231,12 @@ class LaneMemory:
         many.expansion.forces["loop"], many.expansion.forces["margin"] = force_loops(packed, width).T
         if spinning:
             many.graph.spins[many.graph.bodies[:, 1] == 7] = 1
-        self._set_numbers(memory.run)
+        clock, numbers = memory.run.clock, self.context.numbers
+        numbers.atol, numbers.rtol = clock.atol, clock.rtol
+        numbers.max_step, numbers.first_step = clock.max_step, clock.h
+        numbers.t_start, numbers.t_end = clock.t_origin, clock.t_end
+        numbers.first_top = self.context.expansion.order.next
+        numbers.leave_when_stiff = memory.run.numbers.leave_when_stiff
         self.poses = values_of(many.tangent.poses)
         self.where, *self._keep = resident(many)
         pairs = [
@@ -247,14 +252,6 @@ class LaneMemory:
         arrays = [(array, values_of(array)[:, 0].copy()) for array in lane_arrays(many)]
         self.arrays = np.array([(a.ctypes.data, image.ctypes.data, a.size) for a, image in arrays], np.int64)
         self._keep += arrays
-
-    def _set_numbers(self, run):
-        clock, numbers = run.clock, self.context.numbers
-        numbers.atol, numbers.rtol = clock.atol, clock.rtol
-        numbers.max_step, numbers.first_step = clock.max_step, clock.h
-        numbers.t_start, numbers.t_end = clock.t_origin, clock.t_end
-        numbers.first_top = self.context.expansion.order.next
-        numbers.leave_when_stiff = run.numbers.leave_when_stiff
 
 
 # Projection of each lane onto the constraint manifold, as formulations/projection.py has it for one case.

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..maths.tolerances import HALF_DIGITS, TYPED
+from ..shapes import steiner
 from .description import GROUND, Slide
 from .tolerances import HALVINGS, NO_INERTIA, NO_MASS, REACH, SHARE, SLIGHT
 
@@ -77,11 +78,6 @@ def together(parts):
     centroid = sum(m * r for m, r, _ in parts) / mass if mass > 0.0 else np.zeros(3)
     inertia = sum(J + m * steiner(r - centroid) for m, r, J in parts)
     return mass, centroid, inertia
-
-
-def steiner(d):
-    """d.d I - d d^T."""
-    return (d @ d) * np.eye(3) - np.outer(d, d)
 
 
 def _rename(description, top, report):

@@ -28,19 +28,8 @@ class RollingContact(SmoothContact):
 
     Parameters
     ----------
-    first_a, second_a, third_a : array_like (3,)
-        Directions of the semi-axes, at right angles.
     first_b, second_b : array_like (3,)
         Directions in the plane, at right angles.
-    semi_axes : array_like (3,), m
-        Of the ellipsoid; one is zero for a disc.
-    tyre_radius : float, m
-        Thickness added to the ellipsoid in all directions.
-
-    Raises
-    ------
-    InvalidConstraint
-        If a length is negative, or a place or body is wrong.
 
     Examples
     --------

@@ -60,7 +60,6 @@ class Span(Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, offset: float = 0.0, least: float = 0.0, **places: Any) -> None:
         super().__init__(a, b, **places)
         self.offset, self.least = offset, least
-        self.check()
 
     def check(self):
         """Finite numbers."""

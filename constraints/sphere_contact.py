@@ -82,7 +82,6 @@ class SphereContact(Unilateral, Joint):
         super().__init__(a, b, **places)
         self.radius_a, self.radius_b, self.normal_b, self.inside = radius_a, radius_b, normal_b, bool(inside)
         self._set_law(restitution, kinetic, static)
-        self.check()
 
     def __setattr__(self, name, value):
         """Set a checked attribute; a normal is of unit length."""

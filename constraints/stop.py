@@ -74,7 +74,6 @@ class Stop(Unilateral, Joint):
         super().__init__(*found[0][:2], name=name)
         self.lower, self.upper = lower, upper
         self._set_law(restitution)
-        self.check()
 
     def _untitled(self, bodies):
         return f"{self._kind()}({self.joint.name})"

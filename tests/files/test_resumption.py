@@ -218,7 +218,7 @@ def test_singular_configurations(method, count, tmp_path):
 @pytest.mark.parametrize("count", [2, 5, 8, 11, 13, 15])
 def test_runs_that_turn_to_an_implicit_method(count, tmp_path, monkeypatch):
     """Stopped in segments of either method, of which there are five or more."""
-    monkeypatch.setattr(segments, "PATIENCE", 1)
+    monkeypatch.setattr(segments.limits, "PATIENCE", 1)
     monkeypatch.setattr(segments.Turns, "patience", 1)
     path, options = tmp_path / "run.h5", {"rtol": 1e-7, "atol": 1e-7, "history": True}
     whole = ts.simulate(jointed(), (0.0, 2.0), **options)

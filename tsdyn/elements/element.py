@@ -47,8 +47,9 @@ def idle_forces(admitted):
 
 
 def note(item):
-    """A constraint or force has been made: it waits to be added to its scene, or to become a part of a joint."""
+    """A constraint or force has been made: it is checked, and waits for its scene, or to become a part of a joint."""
     if "a" in vars(item):  # its __init__ has called that of its base
+        item.check()
         if not _may_be_idle.get():
             item.demand_effect()
         item.scene._waiting[id(item)] = item
@@ -244,10 +245,16 @@ ENTRIES = (  # of docstrings
 
 
 def by_name(function: Function) -> Function:
-    """Wrap an `__init__`: a or b may be the name of a body in the scene of the other."""
+    """Wrap an `__init__`: a or b may be the name of a body in the scene of the other.
+
+    That of `Attachment` serves a class that has none of its own: bodies by position, and b where markers are on it.
+    """
 
     @wraps(function)
     def call(self, *arguments, **keywords):
+        lacks_b = len(arguments) < 2 and "b" not in keywords and any(marker.body == "b" for marker in self.markers)
+        if type(self).__init__.plain is Attachment.__init__ and (len(arguments) > 2 or lacks_b):
+            raise TypeError("no call of this class")  # answered with the arguments that there are, see calls.py
         arguments, keywords = _meant(self.error, arguments, keywords)
         return function(self, *arguments, **keywords)
 
@@ -336,8 +343,10 @@ class Attachment:
         super().__init_subclass__(**keywords)
         if not isinstance(cls.markers, (tuple, list)) or not all(isinstance(m, Marker) for m in cls.markers):
             return  # to be refused by name
-        cls.__init__ = fitting(by_name(cls.__init__), then=note)
-        if unwrap(cls.__init__).__code__.co_flags & CO_VARKEYWORDS:
+        plain = getattr(cls.__init__, "plain", cls.__init__)  # an inherited one is wrapped already
+        cls.__init__ = fitting(by_name(plain), then=note)
+        cls.__init__.plain = plain
+        if unwrap(plain).__code__.co_flags & CO_VARKEYWORDS:
             cls.__init__.__signature__ = complete_signature(cls)
         if cls.__new__ is not object.__new__:  # else the signature would be that of __new__
             cls.__signature__ = signature(MethodType(cls.__init__, cls))
@@ -479,7 +488,7 @@ class Attachment:
         """Find by name what it refers to in the scene that it is added to."""
 
     def check(self) -> None:
-        """Raise an error where an attribute has an impossible value; asked again when one is set."""
+        """Raise an error where an attribute has an impossible value; asked when one is made, and when one is set."""
 
     @property
     def referred(self) -> tuple[Any, ...]:

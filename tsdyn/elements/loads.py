@@ -446,7 +446,6 @@ class JointLoad:
     ) -> None:
         self._join(joint, which, name)
         self.function, self.period = function, period
-        self.check()
 
     def _join(self, joint, which, name):
         """Attach it to a coordinate of a joint."""

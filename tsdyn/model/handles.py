@@ -211,7 +211,7 @@ class Handles:
             return named(self.bodies, body, "body", InvalidBody)
         body = self.own(body)
         if not isinstance(body, PointMass) or body not in self._where:
-            raise InvalidBody(f"{body!r} is not a body of this solution's scene{self._elsewhere(body)}.")
+            raise InvalidBody(f"{body!r} is not a body of this scene{self._elsewhere(body)}.")
         return body
 
     def _elsewhere(self, body):

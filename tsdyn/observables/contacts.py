@@ -1,7 +1,5 @@
 """Where surfaces touch, and where they touch at no single point."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..elements.bodies import rotation_matrix

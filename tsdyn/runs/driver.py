@@ -110,7 +110,12 @@ class Slices:
                 self.recorder.begin_slice(rows)
                 self._adapt(rows, self._advance(rows))
             else:
-                self._go_on(first)
+                # From the end of a first slice
+                self.recorder.adopt(first.log)
+                if first.status is None:
+                    raise KeyboardInterrupt
+                self._end_slice(first.status)
+                self._adapt(first.rows, clock() - first.began)
                 first = None
             self._look_up()
             if self.status is SLICE_DONE:
@@ -136,14 +141,6 @@ class Slices:
         seconds = time.perf_counter() - started
         self._end_slice(status)
         return seconds
-
-    def _go_on(self, first):
-        """From the end of a first slice."""
-        self.recorder.adopt(first.log)
-        if first.status is None:
-            raise KeyboardInterrupt
-        self._end_slice(first.status)
-        self._adapt(first.rows, clock() - first.began)
 
     def _end_slice(self, status):
         """Take the status of a slice; refuse a run that could not begin."""

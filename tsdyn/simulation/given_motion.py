@@ -355,8 +355,8 @@ class InverseDynamics(Drawn, GivenMotion):
 
     def _of(self, item, required=False):
         """The actuators of a handle or a name; with `required` there is one."""
-        name = item if isinstance(item, str) else None
-        found = [one for one in self._every if one.item is item or name in (one.name, one.item.name)]
+        name, own = item if isinstance(item, str) else None, self.handles.own(item)
+        found = [one for one in self._every if one.item is own or name in (one.name, one.item.name)]
         if not found and required:
             raise unknown_name("actuator", item, self.actuators)
         return found
@@ -460,6 +460,8 @@ def inverse_dynamics(
         memory = rows[0, 1 + 3 * n : 1 + 3 * n + angles + kept.packed.system.memory.size].copy()
         kept.start(scene, (start, rows[0, 1 + n : 1 + 2 * n].copy()), float(rows[0, 0]), CONSISTENT, memory, True)
     every = actuators_of(scene, kept.handles, actuators, rows[:, 1 : 1 + n].copy())
+    if not every:
+        raise InvalidArgument("actuators: give one at least: a force, or a joint with an angle or a displacement.")
     demand_continuous(kept.packed, [one.item for one in every])
     wanted = np.size(given.t) if t is None else np.size(t)
     followed = followed._replace(seconds=clock() - started)

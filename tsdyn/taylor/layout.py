@@ -553,7 +553,10 @@ def masks(graph, packed):
             key = grounded, (*Motion.numbers(par), *[0.0] * kind.memory)
             if key not in patterns:
                 if grounded not in motions:
-                    motions[grounded] = _random_motion(grounded)
+                    # The first coefficients of x, those of the ground constant
+                    x = np.random.default_rng(0).normal(size=(4, len(grounded), 3))
+                    x[1:, np.array(grounded)] = 0.0
+                    motions[grounded] = x.reshape(4, -1).tolist()
                 patterns[key] = _mask(kind, series, key[1], grounded, motions[grounded])
             # Instances with the same numbers have the same pattern
             mask = patterns[key]
@@ -575,13 +578,6 @@ def with_ground_contacts(graph, kinds):
         if not graph.kinds[i].drift and is_ground_contact(kind, masks_of(graph, i)):
             graph.kinds["reduced"][i] = address(kind.kernels, "contact_rows", kind.__name__, InvalidConstraint)
     return graph
-
-
-def _random_motion(grounded):
-    """The first coefficients of x, those of the ground constant."""
-    x = np.random.default_rng(0).normal(size=(4, len(grounded), 3))
-    x[1:, np.array(grounded)] = 0.0
-    return x.reshape(4, -1).tolist()
 
 
 def _mask(kind, series, par, grounded, motion):

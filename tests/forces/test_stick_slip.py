@@ -17,7 +17,10 @@ C, F, M = ts.constraints, ts.forces, ts.motions
 G = 9.81
 
 
-def on_a_slope(ratio, slope=0.17, **given):
+SLOPE = np.radians(10.0)
+
+
+def on_a_slope(ratio, slope=SLOPE, **given):
     """A block on a slope, which pulls with a part of what friction can hold."""
     turn = Rotation.from_rotvec((0.0, slope, 0.0))
     scene = ts.Scene()
@@ -50,7 +53,7 @@ def test_a_block_below_its_angle_does_not_move_by_a_bit(scene):
 
 
 def test_a_block_beyond_its_angle_slides():
-    slope, ratio = np.radians(10.0), 1.1
+    slope, ratio = SLOPE, 1.1
     solution = ts.simulate(on_a_slope(ratio, slope), (0.0, 1.0))
     way = 0.5 * G * np.sin(slope) * (1.0 - 1.0 / ratio)
     assert solution.displacement("guide")[-1] == pytest.approx(way, rel=FINE)
@@ -88,7 +91,7 @@ def test_a_block_that_stops_and_is_pushed_below_the_limit_rests(given):
 
 def test_a_slide_that_curves_to_its_end_in_the_plane():
     """Down a slope, across it at first: speed and direction as of the quadrature by the direction's angle."""
-    slope, mu, speed = np.radians(10.0), 0.3, 1.0
+    slope, mu, speed = SLOPE, 0.3, 1.0
     solution = ts.simulate(on_a_plane((0.0, speed, 0.0), mu, -slope), (0.0, 3.0), rtol=1e-12, dense_output=True)
     # v' = g (sin cos(f) - mu cos), v f' = -g sin sin(f); f from the line of fall: v(f) = v0 tan(f/2)^p / sin(f)
     g, p = G * np.sin(slope), mu / np.tan(slope)
@@ -240,7 +243,7 @@ def test_an_impact_releases_what_sticks():
 def test_evaluate_says_what_a_run_does():
     held, sliding = on_a_slope(0.9), on_a_slope(1.1)
     assert np.abs(held.evaluate().qdd).max() < TIGHT
-    slope = np.radians(10.0)
+    slope = SLOPE
     assert np.linalg.norm(sliding.evaluate().qdd) == pytest.approx(G * np.sin(slope) * (1.0 - 1.0 / 1.1), rel=FINE)
     assert held.mobility().degrees_of_freedom == 1
     for scene in (held, sliding):

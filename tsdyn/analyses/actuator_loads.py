@@ -164,9 +164,10 @@ def _of_item(units, coordinates, item, what):
     found = [] if isinstance(item, Force) else coordinates.get(id(units.handles.own(item)), [])
     if not found:
         raise InvalidArgument(
-            f"{item.name}: a {type(item).__name__} is no {what}. There are JointTorque and JointForce, PointForce and "
-            "Torque (three components), the actuator of a Spring, and joints with an angle or a displacement, for the "
-            "torque or force along it. In place of a motor that prescribes a motion use a JointTorque or JointForce."
+            f"{item.name}: a {type(item).__name__} is no {what}. {what.capitalize()}s are JointTorque and JointForce, "
+            "PointForce and Torque (three components), the actuator of a Spring, and joints with an angle or a "
+            "displacement, for the torque or force along it. In place of a motor that prescribes a motion use a "
+            "JointTorque or JointForce."
         )
     return [_of_coordinate(units, name, item, geometry) for name, geometry in found]
 

@@ -772,7 +772,7 @@ class _ContactRun:
         starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
         for where, (_, *parts) in starts.items():
             arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
-        numbers["first"] = self.first[0]
+        numbers |= {"first": self.first[0], "sampling": self.sampling and self.sampling.saved()}
         if self.end is not None:
             arrays |= {"last": self.end.last, "ended": self.end.remembered}
             numbers["reached"] = self.end.reached
@@ -789,6 +789,9 @@ class _ContactRun:
             vars(self).update({name: known[name] for name in KEPT})
             self.phases.restore(known["phases"], arrays, self._recorded_scene)
             self.modes = Modes.of(known["modes"])
+            if known["sampling"] is not None:
+                self.sampling = Sampling(prepared(phase_of(self.scene, [])), True)
+                self.sampling.restore(known["sampling"])
             starts = [[arrays[f"{where}{name}"] for name in START] for where in ("first.", "")]
             for q, qd, memory in starts:
                 demand(q.shape == qd.shape == (n,) and memory.shape == self.remembered.shape, "the start of a phase")

@@ -24,8 +24,7 @@ NAMED = 5  # contacts in a message
 def has_contacts(scene):
     """Whether runs of a scene have phases, by contacts or exact friction; looked up once until the scene changes."""
     if scene._opens is None:
-        slides = any(getattr(force, "slides", ()) for force in scene._forces)
-        scene._opens = slides or bool(contacts_of(scene._added))
+        scene._opens = bool(frictions_of(scene) or contacts_of(scene._added))
     return scene._opens
 
 
@@ -94,13 +93,25 @@ def at_start(scene):
 
 
 def demand_bilateral(scene, who="this analysis"):
-    """Raise InvalidArgument where a scene has contacts."""
+    """Raise InvalidArgument where a scene has contacts, or friction of the exact law."""
     if has_contacts(scene):
-        names = listed([each.name for each in contacts_of(scene._added)], NAMED)
+        contacts, frictions = contacts_of(scene._added), frictions_of(scene)
+        remedies = ["hold contacts that are closed by unilateral=False and remove the others"] if contacts else []
+        remedies += ["give friction a slip_velocity="] if frictions else []
         raise InvalidArgument(
-            f"{who} is of one phase of a run, along which {names} may open and close. In a copy of the scene, hold "
-            "those that are closed by unilateral=False, and remove the others."
+            f"{who} is of one phase of a run, and there are others where {named(contacts + frictions)} open, close, "
+            f"stick or slide. In a copy of the scene, {' and '.join(remedies)}."
         )
+
+
+def frictions_of(scene):
+    """The forces of the exact law of friction."""
+    return [force for force in scene._forces if getattr(force, "slides", ())]
+
+
+def named(items):
+    """Names of contacts and frictions, in a message."""
+    return listed(list(dict.fromkeys(item.name for item in items)), NAMED)
 
 
 def where_it_stands(function):

@@ -463,6 +463,15 @@ class _ContactRun:
         """The scene of the present modes."""
         return phase_of(self.scene, self._closed_rows(), [self._hold(i, r) for i, r in self.modes.sticking.items()])
 
+    def filled(self):
+        """The same, with what the run remembers among its packed numbers."""
+        phase = self._scene()
+        system = phase.packed.system._replace(reals=phase.packed.system.reals.copy())
+        system.reals[system.memory] = self.remembered[self.count :]
+        filled = object.__new__(type(phase))
+        vars(filled).update(vars(phase), _packed=phase.packed._replace(system=system), _prepared=None)
+        return filled
+
     def _closed_rows(self):
         return [self.gaps.list[i].side.row for i in self.modes.closed]
 

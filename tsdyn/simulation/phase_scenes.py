@@ -24,7 +24,7 @@ NAMED = 5  # contacts in a message
 def has_contacts(scene):
     """Whether runs of a scene have phases, by contacts or exact friction; looked up once until the scene changes."""
     if scene._opens is None:
-        scene._opens = bool(frictions_of(scene) or contacts_of(scene._added))
+        scene._opens = bool(any(getattr(force, "slides", ()) for force in scene._forces) or contacts_of(scene._added))
     return scene._opens
 
 
@@ -93,25 +93,28 @@ def at_start(scene):
 
 
 def demand_bilateral(scene, who="this analysis"):
-    """Raise InvalidArgument where a scene has contacts, or friction of the exact law."""
+    """Raise InvalidArgument where a scene has contacts or exact friction."""
     if has_contacts(scene):
-        contacts, frictions = contacts_of(scene._added), frictions_of(scene)
-        remedies = ["hold contacts that are closed by unilateral=False and remove the others"] if contacts else []
-        remedies += ["give friction a slip_velocity="] if frictions else []
+        demand_regular(scene, who)
         raise InvalidArgument(
-            f"{who} is of one phase of a run, and there are others where {named(contacts + frictions)} open, close, "
-            f"stick or slide. In a copy of the scene, {' and '.join(remedies)}."
+            f"{who} is of one phase of a run, along which {named(contacts_of(scene._added))} may open and close. In a "
+            "copy of the scene, hold those that are closed by unilateral=False, and remove the others."
         )
 
 
-def frictions_of(scene):
-    """The forces of the exact law of friction."""
-    return [force for force in scene._forces if getattr(force, "slides", ())]
-
-
 def named(items):
-    """Names of contacts and frictions, in a message."""
+    """Names of contacts, in a message."""
     return listed(list(dict.fromkeys(item.name for item in items)), NAMED)
+
+
+def demand_regular(scene, who):
+    """Raise InvalidArgument where a scene has friction of the exact law."""
+    exact = [force for force in scene._forces if getattr(force, "slides", ())]
+    if exact:
+        raise InvalidArgument(
+            f"{who} doesn't serve friction of the exact law, which sticks and slides: {named(exact)}. Give "
+            "slip_velocity (slip_rate of a torque), such as 1e-3 m/s, for the regularised law."
+        )
 
 
 def where_it_stands(function):

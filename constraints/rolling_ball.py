@@ -81,6 +81,8 @@ class RollingBall(RollsOnPlane, Joint):
         super().check()
         positive(self.radius, f"{self.name}: radius (m)", self.error)
 
+    compose = RollsOnPlane.rolling
+
     def surface(self):
         """Of the contact."""
         return np.eye(3), [float(self.radius)] * 3, 0.0

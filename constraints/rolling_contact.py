@@ -191,8 +191,8 @@ class RollsOnPlane(Unilateral, Rolls):
         """Directions of the semi-axes (3, 3), semi-axes (3,) and tyre radius, m."""
         raise NotImplementedError
 
-    def compose(self):
-        """The contact row and, where it rolls, the two of the slip."""
+    def rolling(self):
+        """The parts: the contact row and, where it rolls, the two of the slip."""
         places, sizes = self._geometry()
         if self.slip or (self.unilateral and not self.rubs):
             yield "contact", SmoothContact(self.a, self.b, **places, **sizes)

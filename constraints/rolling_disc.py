@@ -86,6 +86,8 @@ class RollingDisc(RollsOnPlane, Joint):
         positive(self.radius, f"{self.name}: radius (m)", self.error)
         not_negative(self.tyre_radius, f"{self.name}: tyre_radius (m)", self.error)
 
+    compose = RollsOnPlane.rolling
+
     def surface(self):
         """Of the contact."""
         return (*across(self.axis_a), self.axis_a), (float(self.radius), float(self.radius), 0.0), self.tyre_radius

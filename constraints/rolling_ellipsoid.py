@@ -111,6 +111,8 @@ class RollingEllipsoid(RollsOnPlane, Joint):
                 f"scipy Rotation; got {shown(axes)}."
             )
 
+    compose = RollsOnPlane.rolling
+
     def surface(self):
         """Of the contact."""
         return self.axes_a, self.semi_axes, 0.0

@@ -128,7 +128,7 @@ def test_a_bowling_ball_runs_on_a_parabola():
     after = v - 0.2 * G * begin * d
     place = v * begin - 0.1 * G * begin**2 * d + after * (3 - begin)
     assert abs(solution.phases[0][1] - begin) < 1e-13
-    np.testing.assert_allclose(solution.position("ball")[-1], [*place, 0, 0, 0.5], atol=1e-12)
+    np.testing.assert_allclose(solution.position("ball")[-1], place + np.array([0, 0, 0.5]), atol=1e-12)
     np.testing.assert_allclose(solution.velocity("ball")[-1], after, atol=1e-13)
 
 
@@ -352,6 +352,10 @@ def test_bad_coefficients():
         C.PlaneContact(block, ground, normal_b=(0, 0, 1), kinetic=0.3)
     with pytest.raises(ts.InvalidConstraint, match="can't turn the point mass 'block'"):
         C.SphereContact(block, ground, radius_a=0.1, radius_b=0.2, kinetic=0.3)
+    brake = scene.add(ts.forces.CoulombFriction(block, ground, force=1.0, name="brake"))
+    with pytest.raises(ts.InvalidArgument, match=r"brake.*slip_velocity"):
+        ts.simulate(scene, (0, 1))
+    scene.remove(brake)
     body = scene.add_body(1.0, (1, 1, 1), position=(0, 0, 3))
     with pytest.raises(ts.InvalidConstraint, match="leave out slip=True"):
         C.RollingBall(body, ground, radius=0.5, normal_b=(0, 0, 1), slip=True, kinetic=0.3)

@@ -141,6 +141,6 @@ class _Problem:
     def modes(self, p):
         """Whether each contact is open, sticks or slides at a solution."""
         y = self.residual(p)[1]
-        N, length = np.maximum(0.0, y[:, 0]), np.hypot(y[:, 1], y[:, 2])
+        N, length = p[::3], np.hypot(y[:, 1], y[:, 2])
         slides = self.known | (length > self.mu * (N + self.given))
         return np.where(N > 0.0, np.where(slides, SLIDES, STICKS), OPEN)

@@ -280,6 +280,13 @@ class _ContactRun:
                 "contacts: leave out slip_velocity, for the exact law."
             )
 
+        if self.frictions.count and self.gaps.rubs.any():
+            names = listed(list(dict.fromkeys(self.frictions.names)), NAMED)
+            raise InvalidArgument(
+                f"exact friction of joints ({names}) doesn't serve scenes in which contacts have friction, too: use "
+                "ViscousFriction, or CoulombFriction with a slip_velocity, or leave out kinetic of the contacts."
+            )
+
     def run(self):
         """Run to the end; the `Task` of the last phase, of the whole scene, and the `Outcome` of all."""
         began, task, status = clock(), None, None if self.known else self.begin()
@@ -783,7 +790,7 @@ class _ContactRun:
         starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
         for where, (_, *parts) in starts.items():
             arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
-        numbers["first"] = self.first[0]
+        numbers |= {"first": self.first[0], "sampling": self.sampling and self.sampling.saved()}
         if self.end is not None:
             arrays |= {"last": self.end.last, "ended": self.end.remembered}
             numbers["reached"] = self.end.reached
@@ -800,6 +807,9 @@ class _ContactRun:
             vars(self).update({name: known[name] for name in KEPT})
             self.phases.restore(known["phases"], arrays, self._recorded_scene)
             self.modes = Modes.of(known["modes"])
+            if known["sampling"] is not None:
+                self.sampling = Sampling(prepared(phase_of(self.scene, [])), True)
+                self.sampling.restore(known["sampling"])
             starts = [[arrays[f"{where}{name}"] for name in START] for where in ("first.", "")]
             for q, qd, memory in starts:
                 demand(q.shape == qd.shape == (n,) and memory.shape == self.remembered.shape, "the start of a phase")

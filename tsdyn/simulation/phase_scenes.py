@@ -25,8 +25,7 @@ NAMED = 5  # contacts in a message
 def has_contacts(scene):
     """Whether runs of a scene have phases, by contacts or exact friction; looked up once until the scene changes."""
     if scene._opens is None:
-        slides = any(getattr(force, "slides", ()) for force in scene._forces)
-        scene._opens = slides or bool(contacts_of(scene._added))
+        scene._opens = bool(any(getattr(force, "slides", ()) for force in scene._forces) or contacts_of(scene._added))
     return scene._opens
 
 
@@ -103,11 +102,15 @@ def demand_bilateral(scene, who="this analysis"):
     """Raise InvalidArgument where a scene has contacts or exact friction."""
     if has_contacts(scene):
         demand_regular(scene, who)
-        names = listed([each.name for each in contacts_of(scene._added)], NAMED)
         raise InvalidArgument(
-            f"{who} is of one phase of a run, along which {names} may open and close. In a copy of the scene, hold "
-            "those that are closed by unilateral=False, and remove the others."
+            f"{who} is of one phase of a run, along which {named(contacts_of(scene._added))} may open and close. In a "
+            "copy of the scene, hold those that are closed by unilateral=False, and remove the others."
         )
+
+
+def named(items):
+    """Names of contacts, in a message."""
+    return listed(list(dict.fromkeys(item.name for item in items)), NAMED)
 
 
 def demand_regular(scene, who):
@@ -115,9 +118,8 @@ def demand_regular(scene, who):
     exact = [force for force in scene._forces if getattr(force, "slides", ())]
     if exact:
         raise InvalidArgument(
-            f"{who} doesn't serve friction of the exact law, which sticks and slides: "
-            f"{listed([force.name for force in exact], NAMED)}. Give slip_velocity (slip_rate of a torque), such as "
-            "1e-3 m/s, for the regularised law."
+            f"{who} doesn't serve friction of the exact law, which sticks and slides: {named(exact)}. Give "
+            "slip_velocity (slip_rate of a torque), such as 1e-3 m/s, for the regularised law."
         )
 
 

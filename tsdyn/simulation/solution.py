@@ -782,8 +782,11 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         sweeps = f", {counted(s.newton_iterations, 'Newton sweep')}" if s.newton_iterations else ""
         if sweeps and s.placements:  # series place none
             sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement"
+        known = self._phases
+        phases = f"{counted(len(known.list), 'phase')}, {counted(len(known.impulses), 'impulse')}" if known else ""
         return {
             "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self._length(), 'output')}",
+            **({"phases": phases} if phases else {}),
             "method": f"{self.method}, formulation {self.formulation}",
             "steps": f"{s.steps}, {s.rejected} rejected, {counted(s.charts, 'chart')}",
             "work": f"{counted(s.evaluations, 'evaluation')}, {counted(s.placements, 'placement')}{sweeps}",

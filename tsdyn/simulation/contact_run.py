@@ -479,7 +479,7 @@ class _ContactRun:
                 continue
             is_open = i not in modes.closed
             function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
-            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
+            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
         breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
         slowing = _Slowing(frictions, modes.begun).over

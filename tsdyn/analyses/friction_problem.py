@@ -140,6 +140,7 @@ class Frictions:
         return A
 
     def motions(self, q, qd):
+        """Slip velocities or rates (k, units, 3), ground frame, sizes of their terms (k, units), axes; q, qd (k, n)."""
         spans, A = self.packed.system.bodies, self.frames(q)
         places = spans[self.rigid, :1] + np.arange(3, 7)
         w, r, rd = np.zeros((3, len(q), len(spans) + 1, 3))
@@ -263,9 +264,13 @@ def immobile(packed, t, q, memory):
 
 
 def _null_space(rows):
-    from scipy.linalg import null_space
+    from scipy.linalg import qr
 
-    return null_space(rows, RANK_TOL) if len(rows) else np.eye(rows.shape[1])
+    if not len(rows):
+        return np.eye(rows.shape[1])
+    Q, R, _ = qr(rows.T, pivoting=True)
+    size = np.abs(np.diag(R))
+    return Q[:, int((size > RANK_TOL * size.max(initial=0.0)).sum()) :]
 
 
 class Rest(NamedTuple):

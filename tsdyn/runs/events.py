@@ -263,7 +263,7 @@ class Watch:
                 self._begin(run, self.tracks is None)
             except EventFailed as failure:
                 raise InvalidArgument(f"events: {failure}") from failure.__cause__
-        stiff = run.numbers.stiff
+        stiff, answer = run.numbers.stiff, getattr(memory, "answer", None)  # of sampled loads
         # One step at a time, searched before the next one
         for _ in range(most):
             if self.begins_again:
@@ -272,7 +272,7 @@ class Watch:
                     return status, reason
                 continue  # it has written an output
             done = run.numbers.steps
-            status = memory.advance(log, 1)
+            status = memory.advance(log, 1) if answer is None else memory.step(log)
             if run.numbers.steps > done:
                 try:
                     last = self._search_step(run, log)
@@ -281,6 +281,12 @@ class Watch:
                 if last is not None and not self._is_resumed(memory, last):
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
                 status = Status.SLICE_DONE if self.begins_again else status
+                if self.begins_again and log.t_eval.size:  # outputs of the slice may have to be taken back
+                    status, reason = self._begin_again(memory, log)
+                    if status != Status.SLICE_DONE:
+                        return status, reason
+            if answer is not None and status == Status.SLICE_DONE:
+                status = answer(log)
             full = run.numbers.chart_rows + 2 >= len(log.charts)
             if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
@@ -328,12 +334,14 @@ class Watch:
             group.lend_all(self.tracks, self.t)
         found = [each for mine in self.list for each in mine]
         numbers = {"t": self.t, "tracks": [vars(track) for track in self.tracks], "found": [each[:2] for each in found]}
+        numbers |= {"start": self.start, "begins_again": self.begins_again}
         states = np.array([each.state for each in found]).reshape(-1, *self.state.shape)
         return numbers, {"watch.state": self.state, "watch.memory": self.memory, "watch.found": states}
 
     def restore(self, numbers, arrays):
         """As it was when it was saved."""
         self.t, self.state, self.memory = numbers["t"], arrays["watch.state"], arrays["watch.memory"]
+        self.start, self.begins_again = float(numbers["start"]), bool(numbers["begins_again"])
         demand(self.state.shape == (3, self._n) and len(self.memory) >= self.angles, "the state of events")
         self.tracks = [Track() for _ in self.events]
         for track, known in zip(self.tracks, numbers["tracks"], strict=True):
@@ -395,11 +403,17 @@ class Watch:
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
         self._note_start()
-        before, self.memory = self.memory, run.remembered.copy()
+        known = self.t, self.state, self.memory
+        self.memory = run.remembered.copy()
         try:
             return self._locate(run, log, Inside(self.reader, run, log, self.t, self.state))
         except KeyboardInterrupt:
-            self.memory = before
+            self.memory = known[2]
+            raise
+        except EventFailed:
+            if self._groups:  # beyond a failure nobody looks for the ends of a phase
+                self.t, self.state, self.memory = known
+                self.go_back(run, log)
             raise
 
     def _locate(self, run, log, step):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,25 +15,35 @@ from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, fr
 from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
 from ..elements.unilateral import contacts_of
-from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
+from ..errors import (
+    InconsistentState,
+    InvalidArgument,
+    InvalidConstraint,
+    InvalidForce,
+    SingularConfiguration,
+    Status,
+    TsdynError,
+)
 from ..integrators import DOP853
 from ..jit.compiled import clock
+from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS
-from ..model.packed import first_rows
+from ..model.handles import handles_of
 from ..observables import diagnostics, reactions
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import interval, output_times, state_arrays
-from ..runs.dense_output import StepPieces
+from ..runs.driver import Sampling
 from ..runs.event_groups import Member
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
-from ..validation import floats, listed
+from ..validation import damaged, demand, floats, listed
 from .phase_scenes import NAMED, first_row_of, gaps_of, has_contacts, phase_of
+from .phases import PhasePieces, Phases, Pinned
 from .progress import reporter, silent
-from .run_options import RunCall
-from .scene_cache import Prepared, prepared
+from .run_options import RunCall, RunOptions
+from .scene_cache import prepared, prepared_numbers
 from .segments import summed
 from .tolerances import (
     CREEPING,
@@ -196,98 +205,6 @@ class _Slowing:
         return values
 
 
-class Phases:
-    """The phases of a run that has ended: when, with which gaps closed, and where their rows are in those of the scene.
-
-    Attributes
-    ----------
-    list : list of (float, float, tuple of str)
-        Start, end (s) and names of the closed contacts.
-    impulses : list of (float, str, float)
-        Time (s), name, impulse (N s, or N m s of an angle).
-    """
-
-    def __init__(self, packed):
-        self.list, self.impulses, self.starts, self.of = [], [], [], []
-        self.packed, self._columns = [], []  # of each set of closed gaps
-        self._rows, self._kinds = _rows_of(packed), {}
-
-    def add(self, begin, rest, end, packed, names):
-        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
-        kind = self._kinds.setdefault(id(packed), len(self.packed))
-        if kind == len(self.packed):
-            own = _rows_of(packed)
-            pairs = [(self._rows[part] + i, own[part] + i) for part, i in _numbered(packed) if part in self._rows]
-            self.packed.append(packed)
-            self._columns.append(np.array(pairs, int).reshape(-1, 2).T)
-        if self.list:
-            self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
-        self.starts.append(begin)
-        self.of.append(kind)
-        self.list.append((rest, max(rest, end), names))
-
-    def at(self, t):
-        """Numbers of the phases at times t (k,); where one begins, the later one."""
-        return np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
-
-    def of_outputs(self, t):
-        """Numbers of the phases of outputs at times t (k,): of several at one time each is of a phase of its own."""
-        same = np.searchsorted(t, t, side="right") - 1 - np.arange(t.size)
-        return np.maximum(self.at(t) - same, 0)
-
-    def multipliers(self, numbers, m, *arrays):
-        """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
-        out = np.zeros((len(numbers), m))
-        for kind, mine, some in self._gathered(numbers, arrays):
-            rows, columns = self._columns[kind]
-            out[np.ix_(mine, rows)] = reactions.multipliers(self.packed[kind], *some)[:, columns]
-        return out
-
-    def constraint_error(self, numbers, *arrays):
-        """The `ConstraintError` of the rows that hold."""
-        out = np.zeros((3, len(numbers)))
-        for kind, mine, some in self._gathered(numbers, arrays):
-            out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
-        return diagnostics.ConstraintError(*out)
-
-    def exerted(self, solution, item, on):
-        """Force and torque (k, 3) as of `reactions.exerted`, of frictions that slide and stick in turn."""
-        out = np.zeros((2, solution.t.size, 3))
-        arrays = solution.t, solution.q, solution.qd, solution.qdd, solution._memory
-        for kind, mine, some in self._gathered(solution._phase_of_rows, arrays):
-            packed, (t, q, qd, qdd, memory) = self.packed[kind], some
-            lam = reactions.multipliers(packed, t, q, qd, qdd, memory)
-            motion = SimpleNamespace(
-                packed=packed, system=packed.system, t=t, q=q, qd=qd, qdd=qdd, multipliers=lam, _memory=memory
-            )
-            out[:, mine] = reactions.exerted(motion, item, on)
-        return out[0], out[1]
-
-    def _gathered(self, numbers, arrays):
-        """Yield each set of closed gaps, the entries (j,) of arrays in its phases, and these parts of the arrays."""
-        kinds = np.array(self.of)[numbers]
-        for kind in np.unique(kinds).tolist():
-            mine = np.flatnonzero(kinds == kind)
-            yield kind, mine, [None if array is None else array[mine] for array in arrays]
-
-
-def _rows_of(packed):
-    """The first row of each primitive, by its id."""
-    return {id(part): first for part, first in first_rows(packed.constraints)}
-
-
-def _numbered(packed):
-    """Yield the id of the primitive of each row, and which of its rows it is."""
-    for part in packed.constraints:
-        yield from ((id(part), i) for i in range(part.all_rows))
-
-
-class _Pieces(StepPieces):
-    """Dense output of phases: where one begins, its own."""
-
-    side = "right"
-
-
 def demand_apart(gaps, q, angles, tol):
     """Raise InconsistentState where contacts penetrate."""
     values = gaps.at(q, angles)
@@ -315,6 +232,34 @@ class Modes:
         """Whether the units are in the same modes, whatever has just opened."""
         return replace(self, opened={}) == replace(other, opened={})
 
+    def saved(self):
+        """Lists of numbers, for JSON: one for each field, of a dict its items."""
+        return [plain(value) for value in vars(self).values()]
+
+    @classmethod
+    def of(cls, record):
+        """As it was when it was saved."""
+        pairs = zip(vars(cls()).items(), record, strict=True)
+        return cls(*(dict(known) if isinstance(value, dict) else known for (_, value), known in pairs))
+
+
+def plain(value):
+    """A value of modes as JSON has it."""
+    if isinstance(value, dict):
+        return [[plain(key), plain(each)] for key, each in value.items()]
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+# Numbers of a run that a checkpoint holds as they are, and the names of its arrays
+KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", "replaced", "written", "totals"
+START, PREFIX = ("q", "qd", "remembered"), "phase "
+# What a phase raises that can't begin, after others: whose fault it is
+FAILURES = {
+    InvalidArgument: Status.EVENT_FAILED, InvalidForce: Status.SAMPLING_FAILED, SingularConfiguration: Status.SINGULAR,
+}  # fmt: skip
+
 
 class _ContactRun:
     """One run in the making.
@@ -330,38 +275,40 @@ class _ContactRun:
     run_task : function of a task, a scene and the tolerance of its start
     instead : function of a task and a status
         Returns the method that begins again, or None.
+    archive : Archive, optional
+        What outputs and histories go to.
     """
 
-    def __init__(self, scene, options, call, run_of, run_task, instead):
-        self.scene, self.options, self.call = scene, options, call
+    def __init__(self, scene, options, call, run_of=None, run_task=None, instead=None, archive=None):
+        self._take_scene(scene)
+        self.options, self.call, self.archive = options, call, archive
         self.run_of, self.run_task, self.instead = run_of, run_task, instead
         self.span = interval(call.t_span)
         self.times = output_times(call.t_eval, *self.span)
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        compile_ahead(KERNELS)
-        self.gaps, self.frictions = gaps_of(scene), Frictions(scene)
-        self.count = kept.handles.count
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
-        self.modes, self.rest = Modes(), self.t
-        self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
+        self.rest = self.t
+        self.kinds, self.parts, self.found, self.report = [], [], [[] for _ in self.users], reporter(call.progress)
         self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
-        self.reason, self.method, self.at_once, self.judged = "", "", 0, (self.t, 0)
+        self.reason, self.methods, self.at_once, self.judged = "", [], 0, (self.t, 0)
+        self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
+        self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
+        self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
+
+    def _take_scene(self, scene):
+        """What follows from the scene alone, and makes the scenes of its phases."""
+        compile_ahead(KERNELS)
+        self.scene, self.gaps, self.frictions, self.modes = scene, gaps_of(scene), Frictions(scene), Modes()
+        self.count = handles_of(scene.packed).count
 
     def _demand_served(self, kept):
-        names = [gap for gap, given in (("store", self.call.store), ("checkpoint", self.call.checkpoint)) if given]
-        if names:
-            raise InvalidArgument(f"{names[0]} doesn't serve scenes with contacts yet: keep the outputs in memory.")
-        if kept.sampled:
-            raise InvalidArgument(
-                "sampled controllers don't serve scenes with contacts yet: leave out period, for a continuous one."
-            )
         rough = [load.force.title for load in kept.packed.loads if load.normal >= 0 and load.force.slips]
         if rough and contacts_of(self.scene._added):
             raise InvalidArgument(
@@ -370,57 +317,129 @@ class _ContactRun:
             )
 
     def run(self):
-        """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
-        began, first = clock(), None
+        """Run to the end; the `Task` of the last phase, of the whole scene, and the `Outcome` of all."""
+        began, task, status = clock(), None, None if self.known else self.begin()
+        try:
+            while status is None:
+                task, outcome = self._phase()
+                with deferred_interrupts():
+                    status = self._after(outcome)
+                if outcome.interrupted and status is None:
+                    raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            if self.end is None:
+                raise
+            status = Status.INTERRUPTED
+        except TsdynError as error:
+            if self.end is None:
+                raise
+            status, self.reason = FAILURES.get(type(error), Status.CONTACT_FAILED), str(error)
+        finally:
+            self.report(None)
+        if self.end is None:
+            self.refuse(status)
+        return self._whole(task or self._first_task()), self._outcome(status, began)
+
+    def _whole(self, task):
+        """A task as that of the whole run."""
+        return task._replace(prepared=prepared_numbers(self.scene), span=self.span)
+
+    def begin(self):
+        """Impact and closed contacts at the start; the Status if there is no way on, else None."""
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        status = self._settle(touching, ()) or self._settle_frictions(Modes(), ())
-        while status is None:
-            try:
-                task, outcome = self._phase()
-            except TsdynError as error:
-                if not self.parts:
-                    raise
-                status, self.reason = Status.SINGULAR, str(error)
-                break
-            first = first or task
-            status = self._after(outcome)
-        if first is None:  # nothing could begin
-            raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
-        self.report(None)
-        return first._replace(prepared=Prepared(self.scene, self.scene.packed), span=self.span), self._outcome(
-            status, began
-        )
+        return self._settle(touching, ()) or self._settle_frictions(Modes(), ())
+
+    def check(self):
+        """Raise what a run raises before its first step; its `Task`, of the whole scene."""
+        status = self.begin()
+        if status is not None:
+            self.refuse(status)
+        return self._whole(self._first_task())
+
+    def _first_task(self):
+        run, call = self._run_of(self._scene())
+        return run._new_task(call, (self.q, self.qd), self.remembered)
+
+    def refuse(self, status):
+        """Raise that nothing can begin."""
+        raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
 
     # One phase
 
     def _phase(self):
         """Run the next phase: its task and outcome."""
-        end = self.span[1]
-        phase, names = self._scene(), self._names()
-        call, plain = RunCall((self.t, end)), replace(self.options, events=None)
-        run, still = self.run_of(phase, plain, call), self._still(phase)
+        phase, names, known = self._scene(), self._names(), self.known
+        run, call = self._run_of(phase)
+        still = self._still(phase)
         if still.size == self.q.size and self.options.method is None:
             run = run._by(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
         run._prepare_kernels(True)
+        self._enter_archive()
         while True:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
+            if known is not None:  # the checkpoint is of an event later on
+                self.t, self.q, self.qd, self.remembered = known
+            other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(), resume=self._resume,
+                max_steps=self._steps_left(), resume=None if other else self._resume, archive=self.archive,
+                sampling=self._sampling(task.prepared),
             )  # fmt: skip
-            self.names, self.packed, self.settled, self.again = names, phase.packed, None, []
-            outcome = self.run_task(task, phase, self.options.initial_tol)
-            other = self.instead(task, outcome.status)
+            self.names, self.packed, self.settled, self.again, self.known = names, phase.packed, None, [], None
+            if self.archive is not None:
+                self.archive.resting = still, resting[still]
+            if not (other and self.replaced):
+                outcome = self.run_task(task, phase, self.options.initial_tol)
+                other = self.instead(task, outcome.status)
             if other is None:
-                outcome = pinned(outcome, self.q if self.parts else task.q, still)
+                outcome = pinned(outcome, resting, still)
                 if self.settled is None:
                     self._end_phase(outcome.end.reached)
+                said = (outcome.method or repr(task.method)).split(" and ")
+                self.methods += [method for method in said if method not in self.methods]
                 return task, outcome
-            run = run._by(other)
+            run, self.replaced = run._by(other), True
+            if self.archive is not None and self.archive.resumed is None:
+                self.archive.go_back(self.written)
+
+    def _enter_archive(self):
+        """Note how the run of a phase begins; let the archive know, and readers, and write a checkpoint that is due."""
+        archive = self.archive
+        if self.known is None:
+            self.first = self.t, self.q, self.qd, self.remembered
+        if archive is None:
+            return
+        archive.before = self.saved
+        if archive.resumed is None:
+            archive.shift, archive.skips, archive.passed = 0.0, False, []
+            self.written = dict(archive.counts)
+            archive.look_up(lambda: ({"t": self.t, "between": True}, {}))
+
+    def _sampling(self, kept):
+        """The sampled loads of a phase, which go on from those of the one before."""
+        if kept.sampled:
+            goes_on = self.known is not None or self.call.state is not None
+            self.sampling = self.sampling.of(kept) if self.sampling else Sampling(kept, goes_on)
+        return self.sampling
+
+    def _run_of(self, phase):
+        """The `Run` of a phase, and the call of it."""
+        call = RunCall((self.t, self.span[1]))
+        return self.run_of(phase, replace(self.options, events=None), call), call
 
     def _end_phase(self, t):
-        self.phases.add(self.t, self.rest, t, self.packed, self.names)
+        self.phases.add(self.phases.kind(self.packed, self._record()), self.t, self.rest, t, self.names)
+
+    def _record(self):
+        """What the scene of the present phase is made of, for files."""
+        return [self.modes.saved(), self.remembered.tolist()]
+
+    def _recorded_scene(self, record):
+        """The scene that such a record tells."""
+        self.modes, self.remembered = Modes.of(record[0]), np.array(record[1], float)
+        demand(self.remembered.shape == (self.count + self.scene.system.memory.size,), "what is remembered")
+        return self._scene()
 
     def _resume(self, t, run, numbers):
         """After events of these numbers: whether the run of the phase goes on, with other velocities.
@@ -443,6 +462,15 @@ class _ContactRun:
     def _scene(self):
         """The scene of the present modes."""
         return phase_of(self.scene, self._closed_rows(), [self._hold(i, r) for i, r in self.modes.sticking.items()])
+
+    def filled(self):
+        """The same, with what the run remembers among its packed numbers."""
+        phase = self._scene()
+        system = phase.packed.system._replace(reals=phase.packed.system.reals.copy())
+        system.reals[system.memory] = self.remembered[self.count :]
+        filled = object.__new__(type(phase))
+        vars(filled).update(vars(phase), _packed=phase.packed._replace(system=system), _prepared=None)
+        return filled
 
     def _closed_rows(self):
         return [self.gaps.list[i].side.row for i in self.modes.closed]
@@ -506,7 +534,7 @@ class _ContactRun:
     def _reporting(self):
         if self.report is silent:
             return silent
-        (start, end), t, done = self.span, self.t, self.steps
+        (start, end), t, done = self.span, self.first[0], self.steps
 
         def report(fraction, at=0.0, steps=0):
             if fraction is not None:
@@ -518,8 +546,8 @@ class _ContactRun:
 
     def _after(self, outcome):
         """Take the end of a phase; the Status of the run, None if it goes on."""
-        end, part = outcome.end, outcome
-        self.method = outcome.method or self.method
+        self.end, archive, self.replaced = outcome.end, self.archive, False
+        end = self.end
         self.steps += end.counts["steps"]
         times, *states = outcome.events
         for i, mine in enumerate(list(zip(times, *states, strict=True))[: len(self.users)]):
@@ -528,12 +556,18 @@ class _ContactRun:
         fired = [i for i, at in zip(self.watched, times, strict=True) if i is not None and at.size]
         ends = outcome.status is Status.EVENT and bool(fired)
         goes_on = ends and end.reached < self.span[1]
-        if not self.per_step and goes_on and len(part.rows) and part.rows[-1, 0] == end.reached:
-            part = part._replace(rows=part.rows[:-1])  # that of the next phase counts
-        if self.again and part.trajectory is not None:
-            part.trajectory.begin_at(self.again)
-        self.parts.append(part)
-        self.taken += len(part.rows)
+        count = len(outcome.rows) if archive is None else archive.counts["outputs"] - self.written["outputs"]
+        if not self.per_step and goes_on and count and self.times[self.taken + count - 1] == end.reached:
+            count -= 1  # the output of the next phase counts
+        self.taken += count
+        if archive is None:
+            if self.again and outcome.trajectory is not None:
+                outcome.trajectory.begin_at(self.again)
+            self.parts.append(outcome._replace(rows=outcome.rows[:count]))
+            self.kinds.append(self.phases.of[-1])
+        else:
+            archive.go_back({**archive.counts, "outputs": self.written["outputs"] + count})
+            self.totals = summed([end.counts] if self.totals is None else [self.totals, end.counts])
         if self.settled is not None:  # within the run of the phase
             return self.settled[0]
         self.t, (self.q, self.qd, _), self.remembered = end.reached, (x.copy() for x in end.last), end.remembered
@@ -556,13 +590,16 @@ class _ContactRun:
 
     def _transit(self, fired):
         """From one phase to the next one, after events of the units `fired`; the Status if there is no way on."""
-        self.reason = ""
+        self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
         (near,) = (self.gap <= TOUCHING * self.length).nonzero()
         count, before = self.gaps.count, self.modes
         hit = [i for i in fired if i < count]
         status = self._settle(sorted({*near.tolist(), *hit, *before.closed, *before.idle}), hit)
+        if self.qd is not qd:
+            energy = diagnostics.kinetic_energy(self.scene.system, np.stack((self.q, self.q)), np.stack((qd, self.qd)))
+            self.phases.gain(energy[1] - energy[0])
         return status or self._settle_frictions(before, [i - count for i in fired if i >= count])
 
     def _is_stuck(self):
@@ -717,26 +754,60 @@ class _ContactRun:
     # The whole
 
     def _outcome(self, status, began):
-        parts = self.parts
+        parts, end, archive, events = self.parts, self.end, self.archive, None
         ends = [part.end for part in parts]
-        last = ends[-1]
-        logs = self.options.history is not False
-        rows = np.concatenate([part.rows for part in parts])
-        events = None
+        logs = self.options.history is not False and archive is None
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
             events = tuple([np.concatenate(column[k]) for column in columns] for k in range(3))
         return Outcome(
-            status, self.reason, rows,
+            status, self.reason,
+            range(archive.counts["outputs"]) if archive else np.concatenate([part.rows for part in parts]),
             RunEnd(
-                last.reached, last.last, last.remembered,
-                summed([end.counts for end in ends]),
+                end.reached, end.last, end.remembered, self.totals or summed([end.counts for end in ends]),
                 StepLog([end.steps for end in ends]) if logs else None,
                 ChartLog([end.charts for end in ends]) if logs else None,
             ),
-            _Pieces([part.trajectory for part in parts]) if self.options.dense_output else None,
-            events, began, self.method, (self.phases, self.phases.of_outputs(rows[:, 0])),
+            PhasePieces([part.trajectory for part in parts], self.kinds) if self.options.dense_output else None,
+            events, began, " and ".join(self.methods), self.phases,
         )  # fmt: skip
+
+    # Checkpoints: what a run goes on with, where its present phase begins
+
+    def saved(self):
+        """Numbers and arrays by name."""
+        phases, arrays = self.phases.saved()
+        numbers = {name: getattr(self, name) for name in KEPT} | {"modes": self.modes.saved(), "phases": phases}
+        starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
+        for where, (_, *parts) in starts.items():
+            arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
+        numbers["first"] = self.first[0]
+        if self.end is not None:
+            arrays |= {"last": self.end.last, "ended": self.end.remembered}
+            numbers["reached"] = self.end.reached
+        for i, found in enumerate(self.found):
+            columns = zip(*found, strict=True) if found else (np.empty(0), *2 * [np.empty((0, self.q.size))])
+            for name, column in zip(("t", "q", "qd"), columns, strict=True):
+                arrays[f"event {i}.{name}"] = np.concatenate(column) if found else column
+        return {"phases": numbers}, {f"{PREFIX}{name}": array for name, array in arrays.items()}
+
+    def restore(self, numbers, arrays):
+        """As it was when it was saved."""
+        with damaged("the checkpoint"):
+            known, n, arrays = numbers["phases"], self.q.size, _own(arrays)
+            vars(self).update({name: known[name] for name in KEPT})
+            self.phases.restore(known["phases"], arrays, self._recorded_scene)
+            self.modes = Modes.of(known["modes"])
+            starts = [[arrays[f"{where}{name}"] for name in START] for where in ("first.", "")]
+            for q, qd, memory in starts:
+                demand(q.shape == qd.shape == (n,) and memory.shape == self.remembered.shape, "the start of a phase")
+            self.known = self.t, *starts[1]
+            self.t, self.q, self.qd, self.remembered = self.first = known["first"], *starts[0]
+            if "reached" in known:
+                demand(arrays["last"].shape == (3, n), "the end of a phase")
+                self.end = RunEnd(known["reached"], arrays["last"], arrays["ended"], self.totals, None, None)
+            for i, found in enumerate(self.found):
+                found.append(tuple(arrays[f"event {i}.{name}"] for name in ("t", "q", "qd")))
 
 
 def jumped(inertia, qd, which, before, e, p, law="newton"):
@@ -759,37 +830,62 @@ def held(inertia, qd, which, rates):
     return qd + change, after
 
 
-class _Pinned:
-    """A trajectory with bodies that rest: to the last bit."""
-
-    def __init__(self, trajectory, q, still):
-        self.trajectory, self.q, self.still = trajectory, q, still
-        self.start, self.end, self.edges, self.anchors = (
-            trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
-        )  # fmt: skip
-
-    def __call__(self, t):
-        """As of a `Trajectory`."""
-        states, memory, status = self.trajectory(t)
-        states[:, 0, self.still], states[:, 1:, self.still] = self.q[self.still], 0.0
-        return states, memory, status
-
-
 def pinned(outcome, q, still):
     """The outcome of a phase with bodies that rest at q (n,), to the last bit; still: their coordinates."""
     if not still.size:
         return outcome
     n, last = q.size, outcome.end.last
-    outcome.rows[:, 1 + still] = q[still]
-    outcome.rows[:, 1 + n + still] = outcome.rows[:, 1 + 2 * n + still] = 0.0
+    if isinstance(outcome.rows, np.ndarray):  # else the archive has done so
+        outcome.rows[:, 1 + still] = q[still]
+        outcome.rows[:, 1 + n + still] = outcome.rows[:, 1 + 2 * n + still] = 0.0
     last[0, still], last[1:, still] = q[still], 0.0
-    trajectory = outcome.trajectory and _Pinned(outcome.trajectory, q, still)
+    trajectory = outcome.trajectory and Pinned(outcome.trajectory, q, still)
     return outcome._replace(trajectory=trajectory)
 
 
-def run_contacts(scene, options, call, run_of, run_task, instead):
+def begun(scene, t, state=None):
+    """A `_ContactRun` from a state (None for the start) at t, with the contacts that stay closed there.
+
+    Raises
+    ------
+    InconsistentState
+        If contacts penetrate, or no reactions keep them from penetrating.
+    """
+    run = _ContactRun(scene, RunOptions(), RunCall((t, t + 1.0), state=state))
+    status = run.begin()
+    if status is not None:
+        run.refuse(status)
+    return run
+
+
+def first_task(scene, options, call, run_of):
+    """The `Task` of a run of the scene, with what `run_contacts` raises before the first step."""
+    return _ContactRun(scene, options, call, run_of).check()
+
+
+def run_contacts(scene, options, call, run_of, run_task, instead, archive=None):
     """The `Task` and the `Outcome` of a run of a scene with contacts; the functions are those of `prepared_run`."""
-    return _ContactRun(scene, options, call, run_of, run_task, instead).run()
+    run = _ContactRun(scene, options, call, run_of, run_task, instead, archive)
+    if archive is not None and archive.known is not None:
+        run.restore(*archive.known)
+    return run.run()
+
+
+def recorded(numbers, arrays):
+    """Numbers and arrays of the `Phases` in a checkpoint."""
+    return numbers["phases"]["phases"], _own(arrays)
+
+
+def _own(arrays):
+    return {name.removeprefix(PREFIX): array for name, array in arrays.items() if name.startswith(PREFIX)}
+
+
+def phases_of(scene, numbers, arrays):
+    """The `Phases` of a file, of a run of this scene; raises KeyError, TypeError or ValueError if they are none."""
+    run, phases = object.__new__(_ContactRun), Phases(scene.packed)
+    run._take_scene(scene)
+    phases.restore(numbers, arrays, run._recorded_scene)
+    return phases
 
 
 @fitting

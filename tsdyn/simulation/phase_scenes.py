@@ -93,38 +93,34 @@ def at_start(scene):
     return phase_of(scene, [gaps.list[i].side.row for i in closed_gaps(gaps, q, angles)])
 
 
-def demand_bilateral(scene):
-    """Raise InvalidArgument where a scene has contacts: a run has phases then."""
+def demand_bilateral(scene, who="this analysis"):
+    """Raise InvalidArgument where a scene has contacts or exact friction."""
     if has_contacts(scene):
+        demand_regular(scene, who)
+        names = listed([each.name for each in contacts_of(scene._added)], NAMED)
         raise InvalidArgument(
-            "a scene with unilateral constraints is run by ts.simulate: prepared runs, ensembles, benchmarks, profiles "
-            "and analyses along a motion don't serve contacts yet."
+            f"{who} is of one phase of a run, along which {names} may open and close. In a copy of the scene, hold "
+            "those that are closed by unilateral=False, and remove the others."
+        )
+
+
+def demand_regular(scene, who):
+    """Raise InvalidArgument where a scene has friction of the exact law."""
+    exact = [force for force in scene._forces if getattr(force, "slides", ())]
+    if exact:
+        raise InvalidArgument(
+            f"{who} doesn't serve friction of the exact law, which sticks and slides: "
+            f"{listed([force.name for force in exact], NAMED)}. Give slip_velocity (slip_rate of a torque), such as "
+            "1e-3 m/s, for the regularised law."
         )
 
 
 def where_it_stands(function):
     """Decorate a method of scenes: contacts that are closed at the start hold, the others are left out."""
-    own = getattr(function, "__wrapped__", function)  # `fitting` names the method that is called
-
-    @wraps(function)
-    def call(scene, *arguments, **keywords):
-        return own(at_start(scene), *arguments, **keywords)
-
-    return fitting(call)
-
-
-def without_contacts(function):
-    """Decorate a method of scenes that takes constraints as bilateral: refuse scenes with contacts."""
     own = getattr(function, "__wrapped__", function)
 
     @wraps(function)
     def call(scene, *arguments, **keywords):
-        if has_contacts(scene):
-            names = listed([each.name for each in contacts_of(scene._added)], NAMED)
-            raise InvalidArgument(
-                f"{function.__name__} is for bilateral constraints, and {names} open{'s' * (',' not in names)}. Remove "
-                "these from a copy of the scene, or hold them closed by unilateral=False."
-            )
-        return own(scene, *arguments, **keywords)
+        return own(at_start(scene), *arguments, **keywords)
 
     return fitting(call)

@@ -620,7 +620,8 @@ class Watch:
             while run.numbers.rows > 0 and log.out[run.numbers.rows - 1, 0] > t:
                 run.numbers.rows -= 1
         elif t > start:
-            log.out[run.numbers.rows - 1] = [t, *state.ravel(), *run.remembered]
+            row = log.out[run.numbers.rows - 1]
+            row[0], row[1 : 1 + state.size], row[1 + state.size :] = t, state.ravel(), run.remembered
         else:
             run.numbers.rows -= 1
         if run.numbers.dense == STORED:

@@ -30,6 +30,7 @@ class Event(NamedTuple):
     limit: float  # occurrences that end the run; inf for never
     direction: float  # of the changes that count; 0 for both
     exact: bool = False  # whether a value at the start that is positive is no rounding of zero
+    falls: bool = False  # of a `Member`: whether it may begin at zero within rounding, and falls from there at once
 
     def value(self, t, instant):
         """The function's value; raises `EventFailed`."""
@@ -497,8 +498,8 @@ class Watch:
 
     def _degree(self, step):
         """The degree that the interpolant and the fastest turn of a body ask for."""
-        pd = np.array([step.at(t)[1, self._p] for t in (step.t0, step.t1)])
-        turn = 2.0 * math.sqrt(np.einsum("kbi,kbi->kb", pd, pd).max(initial=0.0)) * (step.t1 - step.t0)
+        squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
+        turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
         return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
 
     def _walk(self, i, step, points):
@@ -619,7 +620,8 @@ class Watch:
             while run.numbers.rows > 0 and log.out[run.numbers.rows - 1, 0] > t:
                 run.numbers.rows -= 1
         elif t > start:
-            log.out[run.numbers.rows - 1] = [t, *state.ravel(), *run.remembered]
+            row = log.out[run.numbers.rows - 1]
+            row[0], row[1 : 1 + state.size], row[1 + state.size :] = t, state.ravel(), run.remembered
         else:
             run.numbers.rows -= 1
         if run.numbers.dense == STORED:

@@ -28,7 +28,7 @@ from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS
 from ..model.handles import handles_of
-from ..observables import diagnostics, reactions
+from ..observables import reactions
 from ..observables.state import remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
@@ -486,7 +486,7 @@ class _ContactRun:
                 continue
             is_open = i not in modes.closed
             function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
-            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
+            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
         breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
         slowing = _Slowing(frictions, modes.begun).over
@@ -589,8 +589,7 @@ class _ContactRun:
         hit = [i for i in fired if i < count]
         status = self._settle(sorted({*near.tolist(), *hit, *before.closed, *before.idle}), hit)
         if self.qd is not qd:
-            energy = diagnostics.kinetic_energy(self.scene.system, np.stack((self.q, self.q)), np.stack((qd, self.qd)))
-            self.phases.gain(energy[1] - energy[0])
+            self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status or self._settle_frictions(before, [i - count for i in fired if count <= i < count + own])
 
     def _is_stuck(self):

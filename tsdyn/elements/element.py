@@ -336,6 +336,9 @@ class Attachment:
         super().__init_subclass__(**keywords)
         if not isinstance(cls.markers, (tuple, list)) or not all(isinstance(m, Marker) for m in cls.markers):
             return  # to be refused by name
+        beyond = {marker.body for marker in cls.markers} - {"a", "b"}
+        if beyond and not getattr(cls, "others_at", 0):
+            raise cls.error(f"{cls.__name__}: a marker belongs to body 'a' or 'b', not to {min(beyond)}.")
         cls.__init__ = fitting(by_name(cls.__init__), then=note)
         if unwrap(cls.__init__).__code__.co_flags & CO_VARKEYWORDS:
             cls.__init__.__signature__ = complete_signature(cls)

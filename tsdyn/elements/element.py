@@ -343,6 +343,9 @@ class Attachment:
         super().__init_subclass__(**keywords)
         if not isinstance(cls.markers, (tuple, list)) or not all(isinstance(m, Marker) for m in cls.markers):
             return  # to be refused by name
+        beyond = {marker.body for marker in cls.markers} - {"a", "b"}
+        if beyond and not getattr(cls, "others_at", 0):
+            raise cls.error(f"{cls.__name__}: a marker belongs to body 'a' or 'b', not to {min(beyond)}.")
         plain = getattr(cls.__init__, "plain", cls.__init__)  # an inherited one is wrapped already
         cls.__init__ = fitting(by_name(plain), then=note)
         cls.__init__.plain = plain

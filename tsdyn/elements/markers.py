@@ -53,7 +53,7 @@ class Marker:
         if self.body not in ("a", "b") and not (isinstance(self.body, int) and self.body > 1):
             raise InvalidConstraint(f"a marker belongs to body 'a' or 'b', not to {self.body!r}.")
         if not self.argument:
-            object.__setattr__(self, "argument", self.prefix + self.body)
+            object.__setattr__(self, "argument", f"{self.prefix}{self.body}")
 
     def parameter(self) -> Parameter:
         """Return the argument that places it, as one of a signature."""

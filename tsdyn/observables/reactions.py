@@ -547,6 +547,7 @@ def shared(motion):
         _self_stresses(context, t, motion.q[i], np.zeros(16 * len(graph.sides)), stresses[i])
     z = np.zeros((len(lam), lam.shape[1], redundancy(graph)))
     z[:, graph.row[own]] = stresses[:, :, own].swapaxes(1, 2)
+    z[~np.isfinite(z).all(axis=(1, 2))] = 0.0  # at a singular configuration
     x = np.linalg.pinv(z[:, rows], rcond=RANK_TOL) @ lam[:, rows, None]
     names = "packed", "system", "t", "q", "qd", "_memory"
     given = {name: getattr(motion, name) for name in names}

@@ -83,11 +83,11 @@ class Gaps:
         return value
 
     def _term(self, handles, part):
-        """A function of q (..., n) that returns Phi of a primitive (...), as it is where the row is open."""
+        """A function of q (..., n) that returns Phi of a primitive (...)."""
         row, given, coordinates = (
             getattr(self.packed, name)[part] for name in ("constraints", "parameters", "coordinates")
         )
-        phi, markers = twin(getattr(type(row), "gap", type(row).phi)), list(zip(row.markers, coordinates, strict=True))
+        phi, markers = twin(type(row).phi), list(zip(row.markers, coordinates, strict=True))
         markers = [(m.code == POINT, handles.where(row.body_of(m)), tuple(s.tolist())) for m, s in markers]
 
         def term(q):

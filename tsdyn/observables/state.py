@@ -134,15 +134,23 @@ def remembered(state, prepared, t, q):
     angles = state.angles if getattr(state, "anchor", None) is not None else np.empty(0)
     if angles.size != prepared.handles.count:
         angles = prepared.handles.angles_at_start(t, q)
-    for load in prepared.packed.loads if fresh else ():
-        if load.law is not None and load.law.counted:
-            memory[load.slot : load.slot + len(load.law.counted)] = angles[load.law.counted]
-        if getattr(load.force, "remembers_angle", False):
-            row = prepared.handles.row(load.force.joint, "angle")
-            memory[load.slot] = angles[row.first + load.force.which]
-    for part, slot in zip(prepared.packed.constraints, prepared.packed.slots, strict=True) if fresh and slots else ():
-        if slot >= 0:
+    if fresh:
+        begin_memory(prepared.packed, prepared.handles, angles, memory)
+    return np.concatenate((angles, memory))
+
+
+def begin_memory(packed, handles, angles, memory, items=None):
+    """Write into memory (slots,) what forces and constraints, by default all, remember of joints' angles at first."""
+    chosen = None if items is None else {id(item) for item in items}
+    for load in packed.loads:
+        if chosen is None or id(load.force) in chosen:
+            if load.law is not None and load.law.counted:
+                memory[load.slot : load.slot + len(load.law.counted)] = angles[load.law.counted]
+            if getattr(load.force, "remembers_angle", False):
+                row = handles.row(load.force.joint, "angle")
+                memory[load.slot] = angles[row.first + load.force.which]
+    for part, slot in zip(packed.constraints, packed.slots, strict=True) if memory.size else ():
+        if slot >= 0 and (chosen is None or not chosen.isdisjoint((id(part), id(part.owner)))):
             joint, which = part.counted or (None, 0)
             if joint is not None:
-                memory[slot] = angles[prepared.handles.row(joint, "angle").first + which]
-    return np.concatenate((angles, memory))
+                memory[slot] = angles[handles.row(joint, "angle").first + which]

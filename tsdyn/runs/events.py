@@ -28,6 +28,8 @@ class Event(NamedTuple):
     limit: float  # occurrences that end the run; inf for never
     direction: float  # of the changes that count; 0 for both
     exact: bool = False  # whether a value at the start that is positive is no rounding of zero
+    action: object = None  # a function of a `Change` that each occurrence calls, or None
+    goes_on: bool = False  # whether a zero at the start has been counted before
 
     def value(self, t, instant):
         """The function's value; raises `EventFailed`."""
@@ -72,7 +74,10 @@ def prepare(events):
             )
         if math.isnan(number(direction)):
             raise InvalidArgument(f"{name}: direction must be a number, of which the sign counts, got {direction!r}.")
-        found.append(Event(function, name, limit or math.inf, number(direction)))
+        action = getattr(function, "action", None)
+        if action is not None and not callable(action):
+            raise InvalidArgument(f"{name}: action must be a function action(change), got {action!r}.")
+        found.append(Event(function, name, limit or math.inf, number(direction), action=action))
     return found
 
 
@@ -180,6 +185,7 @@ class Track:
     def __init__(self, value):
         self.value = self.end = value  # at that time, and at the end of the present step
         self.sign = 0.0  # the last it had; 0 for none yet
+        self.before = 0.0  # the same at the last step's start, or soon after it
         self.significant = None  # time and value at which it had that sign
         self.zero = None  # time of the last zero, if it has had no sign since
         self.passed = self.pending = False  # that zero is a start within rounding; may become an event on being left
@@ -238,6 +244,8 @@ class Watch:
                 for event, track in zip(self.events, self.tracks, strict=True):
                     if event.exact and track.value > 0.0:
                         track.sign, track.significant = 1.0, (self.t, track.value)
+                    if event.goes_on and track.value == 0.0:
+                        track.zero, track.passed = self.t, True
         stiff = run.numbers.stiff
         # One step at a time, searched before the next one
         for _ in range(most):
@@ -334,6 +342,7 @@ class Watch:
                 break
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
+                self._add_beside(step, each)
                 run.remembered[: self.angles] = self._instant(each.t, each.state).angles
                 self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
@@ -342,6 +351,18 @@ class Watch:
         if failure is not None:
             raise failure
         return None
+
+    def _add_beside(self, step, last):
+        """Add the events with an action that occur at the instant of the last one, to rounding of value and time."""
+        before = max(last.t - NOISE * ROOT * abs(last.t), step.t0)
+        for i, event in enumerate(self.events):
+            track = self.tracks[i]
+            if event.action is None or i == last.index or not track.before:
+                continue
+            value = self._at(i, step, last.t)
+            noise = max(self._shaken(i, step, last.t), NOISE * abs(value - self._at(i, step, before)))
+            if abs(value) <= noise and event.direction * track.before <= 0.0:
+                self.list[i].append(Occurrence(last.t, i, last.state))
 
     def _points(self, i, step, end):
         """Times up to `end`, and values of event i, between which its sign changes once at most; what `EventFailed`."""
@@ -385,6 +406,7 @@ class Watch:
     def _walk(self, i, step, points):
         """The occurrences of event i among these points."""
         track, direction, found = self.tracks[i], self.events[i].direction, []
+        track.before = track.sign or next((math.copysign(1.0, v) for _, v in points if abs(v) > track.noise), 0.0)
         (before, value), *rest = points
         # A value near zero at the start of the run is a zero there, within rounding
         if track.sign == 0.0 and track.zero is None:  # the run's first step

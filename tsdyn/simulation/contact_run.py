@@ -9,6 +9,8 @@ import numpy as np
 
 from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
 from ..calls import fitting
+from ..elements.force import Force
+from ..elements.unilateral import contacts_of
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
 from ..jit.compiled import clock
 from ..maths.tolerances import EPS
@@ -22,12 +24,15 @@ from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import floats, listed
-from .phase_scenes import NAMED, has_contacts, phase_of
+from . import hybrid
+from .hybrid import varied
+from .phase_scenes import NAMED, has_contacts, inactive_of, phase_of
 from .progress import reporter, silent
 from .run_options import RunCall
 from .scene_cache import Prepared, prepared
 from .segments import summed
 from .tolerances import CREEPING, ENDLESS, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
+from .variants import with_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -114,6 +119,10 @@ class Phases:
     ----------
     list : list of (float, float, tuple of str)
         Start, end (s) and names of the closed contacts.
+    inactive : list of tuple
+        The parts that are left out in each.
+    varies : bool
+        Whether forces or numbers differ between them, not rows alone.
     impulses : list of (float, str, float)
         Time (s), name, impulse (N s, or N m s of an angle).
     """
@@ -122,19 +131,27 @@ class Phases:
         self.list, self.impulses, self.starts, self.of = [], [], [], []
         self.packed, self._columns = [], []  # of each set of closed gaps
         self._rows, self._kinds = _rows_of(packed), {}
+        self.inactive, self.varies = [], False
 
-    def add(self, begin, rest, end, packed, names):
-        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
+    def add(self, begin, rest, end, packed, held):
+        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end.
+
+        packed: that of the phase, and the same with the numbers of the start. held: names of closed contacts, and the
+        parts that are inactive.
+        """
+        (packed, plain), (names, inactive) = packed, held
         kind = self._kinds.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
-            own = _rows_of(packed)
-            pairs = [(self._rows[part] + i, own[part] + i) for part, i in _numbered(packed) if part in self._rows]
+            own = _rows_of(plain)
+            pairs = [(self._rows[part] + i, own[part] + i) for part, i in _numbered(plain) if part in self._rows]
             self.packed.append(packed)
             self._columns.append(np.array(pairs, int).reshape(-1, 2).T)
         if self.list:
             self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
         self.starts.append(begin)
         self.of.append(kind)
+        self.inactive.append(inactive)
+        self.varies = self.varies or packed is not plain or any(isinstance(item, Force) for item in inactive)
         self.list.append((rest, max(rest, end), names))
 
     def at(self, t):
@@ -181,11 +198,11 @@ class _Pieces(StepPieces):
     side = "right"
 
 
-def demand_apart(gaps, q, angles, tol):
-    """Raise InconsistentState where gaps are below zero."""
+def demand_apart(gaps, able, q, angles, tol):
+    """Raise InconsistentState where gaps, of those that are able to close, are below zero."""
     values = gaps.at(q, angles)
-    deep = np.flatnonzero(values < -tol * (1.0 + np.abs(q).max()))
-    if deep.size:
+    deep = [i for i in able if values[i] < -tol * (1.0 + np.abs(q).max())]
+    if deep:
         found = listed([f"{gaps.names[i]} {gaps.list[i].contact.excess} by {-values[i]:.3g}" for i in deep], NAMED)
         raise InconsistentState(
             f"at the start (m, or rad): {found}. Move the bodies, or have scene.assemble() close these gaps."
@@ -225,13 +242,15 @@ class _ContactRun:
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        self.gaps = gaps = Gaps(scene.packed)
-        self.count = kept.handles.count
+        self.inactive, self.values, self.switched, self.acted = inactive_of(scene), {}, {}, False
+        self.contacts, self.own = contacts_of(scene._added), Gaps(scene.packed).list
+        self.configure()
+        gaps, self.count = self.gaps, kept.handles.count
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
-        demand_apart(gaps, self.q, self.remembered[: self.count], options.initial_tol)
+        demand_apart(gaps, self.able, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
         self.modes, self.rest = Modes(), self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
@@ -256,14 +275,14 @@ class _ContactRun:
         """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
         began, first = clock(), None
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
-        status = self._settle(touching, ())
+        status = self._settle([i for i in touching if i in self.able], ())
         while status is None:
             try:
                 task, outcome = self._phase()
             except TsdynError as error:
                 if not self.parts:
                     raise
-                status, self.reason = Status.SINGULAR, str(error)
+                status, self.reason = Status.ACTION_FAILED if self.acted else Status.SINGULAR, str(error)
                 break
             first = first or task
             self.parts.append(outcome)
@@ -280,45 +299,82 @@ class _ContactRun:
     def _phase(self):
         """Run the next phase: its task and outcome."""
         end = self.span[1]
-        phase, names = self._scene(), self._names()
+        (phase, base), names = self._scene(), self._names()
         call, plain = RunCall((self.t, end)), replace(self.options, events=None)
         run = self.run_of(phase, plain, call)
         run._prepare_kernels(True)
         while True:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
             task = task._replace(
-                events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
+                events=self._events(phase, base), within=True, report=self._reporting(), times=self._times(),
                 max_steps=self._steps_left(),
             )  # fmt: skip
             outcome = self.run_task(task, phase, self.options.initial_tol)
             other = self.instead(task, outcome.status)
             if other is None:
-                self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, names)
+                packed = phase.packed, base.packed
+                self.phases.add(self.t, self.rest, outcome.end.reached, packed, (names, self.inactive))
                 return task, outcome
             run = run._by(other)
 
+    def configure(self):
+        """Take the gaps of the present parameters, and those of contacts that are active."""
+        off = {id(item) for item in self.inactive}
+        self.switched |= {id(item): item for item in self.inactive}
+        self.able = [i for i, gap in enumerate(self.own) if id(gap.contact) not in off]
+        if off or self.values:
+            without = [item for item in self.inactive if item not in self.contacts]
+            whole, _ = self._scene_of(self.contacts, without)
+            self.gaps = Gaps(whole.packed)
+            self.gaps.list = self.own  # contacts of the scene, whatever their numbers
+        else:
+            self.gaps = Gaps(self.scene.packed)
+
     def _scene(self):
-        """The scene of the present modes."""
-        return phase_of(self.scene, [self.gaps.list[i].side.row for i in self.modes.closed])
+        """The scene of the present modes, and the same with the numbers of the start."""
+        return self._scene_of([self.own[i].side.row for i in self.modes.closed], self.inactive)
+
+    def _scene_of(self, rows, without):
+        plain = phase_of(self.scene, rows, without=without)
+        found = varied(plain, self.values)
+        if found is None:  # packed anew, with parts of its own
+            other = with_parameters(self.scene, self.values)
+            sides = {id(gap.side.row): (gap.contact, gap.contact.sides.index(gap.side)) for gap in self.own}
+            pairs = [(row, sides.get(id(row))) for row in rows]
+            rows = [other[row] if side is None else other[side[0]].sides[side[1]].row for row, side in pairs]
+            found = phase_of(other, rows, without=[other[item] for item in without])
+        return found, plain
 
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
         return tuple(dict.fromkeys(self.gaps.names[i] for i in held))
 
-    def _events(self, phase):
+    def _name_switched(self):
+        """Name in each phase those of the parts that come and go which are active, but for contacts."""
+        parts = [item for item in self.switched.values() if item not in self.contacts]
+        for k, off in enumerate(self.phases.inactive):
+            begin, end, names = self.phases.list[k]
+            active = [item.name for item in parts if all(item is not each for each in off)]
+            self.phases.list[k] = begin, end, (*names, *active)
+
+    def _events(self, phase, base):
         """Events of a phase: the user's, then one for each of the units `watched`."""
         pairs = zip(self.users, self.counts, strict=True)
-        found = [event._replace(limit=event.limit - count) for event, count in pairs]
-        watches = list(self._watches(phase.packed))
+        goes_on = bool(self.parts)
+        found = [
+            event._replace(limit=1.0 if event.action else event.limit - count, goes_on=goes_on)
+            for event, count in pairs
+        ]
+        watches = list(self._watches(phase.packed, base.packed))
         self.watched = [None] * len(found) + [unit for unit, _ in watches]
         return found + [event for _, event in watches]
 
-    def _watches(self, packed):
+    def _watches(self, packed, base):
         """Yield the units that may end a phase, each with its event."""
         gaps, modes, pushes = self.gaps, self.modes, {}
-        first = {id(member.constraint): member.rows.start for member in packed.members}
-        for i in range(gaps.count):
+        first = {id(member.constraint): member.rows.start for member in base.members}
+        for i in self.able:
             if i in modes.idle:
                 continue
             row, sign = gaps.list[i].side.row, gaps.list[i].side.sign
@@ -361,25 +417,39 @@ class _ContactRun:
         self.t, (self.q, self.qd, _) = end.reached, (x.copy() for x in end.last)
         self.remembered = end.remembered
         fired = [i for i, at in zip(self.watched, times, strict=True) if i is not None and at.size]
-        goes_on = outcome.status is Status.EVENT and fired and self.t < self.span[1]
+        acting = [event for event, at in zip(self.users, times, strict=False) if event.action and at.size]
+        ended = any(count >= event.limit for event, count in zip(self.users, self.counts, strict=True))
+        goes_on = outcome.status is Status.EVENT and not ended and self.t < self.span[1]
+        change = hybrid.ask(self, acting, end.last) if goes_on and acting else None
+        if goes_on and acting and (change is None or change._ends):
+            return Status.ACTION_FAILED if change is None else Status.EVENT
         rows = outcome.rows
         if not self.per_step and goes_on and len(rows) and rows[-1, 0] == self.t:  # that of the next phase counts
             self.parts[-1] = outcome._replace(rows=rows[:-1])
         self.taken += len(self.parts[-1].rows)
         values = gaps.at(self.q, self.remembered[: self.count])
-        deep = [i for i in range(gaps.count) if values[i] < -PENETRATION * self.length]
+        deep = [i for i in self.able if values[i] < -PENETRATION * self.length]
         if deep:
             self.reason = (
                 f"Penetration was not noticed: {listed([gaps.names[i] for i in deep], NAMED)}. Give a max_step."
             )
             return Status.CONTACT_FAILED
         if not goes_on:
-            return Status.SUCCESS if outcome.status is Status.EVENT and fired else outcome.status
+            return Status.SUCCESS if outcome.status is Status.EVENT and not ended else outcome.status
         self.reason = ""
         if self._is_stuck():
             return Status.CONTACT_FAILED
+        jump = None if change is None else hybrid.carry_out(self, change)
+        self.acted = change is not None
+        if self.acted and jump is None:
+            return Status.ACTION_FAILED
+        values = self.gaps.at(self.q, self.remembered[: self.count])
         near = [i for i in range(gaps.count) if values[i] <= TOUCHING * self.length]
-        return self._settle(sorted({*near, *fired, *self.modes.closed, *self.modes.idle}), fired)
+        touching = {*near, *fired, *self.modes.closed, *self.modes.idle}.intersection(self.able)
+        status = self._settle(sorted(touching), fired)
+        if jump is not None:
+            hybrid.report(self, jump)
+        return status
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -468,6 +538,7 @@ class _ContactRun:
     # The whole
 
     def _outcome(self, status, began):
+        self._name_switched()
         parts = self.parts
         ends = [part.end for part in parts]
         last = ends[-1]

@@ -16,7 +16,7 @@ from ..jit.compiled import clock
 from ..maths.tolerances import EPS
 from ..model.packed import first_rows
 from ..observables import diagnostics, reactions
-from ..observables.state import RememberingState, remembered
+from ..observables.state import RememberingState, StatePhase, remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.dense_output import StepPieces
 from ..runs.events import Event
@@ -119,8 +119,8 @@ class Phases:
     ----------
     list : list of (float, float, tuple of str)
         Start, end (s) and names of the closed contacts.
-    inactive : list of tuple
-        The parts that are left out in each.
+    changes : list of (tuple, dict)
+        The parts that are left out in each, and the parameters that have been set before.
     varies : bool
         Whether forces or numbers differ between them, not rows alone.
     impulses : list of (float, str, float)
@@ -131,15 +131,15 @@ class Phases:
         self.list, self.impulses, self.starts, self.of = [], [], [], []
         self.packed, self._columns = [], []  # of each set of closed gaps
         self._rows, self._kinds = _rows_of(packed), {}
-        self.inactive, self.varies = [], False
+        self.changes, self.varies = [], False
 
     def add(self, begin, rest, end, packed, held):
         """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end.
 
-        packed: that of the phase, and the same with the numbers of the start. held: names of closed contacts, and the
-        parts that are inactive.
+        packed: that of the phase, and the same with the numbers of the start. held: names of closed contacts, inactive
+        parts, and parameters that have been set.
         """
-        (packed, plain), (names, inactive) = packed, held
+        (packed, plain), (names, *changes) = packed, held
         kind = self._kinds.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
             own = _rows_of(plain)
@@ -150,8 +150,8 @@ class Phases:
             self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
         self.starts.append(begin)
         self.of.append(kind)
-        self.inactive.append(inactive)
-        self.varies = self.varies or packed is not plain or any(isinstance(item, Force) for item in inactive)
+        self.changes.append(changes)
+        self.varies = self.varies or packed is not plain or any(isinstance(item, Force) for item in changes[0])
         self.list.append((rest, max(rest, end), names))
 
     def at(self, t):
@@ -172,6 +172,29 @@ class Phases:
         for kind, mine, some in self._gathered(numbers, arrays):
             out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
         return diagnostics.ConstraintError(*out)
+
+    def packed_at(self, t):
+        """Yield each packed scene of phases at times t (k,), and which times are its."""
+        for kind, mine, _ in self._gathered(self.at(t), ()):
+            yield self.packed[kind], mine
+
+    def phase_at(self, t):
+        """The `StatePhase` at t, s, or of several times; None where actions have changed nothing."""
+        if not any(inactive or values for inactive, values in self.changes):
+            return None
+        numbers = np.unique(self.at(np.atleast_1d(t))).tolist() or [0]
+        inactive, values = self.changes[numbers[-1]]
+        kinds = {self.of[number] for number in numbers}
+        one = kinds.pop() if len(kinds) == 1 else None
+        found = (None, None) if one is None else (self.packed[one], self._columns[one])
+        return StatePhase(tuple(item.name for item in inactive), values, *found)
+
+    def parts(self, solution):
+        """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are."""
+        for kind, mine, _ in self._gathered(solution._phase_of_rows, ()):
+            part = solution._picked(mine)
+            part.packed, part.system, part._phases = self.packed[kind], self.packed[kind].system, None
+            yield part, mine
 
     def _gathered(self, numbers, arrays):
         """Yield each set of closed gaps, the entries (j,) of arrays in its phases, and these parts of the arrays."""
@@ -242,7 +265,11 @@ class _ContactRun:
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        self.inactive, self.values, self.switched, self.acted = inactive_of(scene), {}, {}, False
+        self.inactive, self.values, self.acted = inactive_of(scene), {}, False
+        self.switched = {id(item): item for item in self.inactive}
+        phase = getattr(call.state, "phase", None)
+        if phase is not None:
+            self.inactive, self.values = tuple(scene[name] for name in phase.inactive), phase.values
         self.contacts, self.own = contacts_of(scene._added), Gaps(scene.packed).list
         self.configure()
         gaps, self.count = self.gaps, kept.handles.count
@@ -313,7 +340,7 @@ class _ContactRun:
             other = self.instead(task, outcome.status)
             if other is None:
                 packed = phase.packed, base.packed
-                self.phases.add(self.t, self.rest, outcome.end.reached, packed, (names, self.inactive))
+                self.phases.add(self.t, self.rest, outcome.end.reached, packed, (names, self.inactive, self.values))
                 return task, outcome
             run = run._by(other)
 
@@ -353,7 +380,7 @@ class _ContactRun:
     def _name_switched(self):
         """Name in each phase those of the parts that come and go which are active, but for contacts."""
         parts = [item for item in self.switched.values() if item not in self.contacts]
-        for k, off in enumerate(self.phases.inactive):
+        for k, (off, _) in enumerate(self.phases.changes):
             begin, end, names = self.phases.list[k]
             active = [item.name for item in parts if all(item is not each for each in off)]
             self.phases.list[k] = begin, end, (*names, *active)

@@ -52,7 +52,7 @@ def phase_of(scene, rows, places=(), without=None):
     if known is None:
         known = scene._phases = {}
     without = inactive_of(scene) if without is None else without
-    key = frozenset(map(id, (*rows, *without)))
+    key = frozenset(map(id, rows)), frozenset(map(id, without))
     if key not in known:
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
         gone |= {id(force) for force in scene._forces if _needs(force) & gone}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import time
-from functools import cached_property
+from functools import cached_property, wraps
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -253,18 +253,55 @@ def _quadrature(solution, trajectory, item, a, b):
 
 def _power(solution, trajectory, item, t):
     states, memory, status = trajectory(t)
-    q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
-    system = solution.system
-    memory = with_normal_loads(solution.packed, t, q, qd, qdd, memory)
-    at = SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=solution.packed, system=system)
-    if system.rheonomic[0]:
-        at.multipliers = solution._multipliers_at(t, q, qd, qdd, memory)
-    if item is not None:
-        power = diagnostics.power_of(at, item)
-    else:
+    if status != 0:
+        return np.full(t.size, np.nan)
+    levels, power, phases = [np.ascontiguousarray(states[:, i]) for i in range(3)], np.zeros(t.size), solution._phases
+    varies = phases is not None and phases.varies
+    for packed, mine in phases.packed_at(t) if varies else [(solution.packed, slice(None))]:
+        some = t[mine], *(level[mine] for level in levels)
+        slots = with_normal_loads(packed, *some, memory[mine])
+        at = SimpleNamespace(t=some[0], q=some[1], qd=some[2], _memory=slots, packed=packed, system=packed.system)
+        if packed.system.rheonomic[0]:
+            at.multipliers = (reactions.multipliers if varies else solution._multipliers_at)(
+                *([packed] if varies else []), *some, slots
+            )
+        power[mine] = _supplied(at, item)
+    return power
+
+
+def _supplied(at, item):
+    """Power (k,) supplied by an item, or without one by all, at states that have a packed scene."""
+    if item is None:
         powers = diagnostics.force_powers(at)
-        power = powers.applied + diagnostics.driving_power(at) - powers.dissipation
-    return power if status == 0 else np.full(t.size, np.nan)
+        return powers.applied + diagnostics.driving_power(at) - powers.dissipation
+    if reactions.is_idle(at.packed, item):
+        return np.zeros(at.t.size)
+    load = reactions.loads_of(at.packed).get(id(item))
+    return diagnostics.power_of(at, member(at.packed, item) if load is None else load)
+
+
+# What follows from the packed scene is asked of that of each phase, where phases differ in forces or numbers.
+
+
+def in_phases(method):
+    """Decorate a method that returns arrays over the outputs, a tuple of them, or a named tuple."""
+
+    @wraps(method)
+    def call(self, *arguments, **keywords):
+        phases = getattr(self, "_phases", None)
+        if phases is None or not phases.varies:
+            return method(self, *arguments, **keywords)
+        found, order = [], []
+        for part, mine in phases.parts(self):
+            found.append(method(part, *arguments, **keywords))
+            order.append(mine)
+        back = np.argsort(np.concatenate(order), kind="stable")
+        if isinstance(found[0], tuple):
+            columns = [np.concatenate(column)[back] for column in zip(*found, strict=True)]
+            return type(found[0])(*columns) if hasattr(found[0], "_fields") else tuple(columns)
+        return np.concatenate(found)[back]
+
+    return call
 
 
 # Balances of a run: energies, powers and momenta, mixed into `Solution`.
@@ -275,11 +312,13 @@ class Balances:
     """Mixed into what has `system`, `packed`, `handles` and outputs t (k,), q and qd (k, n)."""
 
     @cached_property
+    @in_phases
     def kinetic_energy(self) -> Floats:
         """Kinetic energy (k,), J."""
         return diagnostics.kinetic_energy(self.system, self.q, self.qd)
 
     @cached_property
+    @in_phases
     def potential_energy(self) -> Floats:
         """Potential energy (k,), J, of gravity (zero at the origin) and of springs; applied loads have none."""
         return diagnostics.potential_energy(self.system, self.q) + self._force_powers.potential
@@ -290,10 +329,12 @@ class Balances:
         return self.kinetic_energy + self.potential_energy
 
     @cached_property
+    @in_phases
     def _force_powers(self):
         return diagnostics.force_powers(self)
 
     @cached_property
+    @in_phases
     def power(self) -> Floats:
         """Power (k,), W, of applied forces, actuators and driven constraints: dE/dt = power - dissipation."""
         return self._force_powers.applied + diagnostics.driving_power(self)
@@ -316,13 +357,14 @@ class Balances:
         """
         return self._integrated(None)
 
+    @in_phases
     def power_of(self, item: ItemLike) -> Floats:
         """Power (k,), W, supplied by one constraint or force (or its name): its share of dE/dt.
 
         Of a motor or a driver: the power of its force or torque along the prescribed motion. Of a force: the power of
         its loads and actuators, less dissipation; stored energy of a spring doesn't count. Of other constraints: zero.
         """
-        return diagnostics.power_of(self, self._part(item))
+        return _supplied(self, self._part(item))
 
     def work_of(self, item: ItemLike) -> Floats:
         """Work (k,), J, since the start, of one constraint or force: the integral of `power_of`.
@@ -335,10 +377,11 @@ class Balances:
         return self._integrated(self._part(item))
 
     def _part(self, item):
-        """The `Load` of a force, or the `Member` of a constraint."""
+        """A constraint or force of the scene."""
         item = self.handles.item(item)
-        load = reactions.loads_of(self.packed).get(id(item))
-        return member(self.packed, item) if load is None else load
+        if id(item) not in reactions.loads_of(self.packed) and not reactions.is_idle(self.packed, item):
+            member(self.packed, item)
+        return item
 
     def _integrated(self, part):
         if self._trajectory is None:
@@ -346,11 +389,13 @@ class Balances:
         return work(self, self._trajectory, part)
 
     @cached_property
+    @in_phases
     def linear_momentum(self) -> Floats:
         """Linear momentum (k, 3), kg m/s, ground frame."""
         return diagnostics.linear_momentum(self.system, self.q, self.qd)
 
     @cached_property
+    @in_phases
     def angular_momentum(self) -> Floats:
         """Angular momentum about the ground's origin (k, 3), kg m^2/s, ground frame."""
         return diagnostics.angular_momentum(self.system, self.q, self.qd)
@@ -498,7 +543,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         t, memory = np.array([self._reached]), self._remembered[None]
         lam = self._multipliers_at(t, q[None], qd[None], qdd[None], memory)[0]
         remembered = self.packed, self._remembered.copy(), Anchor(self._angles)
-        return RememberingState.of(*remembered, self._reached, q, qd, qdd, lam)
+        return self._in_phase(RememberingState.of(*remembered, self._reached, q, qd, qdd, lam))
 
     def at(self, t: ArrayLike) -> RememberingState:
         """Return the state at any time of a run with dense_output=True, on the constraint manifold.
@@ -545,10 +590,17 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         parts = q, qd, qdd, self._multipliers_at(every, q, qd, qdd, memory)
         anchor = self._anchor_of(every)
         if times.ndim:
-            return RememberingState.of(self.packed, memory, anchor, every, *parts)
+            return self._in_phase(RememberingState.of(self.packed, memory, anchor, every, *parts))
         angles, h, levels = anchor
         anchor = Anchor(angles[0], h[0], tuple(level[0] for level in levels))
-        return RememberingState.of(self.packed, memory[0], anchor, float(times), *(part[0] for part in parts))
+        parts = (part[0] for part in parts)
+        return self._in_phase(RememberingState.of(self.packed, memory[0], anchor, float(times), *parts))
+
+    def _in_phase(self, state):
+        """A state, or several, with what actions have changed before."""
+        if self._phases is not None:
+            state.phase = self._phases.phase_at(state.t)
+        return state
 
     def _anchor_of(self, t):
         """Return the turn counts at times t (k,): those at the starts of their steps."""
@@ -611,6 +663,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             return self._phases.constraint_error(self._phase_of_rows, *motion)
         return diagnostics.constraint_error(self.packed, *motion)
 
+    @in_phases
     def actuation(self, control: ItemLike) -> Floats:
         """The values (k, actuators) of the function of a Control at the outputs; those held if it has a period.
 
@@ -628,6 +681,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             raise InvalidForce(f"actuation: {control!r} is no Control of this scene, nor a load by the scene's state.")
         return law_values(self, load, self._memory)
 
+    @in_phases
     def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
         """Force (N) and torque (N m) that a constraint, a joint as a whole, or a force exerts: (k, 3) each.
 
@@ -676,6 +730,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """
         return reactions.contact_point(self, constraint)
 
+    @in_phases
     def friction_demand(self, constraint: ItemLike) -> Floats:
         """Tangential over normal force at a contact, (k,): the coefficient of friction that rolling needs at least.
 

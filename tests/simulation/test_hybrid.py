@@ -198,6 +198,9 @@ def test_masses_gravity_and_loads_change():
     assert np.abs(solution.velocity(stone) - [(1, 1, -10), (1, 2, -10)]).max() < FINE
     assert np.abs(solution.linear_momentum[1] - (1.5, 3.0, -15)).max() < FINE
     assert abs(solution.potential_energy[1]) == 0.0
+    assert np.abs(solution.power_of("wind") - (3.0, 3.0)).max() < FINE
+    dense = ts.simulate(scene, (0, 2), events=at(1.0, drop), dense_output=True)
+    assert abs(dense.work_of("wind")[-1] - (1.5 + 2.25)) < FINE
 
 
 # Impulses

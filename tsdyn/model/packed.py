@@ -102,6 +102,8 @@ class Derived:
     aligned: tuple = None  # mirrored_branches.demand_aligned
     holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
     loads: dict = None  # reactions.loads_of
+    holds: dict = field(default_factory=dict)  # of a phase, phase_scenes.phase_of: slot of a friction -> rows that hold
+    places: dict = field(default_factory=dict)  # it; and id of such a row -> slots, and where its numbers are
     row_parts: list = field(default_factory=list)  # idle: observables.row_parts.taken
     with_singular_places: list = None  # indices of primitives: contacts.singular_place
     places_within: list = None  # of each primitive among those of its class: reactions.only

@@ -144,7 +144,8 @@ def remembered(state, prepared, t, q):
     if not prepared.remembers and (memory is None or np.shape(memory) == (0,)):
         return NOTHING
     slots = prepared.packed.system.memory.size
-    if memory is None and state is not None and slots:
+    taken = sum(load.force.taken for load in prepared.packed.loads)  # a run sets these
+    if memory is None and state is not None and slots > taken:
         raise InvalidArgument(
             "parts of the scene count turns or hold a load, and this state doesn't say how many: give solution.state, "
             "what solution.at(t) returns or what an event function is given, as they are or changed by _replace."

@@ -14,14 +14,16 @@ from ..model.handles import handles_of
 from ..observables.evaluate import constraint_arrays, mass_matrix
 from ..observables.state import begin_memory
 from ..runs.events import EventInstant
-from ..validation import listed, vector3
+from ..validation import floats, listed, vector3
 from .phase_scenes import NAMED
-from .variants import family_of, of_numbers, switchable, with_parameters
+from .variants import family_of, packed_anew, switchable
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Floats, ItemLike
     from ..observables.state import State
 
+
+KEPT = 9  # scenes with other parameters, and one more
 
 # What an action may ask for.
 
@@ -118,7 +120,7 @@ class Change:
         if "." not in parameter and parameter != "gravity":
             raise InvalidArgument(f"{parameter} is of the file. Set what follows from it, such as the length of a rod.")
         values = self._values | {parameter: value}
-        found = with_parameters(self._scene, values)
+        found = with_values(self._scene, values)
         if found.system.memory.size != self._scene.system.memory.size:
             raise InvalidArgument(f"{parameter} can't be set within a run: forces would remember other numbers.")
         self._values = values
@@ -151,6 +153,11 @@ class Change:
             raise InvalidArgument(f"change.impulse: {body.name} is a point mass; leave out point.")
         self._pushes.append(Push(body, impulse, point))
 
+    @property
+    def ends(self) -> bool:
+        """Whether the run ends at the event."""
+        return self._ends
+
     def end(self) -> None:
         """End the run at the event; nothing else that actions of this instant ask for is carried out."""
         self._ends = True
@@ -169,7 +176,7 @@ def ask(run, events, last):
     """
     angles, slots = run.remembered[: run.count], run.remembered[run.count :]
     state = EventInstant(run.phases.packed[run.phases.of[-1]], slots, (run.t, last, angles), run.t, last)
-    change = Change(run.scene, run.t, state, run.inactive, run.values)
+    change = Change(run.base, run.t, state, run.inactive, run.values)
     for event in events:
         try:
             event.action(change)
@@ -197,7 +204,7 @@ def carry_out(run, change):
     run.values, run.inactive = change._values, tuple(change._inactive.values())
     run.configure()
     activated = list(change._activated.values())
-    packed, angles = run.gaps.packed, run.remembered[: run.count]
+    packed, angles = run.scene.packed, run.remembered[: run.count]
     if activated:
         run.remembered = run.remembered.copy()
         handles = handles_of(packed)
@@ -220,10 +227,10 @@ def report(run, jump):
     """List the impulses of the user's and of constraints that have become active, when contacts have been hit, too."""
     found = [(run.t, push.body.name, push.impulse) for push in jump.pushes]
     members, own = (
-        {id(member.constraint): member for member in run.gaps.packed.members},
-        handles_of(run.gaps.packed).own,
+        {id(member.constraint): member for member in run.scene.packed.members},
+        handles_of(run.scene.packed).own,
     )
-    wanted = [item for item in jump.activated if id(own(item)) in members and item not in run.contacts]
+    wanted = [item for item in jump.activated if id(own(item)) in members and not getattr(item, "unilateral", False)]
     if wanted:
         rows = Rows(run)
         P = rows.impulses(jump.load - rows.M @ (run.qd - jump.qd), [*run.modes.closed, *run.modes.idle])
@@ -237,13 +244,15 @@ class Rows:
     """Rows and masses at the present state of a run, dense."""
 
     def __init__(self, run):
-        self.packed, self.gaps, self.q = run.gaps.packed, run.gaps, run.q
+        self.packed, self.gaps, self.q = run.scene.packed, run.gaps, run.q
         system = self.packed.system
         system = system._replace(reals=system.reals.copy())
         system.reals[system.memory] = run.remembered[run.count :]
         self.Phi, self.Phi_q, self.Phi_t, _ = constraint_arrays(system, run.q, run.qd, run.t)
         self.M = mass_matrix(system, run.q)
-        self.bilateral = np.setdiff1d(np.arange(self.Phi.size), run.gaps.rows)
+        off = {id(item) for item in run.without}
+        idle = [np.arange(self.Phi.size)[member.rows] for member in self.packed.members if id(member.constraint) in off]
+        self.bilateral = np.setdiff1d(np.arange(self.Phi.size), np.concatenate((run.gaps.rows, *idle)))
 
     def violated(self, tol):
         """The constraints whose rows don't hold, each with its residual."""
@@ -297,11 +306,20 @@ class Rows:
         return P
 
 
-def varied(scene, values):
-    """A phase with other numbers, as far as it has what they are of; None where it must be packed anew."""
+def with_values(scene, values):
+    """A scene with other values of some parameters, and parts of its own; the last ones are kept until it changes."""
     if not values:
         return scene
-    family, _ = family_of(scene)
-    mine = {name: value for name, value in values.items() if name in family.fields}
-    found = family.numbers(mine)
-    return None if found is None else of_numbers(scene, family, mine, *found)
+    known, numbers = scene._phases, {name: floats(value).tolist() for name, value in values.items()}
+    key = repr(numbers)
+    if known is None:
+        known = scene._phases = {}
+    found = known.get(key)
+    if found is None:
+        for old in [name for name in known if isinstance(name, str)][: 1 - KEPT]:
+            del known[old]
+        family, changes = family_of(scene)
+        found = packed_anew(family, {**changes, **values})
+        if [] not in numbers.values():  # what a function is
+            known[key] = found
+    return found

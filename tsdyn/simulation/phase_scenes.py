@@ -1,7 +1,7 @@
 """Scenes of the phases of a run: what of a scene stays, and what its contacts and frictions are in their modes."""
 
 from functools import partial, wraps
-from typing import NamedTuple
+from itertools import chain
 
 import numpy as np
 
@@ -23,9 +23,10 @@ NAMED = 5  # contacts in a message
 
 
 def has_contacts(scene):
-    """Whether a scene has unilateral constraints, or inactive parts; looked up once until the scene changes."""
+    """Whether runs of a scene have phases, by contacts, exact friction or inactive parts; kept until it changes."""
     if scene._opens is None:
-        scene._opens = bool(contacts_of(scene._added) or inactive_of(scene))
+        slides = any(getattr(force, "slides", ()) for force in scene._forces)
+        scene._opens = slides or bool(contacts_of(scene._added) or inactive_of(scene))
     return scene._opens
 
 
@@ -34,54 +35,45 @@ def inactive_of(scene):
     return tuple(each for each in (*scene._added, *scene._forces) if not each.active)
 
 
-class Place(NamedTuple):
-    """Where a number that the run remembers is among the numbers of a row."""
+def dependent(scene, items):
+    """These items, and friction by reactions of joints among them: a tuple."""
+    gone = {id(item) for item in items}
+    frictions = [force for force in scene._forces if "normal_load" in force.kernels and id(force) not in gone]
+    return *items, *(force for force in frictions if id(force.joint) in gone)
 
-    slot: int  # of System.memory
-    row: object  # a primitive of the phase
-    at: int  # behind where its reals begin
 
-
-def phase_of(scene, rows, places=(), without=None):
+def phase_of(scene, rows, holds=(), without=None):
     """The scene with these rows, primitives, in place of its contacts; kept until the scene changes.
 
-    places: `Place` of what the rows take from the memory of the run. without: constraints and forces left out, by
-    default those that are inactive at the start.
+    holds: rows with numbers that the run remembers, as `friction_problem.Hold`. without: constraints and forces left
+    out, by default those that are inactive at the start.
     """
     known = scene._phases
     if known is None:
         known = scene._phases = {}
-    without = inactive_of(scene) if without is None else without
-    key = frozenset(map(id, rows)), frozenset(map(id, without))
+    without = dependent(scene, inactive_of(scene)) if without is None else without
+    key = frozenset(map(id, rows)), frozenset(map(id, without)), frozenset(hold.key for hold in holds)
     if key not in known:
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
-        gone |= {id(force) for force in scene._forces if _needs(force) & gone}
+        held = [hold.rows() for hold in holds]
         phase = known[key] = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
-            _added=[each for each in scene._added if id(each) not in gone] + list(rows),
-            _forces=[each for each in scene._forces if id(each) not in gone],
-            _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
-            _pack=partial(_pack_phase, phase, scene, places),
+            _added=[each for each in scene._added if id(each) not in gone] + [*rows, *chain(*held)],
+            _forces=[each for each in scene._forces if id(each) not in gone], _packed=None, _start=None,
+            _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
+            _pack=partial(_pack_phase, phase, scene, holds, held),
         )  # fmt: skip
     return known[key]
 
 
-def _needs(force):
-    """The id of the joint whose reaction a force depends on: without the joint it is none."""
-    return {id(force.joint)} if "normal_load" in force.kernels else set()
-
-
-def _pack_phase(phase, scene, places):
+def _pack_phase(phase, scene, holds, held):
     """Pack a phase of a scene: it remembers what the scene does, in the same order."""
     whole = scene.packed
     packed = pack(phase, handles_of(whole).where_some_act((*phase._added, *phase._forces)))
     if whole.system.memory.size:
         packed = _remembering(packed, whole)
-    system, begins = packed.system, begins_of(packed) if places else {}
-    for slot, row, at in places:
-        system.memory[slot] = begins[id(row)] + at
-    return packed
+    return _holding(packed, holds, held) if holds else packed
 
 
 def _remembering(packed, whole):
@@ -90,6 +82,8 @@ def _remembering(packed, whole):
     found = _slots(whole)
     for item, slots in own.items():
         memory[found[item]] = packed.system.memory[slots]
+    if (memory == packed.system.memory).all() if memory.size == packed.system.memory.size else False:
+        return packed
     first = {item: slots.start for item, slots in found.items()}
     pairs = zip(packed.constraints, packed.slots, strict=True)
     return packed._replace(
@@ -108,13 +102,40 @@ def _slots(packed):
     return {item: slice(slot, end) for (slot, item), end in zip(owners, ends, strict=False)}
 
 
+def gaps_of(scene, without=None):
+    """The `Gaps` of a scene, of its inactive contacts too; `without` as of `phase_of`."""
+    from ..analyses.contact_problem import Gaps
+
+    rows = [side.row for contact in contacts_of(scene._added) for side in contact.sides]
+    alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
+    return Gaps(scene.packed, alone.packed, phase_of(scene, [], without=without).packed)
+
+
+def _holding(packed, holds, held):
+    """Packed with the numbers of the rows of holds among what the run remembers."""
+    system, begins, first = packed.system, begins_of(packed), first_row_of(packed)
+    memory = system.memory.copy()
+    for hold, rows in zip(holds, held, strict=True):
+        packed.derived.holds[hold.unit.slot] = np.array([first[id(row)] for row in rows], int)
+        for row, places in zip(rows, hold.places(), strict=True):
+            packed.derived.places[id(row)] = places
+            for slot, at in places:
+                memory[slot] = begins[id(row)] + at
+    return packed._replace(system=system._replace(memory=memory))
+
+
+def first_row_of(packed):
+    """The first row of each constraint, by its id."""
+    return {id(member.constraint): member.rows.start for member in packed.members}
+
+
 def at_start(scene):
     """The scene as it is at its start: contacts that are closed hold, inactive parts are left out."""
     if not has_contacts(scene):
         return scene
-    from ..analyses.contact_problem import Gaps, closed_gaps
+    from ..analyses.contact_problem import closed_gaps
 
-    gaps, (q, _) = Gaps(scene.packed), scene.start
+    gaps, (q, _) = gaps_of(scene), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
     closed = [gaps.list[i] for i in closed_gaps(gaps, q, angles)]
     return phase_of(scene, [gap.side.row for gap in closed if gap.contact.active])

@@ -14,6 +14,7 @@ from ..calls import fitting, fitting_methods
 from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
+from ..model.handles import handles_of
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import diagnostics, reactions
 from ..observables.generalised_forces import law_values
@@ -274,6 +275,7 @@ def _supplied(at, item):
     if item is None:
         powers = diagnostics.force_powers(at)
         return powers.applied + diagnostics.driving_power(at) - powers.dissipation
+    item = handles_of(at.packed).own(item)
     if reactions.is_idle(at.packed, item):
         return np.zeros(at.t.size)
     load = reactions.loads_of(at.packed).get(id(item))

@@ -278,6 +278,10 @@ class Phases:
             part.packed, part.system, part.handles, part._phases = packed, packed.system, handles_of(packed), None
             yield part, mine
 
+    def active(self, item, numbers):
+        """Whether a part is active in the phases of these numbers (k,)."""
+        return np.array([all(item is not each for each in inactive) for inactive, _ in self.changes])[numbers]
+
     def name_switched(self, parts):
         """Name in each phase which of these parts, that come and go, are active in it."""
         for k, (inactive, _) in enumerate(self.changes):

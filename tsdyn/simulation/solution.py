@@ -293,17 +293,22 @@ def in_phases(method):
         phases = getattr(self, "_phases", None)
         if phases is None or not phases.varies:
             return method(self, *arguments, **keywords)
-        found, order = [], []
-        for part, mine in phases.parts(self):
-            found.append(method(part, *arguments, **keywords))
-            order.append(mine)
-        back = np.argsort(np.concatenate(order), kind="stable")
-        if isinstance(found[0], tuple):
-            columns = [np.concatenate(column)[back] for column in zip(*found, strict=True)]
-            return type(found[0])(*columns) if hasattr(found[0], "_fields") else tuple(columns)
-        return np.concatenate(found)[back]
+        return _gathered(self, lambda part: method(part, *arguments, **keywords))
 
     return call
+
+
+def _gathered(solution, ask):
+    """What the outputs of each packed scene say, in the order of the outputs."""
+    found, order = [], []
+    for part, mine in solution._phases.parts(solution):
+        found.append(ask(part))
+        order.append(mine)
+    back = np.argsort(np.concatenate(order), kind="stable")
+    if isinstance(found[0], tuple):
+        columns = [np.concatenate(column)[back] for column in zip(*found, strict=True)]
+        return type(found[0])(*columns) if hasattr(found[0], "_fields") else tuple(columns)
+    return np.concatenate(found)[back]
 
 
 # Balances of a run: energies, powers and momenta, mixed into `Solution`.
@@ -615,12 +620,19 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
 
     @property
     def phases(self) -> list[tuple[float, float, tuple[str, ...]]]:
-        """Start and end (s) of each phase, and names of the contacts that are closed in it; one without contacts."""
+        """Start and end (s) of each phase, and the names of what holds only in some.
+
+        These are closed contacts, frictions that stick, and those active of the parts that come and go by actions.
+        """
         return [(self.span[0], self.reached, ())] if self._phases is None else list(self._phases.list)
 
     @property
     def impulses(self) -> list[tuple[float, str, float]]:
-        """Time (s), name and impulse of each contact at each impact; N s, or N m s of an angle."""
+        """Time (s), name and impulse of contacts at impacts, of parts that become active, of impulses on bodies.
+
+        N s, or N m s of an angle; of a constraint of several rows an array (rows,) as of `multipliers`, of a body an
+        array (3,) in the ground frame.
+        """
         return [] if self._phases is None else list(self._phases.impulses)
 
     @property
@@ -683,7 +695,6 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             raise InvalidForce(f"actuation: {control!r} is no Control of this scene, nor a load by the scene's state.")
         return law_values(self, load, self._memory)
 
-    @in_phases
     def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
         """Force (N) and torque (N m) that a constraint, a joint as a whole, or a force exerts: (k, 3) each.
 
@@ -708,7 +719,48 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> print(force[-1].round(6) + 0.0, torque[-1].round(6) + 0.0)
         [ 0.  0. 20.] [  0. -20.   0.]
         """
-        return exerted(self, item, on)
+        phases = self._phases
+        if phases is None or not (phases.varies or getattr(self.handles.item(item), "slides", ())):
+            return exerted(self, item, on)
+        return _gathered(self, lambda part: exerted(part, item, on))
+
+    def sticking(self, friction: ItemLike) -> Bools:
+        """Whether a friction of the exact law sticks: (k,).
+
+        Parameters
+        ----------
+        friction : friction, or name of one
+            A joint friction or CoulombFriction whose slip velocity is zero.
+
+        Raises
+        ------
+        InvalidForce
+            If it is none of these.
+
+        Examples
+        --------
+        A block of 2 kg comes to rest after 0.5 s:
+
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene(gravity=(0, 0, 0))
+        >>> block = scene.add_point_mass(mass=2.0, velocity=(1, 0, 0))
+        >>> brake = scene.add(ts.forces.CoulombFriction(block, scene.ground, force=4.0, name="brake"))
+        >>> solution = ts.simulate(scene, (0, 1), t_eval=[0.25, 0.75])
+        >>> print(solution.sticking("brake"), solution.phases[-1])
+        [False  True] (0.5, 1.0, ('brake',))
+        """
+        item = self.handles.item(friction)
+        load = reactions.loads_of(self.packed).get(id(item))
+        if load is None or not getattr(item, "slides", ()):
+            raise InvalidForce(
+                f"sticking: {friction!r} is no friction of the exact law: RevoluteFriction, TranslationalFriction, "
+                "ContactFriction and CoulombFriction are, with slip_velocity=0."
+            )
+        slot, rests = load.slot + item.memory, np.ones(self.t.size, bool)
+        for slide in item.slides:
+            rests &= ~self._memory[:, slot : slot + slide.directions].any(axis=1)
+            slot += slide.count
+        return rests & self._phases.active(item, self._phase_of_rows)
 
     def contact_point(self, constraint: ItemLike) -> Floats:
         """Where a surface touches that rolls or slides, (k, 3), m, ground frame: its path on the plane.

@@ -286,7 +286,8 @@ class Phases:
         """Name in each phase which of these parts, that come and go, are active in it."""
         for k, (inactive, _) in enumerate(self.changes):
             active = [item.name for item in parts if all(item is not each for each in inactive)]
-            self.list[k] = (*self.list[k][:2], (*self.list[k][2], *active))
+            begin, end, names = self.list[k]
+            self.list[k] = begin, end, tuple(dict.fromkeys((*names, *active)))
 
     def _gathered(self, numbers, arrays):
         """Yield each set of closed gaps, the entries (j,) of arrays in its phases, and these parts of the arrays."""
@@ -785,8 +786,8 @@ class _ContactRun:
     # The whole
 
     def _outcome(self, status, began):
-        switched = [item for item in self.switched.values() if not getattr(item, "unilateral", False)]
-        self.phases.name_switched(switched)
+        parts = [each for each in (*self.base._added, *self.base._forces) if id(each) in self.switched]
+        self.phases.name_switched([each for each in parts if not getattr(each, "unilateral", False)])
         parts = self.parts
         ends = [part.end for part in parts]
         last = ends[-1]

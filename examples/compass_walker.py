@@ -1,6 +1,6 @@
 """The simplest walker (Garcia et al. 1998): two legs without mass on a slope, without a motor; a limit cycle.
 
-    plane        PlaneContact, hip and feet               3 rows: side by side, a walker without a foot falls over
+    plane        Dot2, ground and hip, ground and feet    1 row each: nothing falls sideways
     legs         Distance, hip and foot                   1 row each
     pins         PointOnLine, foot and an axis across     2 rows each; that of the foot that stands is active
 
@@ -32,7 +32,7 @@ def build(angle=ANGLE, rate=RATE, foot=FOOT):
         pin = ts.constraints.PointOnLine(mass, scene.ground, point_b=position, axis_b=ACROSS, name=f"{name} pin")
         scene.add(pin)
     for body in scene.bodies:
-        scene.add(ts.constraints.PlaneContact(body, scene.ground, normal_b=ACROSS, name=f"{body.name} plane"))
+        scene.add(ts.constraints.Dot2(scene.ground, body, axis_a=ACROSS, name=f"{body.name} plane"))
     scene.deactivate("right pin")
     return scene
 

@@ -209,7 +209,7 @@ def carry_out(run, change):
         run.remembered = run.remembered.copy()
         handles = handles_of(packed)
         begin_memory(packed, handles, angles, run.remembered[run.count :], map(handles.own, activated))
-    rows = Rows(run)
+    rows = JumpRows(run)
     wrong = rows.violated(run.options.initial_tol)
     if wrong:
         run.reason = (
@@ -232,7 +232,7 @@ def report(run, jump):
     )
     wanted = [item for item in jump.activated if id(own(item)) in members and not getattr(item, "unilateral", False)]
     if wanted:
-        rows = Rows(run)
+        rows = JumpRows(run)
         P = rows.impulses(jump.load - rows.M @ (run.qd - jump.qd), [*run.modes.closed, *run.modes.idle])
         for item in wanted:
             mine = P[members[id(own(item))].rows]
@@ -240,7 +240,7 @@ def report(run, jump):
     run.phases.impulses += found
 
 
-class Rows:
+class JumpRows:
     """Rows and masses at the present state of a run, dense."""
 
     def __init__(self, run):

@@ -14,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
+from ..elements.element import angles
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import lemke
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import angle as angle_of
-from ..model.handles import counted, handles_of
+from ..model.handles import counted, displacement, handles_of
 from .contact_rows import ContactWorkspace
 from .tolerances import AT_REST, DEPENDENT, LEVEL
 
@@ -51,6 +52,8 @@ class Gaps:
     names : list of str
         Of their constraints.
     restitution : ndarray (count,)
+    following : dict
+        Of ratchets, whose gap is always zero: their rate, a function of q and qd (..., n), by their numbers.
     """
 
     def __init__(self, packed, contacts, free):
@@ -63,6 +66,7 @@ class Gaps:
         self.sign = np.array([gap.side.sign for gap in self.list])
         self.restitution = np.array([gap.contact.restitution for gap in self.list], float)
         self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
+        self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
 
     def _stop(self, handles, side):
@@ -75,6 +79,13 @@ class Gaps:
             return side.sign * (counted(found, angles[..., at]) - side.bound)
 
         return value
+
+    @staticmethod
+    def _rate(handles, side):
+        """A function of q, qd (..., n) that returns the rate (...) of a joint, in the direction of its ratchet."""
+        kind, rate = ("angle", angle_of) if angles(side.follows) else ("displacement", displacement)
+        (geometry, *_) = getattr(handles.row(side.follows, kind), f"{kind}s")
+        return lambda q, qd: side.sign * rate(geometry, *handles.motions(geometry, (q, qd)), 1)
 
     @property
     def are_counted(self):

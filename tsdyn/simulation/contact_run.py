@@ -79,12 +79,14 @@ class _Closing:
 
     def open(self, opened):
         """Take other contacts that have just opened."""
-        self.which = list(opened)
-        self.start = np.array(list(opened.values())).reshape(-1, 3).T
+        self.which = [i for i in opened if i not in self.gaps.following]
+        self.start = np.array([opened[i] for i in self.which]).reshape(-1, 3).T
 
     def over(self, states):
         """Values (k, count) of states at k times."""
         values = self.gaps.values(states.t, states.q, states.angles if self.gaps.are_counted else None)
+        for i, rate in self.gaps.following.items():
+            values[:, i] = rate(states.q, states.qd)
         if self.which:
             begun, first, rate = self.start
             since = states.t[:, None] - begun
@@ -612,6 +614,8 @@ class _ContactRun:
         jump = hybrid.carry_out(self, change)
         if jump is None:
             return Status.ACTION_FAILED
+        if (self.qd != jump.qd).any():  # ratchets don't take hold as they would have
+            fired = [i for i in fired if i not in self.gaps.following]
         status = self._transit(fired)
         hybrid.report(self, jump)
         return status
@@ -653,8 +657,9 @@ class _ContactRun:
         try:
             inertia = Inertia(self.gaps, self.t, self.q, slots)
             rates = inertia.rates(self.qd)
-            noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
-            if noise:  # a gap that closes with a rate of rounding
+            opening = [i for i in fired if i not in before.closed]
+            noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
+            if noise:  # a gap that closes with a rate of rounding, or a ratchet that takes hold
                 self.qd, rates = held(inertia, self.qd, noise, rates)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)

@@ -130,14 +130,14 @@ def first_row_of(packed):
 
 
 def at_start(scene):
-    """The scene as it is at its start: contacts that are closed hold, inactive parts are left out."""
+    """The scene as it is at its start: contacts that are closed hold; ratchets and inactive parts are left out."""
     if not has_contacts(scene):
         return scene
     from ..analyses.contact_problem import closed_gaps
 
     gaps, (q, _) = gaps_of(scene), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
-    closed = [gaps.list[i] for i in closed_gaps(gaps, q, angles)]
+    closed = [gaps.list[i] for i in closed_gaps(gaps, q, angles) if i not in gaps.following]
     return phase_of(scene, [gap.side.row for gap in closed if gap.contact.active])
 
 

@@ -187,6 +187,13 @@ def ask(run, events, last):
     return change
 
 
+def _deep(run):
+    """The contacts whose gaps are below zero, each with its depth."""
+    tol = run.options.initial_tol * (1.0 + np.abs(run.q).max())
+    values = run.gaps.at(run.q, run.remembered[: run.count])
+    return [f"{run.gaps.names[i]} by {-values[i]:.3g}" for i in run.able if values[i] < -tol]
+
+
 class Jump(NamedTuple):
     """What velocities jump by at an instant, to find the impulses of constraints from."""
 
@@ -210,7 +217,7 @@ def carry_out(run, change):
         handles = handles_of(packed)
         begin_memory(packed, handles, angles, run.remembered[run.count :], map(handles.own, activated))
     rows = JumpRows(run)
-    wrong = rows.violated(run.options.initial_tol)
+    wrong = [*rows.violated(run.options.initial_tol), *_deep(run)]
     if wrong:
         run.reason = (
             f"At t = {run.t:.9g} s these rows don't hold, m or rad: {listed(wrong, NAMED)}. Let the event find where "

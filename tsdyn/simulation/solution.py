@@ -690,6 +690,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             If it is none of these.
         """
         item = self.handles.item(control)
+        if reactions.is_idle(self.packed, item):
+            return np.zeros((self.t.size, len(getattr(item, "actuators", "xyz"))))
         load = reactions.loads_of(self.packed).get(id(item))
         if load is None or load.law is None:
             raise InvalidForce(f"actuation: {control!r} is no Control of this scene, nor a load by the scene's state.")

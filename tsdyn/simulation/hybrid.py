@@ -72,7 +72,7 @@ class Change:
 
     def __init__(self, scene: Any, t: float, state: State, inactive: Any, values: dict[str, Any]) -> None:
         self.t, self.state = t, state
-        self._scene, self._inactive, self._values = scene, {id(item): item for item in inactive}, dict(values)
+        self._scene, self._inactive, self._values = scene, dict.fromkeys(inactive), dict(values)
         self._activated, self._pushes, self._ends = {}, [], False
 
     def activate(self, item: ItemLike) -> None:
@@ -88,14 +88,15 @@ class Change:
         The run ends with an account where a row of the constraint doesn't hold at the positions of the event.
         """
         item = switchable(self._scene, item)
-        if self._inactive.pop(id(item), None) is not None:
-            self._activated[id(item)] = item
+        if item.name in self._inactive:
+            del self._inactive[item.name]
+            self._activated[item.name] = item
 
     def deactivate(self, item: ItemLike) -> None:
         """Leave out a constraint or force from now on; arguments and errors as of `activate`."""
         item = switchable(self._scene, item)
-        self._activated.pop(id(item), None)
-        self._inactive[id(item)] = item
+        self._activated.pop(item.name, None)
+        self._inactive[item.name] = None
 
     def set(self, parameter: str, value: Any) -> None:
         """Set a parameter of the scene for the rest of the run.
@@ -208,8 +209,7 @@ def carry_out(run, change):
 
     Contacts that the impulses close are hit after it.
     """
-    run.values, run.inactive = change._values, tuple(change._inactive.values())
-    run.configure()
+    run.change(tuple(change._inactive), change._values)
     activated = list(change._activated.values())
     packed, angles = run.scene.packed, run.remembered[: run.count]
     if activated:

@@ -39,7 +39,7 @@ from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import damaged, demand, floats, listed
 from . import hybrid
-from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, has_contacts, inactive_of, phase_of
+from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, has_contacts, inactive_of, phase_of, with_own_parts
 from .phases import PhasePieces, Phases, Pinned, plain
 from .progress import reporter, silent
 from .run_options import RunCall, RunOptions
@@ -301,6 +301,7 @@ class _ContactRun:
 
         inactive, values: names and parameters of what actions have changed, by default nothing.
         """
+        with_own_parts(scene)
         self.base, self.count, self.modes, self.acted = scene, handles_of(scene.packed).count, Modes(), False
         at_first = tuple(item.name for item in inactive_of(scene))
         self.switched = set(at_first)

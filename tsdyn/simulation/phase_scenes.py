@@ -35,6 +35,12 @@ def inactive_of(scene):
     return tuple(each for each in (*scene._added, *scene._forces) if not each.active)
 
 
+def with_own_parts(scene):
+    """Pack a scene of `with_parameters` anew if it is packed with the parts of another: phases take its own."""
+    if scene._bodies and scene.packed.bodies[0] is not scene._bodies[0]:
+        scene.touch()
+
+
 def dependent(scene, items):
     """These items, and friction by reactions of joints among them: a tuple."""
     gone = {id(item) for item in items}

@@ -28,7 +28,7 @@ from ..taylor.series_engine import SeriesEngine
 from ..validation import damaged
 from . import stored_runs
 from .local_origin import origin_of, run_near, within_rounding
-from .phase_scenes import at_start
+from .phase_scenes import at_start, with_own_parts
 from .progress import reporter
 from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented, from_names
 from .scene import Scene
@@ -173,6 +173,8 @@ class Run:
     @fitting
     def __init__(self, scene: Scene, options: RunOptions) -> None:
         self.scene, self.options, self._form = scene, options, options.form
+        if options.acts:
+            with_own_parts(scene)
         self._first = at_start(scene)  # whose method and kernels are those of the first phase
         self._compiled = set()  # with outputs between steps, or not
         self._last = self._seen = None  # the last `_Last`, and state

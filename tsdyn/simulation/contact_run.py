@@ -312,7 +312,11 @@ class _ContactRun:
         self.inactive, self.values = inactive, values
         self.switched |= set(inactive)
         self.scene = hybrid.with_values(self.base, values)
-        self.without = dependent(self.scene, [self.scene[name] for name in inactive])
+        parts = {each.name: each for each in (*self.scene._added, *self.scene._forces)}
+        for name in inactive:
+            if name not in parts:
+                raise InvalidArgument(f"the state is of a scene with {name!r}, which this one lacks.")
+        self.without = dependent(self.scene, [parts[name] for name in inactive])
         self.gaps, self.frictions = gaps_of(self.scene, self.without), Frictions(self.scene)
         off = {id(item) for item in self.without}
         self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]
@@ -605,7 +609,7 @@ class _ContactRun:
     def _act(self, events, fired, last):
         """Carry out the actions of events; the Status if there is no way on, else None. last: the state (3, n)."""
         change = hybrid.ask(self, events, last)
-        if change is None or change.ends:
+        if change is None or change._ends:
             return Status.ACTION_FAILED if change is None else Status.EVENT
         self.acted = True
         jump = hybrid.carry_out(self, change)

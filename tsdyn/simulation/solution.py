@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import time
-from functools import cached_property, wraps
+from functools import cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -21,6 +21,7 @@ from ..observables.generalised_forces import law_values
 from ..observables.reactions import acted, exerted, member, with_normal_loads
 from ..observables.state import RememberingState
 from ..validation import counted, floats
+from .by_phase import gathered, in_phases
 from .records import Records
 from .stored_runs import RunOutputs
 from .termination import account, cause_of
@@ -283,35 +284,6 @@ def _supplied(at, item):
         return np.zeros(at.t.size)
     load = reactions.loads_of(at.packed).get(id(item))
     return diagnostics.power_of(at, member(at.packed, item) if load is None else load)
-
-
-# What follows from the packed scene is asked of that of each phase, where phases differ in forces or numbers.
-
-
-def in_phases(method):
-    """Decorate a method that returns arrays over the outputs, a tuple of them, or a named tuple."""
-
-    @wraps(method)
-    def call(self, *arguments, **keywords):
-        phases = getattr(self, "_phases", None)
-        if phases is None or not phases.varies:
-            return method(self, *arguments, **keywords)
-        return _gathered(self, lambda part: method(part, *arguments, **keywords))
-
-    return call
-
-
-def _gathered(solution, ask):
-    """What the outputs of each packed scene say, in the order of the outputs."""
-    found, order = [], []
-    for part, mine in solution._phases.parts(solution):
-        found.append(ask(part))
-        order.append(mine)
-    back = np.argsort(np.concatenate(order), kind="stable")
-    if isinstance(found[0], tuple):
-        columns = [np.concatenate(column)[back] for column in zip(*found, strict=True)]
-        return type(found[0])(*columns) if hasattr(found[0], "_fields") else tuple(columns)
-    return np.concatenate(found)[back]
 
 
 # Balances of a run: energies, powers and momenta, mixed into `Solution`.
@@ -726,7 +698,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         phases = self._phases
         if phases is None or not (phases.varies or getattr(self.handles.item(item), "slides", ())):
             return exerted(self, item, on)
-        return _gathered(self, lambda part: exerted(part, item, on))
+        return gathered(self, lambda part: exerted(part, item, on))
 
     def sticking(self, friction: ItemLike) -> Bools:
         """Whether a friction of the exact law sticks: (k,).

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 
+from ..errors import StorageError
 from ..formulations.locked_orientations import keep_turning
 from ..model.handles import handles_of
 from ..model.packed import first_rows
@@ -124,6 +125,8 @@ class Phases:
 
     def parts(self, solution):
         """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are."""
+        if not self.packed:
+            raise StorageError("phases differ in forces or parameters, and the file has no scene: pass scene=.")
         for kind, mine, _ in self._gathered(solution._phase_of_rows, ()):
             part = solution._picked(mine)
             packed = self.packed[kind]

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..ahead import compile_ahead
 from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
-from ..analyses.contact_rows import ReactionWorkspace
+from ..analyses.contact_rows import KERNELS, ReactionWorkspace
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
 from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
@@ -301,6 +302,7 @@ class _ContactRun:
 
         inactive, values: names and parameters of what actions have changed, by default nothing.
         """
+        compile_ahead(KERNELS)
         with_own_parts(scene)
         self.base, self.count, self.modes, self.acted = scene, handles_of(scene.packed).count, Modes(), False
         at_first = tuple(item.name for item in inactive_of(scene))
@@ -484,6 +486,15 @@ class _ContactRun:
     def _scene(self):
         """The scene of the present modes."""
         return self._scene_of(self._closed_rows(), [self._hold(i, r) for i, r in self.modes.sticking.items()])
+
+    def filled(self):
+        """The same, with what the run remembers among its packed numbers."""
+        phase = self._scene()
+        system = phase.packed.system._replace(reals=phase.packed.system.reals.copy())
+        system.reals[system.memory] = self.remembered[self.count :]
+        filled = object.__new__(type(phase))
+        vars(filled).update(vars(phase), _packed=phase.packed._replace(system=system), _prepared=None)
+        return filled
 
     def _closed_rows(self):
         return [self.gaps.list[i].side.row for i in self.modes.closed]

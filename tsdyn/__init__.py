@@ -74,6 +74,7 @@ __all__ = [
     "Adaptive",
     "Angle",
     "Body",
+    "Change",
     "Collocation",
     "CollocationTableau",
     "CompilerWarning",
@@ -147,6 +148,7 @@ if TYPE_CHECKING:
     from .measuring.benchmark import benchmark
     from .measuring.compare import compare
     from .measuring.profile import profile
+    from .simulation.hybrid import Change
     from .simulation.impacts import impact
 else:
     from ._discovery import refusing as _refusing
@@ -157,6 +159,7 @@ else:
         "benchmark": ".measuring.benchmark",
         "compare": ".measuring.compare",
         "ensemble": ".ensembles.ensemble",
+        "Change": ".simulation.hybrid",
         "impact": ".simulation.impacts",
         "plots": ".plots",
         "profile": ".measuring.profile",

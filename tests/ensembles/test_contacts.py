@@ -79,7 +79,7 @@ def test_starts_that_penetrate_fail_alone_and_are_assembled():
     starts = {"ball.position": [[0, 0, 1.0], [0, 0, -1.0], [0, 0, 0.1]]}
     found = ts.ensemble(bouncing(), starts, (0, 1))
     assert found.status.tolist() == [ts.Status.SUCCESS, ts.Status.CASE_FAILED, ts.Status.SUCCESS]
-    assert "floor by 1.1" in found.message[1]
+    assert "floor penetrates by 1.1" in found.message[1]
     assembled = ts.ensemble(bouncing(), starts, (0, 1), assemble=True)
     assert assembled.status.tolist() == [ts.Status.SUCCESS] * 3
     np.testing.assert_allclose(assembled.q[1:, 2], 0.1, atol=1e-14)

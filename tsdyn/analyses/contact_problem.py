@@ -16,11 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
+from ..elements.element import angles
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import angle as angle_of
-from ..model.handles import counted, handles_of
+from ..model.handles import counted, displacement, handles_of
 from ..model.packed import first_rows, index_of
 from .contact_rows import ContactWorkspace
 from .tolerances import AT_REST, DEPENDENT, LEVEL
@@ -59,6 +60,8 @@ class Gaps:
         Whether there is friction.
     slip_rows : ndarray (count, 2)
         Rows of Phi of the slips, where there is friction.
+    following : dict
+        Of ratchets, whose gap is always zero: their rate, a function of q and qd (..., n), by their numbers.
     """
 
     def __init__(self, packed, contacts, free):
@@ -80,6 +83,7 @@ class Gaps:
         for i in np.flatnonzero(self.rubs):
             self._slips[i] = slip_rows(self.list[i].contact, own)
         self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
+        self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
 
     def _stop(self, handles, side):
@@ -92,6 +96,13 @@ class Gaps:
             return side.sign * (counted(found, angles[..., at]) - side.bound)
 
         return value
+
+    @staticmethod
+    def _rate(handles, side):
+        """A function of q, qd (..., n) that returns the rate (...) of a joint, in the direction of its ratchet."""
+        kind, rate = ("angle", angle_of) if angles(side.follows) else ("displacement", displacement)
+        (geometry, *_) = getattr(handles.row(side.follows, kind), f"{kind}s")
+        return lambda q, qd: side.sign * rate(geometry, *handles.motions(geometry, (q, qd)), 1)
 
     def values(self, t, levels, counted):
         """Gaps (k, count) at times t (k,).

@@ -131,6 +131,7 @@ class Primitive(Attachment):
     counted: Any = ()  # (joint, index) of each angle whose turns a term counts
     others: tuple[AnyBody, ...] = ()  # bodies beyond a and b that a term of a sum reads
     others_at = 0  # their first parameter; pack() fills in three for each
+    anywhere = False  # whether rows on velocities hold wherever positions are, though they could be integrated
     normalises = False  # whether it does no more than keep the length of p
     prescribed: str | tuple[str, ...] = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind

@@ -12,6 +12,7 @@ from .sliding import _Sliding, _SlidingSurface
 
 if TYPE_CHECKING:
     from .element import Attachment
+    from .joint import SumRow
     from .primitive import Primitive
 
 
@@ -27,16 +28,17 @@ class Grip(NamedTuple):
 class Side(NamedTuple):
     """One inequality of a unilateral constraint: gap >= 0, and Phi = 0 of its row where the gap is closed."""
 
-    row: Primitive  # Phi is its first row; with friction the next two rows of the constraint are of the slip
+    row: Primitive | SumRow  # Phi is its first row; with friction the next two rows of the constraint are of the slip
     sign: float  # of the gap over Phi, where the gap is small
     joint: Any = None  # whose counted angle the gap is measured by, sign (angle - bound); else the gap is sign Phi
     which: int = 0  # angle of the joint
     bound: float = 0.0  # rad
     grip: Grip | None = None
+    follows: Any = None  # joint whose rate, times sign, is not negative: the gap is closed wherever that is zero
 
 
 class Unilateral:
-    """Mixed into a constraint that only pushes.
+    """Mixed into a constraint that only pushes, or only pulls.
 
     Attributes
     ----------
@@ -52,6 +54,8 @@ class Unilateral:
     restitution: float
     kinetic: float | None
     static: float | None
+    excess = "penetrates"  # what is said of a gap below zero
+    _opens_by = "unilateral=True"  # the argument of a constraint that opens
 
     def _set_law(self, restitution: float, kinetic: float | None = 0.0, static: float | None = None) -> None:
         """Take the coefficients of impact and friction, at the end of `__init__`."""
@@ -77,7 +81,7 @@ class Unilateral:
             )
         for what, given in (("restitution", self.restitution != 0.0), ("kinetic", self.rubs)):
             if given and not self.unilateral:
-                raise InvalidConstraint(f"{self.name}: {what} is of a contact that opens; set unilateral=True.")
+                raise InvalidConstraint(f"{self.name}: {what} is of a constraint that opens; set {self._opens_by}.")
 
     @property
     def rubs(self) -> bool:

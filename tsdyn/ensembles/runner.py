@@ -295,7 +295,8 @@ class Study:
         default = options.rtol, options.atol, options.may_use_series
         first = at_start(scene)
         prepare_first_run(first, options.method, options.form, self.within, default)
-        self.kept, self.has_phases = scene._prepared, first is not scene
+        acts = options.acts or getattr(call.state, "phase", None) is not None
+        self.kept, self.has_phases = scene._prepared, acts or first is not scene
         self.keep = keep_of(keep, self.times, self.kept.packed)
         self.method, self.n = first_method(options, prepared(first)), self.kept.n
         self.stops = self.kept.stops(*self.span, self.method.step is None)

@@ -494,8 +494,10 @@ def _found_again(process, *parts):
 
 
 @CollectionsDeferred()
-def pack(scene):
+def pack(scene, handles=None):
     """Pack a scene; loads (at the very first use compiles) the kernels of the kinds it uses.
+
+    handles: `Handles` to look its parts up by, where they are not its own.
 
     Raises
     ------
@@ -508,8 +510,8 @@ def pack(scene):
     parameters = {constraint: checked_motions(constraint) for constraint in primitives}
     table, reals = [], []
     kinds, motions, kept, functions = _pack_constraints(parameters, int(starts[-1]), where, table, reals)
-    members, derived = tuple(_members(scene.constraints)), Derived()
-    if any(isinstance(force, SceneLaw) for force in scene.forces):
+    members, derived = tuple(_members(scene.constraints)), Derived(handles=handles)
+    if handles is None and any(isinstance(force, SceneLaw) for force in scene.forces):
         derived.handles = Handles(scene.bodies, list(where.values()), members, scene.forces)
         for pairs in (scene._twins, scene._aliases):  # functions may hold handles of the scene that this is a copy of
             derived.handles.add_aliases((pairs or {}).items())

@@ -521,7 +521,16 @@ def exerted(motion, item, on):
             more = held_reaction(motion, load, body)
             return force + more[0], torque + more[1]
         return force, torque
+    if is_idle(motion.packed, item):
+        acted(motion.packed, item, on)
+        return np.zeros((motion.t.size, 3)), np.zeros((motion.t.size, 3))
     return reaction(motion, member(motion.packed, item), acted(motion.packed, item, on))
+
+
+def is_idle(packed, item):
+    """Whether an item takes no part in a phase of its scene: it is open, or inactive."""
+    present = member_of(packed, item) is not None or id(item) in loads_of(packed)
+    return not present and any(item is known for known in handles_of(packed).items)
 
 
 def contact_point(motion, item):
@@ -613,9 +622,14 @@ class Exerting:
         demand = friction_demand(self._motion(), constraint)
         return demand if np.ndim(self.t) else demand[0]
 
+    def _acting(self):
+        """The packed scene whose parts act, and multipliers of its rows."""
+        return self.packed, self.multipliers
+
     def _motion(self):
         """The states as what `exerted` reads."""
-        packed, levels = self.packed, (self.q, self.qd, self.qdd, self.multipliers)
+        packed, lam = self._acting()
+        levels = self.q, self.qd, self.qdd, lam
         t, (q, qd, qdd, lam) = np.atleast_1d(self.t), map(np.atleast_2d, levels)
         memory = with_normal_loads(packed, t, q, qd, qdd, np.atleast_2d(self.memory))
         return SimpleNamespace(packed=packed, system=packed.system, t=t, q=q, qd=qd, multipliers=lam, _memory=memory)

@@ -31,6 +31,8 @@ class Event(NamedTuple):
     direction: float  # of the changes that count; 0 for both
     exact: bool = False  # whether a value at the start that is positive is no rounding of zero
     falls: bool = False  # of a `Member`: whether it may begin at zero within rounding, and falls from there at once
+    action: object = None  # a function of a `Change` that each occurrence calls, or None
+    goes_on: bool = False  # whether a zero at the start has been counted before
 
     def value(self, t, instant):
         """The function's value; raises `EventFailed`."""
@@ -75,7 +77,10 @@ def prepare(events):
             )
         if math.isnan(number(direction)):
             raise InvalidArgument(f"{name}: direction must be a number, of which the sign counts, got {direction!r}.")
-        found.append(Event(function, name, limit or math.inf, number(direction)))
+        action = getattr(function, "action", None)
+        if action is not None and not callable(action):
+            raise InvalidArgument(f"{name}: action must be a function action(change), got {action!r}.")
+        found.append(Event(function, name, limit or math.inf, number(direction), action=action))
     return found
 
 
@@ -202,6 +207,7 @@ class Track:
         """Take the value at t, the start of a run; has_sign: whether it is no rounding of zero where it is positive."""
         self.value = self.end = value  # at that time, and at the end of the present step
         self.sign = 0.0  # the last it had; 0 for none yet
+        self.before = 0.0  # the same at the last step's start, or soon after it
         self.significant = None  # time and value at which it had that sign
         if has_sign and value != 0.0:
             self.sign, self.significant = math.copysign(1.0, value), (t, value)
@@ -298,16 +304,22 @@ class Watch:
         self._note_start()
         if not anew:
             return
+        again = self.tracks is not None
         self.tracks = self.tracks or [Track() for _ in self.events]
         for group in self._groups:
             group.begin(self._sample(group, np.array([self.t]), self.state[None])[0])
         for i in self._single:
-            self.tracks[i].begin(self.t, self._value(i, self.t, self.state), False)
+            track = self.tracks[i]
+            track.begin(self.t, self._value(i, self.t, self.state), False)
+            if (again or self.events[i].goes_on) and track.value == 0.0:
+                track.zero, track.passed = self.t, True
 
     def _is_resumed(self, memory, last):
         """Whether the run goes on from the event that ends it, in the same memory, with other velocities."""
         run, is_member = memory.run, isinstance(self.events[last.index].function, Member)
         if self.resume is None or not is_member or not memory.begins_again or last.t >= run.clock.t_end:
+            return False
+        if any(found and event.action for event, found in zip(self.events, self.list, strict=True)):
             return False
         self.begins_again = self.resume(last.t, run, [i for i in self._members if self.list[i]])
         return self.begins_again
@@ -453,6 +465,7 @@ class Watch:
                 break
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
+                self._add_beside(step, each)
                 if self.angles:
                     run.remembered[: self.angles] = self._angles(each.t, each.state)
                 self._end(run, log, each.t, each.state, step.t0)
@@ -462,6 +475,18 @@ class Watch:
         if failure is not None:
             raise failure
         return None
+
+    def _add_beside(self, step, last):
+        """Add the events with an action that occur at the instant of the last one, to rounding of value and time."""
+        before = max(last.t - NOISE * ROOT * abs(last.t), step.t0)
+        for i, event in enumerate(self.events):
+            track = self.tracks[i]
+            if event.action is None or i == last.index or not track.before:
+                continue
+            value = self._at(i, step, last.t)
+            noise = max(self._shaken(i, step, last.t), NOISE * abs(value - self._at(i, step, before)))
+            if abs(value) <= noise and event.direction * track.before <= 0.0:
+                self.list[i].append(Occurrence(last.t, i, last.state))
 
     def _points(self, i, step, end):
         """Times up to `end`, and values of event i, between which its sign changes once at most; what `EventFailed`."""
@@ -505,6 +530,7 @@ class Watch:
     def _walk(self, i, step, points):
         """The occurrences of event i among these points."""
         track, direction, found = self.tracks[i], self.events[i].direction, []
+        track.before = track.sign or next((math.copysign(1.0, v) for _, v in points if abs(v) > track.noise), 0.0)
         (before, value), *rest = points
         # A value near zero at the start of the run is a zero there, within rounding
         if track.sign == 0.0 and track.zero is None:  # the run's first step

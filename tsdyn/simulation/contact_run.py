@@ -38,10 +38,11 @@ from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import damaged, demand, listed
+from . import hybrid
 from .grips import Halting, Reactions, phase_with_friction, renewed
 from .impacts import held, impact_of, jumped
-from .phase_scenes import NAMED, first_row_of, gaps_of, phase_of
-from .phases import Modes, PhasePieces, Phases, Pinned
+from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
+from .phases import Modes, PhasePieces, Phases, Pinned, plain
 from .progress import reporter, silent
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
@@ -89,11 +90,14 @@ class _Closing:
 
     def open(self, opened):
         """Take other contacts that have just opened."""
-        self.which, self.start = list(opened), tuple(zip(*opened.values(), strict=True))
+        self.which = [i for i in opened if i not in self.gaps.following]
+        self.start = tuple(zip(*(opened[i] for i in self.which), strict=True))
 
     def over(self, states):
         """Values (k, count) of `States`."""
         values = self.gaps.values(states.t, states.levels, states.counted)
+        for i, rate in self.gaps.following.items():
+            values[:, i] = rate(states.q, states.qd)
         if self.which:
             begun, first, rate = map(np.array, self.start)
             since = states.t[:, None] - begun
@@ -204,15 +208,14 @@ class _Slowing:
         return values
 
 
-def demand_apart(gaps, q, angles, tol):
-    """Raise InconsistentState where contacts penetrate."""
+def demand_apart(gaps, able, q, angles, tol):
+    """Raise InconsistentState where gaps, of those that are able to close, are below zero."""
     values = gaps.at(q, angles)
-    deep = np.flatnonzero(values < -tol * (1.0 + np.abs(q).max()))
-    if deep.size:
-        found = listed([f"{gaps.names[i]} by {-values[i]:.3g}" for i in deep], NAMED)
+    deep = [i for i in able if values[i] < -tol * (1.0 + np.abs(q).max())]
+    if deep:
+        found = listed([f"{gaps.names[i]} {gaps.list[i].contact.excess} by {-values[i]:.3g}" for i in deep], NAMED)
         raise InconsistentState(
-            f"contacts penetrate at the start (m, or rad): {found}. Move the bodies apart, or have scene.assemble() "
-            "close these contacts."
+            f"at the start (m, or rad): {found}. Move the bodies, or have scene.assemble() close these gaps."
         )
 
 
@@ -244,7 +247,8 @@ class _ContactRun:
     """
 
     def __init__(self, scene, options, call, run_of=None, run_task=None, instead=None, archive=None):
-        self._take_scene(scene)
+        phase = getattr(call.state, "phase", None)
+        self._take_scene(scene, *(() if phase is None else phase[:2]))
         self.options, self.call, self.archive = options, call, archive
         self.run_of, self.run_task, self.instead = run_of, run_task, instead
         self.span = interval(call.t_span)
@@ -256,7 +260,7 @@ class _ContactRun:
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
-        demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol)
+        demand_apart(self.gaps, self.able, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
         self.rest = self.t
         self.kinds, self.parts, self.found, self.report = [], [], [[] for _ in self.users], reporter(call.progress)
@@ -266,11 +270,35 @@ class _ContactRun:
         self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
 
-    def _take_scene(self, scene):
-        """What follows from the scene alone, and makes the scenes of its phases."""
+    def _take_scene(self, scene, inactive=None, values=None):
+        """What follows from the scene alone, and makes the scenes of its phases.
+
+        inactive, values: names and parameters of what actions have changed, by default nothing.
+        """
         compile_ahead(KERNELS)
-        self.scene, self.gaps, self.frictions, self.modes = scene, gaps_of(scene), Frictions(scene), Modes()
-        self.count = handles_of(scene.packed).count
+        with_own_parts(scene)
+        self.base, self.count, self.modes, self.acted = scene, handles_of(scene.packed).count, Modes(), False
+        at_first = tuple(item.name for item in inactive_of(scene))
+        self.switched = set(at_first)
+        self.change(at_first if inactive is None else inactive, values or {})
+
+    def change(self, inactive, values):
+        """Take these parts as inactive, by name, and these parameters."""
+        self.inactive, self.values = inactive, values
+        self.switched |= set(inactive)
+        self.scene = hybrid.with_values(self.base, values)
+        parts = {each.name: each for each in (*self.scene._added, *self.scene._forces)}
+        for name in inactive:
+            if name not in parts:
+                raise InvalidArgument(f"the state is of a scene with {name!r}, which this one lacks.")
+        self.without = dependent(self.scene, [parts[name] for name in inactive])
+        self.gaps, self.frictions = gaps_of(self.scene, self.without), Frictions(self.scene)
+        off = {id(item) for item in self.without}
+        self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]
+        self.off = [i for i, unit in enumerate(self.frictions.units) if id(unit.force) in off]
+
+    def _scene_of(self, rows, holds):
+        return phase_of(self.scene, rows, holds, self.without)
 
     def _demand_served(self, kept):
         rough = [load.force.title for load in kept.packed.loads if load.normal >= 0 and load.force.slips]
@@ -304,7 +332,8 @@ class _ContactRun:
         except TsdynError as error:
             if self.end is None:
                 raise
-            status, self.reason = FAILURES.get(type(error), Status.CONTACT_FAILED), str(error)
+            status = Status.ACTION_FAILED if self.acted else FAILURES.get(type(error), Status.CONTACT_FAILED)
+            self.reason = str(error)
         finally:
             self.report(None)
         if self.end is None:
@@ -313,12 +342,13 @@ class _ContactRun:
 
     def _whole(self, task):
         """A task as that of the whole run."""
-        return task._replace(prepared=prepared_numbers(self.scene), span=self.span)
+        return task._replace(prepared=prepared_numbers(self.base), span=self.span)
 
     def begin(self):
         """Impact and closed contacts at the start; the Status if there is no way on, else None."""
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
+        touching = [i for i in touching if i in self.able]
         return self._settle(touching, ()) or self._settle_frictions(Modes(), ())
 
     def check(self):
@@ -400,14 +430,17 @@ class _ContactRun:
         return self.run_of(phase, replace(self.options, events=None), call), call
 
     def _end_phase(self, t):
-        self.phases.add(self.phases.kind(self.packed, self._record()), self.t, self.rest, t, self.names)
+        kind = self.phases.kind(self.packed, self._record(), self.scene.packed)
+        self.phases.add(kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
 
     def _record(self):
         """What the scene of the present phase is made of, for files."""
-        return [self.modes.saved(), self.remembered.tolist()]
+        return [self.modes.saved(), self.remembered.tolist(), plain((self.inactive, self.values))]
 
     def _recorded_scene(self, record):
         """The scene that such a record tells."""
+        inactive, values = record[2]
+        self.change(tuple(inactive), dict(values))
         self.modes, self.remembered = Modes.of(record[0]), np.array(record[1], float)
         demand(self.remembered.shape == (self.count + self.scene.system.memory.size,), "what is remembered")
         return self._scene()
@@ -434,8 +467,8 @@ class _ContactRun:
         """The scene of the present modes."""
         holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
         if self.modes.grips:
-            return phase_with_friction(self.scene, self.gaps, self.modes, holds)
-        return phase_of(self.scene, self._closed_rows(), holds)
+            return phase_with_friction(self.scene, self.gaps, self.modes, holds, self.without)
+        return self._scene_of(self._closed_rows(), holds)
 
     def filled(self):
         """The same, with what the run remembers among its packed numbers."""
@@ -466,7 +499,11 @@ class _ContactRun:
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""
         pairs = zip(self.users, self.counts, strict=True)
-        found = [event._replace(limit=event.limit - count) for event, count in pairs]
+        goes_on = self.end is not None
+        found = [
+            event._replace(limit=1.0 if event.action else event.limit - count, goes_on=goes_on)
+            for event, count in pairs
+        ]
         watches = list(self._watches(phase))
         self.watched = [None] * len(found) + [unit for unit, _ in watches]
         return found + [event for _, event in watches]
@@ -481,7 +518,7 @@ class _ContactRun:
             sides = [gaps.list[i].side for i in modes.closed]
             leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
         self.closing = _Closing(gaps, modes.opened)
-        for i in range(gaps.count):
+        for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
             is_open = i not in modes.closed
@@ -545,7 +582,9 @@ class _ContactRun:
             self.found[i].append(mine)
             self.counts[i] += len(mine[0])
         fired = [i for i, at in zip(self.watched, times, strict=True) if i is not None and at.size]
-        ends = outcome.status is Status.EVENT and bool(fired)
+        acting = [event for event, at in zip(self.users, times, strict=False) if event.action and at.size]
+        ended = any(count >= event.limit for event, count in zip(self.users, self.counts, strict=True))
+        ends = outcome.status is Status.EVENT and not ended
         goes_on = ends and end.reached < self.span[1]
         count = len(outcome.rows) if archive is None else archive.counts["outputs"] - self.written["outputs"]
         if not self.per_step and goes_on and count and self.times[self.taken + count - 1] == end.reached:
@@ -562,9 +601,9 @@ class _ContactRun:
         if self.settled is not None:  # within the run of the phase
             return self.settled[0]
         self.t, (self.q, self.qd, _), self.remembered = end.reached, (x.copy() for x in end.last), end.remembered
-        if goes_on:
-            return self._transit(fired)
         self.reason = outcome.reason
+        if goes_on:
+            return self._act(acting, fired, end.last) if acting else self._transit(fired)
         if self._is_deep():
             return Status.CONTACT_FAILED
         return Status.SUCCESS if ends else outcome.status
@@ -572,22 +611,40 @@ class _ContactRun:
     def _is_deep(self):
         """Whether contacts penetrate; says so."""
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        deep = self.gap < -PENETRATION * self.length
-        if not deep.any():
-            return False
-        found = listed([self.gaps.names[i] for i in np.flatnonzero(deep)], NAMED)
-        self.reason = f"Penetration was not noticed: {found}. Give a max_step."
-        return True
+        deep = [i for i in (self.gap < -PENETRATION * self.length).nonzero()[0].tolist() if i in self.able]
+        if deep:
+            found = listed([self.gaps.names[i] for i in deep], NAMED)
+            self.reason = f"Penetration was not noticed: {found}. Give a max_step."
+        return bool(deep)
 
-    def _transit(self, fired):
-        """From one phase to the next one, after events of the units `fired`; the Status if there is no way on."""
-        self.reason, qd = "", self.qd
+    def _act(self, events, fired, last):
+        """Carry out the actions of events; the Status if there is no way on, else None. last: the state (3, n)."""
+        change = hybrid.ask(self, events, last)
+        if change is None or change._ends:
+            return Status.ACTION_FAILED if change is None else Status.EVENT
+        self.acted = True
+        jump = hybrid.carry_out(self, change)
+        if jump is None:
+            return Status.ACTION_FAILED
+        if (self.qd != jump.qd).any():  # ratchets don't take hold as they would have
+            fired = [i for i in fired if i not in self.gaps.following]
+        status = self._transit(fired, jump.qd)
+        hybrid.report(self, jump)
+        return status
+
+    def _transit(self, fired, qd=None):
+        """From one phase to the next one, after events of the units `fired`; the Status if there is no way on.
+
+        qd: velocities (n,) before what actions have done to them.
+        """
+        self.reason, qd = "", self.qd if qd is None else qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
         (near,) = (self.gap <= TOUCHING * self.length).nonzero()
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         hit = [i for i in fired if i < count]
-        status = self._settle(sorted({*near.tolist(), *hit, *before.closed, *before.idle}), hit)
+        touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
+        status = self._settle(sorted(touching), hit)
         if self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status or self._settle_frictions(before, [i - count for i in fired if count <= i < count + own])
@@ -620,9 +677,10 @@ class _ContactRun:
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
             small = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max()
             rates[[i for i in before.closed if abs(rates[i]) <= small[i]]] = 0.0
-            grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0]
-            noise = [i for i in grazing if rates[i] > 0.0]
-            if noise:  # a gap that closes with a rate of rounding
+            grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
+            opening = [i for i in fired if i not in before.closed]
+            noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
+            if noise:  # a gap that closes with a rate of rounding, or a ratchet that takes hold
                 self.qd, rates = held(inertia, self.qd, noise, rates)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
@@ -657,7 +715,10 @@ class _ContactRun:
         place, (v, sizes, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
         self.remembered, resting, guess = self.remembered.copy(), [], {}
         memory = self.remembered[count:]  # a part of it
+        self.modes.blocked = self.off
         for i, unit in enumerate(frictions.units):
+            if i in self.off:
+                continue
             speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
             if i in before.blocked and memory[unit.way].any():
                 guess[i] = place.read(i, memory)
@@ -677,7 +738,7 @@ class _ContactRun:
         for i, way in rest.ways.items():
             memory[frictions.units[i].way] = place.written(i, way)
         self.modes.sticking = {i: ranks[i] for i in rest.sticking}
-        self.modes.blocked = sorted([*rest.blocked, *(i for i in resting if not ranks[i])])
+        self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
         self.modes.begun = {i: (self.t, rate) for i, rate in rest.rates.items()}
         return None
 
@@ -692,7 +753,7 @@ class _ContactRun:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        phase = phase_of(self.scene, self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
+        phase = self._scene_of(self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
@@ -708,7 +769,7 @@ class _ContactRun:
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
         unit = self.frictions.units[i]
         hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
-        phase = phase_of(self.scene, self._closed_rows(), [hold])
+        phase = self._scene_of(self._closed_rows(), [hold])
         memory = self.remembered[self.count :].copy()
         for k in range(3):
             memory[np.array(unit.held(k))] = hold.numbers[k]
@@ -762,6 +823,8 @@ class _ContactRun:
     # The whole
 
     def _outcome(self, status, began):
+        parts = [each for each in (*self.base._added, *self.base._forces) if each.name in self.switched]
+        self.phases.name_switched([each for each in parts if not getattr(each, "unilateral", False)])
         parts, end, archive, events = self.parts, self.end, self.archive, None
         ends = [part.end for part in parts]
         logs = self.options.history is not False and archive is None
@@ -786,6 +849,7 @@ class _ContactRun:
         """Numbers and arrays by name."""
         phases, arrays = self.phases.saved()
         numbers = {name: getattr(self, name) for name in KEPT} | {"modes": self.modes.saved(), "phases": phases}
+        numbers |= {"changes": plain((self.inactive, self.values)), "switched": sorted(self.switched)}
         starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
         for where, (_, *parts) in starts.items():
             arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
@@ -805,6 +869,9 @@ class _ContactRun:
             known, n, arrays = numbers["phases"], self.q.size, _own(arrays)
             vars(self).update({name: known[name] for name in KEPT})
             self.phases.restore(known["phases"], arrays, self._recorded_scene)
+            inactive, values = known["changes"]
+            self.change(tuple(inactive), dict(values))
+            self.switched |= set(known["switched"])
             self.modes = Modes.of(known["modes"])
             if known["sampling"] is not None:
                 self.sampling = Sampling(prepared(phase_of(self.scene, [])), True)

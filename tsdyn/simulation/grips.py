@@ -23,7 +23,7 @@ from .tolerances import SAME_WAY, SLOW
 # where it sticks, else d (3,), ground frame; `held` where in b, m, the point of a is that sticks.
 
 
-def phase_with_friction(scene, gaps, modes, holds):
+def phase_with_friction(scene, gaps, modes, holds, without=None):
     """The scene of a phase: as `phase_of`, with the directions of sliding contacts and the places of sticking ones."""
     items, numbers = [], {}
     for i in modes.closed:
@@ -36,7 +36,7 @@ def phase_with_friction(scene, gaps, modes, holds):
         else:
             items += gap.side.grip[:2]
             numbers[gap.side.grip.sliding] = modes.grips[i]
-    phase = phase_of(scene, items, holds)
+    phase = phase_of(scene, items, holds, without)
     return _with_numbers(phase, numbers) if numbers else phase
 
 

@@ -1,6 +1,6 @@
 """Scenes of the phases of a run: what of a scene stays, and what its contacts and frictions are in their modes."""
 
-from functools import wraps
+from functools import partial, wraps
 from itertools import chain
 
 import numpy as np
@@ -10,54 +10,108 @@ from ..elements.force import Force
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument
 from ..model.handles import handles_of
-from ..model.packed import begins_of
+from ..model.packed import begins_of, pack
 from ..validation import listed
 
 # A phase is a scene of its own, packed once for each combination of modes: the bodies, joints and forces of the scene,
 # less those that are switched off, and the rows that its units add in their modes, such as that of a closed gap. So
 # nothing below it knows of contacts, and a scene without contacts loads nothing of this. Numbers of these rows that are
 # taken at a transition, such as the place where a block sticks, are among what the run remembers: nothing is packed
-# for other values.
+# for other values. All phases remember the same: angles of all joints, and what all forces and constraints of the scene
+# remember, whether these are active or not.
 
 NAMED = 5  # contacts in a message
 
 
 def has_contacts(scene):
-    """Whether runs of a scene have phases, by contacts or exact friction; looked up once until the scene changes."""
+    """Whether runs of a scene have phases, by contacts, exact friction or inactive parts; kept until it changes."""
     if scene._opens is None:
-        scene._opens = bool(any(getattr(force, "slides", ()) for force in scene._forces) or contacts_of(scene._added))
+        slides = any(getattr(force, "slides", ()) for force in scene._forces)
+        scene._opens = slides or bool(contacts_of(scene._added) or inactive_of(scene))
     return scene._opens
 
 
-def phase_of(scene, rows, holds=(), without=()):
+def inactive_of(scene):
+    """The constraints and forces that are inactive at the start, a tuple."""
+    return tuple(each for each in (*scene._added, *scene._forces) if not each.active)
+
+
+def with_own_parts(scene):
+    """Pack a scene of `with_parameters` anew if it is packed with the parts of another: phases take its own."""
+    if scene._bodies and scene.packed.bodies[0] is not scene._bodies[0]:
+        scene.touch()
+
+
+def dependent(scene, items):
+    """These items, and friction by reactions of joints among them: a tuple."""
+    gone = {id(item) for item in items}
+    frictions = [force for force in scene._forces if "normal_load" in force.kernels and id(force) not in gone]
+    return *items, *(force for force in frictions if id(force.joint) in gone)
+
+
+def phase_of(scene, rows, holds=(), without=None):
     """The scene with these rows, primitives, and forces in place of its contacts; kept until the scene changes.
 
     holds: rows with numbers that the run remembers, as `friction_problem.Hold`. without: constraints and forces left
-    out.
+    out, by default those that are inactive at the start.
     """
     known = scene._phases
     if known is None:
         known = scene._phases = {}
-    key = frozenset((*map(id, (*rows, *without)), *(hold.key for hold in holds)))
+    without = dependent(scene, inactive_of(scene)) if without is None else without
+    key = frozenset(map(id, rows)), frozenset(map(id, without)), frozenset(hold.key for hold in holds)
     if key not in known:
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
         constraints, forces = ([each for each in rows if isinstance(each, Force) is given] for given in (False, True))
         held = [hold.rows() for hold in holds]
-        phase = object.__new__(type(scene))
+        phase = known[key] = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
             _added=[each for each in scene._added if id(each) not in gone] + [*constraints, *chain(*held)],
             _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None, _start=None,
             _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
+            _pack=partial(_pack_phase, phase, scene, holds, held), _whole=scene,
         )  # fmt: skip
-        if holds:
-            phase._packed = _holding(phase.packed, holds, held)
-        known[key] = phase
     return known[key]
 
 
-def gaps_of(scene):
-    """The `Gaps` of a scene with contacts."""
+def _pack_phase(phase, scene, holds, held):
+    """Pack a phase of a scene: it remembers what the scene does, in the same order."""
+    whole = scene.packed
+    packed = pack(phase, handles_of(whole).where_some_act((*phase._added, *phase._forces)))
+    if whole.system.memory.size:
+        packed = _remembering(packed, whole)
+    return _holding(packed, holds, held) if holds else packed
+
+
+def _remembering(packed, whole):
+    """Packed with the memory of a whole scene; what is missing is kept in a number that nothing reads."""
+    own, memory = _slots(packed), np.full(whole.system.memory.size, packed.system.reals.size)
+    found = _slots(whole)
+    for item, slots in own.items():
+        memory[found[item]] = packed.system.memory[slots]
+    if (memory == packed.system.memory).all() if memory.size == packed.system.memory.size else False:
+        return packed
+    first = {item: slots.start for item, slots in found.items()}
+    pairs = zip(packed.constraints, packed.slots, strict=True)
+    return packed._replace(
+        system=packed.system._replace(memory=memory, reals=np.append(packed.system.reals, 0.0)),
+        loads=tuple(load if load.slot < 0 else load._replace(slot=first[id(load.force)]) for load in packed.loads),
+        slots=tuple(slot if slot < 0 else first[id(part)] for part, slot in pairs),
+    )
+
+
+def _slots(packed):
+    """The slots of System.memory of each force and primitive that has any, a slice, by its id."""
+    owners = [(load.slot, id(load.force)) for load in packed.loads]
+    owners += zip(packed.slots, map(id, packed.constraints), strict=True)
+    owners = sorted(owner for owner in owners if owner[0] >= 0)
+    ends = [*(slot for slot, _ in owners[1:]), packed.system.memory.size]
+    return {item: slice(slot, end) for (slot, item), end in zip(owners, ends, strict=False)}
+
+
+def gaps_of(scene, without=None):
+    """The `Gaps` of a scene, of its inactive contacts too; `without` as of `phase_of`."""
     from ..analyses.contact_problem import Gaps
 
     sides = [(contact, side) for contact in contacts_of(scene._added) for side in contact.sides]
@@ -65,7 +119,7 @@ def gaps_of(scene):
     rubbing = [part for contact, side in sides if side.grip for part in contact.parts]
     rows += [part for part in rubbing if not any(part is row for row in rows)]
     alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
-    return Gaps(scene.packed, alone.packed, phase_of(scene, []).packed)
+    return Gaps(scene.packed, alone.packed, phase_of(scene, [], without=without).packed)
 
 
 def _holding(packed, holds, held):
@@ -87,15 +141,16 @@ def first_row_of(packed):
 
 
 def at_start(scene):
-    """The scene with those contacts closed, without friction, that are so at its start; without contacts as it is."""
+    """The scene at its start: closed contacts hold, without friction; ratchets and inactive parts are left out."""
     if not has_contacts(scene):
         return scene
     from ..analyses.contact_problem import closed_gaps
 
     gaps, (q, _) = gaps_of(scene), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
-    closed = [gaps.list[i].side for i in closed_gaps(gaps, q, angles)]
-    return phase_of(scene, [side.grip.gap if side.grip else side.row for side in closed])
+    closed = [gaps.list[i] for i in closed_gaps(gaps, q, angles) if i not in gaps.following]
+    sides = [gap.side for gap in closed if gap.contact.active]
+    return phase_of(scene, [side.grip.gap if side.grip else side.row for side in sides])
 
 
 def demand_bilateral(scene, who="this analysis"):

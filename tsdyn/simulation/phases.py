@@ -1,13 +1,16 @@
 """The phases of a run with contacts: what its solution asks of them, and what files hold of them."""
 
+import json
 from dataclasses import dataclass, field
-from types import SimpleNamespace
 
 import numpy as np
 
+from ..errors import StorageError
 from ..formulations.locked_orientations import keep_turning
+from ..model.handles import handles_of
 from ..model.packed import first_rows
 from ..observables import diagnostics, reactions
+from ..observables.state import StatePhase
 from ..rows.graph_builder import graph_of, set_redundant
 from ..runs.dense_output import StepPieces
 from ..validation import demand, demand_record
@@ -56,7 +59,7 @@ def _entries(pairs):
 
 
 def plain(value):
-    """A value of modes as JSON has it."""
+    """A value of modes, or of what actions have changed, as JSON has it."""
     if isinstance(value, dict):
         return [[plain(key), plain(each)] for key, each in value.items()]
     if isinstance(value, (list, tuple)):
@@ -64,7 +67,7 @@ def plain(value):
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
-RECORD = {"modes": list, "derived": list, "names": list, "contacts": list}
+RECORD = {"modes": list, "derived": list, "names": list, "contacts": list, "changes": list, "changed": list}
 
 
 class Phases:
@@ -86,25 +89,37 @@ class Phases:
         s; before those of `list` where flights below rounding are left out.
     gains : dict of int to float
         Change of the kinetic energy (J) at the beginning of phases, by their numbers: what impacts took.
+    changes : list of (tuple of str, dict)
+        What actions had changed before each phase: names of the parts that are inactive, and parameters by name.
     """
 
     def __init__(self, packed, gaps):
         self.whole, self.gaps, self.list, self.impulses = packed, gaps, [], []
-        self.starts, self.of, self.gains = [], [], {}
+        self.starts, self.of, self.gains, self.changes = [], [], {}, []
         self.packed, self.modes, self._columns, self._known = [], [], [], {}  # of each kind of phase
         self.scenes = []  # of each kind, of phases that were restored
 
-    def kind(self, packed, modes):
-        """The number of the kind of phases that are packed so; modes: what makes its scene again, for files."""
+    @property
+    def varies(self):
+        """Whether forces or numbers differ between phases, not rows alone."""
+        forces = {load.force.name for load in self.whole.loads}
+        return any(values or not forces.isdisjoint(inactive) for inactive, values in self.changes)
+
+    def kind(self, packed, modes, whole):
+        """The number of the kind of phases that are packed so.
+
+        modes: what makes its scene again, for files. whole: the scene with its parameters, packed.
+        """
         kind = self._known.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
             self.packed.append(packed)
             self.modes.append(modes)
-            self._columns.append(shared_rows(self.whole, packed))
+            self._columns.append(shared_rows(whole, packed))
         return kind
 
-    def add(self, kind, begin, rest, end, names):
+    def add(self, kind, begin, rest, end, names, changes):
         """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
+        self.changes.append(changes)
         if self.list:
             self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
         self.starts.append(begin)
@@ -186,18 +201,41 @@ class Phases:
             out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
         return diagnostics.ConstraintError(*out)
 
-    def exerted(self, solution, item, on):
-        """Force and torque (k, 3) as of `reactions.exerted`, of frictions that slide and stick in turn."""
-        out = np.zeros((2, solution.t.size, 3))
-        arrays = solution.t, solution.q, solution.qd, solution.qdd, solution._memory
-        for kind, mine, some in self._gathered(solution._phase_of_rows, arrays):
-            packed, (t, q, qd, qdd, memory) = self.packed[kind], some
-            lam = reactions.multipliers(packed, t, q, qd, qdd, memory)
-            motion = SimpleNamespace(
-                packed=packed, system=packed.system, t=t, q=q, qd=qd, qdd=qdd, multipliers=lam, _memory=memory
-            )
-            out[:, mine] = reactions.exerted(motion, item, on)
-        return out[0], out[1]
+    def packed_at(self, t):
+        """Yield each packed scene of phases at times t (k,), and which times are its."""
+        for kind, mine, _ in self._gathered(self.at(t), ()):
+            yield self.packed[kind], mine
+
+    def phase_at(self, t):
+        """The `StatePhase` at t, s, or of several times; None where actions have changed nothing."""
+        if not any(inactive or values for inactive, values in self.changes):
+            return None
+        numbers = np.unique(self.at(np.atleast_1d(t))).tolist() or [0]
+        kinds = {self.of[number] for number in numbers}
+        one = kinds.pop() if len(kinds) == 1 else None
+        found = (None, None) if one is None else (self.packed[one], self._columns[one])
+        return StatePhase(*self.changes[numbers[-1]], *found)
+
+    def parts(self, solution):
+        """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are."""
+        if not self.packed:
+            raise StorageError("phases differ in forces or parameters, and the file has no scene: pass scene=.")
+        for kind, mine, _ in self._gathered(solution._phase_of_rows, ()):
+            part = solution._picked(mine)
+            packed = self.packed[kind]
+            part.packed, part.system, part.handles, part._phases = packed, packed.system, handles_of(packed), None
+            yield part, mine
+
+    def active(self, item, numbers):
+        """Whether a part is active in the phases of these numbers (k,)."""
+        return np.array([item.name not in inactive for inactive, _ in self.changes])[numbers]
+
+    def name_switched(self, parts):
+        """Name in each phase which of these parts, that come and go, are active in it."""
+        for k, (inactive, _) in enumerate(self.changes):
+            active = [item.name for item in parts if item.name not in inactive]
+            begin, end, names = self.list[k]
+            self.list[k] = begin, end, tuple(dict.fromkeys((*names, *active)))
 
     def _gathered(self, numbers, arrays):
         """Yield each kind of phases, the entries (j,) of arrays in its phases, and these parts of the arrays."""
@@ -212,13 +250,21 @@ class Phases:
         contacts = list(dict.fromkeys(name for _, name, _ in self.impulses))
         place, number = ({name: i for i, name in enumerate(known)} for known in (names, contacts))
         derived = [derived_record(packed) for packed in self.packed]
+        changes = list({json.dumps(plain(each)): plain(each) for each in self.changes}.values())
+        changed = [changes.index(plain(each)) for each in self.changes]
         numbers = {"modes": self.modes, "derived": derived, "names": names, "contacts": contacts}
+        numbers |= {"changes": changes, "changed": changed}
         phases = [(*span, place[named]) for *span, named in self.list]
-        impulses = [(t, number[name], p) for t, name, p in self.impulses]
+        # Of an impulse with several components a line for each, numbered from one
+        impulses = [
+            (t, number[name], x, i + (np.ndim(p) > 0))
+            for t, name, p in self.impulses
+            for i, x in enumerate(np.atleast_1d(p).tolist())
+        ]
         return numbers, {
             "phases": np.column_stack((self.starts, self.of, phases)) if phases else np.zeros((0, 5)),
             "gains": np.array(list(self.gains.items())).reshape(-1, 2),
-            "impulses": np.array(impulses, float).reshape(-1, 3),
+            "impulses": np.array(impulses, float).reshape(-1, 4),
         }
 
     def restore(self, numbers, arrays, scene_of=None):
@@ -232,7 +278,7 @@ class Phases:
         demand_record(numbers, RECORD)
         phases, impulses = arrays["phases"].astype(float), arrays["impulses"].astype(float)
         names, contacts = [tuple(map(str, named)) for named in numbers["names"]], list(map(str, numbers["contacts"]))
-        demand(phases.ndim == impulses.ndim == 2 and phases.shape[1] == 5 and impulses.shape[1] == 3, "the phases")
+        demand(phases.ndim == impulses.ndim == 2 and phases.shape[1] == 5 and impulses.shape[1] == 4, "the phases")
         (of, named), which = phases[:, [1, 4]].T.astype(int), impulses[:, 1]
         for places, known in ((of, numbers["modes"]), (named, names), (which, contacts)):
             demand(np.isin(places, np.arange(len(known))).all(), "the numbers of phases")
@@ -240,13 +286,21 @@ class Phases:
         self.starts, self.of = phases[:, 0].tolist(), of.tolist()
         self.list = [(t, end, names[i]) for t, end, i in zip(*phases[:, 2:4].T.tolist(), named, strict=True)]
         self.gains = {int(number): energy for number, energy in arrays["gains"].astype(float).reshape(-1, 2).tolist()}
-        self.impulses = [(t, contacts[int(i)], p) for t, i, p in impulses.tolist()]
+        self.impulses = []
+        for t, i, p, component in impulses.tolist():
+            if component > 1.0:
+                demand(bool(self.impulses) and np.ndim(self.impulses[-1][2]) == 1, "the impulses")
+                p = np.append(self.impulses.pop()[2], p)
+            self.impulses.append((t, contacts[int(i)], np.array([p]) if component == 1.0 else p))
+        demand(len(numbers["changed"]) == len(self.of), "the changes")
+        known = [(tuple(map(str, inactive)), dict(values)) for inactive, values in numbers["changes"]]
+        self.changes = [known[i] for i in numbers["changed"]]
         for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True) if scene_of else ():
             scene = scene_of(modes)
             packed = scene.packed
             if derived != derived_record(packed):
                 take_derived(packed, derived)
-            self.kind(packed, modes)
+            self.kind(packed, modes, packed if scene._whole is None else scene._whole.packed)
             self.scenes.append(scene)
 
 

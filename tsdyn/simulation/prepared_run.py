@@ -28,7 +28,7 @@ from ..taylor.series_engine import SeriesEngine
 from ..validation import damaged
 from . import stored_runs
 from .local_origin import origin_of, run_near, within_rounding
-from .phase_scenes import at_start
+from .phase_scenes import at_start, with_own_parts
 from .progress import reporter
 from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented, from_names
 from .scene import Scene
@@ -173,6 +173,8 @@ class Run:
     @fitting
     def __init__(self, scene: Scene, options: RunOptions) -> None:
         self.scene, self.options, self._form = scene, options, options.form
+        if options.acts:
+            with_own_parts(scene)
         self._first = at_start(scene)  # whose method and kernels are those of the first phase
         self._compiled = set()  # with outputs between steps, or not
         self._last = self._seen = None  # the last `_Last`, and state
@@ -256,7 +258,7 @@ class Run:
         started, is_stored = clock(), call.store is not None or call.checkpoint is not None
         if is_stored and archive is None and found[0] is None:
             stored_runs.demand_storable(call, self.options)
-        if self._first is not self.scene:
+        if self._has_phases(call):
             return self._solve_phases(call, found, is_stored)
         task = self._task(call)
         if is_stored:
@@ -273,8 +275,13 @@ class Run:
                 return self._by(other)._solve(call)
         return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
+    def _has_phases(self, call):
+        """Whether a run is a sequence of phases: by the scene, by actions of events, or by what these have changed."""
+        acts = self.options.acts or getattr(call.state, "phase", None) is not None
+        return acts or self._first is not self.scene
+
     def _solve_phases(self, call, found, is_stored):
-        """The same of a scene with unilateral constraints."""
+        """The same of a run with phases."""
         from . import contact_run
 
         started, scene, options, archive, goes_on = clock(), self.scene, self.options, None, ""
@@ -304,7 +311,7 @@ class Run:
 
     def _check(self, call: RunCall) -> None:
         """Raise what a call raises before anything is run."""
-        if self._first is self.scene:
+        if not self._has_phases(call):
             self._task(call)
             return
         from . import contact_run

@@ -123,8 +123,9 @@ class RunOptions:
         f(t, state) -> float with a `State`. All zeros inside every step are located on the manifold and recorded in
         `solution.t_events`: sign changes, and touches of zero within rounding, which count once. Events never change
         the steps. As for scipy.integrate.solve_ivp, an attribute `direction` > 0 or < 0 selects rising or falling
-        zeros, and `terminal` = True, or a number of occurrences, ends the run. A function that raises, or returns no
-        finite number, ends the run with success=False.
+        zeros, and `terminal` = True, or a number of occurrences, ends the run. An attribute `action`, a function of a
+        `Change`, changes the scene at each occurrence: parts come and go, parameters are set, bodies are hit. A
+        function that raises, or returns no finite number, ends the run with success=False.
     max_steps : int, optional
         Largest number of steps; the run ends there.
     max_step : float, s, optional
@@ -192,6 +193,12 @@ class RunOptions:
     def may_use_series(self) -> bool:
         """Whether the default method may be Taylor."""
         return self.formulation == "tangent" and self.chart_interval is None
+
+    @property
+    def acts(self) -> bool:
+        """Whether an event has an action."""
+        events = self.events if isinstance(self.events, tuple) else (self.events,)
+        return any(getattr(event, "action", None) is not None for event in events)
 
     def __repr__(self) -> str:
         given = [f"{name}={vars(self)[name]!r}" for name, default in OF_RUN.items() if vars(self)[name] != default]

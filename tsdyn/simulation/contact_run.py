@@ -485,7 +485,10 @@ class _ContactRun:
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
-        names = [self.gaps.names[i] for i in held] + [self.frictions.names[i] for i in sorted(self.modes.sticking)]
+        memory, units = self.remembered[self.count :], self.frictions.units
+        idle = [i for i in self.modes.blocked if not memory[units[i].way].any()]
+        rest = sorted([*self.modes.sticking, *idle])
+        names = [self.gaps.names[i] for i in held] + [self.frictions.names[i] for i in rest]
         return tuple(dict.fromkeys(names))
 
     def _events(self, phase):

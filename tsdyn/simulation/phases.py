@@ -168,7 +168,7 @@ class Phases:
         found, before, hit = [], None, {t for t, *_ in self.impulses}
         for (start, end, names), begun, kind in zip(self.list, self.starts, self.of, strict=True):
             modes = self._modes(kind)
-            if before is not None and begun not in hit and modes.turned(before):
+            if found and names == found[-1][2] and begun not in hit and modes.turned(before):
                 found[-1] = (found[-1][0], end, names)
             else:
                 found.append((start, end, names))
@@ -193,6 +193,14 @@ class Phases:
             if which:
                 out[np.ix_(mine, which)] = losses(self.gaps, which, own, *some)
         return out
+
+    def with_normal_loads(self, numbers, t, q, qd, qdd, memory):
+        """As `reactions.with_normal_loads`: the rows that hold frictions in a phase take their part of the loads."""
+        out = [None] * len(numbers)
+        for kind, mine, some in self._gathered(numbers, (t, q, qd, qdd, memory)):
+            for i, row in zip(mine, reactions.with_normal_loads(self.packed[kind], *some), strict=True):
+                out[i] = row
+        return np.array(out).reshape(len(numbers), -1)
 
     def constraint_error(self, numbers, *arrays):
         """The `ConstraintError` of the rows that hold."""

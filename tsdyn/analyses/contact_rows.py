@@ -16,6 +16,7 @@ from ..errors import SingularConfiguration
 from ..formulations.accelerations import refine_accelerations, solve_accelerations
 from ..jit.kernels import entry, loader, resident
 from ..maths.dense_linalg import copy
+from ..maths.root_isolation import SURVEYING
 from ..model.equations import (
     WIDTH,
     acceleration_bias,
@@ -142,6 +143,9 @@ def find_multipliers(context, t, levels, memory, out):
         for e in range(f.b.size):
             if graph.row[e] >= 0:
                 out[k, graph.row[e]] = f.b[e] if regular else math.nan
+
+
+KERNELS = find_gaps, find_rows, respond, accelerate, find_multipliers, *SURVEYING
 
 
 class ReactionWorkspace:

@@ -224,6 +224,9 @@ def _cross(c, x0, x1, out):
     out[0], out[1] = x, slope
 
 
+SURVEYING = _look, _cross
+
+
 class Survey(NamedTuple):
     """Several functions on one interval."""
 

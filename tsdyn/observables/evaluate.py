@@ -71,8 +71,7 @@ def normal_loads(packed, t, q, qd, Phi_q, lam):
 def unit_force(system, load, t, q, qd, remembered=None):
     """Return the generalised forces g (n,) of one friction for unit normal load."""
     memory = np.zeros((1, system.memory.size + system.normals.size))
-    if remembered is not None:
-        memory[0, : system.memory.size] = remembered
+    memory[0, : system.memory.size] = system.reals[system.memory] if remembered is None else remembered
     memory[0, system.memory.size + load.normal] = 1.0
     return force_loads(system._replace(forces=load.alone), np.array([t]), q[None], qd[None], memory)[0]
 
@@ -153,6 +152,7 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
     Notes
     -----
     Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + Q_v, -gamma).
+    Friction of the exact law that sticks at the state adds the rows that hold it, behind those of the constraints.
 
     Examples
     --------

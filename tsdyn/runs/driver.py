@@ -387,6 +387,26 @@ class Sampled:
             for name, (kind, value) in kept.items():
                 vars(load.force.function)[name] = np.array(value, kind)[()] if kind else value
 
+    def step(self, log):
+        """Make one step. What is due at its end is left to `answer`: the step may have gone past an event."""
+        return self.memory.advance(log, 1)
+
+    def answer(self, log):
+        """Ask the functions that are due where the run is; the Status."""
+        if not self.run.numbers.waiting:
+            return Status.SLICE_DONE
+        try:
+            return self._answer(log)
+        except Failed as failure:
+            self.reason = str(failure)
+            return Status.SAMPLING_FAILED
+
+    def _answer(self, log):
+        """New values, and accelerations with them."""
+        run = self.run
+        self.sampling.ask(self.memory, float(run.clock.t), run.now[0].copy(), run.now[1].copy())
+        return self.memory.advance(log, 0)
+
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""
         run, work = self.run, self.memory.context.work
@@ -402,9 +422,7 @@ class Sampled:
                 status = self.memory.advance(log, most - done if most > 0 else most)
                 if status != Status.SLICE_DONE or not numbers.waiting:
                     return status
-                # New values, and accelerations with them
-                self.sampling.ask(self.memory, float(run.clock.t), run.now[0].copy(), run.now[1].copy())
-                status = self.memory.advance(log, 0)
+                status = self._answer(log)
                 if status != Status.SLICE_DONE or numbers.history - first >= most:
                     return status
         except Failed as failure:

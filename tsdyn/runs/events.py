@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
-from ..model.handles import handles_of
+from ..model.handles import all_angles, counted, handles_of
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import reactions
 from ..observables.reactions import Exerting
@@ -262,7 +262,7 @@ class Watch:
                 self._begin(run, self.tracks is None)
             except EventFailed as failure:
                 raise InvalidArgument(f"events: {failure}") from failure.__cause__
-        stiff = run.numbers.stiff
+        stiff, answer = run.numbers.stiff, getattr(memory, "answer", None)  # of sampled loads
         # One step at a time, searched before the next one
         for _ in range(most):
             if self.begins_again:
@@ -271,7 +271,7 @@ class Watch:
                     return status, reason
                 continue  # it has written an output
             done = run.numbers.steps
-            status = memory.advance(log, 1)
+            status = memory.advance(log, 1) if answer is None else memory.step(log)
             if run.numbers.steps > done:
                 try:
                     last = self._search_step(run, log)
@@ -284,6 +284,8 @@ class Watch:
                     status, reason = self._begin_again(memory, log)
                     if status != Status.SLICE_DONE:
                         return status, reason
+            if answer is not None and status == Status.SLICE_DONE:
+                status = answer(log)
             full = run.numbers.chart_rows + 2 >= len(log.charts)
             if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
@@ -374,6 +376,14 @@ class Watch:
         parts = (np.ascontiguousarray(states[:, i]) for i in range(3))
         return RememberingState.of(self.packed, self.memory[self.angles :], anchor, t, *parts, None)
 
+    def _angles(self, t, state):
+        """Counted angles (angles,) at a state within the step, by the rates at its start and here."""
+        t0, (q, qd, _), angles = self.beside
+        handles = handles_of(self.packed)
+        found, rates = all_angles(handles, *state[:2])
+        before, others = all_angles(handles, q, qd)
+        return counted(found, counted(before, angles) + 0.5 * (t - t0) * (others + rates))
+
     def _value(self, i, t, state):
         event = self.events[i]
         if isinstance(event.function, Member):
@@ -392,11 +402,17 @@ class Watch:
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
         self._note_start()
-        before, self.memory = self.memory, run.remembered.copy()
+        known = self.t, self.state, self.memory
+        self.memory = run.remembered.copy()
         try:
             return self._locate(run, log, Inside(self.reader, run, log, self.t, self.state))
         except KeyboardInterrupt:
-            self.memory = before
+            self.memory = known[2]
+            raise
+        except EventFailed:
+            if self._groups:  # beyond a failure nobody looks for the ends of a phase
+                self.t, self.state, self.memory = known
+                self.go_back(run, log)
             raise
 
     def _locate(self, run, log, step):
@@ -437,7 +453,7 @@ class Watch:
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
                 if self.angles:
-                    run.remembered[: self.angles] = self._instant(each.t, each.state).angles
+                    run.remembered[: self.angles] = self._angles(each.t, each.state)
                 self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
                 return each

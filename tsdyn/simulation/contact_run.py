@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..ahead import compile_ahead
 from ..analyses.contact_friction import halted, settle_grips
 from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
-from ..analyses.contact_rows import ReactionWorkspace
+from ..analyses.contact_rows import KERNELS, ReactionWorkspace
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
 from ..analyses.tolerances import AT_REST, STOPPED
 from ..elements.unilateral import contacts_of
@@ -267,6 +268,7 @@ class _ContactRun:
 
     def _take_scene(self, scene):
         """What follows from the scene alone, and makes the scenes of its phases."""
+        compile_ahead(KERNELS)
         self.scene, self.gaps, self.frictions, self.modes = scene, gaps_of(scene), Frictions(scene), Modes()
         self.count = handles_of(scene.packed).count
 
@@ -434,6 +436,15 @@ class _ContactRun:
         if self.modes.grips:
             return phase_with_friction(self.scene, self.gaps, self.modes, holds)
         return phase_of(self.scene, self._closed_rows(), holds)
+
+    def filled(self):
+        """The same, with what the run remembers among its packed numbers."""
+        phase = self._scene()
+        system = phase.packed.system._replace(reals=phase.packed.system.reals.copy())
+        system.reals[system.memory] = self.remembered[self.count :]
+        filled = object.__new__(type(phase))
+        vars(filled).update(vars(phase), _packed=phase.packed._replace(system=system), _prepared=None)
+        return filled
 
     def _closed_rows(self):
         return [self.gaps.list[i].side.row for i in self.modes.closed]

@@ -100,12 +100,24 @@ def at_start(scene):
 
 
 def demand_bilateral(scene, who="this analysis"):
-    """Raise InvalidArgument where a scene has contacts."""
+    """Raise InvalidArgument where a scene has contacts or exact friction."""
     if has_contacts(scene):
+        demand_regular(scene, who)
         names = listed([each.name for each in contacts_of(scene._added)], NAMED)
         raise InvalidArgument(
             f"{who} is of one phase of a run, along which {names} may open and close. In a copy of the scene, hold "
             "those that are closed by unilateral=False, and remove the others."
+        )
+
+
+def demand_regular(scene, who):
+    """Raise InvalidArgument where a scene has friction of the exact law."""
+    exact = [force for force in scene._forces if getattr(force, "slides", ())]
+    if exact:
+        raise InvalidArgument(
+            f"{who} doesn't serve friction of the exact law, which sticks and slides: "
+            f"{listed([force.name for force in exact], NAMED)}. Give slip_velocity (slip_rate of a torque), such as "
+            "1e-3 m/s, for the regularised law."
         )
 
 

@@ -596,7 +596,7 @@ class Scene:
         return show(scene_data(self, t, said, shapes=shapes, camera=camera, follow=follow), path)
 
     place = _place
-    evaluate = where_it_stands(_evaluate)
+    evaluate = _serving("evaluate")(_evaluate)
     assemble = where_it_stands(_assemble)
     mobility = where_it_stands(_mobility)
     linearise = _serving("linearise")(_linearise)

@@ -10,11 +10,11 @@ from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
 from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InconsistentState, InvalidArgument, NoEquilibrium
 from ..observables import reactions
-from ..observables.state import RememberingState, remembered
+from ..observables.state import RememberingState, State, remembered
 from ..runs.arguments import state_arrays
-from ..validation import listed, number
+from ..validation import finite_vector, listed, number
 from .contact_run import begun, demand_apart
-from .phase_scenes import NAMED, gaps_of, phase_of
+from .phase_scenes import NAMED, at_start, demand_regular, gaps_of, phase_of
 from .phases import shared_rows
 from .scene_cache import prepared
 
@@ -34,13 +34,26 @@ def standing(scene: Any, state: Any, who: str) -> Any:
     return run._scene()
 
 
+def evaluate(scene, own, q=None, qd=None, t=0.0):
+    """As of scenes without contacts: contacts closed at the start hold, frictions stick or slide as at this state."""
+    if not any(getattr(force, "slides", ()) for force in scene._forces):
+        return own(at_start(scene), q, qd, t)
+    start, t = scene.start, number(t)
+    q = finite_vector(start[0] if q is None else q, start[0].size, "q")
+    qd = finite_vector(start[1] if qd is None else qd, start[0].size, "qd")
+    return own(begun(scene, t, State(t, q, qd)).filled(), q, qd, t)
+
+
 def linearise(scene, own, state=None, *arguments, **keywords):
     """As of scenes without contacts: contacts that push at the state hold."""
+    demand_regular(scene, "linearise")
     return own(standing(scene, state, "linearise"), state, *arguments, **keywords)
 
 
 def along(scene, own, *arguments, **keywords):
     """`kinematics` or `inverse_dynamics` of the scene with open contacts; refuses a motion along which one is met."""
+    if own.__name__ != "kinematics":
+        demand_regular(scene, own.__name__)
     motion, who, gaps = own(phase_of(scene, []), *arguments, **keywords), own.__name__, gaps_of(scene)
     for k, q in enumerate(motion.q):
         met = closed_gaps(gaps, q, motion.anchor.angles[k])
@@ -68,6 +81,7 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
     From the contacts that are closed at the guess on: of those that the way to the equilibrium meets the first one is
     closed, and those that would have to pull are opened.
     """
+    demand_regular(scene, "equilibrium")
     gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
     q = scene.start[0] if guess is None else np.asarray(getattr(guess, "q", guess), float)
     closed, seen = closed_gaps(gaps, q, _angles(kept, guess, t, q)), set()

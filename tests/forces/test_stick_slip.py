@@ -17,7 +17,10 @@ C, F, M = ts.constraints, ts.forces, ts.motions
 G = 9.81
 
 
-def on_a_slope(ratio, slope=np.radians(10.0), **given):
+SLOPE = np.radians(10.0)
+
+
+def on_a_slope(ratio, slope=SLOPE, **given):
     """A block on a slope, which pulls with a part of what friction can hold."""
     turn = Rotation.from_rotvec((0.0, slope, 0.0))
     scene = ts.Scene()
@@ -249,7 +252,7 @@ def test_evaluate_says_what_a_run_does():
 
 @pytest.mark.parametrize("name", ["linearise", "equilibrium"])
 def test_what_needs_a_derivative_at_rest_asks_for_a_slip_velocity(name):
-    with pytest.raises(ts.InvalidArgument, match="friction.*slip_velocity"):
+    with pytest.raises(ts.InvalidArgument, match=r"friction.*slip_velocity"):
         getattr(on_a_slope(0.5), name)()
 
 

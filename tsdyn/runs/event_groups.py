@@ -24,7 +24,7 @@ class States(NamedTuple):
     q, qd, qdd = (property(lambda self, i=i: np.ascontiguousarray(self.levels[:, i])) for i in range(3))
 
 
-class Member:
+class GroupMember:
     """One of several event functions that are evaluated together.
 
     Parameters
@@ -43,6 +43,9 @@ class Member:
         levels = np.array([[instant.q, instant.qd, instant.qdd]])
         states = States(np.array([t]), levels, instant.memory, lambda: instant.angles[None])
         return float(self.over(states)[0, self.which])
+
+
+Member = GroupMember
 
 
 class Group:

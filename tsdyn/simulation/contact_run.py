@@ -29,11 +29,11 @@ from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS
 from ..model.handles import handles_of
-from ..observables import diagnostics, reactions
+from ..observables import reactions
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
-from ..runs.event_groups import Member
+from ..runs.event_groups import GroupMember
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
@@ -506,7 +506,7 @@ class _ContactRun:
             if i in modes.idle:
                 continue
             is_open = i not in modes.closed
-            function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
+            function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
         breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
@@ -514,7 +514,7 @@ class _ContactRun:
         for i in range(frictions.count):
             if i in modes.blocked:
                 continue
-            function = Member(breaking, sticking.index(i)) if i in modes.sticking else Member(slowing, i)
+            function = GroupMember(breaking, sticking.index(i)) if i in modes.sticking else GroupMember(slowing, i)
             yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
 
     def _still(self, phase):

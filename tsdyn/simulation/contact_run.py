@@ -14,6 +14,7 @@ from ..analyses.contact_rows import KERNELS, ReactionWorkspace
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
 from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
+from ..configuration.tolerances import INITIAL_TOL
 from ..elements.unilateral import contacts_of
 from ..errors import (
     InconsistentState,
@@ -286,11 +287,13 @@ class _ContactRun:
         self.span = interval(call.t_span)
         self.times = output_times(call.t_eval, *self.span)
         self.per_step, self.taken = self.times.size == 0, 0
-        kept = prepared(phase_of(scene, []))
+        kept = prepared(free := phase_of(scene, []))
         self._demand_served(kept)
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
+        start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
+        kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
@@ -636,6 +639,9 @@ class _ContactRun:
             leaving = [i for i in fired if i in before.closed]
             stay = settle(inertia, resting, self.qd, leaving)[:2] if resting else ([], [])
             self.modes = Modes(*stay, opened)
+        except SingularConfiguration as error:
+            self.reason = str(error)
+            return Status.SINGULAR
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
@@ -951,10 +957,11 @@ def impact(
         raise InvalidArgument(f"law must be 'newton' or 'poisson', got {law!r}.")
     if not has_contacts(scene):
         raise InvalidArgument("impact: the scene has no unilateral constraints, such as PlaneContact(unilateral=True).")
-    gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
+    gaps, kept = gaps_of(scene), prepared(free := phase_of(scene, []))
     q, qd = state_arrays(state, kept.n)
     t = float(getattr(state, "t", 0.0))
     memory = remembered(state, kept, t, q)
+    kept.start(free, (q, qd), t, INITIAL_TOL, memory, True)  # finds redundant bilateral rows
     angles, slots = memory[: kept.handles.count], memory[kept.handles.count :]
     near = closed_gaps(gaps, q, angles)
     which = near if contacts is None else _chosen(gaps, contacts, near)

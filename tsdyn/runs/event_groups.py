@@ -45,9 +45,6 @@ class GroupMember:
         return float(self.over(states)[0, self.which])
 
 
-Member = GroupMember
-
-
 class Group:
     """Events whose functions are evaluated by one function.
 

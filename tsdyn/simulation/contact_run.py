@@ -12,7 +12,7 @@ from ..ahead import compile_ahead
 from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
 from ..analyses.contact_rows import KERNELS, ReactionWorkspace
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
-from ..analyses.tolerances import AT_REST, STOPPED
+from ..analyses.tolerances import AT_REST, RESTS, STOPPED
 from ..calls import fitting
 from ..configuration.tolerances import INITIAL_TOL
 from ..elements.unilateral import contacts_of
@@ -291,6 +291,7 @@ class _ContactRun:
         self._demand_served(kept)
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
+        self.qdd = np.zeros(kept.n)  # before the present transition
         self.remembered = remembered(call.state, kept, self.t, self.q)
         start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
         kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
@@ -451,7 +452,7 @@ class _ContactRun:
         """
         self._end_phase(t)
         before = self.modes
-        self.t, (self.q, self.qd, _), self.remembered = t, run.now.copy(), run.remembered.copy()
+        self.t, (self.q, self.qd, self.qdd), self.remembered = t, run.now.copy(), run.remembered.copy()
         remembered = self.remembered
         self.settled = (self._transit([self.watched[i] for i in numbers]),)
         changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
@@ -487,7 +488,10 @@ class _ContactRun:
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
-        names = [self.gaps.names[i] for i in held] + [self.frictions.names[i] for i in sorted(self.modes.sticking)]
+        memory, units = self.remembered[self.count :], self.frictions.units
+        idle = [i for i in self.modes.blocked if not memory[units[i].way].any()]
+        rest = sorted([*self.modes.sticking, *idle])
+        names = [self.gaps.names[i] for i in held] + [self.frictions.names[i] for i in rest]
         return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
@@ -573,7 +577,8 @@ class _ContactRun:
             self.totals = summed([end.counts] if self.totals is None else [self.totals, end.counts])
         if self.settled is not None:  # within the run of the phase
             return self.settled[0]
-        self.t, (self.q, self.qd, _), self.remembered = end.reached, (x.copy() for x in end.last), end.remembered
+        self.t, self.remembered = end.reached, end.remembered
+        self.q, self.qd, self.qdd = (x.copy() for x in end.last)
         if goes_on:
             return self._transit(fired)
         self.reason = outcome.reason
@@ -654,13 +659,15 @@ class _ContactRun:
         if not frictions.count:
             return None
         place, (v, sizes, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
+        # Velocities that change within rounding of the time are at rest, too
+        gained = RESTS * EPS * abs(self.t) * frictions.motions(self.q[None], self.qdd[None])[1][0]
         self.remembered, resting, guess = self.remembered.copy(), [], {}
         memory = self.remembered[count:]  # a part of it
         for i, unit in enumerate(frictions.units):
             speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
             if i in before.blocked and memory[unit.way].any():
                 guess[i] = place.read(i, memory)
-            if speed <= max(AT_REST * sizes[0, i], 0.0 if signed else STOPPED) or (signed and i in fired):
+            if speed <= max(AT_REST * sizes[0, i], gained[i], 0.0 if signed else STOPPED) or (signed and i in fired):
                 resting.append(i)
                 memory[unit.way] = 0.0
             else:

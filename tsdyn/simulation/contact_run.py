@@ -32,7 +32,7 @@ from ..observables import reactions
 from ..observables.state import remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
-from ..runs.event_groups import Member
+from ..runs.event_groups import GroupMember
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
@@ -254,12 +254,14 @@ class _ContactRun:
         self.span = interval(call.t_span)
         self.times = output_times(call.t_eval, *self.span)
         self.per_step, self.taken = self.times.size == 0, 0
-        kept = prepared(phase_of(scene, []))
+        kept = prepared(free := phase_of(scene, []))
         self._demand_served(kept)
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.qdd = np.zeros(kept.n)  # before the present transition
         self.remembered = remembered(call.state, kept, self.t, self.q)
+        start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
+        kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(self.gaps, self.able, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
@@ -526,7 +528,7 @@ class _ContactRun:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
             is_open = i not in modes.closed
-            function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
+            function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
         breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
@@ -534,7 +536,7 @@ class _ContactRun:
         for i in range(frictions.count):
             if i in modes.blocked:
                 continue
-            function = Member(breaking, sticking.index(i)) if i in modes.sticking else Member(slowing, i)
+            function = GroupMember(breaking, sticking.index(i)) if i in modes.sticking else GroupMember(slowing, i)
             yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
 
     def _still(self, phase):
@@ -701,6 +703,9 @@ class _ContactRun:
                 self.modes = Modes(settled.closed, settled.idle, opened, grips=grips, held=places)
             elif resting:
                 self.modes = Modes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
+        except SingularConfiguration as error:
+            self.reason = str(error)
+            return Status.SINGULAR
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."

@@ -264,9 +264,7 @@ def _power(solution, trajectory, item, t):
     varies = phases is not None and phases.varies
     for packed, mine in phases.packed_at(t) if varies else [(solution.packed, slice(None))]:
         some = t[mine], *(level[mine] for level in levels)
-        slots = (
-            with_normal_loads(packed, *some, memory[mine]) if varies else solution._with_normal_loads(*some, memory)
-        )
+        slots = with_normal_loads(packed, *some, memory[mine]) if varies else solution._with_normal_loads(*some, memory)
         at = SimpleNamespace(t=some[0], q=some[1], qd=some[2], _memory=slots, packed=packed, system=packed.system)
         if packed.system.rheonomic[0]:
             at.multipliers = (reactions.multipliers if varies else solution._multipliers_at)(

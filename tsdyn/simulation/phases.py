@@ -88,6 +88,8 @@ class Phases:
         Change of the kinetic energy (J) at the beginning of phases, by their numbers: what impacts took.
     """
 
+    ARRAYS = "phases", "impulses", "gains"  # that are saved
+
     def __init__(self, packed, gaps):
         self.whole, self.gaps, self.list, self.impulses = packed, gaps, [], []
         self.starts, self.of, self.gains = [], [], {}
@@ -159,11 +161,6 @@ class Phases:
                 found.append((start, end, names))
             before = modes
         return found
-
-    @property
-    def lose(self):
-        """Whether energy is lost by impacts or friction of contacts."""
-        return bool(self.impulses) or bool(self.gaps.rubs.any())
 
     def sticking(self, numbers, i):
         """Whether a contact with friction sticks (k,); i: the number of its gap."""
@@ -241,7 +238,10 @@ class Phases:
         self.list = [(t, end, names[i]) for t, end, i in zip(*phases[:, 2:4].T.tolist(), named, strict=True)]
         self.gains = {int(number): energy for number, energy in arrays["gains"].astype(float).reshape(-1, 2).tolist()}
         self.impulses = [(t, contacts[int(i)], p) for t, i, p in impulses.tolist()]
-        for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True) if scene_of else ():
+        if scene_of is None:
+            self.modes = numbers["modes"]
+            return
+        for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True):
             scene = scene_of(modes)
             packed = scene.packed
             if derived != derived_record(packed):

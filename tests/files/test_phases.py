@@ -1,5 +1,8 @@
 """Stores, checkpoints and saved solutions of runs with contacts and friction: to the bits of a run never stopped."""
 
+import shutil
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -118,6 +121,24 @@ def test_a_store_tells_what_memory_does(tmp_path):
     np.testing.assert_array_equal(stored.reaction("floor")[0], whole.reaction("floor")[0])
     np.testing.assert_array_equal(stored[2:7].multipliers, whole[2:7].multipliers)
     np.testing.assert_array_equal(stored[2:7].to_dataframe(), whole[2:7].to_dataframe())
+
+
+def test_another_restitution_is_another_scene(tmp_path):
+    path = tmp_path / "run.h5"
+    ts.simulate(ball(), (0, 1), store=path, checkpoint=60.0)
+    with pytest.raises(ts.StorageError, match="the scene is another one"):
+        ts.resume(path, scene=bouncing(0.6)[0])
+
+
+def test_a_disk_that_fills_up_in_a_later_phase(tmp_path, monkeypatch):
+    path, free = tmp_path / "run.h5", iter([1 << 30] * 6)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=next(free, 1 << 20)))
+    solution = ts.simulate(tumbling(), (0.0, 1.0), store=path, checkpoint=0.0)
+    assert solution.status == ts.Status.STORE_FAILED
+    assert len(solution.phases) > 1
+    monkeypatch.undo()
+    np.testing.assert_array_equal(ts.resume(path).q, ts.simulate(tumbling(), (0.0, 1.0)).q)
 
 
 def drag(t, a, b, par, out):

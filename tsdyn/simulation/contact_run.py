@@ -301,6 +301,10 @@ class _ContactRun:
             if self.end is None:
                 raise
             status = Status.INTERRUPTED
+        except OSError as error:
+            if self.end is None or self.archive is None:
+                raise
+            status, self.reason = Status.STORE_FAILED, f"{error.strerror or error}."
         except TsdynError as error:
             if self.end is None:
                 raise

@@ -41,7 +41,7 @@ def phase_with_friction(scene, gaps, modes, holds):
 
 
 def _with_numbers(scene, numbers):
-    """The scene with other numbers (3,): of a `Sliding` its direction, of a row the point of b."""
+    """The scene with other numbers (3,): of the law of sliding its direction, of a row the point of b."""
     kept = prepared_numbers(scene)
     _ = kept.refusal, kept.pays, kept.sharp, kept.slips, kept.sampled  # for `Prepared.like`
     packed, begins = scene.packed, begins_of(scene.packed)

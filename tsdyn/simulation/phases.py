@@ -28,14 +28,6 @@ class Modes:
     grips: dict = field(default_factory=dict)  # of closed contacts with friction: see grips.py
     held: dict = field(default_factory=dict)
 
-    def turned(self, other):
-        """Whether these are the modes of another but for directions of slips."""
-        mine, theirs = (
-            (modes.closed, modes.idle, modes.held, [i for i, d in modes.grips.items() if d is None])
-            for modes in (self, other)
-        )
-        return not self.opened and mine == theirs and self.sticking == other.sticking
-
     def same(self, other):
         """Whether the units are in the same modes, whatever has just opened."""
         return replace(self, opened={}) == replace(other, opened={})
@@ -151,15 +143,13 @@ class Phases:
         return Modes.of(self.modes[kind][0])
 
     def told(self):
-        """The `list`, in which phases are one that differ in nothing, or in the directions of slips alone."""
-        found, before, hit = [], None, {t for t, *_ in self.impulses}
-        for (start, end, names), begun, kind in zip(self.list, self.starts, self.of, strict=True):
-            modes = self._modes(kind)
-            if before is not None and begun not in hit and modes.turned(before):
+        """The `list`, in which phases are one where the same hold as before, and no impact is between."""
+        found, hit = [], {t for t, *_ in self.impulses}
+        for (start, end, names), begun in zip(self.list, self.starts, strict=True):
+            if found and names == found[-1][2] and begun not in hit:
                 found[-1] = (found[-1][0], end, names)
             else:
                 found.append((start, end, names))
-            before = modes
         return found
 
     def sticking(self, numbers, i):

@@ -28,11 +28,11 @@ from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS
 from ..model.handles import handles_of
-from ..observables import diagnostics, reactions
+from ..observables import reactions
 from ..observables.state import remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
-from ..runs.event_groups import Member
+from ..runs.event_groups import GroupMember
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
@@ -250,11 +250,13 @@ class _ContactRun:
         self.span = interval(call.t_span)
         self.times = output_times(call.t_eval, *self.span)
         self.per_step, self.taken = self.times.size == 0, 0
-        kept = prepared(phase_of(scene, []))
+        kept = prepared(free := phase_of(scene, []))
         self._demand_served(kept)
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
+        start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
+        kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
@@ -489,15 +491,15 @@ class _ContactRun:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
             is_open = i not in modes.closed
-            function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
-            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
+            function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
+            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
         breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
         slowing = _Slowing(frictions, modes.begun).over
         for i in range(frictions.count):
             if i in modes.blocked:
                 continue
-            function = Member(breaking, sticking.index(i)) if i in modes.sticking else Member(slowing, i)
+            function = GroupMember(breaking, sticking.index(i)) if i in modes.sticking else GroupMember(slowing, i)
             yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
 
     def _still(self, phase):
@@ -512,11 +514,11 @@ class _ContactRun:
         gaps, modes = self.gaps, self.modes
         pushing, grips = Reactions(gaps, modes, packed), gaps.count + self.frictions.count
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
-            yield i, Event(Member(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
+            yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.grips.get(i) is not None]
         halting = Halting(packed, [gaps.list[i].side.grip.sliding for i in slides])
         for k, i in enumerate(slides):
-            yield grips + i, Event(Member(halting.over, k), gaps.names[i], 1.0, -1.0, False)
+            yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 
     def _times(self):
         left = self.times[self.taken :]
@@ -593,8 +595,7 @@ class _ContactRun:
         hit = [i for i in fired if i < count]
         status = self._settle(sorted({*near.tolist(), *hit, *before.closed, *before.idle}), hit)
         if self.qd is not qd:
-            energy = diagnostics.kinetic_energy(self.scene.system, np.stack((self.q, self.q)), np.stack((qd, self.qd)))
-            self.phases.gain(energy[1] - energy[0])
+            self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status or self._settle_frictions(before, [i - count for i in fired if count <= i < count + own])
 
     def _is_stuck(self):
@@ -643,6 +644,9 @@ class _ContactRun:
                 self.modes = Modes(settled.closed, settled.idle, opened, grips=grips, held=places)
             elif resting:
                 self.modes = Modes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
+        except SingularConfiguration as error:
+            self.reason = str(error)
+            return Status.SINGULAR
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."

@@ -332,6 +332,10 @@ class _ContactRun:
             if self.end is None:
                 raise
             status = Status.INTERRUPTED
+        except OSError as error:
+            if self.end is None or self.archive is None:
+                raise
+            status, self.reason = Status.STORE_FAILED, f"{error.strerror or error}."
         except TsdynError as error:
             if self.end is None:
                 raise
@@ -551,11 +555,11 @@ class _ContactRun:
         gaps, modes = self.gaps, self.modes
         pushing, grips = Reactions(gaps, modes, packed), gaps.count + self.frictions.count
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
-            yield i, Event(Member(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
+            yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.grips.get(i) is not None]
         halting = Halting(packed, [gaps.list[i].side.grip.sliding for i in slides])
         for k, i in enumerate(slides):
-            yield grips + i, Event(Member(halting.over, k), gaps.names[i], 1.0, -1.0, False)
+            yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 
     def _times(self):
         left = self.times[self.taken :]

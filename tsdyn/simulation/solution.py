@@ -185,7 +185,7 @@ def energy_error(solution, task):
     Outputs and the last state are compared.
     """
     system, packed = solution.system, solution.packed
-    if system.rheonomic[0] or system.normals.size or (solution._phases is not None and solution._phases.lose):
+    if system.rheonomic[0] or system.normals.size:
         return None
     some, slots = solution[:: max(solution._length() // MOST_OUTPUTS, 1)], system.memory.size
     t = np.concatenate(([task.span[0]], some.t, [solution.reached]))
@@ -755,7 +755,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """
         item = self.handles.item(friction)
         mine = [] if self._phases is None else self._phases.gaps.of_contact(item)
-        if any(self._phases.gaps.rubs[mine]):
+        if mine and self._phases.gaps.rubs[mine].any():
             return self._phases.sticking(self._phase_of_rows, mine[0])
         load = reactions.loads_of(self.packed).get(id(item))
         if load is None or not getattr(item, "slides", ()):

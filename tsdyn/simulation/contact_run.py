@@ -622,22 +622,33 @@ class _ContactRun:
         change = hybrid.ask(self, events, last)
         if change is None or change._ends:
             return Status.ACTION_FAILED if change is None else Status.EVENT
-        self.acted = True
+        self.acted, before = True, self._energy(self.packed)
         jump = hybrid.carry_out(self, change)
         if jump is None:
             return Status.ACTION_FAILED
         if (self.qd != jump.qd).any():  # ratchets don't take hold as they would have
             fired = [i for i in fired if i not in self.gaps.following]
-        status = self._transit(fired, jump.qd)
+        status = self._transit(fired, False)
         hybrid.report(self, jump)
+        if status is None:
+            self.phases.gain(self._energy(self._scene().packed) - before)
         return status
 
-    def _transit(self, fired, qd=None):
+    def _energy(self, packed):
+        """Kinetic and potential energy, J, of a phase at the present state."""
+        t, q, qd, memory = np.array([self.t]), self.q[None], self.qd[None], self.remembered[None, self.count :]
+        energy = diagnostics.kinetic_energy(packed.system, q, qd) + diagnostics.potential_energy(packed.system, q)
+        for load in packed.loads:
+            if getattr(load.force, "potential", None) or hasattr(load.force, "powers"):
+                energy = energy + diagnostics.load_powers(packed, load, t, q, qd, memory)[0]
+        return float(energy[0])
+
+    def _transit(self, fired, measured=True):
         """From one phase to the next one, after events of the units `fired`; the Status if there is no way on.
 
-        qd: velocities (n,) before what actions have done to them.
+        measured: whether the energy that impacts take is noted.
         """
-        self.reason, qd = "", self.qd if qd is None else qd
+        self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
         (near,) = (self.gap <= TOUCHING * self.length).nonzero()
@@ -645,7 +656,7 @@ class _ContactRun:
         hit = [i for i in fired if i < count]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
         status = self._settle(sorted(touching), hit)
-        if self.qd is not qd:
+        if measured and self.qd is not qd:
             energy = diagnostics.kinetic_energy(self.scene.system, np.stack((self.q, self.q)), np.stack((qd, self.qd)))
             self.phases.gain(energy[1] - energy[0])
         return status or self._settle_frictions(before, [i - count for i in fired if i >= count])

@@ -209,9 +209,11 @@ class _Slowing:
         return values
 
 
-def demand_apart(gaps, able, q, angles, tol):
-    """Raise InconsistentState where gaps, of those that are able to close, are below zero."""
+def demand_apart(gaps, q, angles, tol, able=None):
+    """Raise InconsistentState where gaps are below zero, of those that are able to close: by default, at the start."""
     values = gaps.at(q, angles)
+    if able is None:
+        able = [i for i, gap in enumerate(gaps.list) if gap.contact.active]
     deep = [i for i in able if values[i] < -tol * (1.0 + np.abs(q).max())]
     if deep:
         found = listed([f"{gaps.names[i]} {gaps.list[i].contact.excess} by {-values[i]:.3g}" for i in deep], NAMED)
@@ -287,7 +289,7 @@ class _ContactRun:
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
-        demand_apart(self.gaps, self.able, self.q, self.remembered[: self.count], options.initial_tol)
+        demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol, self.able)
         self.users = prepared_events(options.events) or []
         self.rest = self.t
         self.kinds, self.parts, self.found, self.report = [], [], [[] for _ in self.users], reporter(call.progress)

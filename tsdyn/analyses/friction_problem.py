@@ -330,6 +330,8 @@ class RestProblem:
         self.qdd[:, 0] += fixed
         G = self.J @ self.qdd
         self.c, self.G, self.D = G[:, 0] + self.gamma, G[:, 1:count], G[:, count:]
+        self.dead = dead = np.linalg.norm(self.J @ Z, axis=1) <= RANK_TOL * np.linalg.norm(self.J, axis=1)
+        self.G[dead], self.G[:, dead], self.D[dead] = 0.0, 0.0, 0.0  # rates that no motion changes, as at a dead centre
         self.l, self.L, self.K = lam[:, 0], lam[:, 1:count], lam[:, count:]
         self.reactions = [normal_reaction(packed, load, q, qd, Phi_q) for load in frictions]
         places = np.cumsum([0, *(len(each) for each in rows.values())])
@@ -399,14 +401,16 @@ class RestProblem:
         """Units that can't be as they are, with the way in which they slide instead; None if they stick."""
         found = {}
         for i, at in self.at.items():
-            basis = self.bases[i]
+            basis, size = self.bases[i], np.linalg.norm(a[at])
             if i not in ways:
                 (share, bound), force = self.units[i].bound, np.linalg.norm(x[at])
                 bound += share * N[self.units[i].load.normal] if share else 0.0
                 if force > bound * (BROKEN if i in fired else 1.0 + LEVEL):
                     found[i] = x[at] @ basis / force
+                elif self.dead[at].all() and size > small[at].max():  # nothing holds it
+                    found[i] = a[at] @ basis / size
                 continue
-            along, size = a[at] @ basis @ ways[i], np.linalg.norm(a[at])
+            along = a[at] @ basis @ ways[i]
             if along < -small[at].max():
                 found[i] = None
             elif len(at) > 1 and size > small[at].max() and along < size * (1.0 - ASIDE):

@@ -208,9 +208,11 @@ class _Slowing:
         return values
 
 
-def demand_apart(gaps, able, q, angles, tol):
-    """Raise InconsistentState where gaps, of those that are able to close, are below zero."""
+def demand_apart(gaps, q, angles, tol, able=None):
+    """Raise InconsistentState where gaps are below zero, of those that are able to close: by default, at the start."""
     values = gaps.at(q, angles)
+    if able is None:
+        able = [i for i, gap in enumerate(gaps.list) if gap.contact.active]
     deep = [i for i in able if values[i] < -tol * (1.0 + np.abs(q).max())]
     if deep:
         found = listed([f"{gaps.names[i]} {gaps.list[i].contact.excess} by {-values[i]:.3g}" for i in deep], NAMED)
@@ -263,7 +265,7 @@ class _ContactRun:
         start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
         kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
-        demand_apart(self.gaps, self.able, self.q, self.remembered[: self.count], options.initial_tol)
+        demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol, self.able)
         self.users = prepared_events(options.events) or []
         self.rest = self.t
         self.kinds, self.parts, self.found, self.report = [], [], [[] for _ in self.users], reporter(call.progress)
@@ -613,6 +615,7 @@ class _ContactRun:
         self.t, self.remembered = end.reached, end.remembered
         self.q, self.qd, self.qdd = (x.copy() for x in end.last)
         self.reason = outcome.reason
+        self.acted = goes_on and bool(acting)
         if goes_on:
             return self._act(acting, fired, end.last) if acting else self._transit(fired)
         if self._is_deep():
@@ -633,22 +636,33 @@ class _ContactRun:
         change = hybrid.ask(self, events, last)
         if change is None or change._ends:
             return Status.ACTION_FAILED if change is None else Status.EVENT
-        self.acted = True
+        before = self._energy(self.packed)
         jump = hybrid.carry_out(self, change)
         if jump is None:
             return Status.ACTION_FAILED
         if (self.qd != jump.qd).any():  # ratchets don't take hold as they would have
             fired = [i for i in fired if i not in self.gaps.following]
-        status = self._transit(fired, jump.qd)
+        status = self._transit(fired, False)
         hybrid.report(self, jump)
+        if status is None:
+            self.phases.gain(self._energy(self._scene().packed) - before)
         return status
 
-    def _transit(self, fired, qd=None):
+    def _energy(self, packed):
+        """Kinetic and potential energy, J, of a phase at the present state."""
+        t, q, qd, memory = np.array([self.t]), self.q[None], self.qd[None], self.remembered[None, self.count :]
+        energy = diagnostics.kinetic_energy(packed.system, q, qd) + diagnostics.potential_energy(packed.system, q)
+        for load in packed.loads:
+            if getattr(load.force, "potential", None) or hasattr(load.force, "powers"):
+                energy = energy + diagnostics.load_powers(packed, load, t, q, qd, memory)[0]
+        return float(energy[0])
+
+    def _transit(self, fired, measured=True):
         """From one phase to the next one, after events of the units `fired`; the Status if there is no way on.
 
-        qd: velocities (n,) before what actions have done to them.
+        measured: whether the energy that impacts take is noted.
         """
-        self.reason, qd = "", self.qd if qd is None else qd
+        self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
         (near,) = (self.gap <= TOUCHING * self.length).nonzero()
@@ -656,7 +670,7 @@ class _ContactRun:
         hit = [i for i in fired if i < count]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
         status = self._settle(sorted(touching), hit)
-        if self.qd is not qd:
+        if measured and self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status or self._settle_frictions(before, [i - count for i in fired if count <= i < count + own])
 

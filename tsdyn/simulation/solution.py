@@ -21,7 +21,7 @@ from ..observables.generalised_forces import law_values
 from ..observables.reactions import acted, exerted, member, with_normal_loads
 from ..observables.state import RememberingState
 from ..validation import counted, floats
-from .by_phase import gathered, in_phases
+from .by_phase import by_phase, gathered, in_phases
 from .records import Records
 from .stored_runs import RunOutputs
 from .termination import account, cause_of
@@ -340,15 +340,14 @@ class Balances:
         """
         return self._integrated(None)
 
-    @in_phases
     def power_of(self, item: ItemLike) -> Floats:
         """Power (k,), W, supplied by one constraint or force (or its name): its share of dE/dt.
 
         Of a motor or a driver: the power of its force or torque along the prescribed motion. Of a force: the power of
         its loads and actuators, less dissipation; stored energy of a spring doesn't count. Of other constraints: zero.
         """
-        part = self._part(item)
-        return _supplied(self, part) - self._losses_of(part, self._losses())
+        supplied = by_phase(self, lambda part: _supplied(part, part._part(item)))
+        return supplied - self._losses_of(self._part(item), self._losses())
 
     def work_of(self, item: ItemLike) -> Floats:
         """Work (k,), J, since the start, of one constraint or force: the integral of `power_of`.
@@ -678,7 +677,6 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             return self._phases.constraint_error(self._phase_of_rows, *motion)
         return diagnostics.constraint_error(self.packed, *motion)
 
-    @in_phases
     def actuation(self, control: ItemLike) -> Floats:
         """The values (k, actuators) of the function of a Control at the outputs; those held if it has a period.
 
@@ -690,6 +688,9 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         InvalidForce
             If it is none of these.
         """
+        return by_phase(self, lambda part: part._actuation(control))
+
+    def _actuation(self, control):
         item = self.handles.item(control)
         if reactions.is_idle(self.packed, item):
             return np.zeros((self.t.size, len(getattr(item, "actuators", "xyz"))))
@@ -791,7 +792,6 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """
         return reactions.contact_point(self, constraint)
 
-    @in_phases
     def friction_demand(self, constraint: ItemLike) -> Floats:
         """Tangential over normal force at a contact, (k,): the coefficient of friction that rolling needs at least.
 
@@ -809,7 +809,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> print(f"{ts.simulate(scene, (0, 1)).friction_demand(contact)[-1]:.6f}")
         0.285714
         """
-        return reactions.friction_demand(self, constraint)
+        return by_phase(self, lambda part: reactions.friction_demand(part, constraint))
 
     def reaction_unique(self, item: ItemLike, on: BodyLike | None = None) -> Bools:
         """Return True where `reaction` is unique, at each output: bool (k,).

@@ -202,6 +202,22 @@ def test_a_rod_hits_a_plane(mu):
     np.testing.assert_allclose(after.velocity("rod"), [-0.4 + T, 0, -1 + N], atol=1e-14)
 
 
+def test_restitution_is_lowered_where_friction_would_add_energy():
+    """A rod that hits the floor at a steep angle, elastically: Newton's law would give it energy."""
+    scene, a, w = ts.Scene(gravity=(0, 0, 0)), 1.2443, 1.3122
+    start = {"velocity": (0.24285, 0, -1.65635), "angular_velocity": (0, -w, 0)}
+    tilted, place = Rotation.from_euler("y", -a), (np.cos(a), 0, np.sin(a) + 0.01)
+    rod = scene.add_body(1.0, (1e-3, 0.05, 0.05), place, orientation=tilted, **start)
+    law = {"kinetic": 0.6, "restitution": 1.0, "name": "tip"}
+    scene.add(C.PlaneContact(rod, scene.ground, point_a=(-1, 0, 0), **FLOOR, **law))
+    solution = ts.simulate(scene, (0, 0.05))
+    assert solution.success
+    assert len(solution.impulses) >= 1
+    assert "Restitution was lowered at 1 impact" in solution.message
+    assert np.diff(solution.energy).max() <= 1e-13
+    assert 0 < solution.energy[-1] <= solution.energy[0]
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_random_impacts_keep_the_laws(seed):
     """Of a box with five contacts: no approach, impulses that push, no energy gained, by both laws."""

@@ -37,7 +37,7 @@ from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
-from ..validation import damaged, demand, listed
+from ..validation import counted, damaged, demand, listed
 from .grips import Halting, Reactions, phase_with_friction, renewed
 from .impacts import held, impact_of, jumped
 from .phase_scenes import NAMED, first_row_of, gaps_of, phase_of
@@ -264,6 +264,7 @@ class _ContactRun:
         self.reason, self.methods, self.at_once, self.judged = "", [], 0, (self.t, 0)
         self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
         self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
+        self.lowered = set()  # times of impacts at which less than the coefficients of restitution acts
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
 
     def _take_scene(self, scene):
@@ -746,6 +747,8 @@ class _ContactRun:
         """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
         qd = self.qd if qd is None else qd
         p, change, share = impact_of(inertia, touching, qd, before, e)
+        if share < 1.0:
+            self.lowered.add(self.t)
         return p, *jumped(inertia, qd, change, touching, before, share * e, p)
 
     def _lowering(self, inertia, touching, qd, rates):
@@ -769,8 +772,14 @@ class _ContactRun:
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
             events = tuple([np.concatenate(column[k]) for column in columns] for k in range(3))
+        reason = self.reason
+        if self.lowered:
+            reason += (
+                f" Restitution was lowered at {counted(len(self.lowered), 'impact')}, the first at t = "
+                f"{min(self.lowered):.9g} s: with friction they would have added energy."
+            )
         return Outcome(
-            status, self.reason,
+            status, reason.strip(),
             range(archive.counts["outputs"]) if archive else np.concatenate([part.rows for part in parts]),
             RunEnd(
                 end.reached, end.last, end.remembered, self.totals or summed([end.counts for end in ends]),

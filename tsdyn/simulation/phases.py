@@ -169,6 +169,14 @@ class Phases:
                 out[np.ix_(mine, which)] = losses(self.gaps, which, own, *some)
         return out
 
+    def with_normal_loads(self, numbers, t, q, qd, qdd, memory):
+        """As `reactions.with_normal_loads`: the rows that hold frictions in a phase take their part of the loads."""
+        out = [None] * len(numbers)
+        for kind, mine, some in self._gathered(numbers, (t, q, qd, qdd, memory)):
+            for i, row in zip(mine, reactions.with_normal_loads(self.packed[kind], *some), strict=True):
+                out[i] = row
+        return np.array(out).reshape(len(numbers), -1)
+
     def constraint_error(self, numbers, *arrays):
         """The `ConstraintError` of the rows that hold."""
         out = np.zeros((3, len(numbers)))

@@ -258,7 +258,7 @@ def _power(solution, trajectory, item, t):
     states, memory, status = trajectory(t)
     q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
     system = solution.system
-    memory = with_normal_loads(solution.packed, t, q, qd, qdd, memory)
+    memory = solution._with_normal_loads(t, q, qd, qdd, memory)
     at = SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=solution.packed, system=system)
     if system.rheonomic[0]:
         at.multipliers = solution._multipliers_at(t, q, qd, qdd, memory)
@@ -594,7 +594,15 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     @cached_property
     def _memory(self):
         """Memory of forces and normal loads of joint friction, (k, ...)."""
-        return with_normal_loads(self.packed, self.t, self.q, self.qd, self.qdd, self._remembers)
+        motion = self.t, self.q, self.qd, self.qdd, self._remembers
+        return self._with_normal_loads(*motion, self._phase_of_rows)
+
+    def _with_normal_loads(self, t, q, qd, qdd, memory, numbers=None):
+        """Memory of forces and normal loads of joint friction, (k, ...), at times of the run."""
+        if self._phases is None or not self.system.normals.size:
+            return with_normal_loads(self.packed, t, q, qd, qdd, memory)
+        numbers = self._phases.at(t) if numbers is None else numbers
+        return self._phases.with_normal_loads(numbers, t, q, qd, qdd, memory)
 
     @cached_property
     def multipliers(self) -> Floats:

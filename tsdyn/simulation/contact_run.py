@@ -37,8 +37,12 @@ from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
+<<<<<<< HEAD
 from ..validation import damaged, demand, listed
 from . import hybrid
+=======
+from ..validation import counted, damaged, demand, listed
+>>>>>>> stick2
 from .grips import Halting, Reactions, phase_with_friction, renewed
 from .impacts import held, impact_of, jumped
 from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
@@ -273,6 +277,7 @@ class _ContactRun:
         self.reason, self.methods, self.at_once, self.judged = "", [], 0, (self.t, 0)
         self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
         self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
+        self.lowered = set()  # times of impacts at which less than the coefficients of restitution acts
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
 
     def _take_scene(self, scene, inactive=None, values=None):
@@ -500,12 +505,20 @@ class _ContactRun:
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
+<<<<<<< HEAD
         memory, units = self.remembered[self.count :], self.frictions.units
         idle = [i for i in self.modes.blocked if not memory[units[i].way].any()]
         rest = sorted([*self.modes.sticking, *idle])
         names = [self.gaps.names[i] for i in held]
         names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
         names += [self.frictions.names[i] for i in rest]
+=======
+        names = [self.gaps.names[i] for i in held]
+        names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
+        memory, units = self.remembered[self.count :], self.frictions.units
+        idle = [i for i in self.modes.blocked if not memory[units[i].way].any()]
+        names += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
+>>>>>>> stick2
         return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
@@ -836,6 +849,8 @@ class _ContactRun:
         """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
         qd = self.qd if qd is None else qd
         p, change, share = impact_of(inertia, touching, qd, before, e)
+        if share < 1.0:
+            self.lowered.add(self.t)
         return p, *jumped(inertia, qd, change, touching, before, share * e, p)
 
     def _lowering(self, inertia, touching, qd, rates):
@@ -861,8 +876,14 @@ class _ContactRun:
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
             events = tuple([np.concatenate(column[k]) for column in columns] for k in range(3))
+        reason = self.reason
+        if self.lowered:
+            reason += (
+                f" Restitution was lowered at {counted(len(self.lowered), 'impact')}, the first at t = "
+                f"{min(self.lowered):.9g} s: with friction they would have added energy."
+            )
         return Outcome(
-            status, self.reason,
+            status, reason.strip(),
             range(archive.counts["outputs"]) if archive else np.concatenate([part.rows for part in parts]),
             RunEnd(
                 end.reached, end.last, end.remembered, self.totals or summed([end.counts for end in ends]),

@@ -94,6 +94,10 @@ def impact(
     The bilateral constraints hold during the impact. With 0 <= v+ + e v-, 0 <= p complementary, v+ is unique; the
     impulses p of redundant contacts are one of the possible solutions.
 
+    With friction the tangential impulses of a contact are within the kinetic coefficient times p, and against its slip
+    where that doesn't vanish; the impulses returned are normal ones. Coefficients of restitution are lowered together
+    where the energy would grow.
+
     Examples
     --------
     The first of three equal balls in contact is hit; plastic impacts leave all with the same velocity:

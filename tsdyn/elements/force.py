@@ -58,6 +58,9 @@ class Force(Attachment):
         What x is made of, each on body "a" or "b".
     memory : int
         1 for a force that remembers a number from step to step: it is the last of par, and zero at first.
+    taken : int
+        Numbers of par, behind those of `parameters()`, that a run sets where one of its phases begins, such as the
+        direction in which a block begins to slide; zero at first. They may differ from force to force.
     slots : int
         Rows of scratch memory that `series` uses.
     no_series : str
@@ -105,7 +108,7 @@ class Force(Attachment):
 
     error = InvalidForce
     lacks = "forces and has no law"
-    memory = 0
+    memory = taken = 0
     slots = 0
     no_series = ""
     sharp = False

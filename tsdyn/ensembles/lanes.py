@@ -346,7 +346,7 @@ def _of_scene(arena):
             found.append(f"{force.name} changes within less than its series shows")
         elif force.positive is None:
             found.append(f"{force._kind()} doesn't say where it is analytic (`positive`)")
-        elif force.memory:
+        elif force.memory or force.taken:
             found.append(f"{force.name} remembers a number from step to step")
     if redundant_rows(packed).size:
         found.append("some rows are redundant")

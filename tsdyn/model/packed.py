@@ -1,6 +1,7 @@
 """The packed system: the arrays that kernels read, in a named tuple whose type is the same for every scene."""
 
 import os
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -185,7 +186,7 @@ class Load(NamedTuple):
     parameters: tuple  # floats and Signals
     coordinates: tuple  # where its markers are, (3,) each
     alone: np.ndarray  # (1,) of tables.ForceKind: a System.forces that has this instance alone
-    slot: int  # of System.memory; -1 for none
+    slot: int  # of System.memory, the first; -1 for none
     normal: int  # of System.normals; -1 for none
     programs: tuple  # for each number of par: where in System.reals the program of its series begins; -1 for none
     law: object = None  # a `laws.Law` of a function that sees the whole scene
@@ -203,7 +204,8 @@ def pack_forces(forces, where, table, reals, handles):
     """
     groups = {}
     for force in forces:
-        groups.setdefault(id(force.kernels), []).append(force)  # user functions have kernels of their own
+        key = id(force.kernels), force.taken  # user functions have kernels of their own
+        groups.setdefault(key, []).append(force)
     rows, signals, memory, normals, loads = [], [], [], [], {}
     programs, expanded = [], {}
     for members in groups.values():
@@ -236,9 +238,9 @@ def pack_forces(forces, where, table, reals, handles):
                 if not value.motions:
                     signals.append([value.address, len(reals), value.width, -1])
                 reals += [np.nan] * value.width  # until the time is set
-            if force.memory:
-                memory.append(len(reals))
-                reals.append(0.0)
+            remembers = force.memory + force.taken
+            memory += range(len(reals), len(reals) + remembers)
+            reals += [0.0] * remembers
             if "normal_load" in kernels:
                 normals.append(len(reals))
                 reals.append(0.0)
@@ -249,7 +251,7 @@ def pack_forces(forces, where, table, reals, handles):
                 )
             stride = size
             alone = records(ForceKind, [[1, stride, 0, force_address, 0, remember, *begin, 0]])
-            slot = len(memory) - 1 if force.memory else -1
+            slot = len(memory) - remembers if remembers else -1
             normal = len(normals) - 1 if "normal_load" in kernels else -1
             loads[id(force)] = Load(force, parameters, force.coordinates, alone, slot, normal, ())
             expanded[id(force)] = [motion for value in parameters for motion in _series(value)]
@@ -705,6 +707,16 @@ def of_rates(packed):
 def classes(packed):
     """The classes of constraints, in the order of System.kinds."""
     return list(dict.fromkeys(type(constraint) for constraint in packed.constraints))
+
+
+def begins_of(packed):
+    """Where the reals of each primitive begin, by its id, in the order of their rows."""
+    kinds, taken, found = dict(zip(classes(packed), packed.system.kinds, strict=True)), Counter(), {}
+    for primitive in packed.constraints:
+        row = kinds[type(primitive)]
+        found[id(primitive)] = int(row.reals + taken[type(primitive)] * row.stride)
+        taken[type(primitive)] += 1
+    return found
 
 
 def inertia_classes(packed):

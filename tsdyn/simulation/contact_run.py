@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,11 +34,14 @@ if TYPE_CHECKING:
 
     from ..hints import ItemLike, Scene
 
-# A run with contacts is a sequence of phases. Each is a run of the scene with the closed gaps as bilateral rows, and
-# ends at the first zero of an open gap, from above, or of the reaction of a closed one. Then velocities jump by the
-# impulses of an impact, where gaps close; those that are closed and at rest stay so as the complementarity problem of
-# accelerations says; and the next phase begins. Closed gaps whose rows depend on others, such as that of a fourth leg,
-# are left out of the rows: the others hold them.
+# A run with contacts is a sequence of phases. A scene has units: gaps, each open or closed. A phase is a run of the
+# scene with the units in their modes, the closed gaps as bilateral rows, and ends at the first zero of what a unit
+# watches: of an open gap, from above, or of the reaction of a closed one. Then velocities jump by the impulses of an
+# impact, where gaps close; those that are closed and at rest stay so as the complementarity problem of accelerations
+# says; and the next phase begins. Closed gaps whose rows depend on others, such as that of a fourth leg, are left out
+# of the rows: the others hold them.
+#
+# `Modes` has all that a phase follows from, beside t, q, qd and what the run remembers: a checkpoint needs no more.
 
 
 class _Closing:
@@ -190,6 +193,15 @@ def demand_apart(gaps, q, angles, tol):
         )
 
 
+@dataclass
+class Modes:
+    """The modes of the units of a scene: numbers of gaps."""
+
+    closed: list = field(default_factory=list)  # independent rows, with reactions
+    idle: list = field(default_factory=list)  # closed by what others hold
+    opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+
+
 class _ContactRun:
     """One run in the making.
 
@@ -222,7 +234,7 @@ class _ContactRun:
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
-        self.closed, self.idle, self.rest = [], [], self.t
+        self.modes, self.rest = Modes(), self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
         self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
         self.reason, self.method, self.at_once, self.judged = "", "", 0, (self.t, 0)
@@ -268,9 +280,8 @@ class _ContactRun:
 
     def _phase(self):
         """Run the next phase: its task and outcome."""
-        gaps, end = self.gaps, self.span[1]
-        phase = phase_of(self.scene, [gaps.list[i].side.row for i in self.closed])
-        names = [gaps.names[i] for i in sorted([*self.closed, *self.idle])]
+        end = self.span[1]
+        phase, names = self._scene(), self._names()
         call, plain = RunCall((self.t, end)), replace(self.options, events=None)
         run = self.run_of(phase, plain, call)
         run._prepare_kernels(True)
@@ -283,26 +294,40 @@ class _ContactRun:
             outcome = self.run_task(task, phase, self.options.initial_tol)
             other = self.instead(task, outcome.status)
             if other is None:
-                self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, tuple(dict.fromkeys(names)))
+                self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, names)
                 return task, outcome
             run = run._by(other)
 
+    def _scene(self):
+        """The scene of the present modes."""
+        return phase_of(self.scene, [self.gaps.list[i].side.row for i in self.modes.closed])
+
+    def _names(self):
+        """Names of the units whose rows hold."""
+        held = sorted([*self.modes.closed, *self.modes.idle])
+        return tuple(dict.fromkeys(self.gaps.names[i] for i in held))
+
     def _events(self, phase):
-        gaps, pairs = self.gaps, zip(self.users, self.counts, strict=True)
+        """Events of a phase: the user's, then one for each of the units `watched`."""
+        pairs = zip(self.users, self.counts, strict=True)
         found = [event._replace(limit=event.limit - count) for event, count in pairs]
-        self.watched, pushes = [None] * len(found), {}
-        first = {id(member.constraint): member.rows.start for member in phase.packed.members}
+        watches = list(self._watches(phase.packed))
+        self.watched = [None] * len(found) + [unit for unit, _ in watches]
+        return found + [event for _, event in watches]
+
+    def _watches(self, packed):
+        """Yield the units that may end a phase, each with its event."""
+        gaps, modes, pushes = self.gaps, self.modes, {}
+        first = {id(member.constraint): member.rows.start for member in packed.members}
         for i in range(gaps.count):
-            if i in self.idle:
+            if i in modes.idle:
                 continue
             row, sign = gaps.list[i].side.row, gaps.list[i].side.sign
-            if i in self.closed:
-                event = _Leaving(phase.packed, first[id(row)], sign, pushes)
+            if i in modes.closed:
+                event = _Leaving(packed, first[id(row)], sign, pushes)
             else:
-                event = _Closing(gaps, i, self.opened.get(i, ()))
-            found.append(Event(event, gaps.names[i], 1.0, -1.0, i not in self.closed))
-            self.watched.append(i)
-        return found
+                event = _Closing(gaps, i, modes.opened.get(i, ()))
+            yield i, Event(event, gaps.names[i], 1.0, -1.0, i not in modes.closed)
 
     def _times(self):
         left = self.times[self.taken :]
@@ -355,7 +380,7 @@ class _ContactRun:
         if self._is_stuck():
             return Status.CONTACT_FAILED
         near = [i for i in range(gaps.count) if values[i] <= TOUCHING * self.length]
-        return self._settle(sorted({*near, *fired, *self.closed, *self.idle}), fired)
+        return self._settle(sorted({*near, *fired, *self.modes.closed, *self.modes.idle}), fired)
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -376,22 +401,22 @@ class _ContactRun:
     def _settle(self, touching, fired):
         """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
         slots, values = self.remembered[self.count :], self.gaps.at(self.q, self.remembered[: self.count])
-        self.rest, self.opened = self.t, {}
+        before, self.modes, self.rest = self.modes, Modes(), self.t
         if not touching:
-            self.closed, self.idle = [], []
             return None
         try:
             inertia = Inertia(self.gaps, self.t, self.q, self.qd, slots)
             rates = inertia.rates(self.qd)
-            noise = [i for i in fired if i not in self.closed and rates[i] > 0.0]
+            noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
             if noise:  # a gap that closes with a rate of rounding
                 self.qd, rates = held(inertia, self.qd, noise, rates)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
-            self.opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
-            leaving = [i for i in fired if i in self.closed]
-            self.closed, self.idle = settle(inertia, resting, self.qd, leaving)[:2] if resting else ([], [])
+            opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
+            leaving = [i for i in fired if i in before.closed]
+            stay = settle(inertia, resting, self.qd, leaving)[:2] if resting else ([], [])
+            self.modes = Modes(*stay, opened)
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."

@@ -24,7 +24,7 @@ from ..files.scene_text import TableNumbers
 from ..files.types import Unwritable, encode
 from ..jit.code_hash import is_ours
 from ..model.handles import handles_of
-from ..model.packed import Derived, checked_motions, classes, reaches_of, size_of_reaches
+from ..model.packed import Derived, begins_of, checked_motions, reaches_of, size_of_reaches
 from ..motions.elementary import Constant
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal, numbers_of, with_number
@@ -532,17 +532,8 @@ class Family:
         self._bodies = {id(body): own for body, own in bodies}
         self.loads = {id(force): i for i, force in enumerate(template._forces)}
         self._structural, self._has_laws = {}, any(load.law is not None for load in packed.loads)
-        self.begins = self._find_begins()
+        self.begins = [*begins_of(self.packed).values()]
         self.reaches = [reaches_of(*pair) for pair in zip(packed.constraints, packed.coordinates, strict=True)]
-
-    def _find_begins(self):
-        """Where the reals of each primitive begin."""
-        taken, rows, found = {}, dict(zip(classes(self.packed), self.packed.system.kinds, strict=True)), []
-        for primitive in self.packed.constraints:
-            row, at = rows[type(primitive)], taken.get(type(primitive), 0)
-            found.append(int(row.reals + at * row.stride))
-            taken[type(primitive)] = at + 1
-        return found
 
     def field(self, name):
         """The `Field` of a name; raises InvalidArgument."""

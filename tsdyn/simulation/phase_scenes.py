@@ -1,15 +1,20 @@
-"""Scenes of the phases of a run: the scene with some of its unilateral constraints closed, the others left out."""
+"""Scenes of the phases of a run: what of a scene stays, and what its contacts and frictions are in their modes."""
 
 from functools import wraps
+from typing import NamedTuple
 
 from ..calls import fitting
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument
 from ..model.handles import handles_of
+from ..model.packed import begins_of
 from ..validation import listed
 
-# A phase is a scene of its own, packed once for each set of closed gaps, on the bodies, joints and forces of the scene.
-# So nothing below it knows of contacts, and a scene without contacts loads nothing of this.
+# A phase is a scene of its own, packed once for each combination of modes: the bodies, joints and forces of the scene,
+# less those that are switched off, and the rows that its units add in their modes, such as that of a closed gap. So
+# nothing below it knows of contacts, and a scene without contacts loads nothing of this. Numbers of these rows that are
+# taken at a transition, such as the place where a block sticks, are among what the run remembers: nothing is packed
+# for other values.
 
 NAMED = 5  # contacts in a message
 
@@ -21,22 +26,44 @@ def has_contacts(scene):
     return scene._opens
 
 
-def phase_of(scene, rows):
-    """The scene with these rows of its contacts, primitives, for all of them; kept until the scene changes."""
+class Place(NamedTuple):
+    """Where a number that the run remembers is among the numbers of a row."""
+
+    slot: int  # of System.memory
+    row: object  # a primitive of the phase
+    at: int  # behind where its reals begin
+
+
+def phase_of(scene, rows, places=(), without=()):
+    """The scene with these rows, primitives, in place of its contacts; kept until the scene changes.
+
+    places: `Place` of what the rows take from the memory of the run. without: constraints and forces left out.
+    """
     known = scene._phases
     if known is None:
         known = scene._phases = {}
-    key = frozenset(map(id, rows))
+    key = frozenset(map(id, (*rows, *without)))
     if key not in known:
-        contacts = contacts_of(scene._added)
-        others = [each for each in scene._added if not any(each is contact for contact in contacts)]
+        gone = {id(each) for each in (*contacts_of(scene._added), *without)}
         phase = known[key] = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
-            _added=others + list(rows), _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={},
-            _opens=False,
+            _added=[each for each in scene._added if id(each) not in gone] + list(rows),
+            _forces=[each for each in scene._forces if id(each) not in gone],
+            _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
         )  # fmt: skip
+        if places:
+            phase._packed = _remembering(phase.packed, places)
     return known[key]
+
+
+def _remembering(packed, places):
+    """Packed with the memory of these places in numbers of its rows."""
+    system, begins = packed.system, begins_of(packed)
+    memory = system.memory.copy()
+    for slot, row, at in places:
+        memory[slot] = begins[id(row)] + at
+    return packed._replace(system=system._replace(memory=memory))
 
 
 def at_start(scene):

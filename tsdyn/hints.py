@@ -83,6 +83,7 @@ Progress: TypeAlias = bool | Callable[[float], object]
 
 Formulation: TypeAlias = Literal["tangent", "null-space", "maggi-kane"]
 Redundancy: TypeAlias = Literal["drop", "refuse"]
+ImpactLaw: TypeAlias = Literal["newton", "poisson"]
 Folds: TypeAlias = Literal["keep", "free"]
 Frame: TypeAlias = Literal["ground", "body"]
 Axis: TypeAlias = Literal["x", "y", "z"]
@@ -169,6 +170,7 @@ __all__ = [
     "Ground",
     "Handles",
     "Integers",
+    "ImpactLaw",
     "Integrator",
     "InverseDynamics",
     "Item",

@@ -178,6 +178,32 @@ def test_a_flat_block_rests_at_once():
     assert [names for *_, names in solution.phases] == [("edge 1",), ("edge 0", "edge 1")]
 
 
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+def test_laws_of_impact_in_a_run(law):
+    """A flat block on an elastic edge falls on its plastic one: by Poisson's law alone the former rebounds.
+
+    Compression ends with impulses p of both edges; that of the elastic one, p_1, is given again, and the plastic one
+    keeps its edge down: gd_1 = p_1 (G_11 - G_01^2 / G_00).
+    """
+    b, h, e = 0.5, 0.4, 0.8
+    scene, smooth = block(b, h, 0.1), Smooth(b, h)
+    scene["edge 1"].restitution = e
+    solution = ts.simulate(scene, (0, 0.3), law=law, dense_output=True)
+    t = solution.impulses[0][0]
+    rate = np.sqrt(2 * G * smooth.fall(0.1, 0.0) / smooth.inertia(0.0))
+    own, other = 1 + b * b / smooth.own, 1 - b * b / smooth.own
+    _, p = np.linalg.solve([[own, other], [other, own]], [2 * b * rate, 0])
+    exact = {"newton": 0.0, "poisson": e * p * (own - other**2 / own)}[law]
+    assert abs(t - smooth.time(0.1)) < 1e-8
+    assert abs(2 * b * np.abs(solution.at(t).angular_velocity("block")).max() - exact) < 1e-7
+    assert np.diff(solution.energy).max() < 1e-7
+
+
+def test_an_unknown_law_is_named():
+    with pytest.raises(ts.InvalidArgument, match="law must be 'newton' or 'poisson', got 'stronge'"):
+        ts.simulate(block(0.5, 0.4, 0.1), (0, 1), law="stronge")
+
+
 def test_a_falling_box_tips_over():
     """Dropped on an edge beyond its balance; it turns until its side is down, at an instant by quadrature."""
     b, h, tilt, drop = 0.2, 0.5, 0.6, 0.3

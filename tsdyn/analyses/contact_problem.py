@@ -26,8 +26,6 @@ from ..observables.evaluate import constraint_arrays, mass_matrix
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from .tolerances import AT_REST, DEPENDENT, LEVEL
 
-LAWS = "newton", "poisson"
-
 
 class Gap(NamedTuple):
     """One inequality of the scene."""

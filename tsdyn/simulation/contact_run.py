@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analyses.contact_problem import LAWS, Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.contact_problem import Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
 from ..calls import fitting
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
 from ..jit.compiled import clock
@@ -24,7 +24,7 @@ from ..runs.task import Outcome
 from ..validation import floats, listed
 from .phase_scenes import NAMED, has_contacts, phase_of
 from .progress import reporter, silent
-from .run_options import RunCall
+from .run_options import LAWS, RunCall
 from .scene_cache import Prepared, prepared
 from .segments import summed
 from .tolerances import CREEPING, ENDLESS, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
@@ -452,8 +452,9 @@ class _ContactRun:
 
     def _jump(self, inertia, touching, before, e, qd=None):
         """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
-        p = impulses(inertia, touching, before, e)
-        return p, *jumped(inertia, self.qd if qd is None else qd, touching, before, e, p)
+        law = self.options.law
+        p = impulses(inertia, touching, before, e, law)
+        return p, *jumped(inertia, self.qd if qd is None else qd, touching, before, e, p, law)
 
     def _lowering(self, inertia, touching, qd, rates):
         """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""

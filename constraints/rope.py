@@ -1,9 +1,10 @@
-"""Rope: a rope that does not stretch runs through points of bodies, without friction.
+"""Rope: a rope that does not stretch runs through points of bodies, without friction; unilateral.
 
     |x_2 - x_1| + |x_3 - x_2| + ... = length     (1)  one row, the sum of a `Span` for each pair of neighbouring points
+    gap = length - |x_2 - x_1| - ... >= 0        (2)
 
-The tension is the same everywhere, the multiplier of (1). Singular where two neighbouring points coincide, and where
-every point is pulled from opposite sides: a straight rope between fixed ends.
+The tension is the same everywhere, the multiplier of (1). Singular where two neighbouring points of a taut rope
+coincide, and where every point is pulled from opposite sides: a straight rope between fixed ends.
 """
 
 from __future__ import annotations
@@ -13,7 +14,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import InvalidConstraint, SumRow, fitting, ground_point, label, positive, rope_points
+from ..plugins import (
+    InvalidConstraint,
+    Side,
+    SumRow,
+    Unilateral,
+    fitting,
+    ground_point,
+    label,
+    positive,
+    rope_points,
+)
 from .span import Span
 
 VANISHING = 1e-9  # share of the rope's length below which a span has no direction; its square is below rounding
@@ -22,8 +33,8 @@ if TYPE_CHECKING:
     from ..hints import RopePoints
 
 
-class Rope(SumRow):
-    """Inextensible rope through any number of points of bodies: block and tackle, hoists, Atwood's machine.
+class Rope(Unilateral, SumRow):
+    """Inextensible rope through any number of points of bodies, which only pulls: hoists, tackles, tethers, leashes.
 
     Parameters
     ----------
@@ -33,23 +44,26 @@ class Rope(SumRow):
     length : float, m; optional
         Of the rope between its ends; None takes the present one.
     always_taut : bool
-        True: the rope is taut at all times, and pushes where it ought to go slack. Ropes that go slack aren't available
-        yet; `ts.forces.Cable` is the elastic one, which does.
-    restitution : float
-        Of ropes that go slack; 0.
+        True: the rope is taut at all times, and pushes where it ought to go slack. By default it goes slack where its
+        tension vanishes, and becomes taut again with an impact.
+    restitution : float, 0 to 1
+        Coefficient of restitution where the rope becomes taut: 0, the default, where its ends then move at its length,
+        1 where they bounce back without loss.
 
     Raises
     ------
     InvalidConstraint
-        If there are fewer than two points, all are on one body, neighbouring points coincide, a body belongs to another
-        scene, the length is not positive or shorter than the spans that no motion changes, or always_taut is False.
+        If there are fewer than two points, all are on one body, neighbouring points of a rope without a given length
+        coincide, a body belongs to another scene, the length is not positive or shorter than the spans that no motion
+        changes, or restitution is inadmissible.
 
     Notes
     -----
-    One row. The tension is the multiplier of the row; `solution.reaction(rope, on=body)` is the force on each of
-    its bodies, about the centroid. The masses of rope and pulleys are neglected. A pulley of radius R is a point where
-    the rope turns about its axle; the wrapped length, which changes little, is left out. A run ends where a span
-    shrinks to length zero and has no direction.
+    One row. The tension is the multiplier of the row, zero where the rope is slack; `solution.reaction(rope, on=body)`
+    is the force on each of its bodies, about the centroid. `solution.phases` tells when the rope is taut,
+    `solution.impulses` the impulses with which it becomes so. The masses of rope and pulleys are neglected. A pulley of
+    radius R is a point where the rope turns about its axle; the wrapped length, which changes little, is left out. A
+    run ends where a span of a taut rope shrinks to length zero and has no direction.
 
     Examples
     --------
@@ -60,13 +74,22 @@ class Rope(SumRow):
     >>> heavy = scene.add_point_mass(mass=3.0, position=(0, 0, -2))
     >>> light = scene.add_point_mass(mass=1.0, position=(1, 0, -2))
     >>> points = [(heavy, (0, 0, 0)), (scene.ground, (0, 0, 0)), (scene.ground, (1, 0, 0)), (light, (0, 0, 0))]
-    >>> rope = scene.add(ts.constraints.Rope(points, always_taut=True))
+    >>> rope = scene.add(ts.constraints.Rope(points, name="rope"))
     >>> solution = ts.simulate(scene, (0, 0.5))
     >>> print(f"{solution.state.velocity(light)[2]:.3f} m/s, tension {solution.multipliers[-1, 0]:.1f} N")
     2.500 m/s, tension 15.0 N
+
+    A rope of 5.2 m is slack at first, until both have fallen so far that it becomes taut, with an impact:
+
+    >>> rope.length = 5.2
+    >>> light.velocity = (0, 0, -1)
+    >>> solution = ts.simulate(scene, (0, 0.5))
+    >>> print([(round(t, 9), name, round(impulse, 9)) for t, name, impulse in solution.impulses])
+    [(0.1, 'rope', 2.25)]
     """
 
-    permanent = ("points", "always_taut", "restitution")
+    permanent = ("points", "always_taut")
+    _opens_by, excess = "always_taut=False", "is overstretched"
 
     @fitting
     def __init__(
@@ -79,16 +102,14 @@ class Rope(SumRow):
     ) -> None:
         name = label(name, "Rope", InvalidConstraint)
         where = name or "Rope"
-        points = rope_points(points, where, InvalidConstraint)
-        if not always_taut:
-            raise InvalidConstraint(
-                f"{where}: ropes that go slack aren't available yet; set always_taut=True for one that is taut at all "
-                "times, or take ts.forces.Cable, which is elastic."
-            )
-        self.__dict__.update(points=points, always_taut=True, restitution=restitution)
+        if not isinstance(always_taut, bool):
+            raise InvalidConstraint(f"{where}: always_taut must be True or False, got {always_taut!r}.")
+        points = rope_points(points, where, InvalidConstraint, apart=always_taut or length is None)
+        self.__dict__.update(points=points, always_taut=always_taut, unilateral=not always_taut)
         (a, _), (b, _) = next(pair for pair in pairwise(points) if pair[0][0] is not pair[1][0])
         super().__init__(a, b, (), name)
         self.length = self._present_length if length is None else length
+        self._set_law(restitution)
         self.check()
 
     def _untitled(self, bodies):
@@ -110,7 +131,8 @@ class Rope(SumRow):
         return float(sum(np.linalg.norm(np.subtract(s, r)) for s, r in spans))
 
     def check(self):
-        """A length that spans between bodies may have."""
+        """A length that spans between bodies may have, and an admissible coefficient of restitution."""
+        self._check_law()
         positive(self.length, f"{self.name}: length (m)", self.error)
         (first, s), (last, r) = self.points[0], self.points[-1]
         least = self._held_length
@@ -132,8 +154,13 @@ class Rope(SumRow):
         offset = self._held_length - float(self.length)
         for (a, s), (b, r) in pairwise(self.points):
             if a is not b:
-                yield Span(a, b, point_a=s, point_b=r, offset=offset, least=VANISHING * self.length)
+                yield Span(a, b, point_a=s, point_b=r, offset=offset, least=VANISHING * self.length * self.always_taut)
                 offset = 0.0
+
+    @property
+    def sides(self):
+        """Eq. (2)."""
+        return (Side(self, -1.0),)
 
     @classmethod
     def example(cls, rng, a, b):

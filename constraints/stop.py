@@ -56,6 +56,7 @@ class Stop(Unilateral, Joint):
     """
 
     markers = ()
+    excess = "is passed"
 
     def __init__(
         self,

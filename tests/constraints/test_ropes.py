@@ -1,4 +1,4 @@
-"""Ropes that are always taut: Atwood's machine, tackles, hoists, swinging loads; ropes that can't be."""
+"""Ropes: Atwood's machine, tackles, hoists, swinging loads; ropes that go slack; ropes that can't be."""
 
 from itertools import pairwise, product
 
@@ -187,5 +187,105 @@ def test_ropes_that_cant_be():
         C.Rope(span, 4.0, always_taut=True)
     with pytest.raises(ts.InvalidConstraint, match="positive"):
         C.Rope(span, -1.0, always_taut=True)
-    with pytest.raises(ts.InvalidConstraint, match="always_taut=True"):
-        C.Rope(span)
+    for options, said in (
+        ({"restitution": 1.5}, "restitution must be a number from 0"),
+        ({"restitution": 0.5, "always_taut": True}, "set always_taut=False"),
+        ({"always_taut": 1}, "True or False"),
+    ):
+        with pytest.raises(ts.InvalidConstraint, match=said):
+            C.Rope(span, **options)
+
+
+# Ropes that go slack
+
+
+def tether(length, position, velocity=(0, 0, 0), **options):
+    scene = ts.Scene(gravity=(0, 0, -G))
+    bob = scene.add_point_mass(mass=2.0, position=position, velocity=velocity, name="bob")
+    scene.add(C.Rope([(scene.ground, ORIGIN), (bob, ORIGIN)], length, name="rope", **options))
+    return scene, bob
+
+
+@pytest.mark.slow_but("taylor", "dop853")
+@pytest.mark.parametrize("method", METHODS)
+def test_a_pendulum_on_a_rope_goes_slack_flies_and_is_caught(method):
+    """Launched at the bottom with v^2 = 4 g L: slack at cos(angle from the top) = 2/3, then a parabola."""
+    scene, _ = tether(1.0, (0, 0, -1), (np.sqrt(4 * G), 0, 0))
+    solution = ts.simulate(scene, (0.0, 1.5), dense_output=True, **METHODS[method])
+    (taut, slack, again), (t, name, impulse), *_ = solution.phases[:3], *solution.impulses
+    assert [phase[2] for phase in (taut, slack, again)] == [("rope",), (), ("rope",)]
+    start = solution.at(taut[1])
+    assert abs(start.position("bob")[2] - 2.0 / 3.0) < NEAR
+    # |x + v s + g s^2 / 2| = 1 from there: its first positive root
+    (x, z), (u, w) = ((e[0], e[2]) for e in (start.position("bob"), start.velocity("bob")))
+    flight = np.roots([G * G / 4, -G * w, u * u + w * w - G * z, 2 * (x * u + z * w)])  # divided by the time
+    flight = min(root.real for root in flight if abs(root.imag) < 1e-9 and root.real > 1e-6)
+    assert abs(slack[1] - slack[0] - flight) < NEAR
+    end = np.array([x + u * flight, z + w * flight - G * flight**2 / 2]), np.array([u, w - G * flight])
+    assert name == "rope"
+    assert abs(t - again[0]) < FINE
+    assert abs(impulse - 2.0 * (end[0] @ end[1])) < NEAR  # takes the radial velocity
+    after = solution.at(t).velocity("bob")[[0, 2]]
+    assert np.abs(after - (end[1] - (end[0] @ end[1]) * end[0])).max() < NEAR
+    assert np.linalg.norm(solution.position("bob"), axis=1).max() < 1.0 + FINE
+    tension = solution.multipliers[:, 0]
+    assert tension.min() > -NEAR
+    assert not tension[(solution.t > taut[1]) & (solution.t < again[0])].any()
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_a_bob_dropped_beside_its_anchor_rebounds(e):
+    """A fall of the length from the anchor itself, where the span of the slack rope has no direction."""
+    scene, bob = tether(1.25, (0, 0, 0), restitution=e)
+    solution = ts.simulate(scene, (0.0, 0.9), t_eval=[0.0, 0.5, 0.9])
+    (t, _, impulse), *_ = solution.impulses
+    assert abs(t - 0.5) < FINE
+    assert abs(impulse - 2.0 * (1 + e) * 5.0) < FINE
+    assert np.abs(solution.velocity(bob)[1] - (0, 0, 5.0 * e)).max() < FINE
+
+
+def test_a_rope_over_a_pulley_lifts_a_weight_when_it_becomes_taut():
+    """3 kg fall by 0.8 m, then lift 1 kg: 3 v = 4 w; a rope of several spans, one on the ground alone."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    heavy = scene.add_point_mass(mass=3.0, position=(0, 0, -1), name="heavy")
+    light = scene.add_point_mass(mass=1.0, position=(1, 0, -2), name="light")
+    floor = C.PlaneContact(light, scene.ground, point_b=(0, 0, -2), normal_b=(0, 0, 1), unilateral=True, name="floor")
+    scene.add(floor)
+    points = [(heavy, ORIGIN), (scene.ground, ORIGIN), (scene.ground, (1, 0, 0)), (light, ORIGIN)]
+    scene.add(C.Rope(points, 4.8, name="rope"))
+    solution = ts.simulate(scene, (0.0, 0.5))
+    assert [phase[2] for phase in solution.phases] == [("floor",), ("rope",)]
+    (t, name, impulse), *more = solution.impulses
+    assert (name, more) == ("rope", [])
+    assert abs(t - 0.4) < FINE
+    assert abs(impulse - 3.0) < FINE
+    assert abs(solution.state.velocity(light)[2] - (3.0 + 5.0 * 0.1)) < FINE
+    assert np.abs(solution.multipliers[solution.t > 0.4, 1] - 15.0).max() < NEAR
+
+
+def test_slack_ropes_in_files_parameters_and_at_starts(tmp_path):
+    scene, bob = tether(1.0, (0, 0, -1.2), restitution=0.5)
+    with pytest.raises(ts.InconsistentState, match=r"rope is overstretched by 0\.2\."):
+        ts.simulate(scene, (0.0, 0.1))
+    scene.assemble()
+    assert np.abs(bob.position - (0, 0, -1)).max() < FINE
+    bob.position = (0, 0, -0.2)
+    scene.save(tmp_path / "scene.toml")
+    again = ts.load(tmp_path / "scene.toml")
+    assert (again["rope"].length, again["rope"].restitution, again["rope"].always_taut) == (1.0, 0.5, False)
+    expected = ts.simulate(scene, (0.0, 1.0))
+    assert (ts.simulate(again, (0.0, 1.0)).state.q == expected.state.q).all()
+    longer = scene.with_parameters({"rope.length": 2.0})
+    assert abs(ts.simulate(longer, (0.0, 1.0)).impulses[0][0] - np.sqrt(2 * 1.8 / G)) < FINE
+    assert scene.mobility().degrees_of_freedom == 3
+
+
+def test_a_run_ends_where_a_span_of_a_taut_rope_vanishes():
+    scene = ts.Scene(gravity=(0, 0, 0))
+    bead = scene.add_point_mass(mass=1.0, position=(0, 0, -1), velocity=(0, 0, 1), name="bead")
+    other = scene.add_point_mass(mass=3.0, position=(1, 0, -1), velocity=(0.4, 0, -1), name="other")
+    points = [(bead, ORIGIN), (scene.ground, ORIGIN), (scene.ground, (1, 0, 0)), (other, ORIGIN)]
+    scene.add(C.Rope(points, name="line"))
+    solution = ts.simulate(scene, (0.0, 2.0))
+    assert not solution.success
+    assert "The span of 'line' between 'bead' and 'ground' shrinks to length zero" in solution.message

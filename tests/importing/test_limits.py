@@ -1,4 +1,4 @@
-"""Limits of joints in files of robots as stops."""
+"""Limits of joints in files of robots as stops, of tendons as ropes."""
 
 import numpy as np
 import pytest
@@ -51,3 +51,34 @@ def test_limits_of_other_files(tmp_path):
         ts.load(file, limits=True)
     with pytest.raises(ts.TsdynError, match="limits must be True or False"):
         ts.load(file, limits=1)
+
+
+TETHER = """<mujoco>
+  <option gravity="0 0 -10"/>
+  <worldbody>
+    <site name="left"/> <site name="right" pos="1 0 0"/>
+    <body name="load" pos="0.5 0 -0.2"><freejoint/><geom size="0.1" mass="2"/><site name="eye"/></body>
+  </worldbody>
+  <tendon>
+    <spatial name="leash" limited="true" range="0 2"><site site="left"/><site site="eye"/><site site="right"/></spatial>
+    <spatial name="strut" limited="true" range="0.1 2"><site site="left"/><site site="eye"/></spatial>
+  </tendon>
+</mujoco>"""
+
+
+@pytest.mark.filterwarnings("ignore::tsdyn.ImportLosses")
+def test_limits_of_tendons_become_ropes(tmp_path):
+    pytest.importorskip("mujoco")
+    file = tmp_path / "tether.xml"
+    file.write_text(TETHER)
+    assert len(ts.load(file).constraints) == 1  # the normalisation
+    scene = ts.load(file, limits=True)
+    assert [entry.where for entry in scene.imported.groups()["limits of a tendon"]] == ["strut"]
+    rope = scene["limits of leash"]
+    assert (rope.length, rope.always_taut) == (2.0, False)
+    depth = np.sqrt(3) / 2  # of the point from which either span is 1 m
+    (t, name, impulse), *_ = ts.simulate(scene, (0, 1)).impulses
+    fall = depth - 0.2
+    assert name == "limits of leash"
+    assert t == pytest.approx(np.sqrt(2 * fall / 10), abs=1e-12)
+    assert impulse == pytest.approx(2.0 * np.sqrt(2 * fall * 10) / (2 * depth), abs=1e-9)  # two spans stop it

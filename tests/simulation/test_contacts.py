@@ -348,7 +348,7 @@ def test_a_scene_without_contacts_has_one_phase():
 def test_a_start_that_penetrates_is_named_and_assembled():
     scene, _ = bouncing(0.5)
     scene.body("ball").position = (0, 0, -0.2)
-    with pytest.raises(ts.InconsistentState, match=r"floor by 0\.2"):
+    with pytest.raises(ts.InconsistentState, match=r"floor penetrates by 0\.2"):
         ts.simulate(scene, (0, 1))
     scene.assemble()
     assert abs(scene.body("ball").position[2]) < 1e-15

@@ -60,7 +60,7 @@ class Gaps:
         self.bilateral = np.setdiff1d(np.arange(len(packed.system.segments)), self.rows)
         self.are_counted = any(gap.side.joint is not None for gap in self.list)
         handles, parts = handles_of(packed), {id(part): i for i, part in enumerate(packed.constraints)}
-        self._values = [self._value_of(handles, parts[id(gap.side.row)], gap.side) for gap in self.list]
+        self._values = [self._value_of(handles, parts[id(gap.side.row.parts[0])], gap.side) for gap in self.list]
 
     def _value_of(self, handles, part, side):
         """A function of q (..., n) and counted angles (..., angles) that returns a gap (...)."""
@@ -73,21 +73,30 @@ class Gaps:
                 return side.sign * (counted(found, angles[..., at]) - side.bound)
 
             return value
+        terms = [self._term(handles, i) for i in range(part, part + len(side.row.parts))]
+
+        def value(q, angles):
+            return side.sign * sum(term(q) for term in terms)
+
+        return value
+
+    def _term(self, handles, part):
+        """A function of q (..., n) that returns Phi of a primitive (...), as it is where the row is open."""
         row, given, coordinates = (
             getattr(self.packed, name)[part] for name in ("constraints", "parameters", "coordinates")
         )
-        phi, markers = twin(type(row).phi), list(zip(row.markers, coordinates, strict=True))
+        phi, markers = twin(getattr(type(row), "gap", type(row).phi)), list(zip(row.markers, coordinates, strict=True))
         markers = [(m.code == POINT, handles.where(row.body_of(m)), tuple(s.tolist())) for m, s in markers]
 
-        def value(q, angles):
+        def term(q):
             x, out = [], [0.0]
             for is_point, place, s in markers:
                 body = BodyMotion(*place, (q,))
                 x += body.point(s, 0) if is_point else body.arm(s, 0)
             phi(x, given, 0.0, out)
-            return side.sign * out[0]
+            return out[0]
 
-        return value
+        return term
 
     def value(self, i, q, angles):
         """One gap (...) at q (..., n); angles (..., angles): counted ones of joints."""

@@ -267,8 +267,13 @@ def _meant(error, arguments, keywords):
     return arguments, keywords
 
 
-def rope_points(points: Any, what: str, error: type[TsdynError]) -> tuple[tuple[Any, tuple[float, ...]], ...]:
-    """The points of a rope or cable as pairs of a body and three floats, in its frame; names become handles."""
+def rope_points(
+    points: Any, what: str, error: type[TsdynError], apart: bool = True
+) -> tuple[tuple[Any, tuple[float, ...]], ...]:
+    """The points of a rope or cable as pairs of a body and three floats, in its frame; names become handles.
+
+    apart: whether neighbours may not coincide.
+    """
     how = "give points=[(body, (x, y, z)), ...], two or more, in the order of the rope"
     if not isinstance(points, (list, tuple)) or not all(
         isinstance(one, (list, tuple)) and len(one) == 2 for one in points
@@ -295,7 +300,7 @@ def rope_points(points: Any, what: str, error: type[TsdynError]) -> tuple[tuple[
             raise error(f"{what}: the point on {body.name!r} must be {asked}, got {shown(s)}.")
         found.append((body, tuple(place.tolist())))
     for i, ((a, s), (b, r)) in enumerate(pairwise(found)):
-        if not np.linalg.norm(ground_point(a, np.array(s)) - ground_point(b, np.array(r))) > 0.0:
+        if apart and not np.linalg.norm(ground_point(a, np.array(s)) - ground_point(b, np.array(r))) > 0.0:
             raise error(
                 f"{what}: points {i} and {i + 1}, on {a.name!r} and {b.name!r}, coincide; a span of length zero has no "
                 "direction. Move one of them, or leave it out."

@@ -9,13 +9,14 @@ from ..validation import number, shown
 
 if TYPE_CHECKING:
     from .element import Attachment
+    from .joint import SumRow
     from .primitive import Primitive
 
 
 class Side(NamedTuple):
     """One inequality of a unilateral constraint: gap >= 0, and Phi = 0 of its row where the gap is closed."""
 
-    row: Primitive
+    row: Primitive | SumRow
     sign: float  # of the gap over Phi, where the gap is small
     joint: Any = None  # whose counted angle the gap is measured by, sign (angle - bound); else the gap is sign Phi
     which: int = 0  # angle of the joint
@@ -23,7 +24,7 @@ class Side(NamedTuple):
 
 
 class Unilateral:
-    """Mixed into a constraint that only pushes.
+    """Mixed into a constraint that only pushes, or only pulls.
 
     Attributes
     ----------
@@ -35,6 +36,8 @@ class Unilateral:
 
     unilateral = True
     restitution: float
+    excess = "penetrates"  # what is said of a gap below zero
+    _opens_by = "unilateral=True"  # the argument of a constraint that opens
 
     def _set_law(self, restitution: float, kinetic: float = 0.0, static: float | None = None) -> None:
         """Take the coefficients of impact and friction, at the end of `__init__`."""
@@ -53,7 +56,7 @@ class Unilateral:
                 f"{self.name}: friction of unilateral contacts is not available yet: leave out kinetic and static."
             )
         if not self.unilateral and self.restitution != 0.0:
-            raise InvalidConstraint(f"{self.name}: restitution is of a contact that opens; set unilateral=True.")
+            raise InvalidConstraint(f"{self.name}: restitution is of a constraint that opens; set {self._opens_by}.")
 
     @property
     def sides(self) -> tuple[Any, ...]:

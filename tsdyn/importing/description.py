@@ -159,7 +159,7 @@ class TendonItem:
     """A spring between two points, or a cable or rope through several."""
 
     name: str
-    kind: str  # spring, cable, rope
+    kind: str  # spring, cable, rope, limit
     points: list  # pairs: the name of a link, a point (3,) in the ground frame, m
     length: float  # where it has no tension, m
     stiffness: float = 0.0
@@ -279,9 +279,9 @@ class ImportReport:
             self.limits[joint] = lower, upper
         self.leave("limits of a joint", joint, shown or f"[{lower:g}, {upper:g}]")
 
-    def carry_limits(self, joint: str) -> None:
-        """Note that the limits of a joint are stops."""
-        self._left = {entry: None for entry in self._left if (entry.what, entry.where) != ("limits of a joint", joint)}
+    def carry(self, what: str, where: str) -> None:
+        """Note that something has been carried over after all."""
+        self._left = {entry: None for entry in self._left if (entry.what, entry.where) != (what, where)}
 
     def note(self, text: str) -> None:
         """Note what is carried over in another way, once."""

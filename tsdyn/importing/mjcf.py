@@ -129,7 +129,10 @@ def _add_tendon(mujoco, model, data, i, found, names, report):
     elif acts:
         report.leave("spring of a tendon", name, "" if points else "(around geoms, over pulleys or of joints)")
     if model.tendon_limited[i]:
-        report.leave("limits of a tendon", name)
+        low, high = map(float, model.tendon_range[i])
+        report.leave("limits of a tendon", name, f"[{low:g}, {high:g}]")
+        if len({link for link, _ in points}) > 1 and low <= 0.0 < high:
+            found.tendons.append(TendonItem(name, "limit", points, high))
     if model.tendon_frictionloss[i]:
         report.leave("friction of a tendon", name)
     if getattr(model, "tendon_armature", np.zeros(i + 1))[i]:

@@ -68,7 +68,7 @@ def load(
     given : sequence of (frame_a, frame_b, kind)
         Loops to be closed.
     limits : bool
-        Whether limits of joints become stops.
+        Whether limits of joints become stops, and those of tendons ropes.
     """
     root, mistakes = read(path)
     kind, path = FORMATS.get(root.tag), Path(path)
@@ -112,7 +112,7 @@ def _scene(description: Any, make: Any, report: ImportReport, mistakes: Any, lim
         mistakes.add((1, 1), "no link moves: all are fixed to the ground, or have no mass.")
     mistakes.demand_none()
     try:
-        scene = build(description, make, report)
+        scene = build(description, make, report, limits)
     except TsdynError as error:
         mistakes.add((1, 1), str(error))
         mistakes.demand_none()
@@ -122,7 +122,7 @@ def _scene(description: Any, make: Any, report: ImportReport, mistakes: Any, lim
         for name, (lower, upper) in report.limits.items():
             if name in joints:
                 scene.add(Stop(joints[name], lower, upper, name=f"limits of {name}"))
-                report.carry_limits(name)
+                report.carry("limits of a joint", name)
     report.warn(gap)
     return scene
 
@@ -288,8 +288,8 @@ def _slides(scene, joint, a, b, report):
 ONE_AXIS = {"revolute": Revolute, "prismatic": Translational, "planar": Planar, "cylindrical": Cylindrical}
 
 
-def build(description, make, report):
-    """The scene; `make` makes an empty one."""
+def build(description, make, report, limits=False):
+    """The scene; `make` makes an empty one, `limits` asks for those of tendons."""
     scene = make(gravity=description.gravity)
     bodies = {GROUND: scene.ground}
     for name, link in description.links.items():
@@ -303,7 +303,8 @@ def build(description, make, report):
                 made[name] = scene._added[-1], joint.kind
         add_joint_forces(scene, joint, bodies, report)
     for tendon in description.tendons:
-        _add_tendon(scene, tendon, bodies, report)
+        if limits or tendon.kind != "limit":
+            _add_tendon(scene, tendon, bodies, report)
     couple(scene, description, made, report)
     if any(joint.start for joint in description.joints):
         _start(description, bodies)
@@ -354,13 +355,16 @@ def _start(description, bodies):
 
 
 def _add_tendon(scene, tendon, bodies, report):
-    """Add a spring, a cable or a rope."""
+    """Add a spring, a cable, or a rope; the limit of a length is a rope that goes slack."""
     given, name = {"stiffness": tendon.stiffness, "damping": tendon.damping}, unused(scene, tendon.name)
     (a, x), *_, (b, y) = [(bodies[link], point) for link, point in tendon.points]
     points = [(bodies[link], in_frame(bodies[link], Point("a"), point)) for link, point in tendon.points]
     try:
         if tendon.kind == "rope":
             scene.add(Rope(points, tendon.length, always_taut=True, name=name))
+        elif tendon.kind == "limit":
+            scene.add(Rope(points, tendon.length, name=unused(scene, f"limits of {tendon.name}")))
+            report.carry("limits of a tendon", tendon.name)
         elif tendon.kind == "cable":
             scene.add(Cable(points, **given, free_length=tendon.length, name=name))
         else:

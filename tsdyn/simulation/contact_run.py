@@ -182,14 +182,13 @@ class _Pieces(StepPieces):
 
 
 def demand_apart(gaps, q, angles, tol):
-    """Raise InconsistentState where contacts penetrate."""
+    """Raise InconsistentState where gaps are below zero."""
     values = gaps.at(q, angles)
     deep = np.flatnonzero(values < -tol * (1.0 + np.abs(q).max()))
     if deep.size:
-        found = listed([f"{gaps.names[i]} by {-values[i]:.3g}" for i in deep], NAMED)
+        found = listed([f"{gaps.names[i]} {gaps.list[i].contact.excess} by {-values[i]:.3g}" for i in deep], NAMED)
         raise InconsistentState(
-            f"contacts penetrate at the start (m, or rad): {found}. Move the bodies apart, or have scene.assemble() "
-            "close these contacts."
+            f"at the start (m, or rad): {found}. Move the bodies, or have scene.assemble() close these gaps."
         )
 
 

@@ -62,7 +62,8 @@ def load(
         or an axis in both frames that a fourth entry gives, such as (0, 1, 0). The scene is assembled;
         a warning and `scene.imported` say so where it can't be.
     limits : bool
-        Whether limits of the joints of a URDF, MJCF or SDF file become stops, plastic ones named "limits of ...".
+        Whether limits of the joints of a URDF, MJCF or SDF file become stops, plastic ones named "limits of ...", and
+        upper limits of the lengths of tendons through sites ropes that go slack.
 
     Returns
     -------

@@ -154,7 +154,8 @@ def account(solution, scene, reason, goes_on=""):
     lacking = without_series(solution.packed)[:FEW] if found else ()
     if lacking:
         remedy += f" Without a series: {'; '.join(lacking)}."
-    if not found and solution.status in (*NO_NUMBERS, Status.NEWTON_FAILED, Status.SINGULAR, Status.MAX_STEPS):
+    ended = *NO_NUMBERS, Status.NEWTON_FAILED, Status.SINGULAR, Status.MAX_STEPS, Status.CONTACT_FAILED
+    if not found and solution.status in ended:
         found = _vanished(solution)
     if not found and solution.status in NO_NUMBERS:
         found = not_finite_of(solution).said

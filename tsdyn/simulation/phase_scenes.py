@@ -57,6 +57,12 @@ def phase_of(scene, rows, places=(), without=()):
     return known[key]
 
 
+def last_phase(scene, phases):
+    """The scene of the phase that a run has ended in."""
+    packed = phases.packed[phases.of[-1]]
+    return next(phase for phase in scene._phases.values() if phase.packed is packed)
+
+
 def _remembering(packed, places):
     """Packed with the memory of these places in numbers of its rows."""
     system, begins = packed.system, begins_of(packed)

@@ -20,6 +20,7 @@ from ..rows.tolerances import UNEQUAL_MASSES
 from ..runs.tolerances import AT_LONGEST
 from ..taylor.layout import without_series
 from ..validation import counted
+from .phase_scenes import last_phase
 from .tolerances import (
     AT_ONCE,
     BLOW_UP,
@@ -249,13 +250,16 @@ def suspect(solution, scene):
     """Name the nearly singular item at the last state."""
     if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
         return ""
-    place = singular_place(solution.packed, solution._last[0])
+    if solution._phases is not None:
+        scene = last_phase(scene, solution._phases)
+    packed = scene.packed
+    place = singular_place(packed, solution._last[0])
     if place:
         return f"{place}: a singular configuration."
     if solution._last.shape[1] > MOST_SINGULAR:
         return _suspect_of_many(solution, scene)
-    _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)
-    rows, share = weakest_row(scene, Phi_q, len(redundant_rows(solution.packed)))
+    _, Phi_q, _, _ = constraint_arrays(packed.system, solution._last[0], solution._last[1], solution._reached)
+    rows, share = weakest_row(scene, Phi_q, len(redundant_rows(packed)))
     if not share < NEARLY_SINGULAR:
         return ""
     return (
@@ -266,7 +270,7 @@ def suspect(solution, scene):
 
 def _suspect_of_many(solution, scene):
     """Do the same by elimination, in O(N)."""
-    packed = solution.packed
+    packed = scene.packed
     rows = dependent_rows(packed, solution._last[0], solution._reached, NEARLY_SINGULAR**2)
     redundant = len(redundant_rows(packed))
     if rows is None or len(rows) <= redundant:

@@ -41,7 +41,7 @@ def test_a_random_scene(seed):
 def test_a_scene_that_hypothesis_draws(data):
     numbers = DrawnNumbers(data)
     case = drawn(numbers, 2, 8)
-    found = judge_case(case, comparison(numbers))
+    found = judge_case(case, comparison(numbers, case))
     assert not found.fault, f"{found.name}: {found.word}: {found.said}"
 
 

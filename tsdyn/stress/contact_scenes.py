@@ -1,4 +1,6 @@
-"""Random scenes with contacts, stops and ropes that go slack: stacks, cradles, chains over a floor, joints with play."""
+"""Random scenes with contacts, stops and ropes that go slack: stacks, cradles, chains over a floor, pins with play."""
+
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -86,13 +88,15 @@ def stack(d, n):
 def chain_over_floor(d, n):
     """Links over a floor, free or hung up, straight or bent, with stops between them."""
     e, L, last = _upright(d), 0.4 * d.length, d.scene.ground
-    is_planar, is_free, has_stops, way = d.rng.integers(2), d.rng.integers(2), d.rng.integers(2), d.rng.choice((0.0, 1.0))
+    is_planar, is_free, has_stops, is_bent = d.rng.integers(2, size=4)
     tip = np.array((0.0, 0.0, d.rng.uniform(0.1, 0.8) * d.length))
     for i in range(min(n, 8)):
-        along = np.array((1.0, 0.0, way * d.rng.uniform(0.0, 1.0)))
+        along = np.array((1.0, 0.0, is_bent * d.rng.uniform(0.0, 1.0)))
         along *= L / np.linalg.norm(along)
         turned = Rotation.from_euler("y", -np.arctan2(along[2], along[0]))
-        link = d.scene.add_body(d.mass, np.array((0.001, 0.0133, 0.0133)) * d.mass * d.length**2, tip + along / 2, turned)
+        link = d.scene.add_body(
+            d.mass, np.array((0.001, 0.0133, 0.0133)) * d.mass * d.length**2, tip + along / 2, turned
+        )
         if i or not is_free:
             kind, axis = (joints.Revolute, {"axis": (0, 1, 0)}) if is_planar else (joints.Spherical, {})
             joint = d.scene.add(kind.at(last, link, point=tip, **axis))
@@ -132,8 +136,10 @@ def ropes(d, n):
         if d.rng.random() < 0.3:
             points.insert(1, (d.scene.ground, d.place(place + np.array((0.7, 0.0, 0.8)))))
         ends = [s if one is d.scene.ground else np.asarray(one.position) for one, s in points]
-        length = sum(np.linalg.norm(b - a) for a, b in zip(ends, ends[1:], strict=False))
-        d.scene.add(joints.Rope(points, length=length * d.rng.choice((1.0, 1.0 + d.rng.uniform(0.0, 0.3))), **_law(d, e)))
+        length = sum(np.linalg.norm(b - a) for a, b in pairwise(ends))
+        d.scene.add(
+            joints.Rope(points, length=length * d.rng.choice((1.0, 1.0 + d.rng.uniform(0.0, 0.3))), **_law(d, e))
+        )
         last = body
 
 
@@ -146,7 +152,12 @@ def play(d, n):
         body.orientation = (1.0, 0.0, 0.0, 0.0)
         pin = np.array((-0.5, 0.0, 0.0)) * d.length
         if i == 0:
-            given = {"center_a": pin, "radius_a": 0.1 * d.length, "radius_b": 0.1 * d.length + clearance, "inside": True}
+            given = {
+                "center_a": pin,
+                "radius_a": 0.1 * d.length,
+                "radius_b": 0.1 * d.length + clearance,
+                "inside": True,
+            }
             d.scene.add(joints.SphereContact(body, last, **given, **_law(d, e)))
         else:
             d.scene.add(joints.Spherical.at(last, body, point=d.place(place)))

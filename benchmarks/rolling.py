@@ -1,9 +1,9 @@
 """Rolling in tsdyn, MuJoCo and Exudyn: error against time.
 
 A coin in a steady turn (examples/coin.py) for one turn of 2.5 s; the same coin, which nods as it rolls, as long; and a
-ball on a turntable (examples/turntable.py) for one of its turns, pi s. References are closed forms, and of the coin that
-nods Newton's and Euler's equations about its contact point, by DOP853 at 1e-13. MuJoCo holds rolling by contact with
-friction, as stiff as the step allows; Exudyn has a joint of a rolling disc, none of a ball. Engines that aren't
+ball on a turntable (examples/turntable.py) for one of its turns, pi s. References are closed forms, and of the coin
+that nods Newton's and Euler's equations about its contact point, by DOP853 at 1e-13. MuJoCo holds rolling by contact
+with friction, as stiff as the step allows; Exudyn has a joint of a rolling disc, none of a ball. Engines that aren't
 installed are left out.
 
 Run it: python -m benchmarks.rolling

@@ -150,11 +150,12 @@ class Rope(Unilateral, SumRow):
         return tuple(body for body, _ in self.points)
 
     def compose(self):
-        """Eq. (1)."""
+        """Eq. (1). No span of a rope that is always taut may vanish; that of a slack one may."""
+        least = VANISHING * self.length if self.always_taut else 0.0
         offset = self._held_length - float(self.length)
         for (a, s), (b, r) in pairwise(self.points):
             if a is not b:
-                yield Span(a, b, point_a=s, point_b=r, offset=offset, least=VANISHING * self.length * self.always_taut)
+                yield Span(a, b, point_a=s, point_b=r, offset=offset, least=least)
                 offset = 0.0
 
     @property

@@ -73,12 +73,6 @@ class Span(Primitive):
         out[0] = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2 - par[1]) + par[0]
 
     @staticmethod
-    def gap(x, par, t, out):
-        """Eq. (1) of a slack rope, whose span may vanish."""
-        d0, d1, d2 = x[3] - x[0], x[4] - x[1], x[5] - x[2]
-        out[0] = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2) + par[0]
-
-    @staticmethod
     def jacobian(x, par, t, out):
         """Eq. (2)."""
         d0, d1, d2 = x[3] - x[0], x[4] - x[1], x[5] - x[2]

@@ -157,6 +157,7 @@ else:
         "benchmark": ".measuring.benchmark",
         "compare": ".measuring.compare",
         "ensemble": ".ensembles.ensemble",
+        "Change": ".simulation.hybrid",
         "impact": ".simulation.contact_run",
         "plots": ".plots",
         "profile": ".measuring.profile",

@@ -336,6 +336,7 @@ class Status(IntEnum):
     NOT_RUN = 20
     SERIES_ENDED = 21
     CONTACT_FAILED = 22
+    ACTION_FAILED = 23
 
     def __str__(self) -> str:
         return self.name.lower()
@@ -425,5 +426,9 @@ _SENTENCES = {
     Status.CONTACT_FAILED: (
         "The contacts leave no way on.",
         "Look at the contacts named, at what drives their bodies together, and at their coefficients of restitution.",
+    ),
+    Status.ACTION_FAILED: (
+        "What the action of an event asks for can't be carried out.",
+        "Correct the action; solution.state is the state at the event.",
     ),
 }

@@ -1,10 +1,10 @@
 """Gaps of unilateral constraints, impacts, and which contacts stay closed: complementarity problems at one state.
 
-    J, G = J M~ J^T     rows of the closed gaps, and their Schur complement, the bilateral rows B eliminated
+    J, G = J M~ J^T     rows of the gaps, and their Schur complement, the bilateral rows eliminated
     impact              gd+ = gd- + G p,   0 <= gd+ + e min(gd-, 0),  p >= 0, complementary (Newton's law)
     accelerations       gdd = c + G lam,   0 <= gdd,  lam >= 0, complementary;  c: gdd of open gaps
 
-M~ = Z (Z^T M Z)^-1 Z^T with a basis Z of the motions that B leaves free. lam and p push: the opposite of multipliers.
+M~ f are the accelerations that loads f make where the bilateral rows hold. lam and p push: the opposite of multipliers.
 """
 
 from __future__ import annotations
@@ -14,16 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
-from ..elements.markers import POINT
 from ..elements.unilateral import contacts_of
-from ..errors import SingularConfiguration
-from ..jit.kernels import twin
 from ..maths.complementarity import lemke
 from ..maths.tolerances import RANK_TOL
-from ..model.handles import BodyMotion, counted, handles_of
 from ..model.handles import angle as angle_of
-from ..observables.evaluate import constraint_arrays, mass_matrix
-from ..observables.generalised_forces import applied_loads, velocity_forces
+from ..model.handles import counted, handles_of
+from .contact_rows import ContactWorkspace
 from .tolerances import AT_REST, DEPENDENT, LEVEL
 
 
@@ -36,7 +32,14 @@ class Gap(NamedTuple):
 
 
 class Gaps:
-    """The inequalities of a packed scene whose unilateral constraints are all among its rows.
+    """The inequalities of a scene; one evaluation at a time.
+
+    Parameters
+    ----------
+    packed : Packed
+        Of the scene, whose unilateral constraints are all among its rows.
+    contacts, free : Packed
+        Of its contacts' rows alone, in the order of the gaps; of the scene with all contacts open.
 
     Attributes
     ----------
@@ -48,7 +51,7 @@ class Gaps:
     restitution : ndarray (count,)
     """
 
-    def __init__(self, packed):
+    def __init__(self, packed, contacts, free):
         self.packed, self.list = packed, []
         first = {id(member.constraint): member.rows.start for member in packed.members}
         for contact in contacts_of(member.constraint for member in packed.members):
@@ -57,54 +60,35 @@ class Gaps:
         self.rows = np.array([gap.row for gap in self.list], int)
         self.sign = np.array([gap.side.sign for gap in self.list])
         self.restitution = np.array([gap.contact.restitution for gap in self.list], float)
-        self.bilateral = np.setdiff1d(np.arange(len(packed.system.segments)), self.rows)
-        self.are_counted = any(gap.side.joint is not None for gap in self.list)
-        handles, parts = handles_of(packed), {id(part): i for i, part in enumerate(packed.constraints)}
-        self._values = [self._value_of(handles, parts[id(gap.side.row.parts[0])], gap.side) for gap in self.list]
+        self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
+        self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
 
-    def _value_of(self, handles, part, side):
-        """A function of q (..., n) and counted angles (..., angles) that returns a gap (...)."""
-        if side.joint is not None:
-            place = handles.row(side.joint, "angle")
-            geometry, at = place.angles[side.which], place.first + side.which
-
-            def value(q, angles):
-                found = angle_of(geometry, *handles.motions(geometry, (q,)), 0)
-                return side.sign * (counted(found, angles[..., at]) - side.bound)
-
-            return value
-        terms = [self._term(handles, i) for i in range(part, part + len(side.row.parts))]
+    def _stop(self, handles, side):
+        """A function of q (..., n) and counted angles (..., angles) that returns the gap (...) of a joint's angle."""
+        place = handles.row(side.joint, "angle")
+        geometry, at = place.angles[side.which], place.first + side.which
 
         def value(q, angles):
-            return side.sign * sum(term(q) for term in terms)
+            found = angle_of(geometry, *handles.motions(geometry, (q,)), 0)
+            return side.sign * (counted(found, angles[..., at]) - side.bound)
 
         return value
 
-    def _term(self, handles, part):
-        """A function of q (..., n) that returns Phi of a primitive (...), as it is where the row is open."""
-        row, given, coordinates = (
-            getattr(self.packed, name)[part] for name in ("constraints", "parameters", "coordinates")
-        )
-        phi, markers = twin(getattr(type(row), "gap", type(row).phi)), list(zip(row.markers, coordinates, strict=True))
-        markers = [(m.code == POINT, handles.where(row.body_of(m)), tuple(s.tolist())) for m, s in markers]
+    @property
+    def are_counted(self):
+        """Whether angles of joints are counted for them."""
+        return bool(self._stops)
 
-        def term(q):
-            x, out = [], [0.0]
-            for is_point, place, s in markers:
-                body = BodyMotion(*place, (q,))
-                x += body.point(s, 0) if is_point else body.arm(s, 0)
-            phi(x, given, 0.0, out)
-            return out[0]
+    def values(self, t, q, angles):
+        """Gaps (k, count) at t (k,), q (k, n); angles (k, angles): counted ones of joints, where they are counted."""
+        found = self.sign * self.workspace.gaps(t, q)[:, : self.count]
+        for i, value in self._stops:
+            found[:, i] = value(q, angles)
+        return found
 
-        return term
-
-    def value(self, i, q, angles):
-        """One gap (...) at q (..., n); angles (..., angles): counted ones of joints."""
-        return self._values[i](q, angles)
-
-    def at(self, q, angles):
-        """Gaps (count,) at q (n,)."""
-        return np.array([value(q, angles) for value in self._values], float)
+    def at(self, q, angles, t=0.0):
+        """Gaps (count,) at one state."""
+        return self.values(np.array([t]), q[None], angles[None])[0]
 
 
 def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):
@@ -114,67 +98,52 @@ def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):
 
 
 class Inertia:
-    """Rows, masses and motions that the bilateral rows leave free, at one state.
+    """What pushes at gaps do where the bilateral rows hold, at one state.
 
     Parameters
     ----------
     gaps : Gaps
     t : float, s
-    q, qd : ndarray (n,)
+    q : ndarray (n,)
     slots : ndarray
         What forces remember.
+
+    Attributes
+    ----------
+    J : ndarray (count, n)
+    G : ndarray (count, count)
     """
 
-    def __init__(self, gaps, t, q, qd, slots):
-        from scipy.linalg import cho_factor, qr
+    def __init__(self, gaps, t, q, slots):
+        self.gaps, self.t, self.q, self.slots = gaps, t, q, slots
+        J, drift = gaps.workspace.rows(t, q)
+        self.J, self.drift = gaps.sign[:, None] * J[: gaps.count], gaps.sign * drift[: gaps.count]
+        self.response = gaps.workspace.respond(t, q, slots, self.J)  # M~ J^T, transposed
+        self.G = self.J @ self.response.T
 
-        self.gaps, self.t, self.q, self.qd, self.slots = gaps, t, q, qd, slots
-        system = gaps.packed.system
-        with np.errstate(over="ignore", invalid="ignore"):
-            _, Phi_q, self.Phi_t, self.gamma = constraint_arrays(system, q, qd, t)
-        self.J, self.B = gaps.sign[:, None] * Phi_q[gaps.rows], Phi_q[gaps.bilateral]
-        self.M = mass_matrix(system, q)
-        # Z of the bilateral rows; Q1 R^T of their independent ones
-        Q, R, order = qr(self.B.T, pivoting=True)
-        size = np.abs(np.diag(R))
-        rank = int((size > RANK_TOL * size.max(initial=0.0)).sum())
-        self.own, self.R, self.order = Q[:, :rank], R[:rank, :rank], order[:rank]
-        self.Z = Z = Q[:, rank:]
-        try:
-            self.factor = cho_factor(Z.T @ self.M @ Z) if Z.size else None
-        except np.linalg.LinAlgError as error:
-            raise SingularConfiguration("a direction that the constraints leave free carries no inertia.") from error
-        self.G = self.J @ self.free(self.J.T)
+    def free(self, loads):
+        """M~ loads: the accelerations (n, ...) that loads (n, ...) make where the bilateral rows hold."""
+        rows = np.ascontiguousarray(loads.T).reshape(-1, loads.shape[0])
+        return self.gaps.workspace.respond(self.t, self.q, self.slots, rows).T.reshape(loads.shape)
 
-    def free(self, load):
-        """M~ load: the accelerations (n, ...) that a load makes where the bilateral rows hold."""
-        from scipy.linalg import cho_solve
-
-        return self.Z @ cho_solve(self.factor, self.Z.T @ load) if self.Z.size else np.zeros_like(load)
+    def pushed(self, which, p):
+        """The change of velocities (n,) by impulses p (k,) of the gaps `which`."""
+        return p @ self.response[which]
 
     def rates(self, qd, sizes=None):
         """Rates of the gaps (count,), zero where they are so to rounding of velocities of these `sizes` (n,)."""
-        drift = self.gaps.sign * self.Phi_t[self.gaps.rows]
-        rates, sizes = self.J @ qd + drift, np.abs(qd) if sizes is None else sizes
-        return np.where(np.abs(rates) <= AT_REST * (np.abs(self.J) @ sizes + np.abs(drift)), 0.0, rates)
+        rates, sizes = self.J @ qd + self.drift, np.abs(qd) if sizes is None else sizes
+        return np.where(np.abs(rates) <= AT_REST * (np.abs(self.J) @ sizes + np.abs(self.drift)), 0.0, rates)
 
     def hold(self, which, rates):
         """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
         own = np.linalg.lstsq(self.G[np.ix_(which, which)], rates, rcond=RANK_TOL**2)[0]
-        return -self.free(self.J[which].T @ own)
+        return self.pushed(which, -own)
 
     def accelerations(self, qd):
         """Accelerations of all gaps (count,) where all are open, at velocities qd (n,); and their terms (count,)."""
-        from scipy.linalg import solve_triangular
-
-        system, t, q = self.gaps.packed.system, np.array([self.t]), self.q[None]
-        _, _, _, gamma = constraint_arrays(system, self.q, qd, self.t)
-        loads = applied_loads(system, t, q, qd[None], self.slots[None])[0] + velocity_forces(system, q, qd[None])[0]
-        qdd = np.zeros(qd.size)
-        if self.order.size:
-            qdd = self.own @ solve_triangular(self.R, -gamma[self.gaps.bilateral][self.order], trans="T")
-        qdd = qdd + self.free(loads - self.M @ qdd)
-        bias = self.gaps.sign * gamma[self.gaps.rows]
+        qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
+        bias = self.gaps.sign * gamma[: self.gaps.count]
         return self.J @ qdd + bias, np.abs(self.J) @ np.abs(qdd) + np.abs(bias)
 
 
@@ -262,9 +231,9 @@ def settle(inertia, resting, qd, fired=()):
 
 def _depends(inertia, closed, i):
     """Whether the row of a gap depends on those of closed ones and on the bilateral rows."""
-    rows = inertia.J @ inertia.Z
-    own, others = rows[i], rows[closed]
+    own, alone = inertia.response[i], inertia.J[i]
     if not closed:
-        return not np.linalg.norm(own) > DEPENDENT * np.linalg.norm(inertia.J[i])
-    left = own - np.linalg.lstsq(others.T, own, rcond=None)[0] @ others
+        return not inertia.G[i, i] > DEPENDENT**2 * np.linalg.norm(alone) * np.linalg.norm(own)
+    share = np.linalg.lstsq(inertia.G[np.ix_(closed, closed)], inertia.G[closed, i], rcond=None)[0]
+    left = own - share @ inertia.response[closed]
     return bool(np.linalg.norm(left) <= DEPENDENT * np.linalg.norm(own))

@@ -121,3 +121,14 @@ LEVEL = 1e-11
 # Part of a row that is independent of others, up to which it depends on them: sines of angles, squares of which are
 # found to 1e-14.
 DEPENDENT = 1e-7
+
+# --- friction at rest ------------------------------------------------------------------------------------------------
+# m/s or rad/s: a body that slides in a plane, more slowly, has come to rest where its direction turns: ten times the
+# velocity below which its direction is kept.
+STOPPED = 1e-8
+# Rounds of pivoting over those for all units at once; after as many, or where modes come back, one unit at a time.
+PIVOTS = 30
+# Reaction over the bound from which on a unit whose event has come slides.
+BROKEN = 1.0 - 1e-7
+# What the cosine of the angle between the direction and the acceleration of a beginning slide may lack of one.
+ASIDE = 1e-12

@@ -334,6 +334,7 @@ class Attachment:
     angle_near = 0.0  # on which turn its angles begin: set by `Scene.set`
     drives = ""  # of a motor: the coordinate that it prescribes, and its attribute: "angle" or "displacement"
     added = False  # to its scene
+    active = True  # whether it takes part from the start of a run; see `Scene.deactivate`
     named = False  # by its user
     owner: Any = None  # the joint that it is a part of
 

@@ -1,20 +1,20 @@
-"""Joint friction: laws in proportion to the reaction of their own joint or contact, and their series."""
+"""Coulomb friction: exact and regularised laws, in proportion to a reaction or of given magnitude; their series."""
 
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Never, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Never, Self
 
 import numpy as np
 
 from ..calls import fitting, unknown_argument
 from ..errors import InvalidForce
 from ..jit.kernels import kernel
-from ..maths.recurrences import cross, dot, exponential, inverse_root, product, root, scaled
-from ..maths.tolerances import PIVOT_ROUNDING
+from ..maths.recurrences import cross, dot, exponential, inverse_root, product, quotient, root, scaled, square
+from ..maths.tolerances import PIVOT_ROUNDING, TINY
 from ..validation import label, not_negative, positive
 from .markers import TURN, Marker, Point, Turn, Vector
-from .tolerances import LEAST_SLIP, SLIP, STRIBECK
+from .tolerances import LEAST_SLIP, SLIP
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -34,6 +34,35 @@ def coefficient(vv, par):
     mu(v) = (mu + (mu_s - mu) exp(-(v / v_s)^2)) v / sqrt(v^2 + v_0^2)
     """
     return (par[0] + (par[1] - par[0]) * np.exp(-vv / (par[2] * par[2]))) / np.sqrt(vv + par[3] * par[3])
+
+
+# The exact law: while bodies slide, the friction has the direction against v, and mu(|v|) has no regularisation. Where
+# they stick, it has none: rows hold them (phase_scenes.py), and the numbers of the direction are zero.
+
+
+@kernel
+def sliding(vv, par):
+    """mu(|v|) of the exact law; vv = |v|^2, par = (mu, mu_s, v_s, ...). Without a Stribeck velocity, v_s = 0, it is mu.
+
+    mu(v) = mu + (mu_s - mu) exp(-(v / v_s)^2)
+    """
+    if par[2] == 0.0:
+        return par[0] + 0.0 * vv
+    return par[0] + (par[1] - par[0]) * np.exp(-vv / (par[2] * par[2]))
+
+
+@kernel
+def heading(v0, v1, v2, d):
+    """e = v / |v| while v is within 90 degrees of d (3,), and d where |v| is far below v_0; zero where d is.
+
+    u = d + (v - d d.v) d.v / ((d.v)^2 + v_0^2),  e = u / |u|:  analytic at v = 0, and constant where v has the
+    direction of d, whatever its sign.
+    """
+    a = v0 * d[0] + v1 * d[1] + v2 * d[2]
+    c = a / (a * a + SLIP * SLIP)
+    u0, u1, u2 = d[0] + c * (v0 - a * d[0]), d[1] + c * (v1 - a * d[1]), d[2] + c * (v2 - a * d[2])
+    size = np.sqrt(u0 * u0 + u1 * u1 + u2 * u2 + TINY)
+    return u0 / size, u1 / size, u2 / size
 
 
 @kernel
@@ -78,6 +107,24 @@ def direction_series(s, v, first, v_0, k):
     return scaled(s, v, first + 1, k)
 
 
+HEADING_ROWS = 11
+
+
+@kernel
+def heading_series(s, v, first, d, k):
+    """Coefficient k, a tuple of three, of `heading`; v in rows v to v + 2 of s, HEADING_ROWS rows are its own."""
+    a, u, zero = first, first + 3, 1.0 if k == 0 else 0.0
+    s[a, k] = s[v, k] * d[0] + s[v + 1, k] * d[1] + s[v + 2, k] * d[2]
+    s[a + 1, k] = square(s[a], k) + SLIP * SLIP * zero
+    s[a + 2, k] = quotient(s[a], s[a + 1], s[a + 2], k)
+    for i in range(3):
+        s[first + 6 + i, k] = s[v + i, k] - s[a, k] * d[i]
+        s[u + i, k] = d[i] * zero + product(s[first + 6 + i], s[a + 2], k)
+    s[first + 9, k] = dot(s, u, u, k) + TINY * zero
+    s[first + 10, k] = inverse_root(s[first + 9], s[first + 10], k)
+    return scaled(s, u, first + 10, k)
+
+
 @kernel
 def act_series(s, f, k, out):
     """Coefficient k of what the force F in rows f to f + 2 of s is to a and b; x_a - x_b is in rows 0 to 2."""
@@ -100,14 +147,45 @@ def along_and_across(x, f):
     return along, turn, np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
 
 
+def slip_velocity(value, what, error):
+    """A velocity of regularisation; zero, or None, for the exact law."""
+    return 0.0 if value is None else not_negative(value, what, error)
+
+
 def optional(check):
     """The check of a value that may be None."""
     return lambda value, what, error: None if value is None else check(value, what, error)
 
 
 def slip_of(given):
-    """The slip velocity of a law, m/s or rad/s: as given, no less than rounding resolves; None is the default."""
-    return SLIP if given is None else max(given, LEAST_SLIP)
+    """The slip velocity of a regularised law, m/s or rad/s: as given, no less than rounding resolves; SLIP for zero."""
+    return max(given, LEAST_SLIP) if given > 0.0 else SLIP
+
+
+class Slide(NamedTuple):
+    """Where a friction of the exact law sticks or slides: a unit of the phases of a run.
+
+    A run sets its numbers among those that the force has taken: of the direction in which it slides, zero while it
+    sticks; then of the rows that hold it.
+    """
+
+    turns: bool  # whether bodies turn on one another; else a point of a slides over b
+    directions: int  # numbers of the direction: 1 along axis_a, 3 else
+    freedom: int  # rows that hold it, at most: 1 along axis_a, 2 across normal_b, 3 where nothing is known
+
+    @property
+    def row_numbers(self) -> int:
+        """Numbers of a row: a direction of each body, or one of b; and its value."""
+        return 7 if self.turns else 4
+
+    @property
+    def count(self) -> int:
+        """Its numbers."""
+        return self.directions + self.freedom * self.row_numbers
+
+
+PIN, GUIDE, PLANE = Slide(True, 1, 1), Slide(False, 1, 1), Slide(False, 3, 2)
+POINT_OF_BODY, ORIENTATION = Slide(False, 3, 3), Slide(True, 3, 3)
 
 
 class BodyFriction:
@@ -173,6 +251,16 @@ class BodyFriction:
 
 COEFFICIENT_ROWS, BEARING_ROWS = 5, 20
 F, T, ALONG, TURNING, F_ACROSS, T_ACROSS, SQUARES, ROOTS, PART, LOAD = 0, 3, 6, 7, 8, 11, 14, 16, 18, 19
+
+
+@kernel
+def sliding_series(s, square, first, par, k):
+    """Coefficient k of `sliding`; v^2 is in row `square` of s, COEFFICIENT_ROWS rows are its own."""
+    if par[2] == 0.0:
+        return par[0] if k == 0 else 0.0
+    s[first, k] = -s[square, k] / (par[2] * par[2])
+    s[first + 1, k] = exponential(s[first], s[first + 1], k)
+    return (par[1] - par[0]) * s[first + 1, k] + (par[0] if k == 0 else 0.0)
 
 
 @kernel
@@ -254,15 +342,16 @@ class JointFriction:
     kinetic : float
         Coefficient of friction while sliding.
     static : float, optional
-        Coefficient near rest, at least the kinetic one (default).
-    slip_velocity : float, m/s, optional
-        Regularisation: velocity at which the friction is 71% of its magnitude. Sticking is replaced by slower creep: by
-        default 1e-9 m/s, so that a joint under nine tenths of its friction creeps by 2e-7 m in 100 s. Less than
-        1e-11 m/s acts as 1e-11 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in
+        Coefficient at rest, at least the kinetic one (default): the joint sticks while its friction is within static
+        times the normal load.
+    slip_velocity : float, m/s
+        0 (default) for the exact, set-valued law: the joint sticks or slides, and changes at events. A velocity asks
+        for the regularised law, with 71% of the friction there, and creep in place of sticking; less than 1e-11 m/s
+        acts as 1e-11 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in
         proportion to it where the joint comes to rest: give 1e-3 m/s for them.
     stribeck_velocity : float, m/s, optional
-        Velocity at which the excess of the static over the kinetic coefficient has fallen to 37%; by default
-        10 slip_velocity, or 0.01 m/s where that is left out.
+        Velocity at which the excess of the static over the kinetic coefficient has fallen to 37%. By default the
+        kinetic coefficient acts as soon as the joint slides; with a slip velocity it is ten times that.
     preload : float, N
         Normal load in addition to the reaction.
     name : str, optional
@@ -294,12 +383,13 @@ class JointFriction:
     sources = ("kinetic", "static")
     markers: tuple[Marker, ...] = ()
     particles = True
-    slips = sharp = True  # at rest, and where a part of the normal load passes zero
+    sharp = True  # where a part of the normal load passes zero
+    place: Slide | None = None  # of an exact law, where `law` has one
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType(
         {
             "kinetic": not_negative,
             "static": optional(not_negative),
-            "slip_velocity": optional(positive),
+            "slip_velocity": slip_velocity,
             "stribeck_velocity": optional(positive),
             "preload": not_negative,
         }
@@ -312,7 +402,7 @@ class JointFriction:
         *,
         kinetic: float,
         static: float | None = None,
-        slip_velocity: float | None = None,
+        slip_velocity: float = 0.0,
         stribeck_velocity: float | None = None,
         preload: float = 0.0,
         name: str = "",
@@ -364,10 +454,24 @@ class JointFriction:
     def parameters(self) -> tuple[Any, ...]:
         """(mu, mu_s, v_s, v_0, preload), then the geometry."""
         static = self.kinetic if self.static is None else self.static
-        stribeck = self.stribeck_velocity
-        if stribeck is None:
-            stribeck = STRIBECK if self.slip_velocity is None else 10.0 * self.slip_velocity
-        return self.kinetic, static, stribeck, slip_of(self.slip_velocity), self.preload, *self.geometry()
+        slip = 0.0 if self.slides else slip_of(self.slip_velocity)
+        stribeck = 10.0 * slip if self.stribeck_velocity is None else self.stribeck_velocity
+        return self.kinetic, static, stribeck, slip, self.preload, *self.geometry()
+
+    @property
+    def slips(self) -> bool:
+        """Whether the law is regularised."""
+        return not self.slides
+
+    @property
+    def slides(self) -> tuple[Slide, ...]:
+        """Where it sticks or slides by the exact law."""
+        return (self.place,) if self.place is not None and self.slip_velocity == 0.0 else ()
+
+    @property
+    def taken(self) -> int:
+        """Numbers of par that a run sets: those of its slides."""
+        return sum(each.count for each in self.slides)
 
     def geometry(self) -> tuple[float, ...]:
         """What `law` and `normal_load` need besides, floats."""

@@ -139,7 +139,7 @@ def _item(item, refused):
             found[name] = value
     if getattr(item, "is_idle", False):  # says so, for nothing is left out by mistake
         found |= {name: encode(vars(item)[name]) for name in item.sources if vars(item)[name] is not None}
-    return found | _history(item)
+    return found | _history(item) | ({} if item.active else {"active": False})
 
 
 def _coordinate_names(given):
@@ -223,7 +223,7 @@ def _set(reading, scene, path, table):
 # Constraints and forces of a document.
 
 KINDS = ("angle", "displacement")  # of joint coordinates
-ITEM_KEYS = ("type", "name", "at", *BUILT, "angle_near")
+ITEM_KEYS = ("type", "name", "at", *BUILT, "angle_near", "active")
 
 
 def add_item(reading, scene, path, table, kinds):
@@ -261,6 +261,12 @@ def add_item(reading, scene, path, table, kinds):
     _restore(reading, path, item, given, table)
     if made(reading, path, what, scene.add, [item]) is not None:
         reading.items[item.name] = item
+        if not isinstance(table.get("active", True), bool):
+            reading.mistakes.add_value(
+                (*path, "active"), f"{what}: active", table["active"], "it must be true or false."
+            )
+        elif not table.get("active", True):
+            made(reading, path, what, scene.deactivate, [item])
 
 
 def _class(reading, path, table, what, kinds):

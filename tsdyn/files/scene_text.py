@@ -139,6 +139,7 @@ def marks(scene):
             [_marks_of(part) for part in parts],
             geometry,
             np.asarray(item.angle_near).tobytes(),
+            item.active,
         )
     return found
 

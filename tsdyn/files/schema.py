@@ -160,6 +160,7 @@ def _item(name, cls):
         **{key: {"description": "the name of a body, or ground", "type": "string"} for key in bodies},
         **{key: _property(argument) for key, argument in arguments.items()},
         "at": {"type": "object", "additionalProperties": False, "properties": dict.fromkeys(at, VECTOR)},
+        "active": {"type": "boolean"},
     }
     if cls.joint_coordinates:
         properties |= {key: {"$ref": "#/$defs/array"} for key in (*BUILT, "angle_near")}

@@ -3,6 +3,7 @@
     n      normal, v = velocity of a's point over b, less its part along n
     N      = N_0 + |n.F|                                                 (1)
     force  = -mu(|v|) N v / |v|     on a at its point, the opposite on b (2)
+           = -mu(|v|) N e           of the exact law, e of friction.heading
     dissipation = mu(|v|) N |v|                                          (3)
 
 F is the force that the contact exerts; mu is given by friction_laws.coefficient.
@@ -12,6 +13,8 @@ import numpy as np
 
 from ..constraints.plane_contact import PlaneContact
 from ..plugins import (
+    HEADING_ROWS,
+    PLANE,
     Force,
     JointFriction,
     Point,
@@ -22,11 +25,17 @@ from ..plugins import (
     coefficient,
     coefficient_series,
     dot,
+    heading,
+    heading_series,
     magnitude,
     scaled,
+    sliding,
+    sliding_series,
     slip,
     slip_series,
 )
+
+WAY = -1 - PLANE.count  # in par, the direction near which it slides
 
 
 class ContactFriction(JointFriction, Force):
@@ -54,7 +63,8 @@ class ContactFriction(JointFriction, Force):
 
     joints = (PlaneContact,)
     markers = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("b", "normal_b"))
-    slots = 30
+    slots = 30 + HEADING_ROWS
+    place = PLANE
 
     @staticmethod
     def law(x, xd, par, t, out):
@@ -62,7 +72,11 @@ class ContactFriction(JointFriction, Force):
         v0, v1, v2 = slip(x, xd)
         off = x[12] * v0 + x[13] * v1 + x[14] * v2
         v0, v1, v2 = v0 - off * x[12], v1 - off * x[13], v2 - off * x[14]
-        f = -par[-1] * coefficient(v0 * v0 + v1 * v1 + v2 * v2, par)
+        if par[3] == 0.0:
+            f = -par[-1] * sliding(v0 * v0 + v1 * v1 + v2 * v2, par)
+            v0, v1, v2 = heading(v0, v1, v2, par[WAY : WAY + 3])
+        else:
+            f = -par[-1] * coefficient(v0 * v0 + v1 * v1 + v2 * v2, par)
         act(x, f * v0, f * v1, f * v2, 0.0, 0.0, 0.0, out)
 
     @staticmethod
@@ -82,8 +96,13 @@ class ContactFriction(JointFriction, Force):
         for i in range(3):
             s[13 + i, k] = s[6 + i, k] - off[i]
         s[16, k] = dot(s, 13, 13, k)
-        s[22, k] = -coefficient_series(s, 16, 17, par, k)
-        s[23, k], s[24, k], s[25, k] = scaled(s, 13, 22, k)
+        way = 13
+        if par[3] == 0.0:
+            s[22, k], way = -sliding_series(s, 16, 17, par, k), 19
+            s[19, k], s[20, k], s[21, k] = heading_series(s, 13, 30, par[WAY : WAY + 3], k)
+        else:
+            s[22, k] = -coefficient_series(s, 16, 17, par, k)
+        s[23, k], s[24, k], s[25, k] = scaled(s, way, 22, k)
         act_series(s, 23, k, out)
 
     @staticmethod
@@ -101,4 +120,7 @@ class ContactFriction(JointFriction, Force):
         off = x[12] * v0 + x[13] * v1 + x[14] * v2
         v0, v1, v2 = v0 - off * x[12], v1 - off * x[13], v2 - off * x[14]
         vv = v0 * v0 + v1 * v1 + v2 * v2
+        if par[3] == 0.0:
+            e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3])
+            return par[-1] * sliding(vv, par) * (e0 * v0 + e1 * v1 + e2 * v2)
         return par[-1] * coefficient(vv, par) * vv

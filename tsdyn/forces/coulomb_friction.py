@@ -1,11 +1,12 @@
-"""Coulomb friction of constant magnitude between two bodies, in translation and rotation, regularised at rest.
+"""Coulomb friction of constant magnitude between two bodies, in translation and rotation.
 
     v, w as for ViscousFriction: relative velocity at a's point, relative angular velocity
     F = -R v / sqrt(v.v + v0^2)     on a at x_a, the opposite on b at the same point     (1)
     N = -N0 w / sqrt(w.w + w0^2)    on a, the opposite on b                              (2)
     dissipation = -F.v - N.w                                                             (3)
 
-Below the slip velocity v0 the law is viscous: a body that should stick creeps.
+By the exact law, v0 = 0 or w0 = 0, F = -R e or N = -N0 e with e of friction.heading. Below a slip velocity v0 the law
+is viscous: a body that should stick creeps.
 """
 
 from __future__ import annotations
@@ -16,21 +17,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..plugins import (
+    HEADING_ROWS,
+    ORIENTATION,
+    POINT_OF_BODY,
     BodyFriction,
     Force,
     act,
     act_series,
     direction_series,
+    heading,
+    heading_series,
     not_negative,
     optional,
-    positive,
     slip,
     slip_of,
     slip_series,
+    slip_velocity,
 )
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
+
+WAY, TURN = 6, -ORIENTATION.count  # in par, the directions near which the bodies slide and turn
 
 
 class CoulombFriction(BodyFriction, Force):
@@ -42,11 +50,14 @@ class CoulombFriction(BodyFriction, Force):
         Magnitude of the friction force: coefficient of friction times normal force.
     torque : float, N m
         Magnitude of the friction torque.
-    slip_velocity : float, m/s, optional
-        Regularisation: velocity at which the force is 71% of its magnitude; by default 1e-9 m/s, and less than
-        1e-11 m/s acts as 1e-11 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in
-        proportion to it where the bodies come to rest: give 1e-3 m/s for them.
-    slip_rate : float, rad/s, optional
+    static_force, static_torque : float, N or N m, optional
+        The largest ones at rest, no less than those while sliding (default): the bodies stick up to them.
+    slip_velocity : float, m/s
+        0 (default) for the exact, set-valued law: the bodies stick or slide, and change at events. A velocity asks for
+        the regularised law, with 71% of the force there, and creep in place of sticking; less than 1e-11 m/s acts as
+        1e-11 m/s. Explicit methods that are asked for by name, and the Maggi/Kane form, need steps in proportion to it
+        where the bodies come to rest: give 1e-3 m/s for them.
+    slip_rate : float, rad/s
         The same of the torque.
 
     Examples
@@ -63,14 +74,16 @@ class CoulombFriction(BodyFriction, Force):
     """
 
     sources = ("force", "torque")
-    slots = 19
-    slips = sharp = True  # at rest
+    slots = 19 + 2 * HEADING_ROWS
+    sharp = True  # at rest
     quantities = MappingProxyType(
         {
             "force": not_negative,
             "torque": not_negative,
-            "slip_velocity": optional(positive),
-            "slip_rate": optional(positive),
+            "static_force": optional(not_negative),
+            "static_torque": optional(not_negative),
+            "slip_velocity": slip_velocity,
+            "slip_rate": slip_velocity,
         }
     )
 
@@ -81,23 +94,69 @@ class CoulombFriction(BodyFriction, Force):
         *,
         force: float = 0.0,
         torque: float = 0.0,
-        slip_velocity: float | None = None,
-        slip_rate: float | None = None,
+        static_force: float | None = None,
+        static_torque: float | None = None,
+        slip_velocity: float = 0.0,
+        slip_rate: float = 0.0,
         **given: Any,
     ) -> None:
-        super().__init__(a, b, force=force, torque=torque, slip_velocity=slip_velocity, slip_rate=slip_rate, **given)
+        statics = {"static_force": static_force, "static_torque": static_torque}
+        slips = {"slip_velocity": slip_velocity, "slip_rate": slip_rate}
+        super().__init__(a, b, force=force, torque=torque, **statics, **slips, **given)
+
+    def check(self):
+        """Refuse a static force or torque that is less than that of sliding."""
+        super().check()
+        for name in self.sources:
+            static, value = getattr(self, f"static_{name}"), getattr(self, name)
+            if static is not None and static < value:
+                raise self.error(
+                    f"{self.name}: static_{name} must be at least {name} = {value:g}, got {static:g}; leave it out "
+                    "where they are the same."
+                )
 
     def parameters(self):
-        """(R, N0, v0, w0)."""
-        return self.force, self.torque, slip_of(self.slip_velocity), slip_of(self.slip_rate)
+        """(R, N0, v0, w0), then the largest force and torque at rest."""
+        static_force = self.force if self.static_force is None else self.static_force
+        static_torque = self.torque if self.static_torque is None else self.static_torque
+        v0 = 0.0 if POINT_OF_BODY in self.slides else slip_of(self.slip_velocity)
+        w0 = 0.0 if ORIENTATION in self.slides else slip_of(self.slip_rate)
+        return self.force, self.torque, v0, w0, static_force, static_torque
+
+    @property
+    def slides(self):
+        """Where it sticks or slides by the exact law: at the point, and in rotation."""
+        point = (POINT_OF_BODY,) if self._acts("force", self.slip_velocity) else ()
+        return point + ((ORIENTATION,) if self._acts("torque", self.slip_rate) else ())
+
+    def _acts(self, name, slip):
+        return slip == 0.0 and bool(getattr(self, name) or getattr(self, f"static_{name}"))
+
+    @property
+    def taken(self):
+        """Numbers of par that a run sets: those of its slides."""
+        return sum(each.count for each in self.slides)
+
+    @property
+    def slips(self):
+        """Whether a law is regularised."""
+        return (self.force > 0.0 and self.slip_velocity > 0.0) or (self.torque > 0.0 and self.slip_rate > 0.0)
 
     @staticmethod
     def law(x, xd, par, t, out):
         """Eqs. (1), (2)."""
         v0, v1, v2 = slip(x, xd)
         w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
-        f = -par[0] / np.sqrt(v0 * v0 + v1 * v1 + v2 * v2 + par[2] * par[2])
-        n = -par[1] / np.sqrt(w0 * w0 + w1 * w1 + w2 * w2 + par[3] * par[3])
+        if par[2] == 0.0:
+            v0, v1, v2 = heading(v0, v1, v2, par[WAY : WAY + 3])
+            f = -par[0] + 0.0 * v0
+        else:
+            f = -par[0] / np.sqrt(v0 * v0 + v1 * v1 + v2 * v2 + par[2] * par[2])
+        if par[3] == 0.0:
+            w0, w1, w2 = heading(w0, w1, w2, par[TURN : TURN + 3])
+            n = -par[1] + 0.0 * w0
+        else:
+            n = -par[1] / np.sqrt(w0 * w0 + w1 * w1 + w2 * w2 + par[3] * par[3])
         act(x, f * v0, f * v1, f * v2, n * w0, n * w1, n * w2, out)
 
     @staticmethod
@@ -106,12 +165,18 @@ class CoulombFriction(BodyFriction, Force):
         if par[1] != 0.0:
             for i in range(3):
                 s[12 + i, k] = xd[3 + i] - xd[9 + i]
-            n0, n1, n2 = direction_series(s, 12, 15, par[3], k)
+            if par[3] == 0.0:
+                n0, n1, n2 = heading_series(s, 12, 19, par[TURN : TURN + 3], k)
+            else:
+                n0, n1, n2 = direction_series(s, 12, 15, par[3], k)
             out[3], out[4], out[5] = -par[1] * n0, -par[1] * n1, -par[1] * n2
             out[9], out[10], out[11] = par[1] * n0, par[1] * n1, par[1] * n2
         if par[0] != 0.0:
             slip_series(x, xd, k, s)
-            f0, f1, f2 = direction_series(s, 6, 17, par[2], k)
+            if par[2] == 0.0:
+                f0, f1, f2 = heading_series(s, 6, 19 + HEADING_ROWS, par[WAY : WAY + 3], k)
+            else:
+                f0, f1, f2 = direction_series(s, 6, 17, par[2], k)
             s[9, k], s[10, k], s[11, k] = -par[0] * f0, -par[0] * f1, -par[0] * f2
             act_series(s, 9, k, out)
 
@@ -121,7 +186,15 @@ class CoulombFriction(BodyFriction, Force):
         v0, v1, v2 = slip(x, xd)
         w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
         vv, ww = v0 * v0 + v1 * v1 + v2 * v2, w0 * w0 + w1 * w1 + w2 * w2
-        return par[0] * vv / np.sqrt(vv + par[2] * par[2]) + par[1] * ww / np.sqrt(ww + par[3] * par[3])
+        if par[2] == 0.0:
+            e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3])
+            lost = par[0] * (e0 * v0 + e1 * v1 + e2 * v2)
+        else:
+            lost = par[0] * vv / np.sqrt(vv + par[2] * par[2])
+        if par[3] == 0.0:
+            e0, e1, e2 = heading(w0, w1, w2, par[TURN : TURN + 3])
+            return lost + par[1] * (e0 * w0 + e1 * w1 + e2 * w2)
+        return lost + par[1] * ww / np.sqrt(ww + par[3] * par[3])
 
     @classmethod
     def example(cls, rng, a, b):

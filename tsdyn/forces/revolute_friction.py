@@ -3,6 +3,7 @@
     n      axis, w = n.(omega_a - omega_b),  v = R w
     N      = N_0 + |F - n n.F| + (R_c / R) |n.F| + (2 / L) |T - n n.T|      (1)
     torque = -mu(v) R N n     on a, the opposite on b                       (2)
+           = -mu(|v|) s R N n of the exact law, s the sign of w while it slides
     dissipation = mu(v) N v                                                 (3)
 
 F and T are the force and the torque that the joint exerts at its point; mu is given by friction_laws.coefficient. A
@@ -20,6 +21,7 @@ from ..constraints.revolute import Revolute
 from ..plugins import (
     AXIS,
     BEARING_ROWS,
+    PIN,
     Force,
     JointFriction,
     along_and_across,
@@ -32,8 +34,12 @@ from ..plugins import (
     positive,
     product,
     scaled,
+    sliding,
+    sliding_series,
     square,
 )
+
+SIGN = -1 - PIN.count  # in par, of w while it slides
 
 
 class RevoluteFriction(JointFriction, Force):
@@ -66,6 +72,7 @@ class RevoluteFriction(JointFriction, Force):
     joints = (Revolute,)
     markers = AXIS
     slots = 15 + BEARING_ROWS
+    place = PIN
     quantities = MappingProxyType(
         {
             **JointFriction.quantities,
@@ -96,7 +103,10 @@ class RevoluteFriction(JointFriction, Force):
         """Eq. (2)."""
         n0, n1, n2 = x[12], x[13], x[14]
         v = par[5] * (n0 * (xd[3] - xd[9]) + n1 * (xd[4] - xd[10]) + n2 * (xd[5] - xd[11]))
-        torque = -par[-1] * par[5] * coefficient(v * v, par) * v
+        if par[3] == 0.0:
+            torque = -par[-1] * par[5] * sliding(v * v, par) * par[SIGN]
+        else:
+            torque = -par[-1] * par[5] * coefficient(v * v, par) * v
         out[3], out[4], out[5] = torque * n0, torque * n1, torque * n2
         out[9], out[10], out[11] = -torque * n0, -torque * n1, -torque * n2
 
@@ -113,8 +123,11 @@ class RevoluteFriction(JointFriction, Force):
             s[i, k], s[3 + i, k] = x[12 + i], xd[3 + i] - xd[9 + i]
         s[6, k] = par[5] * dot(s, 0, 3, k)
         s[7, k] = square(s[6], k)
-        s[13, k] = coefficient_series(s, 7, 8, par, k)
-        s[14, k] = -par[5] * product(s[13], s[6], k)
+        if par[3] == 0.0:
+            s[14, k] = -par[5] * sliding_series(s, 7, 8, par, k) * par[SIGN]
+        else:
+            s[13, k] = coefficient_series(s, 7, 8, par, k)
+            s[14, k] = -par[5] * product(s[13], s[6], k)
         n0, n1, n2 = scaled(s, 0, 14, k)
         out[3], out[4], out[5] = n0, n1, n2
         out[9], out[10], out[11] = -n0, -n1, -n2
@@ -130,6 +143,8 @@ class RevoluteFriction(JointFriction, Force):
     def dissipation(x, xd, par, t):
         """Eq. (3)."""
         v = par[5] * (x[12] * (xd[3] - xd[9]) + x[13] * (xd[4] - xd[10]) + x[14] * (xd[5] - xd[11]))
+        if par[3] == 0.0:
+            return par[-1] * sliding(v * v, par) * par[SIGN] * v
         return par[-1] * coefficient(v * v, par) * v * v
 
     @classmethod

@@ -3,6 +3,7 @@
     n      axis, v = n.(velocity of a's point over b)
     N      = N_0 + |F - n n.F| + |n.T| / W + (2 / L) |T - n n.T|     (1)
     force  = -mu(v) N n     on a along the axis, the opposite on b   (2)
+           = -mu(|v|) s N n of the exact law, s the sign of v while it slides
     dissipation = mu(v) N v                                          (3)
 
 F and T are the force and the torque that the joint exerts at its point on a (on b if a is the ground); mu is given by
@@ -21,6 +22,7 @@ from ..constraints.translational import Translational
 from ..plugins import (
     AXIS,
     BEARING_ROWS,
+    GUIDE,
     Force,
     JointFriction,
     act,
@@ -34,10 +36,14 @@ from ..plugins import (
     positive,
     product,
     scaled,
+    sliding,
+    sliding_series,
     slip,
     slip_series,
     square,
 )
+
+SIGN = -1 - GUIDE.count  # in par, of v while it slides
 
 
 class TranslationalFriction(JointFriction, Force):
@@ -67,6 +73,7 @@ class TranslationalFriction(JointFriction, Force):
     joints = (Translational,)
     markers = AXIS
     slots = 24 + BEARING_ROWS
+    place = GUIDE
     quantities = MappingProxyType(
         {**JointFriction.quantities, "length": optional(positive), "width": optional(positive)}
     )
@@ -91,7 +98,10 @@ class TranslationalFriction(JointFriction, Force):
         """Eq. (2)."""
         v0, v1, v2 = slip(x, xd)
         v = x[12] * v0 + x[13] * v1 + x[14] * v2
-        force = -par[-1] * coefficient(v * v, par) * v
+        if par[3] == 0.0:
+            force = -par[-1] * sliding(v * v, par) * par[SIGN]
+        else:
+            force = -par[-1] * coefficient(v * v, par) * v
         act(x, force * x[12], force * x[13], force * x[14], 0.0, 0.0, 0.0, out)
 
     @staticmethod
@@ -108,8 +118,11 @@ class TranslationalFriction(JointFriction, Force):
             s[9 + i, k] = x[12 + i]
         s[12, k] = dot(s, 9, 6, k)
         s[13, k] = square(s[12], k)
-        s[19, k] = coefficient_series(s, 13, 14, par, k)
-        s[20, k] = -product(s[19], s[12], k)
+        if par[3] == 0.0:
+            s[20, k] = -sliding_series(s, 13, 14, par, k) * par[SIGN]
+        else:
+            s[19, k] = coefficient_series(s, 13, 14, par, k)
+            s[20, k] = -product(s[19], s[12], k)
         s[21, k], s[22, k], s[23, k] = scaled(s, 9, 20, k)
         act_series(s, 21, k, out)
 
@@ -125,6 +138,8 @@ class TranslationalFriction(JointFriction, Force):
         """Eq. (3)."""
         v0, v1, v2 = slip(x, xd)
         v = x[12] * v0 + x[13] * v1 + x[14] * v2
+        if par[3] == 0.0:
+            return par[-1] * sliding(v * v, par) * par[SIGN] * v
         return par[-1] * coefficient(v * v, par) * v * v
 
     @classmethod

@@ -117,6 +117,87 @@ class Fit(NamedTuple):
     resolved: bool
 
 
+def _points(degree, a, b):
+    times = a + 0.5 * (b - a) * (table(degree).points + 1.0)
+    times[-1] = b
+    return times
+
+
+def _refined(degree, a, b, samples, sample):
+    """Times of a degree, and samples (degree + 2, ...) of which those of half the degree are known."""
+    grid, times, finer = table(degree), _points(degree, a, b), np.empty((degree + 2, *samples.shape[1:]))
+    finer[grid.known], finer[grid.fresh] = samples, sample(times[grid.fresh])
+    return times, finer
+
+
+def _judged(degree, samples, noise):
+    """What a `Fit` says of samples (degree + 2, ...): fine, off, clear, scale, resolved."""
+    grid = table(degree)
+    fine, errors = grid.values @ samples, np.abs(grid.errors @ samples)
+    scale, off = np.abs(samples).max(axis=0), errors[0] + np.maximum(errors[-2], errors[-1])
+    clear = np.maximum(np.maximum(fine.min(axis=0), -fine.max(axis=0)), 0.0)
+    resolved = (off <= np.maximum(TIGHT * scale, noise)) | (CLEAR * errors.sum(axis=0) <= clear)
+    return fine, off, clear, scale, resolved
+
+
+class Survey(NamedTuple):
+    """Several functions on one interval, by interpolants: which have no zero, and where others cross zero first."""
+
+    calm: np.ndarray  # (m,)  bool: clear of zero
+    since: np.ndarray  # (m,)  times up to which functions are clear; inf for calm ones
+    until: np.ndarray  # (m,)  by when those have the other sign that cross zero once from `since` on; else NaN
+    last: np.ndarray  # (m,)  values at the end
+    degree: int  # that resolves the functions
+
+
+def survey(sample, a, first, b, degree, noise):
+    """Look at several functions at once: most have no zero between a and b, and need no search.
+
+    A function is clear of zero at a point of the fine grid if its value exceeds the second difference there, by which
+    the function may bend between the points, and the errors.
+
+    Parameters
+    ----------
+    sample : function
+        Values (k, m) at increasing times (k,).
+    a, b : float
+    first : ndarray (m,)
+        Values at a.
+    degree : int
+        Of the first interpolants.
+    noise : ndarray (m,)
+        Known rounding errors.
+
+    Returns
+    -------
+    Survey
+    """
+    samples = np.concatenate((first[None], sample(_points(degree, a, b)[1:])))
+    while True:
+        fine, off, _, scale, resolved = _judged(degree, samples, noise)
+        if degree == LARGEST or resolved.all() or np.isnan(off).any():
+            break
+        degree *= 2
+        _, samples = _refined(degree, a, b, samples, sample)
+    grid, sign = a + 0.5 * (b - a) * (table(degree).fine + 1.0), np.sign(first)
+    height, bend = sign * fine, np.empty_like(fine)
+    np.abs(fine[2:] - 2.0 * fine[1:-1] + fine[:-2], out=bend[1:-1])
+    bend[0], bend[-1] = bend[1], bend[-2]
+    bend += np.maximum(CLEAR * off, noise)
+    usable = resolved & (scale >= UNDERFLOWING)
+    clear, beyond = (height > bend) & usable, (height < -bend) & usable
+    calm, columns = clear.all(axis=0), np.arange(first.size)
+    doubt = clear.argmin(axis=0)
+    before = np.maximum(doubt - 1, 0)
+    later = np.arange(len(fine))[:, None] >= doubt
+    across = (beyond & later).argmax(axis=0)
+    within = later[1:] & (np.arange(1, len(fine))[:, None] <= across)
+    falls = ((np.diff(height, axis=0) < 0.0) | ~within).all(axis=0)
+    once = (doubt > 0) & beyond[across, columns] & falls
+    since = np.where(calm, np.inf, grid[before])
+    return Survey(calm, since, np.where(once & ~calm, grid[across], np.nan), samples[-1], degree)
+
+
 class Search:
     """A search.
 
@@ -176,31 +257,20 @@ class Search:
 
     def _fit(self, a, b, first, last, degree):
         """Return the `Fit` of the degree that resolves the function on [a, b], or of the highest worth trying."""
-        half, grid = 0.5 * (b - a), table(degree)
-        times, samples = a + half * (grid.points + 1.0), np.empty(degree + 2)
-        times[-1], samples[0] = b, first
+        times, samples = _points(degree, a, b), np.empty(degree + 2)
+        samples[0] = first
         if last is None:
             samples[1:] = self._values(times[1:])
         else:
             samples[1:-1], samples[-1] = self._values(times[1:-1]), last
         while True:
-            fit = self._judged(a, b, degree, times, samples)
+            fine, *judged = _judged(degree, samples, self.noise)
+            fit = Fit(a, b, degree, times, samples, fine, *(x.item() for x in judged))
             hopeless = degree == LARGEST or (degree == LARGEST // 2 and fit.off > UNRESOLVED * fit.scale)
             if fit.resolved or hopeless or fit.off != fit.off:
                 return fit
             degree *= 2
-            grid, before = table(degree), samples
-            times, samples = a + half * (grid.points + 1.0), np.empty(degree + 2)
-            times[-1], samples[grid.known] = b, before
-            samples[grid.fresh] = self._values(times[grid.fresh])
-
-    def _judged(self, a, b, degree, times, samples):
-        grid = table(degree)
-        fine, errors = grid.values @ samples, np.abs(grid.errors @ samples)
-        scale, off = float(np.abs(samples).max()), float(errors[0] + max(errors[-2], errors[-1]))
-        clear = max(float(fine.min()), -float(fine.max()), 0.0)
-        resolved = off <= max(TIGHT * scale, self.noise) or CLEAR * float(errors.sum()) <= clear
-        return Fit(a, b, degree, times, samples, fine, off, clear, scale, resolved)
+            times, samples = _refined(degree, a, b, samples, self._values)
 
     def _rounding(self, fit):
         """Return the rounding error of the values: high coefficients where a smooth function has none."""

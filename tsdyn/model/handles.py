@@ -199,6 +199,13 @@ class Handles:
     def __setstate__(self, state):
         self.__dict__.update(state, _aliases=WeakKeyDictionary())
 
+    def where_some_act(self, items):
+        """The same handles where only some of the items take part in the equations: coordinates of all are counted."""
+        other, acting = object.__new__(Handles), {id(item) for item in items}
+        vars(other).update(vars(self))
+        other.driven = [one for one in self.driven if {id(one.motor.item), id(one.joint.item)} <= acting]
+        return other
+
     def where(self, body):
         """Where the coordinates of a body begin, and how many they are; (0, 0) for the ground."""
         return self._where.get(body, (0, 0))

@@ -102,6 +102,8 @@ class Derived:
     aligned: tuple = None  # mirrored_branches.demand_aligned
     holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
     loads: dict = None  # reactions.loads_of
+    holds: dict = field(default_factory=dict)  # of a phase, phase_scenes.phase_of: slot of a friction -> rows that hold
+    places: dict = field(default_factory=dict)  # it; and id of such a row -> slots, and where its numbers are
     row_parts: list = field(default_factory=list)  # idle: observables.row_parts.taken
     with_singular_places: list = None  # indices of primitives: contacts.singular_place
     places_within: list = None  # of each primitive among those of its class: reactions.only
@@ -491,8 +493,10 @@ def _found_again(process, *parts):
 
 
 @CollectionsDeferred()
-def pack(scene):
+def pack(scene, handles=None):
     """Pack a scene; loads (at the very first use compiles) the kernels of the kinds it uses.
+
+    handles: `Handles` to look its parts up by, where they are not its own.
 
     Raises
     ------
@@ -505,8 +509,8 @@ def pack(scene):
     parameters = {constraint: checked_motions(constraint) for constraint in primitives}
     table, reals = [], []
     kinds, motions, kept, functions = _pack_constraints(parameters, int(starts[-1]), where, table, reals)
-    members, derived = tuple(_members(scene.constraints)), Derived()
-    if any(isinstance(force, SceneLaw) for force in scene.forces):
+    members, derived = tuple(_members(scene.constraints)), Derived(handles=handles)
+    if handles is None and any(isinstance(force, SceneLaw) for force in scene.forces):
         derived.handles = Handles(scene.bodies, list(where.values()), members, scene.forces)
         for pairs in (scene._twins, scene._aliases):  # functions may hold handles of the scene that this is a copy of
             derived.handles.add_aliases((pairs or {}).items())

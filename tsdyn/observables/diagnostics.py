@@ -68,6 +68,13 @@ def _groups(packed, t, q, qd, qdd, time_rate, memory):
     starts, groups = starts_of(packed), {}
     lists = first_rows(packed.constraints), packed.parameters, packed.coordinates, packed.slots
     for (constraint, row), values, places, slot in zip(*lists, strict=True):
+        held = packed.derived.places.get(id(constraint))
+        if held is not None:
+            yield (
+                np.arange(row, row + constraint.rows),
+                _remembered_levels(constraint, starts, places, values, held, memory, t, q, qd, qdd, time_rate),
+            )
+            continue
         if slot >= 0:
             values = *values, np.zeros(t.size) if memory is None else memory[:, slot]
         bodies = tuple(constraint.body_of(marker) for marker in constraint.markers)
@@ -108,6 +115,22 @@ def _levels(constraint, members, t, q, qd, qdd, time_rate):
     levels = [[np.broadcast_to(getattr(row, name), shape) for row in out] for name in ("x", "xd", "xdd")]
     places = np.concatenate([np.array(rows) + i for i in range(len(out))])
     return places, [np.concatenate(level, axis=1) for level in levels]
+
+
+def _remembered_levels(constraint, starts, places, values, held, memory, *motion):  # as of `_levels`, and:
+    """The levels (k, rows) of a constraint with numbers that a run remembers: held has (slot, place in its reals)."""
+    t, q, qd, qdd, time_rate = motion
+    reals = np.tile(np.concatenate((*places, values)), (t.size, 1))
+    for slot, at in held:
+        reals[:, at] = memory[:, slot]
+    x, first = [], 3 * len(places)
+    for j, marker in enumerate(constraint.markers):
+        body, s = constraint.body_of(marker), reals[:, 3 * j : 3 * j + 3].T
+        x += marker_jet(marker, body.dimension, starts.get(body, 0), s, q, qd, qdd)
+    out = [None] * constraint.rows
+    twin(type(constraint).phi)(x, list(reals[:, first:].T), Jet(t, time_rate), out)
+    out = [Jet.of(row) for row in out]
+    return [np.stack([np.broadcast_to(getattr(row, name), t.shape) for row in out], 1) for name in ("x", "xd", "xdd")]
 
 
 def _rates(kind, x, par, t, time_rate):

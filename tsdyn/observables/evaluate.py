@@ -35,14 +35,16 @@ JAMMED = (
 )
 
 
-def balance(packed, t, q, qd, Phi_q, solve):
-    """Return friction forces (n,) and the solution of the equations of motion; solve(load) is affine in the load.
+def balance(packed, t, q, qd, Phi_q, solve, memory=None):
+    """Return friction forces (n,), the solution of the equations of motion and the normal loads (frictions,).
+
+    solve(load) is affine in the load; memory (slots,): what forces remember, zeros by default.
 
     Newton's method for the normal loads N = N(lam_0 + sum_i lam_i N_i).
     """
     system, n = packed.system, q.size
     frictions = coupled_loads(packed)
-    units = [_unit(system, load, t, q, qd) for load in frictions]
+    units = [_unit(system, load, t, q, qd, memory) for load in frictions]
     first = solve(np.zeros(n))
     parts = np.array([solve(unit) - first for unit in units])
     reactions = [_reaction(packed, load, q, qd, Phi_q) for load in frictions]
@@ -57,7 +59,7 @@ def balance(packed, t, q, qd, Phi_q, solve):
             raise SingularConfiguration(JAMMED) from error
         N = N + step
         if not np.abs(step).max() > ROUNDING * np.abs(N).max():
-            return N @ np.array(units), first + N @ parts
+            return N @ np.array(units), first + N @ parts, N
     raise SingularConfiguration(JAMMED)
 
 
@@ -68,9 +70,11 @@ def normal_loads(packed, t, q, qd, Phi_q, lam):
     return loads, np.array([_unit(packed.system, load, t, q, qd) for load in frictions])
 
 
-def _unit(system, load, t, q, qd):
+def _unit(system, load, t, q, qd, remembered=None):
     """Return the generalised forces g (n,) of one friction for unit normal load."""
     memory = np.zeros((1, system.memory.size + system.normals.size))
+    if remembered is not None:
+        memory[0, : system.memory.size] = remembered
     memory[0, system.memory.size + load.normal] = 1.0
     return force_loads(system._replace(forces=load.alone), np.array([t]), q[None], qd[None], memory)[0]
 
@@ -204,7 +208,7 @@ def _with_friction(packed, t, q, qd, Phi_q, solve):
     if not packed.system.normals.size:
         return 0.0, solve(0.0)
 
-    return balance(packed, float(t), q, qd, Phi_q, solve)
+    return balance(packed, float(t), q, qd, Phi_q, solve)[:2]
 
 
 def _of_independent_rows(packed, M, Phi_q, load, gamma):

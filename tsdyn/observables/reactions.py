@@ -288,6 +288,51 @@ def force_reaction(solution, load, body):
     return at_first_point(solution, body, Q[:, at : at + length], force, load.coordinates)
 
 
+def held_reaction(motion, load, body):
+    """What rows that hold a friction exert on a body where it sticks: force and torque (k, 3) as of `force_reaction`.
+
+    motion is one of the phase with these rows, multipliers (k, m) and all.
+    """
+    force, torque = np.zeros((2, len(motion.q), 3))
+    lam, slot, item = particular(motion.multipliers), load.slot + load.force.memory, load.force
+    frames = [rotations(motion.system, motion.packed, each, motion.q) for each in (item.a, item.b)]
+    for slide in item.slides:
+        first = slot + slide.directions
+        for k, row in enumerate(motion.packed.derived.holds.get(slot, ())):
+            numbers = motion._memory[:, first + k * slide.row_numbers :][:, : slide.row_numbers]
+            s, h = (np.einsum("kij,kj->ki", A, numbers[:, 3 * i :][:, :3]) for i, A in enumerate(frames))
+            if slide.turns:
+                torque -= lam[:, row, None] * np.cross(s, h)
+            else:
+                force -= lam[:, row, None] * np.einsum("kij,kj->ki", frames[1], numbers[:, :3])
+        slot += slide.count
+    if body is item.a:
+        return force, torque
+    points = [
+        (marker.body, s) for marker, s in zip(item.markers, load.coordinates, strict=True) if marker.code == POINT
+    ]
+    (_, of_a), of_b = points[0], next((s for letter, s in points if letter == "b"), np.zeros(3))
+    arm = place_of(motion, item.a, of_a, frames[0]) - place_of(motion, item.b, of_b, frames[1])
+    return -force, -torque - np.cross(arm, force)
+
+
+def rotations(system, packed, body, q):
+    """Rotation matrices (k, 3, 3) of a body along q (k, n)."""
+    if body.dimension != 7:
+        return np.broadcast_to(np.eye(3), (len(q), 3, 3))
+    at, _ = system.bodies[index_of(packed, body)]
+    return rotation_matrix(q[:, at + 3 : at + 7])
+
+
+def place_of(motion, body, s, A):
+    """A point s of a body, (k, 3), m, ground frame, by its rotation matrices."""
+    place = A @ s
+    if not body.dimension:
+        return place
+    at, _ = motion.system.bodies[index_of(motion.packed, body)]
+    return place + motion.q[:, at : at + 3]
+
+
 def at_first_point(solution, body, load, item, coordinates, place=None):
     """Force and torque of generalised forces load (k, 7 or 3) on a body, about the first point of the item on it.
 
@@ -458,8 +503,22 @@ def exerted(motion, item, on):
     item = handles_of(motion.packed).item(item)
     load = loads_of(motion.packed).get(id(item))
     if load is not None:
-        return force_reaction(motion, load, acted(motion.packed, item, on))
+        body = acted(motion.packed, item, on)
+        force, torque = force_reaction(motion, load, body)
+        if getattr(item, "slides", ()) and motion.packed.derived.holds:
+            more = held_reaction(motion, load, body)
+            return force + more[0], torque + more[1]
+        return force, torque
+    if is_idle(motion.packed, item):
+        acted(motion.packed, item, on)
+        return np.zeros((motion.t.size, 3)), np.zeros((motion.t.size, 3))
     return reaction(motion, member(motion.packed, item), acted(motion.packed, item, on))
+
+
+def is_idle(packed, item):
+    """Whether an item takes no part in a phase of its scene: it is open, or inactive."""
+    present = member_of(packed, item) is not None or id(item) in loads_of(packed)
+    return not present and any(item is known for known in handles_of(packed).items)
 
 
 def contact_point(motion, item):
@@ -526,9 +585,14 @@ class Exerting:
         demand = friction_demand(self._motion(), constraint)
         return demand if np.ndim(self.t) else demand[0]
 
+    def _acting(self):
+        """The packed scene whose parts act, and multipliers of its rows."""
+        return self.packed, self.multipliers
+
     def _motion(self):
         """The states as what `exerted` reads."""
-        packed, levels = self.packed, (self.q, self.qd, self.qdd, self.multipliers)
+        packed, lam = self._acting()
+        levels = self.q, self.qd, self.qdd, lam
         t, (q, qd, qdd, lam) = np.atleast_1d(self.t), map(np.atleast_2d, levels)
         memory = with_normal_loads(packed, t, q, qd, qdd, np.atleast_2d(self.memory))
         return SimpleNamespace(packed=packed, system=packed.system, t=t, q=q, qd=qd, multipliers=lam, _memory=memory)

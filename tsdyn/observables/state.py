@@ -87,6 +87,15 @@ class State(Exerting, Kinematics["float | Any"], _Arrays):
         )
 
 
+class StatePhase(NamedTuple):
+    """What the actions of events have made of a scene up to a state."""
+
+    inactive: tuple  # names of the constraints and forces that take no part
+    values: dict  # parameters that were set, by name
+    packed: Any  # of the phase of the run; None of several states in different ones
+    columns: Any  # rows of the scene, and where they are among those of the phase: (2, rows)
+
+
 class RememberingState(State):
     """A State that knows its scene and the memory of forces, from which a run continues.
 
@@ -97,11 +106,14 @@ class RememberingState(State):
         Memory of forces.
     anchor : Anchor
         Reference of turn counts.
+    phase : StatePhase or None
+        None where no action has changed the scene.
     """
 
     packed: Any = None
     memory: Any = None
     anchor: Any = None
+    phase: StatePhase | None = None
 
     @classmethod
     def of(cls, packed, memory, anchor, *parts):
@@ -111,7 +123,19 @@ class RememberingState(State):
         return state
 
     def _replace(self, **changes: Any) -> RememberingState:
-        return self.of(self.packed, self.memory, self.anchor, *super()._replace(**changes))
+        state = self.of(self.packed, self.memory, self.anchor, *super()._replace(**changes))
+        state.phase = self.phase
+        return state
+
+    def _acting(self):
+        if self.phase is None:
+            return super()._acting()
+        if self.phase.packed is None:
+            raise InvalidArgument("these states are of several phases of a run: ask for reactions at one time each.")
+        rows, columns = self.phase.columns
+        lam = np.zeros((*np.shape(self.multipliers)[:-1], len(self.phase.packed.system.segments)))
+        lam[..., columns] = self.multipliers[..., rows]
+        return self.phase.packed, lam
 
 
 def remembered(state, prepared, t, q):
@@ -120,7 +144,8 @@ def remembered(state, prepared, t, q):
     if not prepared.remembers and (memory is None or np.shape(memory) == (0,)):
         return NOTHING
     slots = prepared.packed.system.memory.size
-    if memory is None and state is not None and slots:
+    taken = sum(load.force.taken for load in prepared.packed.loads)  # a run sets these
+    if memory is None and state is not None and slots > taken:
         raise InvalidArgument(
             "parts of the scene count turns or hold a load, and this state doesn't say how many: give solution.state, "
             "what solution.at(t) returns or what an event function is given, as they are or changed by _replace."
@@ -134,15 +159,25 @@ def remembered(state, prepared, t, q):
     angles = state.angles if getattr(state, "anchor", None) is not None else np.empty(0)
     if angles.size != prepared.handles.count:
         angles = prepared.handles.angles_at_start(t, q)
-    for load in prepared.packed.loads if fresh else ():
-        if load.law is not None and load.law.counted:
-            memory[load.slot : load.slot + len(load.law.counted)] = angles[load.law.counted]
-        if getattr(load.force, "remembers_angle", False):
-            row = prepared.handles.row(load.force.joint, "angle")
-            memory[load.slot] = angles[row.first + load.force.which]
-    for part, slot in zip(prepared.packed.constraints, prepared.packed.slots, strict=True) if fresh and slots else ():
-        if slot >= 0:
+    if fresh:
+        begin_memory(prepared.packed, prepared.handles, angles, memory)
+    return np.concatenate((angles, memory))
+
+
+def begin_memory(packed, handles, angles, memory, items=None):
+    """Write into memory (slots,) what forces and constraints remember of angles at first; items: those activated."""
+    chosen = None if items is None else {id(item) for item in items}
+    for load in packed.loads:
+        if chosen is None or id(load.force) in chosen:
+            if chosen and load.force.memory and load.force.joint_coordinates:
+                memory[load.slot] = angles[handles.row(load.force, "angle").first]
+            if load.law is not None and load.law.counted:
+                memory[load.slot : load.slot + len(load.law.counted)] = angles[load.law.counted]
+            if getattr(load.force, "remembers_angle", False):
+                row = handles.row(load.force.joint, "angle")
+                memory[load.slot] = angles[row.first + load.force.which]
+    for part, slot in zip(packed.constraints, packed.slots, strict=True) if memory.size else ():
+        if slot >= 0 and (chosen is None or not chosen.isdisjoint((id(part), id(part.owner)))):
             joint, which = part.counted or (None, 0)
             if joint is not None:
-                memory[slot] = angles[prepared.handles.row(joint, "angle").first + which]
-    return np.concatenate((angles, memory))
+                memory[slot] = angles[handles.row(joint, "angle").first + which]

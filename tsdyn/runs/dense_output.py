@@ -438,6 +438,10 @@ class Trajectory:
         self.start, self.first, self.angles = start, first, angles
         self.asked = stops[stops[:, 1] != 0.0, 0]
 
+    def begin_at(self, times):
+        """Let the steps count that begin at these times, as at stops where a function is asked."""
+        self.asked = np.concatenate((self.asked, times))
+
     def __getstate__(self):
         return {**self.__dict__, "_reading": None}
 
@@ -466,7 +470,8 @@ class Trajectory:
             return np.repeat(self.first[None], t.size, axis=0), np.zeros((t.size, slots)), Status.SUCCESS
         rows = np.searchsorted(self.blocks[:, B_END], t)
         if self.asked.size:
-            rows = np.minimum(rows + np.isin(t, self.asked), len(self.blocks) - 1)
+            later = np.searchsorted(self.blocks[:, B_END], t, side="right")
+            rows = np.minimum(np.where(np.isin(t, self.asked), later, rows), len(self.blocks) - 1)
         order = np.argsort(rows, kind="stable")  # so that a chart is made once
         out = np.empty((t.size, *self.first.shape))
         reader = self.reading.reader()

@@ -362,6 +362,8 @@ class Sampling:
 class Sampled:
     """The memory of a run, advanced from instant to instant; see `Memory`."""
 
+    begins_again = False
+
     def __init__(self, memory, sampling):
         self.memory, self.sampling = memory, sampling
         self.run, self.weight, self.context = memory.run, memory.weight, memory.context
@@ -480,7 +482,7 @@ class SegmentLink:
             return None
         reader = reading.reader()
         if self.watch is None:
-            self.watch = Watch(task.events, task.prepared.packed, reader, task.span[0])
+            self.watch = Watch(task.events, task.prepared.packed, reader, task.span[0], task.resume)
         else:
             self.watch.read_by(reader)
         return self.watch

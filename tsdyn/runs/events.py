@@ -1,12 +1,13 @@
 """Events: users' functions of time and state, and their zeros inside every step, on states of the manifold."""
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InvalidArgument, Status
-from ..maths.root_isolation import LARGEST, Search, TooFast
+from ..maths.root_isolation import LARGEST, Search, TooFast, survey
 from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import handles_of
 from ..model.kinematics import Anchor, Kinematics
@@ -28,6 +29,8 @@ class Event(NamedTuple):
     limit: float  # occurrences that end the run; inf for never
     direction: float  # of the changes that count; 0 for both
     exact: bool = False  # whether a value at the start that is positive is no rounding of zero
+    action: object = None  # a function of a `Change` that each occurrence calls, or None
+    goes_on: bool = False  # whether a zero at the start has been counted before
 
     def value(self, t, instant):
         """The function's value; raises `EventFailed`."""
@@ -41,6 +44,28 @@ class Event(NamedTuple):
         if not math.isfinite(value):
             raise EventFailed(f"{self.name} must return a finite number; at t = {t:.9g} s it gave {given!r}.", t)
         return value
+
+
+class Member:
+    """One of several event functions that are evaluated together.
+
+    Parameters
+    ----------
+    over : function
+        Values (k, members) at a state of k times.
+    which : int
+        The function's number.
+    """
+
+    def __init__(self, over, which):
+        self.over, self.which = over, which
+
+    def __call__(self, t, instant):
+        """The value at one state."""
+        arrays = np.array([t]), *(np.array([part]) for part in (instant.q, instant.qd, instant.qdd))
+        return self.over(RememberingState.of(instant.packed, instant.memory, instant.anchor, *arrays, None))[
+            0, self.which
+        ]
 
 
 class EventFailed(Exception):
@@ -72,7 +97,10 @@ def prepare(events):
             )
         if math.isnan(number(direction)):
             raise InvalidArgument(f"{name}: direction must be a number, of which the sign counts, got {direction!r}.")
-        found.append(Event(function, name, limit or math.inf, number(direction)))
+        action = getattr(function, "action", None)
+        if action is not None and not callable(action):
+            raise InvalidArgument(f"{name}: action must be a function action(change), got {action!r}.")
+        found.append(Event(function, name, limit or math.inf, number(direction), action=action))
     return found
 
 
@@ -174,12 +202,19 @@ class Occurrence(NamedTuple):
     state: np.ndarray  # (3, n)
 
 
+@cache
+def _signs(n):
+    """Random signs (3, 3, n)."""
+    return np.random.default_rng(0).choice([-1.0, 1.0], (3, 3, n))
+
+
 class Track:
     """What is known of one function up to the last step's end."""
 
     def __init__(self, value):
         self.value = self.end = value  # at that time, and at the end of the present step
         self.sign = 0.0  # the last it had; 0 for none yet
+        self.before = 0.0  # the same at the last step's start, or soon after it
         self.significant = None  # time and value at which it had that sign
         self.zero = None  # time of the last zero, if it has had no sign since
         self.passed = self.pending = False  # that zero is a start within rounding; may become an event on being left
@@ -196,8 +231,8 @@ class Watch:
         The time up to which events have been searched.
     """
 
-    def __init__(self, events, packed, reader, start):
-        self.events, self.packed = events, packed
+    def __init__(self, events, packed, reader, start, resume=None):
+        self.events, self.packed, self.resume, self.begins_again = events, packed, resume, False
         self.start = self.t = start
         self.state = self.memory = None  # at t, and what is remembered of it: joints' angles, and what forces do
         self.angles = handles_of(packed).count
@@ -206,7 +241,13 @@ class Watch:
         self.list = [[] for _ in events]
         rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
         self._p = rigid[:, None] + np.arange(3, 7)
-        self._signs = np.random.default_rng(0).choice([-1.0, 1.0], (3, 3, packed.system.bodies[:, 1].sum()))
+        self._n = int(packed.system.bodies[:, 1].sum())
+        groups = {}  # numbers of events and of members, by the function that evaluates them together
+        for i, event in enumerate(events):
+            if isinstance(event.function, Member):
+                groups.setdefault(event.function.over, []).append((i, event.function.which))
+        self._groups = [(over, *map(list, zip(*pairs, strict=True))) for over, pairs in groups.items()]
+        self._degrees = [0] * len(self._groups)
         self.read_by(reader)
 
     def read_by(self, reader):
@@ -228,19 +269,18 @@ class Watch:
             status = memory.advance(log, -1)
             if not run.numbers.begun:
                 return status, ""
-            self.state, self.memory = run.now.copy(), run.remembered.copy()
-            self._note_start()
-            if self.tracks is None:
-                try:
-                    self.tracks = [Track(self._value(i, self.t, self.state)) for i in range(len(self.events))]
-                except EventFailed as failure:
-                    raise InvalidArgument(f"events: {failure}") from failure.__cause__
-                for event, track in zip(self.events, self.tracks, strict=True):
-                    if event.exact and track.value > 0.0:
-                        track.sign, track.significant = 1.0, (self.t, track.value)
+            try:
+                self._begin(run, self.tracks is None)
+            except EventFailed as failure:
+                raise InvalidArgument(f"events: {failure}") from failure.__cause__
         stiff = run.numbers.stiff
         # One step at a time, searched before the next one
         for _ in range(most):
+            if self.begins_again:
+                status, reason = self._begin_again(memory, log)
+                if status != Status.SLICE_DONE:
+                    return status, reason
+                continue  # it has written an output
             done = run.numbers.steps
             status = memory.advance(log, 1)
             if run.numbers.steps > done:
@@ -248,11 +288,56 @@ class Watch:
                     last = self._search_step(run, log)
                 except EventFailed as failure:
                     return Status.EVENT_FAILED, str(failure)
-                if last is not None:
+                if last is not None and not self._is_resumed(memory, last):
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
+                status = Status.SLICE_DONE if self.begins_again else status
             full = run.numbers.chart_rows + 2 >= len(log.charts)
             if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
+        return status, ""
+
+    def _begin(self, run, anew):
+        """Take the values at the start of a run, or where it begins `anew` after a jump."""
+        self.state, self.memory = run.now.copy(), run.remembered.copy()
+        self._note_start()
+        if not anew:
+            return
+        values, again = dict.fromkeys(range(len(self.events))), self.tracks is not None
+        for over, numbers, which in self._groups:
+            found = self._values(over, np.array([self.t]), [self.state])[0]
+            values.update(zip(numbers, found[which].tolist(), strict=True))
+        self.tracks = [Track(self._value(i, self.t, self.state) if x is None else x) for i, x in values.items()]
+        for event, track in zip(self.events, self.tracks, strict=True):
+            if event.exact and track.value > 0.0:
+                track.sign, track.significant = 1.0, (self.t, track.value)
+            if (again or event.goes_on) and track.value == 0.0 and not isinstance(event.function, Member):
+                track.zero, track.passed = self.t, True
+
+    def _is_resumed(self, memory, last):
+        """Whether the run goes on from the event that ends it, in the same memory, with other velocities."""
+        run, members = memory.run, [i for _, numbers, _ in self._groups for i in numbers]
+        if self.resume is None or last.index not in members or not memory.begins_again or last.t >= run.clock.t_end:
+            return False
+        if any(found and event.action for event, found in zip(self.events, self.list, strict=True)):
+            return False
+        self.begins_again = self.resume(last.t, run, [i for i in members if self.list[i]])
+        return self.begins_again
+
+    def _begin_again(self, memory, log):
+        """Begin the run again where it is; the Status, and what there is to say of it."""
+        run, t = memory.run, memory.run.clock.t
+        self.begins_again, self.start = False, t
+        for _, numbers, _ in self._groups:
+            for i in numbers:
+                self.list[i].clear()
+        status = memory.begin_again(log)
+        if not run.numbers.begun:
+            run.numbers.begun = 1  # there is a run so far
+            return status, ""
+        try:
+            self._begin(run, True)
+        except EventFailed as failure:
+            return Status.EVENT_FAILED, str(failure)
         return status, ""
 
     def saved(self):
@@ -265,7 +350,7 @@ class Watch:
     def restore(self, numbers, arrays):
         """As it was when it was saved."""
         self.t, self.state, self.memory = numbers["t"], arrays["watch.state"], arrays["watch.memory"]
-        demand(self.state.shape == (3, self._signs.shape[2]) and len(self.memory) >= self.angles, "the state of events")
+        demand(self.state.shape == (3, self._n) and len(self.memory) >= self.angles, "the state of events")
         self.tracks = [Track(0.0) for _ in self.events]
         for track, known in zip(self.tracks, numbers["tracks"], strict=True):
             if known["significant"] is not None:
@@ -298,7 +383,16 @@ class Watch:
         return RememberingState.of(self.packed, self.memory[self.angles :], anchor, t, *parts, None)
 
     def _value(self, i, t, state):
-        return self.events[i].value(t, self._instant(t, state))
+        event = self.events[i]
+        if isinstance(event.function, Member):
+            return float(self._values(event.function.over, np.array([t]), [state])[0, event.function.which])
+        return event.value(t, self._instant(t, state))
+
+    def _values(self, over, times, states):
+        """Values (k, members) of a group at times (k,) with their states; NaN where there is none."""
+        none = np.full_like(self.state, np.nan)
+        known = np.reshape([none if state is None else state for state in states], (-1, *none.shape))
+        return over(self._instants(times, known))
 
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
@@ -313,7 +407,12 @@ class Watch:
     def _locate(self, run, log, step):
         found, failure, end = [], None, step.t1
         step.degree = self._degree(step)
-        for i in range(len(self.events)):
+        left = {i for i in range(len(self.events)) if not isinstance(self.events[i].function, Member)}
+        for k in range(len(self._groups)):
+            first, more, end = self._first_of_group(k, step, end)
+            found += first
+            left |= more
+        for i in sorted(left):
             # Times that bracket the zeros of event i
             points, failed = self._points(i, step, end)
             if failed is not None:
@@ -334,6 +433,7 @@ class Watch:
                 break
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
+                self._add_beside(step, each)
                 run.remembered[: self.angles] = self._instant(each.t, each.state).angles
                 self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
@@ -343,15 +443,67 @@ class Watch:
             raise failure
         return None
 
+    def _add_beside(self, step, last):
+        """Add the events with an action that occur at the instant of the last one, to rounding of value and time."""
+        before = max(last.t - NOISE * ROOT * abs(last.t), step.t0)
+        for i, event in enumerate(self.events):
+            track = self.tracks[i]
+            if event.action is None or i == last.index or not track.before:
+                continue
+            value = self._at(i, step, last.t)
+            noise = max(self._shaken(i, step, last.t), NOISE * abs(value - self._at(i, step, before)))
+            if abs(value) <= noise and event.direction * track.before <= 0.0:
+                self.list[i].append(Occurrence(last.t, i, last.state))
+
+    def _first_of_group(self, k, step, end):
+        """Of a group up to `end`: the first event that ends the run, those to be searched one by one, the new end."""
+        (over, numbers, which), found, alone = self._groups[k], [], set()
+        left = np.arange(len(numbers))
+        while left.size:
+            members, columns = [numbers[i] for i in left], [which[i] for i in left]
+            tracks = [self.tracks[i] for i in members]
+            first, noise = np.array([[track.value, track.noise] for track in tracks]).T
+
+            def sample(times, columns=columns):
+                return self._values(over, times, step.states(times))[:, columns]
+
+            degree = max(step.degree, self._degrees[k] // 2)
+            seen = survey(sample, step.t0, first, end, degree, noise)
+            self._degrees[k] = seen.degree
+            crossing, since, until = [], seen.since.tolist(), seen.until.tolist()
+            for j, (i, track, value) in enumerate(zip(members, tracks, seen.last.tolist(), strict=True)):
+                event, sign = self.events[i], math.copysign(1.0, track.value)
+                plain = track.zero is None and track.sign in (0.0, sign)
+                if plain and seen.calm[j]:
+                    track.value = track.end = value
+                    track.sign, track.significant = sign, (end, value)
+                elif plain and until[j] == until[j] and event.direction * sign < 0.0 and event.limit == 1.0:
+                    crossing.append(j)
+                elif self.list[i] or since[j] < end:
+                    alone.add(i)
+            if not crossing:
+                break
+            # The earliest one; what is clear up to it needs no look
+            j = min(crossing, key=since.__getitem__)
+            first = (since[j], self._value(members[j], since[j], step.at(since[j])))
+            last = (until[j], self._value(members[j], until[j], step.at(until[j])))
+            if not first[1] * last[1] < 0.0:
+                return found, alone | {members[i] for i in crossing}, end
+            t = self._between(members[j], step, first, last)
+            if t <= end:
+                end = t
+                found = [Occurrence(t, members[j], step.at(t))]
+            left = left[[i for i in crossing if i != j and since[i] <= end]]
+        return found, alone, end
+
     def _points(self, i, step, end):
         """Times up to `end`, and values of event i, between which its sign changes once at most; what `EventFailed`."""
         track, good, failure = self.tracks[i], [step.t0], None
 
         def sample(times):
-            values = np.full(times.size, np.nan)
-            states, over = step.states(times), getattr(self.events[i].function, "over", None)
-            if over is not None and states and not any(state is None for state in states):
-                return over(self._instants(times, np.array(states)))
+            values, function, states = np.full(times.size, np.nan), self.events[i].function, step.states(times)
+            if isinstance(function, Member):
+                return self._values(function.over, times, states)[:, function.which]
             for k, (t, state) in enumerate(zip(times.tolist(), states, strict=True)):
                 if state is not None:
                     values[k] = self._value(i, t, state)
@@ -385,6 +537,7 @@ class Watch:
     def _walk(self, i, step, points):
         """The occurrences of event i among these points."""
         track, direction, found = self.tracks[i], self.events[i].direction, []
+        track.before = track.sign or next((math.copysign(1.0, v) for _, v in points if abs(v) > track.noise), 0.0)
         (before, value), *rest = points
         # A value near zero at the start of the run is a zero there, within rounding
         if track.sign == 0.0 and track.zero is None:  # the run's first step
@@ -421,7 +574,7 @@ class Watch:
             # Rounding of the state, in three random directions
             state, value = step.at(t), self._at(i, step, t)
             size = SHAKEN * np.abs(state).max(axis=1, keepdims=True)
-            shaken = [self._value(i, t, state + size * sign) for sign in self._signs]
+            shaken = [self._value(i, t, state + size * sign) for sign in _signs(self._n)]
         except EventFailed:
             return 0.0
         return NOISE * max(abs(each - value) for each in shaken)
@@ -453,14 +606,14 @@ class Watch:
         if a == 0.0 or (a < 0.0) == (b < 0.0):
             return [Occurrence(t0, i, step.at(t0))]
         root = self._between(i, step, (t0, a), (t1, b))
-        at_start = not self.events[i].exact and self._is_start(i, step, root, a)
+        at_start = not self.events[i].exact and self._is_start(i, step, root, (t0, a))
         return [] if at_start else [Occurrence(root, i, step.at(root))]
 
     def _is_start(self, i, step, t, before):
-        """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before."""
+        """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before, there."""
         if t - self.start <= START_ZERO * max(abs(self.start), step.t1 - step.t0):
             return True
-        return step.t0 == self.start and abs(before) <= self._shaken(i, step, step.t0)
+        return before[0] == self.start and abs(before[1]) <= self._shaken(i, step, self.start)
 
     def _between(self, i, step, first, last):
         """Where event i changes its sign between two times with values."""

@@ -4,6 +4,8 @@ import math
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+
 from ..errors import Status
 from ..jit.interrupts import interruptible
 from ..jit.kernels import callback, resident
@@ -12,7 +14,7 @@ from ..model.laws import calls_laws, interrupts_answered
 from ..rows.interface import reset_selection, selection_parts
 from ..workspaces import FILLED, STORED, divided, enter_joints, hold, words
 from .arguments import step_count
-from .run_log import no_log
+from .run_log import no_log, with_end
 from .tolerances import LONG_STEPS, PIECE
 
 # Ctrl-C within a step of a large scene.
@@ -250,6 +252,28 @@ class Memory:
         clock.t_end = task.span[1]
         if step is not None:
             self.run.numbers.steps_wanted = step_count(*task.span, step)
+
+    @property
+    def begins_again(self):
+        """Whether a run can begin again where it is: steps on no grid, and that know nothing of those before."""
+        return self.run.numbers.adaptive == 1 and self.run.numbers.stage_at == 0
+
+    def begin_again(self, log):
+        """Begin again where the run is, from the positions and velocities of `run.now`; the Status."""
+        run, numbers, control, t = self.run, self.run.numbers, self.work.control, self.run.clock.t
+        # Outputs and stops from here on are still to come
+        while numbers.rows > 0 and log.t_eval.size and log.out[numbers.rows - 1, 0] >= t:
+            numbers.rows -= 1
+        numbers.next_eval = int(np.searchsorted(log.t_eval, t))
+        numbers.next_stop = int(np.searchsorted(log.stops[:, 0], t, side="right"))
+        if numbers.in_chart > 0:
+            with_end(log.charts[: numbers.chart_rows + 1], numbers, control.condition, control.contraction)
+            numbers.chart_rows += 1
+        self.work.q[...], self.work.qd[...] = run.now[0], run.now[1]
+        own = self.context.system
+        own.reals[own.memory] = run.remembered[len(run.joints) :]
+        numbers.begun = 0
+        return self.advance(log, -1)
 
     def saved(self):
         """What is to be saved of it beside its arrays: nothing."""

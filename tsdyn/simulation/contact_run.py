@@ -7,27 +7,43 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analyses.contact_problem import Gaps, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
+from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
+from ..elements.force import Force
+from ..elements.unilateral import contacts_of
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
+from ..integrators import DOP853
 from ..jit.compiled import clock
 from ..maths.tolerances import EPS
+from ..model.handles import handles_of
 from ..model.packed import first_rows
 from ..observables import diagnostics, reactions
-from ..observables.state import RememberingState, remembered
+from ..observables.state import RememberingState, StatePhase, remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.dense_output import StepPieces
-from ..runs.events import Event
+from ..runs.events import Event, Member
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import floats, listed
-from .phase_scenes import NAMED, has_contacts, phase_of
+from . import hybrid
+from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, has_contacts, inactive_of, phase_of
 from .progress import reporter, silent
 from .run_options import LAWS, RunCall
 from .scene_cache import Prepared, prepared
 from .segments import summed
-from .tolerances import CREEPING, ENDLESS, EVENTS_JUDGED, MOST_AT_AN_INSTANT, PENETRATION, ROUNDED, TOUCHING
+from .tolerances import (
+    CREEPING,
+    ENDLESS,
+    EVENTS_JUDGED,
+    MOST_AT_AN_INSTANT,
+    MOST_PINNED,
+    PENETRATION,
+    ROUNDED,
+    TOUCHING,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -45,7 +61,7 @@ if TYPE_CHECKING:
 
 
 class _Closing:
-    """The gap of an open contact, as an event function.
+    """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
     however soon it comes.
@@ -53,58 +69,126 @@ class _Closing:
     Parameters
     ----------
     gaps : Gaps
-    i : int
-    start : tuple
-        Time, gap and rate where the contact has opened with a rate; else empty.
+    opened : dict
+        Of contacts that have opened with a rate: time, gap and rate there, by their numbers.
     """
 
-    def __init__(self, gaps, i, start):
-        self.gaps, self.i, self.start = gaps, i, start
+    def __init__(self, gaps, opened):
+        self.gaps = gaps
+        self.open(opened)
+
+    def open(self, opened):
+        """Take other contacts that have just opened."""
+        self.which = list(opened)
+        self.start = np.array(list(opened.values())).reshape(-1, 3).T
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        return self(states.t, states)
+        """Values (k, count) of states at k times."""
+        values = self.gaps.values(states.t, states.q, states.angles if self.gaps.are_counted else None)
+        if self.which:
+            begun, first, rate = self.start
+            since = states.t[:, None] - begun
+            later = since > 0.0
+            divided = (values[:, self.which] - first) / np.where(later, since, 1.0)
+            values[:, self.which] = np.where(later, divided, rate)
+        return values
 
-    def __call__(self, t, state):
-        """The value at a state, or values at several."""
-        gap = self.gaps.value(self.i, state.q, state.angles if self.gaps.are_counted else None)
-        if not self.start:
-            return gap
-        begun, first, rate = self.start
-        since = np.where(t > begun, t - begun, 1.0)
-        return np.where(t > begun, (gap - first) / since, rate)
+
+class _Loads:
+    """Multipliers and normal loads of a phase, shared by its events."""
+
+    def __init__(self, packed):
+        self.packed, self._last = packed, (None, None)
+
+    def at(self, states):
+        """Multipliers (k, m), NaN of redundant rows, and normal loads (k, frictions) of one state or of several."""
+        t, q, qd, qdd = np.atleast_1d(states.t), *map(np.atleast_2d, (states.q, states.qd, states.qdd))
+        key, (last, found) = (t.tobytes(), q.tobytes()), self._last
+        if key != last:
+            memory = np.tile(states.memory, (t.size, 1))
+            wide = reactions.with_normal_loads(self.packed, t, q, qd, qdd, memory)
+            found = reactions.multipliers(self.packed, t, q, qd, qdd, wide), wide[:, memory.shape[1] :]
+            self._last = key, found
+        return found
 
 
 class _Leaving:
-    """The reaction of a closed contact, positive where it pushes, as an event function.
+    """The reactions of closed contacts, positive where they push, as event functions.
 
     Parameters
     ----------
     packed : Packed
         Of the phase.
-    row : int
-    sign : float
-        Of the gap over Phi.
-    seen : dict
-        What is shared with the other contacts of the phase.
+    rows : list of int
+    signs : list of float
+        Of the gaps over Phi.
     """
 
-    def __init__(self, packed, row, sign, seen):
-        self.packed, self.row, self.sign, self.seen = packed, row, sign, seen
+    def __init__(self, packed, rows, signs):
+        self.packed, self.rows, self.signs = packed, rows, np.array(signs)
 
     def over(self, states):
-        """Values (k,) of states at k times."""
-        key = states.t.tobytes(), states.q.tobytes()
-        if key not in self.seen:  # those of other contacts at the same times are found with it
-            self.seen.clear()
-            memory = np.tile(states.memory, (states.t.size, 1))
-            levels = states.t, states.q, states.qd, states.qdd, memory
-            self.seen[key] = reactions.multipliers(self.packed, *levels)
-        return -self.sign * self.seen[key][:, self.row]
+        """Values (k, closed) of states at k times."""
+        memory = np.tile(states.memory, (states.t.size, 1))
+        lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        return -self.signs * lam[:, self.rows]
 
-    def __call__(self, t, state):
-        """The value at one state."""
-        return -self.sign * state.multipliers[self.row]
+
+class _Breaking:
+    """What the reactions of frictions that stick are below their bounds, as event functions.
+
+    Parameters
+    ----------
+    packed : Packed
+        Of the phase.
+    units : list of friction_problem.Unit
+    """
+
+    def __init__(self, packed, units):
+        self.packed, self.units = packed, units
+
+    def over(self, states):
+        """Values (k, units) of states at k times."""
+        memory = np.tile(states.memory, (states.t.size, 1))
+        motion = states.t, states.q, states.qd, states.qdd
+        wide = reactions.with_normal_loads(self.packed, *motion, memory)
+        lam = reactions.particular(reactions.multipliers(self.packed, *motion, wide))
+        values = np.zeros((states.t.size, len(self.units)))
+        for unit, value in zip(self.units, values.T, strict=True):
+            share, bound = unit.bound
+            value += bound - np.linalg.norm(lam[:, self.packed.derived.holds[unit.slot]], axis=1)
+            if share:
+                value += share * wide[:, memory.shape[1] + unit.load.normal]
+        return values
+
+
+class _Slowing:
+    """The velocities of frictions that slide, along their directions, as event functions.
+
+    In a plane half of the speed is taken off: where the direction has turned by 60 degrees, it is taken anew. The
+    velocity of one that has just begun to slide is divided by the time since.
+
+    Parameters
+    ----------
+    frictions : Frictions
+    which : list of int
+    begun : dict
+        Of those that have just begun to slide: time and acceleration there, by their numbers.
+    """
+
+    def __init__(self, frictions, which, begun):
+        self.frictions, self.which, self.begun = frictions, which, begun
+
+    def over(self, states):
+        """Values (k, which) of states at k times."""
+        values = np.empty((states.t.size, len(self.which)))
+        for i, value in zip(self.which, values.T, strict=True):
+            value[:] = self.frictions.speed(i, states.q, states.qd, states.memory)
+            if i in self.begun:
+                begun, first = self.begun[i]
+                later = states.t > begun
+                value[:] = np.where(later, value / np.where(later, states.t - begun, 1.0), first)
+        return values
 
 
 class Phases:
@@ -116,30 +200,44 @@ class Phases:
         Start, end (s) and names of the closed contacts.
     impulses : list of (float, str, float)
         Time (s), name, impulse (N s, or N m s of an angle).
+    changes : list of (tuple, dict)
+        The parts that are inactive in each, and the parameters that have been set before.
+    varies : bool
+        Whether forces or numbers differ between them, not rows alone.
     """
 
-    def __init__(self, packed):
+    def __init__(self):
         self.list, self.impulses, self.starts, self.of = [], [], [], []
         self.packed, self._columns = [], []  # of each set of closed gaps
-        self._rows, self._kinds = _rows_of(packed), {}
+        self._kinds, self.changes, self.varies = {}, [], False
 
-    def add(self, begin, rest, end, packed, names):
-        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
+    def add(self, begin, rest, end, packed, names, wholes, changes):
+        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end.
+
+        wholes: the packed scene, and that with the parameters of the phase, whose rows are the same.
+        """
         kind = self._kinds.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
-            own = _rows_of(packed)
-            pairs = [(self._rows[part] + i, own[part] + i) for part, i in _numbered(packed) if part in self._rows]
+            of_whole, own = _rows_of(wholes[1]), _rows_of(packed)
+            pairs = [(of_whole[part] + i, own[part] + i) for part, i in _numbered(packed) if part in of_whole]
             self.packed.append(packed)
             self._columns.append(np.array(pairs, int).reshape(-1, 2).T)
         if self.list:
             self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
         self.starts.append(begin)
         self.of.append(kind)
+        self.changes.append(changes)
+        self.varies = self.varies or wholes[0] is not wholes[1] or any(isinstance(item, Force) for item in changes[0])
         self.list.append((rest, max(rest, end), names))
 
     def at(self, t):
         """Numbers of the phases at times t (k,); where one begins, the later one."""
         return np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
+
+    def of_outputs(self, t):
+        """Numbers of the phases of outputs at times t (k,): of several at one time each is of a phase of its own."""
+        same = np.searchsorted(t, t, side="right") - 1 - np.arange(t.size)
+        return np.maximum(self.at(t) - same, 0)
 
     def multipliers(self, numbers, m, *arrays):
         """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
@@ -155,6 +253,40 @@ class Phases:
         for kind, mine, some in self._gathered(numbers, arrays):
             out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
         return diagnostics.ConstraintError(*out)
+
+    def packed_at(self, t):
+        """Yield each packed scene of phases at times t (k,), and which times are its."""
+        for kind, mine, _ in self._gathered(self.at(t), ()):
+            yield self.packed[kind], mine
+
+    def phase_at(self, t):
+        """The `StatePhase` at t, s, or of several times; None where actions have changed nothing."""
+        if not any(inactive or values for inactive, values in self.changes):
+            return None
+        numbers = np.unique(self.at(np.atleast_1d(t))).tolist() or [0]
+        inactive, values = self.changes[numbers[-1]]
+        kinds = {self.of[number] for number in numbers}
+        one = kinds.pop() if len(kinds) == 1 else None
+        found = (None, None) if one is None else (self.packed[one], self._columns[one])
+        return StatePhase(tuple(item.name for item in inactive), values, *found)
+
+    def parts(self, solution):
+        """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are."""
+        for kind, mine, _ in self._gathered(solution._phase_of_rows, ()):
+            part = solution._picked(mine)
+            packed = self.packed[kind]
+            part.packed, part.system, part.handles, part._phases = packed, packed.system, handles_of(packed), None
+            yield part, mine
+
+    def active(self, item, numbers):
+        """Whether a part is active in the phases of these numbers (k,)."""
+        return np.array([all(item is not each for each in inactive) for inactive, _ in self.changes])[numbers]
+
+    def name_switched(self, parts):
+        """Name in each phase which of these parts, that come and go, are active in it."""
+        for k, (inactive, _) in enumerate(self.changes):
+            active = [item.name for item in parts if all(item is not each for each in inactive)]
+            self.list[k] = (*self.list[k][:2], (*self.list[k][2], *active))
 
     def _gathered(self, numbers, arrays):
         """Yield each set of closed gaps, the entries (j,) of arrays in its phases, and these parts of the arrays."""
@@ -181,11 +313,11 @@ class _Pieces(StepPieces):
     side = "right"
 
 
-def demand_apart(gaps, q, angles, tol):
-    """Raise InconsistentState where gaps are below zero."""
+def demand_apart(gaps, able, q, angles, tol):
+    """Raise InconsistentState where gaps, of those that are able to close, are below zero."""
     values = gaps.at(q, angles)
-    deep = np.flatnonzero(values < -tol * (1.0 + np.abs(q).max()))
-    if deep.size:
+    deep = [i for i in able if values[i] < -tol * (1.0 + np.abs(q).max())]
+    if deep:
         found = listed([f"{gaps.names[i]} {gaps.list[i].contact.excess} by {-values[i]:.3g}" for i in deep], NAMED)
         raise InconsistentState(
             f"at the start (m, or rad): {found}. Move the bodies, or have scene.assemble() close these gaps."
@@ -194,11 +326,18 @@ def demand_apart(gaps, q, angles, tol):
 
 @dataclass
 class Modes:
-    """The modes of the units of a scene: numbers of gaps."""
+    """The modes of the units of a scene: numbers of gaps, and of frictions. All others are open, or slide."""
 
     closed: list = field(default_factory=list)  # independent rows, with reactions
     idle: list = field(default_factory=list)  # closed by what others hold
     opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+    sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
+    blocked: list = field(default_factory=list)  # frictions without motion that others hold
+    begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
+
+    def same(self, other):
+        """Whether the units are in the same modes, whatever has just opened."""
+        return replace(self, opened={}) == replace(other, opened={})
 
 
 class _ContactRun:
@@ -225,17 +364,22 @@ class _ContactRun:
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        self.gaps = gaps = Gaps(scene.packed)
-        self.count = kept.handles.count
+        self.base, self.count = scene, kept.handles.count
+        self.inactive, self.values, self.acted = inactive_of(scene), {}, False
+        self.switched = {id(item): item for item in self.inactive}
+        phase = getattr(call.state, "phase", None)
+        if phase is not None:
+            self.inactive, self.values = tuple(scene[name] for name in phase.inactive), phase.values
+        self.configure()
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
-        demand_apart(gaps, self.q, self.remembered[: self.count], options.initial_tol)
+        demand_apart(self.gaps, self.able, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
         self.modes, self.rest = Modes(), self.t
         self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
-        self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
+        self.phases, self.counts, self.steps = Phases(), [0] * len(self.users), 0
         self.reason, self.method, self.at_once, self.judged = "", "", 0, (self.t, 0)
 
     def _demand_served(self, kept):
@@ -246,32 +390,34 @@ class _ContactRun:
             raise InvalidArgument(
                 "sampled controllers don't serve scenes with contacts yet: leave out period, for a continuous one."
             )
-        if kept.rough:
+        rough = [load.force.title for load in kept.packed.loads if load.normal >= 0 and load.force.slips]
+        if rough and contacts_of(self.scene._added):
             raise InvalidArgument(
-                f"friction that depends on reactions ({', '.join(kept.rough)}) doesn't serve scenes with contacts yet: "
-                "use friction of given magnitude, such as ViscousFriction."
+                f"regularised friction that depends on reactions ({', '.join(rough)}) doesn't serve scenes with "
+                "contacts: leave out slip_velocity, for the exact law."
             )
 
     def run(self):
         """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
         began, first = clock(), None
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
-        status = self._settle(touching, ())
+        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
+        touching = [i for i in touching if i in self.able]
+        status = self._settle(touching, ()) or self._settle_frictions(Modes(), ())
         while status is None:
             try:
                 task, outcome = self._phase()
             except TsdynError as error:
                 if not self.parts:
                     raise
-                status, self.reason = Status.SINGULAR, str(error)
+                status, self.reason = Status.ACTION_FAILED if self.acted else Status.SINGULAR, str(error)
                 break
             first = first or task
-            self.parts.append(outcome)
             status = self._after(outcome)
         if first is None:  # nothing could begin
             raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
         self.report(None)
-        return first._replace(prepared=Prepared(self.scene, self.scene.packed), span=self.span), self._outcome(
+        return first._replace(prepared=Prepared(self.base, self.base.packed), span=self.span), self._outcome(
             status, began
         )
 
@@ -282,51 +428,119 @@ class _ContactRun:
         end = self.span[1]
         phase, names = self._scene(), self._names()
         call, plain = RunCall((self.t, end)), replace(self.options, events=None)
-        run = self.run_of(phase, plain, call)
+        run, still = self.run_of(phase, plain, call), self._still(phase)
+        if still.size == self.q.size and self.options.method is None:
+            run = run._by(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
         run._prepare_kernels(True)
         while True:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(),
+                max_steps=self._steps_left(), resume=self._resume,
             )  # fmt: skip
+            self.names, self.packed, self.settled, self.again = names, phase.packed, None, []
             outcome = self.run_task(task, phase, self.options.initial_tol)
             other = self.instead(task, outcome.status)
             if other is None:
-                self.phases.add(self.t, self.rest, outcome.end.reached, phase.packed, names)
+                outcome = pinned(outcome, self.q if self.parts else task.q, still)
+                if self.settled is None:
+                    self._end_phase(outcome.end.reached)
                 return task, outcome
             run = run._by(other)
 
+    def _end_phase(self, t):
+        wholes, changes = (self.base.packed, self.scene.packed), (self.inactive, self.values)
+        self.phases.add(self.t, self.rest, t, self.packed, self.names, wholes, changes)
+
+    def _resume(self, t, run, numbers):
+        """After events of these numbers: whether the run of the phase goes on, with other velocities.
+
+        It does where the same gaps are closed as before.
+        """
+        self._end_phase(t)
+        before = self.modes
+        self.t, (self.q, self.qd, _), self.remembered = t, run.now.copy(), run.remembered.copy()
+        remembered = self.remembered
+        self.settled = (self._transit([self.watched[i] for i in numbers]),)
+        changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
+        if self.settled[0] is not None or changed:
+            return False
+        run.now[1], self.settled = self.qd, None
+        self.closing.open(self.modes.opened)
+        self.again.append(t)
+        return True
+
+    def configure(self):
+        """Take the scene of the present parameters, and the units that are active."""
+        self.scene = hybrid.with_values(self.base, self.values)
+        self.switched |= {id(item): item for item in self.inactive}
+        inactive = self.inactive if self.scene is self.base else [self.scene[item] for item in self.inactive]
+        self.without = dependent(self.scene, inactive)
+        self.gaps, self.frictions = gaps_of(self.scene, self.without), Frictions(self.scene)
+        off = {id(item) for item in self.without}
+        self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]
+        self.off = [i for i, unit in enumerate(self.frictions.units) if id(unit.force) in off]
+
+    def _scene_of(self, rows, holds):
+        return phase_of(self.scene, rows, holds, self.without)
+
     def _scene(self):
         """The scene of the present modes."""
-        return phase_of(self.scene, [self.gaps.list[i].side.row for i in self.modes.closed])
+        return self._scene_of(self._closed_rows(), [self._hold(i, r) for i, r in self.modes.sticking.items()])
+
+    def _closed_rows(self):
+        return [self.gaps.list[i].side.row for i in self.modes.closed]
+
+    def _hold(self, i, rank):
+        """The rows that hold a friction, with the numbers that the run remembers."""
+        unit = self.frictions.units[i]
+        places = [self.count + np.array(unit.held(k)) for k in range(rank)]
+        return Hold(unit, rank, self.remembered[np.array(places, int)])
 
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
-        return tuple(dict.fromkeys(self.gaps.names[i] for i in held))
+        names = [self.gaps.names[i] for i in held] + [self.frictions.names[i] for i in sorted(self.modes.sticking)]
+        return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""
         pairs = zip(self.users, self.counts, strict=True)
-        found = [event._replace(limit=event.limit - count) for event, count in pairs]
-        watches = list(self._watches(phase.packed))
+        goes_on = bool(self.parts)
+        found = [
+            event._replace(limit=1.0 if event.action else event.limit - count, goes_on=goes_on)
+            for event, count in pairs
+        ]
+        watches = list(self._watches(phase))
         self.watched = [None] * len(found) + [unit for unit, _ in watches]
         return found + [event for _, event in watches]
 
-    def _watches(self, packed):
-        """Yield the units that may end a phase, each with its event."""
-        gaps, modes, pushes = self.gaps, self.modes, {}
-        first = {id(member.constraint): member.rows.start for member in packed.members}
-        for i in range(gaps.count):
+    def _watches(self, phase):
+        """Yield the units that may end a phase, gaps and then frictions, each with its event."""
+        gaps, frictions, modes, packed = self.gaps, self.frictions, self.modes, phase.packed
+        first = first_row_of(packed)
+        sides = [gaps.list[i].side for i in modes.closed]
+        leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
+        self.closing = _Closing(gaps, modes.opened)
+        for i in self.able:
             if i in modes.idle:
                 continue
-            row, sign = gaps.list[i].side.row, gaps.list[i].side.sign
-            if i in modes.closed:
-                event = _Leaving(packed, first[id(row)], sign, pushes)
-            else:
-                event = _Closing(gaps, i, modes.opened.get(i, ()))
-            yield i, Event(event, gaps.names[i], 1.0, -1.0, i not in modes.closed)
+            is_open = i not in modes.closed
+            function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
+            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
+        sticking = list(modes.sticking)
+        sliding = [i for i in range(frictions.count) if i not in sticking and i not in modes.blocked]
+        breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
+        slowing = _Slowing(frictions, sliding, modes.begun).over
+        for function, which in ((breaking, sticking), (slowing, sliding)):
+            for k, i in enumerate(which):
+                yield gaps.count + i, Event(Member(function, k), frictions.names[i], 1.0, -1.0)
+
+    def _still(self, phase):
+        """Coordinates of the bodies that rest where frictions stick."""
+        if not self.modes.sticking or self.q.size > MOST_PINNED:
+            return np.zeros(0, int)
+        return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
 
     def _times(self):
         left = self.times[self.taken :]
@@ -351,35 +565,67 @@ class _ContactRun:
 
     def _after(self, outcome):
         """Take the end of a phase; the Status of the run, None if it goes on."""
-        end, gaps = outcome.end, self.gaps
-        self.reason, self.method = outcome.reason, outcome.method or self.method
+        end, part = outcome.end, outcome
+        self.method = outcome.method or self.method
         self.steps += end.counts["steps"]
         times, *states = outcome.events
         for i, mine in enumerate(list(zip(times, *states, strict=True))[: len(self.users)]):
             self.found[i].append(mine)
             self.counts[i] += len(mine[0])
-        self.t, (self.q, self.qd, _) = end.reached, (x.copy() for x in end.last)
-        self.remembered = end.remembered
         fired = [i for i, at in zip(self.watched, times, strict=True) if i is not None and at.size]
-        goes_on = outcome.status is Status.EVENT and fired and self.t < self.span[1]
-        rows = outcome.rows
-        if not self.per_step and goes_on and len(rows) and rows[-1, 0] == self.t:  # that of the next phase counts
-            self.parts[-1] = outcome._replace(rows=rows[:-1])
-        self.taken += len(self.parts[-1].rows)
-        values = gaps.at(self.q, self.remembered[: self.count])
-        deep = [i for i in range(gaps.count) if values[i] < -PENETRATION * self.length]
+        acting = [event for event, at in zip(self.users, times, strict=False) if event.action and at.size]
+        ended = any(count >= event.limit for event, count in zip(self.users, self.counts, strict=True))
+        ends = outcome.status is Status.EVENT and not ended
+        goes_on = ends and end.reached < self.span[1]
+        if not self.per_step and goes_on and len(part.rows) and part.rows[-1, 0] == end.reached:
+            part = part._replace(rows=part.rows[:-1])  # that of the next phase counts
+        if self.again and part.trajectory is not None:
+            part.trajectory.begin_at(self.again)
+        self.parts.append(part)
+        self.taken += len(part.rows)
+        if self.settled is not None:  # within the run of the phase
+            return self.settled[0]
+        self.t, (self.q, self.qd, _), self.remembered = end.reached, (x.copy() for x in end.last), end.remembered
+        self.reason = outcome.reason
+        if goes_on:
+            return self._act(acting, fired, end.last) if acting else self._transit(fired)
+        if self._is_deep():
+            return Status.CONTACT_FAILED
+        return Status.SUCCESS if ends else outcome.status
+
+    def _is_deep(self):
+        """Whether contacts penetrate; says so."""
+        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
+        deep = [i for i in self.able if self.gap[i] < -PENETRATION * self.length]
         if deep:
-            self.reason = (
-                f"Penetration was not noticed: {listed([gaps.names[i] for i in deep], NAMED)}. Give a max_step."
-            )
-            return Status.CONTACT_FAILED
-        if not goes_on:
-            return Status.SUCCESS if outcome.status is Status.EVENT and fired else outcome.status
+            found = listed([self.gaps.names[i] for i in deep], NAMED)
+            self.reason = f"Penetration was not noticed: {found}. Give a max_step."
+        return bool(deep)
+
+    def _act(self, events, fired, last):
+        """Carry out the actions of events; the Status if there is no way on, else None. last: the state (3, n)."""
+        change = hybrid.ask(self, events, last)
+        if change is None or change.ends:
+            return Status.ACTION_FAILED if change is None else Status.EVENT
+        self.acted = True
+        jump = hybrid.carry_out(self, change)
+        if jump is None:
+            return Status.ACTION_FAILED
+        status = self._transit(fired)
+        hybrid.report(self, jump)
+        return status
+
+    def _transit(self, fired):
+        """From one phase to the next one, after events of the units `fired`; the Status if there is no way on."""
         self.reason = ""
-        if self._is_stuck():
+        if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        near = [i for i in range(gaps.count) if values[i] <= TOUCHING * self.length]
-        return self._settle(sorted({*near, *fired, *self.modes.closed, *self.modes.idle}), fired)
+        near = np.flatnonzero(self.gap <= TOUCHING * self.length).tolist()
+        count, before = self.gaps.count, self.modes
+        hit = [i for i in fired if i < count]
+        touching = {*near, *hit, *before.closed, *before.idle}.intersection(self.able)
+        status = self._settle(sorted(touching), hit)
+        return status or self._settle_frictions(before, [i - count for i in fired if i >= count])
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -387,7 +633,7 @@ class _ContactRun:
         length = self.t - self.phases.starts[-1]
         self.at_once = self.at_once + 1 if length <= 16.0 * EPS * max(abs(self.t), EPS) else 0
         self.judged = since, count + 1
-        if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count:
+        if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count + self.frictions.count:
             self.reason = f"There are {self.at_once} events at t = {self.t:.9g} s."
             return True
         if count + 1 >= EVENTS_JUDGED:
@@ -399,12 +645,12 @@ class _ContactRun:
 
     def _settle(self, touching, fired):
         """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
-        slots, values = self.remembered[self.count :], self.gaps.at(self.q, self.remembered[: self.count])
+        slots, values = self.remembered[self.count :], self.gap
         before, self.modes, self.rest = self.modes, Modes(), self.t
         if not touching:
             return None
         try:
-            inertia = Inertia(self.gaps, self.t, self.q, self.qd, slots)
+            inertia = Inertia(self.gaps, self.t, self.q, slots)
             rates = inertia.rates(self.qd)
             noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
             if noise:  # a gap that closes with a rate of rounding
@@ -421,6 +667,77 @@ class _ContactRun:
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         return None
+
+    def _settle_frictions(self, before, fired):
+        """Which frictions stick; the Status if there is no way on, else None."""
+        frictions, memory = self.frictions, self.remembered[self.count :].copy()
+        resting, guess = [], {}
+        for i, unit in enumerate(frictions.units):
+            if i in self.off:
+                continue
+            v, size = frictions.velocity(i, self.q[None], self.qd[None])
+            speed, single = np.linalg.norm(v[0]), unit.slide.directions == 1
+            if i in before.blocked and memory[unit.way].any():
+                guess[i] = frictions.read(i, self.q, memory)
+            if speed <= max(AT_REST * size[0], 0.0 if single else STOPPED) or (single and i in fired):
+                resting.append(i)
+                memory[unit.way] = 0.0
+            else:
+                memory[unit.way] = frictions.written(i, self.q, v[0] / speed)
+        self.remembered = np.concatenate((self.remembered[: self.count], memory))
+        self.modes.blocked = self.off
+        if not resting:
+            return None
+        try:
+            rest, ranks = self._rest(before, resting, {i: way for i, way in guess.items() if i in resting}, fired)
+        except NoRest as error:
+            names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
+            self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
+            return Status.CONTACT_FAILED
+        for i, way in rest.ways.items():
+            unit = frictions.units[i]
+            self.remembered[self.count + unit.slot : self.count + unit.way.stop] = frictions.written(i, self.q, way)
+        self.modes.sticking = {i: ranks[i] for i in rest.sticking}
+        self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
+        self.modes.begun = {i: (self.t, rest.rates[i]) for i in rest.ways}
+        return None
+
+    def _rest(self, before, resting, guess, fired):
+        """The `Rest` of the frictions that are at rest, and how many rows hold each."""
+        frictions, ranks = self.frictions, {}
+        for i in resting:
+            if i in before.sticking:
+                ranks[i] = before.sticking[i]
+                continue
+            basis = frictions.basis(i, self.q, self._motions_of)
+            ranks[i] = len(basis)
+            numbers = frictions.numbers(i, self.q, basis)
+            for k in range(len(basis)):
+                self.remembered[self.count + np.array(frictions.units[i].held(k))] = numbers[k]
+        free = [i for i in resting if ranks[i]]
+        phase = self._scene_of(self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
+        rows = {i: phase.packed.derived.holds[frictions.units[i].slot] for i in free}
+        memory = self.remembered[self.count :]
+        fresh = [i for i in free if i not in before.sticking]
+        if fresh:  # their rows hold to the last bit where they are
+            Phi = values_of(phase.packed, self.t, self.q, memory)
+            for i in fresh:
+                for k, row in enumerate(rows[i]):
+                    memory[frictions.units[i].held(k)[-1]] = Phi[row]
+        bases = {i: frictions.directions(i, self.q, self._hold(i, ranks[i]).numbers) for i in free}
+        problem = RestProblem(frictions, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
+        sticking = [i for i in free if i not in guess]
+        return problem.settle(sticking, guess, fired), ranks
+
+    def _motions_of(self, i):
+        """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
+        frictions, unit = self.frictions, self.frictions.units[i]
+        hold = Hold(unit, 3, frictions.numbers(i, self.q, np.eye(3)))
+        phase = self._scene_of(self._closed_rows(), [hold])
+        memory = self.remembered[self.count :].copy()
+        for k in range(3):
+            memory[np.array(unit.held(k))] = hold.numbers[k]
+        return free_motions(phase.packed, self.t, self.q, memory, phase.packed.derived.holds[unit.slot])
 
     def _hit(self, inertia, touching, rates):
         """Jump of velocities at an impact; the rates (count,) afterwards."""
@@ -469,17 +786,19 @@ class _ContactRun:
     # The whole
 
     def _outcome(self, status, began):
+        switched = [item for item in self.switched.values() if not getattr(item, "unilateral", False)]
+        self.phases.name_switched(switched)
         parts = self.parts
         ends = [part.end for part in parts]
         last = ends[-1]
         logs = self.options.history is not False
-        numbers = np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts])
+        rows = np.concatenate([part.rows for part in parts])
         events = None
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
             events = tuple([np.concatenate(column[k]) for column in columns] for k in range(3))
         return Outcome(
-            status, self.reason, np.concatenate([part.rows for part in parts]),
+            status, self.reason, rows,
             RunEnd(
                 last.reached, last.last, last.remembered,
                 summed([end.counts for end in ends]),
@@ -487,13 +806,13 @@ class _ContactRun:
                 ChartLog([end.charts for end in ends]) if logs else None,
             ),
             _Pieces([part.trajectory for part in parts]) if self.options.dense_output else None,
-            events, began, self.method, (self.phases, numbers),
+            events, began, self.method, (self.phases, self.phases.of_outputs(rows[:, 0])),
         )  # fmt: skip
 
 
 def jumped(inertia, qd, which, before, e, p, law="newton"):
     """Velocities (n,) after impulses p (k,) of the gaps `which`, and the rates (count,) of all gaps then."""
-    change = inertia.free(inertia.J[which].T @ p)
+    change = inertia.pushed(which, p)
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = np.maximum(after[which], 0.0)  # but for rounding
     if law == "newton":  # without rounding where the impact acts
@@ -509,6 +828,34 @@ def held(inertia, qd, which, rates):
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = 0.0
     return qd + change, after
+
+
+class _Pinned:
+    """A trajectory with bodies that rest: to the last bit."""
+
+    def __init__(self, trajectory, q, still):
+        self.trajectory, self.q, self.still = trajectory, q, still
+        self.start, self.end, self.edges, self.anchors = (
+            trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
+        )  # fmt: skip
+
+    def __call__(self, t):
+        """As of a `Trajectory`."""
+        states, memory, status = self.trajectory(t)
+        states[:, 0, self.still], states[:, 1:, self.still] = self.q[self.still], 0.0
+        return states, memory, status
+
+
+def pinned(outcome, q, still):
+    """The outcome of a phase with bodies that rest at q (n,), to the last bit; still: their coordinates."""
+    if not still.size:
+        return outcome
+    n, last = q.size, outcome.end.last
+    outcome.rows[:, 1 + still] = q[still]
+    outcome.rows[:, 1 + n + still] = outcome.rows[:, 1 + 2 * n + still] = 0.0
+    last[0, still], last[1:, still] = q[still], 0.0
+    trajectory = outcome.trajectory and _Pinned(outcome.trajectory, q, still)
+    return outcome._replace(trajectory=trajectory)
 
 
 def run_contacts(scene, options, call, run_of, run_task, instead):
@@ -580,7 +927,7 @@ def impact(
         raise InvalidArgument(f"law must be 'newton' or 'poisson', got {law!r}.")
     if not has_contacts(scene):
         raise InvalidArgument("impact: the scene has no unilateral constraints, such as PlaneContact(unilateral=True).")
-    gaps, kept = Gaps(scene.packed), prepared(phase_of(scene, []))
+    gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
     q, qd = state_arrays(state, kept.n)
     t = float(getattr(state, "t", 0.0))
     memory = remembered(state, kept, t, q)
@@ -593,7 +940,7 @@ def impact(
             e[_chosen(gaps, [item], None)] = _coefficient(value)
     elif restitution is not None:
         e[:] = _coefficient(restitution)
-    inertia = Inertia(gaps, t, q, qd, slots)
+    inertia = Inertia(gaps, t, q, slots)
     before = inertia.rates(qd)[which]
     try:
         p = impulses(inertia, which, before, e[which], law)

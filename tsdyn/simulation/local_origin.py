@@ -117,7 +117,7 @@ def run_near(driver, task, scene, origin, tol):
     if task.archive is not None:
         task.archive.shift = shift
     watched = task.events and [each._replace(function=_away(each.function, packed, shift)) for each in task.events]
-    outcome = driver(task._replace(prepared=local, q=q, qd=qd, events=watched))
+    outcome = driver(task._replace(prepared=local, q=q, qd=qd, events=watched, resume=None))
     rows, end, events = outcome.rows, outcome.end, outcome.events
     last = end.last.copy()
     if task.archive is None:

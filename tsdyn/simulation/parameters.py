@@ -303,6 +303,8 @@ class Edit:
         if isinstance(owner, Joint):
             return self._enter_joint(self.family.members[id(owner)], owner, changes)
         other = with_attributes(owner, changes)
+        if getattr(other, "taken", 0) != getattr(owner, "taken", 0):
+            return False
         load = self.family.loads.get(id(owner))
         return self._enter_constraint(owner, other) if load is None else self._enter_force(load, owner, other)
 

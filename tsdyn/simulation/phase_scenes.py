@@ -1,59 +1,69 @@
 """Scenes of the phases of a run: what of a scene stays, and what its contacts and frictions are in their modes."""
 
-from functools import wraps
-from typing import NamedTuple
+from functools import partial, wraps
+from itertools import chain
+
+import numpy as np
 
 from ..calls import fitting
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument
 from ..model.handles import handles_of
-from ..model.packed import begins_of
+from ..model.packed import begins_of, pack
 from ..validation import listed
 
 # A phase is a scene of its own, packed once for each combination of modes: the bodies, joints and forces of the scene,
 # less those that are switched off, and the rows that its units add in their modes, such as that of a closed gap. So
 # nothing below it knows of contacts, and a scene without contacts loads nothing of this. Numbers of these rows that are
 # taken at a transition, such as the place where a block sticks, are among what the run remembers: nothing is packed
-# for other values.
+# for other values. All phases remember the same: angles of all joints, and what all forces and constraints of the scene
+# remember, whether these are active or not.
 
 NAMED = 5  # contacts in a message
 
 
 def has_contacts(scene):
-    """Whether a scene has unilateral constraints; looked up once until the scene changes."""
+    """Whether runs of a scene have phases, by contacts, exact friction or inactive parts; kept until it changes."""
     if scene._opens is None:
-        scene._opens = bool(contacts_of(scene._added))
+        slides = any(getattr(force, "slides", ()) for force in scene._forces)
+        scene._opens = slides or bool(contacts_of(scene._added) or inactive_of(scene))
     return scene._opens
 
 
-class Place(NamedTuple):
-    """Where a number that the run remembers is among the numbers of a row."""
-
-    slot: int  # of System.memory
-    row: object  # a primitive of the phase
-    at: int  # behind where its reals begin
+def inactive_of(scene):
+    """The constraints and forces that are inactive at the start, a tuple."""
+    return tuple(each for each in (*scene._added, *scene._forces) if not each.active)
 
 
-def phase_of(scene, rows, places=(), without=()):
+def dependent(scene, items):
+    """These items, and friction by reactions of joints among them: a tuple."""
+    gone = {id(item) for item in items}
+    frictions = [force for force in scene._forces if "normal_load" in force.kernels and id(force) not in gone]
+    return *items, *(force for force in frictions if id(force.joint) in gone)
+
+
+def phase_of(scene, rows, holds=(), without=None):
     """The scene with these rows, primitives, in place of its contacts; kept until the scene changes.
 
-    places: `Place` of what the rows take from the memory of the run. without: constraints and forces left out.
+    holds: rows with numbers that the run remembers, as `friction_problem.Hold`. without: constraints and forces left
+    out, by default those that are inactive at the start.
     """
     known = scene._phases
     if known is None:
         known = scene._phases = {}
-    key = frozenset(map(id, (*rows, *without)))
+    without = dependent(scene, inactive_of(scene)) if without is None else without
+    key = frozenset(map(id, rows)), frozenset(map(id, without)), frozenset(hold.key for hold in holds)
     if key not in known:
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
+        held = [hold.rows() for hold in holds]
         phase = known[key] = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
-            _added=[each for each in scene._added if id(each) not in gone] + list(rows),
-            _forces=[each for each in scene._forces if id(each) not in gone],
-            _packed=None, _start=None, _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
+            _added=[each for each in scene._added if id(each) not in gone] + [*rows, *chain(*held)],
+            _forces=[each for each in scene._forces if id(each) not in gone], _packed=None, _start=None,
+            _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
+            _pack=partial(_pack_phase, phase, scene, holds, held),
         )  # fmt: skip
-        if places:
-            phase._packed = _remembering(phase.packed, places)
     return known[key]
 
 
@@ -63,24 +73,78 @@ def last_phase(scene, phases):
     return next(phase for phase in scene._phases.values() if phase.packed is packed)
 
 
-def _remembering(packed, places):
-    """Packed with the memory of these places in numbers of its rows."""
-    system, begins = packed.system, begins_of(packed)
+def _pack_phase(phase, scene, holds, held):
+    """Pack a phase of a scene: it remembers what the scene does, in the same order."""
+    whole = scene.packed
+    packed = pack(phase, handles_of(whole).where_some_act((*phase._added, *phase._forces)))
+    if whole.system.memory.size:
+        packed = _remembering(packed, whole)
+    return _holding(packed, holds, held) if holds else packed
+
+
+def _remembering(packed, whole):
+    """Packed with the memory of a whole scene; what is missing is kept in a number that nothing reads."""
+    own, memory = _slots(packed), np.full(whole.system.memory.size, packed.system.reals.size)
+    found = _slots(whole)
+    for item, slots in own.items():
+        memory[found[item]] = packed.system.memory[slots]
+    if (memory == packed.system.memory).all() if memory.size == packed.system.memory.size else False:
+        return packed
+    first = {item: slots.start for item, slots in found.items()}
+    pairs = zip(packed.constraints, packed.slots, strict=True)
+    return packed._replace(
+        system=packed.system._replace(memory=memory, reals=np.append(packed.system.reals, 0.0)),
+        loads=tuple(load if load.slot < 0 else load._replace(slot=first[id(load.force)]) for load in packed.loads),
+        slots=tuple(slot if slot < 0 else first[id(part)] for part, slot in pairs),
+    )
+
+
+def _slots(packed):
+    """The slots of System.memory of each force and primitive that has any, a slice, by its id."""
+    owners = [(load.slot, id(load.force)) for load in packed.loads]
+    owners += zip(packed.slots, map(id, packed.constraints), strict=True)
+    owners = sorted(owner for owner in owners if owner[0] >= 0)
+    ends = [*(slot for slot, _ in owners[1:]), packed.system.memory.size]
+    return {item: slice(slot, end) for (slot, item), end in zip(owners, ends, strict=False)}
+
+
+def gaps_of(scene, without=None):
+    """The `Gaps` of a scene, of its inactive contacts too; `without` as of `phase_of`."""
+    from ..analyses.contact_problem import Gaps
+
+    rows = [side.row for contact in contacts_of(scene._added) for side in contact.sides]
+    alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
+    return Gaps(scene.packed, alone.packed, phase_of(scene, [], without=without).packed)
+
+
+def _holding(packed, holds, held):
+    """Packed with the numbers of the rows of holds among what the run remembers."""
+    system, begins, first = packed.system, begins_of(packed), first_row_of(packed)
     memory = system.memory.copy()
-    for slot, row, at in places:
-        memory[slot] = begins[id(row)] + at
+    for hold, rows in zip(holds, held, strict=True):
+        packed.derived.holds[hold.unit.slot] = np.array([first[id(row)] for row in rows], int)
+        for row, places in zip(rows, hold.places(), strict=True):
+            packed.derived.places[id(row)] = places
+            for slot, at in places:
+                memory[slot] = begins[id(row)] + at
     return packed._replace(system=system._replace(memory=memory))
 
 
+def first_row_of(packed):
+    """The first row of each constraint, by its id."""
+    return {id(member.constraint): member.rows.start for member in packed.members}
+
+
 def at_start(scene):
-    """The scene with those contacts closed that are so at its start; a scene without contacts as it is."""
+    """The scene as it is at its start: contacts that are closed hold, inactive parts are left out."""
     if not has_contacts(scene):
         return scene
-    from ..analyses.contact_problem import Gaps, closed_gaps
+    from ..analyses.contact_problem import closed_gaps
 
-    gaps, (q, _) = Gaps(scene.packed), scene.start
+    gaps, (q, _) = gaps_of(scene), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
-    return phase_of(scene, [gaps.list[i].side.row for i in closed_gaps(gaps, q, angles)])
+    closed = [gaps.list[i] for i in closed_gaps(gaps, q, angles)]
+    return phase_of(scene, [gap.side.row for gap in closed if gap.contact.active])
 
 
 def demand_bilateral(scene):
@@ -109,12 +173,13 @@ def without_contacts(function):
 
     @wraps(function)
     def call(scene, *arguments, **keywords):
-        if has_contacts(scene):
-            names = listed([each.name for each in contacts_of(scene._added)], NAMED)
+        opening = [each.name for each in contacts_of(scene._added) if each.active]
+        if opening:
+            names = listed(opening, NAMED)
             raise InvalidArgument(
                 f"{function.__name__} is for bilateral constraints, and {names} open{'s' * (',' not in names)}. Remove "
                 "these from a copy of the scene, or hold them closed by unilateral=False."
             )
-        return own(scene, *arguments, **keywords)
+        return own(at_start(scene), *arguments, **keywords)
 
     return fitting(call)

@@ -576,7 +576,7 @@ def simulate(  # many arguments, by name: each is an option of a run
         max_step, history, chart_interval, law,
     )  # fmt: skip
     call = RunCall(t_span, t_eval, store, checkpoint, progress, state)
-    if has_contacts(scene):
+    if has_contacts(scene) or options.acts or getattr(state, "phase", None) is not None:
         return _solve_contacts(scene, options, call)
     return _run_of(scene, options, call)._solve(call)
 

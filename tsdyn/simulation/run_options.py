@@ -206,6 +206,12 @@ class RunOptions:
         """Whether the default method may be Taylor."""
         return self.formulation == "tangent" and self.chart_interval is None
 
+    @property
+    def acts(self) -> bool:
+        """Whether an event has an action."""
+        events = self.events if isinstance(self.events, tuple) else (self.events,)
+        return any(getattr(event, "action", None) is not None for event in events)
+
     def __repr__(self) -> str:
         given = [f"{name}={vars(self)[name]!r}" for name, default in OF_RUN.items() if vars(self)[name] != default]
         return f"RunOptions({', '.join(given)})"

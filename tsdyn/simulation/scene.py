@@ -42,7 +42,9 @@ from .given_motion import kinematics as _kinematics
 from .phase_scenes import where_it_stands, without_contacts
 from .scene_cache import preparing
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
+from .variants import activate as _activate
 from .variants import copy as _copy
+from .variants import deactivate as _deactivate
 from .variants import parameters as _parameters
 from .variants import place as _place
 from .variants import remove as _remove
@@ -78,12 +80,14 @@ def summary(scene: Scene) -> str:
     parts = [(len(scene.bodies) - points, "rigid body", "rigid bodies"), (points, "point mass", "point masses")]
     bodies = ", ".join(counted(*part) for part in parts if part[0]) or "no bodies"
     forces = f", {counted(len(scene.forces), 'force')}" if scene.forces else ""
-    return f"<Scene of {bodies}: {counted(n, 'coordinate')}, {counted(rows, 'constraint row')}{forces}>"
+    idle = sum(not item.active for item in (*scene.constraints, *scene.forces))
+    idle = f", {idle} inactive" if idle else ""
+    return f"<Scene of {bodies}: {counted(n, 'coordinate')}, {counted(rows, 'constraint row')}{forces}{idle}>"
 
 
 def _item(item):
     names = [body.name for body in (item.a, item.b) if body is not None]
-    return item.name, item._kind(), ", ".join(names)
+    return item.name, item._kind(), ", ".join(names) + "; inactive" * (not item.active)
 
 
 def _rows(lines):
@@ -212,7 +216,8 @@ class Scene:
     ground: AnyBody
     imported: ImportReport | None = None
     _named = None  # of a file with a table `parameters`: its `NamedNumbers`
-    _phases = _opens = None  # of a scene with contacts: see phase_scenes.py
+    _phases = _opens = None  # of a scene with contacts, or inactive parts: see phase_scenes.py
+    _pack = pack  # what packs it; of a phase its own
     _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:
@@ -438,7 +443,7 @@ class Scene:
         if self._packed is None:
             if not self._bodies:
                 raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
-            self._packed = pack(self)
+            self._packed = self._pack()
             if self._aliases:
                 handles_of(self._packed).add_aliases(self._aliases.items())
             self._users = list(user_functions(self._packed))
@@ -582,6 +587,8 @@ class Scene:
     set = where_it_stands(fitting(set_joint))
     set_start = _set_start
     remove = _remove
+    activate = fitting(_activate)
+    deactivate = fitting(_deactivate)
     copy = _copy
     save = save
     __copy__ = _copy

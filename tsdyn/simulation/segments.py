@@ -245,6 +245,8 @@ class Carrier:
         Pivot share of the weakest row at the start; the method resumes when it has grown.
     """
 
+    begins_again = False
+
     def __init__(self, memory, task, share):
         self.memory, self.share = memory, share
         self.run, self.weight, self.context = memory.run, memory.weight, memory.context

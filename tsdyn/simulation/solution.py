@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import time
-from functools import cached_property
+from functools import cached_property, wraps
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -14,6 +14,7 @@ from ..calls import fitting, fitting_methods
 from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
+from ..model.handles import handles_of
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import diagnostics, reactions
 from ..observables.generalised_forces import law_values
@@ -106,8 +107,8 @@ class Showing:
         Parameters
         ----------
         channels : str or sequence of str, optional
-            Names of channels, see below. By default constraint errors, energies, steps and charts are drawn; with contacts,
-            when they are closed, instead of charts.
+            Names of channels, see below. By default constraint errors, energies, steps and charts are drawn; of a run
+            with contacts, when they are closed in place of charts.
         path : str or Path, optional
             A file to write the figure to, in the format of its suffix. A lone text that ends like a file of a picture,
             such as "run.png", is a path.
@@ -254,18 +255,61 @@ def _quadrature(solution, trajectory, item, a, b):
 
 def _power(solution, trajectory, item, t):
     states, memory, status = trajectory(t)
-    q, qd, qdd = (np.ascontiguousarray(states[:, i]) for i in range(3))
-    system = solution.system
-    memory = with_normal_loads(solution.packed, t, q, qd, qdd, memory)
-    at = SimpleNamespace(t=t, q=q, qd=qd, _memory=memory, packed=solution.packed, system=system)
-    if system.rheonomic[0]:
-        at.multipliers = solution._multipliers_at(t, q, qd, qdd, memory)
-    if item is not None:
-        power = diagnostics.power_of(at, item)
-    else:
+    if status != 0:
+        return np.full(t.size, np.nan)
+    levels, power, phases = [np.ascontiguousarray(states[:, i]) for i in range(3)], np.zeros(t.size), solution._phases
+    varies = phases is not None and phases.varies
+    for packed, mine in phases.packed_at(t) if varies else [(solution.packed, slice(None))]:
+        some = t[mine], *(level[mine] for level in levels)
+        slots = with_normal_loads(packed, *some, memory[mine])
+        at = SimpleNamespace(t=some[0], q=some[1], qd=some[2], _memory=slots, packed=packed, system=packed.system)
+        if packed.system.rheonomic[0]:
+            at.multipliers = (reactions.multipliers if varies else solution._multipliers_at)(
+                *([packed] if varies else []), *some, slots
+            )
+        power[mine] = _supplied(at, item)
+    return power
+
+
+def _supplied(at, item):
+    """Power (k,) supplied by an item, or without one by all, at states that have a packed scene."""
+    if item is None:
         powers = diagnostics.force_powers(at)
-        power = powers.applied + diagnostics.driving_power(at) - powers.dissipation
-    return power if status == 0 else np.full(t.size, np.nan)
+        return powers.applied + diagnostics.driving_power(at) - powers.dissipation
+    item = handles_of(at.packed).own(item)
+    if reactions.is_idle(at.packed, item):
+        return np.zeros(at.t.size)
+    load = reactions.loads_of(at.packed).get(id(item))
+    return diagnostics.power_of(at, member(at.packed, item) if load is None else load)
+
+
+# What follows from the packed scene is asked of that of each phase, where phases differ in forces or numbers.
+
+
+def in_phases(method):
+    """Decorate a method that returns arrays over the outputs, a tuple of them, or a named tuple."""
+
+    @wraps(method)
+    def call(self, *arguments, **keywords):
+        phases = getattr(self, "_phases", None)
+        if phases is None or not phases.varies:
+            return method(self, *arguments, **keywords)
+        return _gathered(self, lambda part: method(part, *arguments, **keywords))
+
+    return call
+
+
+def _gathered(solution, ask):
+    """What the outputs of each packed scene say, in the order of the outputs."""
+    found, order = [], []
+    for part, mine in solution._phases.parts(solution):
+        found.append(ask(part))
+        order.append(mine)
+    back = np.argsort(np.concatenate(order), kind="stable")
+    if isinstance(found[0], tuple):
+        columns = [np.concatenate(column)[back] for column in zip(*found, strict=True)]
+        return type(found[0])(*columns) if hasattr(found[0], "_fields") else tuple(columns)
+    return np.concatenate(found)[back]
 
 
 # Balances of a run: energies, powers and momenta, mixed into `Solution`.
@@ -276,11 +320,13 @@ class Balances:
     """Mixed into what has `system`, `packed`, `handles` and outputs t (k,), q and qd (k, n)."""
 
     @cached_property
+    @in_phases
     def kinetic_energy(self) -> Floats:
         """Kinetic energy (k,), J."""
         return diagnostics.kinetic_energy(self.system, self.q, self.qd)
 
     @cached_property
+    @in_phases
     def potential_energy(self) -> Floats:
         """Potential energy (k,), J, of gravity (zero at the origin) and of springs; applied loads have none."""
         return diagnostics.potential_energy(self.system, self.q) + self._force_powers.potential
@@ -291,10 +337,12 @@ class Balances:
         return self.kinetic_energy + self.potential_energy
 
     @cached_property
+    @in_phases
     def _force_powers(self):
         return diagnostics.force_powers(self)
 
     @cached_property
+    @in_phases
     def power(self) -> Floats:
         """Power (k,), W, of applied forces, actuators and driven constraints: dE/dt = power - dissipation."""
         return self._force_powers.applied + diagnostics.driving_power(self)
@@ -317,13 +365,14 @@ class Balances:
         """
         return self._integrated(None)
 
+    @in_phases
     def power_of(self, item: ItemLike) -> Floats:
         """Power (k,), W, supplied by one constraint or force (or its name): its share of dE/dt.
 
         Of a motor or a driver: the power of its force or torque along the prescribed motion. Of a force: the power of
         its loads and actuators, less dissipation; stored energy of a spring doesn't count. Of other constraints: zero.
         """
-        return diagnostics.power_of(self, self._part(item))
+        return _supplied(self, self._part(item))
 
     def work_of(self, item: ItemLike) -> Floats:
         """Work (k,), J, since the start, of one constraint or force: the integral of `power_of`.
@@ -336,10 +385,11 @@ class Balances:
         return self._integrated(self._part(item))
 
     def _part(self, item):
-        """The `Load` of a force, or the `Member` of a constraint."""
+        """A constraint or force of the scene."""
         item = self.handles.item(item)
-        load = reactions.loads_of(self.packed).get(id(item))
-        return member(self.packed, item) if load is None else load
+        if id(item) not in reactions.loads_of(self.packed) and not reactions.is_idle(self.packed, item):
+            member(self.packed, item)
+        return item
 
     def _integrated(self, part):
         if self._trajectory is None:
@@ -347,11 +397,13 @@ class Balances:
         return work(self, self._trajectory, part)
 
     @cached_property
+    @in_phases
     def linear_momentum(self) -> Floats:
         """Linear momentum (k, 3), kg m/s, ground frame."""
         return diagnostics.linear_momentum(self.system, self.q, self.qd)
 
     @cached_property
+    @in_phases
     def angular_momentum(self) -> Floats:
         """Angular momentum about the ground's origin (k, 3), kg m^2/s, ground frame."""
         return diagnostics.angular_momentum(self.system, self.q, self.qd)
@@ -499,7 +551,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         t, memory = np.array([self._reached]), self._remembered[None]
         lam = self._multipliers_at(t, q[None], qd[None], qdd[None], memory)[0]
         remembered = self.packed, self._remembered.copy(), Anchor(self._angles)
-        return RememberingState.of(*remembered, self._reached, q, qd, qdd, lam)
+        return self._in_phase(RememberingState.of(*remembered, self._reached, q, qd, qdd, lam))
 
     def at(self, t: ArrayLike) -> RememberingState:
         """Return the state at any time of a run with dense_output=True, on the constraint manifold.
@@ -546,10 +598,17 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         parts = q, qd, qdd, self._multipliers_at(every, q, qd, qdd, memory)
         anchor = self._anchor_of(every)
         if times.ndim:
-            return RememberingState.of(self.packed, memory, anchor, every, *parts)
+            return self._in_phase(RememberingState.of(self.packed, memory, anchor, every, *parts))
         angles, h, levels = anchor
         anchor = Anchor(angles[0], h[0], tuple(level[0] for level in levels))
-        return RememberingState.of(self.packed, memory[0], anchor, float(times), *(part[0] for part in parts))
+        parts = (part[0] for part in parts)
+        return self._in_phase(RememberingState.of(self.packed, memory[0], anchor, float(times), *parts))
+
+    def _in_phase(self, state):
+        """A state, or several, with what actions have changed before."""
+        if self._phases is not None:
+            state.phase = self._phases.phase_at(state.t)
+        return state
 
     def _anchor_of(self, t):
         """Return the turn counts at times t (k,): those at the starts of their steps."""
@@ -562,12 +621,19 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
 
     @property
     def phases(self) -> list[tuple[float, float, tuple[str, ...]]]:
-        """Start and end (s) of each phase, and names of the contacts that are closed in it; one without contacts."""
+        """Start and end (s) of each phase, and the names of what holds only in some.
+
+        These are closed contacts, frictions that stick, and those active of the parts that come and go by actions.
+        """
         return [(self.span[0], self.reached, ())] if self._phases is None else list(self._phases.list)
 
     @property
     def impulses(self) -> list[tuple[float, str, float]]:
-        """Time (s), name and impulse of each contact at each impact; N s, or N m s of an angle."""
+        """Time (s), name and impulse of contacts at impacts, of parts that become active, of impulses on bodies.
+
+        N s, or N m s of an angle; of a constraint of several rows an array (rows,) as of `multipliers`, of a body an
+        array (3,) in the ground frame.
+        """
         return [] if self._phases is None else list(self._phases.impulses)
 
     @property
@@ -612,6 +678,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             return self._phases.constraint_error(self._phase_of_rows, *motion)
         return diagnostics.constraint_error(self.packed, *motion)
 
+    @in_phases
     def actuation(self, control: ItemLike) -> Floats:
         """The values (k, actuators) of the function of a Control at the outputs; those held if it has a period.
 
@@ -653,7 +720,48 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> print(force[-1].round(6) + 0.0, torque[-1].round(6) + 0.0)
         [ 0.  0. 20.] [  0. -20.   0.]
         """
-        return exerted(self, item, on)
+        phases = self._phases
+        if phases is None or not (phases.varies or getattr(self.handles.item(item), "slides", ())):
+            return exerted(self, item, on)
+        return _gathered(self, lambda part: exerted(part, item, on))
+
+    def sticking(self, friction: ItemLike) -> Bools:
+        """Whether a friction of the exact law sticks: (k,).
+
+        Parameters
+        ----------
+        friction : friction, or name of one
+            A joint friction or CoulombFriction whose slip velocity is zero.
+
+        Raises
+        ------
+        InvalidForce
+            If it is none of these.
+
+        Examples
+        --------
+        A block of 2 kg comes to rest after 0.5 s:
+
+        >>> import tsdyn as ts
+        >>> scene = ts.Scene(gravity=(0, 0, 0))
+        >>> block = scene.add_point_mass(mass=2.0, velocity=(1, 0, 0))
+        >>> brake = scene.add(ts.forces.CoulombFriction(block, scene.ground, force=4.0, name="brake"))
+        >>> solution = ts.simulate(scene, (0, 1), t_eval=[0.25, 0.75])
+        >>> print(solution.sticking("brake"), solution.phases[-1])
+        [False  True] (0.5, 1.0, ('brake',))
+        """
+        item = self.handles.item(friction)
+        load = reactions.loads_of(self.packed).get(id(item))
+        if load is None or not getattr(item, "slides", ()):
+            raise InvalidForce(
+                f"sticking: {friction!r} is no friction of the exact law: RevoluteFriction, TranslationalFriction, "
+                "ContactFriction and CoulombFriction are, with slip_velocity=0."
+            )
+        slot, rests = load.slot + item.memory, np.ones(self.t.size, bool)
+        for slide in item.slides:
+            rests &= ~self._memory[:, slot : slot + slide.directions].any(axis=1)
+            slot += slide.count
+        return rests & self._phases.active(item, self._phase_of_rows)
 
     def contact_point(self, constraint: ItemLike) -> Floats:
         """Where a surface touches that rolls or slides, (k, 3), m, ground frame: its path on the plane.
@@ -677,6 +785,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """
         return reactions.contact_point(self, constraint)
 
+    @in_phases
     def friction_demand(self, constraint: ItemLike) -> Floats:
         """Tangential over normal force at a contact, (k,): the coefficient of friction that rolling needs at least.
 

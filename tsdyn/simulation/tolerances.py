@@ -77,3 +77,6 @@ ENDLESS = 1e-12
 MOST_AT_AN_INSTANT = 100
 # Events after which progress is judged: a run that would need CREEPING times as many more is ended.
 EVENTS_JUDGED, CREEPING = 1000, 1e3
+
+# Coordinates of a scene up to which bodies that rest, where frictions stick, are found, by dense matrices.
+MOST_PINNED = 1000

@@ -20,7 +20,7 @@ from .phase_scenes import has_contacts
 from .scene_cache import prepared_numbers
 
 if TYPE_CHECKING:
-    from ..hints import Floats, ParameterList, Scene
+    from ..hints import Floats, ItemLike, ParameterList, Scene
 
 
 # Editing of scenes: removal of bodies, constraints and forces, and copies of a scene.
@@ -74,6 +74,60 @@ def remove(scene: Scene, item: Any) -> Any:
         item.__dict__["added"] = False
     scene._titles = None
     scene.touch()
+    return item
+
+
+def deactivate(scene: Scene, item: ItemLike) -> Any:
+    """Leave a constraint or force out at the start of runs, until the action of an event activates it.
+
+    Analyses and assembly leave it out, too. A file of the scene says so.
+
+    Parameters
+    ----------
+    item : constraint, joint, force or str
+        A handle, or a unique name.
+
+    Returns
+    -------
+    constraint, joint or force
+        The item; its `active` is False.
+
+    Raises
+    ------
+    InvalidArgument
+        If the scene has no such item, or it can't come and go: a body, a normalisation, an `Armature`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> block = (scene := ts.Scene()).add_body(mass=1.0, inertia=(1, 1, 1))
+    >>> scene.add(ts.constraints.Fixed.at(block, scene.ground, name="clamp"))
+    <Fixed 'clamp': 6 rows>
+    >>> scene.deactivate("clamp").active, scene.mobility().degrees_of_freedom
+    (False, 6)
+    """
+    return _switched(scene, item, False)
+
+
+def activate(scene: Scene, item: ItemLike) -> Any:
+    """Let a constraint or force take part again that `deactivate` has left out; arguments and errors as there."""
+    return _switched(scene, item, True)
+
+
+def _switched(scene, item, active):
+    item = switchable(scene, item)
+    item.__dict__["active"] = active
+    scene.touch()
+    return item
+
+
+def switchable(scene, item):
+    """Return the constraint or force of a handle or name, which may come and go."""
+    item = found(scene, item)
+    if isinstance(item, PointMass):
+        raise InvalidArgument(f"{item.name} is a body; constraints and forces come and go.")
+    if getattr(item, "adds_inertia", False):
+        raise InvalidArgument(f"{item.name} has inertia, which can't come and go: couple a body by a constraint.")
     return item
 
 

@@ -1,0 +1,155 @@
+"""Gaps of contacts, their rows, and what loads do where the bilateral rows hold: kernels, and their workspace.
+
+J, gd = J qd + Phi_t, gdd = J qdd + gamma       rows of Phi that are gaps, times their signs
+H W H^T lam = H W f,  a = W (f - H^T lam)       H: bilateral rows                                           (1)
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.loops.constraint_rows import move_bodies, place_bodies, take_loads, write_accelerations
+from ..errors import SingularConfiguration
+from ..formulations.accelerations import refine_accelerations, solve_accelerations
+from ..jit.kernels import entry, loader, resident
+from ..maths.dense_linalg import copy
+from ..model.equations import (
+    acceleration_bias,
+    constraint_jacobian,
+    constraints,
+    recall,
+    set_time,
+    time_derivative,
+    with_short_rows,
+)
+from ..model.laws import calls_laws, interrupts_answered
+from ..model.packed import System, no_system
+from ..rows.constraint_graph import BIAS, REDUCED
+from ..rows.graph_builder import graph_of
+from ..rows.interface import (
+    DYNAMICS,
+    constrain_accelerations,
+    evaluate_bias,
+    evaluate_rows,
+    factorise_rows,
+    weigh_bodies,
+)
+from ..workspaces import Parts, no_parts, parts
+
+
+class ContactParts(NamedTuple):
+    """What kernels of contacts find by one address."""
+
+    free: Parts  # of the scene with all contacts open
+    rows: System  # of the contacts alone
+
+
+load_contacts = loader(ContactParts(no_parts(), no_system()))
+
+
+@entry("pvmm")
+def find_gaps(context, t, q, out):
+    """out (k, m) = Phi of the rows of contacts at times t (k,), positions q (k, n)."""
+    s = load_contacts(context).rows
+    for k in range(t.size):
+        set_time(s, t[k])
+        constraints(s, q[k], t[k], out[k])
+
+
+@entry("pdvmv")
+def find_rows(context, t, q, J, drift):
+    """J (m, n) and Phi_t (m,) of the rows of contacts; both zero on entry."""
+    s = load_contacts(context).rows
+    set_time(s, t)
+    constraint_jacobian(s, q, t, J)
+    time_derivative(s, q, t, drift)
+
+
+@entry("pdvvmm")
+def respond(context, t, q, memory, loads, out):
+    """out (k, n): accelerations by loads (k, n), Eq. (1). The factors stay; 0 where there are none, else 1."""
+    c = load_contacts(context).free
+    graph, s, w, f = c.graph, c.system, c.work, c.tangent
+    recall(s, memory)
+    set_time(s, t)
+    copy(q, w.q)
+    for i in range(w.qd.size):
+        w.qd[i] = 0.0
+    place_bodies(graph.bodies, q, f.poses)
+    move_bodies(graph.bodies, q, w.qd, f.poses)
+    evaluate_rows(graph, s, f, f.rows, t)
+    if not factorise_rows(graph, s, f, f.rows, t, DYNAMICS):
+        return 0
+    # At rest inertia rows have no bias; neither has any other row here
+    evaluate_bias(graph, s, f, t)
+    for e in range(f.gamma.size):
+        f.gamma[e] = 0.0
+    for k in range(loads.shape[0]):
+        take_loads(graph.bodies, q, loads[k], f.Z)
+        weigh_bodies(graph, f.Z)
+        if f.b.size > 0:
+            constrain_accelerations(graph, f.rows, f.gamma, f.Z, f.b)
+        refine_accelerations(graph, f)
+        write_accelerations(graph.bodies, f.poses, f.Z, out[k])
+    return 1
+
+
+@entry("pdvvvv")
+def accelerate(context, t, q, qd, out, gamma):
+    """Accelerations out (n,) with all contacts open, and gamma (m,) of their rows, where `respond` has been called."""
+    c = load_contacts(context)
+    graph, s, w, f = c.free.graph, c.free.system, c.free.work, c.free.tangent
+    copy(qd, w.qd)
+    move_bodies(graph.bodies, q, qd, f.poses)
+    solve_accelerations(graph, s, w, f, t)
+    refine_accelerations(graph, f)
+    write_accelerations(graph.bodies, f.poses, f.Z, out)
+    acceleration_bias(c.rows, q, qd, t, gamma)
+
+
+class ContactWorkspace:
+    """The kernels' workspace; one evaluation at a time.
+
+    Parameters
+    ----------
+    contacts : Packed
+        Of the rows of all contacts alone: the bodies of the scene, nothing else.
+    free : Packed
+        Of the scene with all contacts open.
+    """
+
+    def __init__(self, contacts, free):
+        rows, system = contacts.system, with_short_rows(free)
+        self.n, self.m = int(rows.bodies[:, 1].sum()), len(rows.segments)
+        graph = graph_of(free, REDUCED, BIAS)
+        own = (each._replace(reals=each.reals.copy()) for each in (system, rows))
+        system, rows = own
+        self.address, *self._keep = resident(ContactParts(parts(system, graph, self.n), rows))
+        self._accelerate = interrupts_answered()(accelerate) if calls_laws(free) else accelerate
+
+    def gaps(self, t, q):
+        """Phi (k, m) of the rows at times t (k,), positions q (k, n)."""
+        out = np.zeros((t.size, self.m))
+        find_gaps(self.address, t, q, out)
+        return out
+
+    def rows(self, t, q):
+        """J (m, n) and Phi_t (m,)."""
+        J, drift = np.zeros((self.m, self.n)), np.zeros(self.m)
+        find_rows(self.address, t, q, J, drift)
+        return J, drift
+
+    def respond(self, t, q, memory, loads):
+        """Accelerations (k, n) by loads (k, n), which must be contiguous."""
+        out = np.empty_like(loads)
+        if not respond(self.address, t, q, memory, loads, out):
+            raise SingularConfiguration("a direction that the constraints leave free carries no inertia.")
+        return out
+
+    def accelerations(self, t, q, qd):
+        """Accelerations (n,) with all contacts open, and gamma (m,); after `respond` at these t and q."""
+        qdd, gamma = np.empty(self.n), np.zeros(self.m)
+        self._accelerate(self.address, t, q, qd, qdd, gamma)
+        return qdd, gamma

@@ -11,10 +11,13 @@ from docs.gallery_pages import IMAGES, ROOT, index, page
 from examples import (
     andrews_squeezer,
     bicycle,
+    bouncing_balls,
+    box_stack,
     bricard,
     cardan_shaft,
     chebyshev_linkage,
     coin,
+    cradle,
     delta_robot,
     double_pendulum,
     flyball_governor,
@@ -41,8 +44,8 @@ ROUGH = {  # an end that shows what a run at 1e-3 does wrong
     scotch_yoke: 1.0,
 }
 FURTHER = (
-    bicycle, cardan_shaft, chebyshev_linkage, coin, delta_robot, flyball_governor, leg_with_rods, rattleback,
-    stewart_platform, suspension, turntable, two_wheeled_robot,
+    bicycle, bouncing_balls, box_stack, cardan_shaft, chebyshev_linkage, coin, cradle, delta_robot,
+    flyball_governor, leg_with_rods, rattleback, stewart_platform, suspension, turntable, two_wheeled_robot,
 )  # fmt: skip
 
 
@@ -68,6 +71,13 @@ def test_pictures_are_small(entry):
 def test_examples_check_themselves(module, capsys):
     module.main()
     assert re.search("ended +success", capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("name", ["coin", "cradle"])
+def test_pages_of_animated_examples_show_the_run(name):
+    entry = next(each for each in ENTRIES if each.name == name)
+    assert f'<iframe src="../animations/{name}.html"' in page(entry)
+    assert "<iframe" not in page(next(each for each in ENTRIES if each.name == "bricard"))
 
 
 @pytest.mark.slow

@@ -12,6 +12,14 @@ class AngleDriver(References, Primitive):
     @property
     def opposed(self) -> tuple[Any, ...]: ...
 
+class AngleRate(Primitive):
+    zero_a: Attribute[ArrayLike, Floats]
+    quarter_a: Attribute[ArrayLike, Floats]
+    hand_b: Attribute[ArrayLike, Floats]
+    def __init__(self, a: BodyLike, b: BodyLike, *, zero_a: ArrayLike | None = ..., quarter_a: ArrayLike | None = ..., hand_b: ArrayLike | None = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, zero: ArrayLike | None = ..., quarter: ArrayLike | None = ..., hand: ArrayLike | None = ..., zero_a: ArrayLike | None = ..., quarter_a: ArrayLike | None = ..., hand_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
+
 class AngleTerm(References, Primitive):
     across_a: Attribute[ArrayLike, Floats]
     ratio: float
@@ -50,6 +58,12 @@ class Cylindrical(Points, Axes, Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
+
+class DisplacementRate(Points, Primitive):
+    axis_a: Attribute[ArrayLike, Floats]
+    def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., name: str = ...) -> Self: ...
 
 class DisplacementTerm(Points, Primitive):
     axis_a: Attribute[ArrayLike, Floats]
@@ -236,6 +250,13 @@ class PlaneContact(Points, Primitive):
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., normal: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., unilateral: bool = ..., restitution: float = ..., kinetic: float = ..., static: float | None = ..., name: str = ...) -> Self: ...
     @property
     def sides(self) -> tuple[Any, ...]: ...
+
+class Ratchet(Joint):
+    joint: Joint
+    direction: int
+    def __init__(self, joint: Joint, direction: int = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, joint: Joint, direction: int = ..., name: str = ...) -> Self: ...
 
 class RollingBall(Joint):
     center_a: Attribute[ArrayLike, Floats]

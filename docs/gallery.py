@@ -235,6 +235,42 @@ SECTIONS = {
             lambda m, s: np.stack([s.displacement("body guide"), s.displacement("wheel guide")], axis=1),
         ),
     ),
+    "Hybrid systems": (
+        Entry(
+            "clutch",
+            "Clutch and brake",
+            5.0,
+            "driver, load (rad/s)",
+            lambda m, s: np.stack([s.angle_rate(f"{name} hinge") for name in ("driver", "load")], axis=1),
+            run=lambda m: ts.simulate(m.build(), (0.0, 5.0), events=m.events(), dense_output=True),
+        ),
+        Entry(
+            "catapult",
+            "Catapult",
+            1.5,
+            "stone (m)",
+            lambda m, s: s.position("stone")[:, [0, 2]],
+            run=lambda m: m.shoot(),
+        ),
+        Entry(
+            "docking",
+            "Docking",
+            100.0,
+            "spins of station, probe (rad/s)",
+            lambda m, s: np.stack([s.angular_velocity(name)[:, 2] for name in ("station", "probe")], axis=1),
+            (0.0, 0.3),
+            run=lambda m: m.fly(),
+        ),
+        Entry(
+            "compass_walker",
+            "Compass walker",
+            12.0,
+            "feet (m)",
+            lambda m, s: np.stack([s.position(name)[:, 0] for name in m.FEET], axis=1),
+            (0.0, 0.5, 1.0),
+            run=lambda m: m.walk(12.0),
+        ),
+    ),
     "Plug-ins and studies": (
         Entry("bead_on_surface", "A constraint of your own", 5.0, "bead (m)", lambda m, s: s.position("bead")),
         Entry(

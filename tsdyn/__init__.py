@@ -74,6 +74,7 @@ __all__ = [
     "Adaptive",
     "Angle",
     "Body",
+    "Change",
     "Collocation",
     "CollocationTableau",
     "CompilerWarning",
@@ -148,6 +149,7 @@ if TYPE_CHECKING:
     from .measuring.compare import compare
     from .measuring.profile import profile
     from .simulation.contact_run import impact
+    from .simulation.hybrid import Change
 else:
     from ._discovery import refusing as _refusing
 

@@ -1,10 +1,10 @@
-"""Lemke's method: solutions of random problems, degenerate ones included, and proofs that there is none."""
+"""Linear complementarity: solutions of random problems, degenerate ones included, and proofs that there is none."""
 
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from tsdyn.maths.complementarity import lemke
+from tsdyn.maths.complementarity import complement
 
 
 def residual(M, q, z):
@@ -21,7 +21,7 @@ def test_positive_semidefinite_problems_are_solved_or_proved_infeasible(seed):
     A = rng.normal(size=(n, rank)).round(int(rng.integers(0, 3)))  # many ties
     M = A @ A.T
     q = M @ rng.normal(size=n) if seed % 2 else rng.normal(size=n)
-    z, basic = lemke(M, q)
+    z, basic = complement(M, q)
     feasible = linprog(np.zeros(n), A_ub=-M, b_ub=q, bounds=(0, None)).status == 0
     assert (z is not None) == feasible
     if z is not None:
@@ -34,12 +34,12 @@ def test_a_box_on_four_corners_stands_on_three():
     """Four forces of a plane box are redundant: a basic solution carries the weight on three at most."""
     corners = np.array([(1, x, y) for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
     M = corners @ np.diag([1.0, 3.0, 3.0]) @ corners.T
-    z, basic = lemke(M, corners @ [-9.81, 0.3, 0.2])
+    z, basic = complement(M, corners @ [-9.81, 0.3, 0.2])
     assert basic.sum() <= 3
     np.testing.assert_allclose(corners.T @ z, [9.81, -0.1, -0.2 / 3], atol=1e-13)
 
 
 def test_rows_that_nothing_can_move_have_no_solution():
-    assert lemke(np.zeros((1, 1)), np.array([-1.0]))[0] is None
-    assert lemke(np.array([[1.0, -1.0], [-1.0, 1.0]]), np.array([-1.0, -1.0]))[0] is None
-    np.testing.assert_array_equal(lemke(np.zeros((2, 2)), np.zeros(2))[0], [0.0, 0.0])
+    assert complement(np.zeros((1, 1)), np.array([-1.0]))[0] is None
+    assert complement(np.array([[1.0, -1.0], [-1.0, 1.0]]), np.array([-1.0, -1.0]))[0] is None
+    np.testing.assert_array_equal(complement(np.zeros((2, 2)), np.zeros(2))[0], [0.0, 0.0])

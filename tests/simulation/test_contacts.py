@@ -406,17 +406,8 @@ def test_bodies_that_are_squeezed_end_the_run_with_an_account():
     assert "ram" in solution.message
 
 
-def test_what_does_not_serve_contacts_yet_says_so(tmp_path):
+def test_what_impacts_refuse():
     scene, _ = bouncing(0.5)
-    for call in (
-        lambda: ts.simulate(scene, (0, 1), store=tmp_path / "run.zarr"),
-        lambda: ts.prepare(scene),
-        lambda: ts.ensemble(scene, {"ball.mass": [1.0, 2.0]}, (0, 1)),
-        scene.equilibrium,
-        lambda: ts.simulate(scene, (0, 1)).save(tmp_path / "run.h5"),
-    ):
-        with pytest.raises(ts.InvalidArgument, match=r"contact|unilateral|bilateral"):
-            call()
     with pytest.raises(ts.InvalidArgument, match="law"):
         ts.impact(scene, ts.State(0.0, *scene.start), law="stronge")
     with pytest.raises(ts.InvalidConstraint, match="wall"):

@@ -357,6 +357,70 @@ def test_the_same_bits_again():
     assert runs[0].q.tobytes() == ts.simulate(scene.copy(), (0, 3), events=at(1.0, engage)).q.tobytes()
 
 
+# Files, prepared runs, ensembles
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of the interrupts
+@pytest.mark.parametrize("suffix", ["h5", "zarr"])
+def test_stores_checkpoints_and_saved_solutions(tmp_path, suffix):
+    scene, _ = rotors()
+    options = {"events": [at(1.0, engage), at(2.0, lambda change: change.deactivate("clutch"))], "max_step": 0.05}
+    whole = ts.simulate(scene, (0, 3), dense_output=True, **options)
+    known = ts.load(whole.save(tmp_path / f"run.{suffix}"))
+    assert (known.phases, known.impulses) == (whole.phases, whole.impulses)
+    assert known.multipliers.tobytes() == whole.multipliers.tobytes()
+    assert known.at(1.5).phase[:2] == whole.at(1.5).phase[:2] != whole.at(0.5).phase[:2]
+    for number, end in enumerate((0.5, 1.0, 1.5, 2.0, 2.5)):
+
+        def stop(fraction, end=end):
+            if fraction is not None and fraction >= end / 3.0:
+                raise KeyboardInterrupt
+
+        path = tmp_path / f"part {number}.{suffix}"
+        ts.simulate(scene, (0, 3), store=path, checkpoint=0.0, progress=stop, **options)
+        rest = ts.resume(path, events=options["events"])
+        assert rest.q.tobytes() == whole.q.tobytes()
+        assert (rest.phases, rest.impulses) == (whole.phases, whole.impulses)
+
+
+def test_impulses_of_several_rows_are_saved(tmp_path):
+    scene = ts.Scene(gravity=(0, 0, 0))
+    body = scene.add_body(mass=2.0, inertia=(1, 1, 1), velocity=(1, 2, 0), name="body")
+    scene.add(C.Spherical(body, scene.ground, point_b=(1, 2, 0), name="peg"))
+    scene.deactivate("peg")
+    events = [at(0.5, lambda change: change.impulse(body, (0, 0, 1))), at(1.0, lambda change: change.deactivate("peg"))]
+
+    def there(t, state):
+        return t - 1.0
+
+    there.action = lambda change: change.activate("peg")
+    solution = ts.simulate(scene, (0, 2), events=[there, *events[1:]])
+    assert solution.status is ts.Status.SUCCESS  # both at one instant: activated, and deactivated
+    solution = ts.simulate(scene, (0, 2), events=there)
+    ((_, name, impulse),) = solution.impulses
+    assert name == "peg"
+    assert np.abs(np.abs(impulse) - (2, 4, 0)).max() < FINE
+    ((_, again, found),) = ts.load(solution.save(tmp_path / "run.h5")).impulses
+    assert (again, found.tolist()) == (name, impulse.tolist())
+
+
+def test_prepared_runs_and_ensembles():
+    scene, _ = rotors()
+    events = [at(1.0, engage)]
+    expected = ts.simulate(scene, (0, 2), events=events)
+    run = ts.prepare(scene, events=events)
+    assert [run((0, 2)).q.tobytes() == expected.q.tobytes() for _ in range(2)] == [True, True]
+    kicked = ts.Scene(gravity=(0, 0, 0))
+    stone = kicked.add_point_mass(mass=2.0, name="stone")  # a scene without phases of its own
+    kick = at(1.0, lambda change: change.impulse("stone", (2.0, 0, 0)))
+    assert abs(ts.prepare(kicked, events=kick)((0, 2)).velocity(stone)[-1, 0] - 1.0) < FINE
+    ensemble = ts.ensemble(kicked, {"stone.mass": [1.0, 2.0, 4.0]}, (0.0, 2.0), events=kick)
+    assert np.abs(ensemble.qd[:, 0] - (2.0, 1.0, 0.5)).max() < FINE
+    pulled = kicked.with_parameters({"stone.mass": 4.0})
+    kick.action = lambda change: change.impulse("stone", (2.0, 0, 0), point=None)
+    assert abs(ts.simulate(pulled, (0, 2), events=kick).velocity(stone)[-1, 0] - 0.5) < FINE
+
+
 # Inactive parts of scenes
 
 

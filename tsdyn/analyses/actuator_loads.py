@@ -378,7 +378,7 @@ def _demand_effective(instant, actuators, used):
 
 def _friction(packed, t, q, qd, instant, load):
     """Friction that depends on reactions (n,), in balance with them, and its normal loads."""
-    friction, x, _ = balance(packed, float(t), q, qd, instant.Phi_q, lambda more: instant.solve(load + more))
+    friction, x = balance(packed, float(t), q, qd, instant.Phi_q, lambda more: instant.solve(load + more))
     return friction, normal_loads(packed, float(t), q, qd, instant.Phi_q, np.nan_to_num(x[q.size :]))[0]
 
 

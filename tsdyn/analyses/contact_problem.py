@@ -9,16 +9,18 @@ M~ f are the accelerations that loads f make where the bilateral rows hold. lam 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
+from ..elements.element import angles
 from ..elements.unilateral import contacts_of
-from ..maths.complementarity import lemke
+from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import angle as angle_of
-from ..model.handles import counted, handles_of
+from ..model.handles import counted, displacement, handles_of
 from .contact_rows import ContactWorkspace
 from .tolerances import AT_REST, DEPENDENT, LEVEL
 
@@ -49,6 +51,8 @@ class Gaps:
     names : list of str
         Of their constraints.
     restitution : ndarray (count,)
+    following : dict
+        Of ratchets, whose gap is always zero: their rate, a function of q and qd (..., n), by their numbers.
     """
 
     def __init__(self, packed, contacts, free):
@@ -61,6 +65,7 @@ class Gaps:
         self.sign = np.array([gap.side.sign for gap in self.list])
         self.restitution = np.array([gap.contact.restitution for gap in self.list], float)
         self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
+        self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
 
     def _stop(self, handles, side):
@@ -74,21 +79,29 @@ class Gaps:
 
         return value
 
-    @property
-    def are_counted(self):
-        """Whether angles of joints are counted for them."""
-        return bool(self._stops)
+    @staticmethod
+    def _rate(handles, side):
+        """A function of q, qd (..., n) that returns the rate (...) of a joint, in the direction of its ratchet."""
+        kind, rate = ("angle", angle_of) if angles(side.follows) else ("displacement", displacement)
+        (geometry, *_) = getattr(handles.row(side.follows, kind), f"{kind}s")
+        return lambda q, qd: side.sign * rate(geometry, *handles.motions(geometry, (q, qd)), 1)
 
-    def values(self, t, q, angles):
-        """Gaps (k, count) at t (k,), q (k, n); angles (k, angles): counted ones of joints, where they are counted."""
-        found = self.sign * self.workspace.gaps(t, q)[:, : self.count]
-        for i, value in self._stops:
-            found[:, i] = value(q, angles)
+    def values(self, t, levels, counted):
+        """Gaps (k, count) at times t (k,).
+
+        levels (k, ...) begin with q (n,); counted is a function that returns the counted angles (k, angles) of joints.
+        """
+        rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
+        found = self.sign * self.workspace.gaps(t, rows)[:, : self.count]
+        if self._stops:
+            q, angles = rows[:, : self.workspace.n], counted()
+            for i, value in self._stops:
+                found[:, i] = value(q, angles)
         return found
 
     def at(self, q, angles, t=0.0):
         """Gaps (count,) at one state."""
-        return self.values(np.array([t]), q[None], angles[None])[0]
+        return self.values(np.array([t]), q[None], lambda: angles[None])[0]
 
 
 def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):
@@ -107,6 +120,10 @@ class Inertia:
     q : ndarray (n,)
     slots : ndarray
         What forces remember.
+    which : list of int
+        Gaps that are looked at; all else is zero of others.
+    held : sequence of int
+        Those that may be held closed, independent: a guess.
 
     Attributes
     ----------
@@ -114,12 +131,24 @@ class Inertia:
     G : ndarray (count, count)
     """
 
-    def __init__(self, gaps, t, q, slots):
-        self.gaps, self.t, self.q, self.slots = gaps, t, q, slots
-        J, drift = gaps.workspace.rows(t, q)
-        self.J, self.drift = gaps.sign[:, None] * J[: gaps.count], gaps.sign * drift[: gaps.count]
-        self.response = gaps.workspace.respond(t, q, slots, self.J)  # M~ J^T, transposed
-        self.G = self.J @ self.response.T
+    def __init__(self, gaps, t, q, slots, which, held=()):
+        self.gaps, self.t, self.q, self.slots, self.which, self.held = gaps, t, q, slots, np.array(which, int), held
+        rows, drift = gaps.workspace.rows(t, q, self.which)
+        self._rows, self._drift = gaps.sign[self.which, None] * rows, (gaps.sign * drift[: gaps.count])[self.which]
+        self.J, self.response, self.G = (np.zeros((gaps.count, size)) for size in (q.size, q.size, gaps.count))
+        response = gaps.workspace.respond(t, q, slots, self._rows)
+        self.J[self.which], self.response[self.which] = self._rows, response  # M~ J^T, transposed
+        self.G[self.which[:, None], self.which] = self._rows @ response.T
+        self._sizes = np.abs(self._rows)
+
+    def among(self, which):
+        """G of some gaps."""
+        return self.G[which][:, which]
+
+    def _of_all(self, values):
+        out = np.zeros(self.gaps.count)
+        out[self.which] = values
+        return out
 
     def free(self, loads):
         """M~ loads: the accelerations (n, ...) that loads (n, ...) make where the bilateral rows hold."""
@@ -130,21 +159,26 @@ class Inertia:
         """The change of velocities (n,) by impulses p (k,) of the gaps `which`."""
         return p @ self.response[which]
 
+    def sizes(self, x):
+        """|J| |x| (count,): the sizes of terms."""
+        return self._of_all(self._sizes @ np.abs(x))
+
     def rates(self, qd, sizes=None):
         """Rates of the gaps (count,), zero where they are so to rounding of velocities of these `sizes` (n,)."""
-        rates, sizes = self.J @ qd + self.drift, np.abs(qd) if sizes is None else sizes
-        return np.where(np.abs(rates) <= AT_REST * (np.abs(self.J) @ sizes + np.abs(self.drift)), 0.0, rates)
+        rates, terms = self._rows @ qd + self._drift, self._sizes @ (np.abs(qd) if sizes is None else sizes)
+        rates[np.abs(rates) <= AT_REST * (terms + np.abs(self._drift))] = 0.0
+        return self._of_all(rates)
 
     def hold(self, which, rates):
         """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
-        own = np.linalg.lstsq(self.G[np.ix_(which, which)], rates, rcond=RANK_TOL**2)[0]
+        own = np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
         return self.pushed(which, -own)
 
     def accelerations(self, qd):
-        """Accelerations of all gaps (count,) where all are open, at velocities qd (n,); and their terms (count,)."""
+        """Accelerations of the gaps (count,) where all are open, at velocities qd (n,); and their terms (count,)."""
         qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
-        bias = self.gaps.sign * gamma[: self.gaps.count]
-        return self.J @ qdd + bias, np.abs(self.J) @ np.abs(qdd) + np.abs(bias)
+        bias = (self.gaps.sign * gamma[: self.gaps.count])[self.which]
+        return self._of_all(self._rows @ qdd + bias), self._of_all(self._sizes @ np.abs(qdd) + np.abs(bias))
 
 
 class NoSolution(Exception):
@@ -157,14 +191,13 @@ def impulses(inertia, which, rates, restitution, law="newton"):
     rates (k,) before the impact, restitution (k,). Where Poisson's law would add energy, as it can with different
     coefficients, they are lowered together.
     """
-    G = inertia.G[np.ix_(which, which)]
     if law == "newton":
-        return _solved(G, rates + restitution * np.minimum(rates, 0.0))[0]
-    compressed = _solved(G, rates)[0]
+        return _solved(inertia, which, rates + restitution * np.minimum(rates, 0.0))[0]
+    G, compressed = inertia.among(which), _solved(inertia, which, rates)[0]
     share, released = 1.0, None
     while released is None or energy_gain(G, rates, released) > LEVEL * (np.abs(rates) @ np.abs(released)):
         given = (1.0 + share * restitution) * compressed
-        released = given + _solved(G, rates + G @ given)[0]
+        released = given + _solved(inertia, which, rates + G @ given)[0]
         share = share / 2.0 if share > LEVEL else 0.0
     return released
 
@@ -174,11 +207,13 @@ def energy_gain(G, rates, p):
     return p @ rates + 0.5 * p @ G @ p
 
 
-def _solved(G, q):
-    p, basic = lemke(G, q)
+def _solved(inertia, which, q):
+    """Solution (k,) of the gaps `which`, and which of them are held; those held at last are a first guess."""
+    p, held = complement(inertia.among(which), q, [k for k, i in enumerate(which) if i in inertia.held])
     if p is None:
         raise NoSolution
-    return p, basic
+    inertia.held = {i for i, own in zip(which, held, strict=True) if own}
+    return p, held
 
 
 class Settled(NamedTuple):
@@ -206,9 +241,11 @@ def settle(inertia, resting, qd, fired=()):
     NoSolution
     """
     c, terms = inertia.accelerations(qd)
+    if not resting:
+        return Settled([], [], c)
     resting, fired = list(resting), [i for i in fired if i in resting]
     while True:
-        lam, basic = _solved(inertia.G[np.ix_(resting, resting)], c[resting])
+        lam, basic = _solved(inertia, resting, c[resting])
         gdd = c + inertia.G[:, resting] @ lam
         small = LEVEL * (terms + np.abs(inertia.G[:, resting]) @ lam)
         # A reaction that has just vanished doesn't come back by rounding
@@ -234,6 +271,6 @@ def _depends(inertia, closed, i):
     own, alone = inertia.response[i], inertia.J[i]
     if not closed:
         return not inertia.G[i, i] > DEPENDENT**2 * np.linalg.norm(alone) * np.linalg.norm(own)
-    share = np.linalg.lstsq(inertia.G[np.ix_(closed, closed)], inertia.G[closed, i], rcond=None)[0]
+    share = np.linalg.lstsq(inertia.among(closed), inertia.G[closed, i], rcond=None)[0]
     left = own - share @ inertia.response[closed]
     return bool(np.linalg.norm(left) <= DEPENDENT * np.linalg.norm(own))

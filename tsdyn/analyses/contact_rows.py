@@ -6,6 +6,7 @@ H W H^T lam = H W f,  a = W (f - H^T lam)       H: bilateral rows               
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..formulations.accelerations import refine_accelerations, solve_acceleratio
 from ..jit.kernels import entry, loader, resident
 from ..maths.dense_linalg import copy
 from ..model.equations import (
+    WIDTH,
     acceleration_bias,
     constraint_jacobian,
     constraints,
@@ -36,7 +38,7 @@ from ..rows.interface import (
     factorise_rows,
     weigh_bodies,
 )
-from ..workspaces import Parts, no_parts, parts
+from ..workspaces import Parts, load_parts, no_parts, parts
 
 
 class ContactParts(NamedTuple):
@@ -51,20 +53,29 @@ load_contacts = loader(ContactParts(no_parts(), no_system()))
 
 @entry("pvmm")
 def find_gaps(context, t, q, out):
-    """out (k, m) = Phi of the rows of contacts at times t (k,), positions q (k, n)."""
+    """out (k, m) = Phi of the rows of contacts at times t (k,), positions q (k, n), rows of which may go on."""
     s = load_contacts(context).rows
     for k in range(t.size):
         set_time(s, t[k])
         constraints(s, q[k], t[k], out[k])
 
 
-@entry("pdvmv")
-def find_rows(context, t, q, J, drift):
-    """J (m, n) and Phi_t (m,) of the rows of contacts; both zero on entry."""
+@entry("pdvwmmv")
+def find_rows(context, t, q, place, short, J, drift):
+    """Rows J (k, n) of contacts, and Phi_t (m,) of all; zero on entry.
+
+    place (m,): which row of J is that of a contact, -1 for none; short (lines, 14): scratch, zero on entry.
+    """
     s = load_contacts(context).rows
     set_time(s, t)
-    constraint_jacobian(s, q, t, J)
+    constraint_jacobian(s, q, t, short)
     time_derivative(s, q, t, drift)
+    for i in range(short.shape[0]):
+        k = place[i if i < place.size else s.tails[i - place.size]]
+        for half in range(2 if k >= 0 else 0):
+            at = s.segments[i, 2 * half]
+            for c in range(s.segments[i, 2 * half + 1]):
+                J[k, at + c] += short[i, 7 * half + c]
 
 
 @entry("pdvvmm")
@@ -109,6 +120,47 @@ def accelerate(context, t, q, qd, out, gamma):
     acceleration_bias(c.rows, q, qd, t, gamma)
 
 
+@entry("pvmvm")
+def find_multipliers(context, t, levels, memory, out):
+    """out (k, m): multipliers at times t (k,) and states on the manifold, levels (k, 3 n), by the equations of motion.
+
+    Zero of dropped rows, NaN where there are none.
+    """
+    c = load_parts(context)
+    graph, s, w, f = c.graph, c.system, c.work, c.tangent
+    n = w.q.size
+    recall(s, memory)
+    for k in range(t.size):
+        copy(levels[k, :n], w.q)
+        copy(levels[k, n : 2 * n], w.qd)
+        set_time(s, t[k])
+        place_bodies(graph.bodies, w.q, f.poses)
+        move_bodies(graph.bodies, w.q, w.qd, f.poses)
+        evaluate_rows(graph, s, f, f.rows, t[k])
+        regular = factorise_rows(graph, s, f, f.rows, t[k], DYNAMICS)
+        solve_accelerations(graph, s, w, f, t[k])
+        for e in range(f.b.size):
+            if graph.row[e] >= 0:
+                out[k, graph.row[e]] = f.b[e] if regular else math.nan
+
+
+class ReactionWorkspace:
+    """Multipliers of a packed scene without friction that depends on reactions; one evaluation at a time."""
+
+    def __init__(self, packed):
+        system = with_short_rows(packed)
+        self.n, self.m = int(system.bodies[:, 1].sum()), len(packed.system.segments)
+        whole = parts(system._replace(reals=system.reals.copy()), graph_of(packed, REDUCED, BIAS), self.n)
+        self.address, *self._keep = resident(whole)
+        self._find = interrupts_answered()(find_multipliers) if calls_laws(packed) else find_multipliers
+
+    def multipliers(self, t, levels, memory):
+        """Multipliers (k, m) at times t (k,), levels (k, 3, n); of normalisations zero."""
+        out = np.zeros((t.size, self.m))
+        self._find(self.address, t, levels.reshape(t.size, 3 * self.n), memory, out)
+        return out
+
+
 class ContactWorkspace:
     """The kernels' workspace; one evaluation at a time.
 
@@ -121,24 +173,28 @@ class ContactWorkspace:
     """
 
     def __init__(self, contacts, free):
-        rows, system = contacts.system, with_short_rows(free)
-        self.n, self.m = int(rows.bodies[:, 1].sum()), len(rows.segments)
+        self.n, self.m = int(contacts.system.bodies[:, 1].sum()), len(contacts.system.segments)
         graph = graph_of(free, REDUCED, BIAS)
-        own = (each._replace(reals=each.reals.copy()) for each in (system, rows))
-        system, rows = own
+        own = (each._replace(reals=each.reals.copy()) for each in map(with_short_rows, (free, contacts)))
+        (system, rows), self._all = own, np.arange(self.m)
+        self._short = np.zeros((len(rows.segments), WIDTH))
         self.address, *self._keep = resident(ContactParts(parts(system, graph, self.n), rows))
         self._accelerate = interrupts_answered()(accelerate) if calls_laws(free) else accelerate
 
     def gaps(self, t, q):
-        """Phi (k, m) of the rows at times t (k,), positions q (k, n)."""
+        """Phi (k, m) of the rows at times t (k,), positions q (k, n), rows of which may go on."""
         out = np.zeros((t.size, self.m))
         find_gaps(self.address, t, q, out)
         return out
 
-    def rows(self, t, q):
-        """J (m, n) and Phi_t (m,)."""
-        J, drift = np.zeros((self.m, self.n)), np.zeros(self.m)
-        find_rows(self.address, t, q, J, drift)
+    def rows(self, t, q, which=None):
+        """J (k, n) of the rows `which`, or of all, and Phi_t (m,) of all."""
+        place = self._all
+        if which is not None:
+            place = np.full(self.m, -1)
+            place[which] = np.arange(len(which))
+        J, drift = np.zeros((self.m if which is None else len(which), self.n)), np.zeros(self.m)
+        find_rows(self.address, t, q, place, self._short, J, drift)
         return J, drift
 
     def respond(self, t, q, memory, loads):

@@ -18,13 +18,12 @@ from ..constraints.dot1 import Dot1
 from ..constraints.dot2 import Dot2
 from ..elements.bodies import rotation_matrix
 from ..elements.element import stop_waiting
-from ..elements.friction import GUIDE, PIN, PLANE, slip
+from ..elements.friction import GUIDE, PIN, PLANE
 from ..errors import SingularConfiguration
-from ..jit.kernels import twin
-from ..maths.tolerances import RANK_TOL
-from ..model.packed import first_rows
-from ..observables.diagnostics import marker_states
-from ..observables.evaluate import balance, constraint_arrays, mass_matrix
+from ..maths.tolerances import RANK_TOL, ROUNDING
+from ..model.kinematics import angular_velocity
+from ..model.packed import coupled_loads, first_rows
+from ..observables.evaluate import ITERATIONS, constraint_arrays, mass_matrix, normal_reaction, unit_force
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from .tolerances import ASIDE, BROKEN, LEVEL, PIVOTS
 
@@ -49,6 +48,14 @@ class Unit(NamedTuple):
         """Where the numbers of row i are."""
         first = self.slot + self.slide.directions + i * self.slide.row_numbers
         return range(first, first + self.slide.row_numbers)
+
+    @property
+    def sliding(self) -> tuple[float, float]:
+        """The multiplier with which it begins to slide: of a normal load of one, and by itself."""
+        par = self.load.parameters
+        if self.load.normal >= 0:
+            return par[1 if par[2] else 0] * (par[5] if self.slide is PIN else 1.0), 0.0
+        return 0.0, par[1] if self.slide.turns else par[0]
 
     @property
     def bound(self) -> tuple[float, float]:
@@ -107,92 +114,108 @@ class Frictions:
                 self.units.append(Unit(load, force, slide, slot))
                 slot += slide.count
         self.count, self.names = len(self.units), [unit.force.name for unit in self.units]
+        # Of each unit the bodies a and b, numbers of rows of System.bodies; the ground is behind them
+        spans = self.packed.system.bodies
+        self.rigid = np.flatnonzero(spans[:, 1] == 7)
+        ends = [(unit.force.a, unit.force.b) for unit in self.units]
+        self.ends = np.array([[body.index if body.dimension else len(spans) for body in pair] for pair in ends], int)
+        self.ends = self.ends.reshape(-1, 2)
+        # The point of a, and the axis or normal: of a, or of b
+        self.points = np.array([unit.load.coordinates[0] for unit in self.units]).reshape(-1, 3)
+        slides = [unit.slide for unit in self.units]
+        self.axes = np.array([unit.load.coordinates[4] if unit.slide in AXIAL else (0, 0, 0) for unit in self.units])
+        self.axes = self.axes.reshape(-1, 3).astype(float)
+        self.side = np.array([int(slide is PLANE) for slide in slides], int)
+        self.turns = np.array([slide.turns for slide in slides], bool)
+        self.signed = np.array([slide.directions == 1 for slide in slides], bool)
+        self.plane = np.array([slide is PLANE for slide in slides], bool)
+        self.ways = np.array([range(unit.way.start, unit.way.start + 3) for unit in self.units], int).reshape(-1, 3)
+        self.ways = np.where(self.signed[:, None], self.ways[:, :1], self.ways)
 
-    def velocity(self, i, q, qd):
-        """Slip velocity (k, 3) or rate, ground frame, at q, qd (k, n); and the sizes of its terms (k,)."""
-        load, slide = self.units[i].load, self.units[i].slide
-        x, xd = marker_states(self.packed, load, q, qd)
-        x = [np.broadcast_to(part.x, len(q)) for part in x]
-        xd = [np.broadcast_to(part, len(q)) for part in xd]
-        if slide.turns:
-            v, parts = [xd[3 + c] - xd[9 + c] for c in range(3)], (xd[3:6], xd[9:12])
-        else:
-            v, parts = twin(slip)(x, xd), (xd[:3], xd[6:9])
-        v, sizes = np.stack(v, axis=1), sum(np.abs(part).sum(axis=0) for part in parts)
-        if slide in (PIN, GUIDE, PLANE):
-            n = np.stack(x[12:15], axis=1)
-            along = (v * n).sum(axis=1, keepdims=True) * n
-            v = v - along if slide is PLANE else along
-        return v, sizes
+    def frames(self, q):
+        """Rotation matrices (k, bodies, 3, 3), that of the ground last, at q (k, n)."""
+        spans = self.packed.system.bodies
+        A = np.broadcast_to(np.eye(3), (len(q), len(spans) + 1, 3, 3)).copy()
+        A[:, self.rigid] = rotation_matrix(q[:, spans[self.rigid, :1] + np.arange(3, 7)])
+        return A
 
-    def along(self, i, q, v):
-        """Components (k,) of slip velocities v (k, 3) at q (k, n) along the axis of a joint."""
-        x, _ = marker_states(self.packed, self.units[i].load, q, np.zeros_like(q))
-        return sum(np.broadcast_to(part.x, len(q)) * v[:, c] for c, part in enumerate(x[12:15]))
+    def motions(self, q, qd):
+        """Slip velocities or rates (k, units, 3), ground frame, sizes of their terms (k, units), axes; q, qd (k, n)."""
+        spans, A = self.packed.system.bodies, self.frames(q)
+        places = spans[self.rigid, :1] + np.arange(3, 7)
+        w, r, rd = np.zeros((3, len(q), len(spans) + 1, 3))
+        w[:, self.rigid] = np.einsum("kbij,kbj->kbi", A[:, self.rigid], angular_velocity(q[:, places], qd[:, places]))
+        r[:, :-1], rd[:, :-1] = (x[:, spans[:, :1] + np.arange(3)] for x in (q, qd))
+        a, b = self.ends.T
+        s = np.einsum("kuij,uj->kui", A[:, a], self.points)
+        parts = rd[:, a], np.cross(w[:, a], s), rd[:, b], np.cross(w[:, b], r[:, a] + s - r[:, b])
+        turns = self.turns[:, None]
+        v = np.where(turns, w[:, a] - w[:, b], parts[0] + parts[1] - parts[2] - parts[3])
+        sizes = np.where(turns, np.abs(w[:, a]) + np.abs(w[:, b]), sum(map(np.abs, parts))).sum(axis=2)
+        units = np.arange(self.count)
+        axes = np.einsum("kuij,uj->kui", A[:, self.ends[units, self.side]], self.axes)
+        along = (v * axes).sum(axis=2, keepdims=True) * axes
+        return np.where(self.signed[:, None], along, v - along), sizes, axes
 
-    def speed(self, i, q, qd, memory):
-        """Of one that slides, (k,): the velocity along its direction, in a plane less half of the speed."""
-        v, _ = self.velocity(i, q, qd)
-        unit = self.units[i]
-        if unit.slide.directions == 1:
-            return memory[unit.slot] * self.along(i, q, v)
-        return v @ memory[unit.way] - 0.5 * np.linalg.norm(v, axis=1)
+    def speeds(self, q, qd, memory):
+        """Of those that slide (k, units): velocities along their directions, in a plane less half of the speed."""
+        v, _, axes = self.motions(q, qd)
+        ways = memory[self.ways] * np.where(self.signed[:, None], axes, 1.0)
+        return (v * ways).sum(axis=2) - np.where(self.signed, 0.0, 0.5) * np.linalg.norm(v, axis=2)
 
-    def axis(self, i, q):
-        """The axis or the normal (3,) of a joint at q (n,), ground frame."""
-        x, _ = marker_states(self.packed, self.units[i].load, q[None], np.zeros((1, q.size)))
-        return np.array([float(np.squeeze(part.x)) for part in x[12:15]])
+    def at(self, q):
+        """The `Place` at q (n,)."""
+        A, (_, _, axes) = self.frames(q[None])[0], self.motions(q[None], np.zeros((1, q.size)))
+        return Place(self, axes[0], A)
 
-    def written(self, i, q, way):
+
+AXIAL = PIN, GUIDE, PLANE
+
+
+class Place:
+    """The frictions of a scene in one configuration: axes (units, 3) and rotation matrices (bodies, 3, 3)."""
+
+    def __init__(self, frictions, axes, A):
+        self.frictions, self.axes, self.A = frictions, axes, A
+
+    def written(self, i, way):
         """The numbers of a direction (3,), ground frame: a sign where there is an axis."""
-        if self.units[i].slide.directions == 1:
-            return np.sign(way @ self.axis(i, q))
-        return way
+        return np.sign(way @ self.axes[i]) if self.frictions.signed[i] else way
 
-    def read(self, i, q, memory):
+    def read(self, i, memory):
         """The direction (3,), ground frame, of a unit that slides; zeros while it sticks."""
-        numbers = memory[self.units[i].way]
-        return numbers[0] * self.axis(i, q) if numbers.size == 1 else numbers
+        numbers = memory[self.frictions.units[i].way]
+        return numbers[0] * self.axes[i] if numbers.size == 1 else numbers
 
-    def basis(self, i, q, free):
+    def basis(self, i, free):
         """Orthonormal directions (r, 3), ground frame, in which a unit may slide.
 
-        free: function of a unit that returns its velocities (3, motions) of all motions that the rows leave free.
+        free: function of a unit that returns its velocities (3, motions), of all motions that the rows leave free.
         """
-        slide = self.units[i].slide
+        slide = self.frictions.units[i].slide
         if slide in (PIN, GUIDE):
-            return self.axis(i, q)[None]
+            return self.axes[i][None]
         if slide is PLANE:
-            return np.array(perpendiculars(self.axis(i, q)))
+            return np.array(perpendiculars(self.axes[i]))
         U, size, _ = np.linalg.svd(free(i))
         return U[:, : int((size > RANK_TOL * max(size.max(initial=0.0), 1.0)).sum())].T
 
-    def frames(self, i, q):
-        """Rotation matrices (3, 3) of the bodies a and b."""
-        return [self._rotation(body, q) for body in (self.units[i].force.a, self.units[i].force.b)]
-
-    def _rotation(self, body, q):
-        if body.dimension != 7:
-            return np.eye(3)
-        at = self.packed.system.bodies[body.index, 0]
-        return rotation_matrix(q[at + 3 : at + 7])
-
-    def numbers(self, i, q, basis):
-        """Numbers (r, numbers) of rows that hold a unit as it is at q, but for their values, which are zero."""
-        A, B = self.frames(i, q)
-        found = np.zeros((len(basis), self.units[i].slide.row_numbers))
+    def numbers(self, i, basis):
+        """Numbers (r, numbers) of rows that hold a unit as it is, but for their values, which are zero."""
+        A, B = self.A[self.frictions.ends[i]]
+        found = np.zeros((len(basis), self.frictions.units[i].slide.row_numbers))
         for row, t in zip(found, basis, strict=True):
-            if self.units[i].slide.turns:
+            if self.frictions.turns[i]:
                 s, h = perpendiculars(t)  # t = s x h
                 row[:3], row[3:6] = s @ A, h @ B
             else:
                 row[:3] = t @ B
         return found
 
-    def directions(self, i, q, numbers):
+    def directions(self, i, numbers):
         """Directions (r, 3), ground frame, of rows with these numbers (r, numbers)."""
-        A, B = self.frames(i, q)
-        if self.units[i].slide.turns:
+        A, B = self.A[self.frictions.ends[i]]
+        if self.frictions.turns[i]:
             return np.cross(numbers[:, :3] @ A.T, numbers[:, 3:6] @ B.T)
         return numbers[:, :3] @ B.T
 
@@ -241,9 +264,13 @@ def immobile(packed, t, q, memory):
 
 
 def _null_space(rows):
-    from scipy.linalg import null_space
+    from scipy.linalg import qr
 
-    return null_space(rows, RANK_TOL) if len(rows) else np.eye(rows.shape[1])
+    if not len(rows):
+        return np.eye(rows.shape[1])
+    Q, R, _ = qr(rows.T, pivoting=True)
+    size = np.abs(np.diag(R))
+    return Q[:, int((size > RANK_TOL * size.max(initial=0.0)).sum()) :]
 
 
 class Rest(NamedTuple):
@@ -267,9 +294,13 @@ class NoRest(Exception):
 class RestProblem:
     """Rows, masses and loads at one state, with rows for all units that are at rest.
 
+        x                  multipliers of these rows; N: normal loads
+        J qdd + gamma      c + G x + D N       D: of the frictions that slide already
+        multipliers        l + L x + K N       of the other rows, of which the normal loads follow
+
     Parameters
     ----------
-    frictions : Frictions
+    place : Place
     packed : Packed
         Of a phase with the rows of these units.
     rows : dict of int to ndarray
@@ -277,115 +308,138 @@ class RestProblem:
     bases : dict of int to ndarray (r, 3)
         Unit -> the directions of its rows, ground frame.
     t, q, qd, memory
-        The state; of the memory the directions of units that slide already are read.
+        The state; memory has the directions of the units that slide already.
     """
 
-    def __init__(self, frictions, packed, rows, bases, t, q, qd, memory):
-        self.frictions, self.packed, self.rows, self.bases = frictions, packed, rows, bases
-        self.t, self.q, self.qd, self.memory = t, q, qd, memory.copy()
-        self.system = _remembering(packed.system, memory)
-        self.Phi, self.Phi_q, _, self.gamma = constraint_arrays(self.system, q, qd, t)
-        self.M, self.S = mass_matrix(self.system, q), velocity_forces(self.system, q[None], qd[None])[0]
-        mine = np.concatenate([*rows.values(), np.zeros(0, int)])
-        self.others = np.setdiff1d(np.arange(len(self.Phi)), mine)
-
-    def solve(self, sticking):
-        """Accelerations (n,), multipliers (m,) and normal loads where these units stick; `memory` says the rest."""
+    def __init__(self, place, packed, rows, bases, t, q, qd, memory):
         from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
 
-        which = np.concatenate([self.others, *(self.rows[i] for i in sorted(sticking))]).astype(int)
-        Q, R, order = qr(self.Phi_q[which].T, pivoting=True)
+        self.place, self.units, self.rows, self.bases = place, place.frictions.units, rows, bases
+        system = _remembering(packed.system, memory)
+        _, Phi_q, _, gamma = constraint_arrays(system, q, qd, t)
+        M = mass_matrix(system, q)
+        mine = np.concatenate([*rows.values(), np.zeros(0, int)])
+        others = np.setdiff1d(np.arange(len(gamma)), mine)
+        Q, R, order = qr(Phi_q[others].T, pivoting=True)
         size = np.abs(np.diag(R))
         rank = int((size > RANK_TOL * size.max(initial=0.0)).sum())
-        Z, own, R, order = Q[:, rank:], Q[:, :rank], R[:rank, :rank], which[order[:rank]]
+        Z, own, R, order = Q[:, rank:], Q[:, :rank], R[:rank, :rank], others[order[:rank]]
         try:
-            factor = cho_factor(Z.T @ self.M @ Z) if Z.size else None
+            factor = cho_factor(Z.T @ M @ Z) if Z.size else None
         except np.linalg.LinAlgError as error:
             raise SingularConfiguration("a direction that the constraints leave free carries no inertia.") from error
-        fixed = own @ solve_triangular(R, -self.gamma[order], trans="T") if rank else np.zeros(self.q.size)
-        memory = self.memory[None]
-        known = applied_loads(self.system, np.array([self.t]), self.q[None], self.qd[None], memory)[0] + self.S
+        fixed = own @ solve_triangular(R, -gamma[order], trans="T") if rank else np.zeros(q.size)
+        known = applied_loads(system, np.array([t]), q[None], qd[None], memory[None])[0]
+        known += velocity_forces(system, q[None], qd[None])[0] - M @ fixed
+        self.normals = packed.system.normals.size
+        frictions = coupled_loads(packed)
+        sliding = [unit_force(packed.system, load, t, q, qd, memory) for load in frictions]
+        loads = np.column_stack([known, -Phi_q[mine].T, *sliding])
+        free = Z @ cho_solve(factor, Z.T @ loads) if Z.size else np.zeros_like(loads)
+        lam = np.zeros((len(gamma), loads.shape[1]))
+        if rank:
+            lam[order] = solve_triangular(R, own.T @ (loads - M @ free))
+        count = 1 + mine.size
+        self.J, self.gamma, self.qdd = Phi_q[mine], gamma[mine], free
+        self.qdd[:, 0] += fixed
+        G = self.J @ self.qdd
+        self.c, self.G, self.D = G[:, 0] + self.gamma, G[:, 1:count], G[:, count:]
+        self.l, self.L, self.K = lam[:, 0], lam[:, 1:count], lam[:, count:]
+        self.reactions = [normal_reaction(packed, load, q, qd, Phi_q) for load in frictions]
+        places = np.cumsum([0, *(len(each) for each in rows.values())])
+        self.at = {i: np.arange(*places[k : k + 2]) for k, i in enumerate(rows)}
 
-        def response(load):
-            load = known + load - self.M @ fixed
-            free = Z @ cho_solve(factor, Z.T @ load) if Z.size else np.zeros(self.q.size)
-            lam = np.zeros(len(self.Phi))
-            if rank:
-                lam[order] = solve_triangular(R, own.T @ (load - self.M @ free))
-            return np.concatenate((fixed + free, lam))
-
-        loads = np.zeros(0)
-        if self.packed.system.normals.size:
-            _, found, loads = balance(self.packed, self.t, self.q, self.qd, self.Phi_q, response, self.memory)
+    def solve(self, ways):
+        """Multipliers x of the rows, and normal loads, where units slide in these directions and the others stick."""
+        stick = np.concatenate([*(self.at[i] for i in self.rows if i not in ways), np.zeros(0, int)]).astype(int)
+        x, P = np.zeros(len(self.c)), np.zeros((len(self.c), self.normals))
+        for i, way in ways.items():
+            share, force = self.units[i].sliding
+            x[self.at[i]] = force * (self.bases[i] @ way)
+            if share:
+                P[self.at[i], self.units[i].load.normal] = share * (self.bases[i] @ way)
+        if stick.size:  # of rows that depend on one another, the least
+            right = np.column_stack([self.c + self.G @ x, self.D + self.G @ P])[stick]
+            held = -np.linalg.lstsq(self.G[np.ix_(stick, stick)], right, rcond=RANK_TOL**2)[0]
+            x[stick], P[stick] = held[:, 0], held[:, 1:]
+        # N = N(l + L x + K N), by Newton's method
+        lam, slopes, N = self.l + self.L @ x, self.L @ P + self.K, np.zeros(self.normals)
+        for _ in range(ITERATIONS if N.size else 0):
+            values, changes = zip(*(reaction(lam + slopes @ N) for reaction in self.reactions), strict=True)
+            try:
+                step = np.linalg.solve(np.eye(N.size) - np.array(changes) @ slopes, np.array(values) - N)
+            except np.linalg.LinAlgError:
+                raise NoRest(list(self.rows)) from None
+            N = N + step
+            if not np.abs(step).max() > ROUNDING * np.abs(N).max():
+                break
         else:
-            found = response(np.zeros(self.q.size))
-        self.free = Z
-        return found[: self.q.size], found[self.q.size :], loads
+            if N.size:
+                raise NoRest(list(self.rows))
+        return x + P @ N, N
 
-    def settle(self, sticking, ways, fired):
-        """The `Rest` of the units, by pivoting from a guess: those that stick, directions of those that slide.
+    def settle(self, ways, fired):
+        """The `Rest` of the units, by pivoting from a guess: directions of those that slide.
 
         fired: units whose reactions have just reached their bounds. Raises `NoRest`.
         """
-        sticking, ways, fired, seen = set(sticking), dict(ways), set(fired), set()
+        ways, fired, seen = dict(ways), set(fired), set()
         for count in range(PIVOTS * (1 + len(self.rows))):
-            self._set(sticking, ways)
-            qdd, lam, loads = self.solve(sticking)
-            wrong = self._wrong(sticking, ways, qdd, lam, loads, fired)
+            x, N = self.solve(ways)
+            a = self.c + self.G @ x + self.D @ N
+            small = self._rounding(x, N)
+            wrong = self._wrong(ways, x, N, a, small, fired)
             if not wrong:
-                blocked = [i for i in self.rows if i in ways and self._is_blocked(i)]
-                return Rest(sorted(sticking), ways, blocked, loads, self._rates(ways, qdd))
-            known = frozenset(sticking), tuple((i, *np.sign(np.round(d, 3))) for i, d in sorted(ways.items()))
+                sticking = [i for i in self.rows if i not in ways]
+                blocked = [i for i in ways if self._is_blocked(i, sticking)]
+                return Rest(sticking, ways, blocked, N, self._rates(ways, a, small))
+            known = tuple((i, *np.sign(np.round(d, 3))) for i, d in sorted(ways.items()))
             one_by_one = known in seen or count >= PIVOTS
             seen.add(known)
             for i in sorted(wrong)[: 1 if one_by_one else None]:
-                way = wrong[i]
-                if way is None:
+                if wrong[i] is None:
                     del ways[i]
-                    sticking.add(i)
                     fired.discard(i)
                 else:
-                    sticking.discard(i)
-                    ways[i] = way
+                    ways[i] = wrong[i]
         raise NoRest(sorted(wrong))
 
-    def _set(self, sticking, ways):
-        """Let the memory say which way units slide."""
-        for i in self.rows:
-            unit, way = self.frictions.units[i], ways.get(i)
-            self.memory[unit.way] = 0.0 if way is None else self.frictions.written(i, self.q, way)
+    def _rounding(self, x, N):
+        """Accelerations of the rows that are zero to rounding."""
+        qdd = self.qdd @ np.concatenate(([1.0], x, N))
+        return LEVEL * (np.abs(self.J) @ np.abs(qdd) + np.abs(self.gamma))
 
-    def _wrong(self, sticking, ways, qdd, lam, loads, fired):
+    def _wrong(self, ways, x, N, a, small, fired):
         """Units that can't be as they are, with the way in which they slide instead; None if they stick."""
-        found, sizes = {}, np.abs(self.Phi_q) @ np.abs(qdd) + np.abs(self.gamma)
-        for i, rows in self.rows.items():
+        found = {}
+        for i, at in self.at.items():
             basis = self.bases[i]
-            if i in sticking:
-                share, force = self.frictions.units[i].bound, np.linalg.norm(lam[rows])
-                bound = share[1] + (share[0] * loads[self.frictions.units[i].load.normal] if share[0] else 0.0)
+            if i not in ways:
+                (share, bound), force = self.units[i].bound, np.linalg.norm(x[at])
+                bound += share * N[self.units[i].load.normal] if share else 0.0
                 if force > bound * (BROKEN if i in fired else 1.0 + LEVEL):
-                    found[i] = lam[rows] @ basis / force
+                    found[i] = x[at] @ basis / force
                 continue
-            a, small = self.Phi_q[rows] @ qdd + self.gamma[rows], LEVEL * sizes[rows].max()
-            along, size = a @ basis @ ways[i], np.linalg.norm(a)
-            if along < -small:
+            along, size = a[at] @ basis @ ways[i], np.linalg.norm(a[at])
+            if along < -small[at].max():
                 found[i] = None
-            elif len(rows) > 1 and size > small and along < size * (1.0 - ASIDE):
-                found[i] = a @ basis / size
+            elif len(at) > 1 and size > small[at].max() and along < size * (1.0 - ASIDE):
+                found[i] = a[at] @ basis / size
         return found
 
-    def _rates(self, ways, qdd):
+    def _rates(self, ways, a, small):
         """Accelerations along the directions of sliding, in a plane less half of their size; zero within rounding."""
-        found, sizes = {}, np.abs(self.Phi_q) @ np.abs(qdd) + np.abs(self.gamma)
+        found = {}
         for i, way in ways.items():
-            rows = self.rows[i]
-            a, small = self.Phi_q[rows] @ qdd + self.gamma[rows], LEVEL * sizes[rows].max()
-            part = 0.0 if self.frictions.units[i].slide.directions == 1 else 0.5
-            rate = a @ self.bases[i] @ way - part * np.linalg.norm(a)
-            found[i] = float(rate) if rate > small else 0.0
+            at, part = self.at[i], 0.0 if self.place.frictions.signed[i] else 0.5
+            rate = a[at] @ self.bases[i] @ way - part * np.linalg.norm(a[at])
+            found[i] = float(rate) if rate > small[at].max() else 0.0
         return found
 
-    def _is_blocked(self, i):
-        """Whether a unit can't move where those that stick hold."""
-        rows = self.Phi_q[self.rows[i]]
-        return not np.abs(rows @ self.free).max(initial=0.0) > RANK_TOL * np.abs(rows).max()
+    def _is_blocked(self, i, sticking):
+        """Whether a unit can't move where others stick, or at all."""
+        stick = np.concatenate([*(self.at[k] for k in sticking), np.zeros(0, int)]).astype(int)
+        own = self.G[np.ix_(self.at[i], self.at[i])]
+        held = np.linalg.lstsq(self.G[np.ix_(stick, stick)], self.G[np.ix_(stick, self.at[i])], rcond=RANK_TOL**2)[0]
+        left = np.diag(own - self.G[np.ix_(self.at[i], stick)] @ held)
+        return bool(np.abs(left).max() <= RANK_TOL * np.abs(np.diag(own)).max())

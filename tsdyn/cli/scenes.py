@@ -92,6 +92,7 @@ def _info(parsed):
         return _cache_info(parsed)
     if Path(parsed.scene).suffix.lower() in SOLUTIONS:
         return _solution_info(parsed)
+    from ..simulation.phase_scenes import at_start
     from ..simulation.prepared_run import first_method, reason
     from ..simulation.run_options import RunOptions
     from ..simulation.scene_cache import prepared
@@ -99,7 +100,7 @@ def _info(parsed):
     # the table of a study is left unread: what it names may not be there
     document = load_document(parsed.scene, parsed.allow_code, False, robot_options(parsed))
     scene, given = document.scene, document.run
-    mobility, chosen = scene.mobility(), (RunOptions(), prepared(scene))
+    mobility, chosen = scene.mobility(), (RunOptions(), prepared(at_start(scene)))
     why = f"{type(first_method(*chosen)).__name__}: {reason(*chosen)}"
     if parsed.json:
         print_json(_facts(scene, mobility, why, given))

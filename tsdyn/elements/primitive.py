@@ -127,6 +127,7 @@ class Primitive(Attachment):
     normal_at = -1  # among the markers
     summed = False
     counted: Any = None  # (joint, index) of the angle whose turns a term counts
+    anywhere = False  # whether rows on velocities hold wherever positions are, though they could be integrated
     normalises = False  # whether it does no more than keep the length of p
     prescribed: str | tuple[str, ...] = ""
     kernels = MappingProxyType({})  # name -> Callback, compiled when a scene first uses the kind

@@ -21,6 +21,7 @@ class Side(NamedTuple):
     joint: Any = None  # whose counted angle the gap is measured by, sign (angle - bound); else the gap is sign Phi
     which: int = 0  # angle of the joint
     bound: float = 0.0  # rad
+    follows: Any = None  # joint whose rate, times sign, is not negative: the gap is closed wherever that is zero
 
 
 class Unilateral:

@@ -13,7 +13,6 @@ from ..calls import fitting, unknown_argument
 from ..elements.bodies import named
 from ..errors import InvalidArgument, InvalidFile, Status, StorageError
 from ..files import scene_text
-from ..simulation.phase_scenes import demand_bilateral
 from ..simulation.progress import bar_class
 from ..simulation.run_options import OPTIONS, demand_arguments_of_file, from_names
 from ..simulation.scene import Scene
@@ -162,7 +161,6 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     """
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
-    demand_bilateral(scene)
     lanes = demand_lanes(lanes)
     threads = whole(threads, "threads")
     if threads is not None and executor is not None:

@@ -23,8 +23,10 @@ from ..runs.events import prepare
 from ..runs.task import Task, between
 from ..simulation import prepared_run
 from ..simulation.parameters import KEPT
+from ..simulation.phase_scenes import at_start
 from ..simulation.prepared_run import Run, first_method, run_task
 from ..simulation.run_options import by_name
+from ..simulation.scene_cache import prepared
 from ..simulation.solution import Solution
 from ..simulation.variants import family_of, of_numbers, packed_anew, start_names
 from .case_loop import Batch, Finished, FirstSlice, Starts
@@ -291,16 +293,19 @@ class Study:
         self.within = options.dense_output or self.events is not None or between(self.times, self.span)
         self.family, self.changes = family_of(scene)
         default = options.rtol, options.atol, options.may_use_series
-        prepare_first_run(scene, options.method, options.form, self.within, default)
-        self.kept = scene._prepared
+        first = at_start(scene)
+        prepare_first_run(first, options.method, options.form, self.within, default)
+        acts = options.acts or getattr(call.state, "phase", None) is not None
+        self.kept, self.has_phases = scene._prepared, acts or first is not scene
         self.keep = keep_of(keep, self.times, self.kept.packed)
-        self.method, self.n = first_method(options, self.kept), self.kept.n
+        self.method, self.n = first_method(options, prepared(first)), self.kept.n
         self.stops = self.kept.stops(*self.span, self.method.step is None)
         self.names = None if cases.names is None else {*self.changes, *cases.names}
         if self.names is not None and free is not None:
             self.names |= start_names(self.kept.packed)
         self.retimes = self._retimes()
-        self.has_arena = options.redundancy == "drop" and serves(self.family, self.kept, self.names)
+        alike = options.redundancy == "drop" and not self.has_phases
+        self.has_arena = alike and serves(self.family, self.kept, self.names)
         self.halt, self.idle = np.zeros(1, np.int64), []  # runners of the threads of an executor
 
     def _retimes(self):

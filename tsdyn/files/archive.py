@@ -84,7 +84,9 @@ class Archive:
         self._interval, self.request, self.facts = interval, request, facts
         self._format = format_of(path)
         self.shift, self.skips, self.passed = 0.0, False, []  # of positions; a first row; segments that have ended
-        self.resumed = None  # what a run that goes on begins with: numbers, arrays
+        self.resting = None  # coordinates of bodies that rest in the present phase, and where
+        self.known = self.resumed = None  # what a run that goes on begins with: numbers, arrays; its present phase
+        self.before = None  # makes numbers and arrays of the phases that have ended, and of how the present one begins
         self._store = None
 
     def begin(self):
@@ -100,7 +102,8 @@ class Archive:
     def go_on(self, numbers, arrays):
         """Open the store where a checkpoint was written."""
         self._reopen(numbers["counts"], numbers["size"])
-        self.resumed, self.passed = (numbers, arrays), numbers["passed"]
+        self.known, self.passed = (numbers, arrays), numbers["passed"]
+        self.resumed = None if numbers.get("between") else self.known
 
     def begin_again(self, request):
         """Forget what has been written: another method begins at the start."""
@@ -109,6 +112,20 @@ class Archive:
         self._store.close()
         self._reopen(self._none(), 0)
         self.passed, self.resumed = [], None
+
+    def go_back(self, counts):
+        """Forget the rows beyond these counts: the next ones take their places."""
+        for name, count in counts.items():
+            surplus, parts = self.counts[name] - count, self._waiting[name]
+            while surplus > 0 and parts:
+                rows = parts.pop()
+                if len(rows) > surplus:
+                    parts.append(rows[:-surplus])
+                surplus -= len(rows)
+            if surplus > 0:  # a checkpoint may count on what is written
+                checkpoint.remove(self.path)
+                self._written = -math.inf
+        self.counts = dict(counts)
 
     def _none(self):
         return dict.fromkeys(self._tables, 0)
@@ -134,9 +151,19 @@ class Archive:
         if self.skips and name == OUTPUTS and len(rows):
             rows, self.skips = rows[1:], False
         if len(rows):
-            self._waiting[name].append(rows.copy())
+            self._waiting[name].append(self._placed(rows) if name == OUTPUTS else rows.copy())
             self.counts[name] += len(rows)
             self._size += rows.size
+
+    def _placed(self, rows):
+        """A copy of outputs: in the scene's coordinates, bodies that rest where they are to the last bit."""
+        rows, n = rows.copy(), len(self._tables[OUTPUTS].labels["coordinate"])
+        if not np.isscalar(self.shift):
+            rows[:, 1 : 1 + n] += self.shift
+        if self.resting is not None:
+            still, q = self.resting
+            rows[:, 1 + still], rows[:, 1 + n + still], rows[:, 1 + 2 * n + still] = q, 0.0, 0.0
+        return rows
 
     def look_up(self, state):
         """Between slices: let readers see what is new, and write a checkpoint if one is due; `state()` makes it."""
@@ -155,8 +182,8 @@ class Archive:
         self._write()
         self._store.sync()
         facts = {**self.facts, "counts": self.counts, "passed": self.passed, "size": self._store.size}
-        asked, held = self.request
-        checkpoint.write(self.path, {**facts, **asked, **numbers}, {**held, **arrays})
+        (asked, held), (before, more) = self.request, ({}, {}) if self.before is None else self.before()
+        checkpoint.write(self.path, {**facts, **asked, **before, **numbers}, {**held, **more, **arrays})
         self._written = time.perf_counter()
         self._due = self._written + READERS
 
@@ -190,8 +217,6 @@ class Archive:
             return found | {columns[0]: rows[:, 0]}
         n = len(self._tables[OUTPUTS].labels["coordinate"])
         found = {level: rows[:, 1 + i * n : 1 + (i + 1) * n] for i, level in enumerate(_LEVELS)}
-        if not np.isscalar(self.shift):
-            found["q"] = found["q"] + self.shift
         if rows.shape[1] > 1 + 3 * n:
             found["remembered"] = rows[:, 1 + 3 * n :]
         return found | {"time": rows[:, 0]}

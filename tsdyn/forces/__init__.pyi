@@ -66,12 +66,12 @@ class ContactFriction(JointFriction, Force):
     def joint(self) -> Attachment: ...
     kinetic: float
     static: float | None
-    slip_velocity: float | None
+    slip_velocity: float
     stribeck_velocity: float | None
     preload: float
-    def __init__(self, joint: Attachment, *, kinetic: float, static: float | None = ..., slip_velocity: float | None = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
+    def __init__(self, joint: Attachment, *, kinetic: float, static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(cls, joint: Attachment, *, kinetic: float, static: float | None = ..., slip_velocity: float | None = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
+    def at(cls, joint: Attachment, *, kinetic: float, static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
 
 class Control(Force):
     function: ControlLaw
@@ -91,12 +91,14 @@ class Control(Force):
 class CoulombFriction(Force):
     force: float
     torque: float
-    slip_velocity: float | None
-    slip_rate: float | None
+    static_force: float | None
+    static_torque: float | None
+    slip_velocity: float
+    slip_rate: float
     point_a: Attribute[ArrayLike, Floats]
-    def __init__(self, a: BodyLike, b: BodyLike, *, force: float = ..., torque: float = ..., slip_velocity: float | None = ..., slip_rate: float | None = ..., point_a: ArrayLike = ..., name: str = ...) -> None: ...
+    def __init__(self, a: BodyLike, b: BodyLike, *, force: float = ..., torque: float = ..., static_force: float | None = ..., static_torque: float | None = ..., slip_velocity: float = ..., slip_rate: float = ..., point_a: ArrayLike = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., force: float = ..., torque: float = ..., slip_velocity: float | None = ..., slip_rate: float | None = ..., point_a: ArrayLike = ..., name: str = ...) -> Self: ...
+    def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., force: float = ..., torque: float = ..., static_force: float | None = ..., static_torque: float | None = ..., slip_velocity: float = ..., slip_rate: float = ..., point_a: ArrayLike = ..., name: str = ...) -> Self: ...
 
 class JointForce(JointLoads, Force):
     def __init__(self, joint: Attachment, *, function: JointLaw, period: float | None = ..., which: int = ..., name: str = ...) -> None: ...
@@ -125,12 +127,12 @@ class RevoluteFriction(JointFriction, Force):
     collar_radius: float
     length: float | None
     static: float | None
-    slip_velocity: float | None
+    slip_velocity: float
     stribeck_velocity: float | None
     preload: float
-    def __init__(self, joint: Revolute, *, radius: float, kinetic: float, collar_radius: float = ..., length: float | None = ..., static: float | None = ..., slip_velocity: float | None = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
+    def __init__(self, joint: Revolute, *, radius: float, kinetic: float, collar_radius: float = ..., length: float | None = ..., static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(cls, joint: Revolute, *, radius: float, kinetic: float, collar_radius: float = ..., length: float | None = ..., static: float | None = ..., slip_velocity: float | None = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
+    def at(cls, joint: Revolute, *, radius: float, kinetic: float, collar_radius: float = ..., length: float | None = ..., static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
 
 class Torque(Force):
     torque: Attribute[VectorLoad, Any]
@@ -147,12 +149,12 @@ class TranslationalFriction(JointFriction, Force):
     length: float | None
     width: float | None
     static: float | None
-    slip_velocity: float | None
+    slip_velocity: float
     stribeck_velocity: float | None
     preload: float
-    def __init__(self, joint: Translational, *, kinetic: float, length: float | None = ..., width: float | None = ..., static: float | None = ..., slip_velocity: float | None = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
+    def __init__(self, joint: Translational, *, kinetic: float, length: float | None = ..., width: float | None = ..., static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> None: ...
     @classmethod
-    def at(cls, joint: Translational, *, kinetic: float, length: float | None = ..., width: float | None = ..., static: float | None = ..., slip_velocity: float | None = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
+    def at(cls, joint: Translational, *, kinetic: float, length: float | None = ..., width: float | None = ..., static: float | None = ..., slip_velocity: float = ..., stribeck_velocity: float | None = ..., preload: float = ..., name: str = ...) -> Self: ...
 
 class UserForce(Points, Force):
     function: Callable[..., object]

@@ -8,12 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from ..jit.kernels import entry, kernel
 from .tolerances import (
     AT_ZERO,
     CLEAR,
     DEEPEST,
     EPS,
     EXTREME,
+    MOST_BISECTIONS,
     MOST_SCALED,
     NEAR_ZERO,
     NEGLIGIBLE,
@@ -130,31 +132,119 @@ def _refined(degree, a, b, samples, sample):
     return times, finer
 
 
-def _judged(degree, samples, noise):
-    """What a `Fit` says of samples (degree + 2, ...): fine, off, clear, scale, resolved."""
-    grid = table(degree)
-    fine, errors = grid.values @ samples, np.abs(grid.errors @ samples)
-    scale, off = np.abs(samples).max(axis=0), errors[0] + np.maximum(errors[-2], errors[-1])
-    clear = np.maximum(np.maximum(fine.min(axis=0), -fine.max(axis=0)), 0.0)
-    resolved = (off <= np.maximum(TIGHT * scale, noise)) | (CLEAR * errors.sum(axis=0) <= clear)
-    return fine, off, clear, scale, resolved
+# Several functions at once: most have no zero on an interval, and need no search.
+#
+# A function is clear of zero at a point of the fine grid if its value exceeds the second difference there, by which it
+# may bend between points, and the error of the interpolant.
+
+
+@kernel
+def _bend(fine, k):
+    i = min(max(k, 1), fine.size - 2)
+    return abs(fine[i + 1] - 2.0 * fine[i] + fine[i - 1])
+
+
+@kernel
+def _look_at(values, errors, samples, j, noise, fine):
+    """The fine values of function j, and the margin by which others exceed zero; inf if unresolved, NaN of NaN."""
+    n, last = samples.shape[0], errors.shape[0] - 2
+    scale, least, most, off, high, total = 0.0, math.inf, -math.inf, 0.0, 0.0, 0.0
+    for i in range(n):
+        scale = max(scale, abs(samples[i, j]))
+    for e in range(errors.shape[0]):
+        x = 0.0
+        for i in range(n):
+            x += errors[e, i] * samples[i, j]
+        total += abs(x)
+        if e == 0:
+            off = abs(x)
+        if e >= last:
+            high = max(high, abs(x))
+    for k in range(fine.size):
+        x = 0.0
+        for i in range(n):
+            x += values[k, i] * samples[i, j]
+        fine[k] = x
+        least, most = min(least, x), max(most, x)
+    if total != total:
+        return total
+    off += high
+    resolved = off <= max(TIGHT * scale, noise) or CLEAR * total <= max(least, -most)
+    return max(CLEAR * off, noise) if resolved and scale >= UNDERFLOWING else math.inf
+
+
+@entry("mmmvvm")
+def _look(values, errors, samples, noise, fine, out):
+    """out (m, 2): fine points up to which functions are clear of zero; by which they have crossed it once, or -1.
+
+    Return 1 if all are resolved, 0 if not, -1 where one is no number.
+    """
+    found = 1
+    for j in range(samples.shape[1]):
+        margin = _look_at(values, errors, samples, j, noise[j], fine)
+        out[j, 0], out[j, 1] = 0.0, -1.0
+        if not margin < math.inf:
+            found = min(found, 0 if margin == math.inf else -1)
+            continue
+        sign, k = math.copysign(1.0, samples[0, j]), 0
+        while k < fine.size and sign * fine[k] > _bend(fine, k) + margin:
+            k += 1
+        out[j, 0] = k
+        while 0 < k < fine.size and sign * fine[k] < sign * fine[k - 1]:
+            if sign * fine[k] < -_bend(fine, k) - margin:
+                out[j, 1] = k
+                break
+            k += 1
+    return found
+
+
+@entry("vddv")
+def _cross(c, x0, x1, out):
+    """out: where a Chebyshev series, of other signs at x0 and x1, is zero; its slope there."""
+    rises, x = 0.0, 0.5 * (x0 + x1)
+    for sweep in range(MOST_BISECTIONS):
+        # The series by T, its derivative by U
+        value, slope, T, before, U, under = c[0], 0.0, x, 1.0, 1.0, 0.0
+        for n in range(1, c.size):
+            value += c[n] * T
+            slope += n * c[n] * U
+            T, before = 2.0 * x * T - before, T
+            U, under = 2.0 * x * U - under, U
+        if sweep == 0:
+            rises = math.copysign(1.0, slope)
+        if rises * value < 0.0:
+            x0 = x
+        else:
+            x1 = x
+        # Newton's method; bisection where that leaves the bracket
+        to = x - value / slope if slope != 0.0 else x0
+        if abs(to - x) <= 2.0 * EPS:
+            break
+        x = to if x0 < to < x1 else 0.5 * (x0 + x1)
+    out[0], out[1] = x, slope
 
 
 class Survey(NamedTuple):
-    """Several functions on one interval, by interpolants: which have no zero, and where others cross zero first."""
+    """Several functions on one interval."""
 
-    calm: np.ndarray  # (m,)  bool: clear of zero
-    since: np.ndarray  # (m,)  times up to which functions are clear; inf for calm ones
-    until: np.ndarray  # (m,)  by when those have the other sign that cross zero once from `since` on; else NaN
-    last: np.ndarray  # (m,)  values at the end
-    degree: int  # that resolves the functions
+    a: float
+    b: float
+    degree: int  # of interpolants that resolve them
+    samples: np.ndarray  # (N + 2, m)
+    since: list  # times up to which functions are clear of zero; inf of those that are so all along
+    until: list  # by when functions have crossed zero, once; NaN where that is unclear
+
+    def root(self, j):
+        """Where the interpolant of function j crosses zero, between its `since` and `until`; its slope there."""
+        grid, half, out = table(self.degree), 0.5 * (self.b - self.a), np.empty(2)
+        x0, x1 = ((t - self.a) / half - 1.0 for t in (self.since[j], self.until[j]))
+        _cross(grid.coefficients @ self.samples[grid.at_nodes, j], x0, x1, out)
+        x, slope = out.tolist()
+        return self.a + half * (x + 1.0), slope / half
 
 
 def survey(sample, a, first, b, degree, noise):
-    """Look at several functions at once: most have no zero between a and b, and need no search.
-
-    A function is clear of zero at a point of the fine grid if its value exceeds the second difference there, by which
-    the function may bend between the points, and the errors.
+    """Look at several functions at once, on [a, b].
 
     Parameters
     ----------
@@ -174,28 +264,17 @@ def survey(sample, a, first, b, degree, noise):
     """
     samples = np.concatenate((first[None], sample(_points(degree, a, b)[1:])))
     while True:
-        fine, off, _, scale, resolved = _judged(degree, samples, noise)
-        if degree == LARGEST or resolved.all() or np.isnan(off).any():
+        grid, out = table(degree), np.empty((first.size, 2))
+        if _look(grid.values, grid.errors, samples, noise, np.empty(grid.fine.size), out) != 0 or degree == LARGEST:
             break
         degree *= 2
         _, samples = _refined(degree, a, b, samples, sample)
-    grid, sign = a + 0.5 * (b - a) * (table(degree).fine + 1.0), np.sign(first)
-    height, bend = sign * fine, np.empty_like(fine)
-    np.abs(fine[2:] - 2.0 * fine[1:-1] + fine[:-2], out=bend[1:-1])
-    bend[0], bend[-1] = bend[1], bend[-2]
-    bend += np.maximum(CLEAR * off, noise)
-    usable = resolved & (scale >= UNDERFLOWING)
-    clear, beyond = (height > bend) & usable, (height < -bend) & usable
-    calm, columns = clear.all(axis=0), np.arange(first.size)
-    doubt = clear.argmin(axis=0)
-    before = np.maximum(doubt - 1, 0)
-    later = np.arange(len(fine))[:, None] >= doubt
-    across = (beyond & later).argmax(axis=0)
-    within = later[1:] & (np.arange(1, len(fine))[:, None] <= across)
-    falls = ((np.diff(height, axis=0) < 0.0) | ~within).all(axis=0)
-    once = (doubt > 0) & beyond[across, columns] & falls
-    since = np.where(calm, np.inf, grid[before])
-    return Survey(calm, since, np.where(once & ~calm, grid[across], np.nan), samples[-1], degree)
+    half, fine, (clear, crossed) = 0.5 * (b - a), grid.fine, out.astype(int).T.tolist()
+    return Survey(
+        a, b, degree, samples,
+        [a + half * (float(fine[max(k - 1, 0)]) + 1.0) if k < fine.size else math.inf for k in clear],
+        [a + half * (float(fine[k]) + 1.0) if k >= 0 else math.nan for k in crossed],
+    )  # fmt: skip
 
 
 class Search:
@@ -264,13 +343,20 @@ class Search:
         else:
             samples[1:-1], samples[-1] = self._values(times[1:-1]), last
         while True:
-            fine, *judged = _judged(degree, samples, self.noise)
-            fit = Fit(a, b, degree, times, samples, fine, *(x.item() for x in judged))
+            fit = self._judged(a, b, degree, times, samples)
             hopeless = degree == LARGEST or (degree == LARGEST // 2 and fit.off > UNRESOLVED * fit.scale)
             if fit.resolved or hopeless or fit.off != fit.off:
                 return fit
             degree *= 2
             times, samples = _refined(degree, a, b, samples, self._values)
+
+    def _judged(self, a, b, degree, times, samples):
+        grid = table(degree)
+        fine, errors = grid.values @ samples, np.abs(grid.errors @ samples)
+        scale, off = float(np.abs(samples).max()), float(errors[0] + max(errors[-2], errors[-1]))
+        clear = max(float(fine.min()), -float(fine.max()), 0.0)
+        resolved = off <= max(TIGHT * scale, self.noise) or CLEAR * float(errors.sum()) <= clear
+        return Fit(a, b, degree, times, samples, fine, off, clear, scale, resolved)
 
     def _rounding(self, fit):
         """Return the rounding error of the values: high coefficients where a smooth function has none."""

@@ -41,8 +41,11 @@ RANK_TOL = 1e-7
 # (the next sweep squares it).
 ORTHOGONAL, CONVERGED = 1e-15, 1e-10
 
-# Pivot of Lemke's method, of a matrix with unit diagonal, up to which it is zero: depth of the pivots beside rounding.
-LEAST_PIVOT = 1e-11
+# Complementarity, of a matrix with unit diagonal and q of size one: a pivot up to which it is zero, the depth of pivots
+# beside rounding; -w of a row without a pivot that is no rounding of nearly dependent rows.
+LEAST_PIVOT, WITHOUT_SOLUTION = 1e-11, 1e-8
+# Rows that enter, for each row: about one does; more are rounding.
+MOST_ENTRIES = 20
 
 # Rows of a sparse matrix from which a factorisation may take more than 0.1 s.
 LONG_LU = 1 << 15
@@ -60,6 +63,8 @@ CLEAR = 10.0
 # Share of the interval on which roughness is rounding; the least interval, in roundings of the time; the least share of
 # the whole.
 ROUGH_SHARE, SHORTEST_INTERVAL, DEEPEST = 1e-7, 1e4 * EPS, 2.0**-24
+# Steps of Newton's method or of bisection to a zero of an interpolant.
+MOST_BISECTIONS = 64
 # Noise is measured on intervals of the share ROUGH_SHARE, then this many times as long, up to the second share.
 NOISE_RATIO, WIDEST_NOISE = 1e-3, 1e-3
 # Values are multiplied by a power of two: by SAFE, so that no sum of them is infinite; by one that makes the largest

@@ -20,6 +20,7 @@ from ..model.packed import has_rates
 from ..observables.state import remembered
 from ..runs.arguments import interval, state_arrays
 from ..simulation import prepared_run
+from ..simulation.phase_scenes import demand_bilateral
 from ..simulation.prepared_run import DRIVERS, simulate
 from ..simulation.run_options import OPTIONS, from_names
 from ..simulation.scene import Scene
@@ -218,6 +219,7 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
         raise InvalidArgument("profile times compiled kernels, and with TSDYN_DEBUG=1 there are none.")
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
+    demand_bilateral(scene, "profile")
     for name in options:
         if name == "progress":
             raise InvalidArgument("profile makes many runs and has no progress; leave progress out.")

@@ -35,19 +35,17 @@ JAMMED = (
 )
 
 
-def balance(packed, t, q, qd, Phi_q, solve, memory=None):
-    """Return friction forces (n,), the solution of the equations of motion and the normal loads (frictions,).
-
-    solve(load) is affine in the load; memory (slots,): what forces remember, zeros by default.
+def balance(packed, t, q, qd, Phi_q, solve):
+    """Return friction forces (n,) and the solution of the equations of motion; solve(load) is affine in the load.
 
     Newton's method for the normal loads N = N(lam_0 + sum_i lam_i N_i).
     """
     system, n = packed.system, q.size
     frictions = coupled_loads(packed)
-    units = [_unit(system, load, t, q, qd, memory) for load in frictions]
+    units = [unit_force(system, load, t, q, qd) for load in frictions]
     first = solve(np.zeros(n))
     parts = np.array([solve(unit) - first for unit in units])
-    reactions = [_reaction(packed, load, q, qd, Phi_q) for load in frictions]
+    reactions = [normal_reaction(packed, load, q, qd, Phi_q) for load in frictions]
     N = np.zeros(len(frictions))
     for _ in range(ITERATIONS):
         lam = np.nan_to_num((first + N @ parts)[n:])
@@ -59,18 +57,18 @@ def balance(packed, t, q, qd, Phi_q, solve, memory=None):
             raise SingularConfiguration(JAMMED) from error
         N = N + step
         if not np.abs(step).max() > ROUNDING * np.abs(N).max():
-            return N @ np.array(units), first + N @ parts, N
+            return N @ np.array(units), first + N @ parts
     raise SingularConfiguration(JAMMED)
 
 
 def normal_loads(packed, t, q, qd, Phi_q, lam):
     """Return the normal loads (frictions,) by multipliers (m,), and the friction forces of unit ones (frictions, n)."""
     frictions = coupled_loads(packed)
-    loads = np.array([_reaction(packed, load, q, qd, Phi_q)(lam)[0] for load in frictions])
-    return loads, np.array([_unit(packed.system, load, t, q, qd) for load in frictions])
+    loads = np.array([normal_reaction(packed, load, q, qd, Phi_q)(lam)[0] for load in frictions])
+    return loads, np.array([unit_force(packed.system, load, t, q, qd) for load in frictions])
 
 
-def _unit(system, load, t, q, qd, remembered=None):
+def unit_force(system, load, t, q, qd, remembered=None):
     """Return the generalised forces g (n,) of one friction for unit normal load."""
     memory = np.zeros((1, system.memory.size + system.normals.size))
     if remembered is not None:
@@ -79,7 +77,7 @@ def _unit(system, load, t, q, qd, remembered=None):
     return force_loads(system._replace(forces=load.alone), np.array([t]), q[None], qd[None], memory)[0]
 
 
-def _reaction(packed, load, q, qd, Phi_q):
+def normal_reaction(packed, load, q, qd, Phi_q):
     """Return a normal load as a function of multipliers (m,), with its derivative (m,)."""
     force, member = load.force, next(m for m in packed.members if m.constraint is load.force.joint)
     rows = Phi_q[member.rows]
@@ -208,7 +206,7 @@ def _with_friction(packed, t, q, qd, Phi_q, solve):
     if not packed.system.normals.size:
         return 0.0, solve(0.0)
 
-    return balance(packed, float(t), q, qd, Phi_q, solve)[:2]
+    return balance(packed, float(t), q, qd, Phi_q, solve)
 
 
 def _of_independent_rows(packed, M, Phi_q, load, gamma):

@@ -404,11 +404,10 @@ class StepPieces:
         """What the parts say of times t, in their order; where it is no array, a list."""
         piece = np.searchsorted([part.end for part in self.parts[:-1]], t, side=self.side)
         order, found = [], []
-        for i, part in enumerate(self.parts):
+        for i in np.unique(piece).tolist() or [0]:
             at = np.flatnonzero(piece == i)
-            if at.size or (not found and i == len(self.parts) - 1):
-                order.append(at)
-                found.append(ask(part, t[at]))
+            order.append(at)
+            found.append(ask(self.parts[i], t[at]))
         back = np.argsort(np.concatenate(order), kind="stable")
         columns = zip(*found, strict=True)
         return [np.concatenate(column)[back] if isinstance(column[0], np.ndarray) else column for column in columns]

@@ -319,6 +319,12 @@ class Sampling:
             if callable(reset) and not continued:
                 reset()
 
+    def of(self, prepared):
+        """Those of the next phase of the run, which go on."""
+        other = Sampling(prepared, True)
+        other.last = self.last
+        return other
+
     def ask(self, memory, t, q, qd):
         """Evaluate the functions that are due at t, and hold their values."""
         for i, load in enumerate(self.loads):
@@ -624,7 +630,7 @@ def _driven(task, memory, driven, readings, watch, began):
     trajectory = _trajectory(task, memory, recorder, recorder.blocks, readings) if task.dense_output else None
     end = RecordedEnd(memory, recorder.steps, recorder.chart_history(_charts(memory, recorder)))
     found = None if watch is None else watch.found(task.prepared.n)
-    return Outcome(status, reason, recorder.out, end, trajectory, found, began)
+    return Outcome(status, reason, recorder.out, end, trajectory, found, began, interrupted=recorder.interrupted)
 
 
 def _charts(memory, log):

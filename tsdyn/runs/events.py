@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidArgument, Status
-from ..maths.root_isolation import LARGEST, Search, TooFast, survey
+from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import handles_of
 from ..model.kinematics import Anchor, Kinematics
@@ -16,6 +16,7 @@ from ..observables.reactions import Exerting
 from ..observables.state import RememberingState
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
+from .event_groups import Group, Member, States
 from .tolerances import FAST_TURN, LEAST_TIME, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
 
 # Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp.
@@ -44,28 +45,6 @@ class Event(NamedTuple):
         if not math.isfinite(value):
             raise EventFailed(f"{self.name} must return a finite number; at t = {t:.9g} s it gave {given!r}.", t)
         return value
-
-
-class Member:
-    """One of several event functions that are evaluated together.
-
-    Parameters
-    ----------
-    over : function
-        Values (k, members) at a state of k times.
-    which : int
-        The function's number.
-    """
-
-    def __init__(self, over, which):
-        self.over, self.which = over, which
-
-    def __call__(self, t, instant):
-        """The value at one state."""
-        arrays = np.array([t]), *(np.array([part]) for part in (instant.q, instant.qd, instant.qdd))
-        return self.over(RememberingState.of(instant.packed, instant.memory, instant.anchor, *arrays, None))[
-            0, self.which
-        ]
 
 
 class EventFailed(Exception):
@@ -171,6 +150,18 @@ class Inside:
             known.update(found)
         return [known[t] for t in times]
 
+    def levels(self, times):
+        """The same as an array (k, 3, n), NaN where there is none; not kept."""
+        ends = times.size > 0 and times[-1] == self.t1
+        inside = times[:-1] if ends else times
+        found, status = self._reader(
+            inside, np.zeros(inside.size, int), self._block, self._log.charts, self._log.points
+        )
+        if status != Status.SUCCESS:
+            none = np.full_like(self._known[self.t0], np.nan)
+            return np.reshape([none if state is None else state for state in self.states(times)], (-1, *none.shape))
+        return np.concatenate((found, self._known[self.t1][None])) if ends else found
+
     def _read(self, times):
         rows = np.zeros(times.size, int)
         states, status = self._reader(times, rows, self._block, self._log.charts, self._log.points)
@@ -211,11 +202,14 @@ def _signs(n):
 class Track:
     """What is known of one function up to the last step's end."""
 
-    def __init__(self, value):
+    def begin(self, t, value, has_sign):
+        """Take the value at t, the start of a run; has_sign: whether it is no rounding of zero where it is positive."""
         self.value = self.end = value  # at that time, and at the end of the present step
         self.sign = 0.0  # the last it had; 0 for none yet
         self.before = 0.0  # the same at the last step's start, or soon after it
         self.significant = None  # time and value at which it had that sign
+        if has_sign and value != 0.0:
+            self.sign, self.significant = math.copysign(1.0, value), (t, value)
         self.zero = None  # time of the last zero, if it has had no sign since
         self.passed = self.pending = False  # that zero is a start within rounding; may become an event on being left
         self.noise = 0.0  # rounding error of the values, once measured
@@ -242,12 +236,13 @@ class Watch:
         rigid = packed.system.bodies[packed.system.bodies[:, 1] == 7, 0]
         self._p = rigid[:, None] + np.arange(3, 7)
         self._n = int(packed.system.bodies[:, 1].sum())
-        groups = {}  # numbers of events and of members, by the function that evaluates them together
+        groups = {}  # numbers of events, by the function that evaluates them together
         for i, event in enumerate(events):
             if isinstance(event.function, Member):
-                groups.setdefault(event.function.over, []).append((i, event.function.which))
-        self._groups = [(over, *map(list, zip(*pairs, strict=True))) for over, pairs in groups.items()]
-        self._degrees = [0] * len(self._groups)
+                groups.setdefault(event.function.over, []).append(i)
+        self._groups = [Group(over, events, numbers) for over, numbers in groups.items()]
+        self._members = [i for numbers in groups.values() for i in numbers]
+        self._single = [i for i in range(len(events)) if i not in set(self._members)]
         self.read_by(reader)
 
     def read_by(self, reader):
@@ -291,6 +286,10 @@ class Watch:
                 if last is not None and not self._is_resumed(memory, last):
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
                 status = Status.SLICE_DONE if self.begins_again else status
+                if self.begins_again and log.t_eval.size:  # outputs of the slice may have to be taken back
+                    status, reason = self._begin_again(memory, log)
+                    if status != Status.SLICE_DONE:
+                        return status, reason
             full = run.numbers.chart_rows + 2 >= len(log.charts)
             if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
@@ -302,34 +301,32 @@ class Watch:
         self._note_start()
         if not anew:
             return
-        values, again = dict.fromkeys(range(len(self.events))), self.tracks is not None
-        for over, numbers, which in self._groups:
-            found = self._values(over, np.array([self.t]), [self.state])[0]
-            values.update(zip(numbers, found[which].tolist(), strict=True))
-        self.tracks = [Track(self._value(i, self.t, self.state) if x is None else x) for i, x in values.items()]
-        for event, track in zip(self.events, self.tracks, strict=True):
-            if event.exact and track.value > 0.0:
-                track.sign, track.significant = 1.0, (self.t, track.value)
-            if (again or event.goes_on) and track.value == 0.0 and not isinstance(event.function, Member):
+        again = self.tracks is not None
+        self.tracks = self.tracks or [Track() for _ in self.events]
+        for group in self._groups:
+            group.begin(self._sample(group, np.array([self.t]), self.state[None])[0])
+        for i in self._single:
+            track = self.tracks[i]
+            track.begin(self.t, self._value(i, self.t, self.state), False)
+            if (again or self.events[i].goes_on) and track.value == 0.0:
                 track.zero, track.passed = self.t, True
 
     def _is_resumed(self, memory, last):
         """Whether the run goes on from the event that ends it, in the same memory, with other velocities."""
-        run, members = memory.run, [i for _, numbers, _ in self._groups for i in numbers]
-        if self.resume is None or last.index not in members or not memory.begins_again or last.t >= run.clock.t_end:
+        run, is_member = memory.run, isinstance(self.events[last.index].function, Member)
+        if self.resume is None or not is_member or not memory.begins_again or last.t >= run.clock.t_end:
             return False
         if any(found and event.action for event, found in zip(self.events, self.list, strict=True)):
             return False
-        self.begins_again = self.resume(last.t, run, [i for i in members if self.list[i]])
+        self.begins_again = self.resume(last.t, run, [i for i in self._members if self.list[i]])
         return self.begins_again
 
     def _begin_again(self, memory, log):
         """Begin the run again where it is; the Status, and what there is to say of it."""
         run, t = memory.run, memory.run.clock.t
         self.begins_again, self.start = False, t
-        for _, numbers, _ in self._groups:
-            for i in numbers:
-                self.list[i].clear()
+        for i in self._members:
+            self.list[i].clear()
         status = memory.begin_again(log)
         if not run.numbers.begun:
             run.numbers.begun = 1  # there is a run so far
@@ -342,22 +339,29 @@ class Watch:
 
     def saved(self):
         """What is known and found between two steps: numbers, and arrays by name."""
+        for group in self._groups:
+            group.lend_all(self.tracks, self.t)
         found = [each for mine in self.list for each in mine]
         numbers = {"t": self.t, "tracks": [vars(track) for track in self.tracks], "found": [each[:2] for each in found]}
+        numbers |= {"start": self.start, "begins_again": self.begins_again}
         states = np.array([each.state for each in found]).reshape(-1, *self.state.shape)
         return numbers, {"watch.state": self.state, "watch.memory": self.memory, "watch.found": states}
 
     def restore(self, numbers, arrays):
         """As it was when it was saved."""
         self.t, self.state, self.memory = numbers["t"], arrays["watch.state"], arrays["watch.memory"]
+        self.start, self.begins_again = float(numbers["start"]), bool(numbers["begins_again"])
         demand(self.state.shape == (3, self._n) and len(self.memory) >= self.angles, "the state of events")
-        self.tracks = [Track(0.0) for _ in self.events]
+        self.tracks = [Track() for _ in self.events]
         for track, known in zip(self.tracks, numbers["tracks"], strict=True):
+            track.begin(0.0, 0.0, False)
             if known["significant"] is not None:
                 t, value = map(float, known["significant"])
                 known = known | {"significant": (t, value)}
             demand_numbers(known | {"significant": None}, vars(track), ("significant", "zero"))
             vars(track).update(known)
+        for group in self._groups:
+            group.take_all(self.tracks)
         self.list = [[] for _ in self.events]
         for (t, index), state in zip(numbers["found"], arrays["watch.found"], strict=True):
             demand(is_count(index), "the number of an event")
@@ -385,14 +389,17 @@ class Watch:
     def _value(self, i, t, state):
         event = self.events[i]
         if isinstance(event.function, Member):
-            return float(self._values(event.function.over, np.array([t]), [state])[0, event.function.which])
+            over, which = event.function.over, event.function.which
+            return float(over(self._states(np.array([t]), state[None]))[0, which])
         return event.value(t, self._instant(t, state))
 
-    def _values(self, over, times, states):
-        """Values (k, members) of a group at times (k,) with their states; NaN where there is none."""
-        none = np.full_like(self.state, np.nan)
-        known = np.reshape([none if state is None else state for state in states], (-1, *none.shape))
-        return over(self._instants(times, known))
+    def _states(self, times, levels):
+        """What groups are given: times t (k,), levels (k, 3, n)."""
+        return States(times, levels, self.memory[self.angles :], lambda: self._instants(times, levels).angles)
+
+    def _sample(self, group, times, levels):
+        """Values (k, members) of a group."""
+        return group.over(self._states(times, levels))[:, group.which]
 
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
@@ -407,12 +414,18 @@ class Watch:
     def _locate(self, run, log, step):
         found, failure, end = [], None, step.t1
         step.degree = self._degree(step)
-        left = {i for i in range(len(self.events)) if not isinstance(self.events[i].function, Member)}
-        for k in range(len(self._groups)):
-            first, more, end = self._first_of_group(k, step, end)
-            found += first
-            left |= more
-        for i in sorted(left):
+        members = {}
+        for group in self._groups:
+            first, alone = group.search(step, lambda times, group=group: self._sample(group, times, step.levels(times)))
+            if first is not None:
+                i, t = first
+                t = self._beyond(i, step, t, ROOT * abs(t), end, self.events[i].direction)
+                found.append(Occurrence(t, i, step.at(t)))
+                end = min(end, t)
+            for i in alone:
+                members[group.numbers[i]] = group, i
+                group.lend(self.tracks[group.numbers[i]], i, step.t0)
+        for i in sorted([*self._single, *members]) if members else self._single:
             # Times that bracket the zeros of event i
             points, failed = self._points(i, step, end)
             if failed is not None:
@@ -423,6 +436,8 @@ class Watch:
             except EventFailed as failed:
                 mine, failure, end = [], failed, min(end, failed.t)
             found += mine
+            if i in members:
+                members[i][0].take_back(self.tracks[i], members[i][1])
             # The run ends with the event that reaches its limit
             last = self.events[i].limit - len(self.list[i])
             if len(mine) >= last:
@@ -434,7 +449,8 @@ class Watch:
             self.list[each.index].append(each)
             if len(self.list[each.index]) >= self.events[each.index].limit:
                 self._add_beside(step, each)
-                run.remembered[: self.angles] = self._instant(each.t, each.state).angles
+                if self.angles:
+                    run.remembered[: self.angles] = self._instant(each.t, each.state).angles
                 self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
                 return each
@@ -455,55 +471,15 @@ class Watch:
             if abs(value) <= noise and event.direction * track.before <= 0.0:
                 self.list[i].append(Occurrence(last.t, i, last.state))
 
-    def _first_of_group(self, k, step, end):
-        """Of a group up to `end`: the first event that ends the run, those to be searched one by one, the new end."""
-        (over, numbers, which), found, alone = self._groups[k], [], set()
-        left = np.arange(len(numbers))
-        while left.size:
-            members, columns = [numbers[i] for i in left], [which[i] for i in left]
-            tracks = [self.tracks[i] for i in members]
-            first, noise = np.array([[track.value, track.noise] for track in tracks]).T
-
-            def sample(times, columns=columns):
-                return self._values(over, times, step.states(times))[:, columns]
-
-            degree = max(step.degree, self._degrees[k] // 2)
-            seen = survey(sample, step.t0, first, end, degree, noise)
-            self._degrees[k] = seen.degree
-            crossing, since, until = [], seen.since.tolist(), seen.until.tolist()
-            for j, (i, track, value) in enumerate(zip(members, tracks, seen.last.tolist(), strict=True)):
-                event, sign = self.events[i], math.copysign(1.0, track.value)
-                plain = track.zero is None and track.sign in (0.0, sign)
-                if plain and seen.calm[j]:
-                    track.value = track.end = value
-                    track.sign, track.significant = sign, (end, value)
-                elif plain and until[j] == until[j] and event.direction * sign < 0.0 and event.limit == 1.0:
-                    crossing.append(j)
-                elif self.list[i] or since[j] < end:
-                    alone.add(i)
-            if not crossing:
-                break
-            # The earliest one; what is clear up to it needs no look
-            j = min(crossing, key=since.__getitem__)
-            first = (since[j], self._value(members[j], since[j], step.at(since[j])))
-            last = (until[j], self._value(members[j], until[j], step.at(until[j])))
-            if not first[1] * last[1] < 0.0:
-                return found, alone | {members[i] for i in crossing}, end
-            t = self._between(members[j], step, first, last)
-            if t <= end:
-                end = t
-                found = [Occurrence(t, members[j], step.at(t))]
-            left = left[[i for i in crossing if i != j and since[i] <= end]]
-        return found, alone, end
-
     def _points(self, i, step, end):
         """Times up to `end`, and values of event i, between which its sign changes once at most; what `EventFailed`."""
         track, good, failure = self.tracks[i], [step.t0], None
 
         def sample(times):
-            values, function, states = np.full(times.size, np.nan), self.events[i].function, step.states(times)
+            values, function = np.full(times.size, np.nan), self.events[i].function
             if isinstance(function, Member):
-                return self._values(function.over, times, states)[:, function.which]
+                return function.over(self._states(times, step.levels(times)))[:, function.which]
+            states = step.states(times)
             for k, (t, state) in enumerate(zip(times.tolist(), states, strict=True)):
                 if state is not None:
                     values[k] = self._value(i, t, state)
@@ -530,8 +506,8 @@ class Watch:
 
     def _degree(self, step):
         """The degree that the interpolant and the fastest turn of a body ask for."""
-        squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
-        turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
+        pd = np.array([step.at(t)[1, self._p] for t in (step.t0, step.t1)])
+        turn = 2.0 * math.sqrt(np.einsum("kbi,kbi->kb", pd, pd).max(initial=0.0)) * (step.t1 - step.t0)
         return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
 
     def _walk(self, i, step, points):
@@ -629,10 +605,15 @@ class Watch:
         # Brent's method, as near as numbers of this size allow
         least = max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
         root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
-        shift = least + ROOT * abs(root)
-        # a run that continues from a terminal event must not find it again
+        return self._beyond(i, step, root, least + ROOT * abs(root), t1, b)
+
+    def _beyond(self, i, step, root, shift, t1, b):
+        """A root, or a time after it up to t1 where event i has the sign of b.
+
+        A run that continues from a terminal event must not find it again.
+        """
         ends, side = self.events[i].limit < math.inf and not self.events[i].exact, math.copysign(1.0, b)
-        while ends and root + shift < t1 and side * value(root) <= 0.0:
+        while ends and root + shift < t1 and side * self._at(i, step, root) <= 0.0:
             root, shift = root + shift, 2.0 * shift
         return root
 

@@ -63,4 +63,5 @@ class Outcome(NamedTuple):
     events: tuple  # times, positions, velocities of each event; or None
     began: float  # by `jit.compiled.clock` when the driver began, prepared
     method: str = ""  # the methods of a run that has turned from one to another
-    phases: tuple = None  # of a run with contacts: its `contact_run.Phases`, and the number of that of each output
+    phases: tuple = None  # of a run with contacts: its `phases.Phases`, and the number of that of each output
+    interrupted: bool = False  # whether Ctrl-C came when it had ended, perhaps for another part of the run to go on

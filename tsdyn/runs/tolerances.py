@@ -95,6 +95,9 @@ START_ZERO = 64.0 * EPS
 SHAKEN, NOISE = 4.0 * EPS, 4.0
 
 # Of the time: how near to a zero Brent's method comes, as near as it can. s: the least distance there, a normal number.
+# Steps of Newton's method from the root of an interpolant; share of the step up to which a move that doesn't get
+# shorter is rounding.
+ROOT_STEPS, ROUGH_ROOT = 6, 1e-8
 ROOT, LEAST_TIME = 4.0 * EPS, 2.0**-1022
 
 # --- slices ----------------------------------------------------------------------------------------------------------

@@ -3,36 +3,47 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.contact_rows import ReactionWorkspace
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
 from ..analyses.tolerances import AT_REST, STOPPED
 from ..calls import fitting
-from ..elements.force import Force
 from ..elements.unilateral import contacts_of
-from ..errors import InconsistentState, InvalidArgument, InvalidConstraint, Status, TsdynError
+from ..errors import (
+    InconsistentState,
+    InvalidArgument,
+    InvalidConstraint,
+    InvalidForce,
+    SingularConfiguration,
+    Status,
+    TsdynError,
+)
 from ..integrators import DOP853
 from ..jit.compiled import clock
+from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS
 from ..model.handles import handles_of
-from ..model.packed import first_rows
 from ..observables import diagnostics, reactions
-from ..observables.state import RememberingState, StatePhase, remembered
+from ..observables.state import RememberingState, remembered
 from ..runs.arguments import interval, output_times, state_arrays
-from ..runs.dense_output import StepPieces
-from ..runs.events import Event, Member
+from ..runs.driver import Sampling
+from ..runs.event_groups import Member
+from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
-from ..validation import floats, listed
+from ..validation import damaged, demand, floats, listed
 from . import hybrid
-from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, has_contacts, inactive_of, phase_of
+from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, has_contacts, inactive_of, phase_of, with_own_parts
+from .phases import PhasePieces, Phases, Pinned, plain
 from .progress import reporter, silent
-from .run_options import LAWS, RunCall
-from .scene_cache import Prepared, prepared
+from .run_options import LAWS, RunCall, RunOptions
+from .scene_cache import prepared, prepared_numbers
 from .segments import summed
 from .tolerances import (
     CREEPING,
@@ -79,14 +90,16 @@ class _Closing:
 
     def open(self, opened):
         """Take other contacts that have just opened."""
-        self.which = list(opened)
-        self.start = np.array(list(opened.values())).reshape(-1, 3).T
+        self.which = [i for i in opened if i not in self.gaps.following]
+        self.start = tuple(zip(*(opened[i] for i in self.which), strict=True))
 
     def over(self, states):
-        """Values (k, count) of states at k times."""
-        values = self.gaps.values(states.t, states.q, states.angles if self.gaps.are_counted else None)
+        """Values (k, count) of `States`."""
+        values = self.gaps.values(states.t, states.levels, states.counted)
+        for i, rate in self.gaps.following.items():
+            values[:, i] = rate(states.q, states.qd)
         if self.which:
-            begun, first, rate = self.start
+            begun, first, rate = map(np.array, self.start)
             since = states.t[:, None] - begun
             later = since > 0.0
             divided = (values[:, self.which] - first) / np.where(later, since, 1.0)
@@ -127,10 +140,18 @@ class _Leaving:
     def __init__(self, packed, rows, signs):
         self.packed, self.rows, self.signs = packed, rows, np.array(signs)
 
+    @cached_property
+    def workspace(self):
+        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
+        return None if self.packed.system.normals.size else ReactionWorkspace(self.packed)
+
     def over(self, states):
-        """Values (k, closed) of states at k times."""
-        memory = np.tile(states.memory, (states.t.size, 1))
-        lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        """Values (k, closed) of `States`."""
+        if self.workspace is not None:
+            lam = self.workspace.multipliers(states.t, states.levels, states.memory)
+        else:
+            memory = np.tile(states.memory, (states.t.size, 1))
+            lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
         return -self.signs * lam[:, self.rows]
 
 
@@ -163,7 +184,7 @@ class _Breaking:
 
 
 class _Slowing:
-    """The velocities of frictions that slide, along their directions, as event functions.
+    """The velocities of frictions, along the directions in which they slide, as event functions.
 
     In a plane half of the speed is taken off: where the direction has turned by 60 degrees, it is taken anew. The
     velocity of one that has just begun to slide is divided by the time since.
@@ -171,146 +192,20 @@ class _Slowing:
     Parameters
     ----------
     frictions : Frictions
-    which : list of int
     begun : dict
         Of those that have just begun to slide: time and acceleration there, by their numbers.
     """
 
-    def __init__(self, frictions, which, begun):
-        self.frictions, self.which, self.begun = frictions, which, begun
+    def __init__(self, frictions, begun):
+        self.frictions, self.begun = frictions, begun
 
     def over(self, states):
-        """Values (k, which) of states at k times."""
-        values = np.empty((states.t.size, len(self.which)))
-        for i, value in zip(self.which, values.T, strict=True):
-            value[:] = self.frictions.speed(i, states.q, states.qd, states.memory)
-            if i in self.begun:
-                begun, first = self.begun[i]
-                later = states.t > begun
-                value[:] = np.where(later, value / np.where(later, states.t - begun, 1.0), first)
+        """Values (k, frictions) of states at k times."""
+        values = self.frictions.speeds(states.q, states.qd, states.memory)
+        for i, (begun, first) in self.begun.items():
+            later = states.t > begun
+            values[:, i] = np.where(later, values[:, i] / np.where(later, states.t - begun, 1.0), first)
         return values
-
-
-class Phases:
-    """The phases of a run that has ended: when, with which gaps closed, and where their rows are in those of the scene.
-
-    Attributes
-    ----------
-    list : list of (float, float, tuple of str)
-        Start, end (s) and names of the closed contacts.
-    impulses : list of (float, str, float)
-        Time (s), name, impulse (N s, or N m s of an angle).
-    changes : list of (tuple, dict)
-        The parts that are inactive in each, and the parameters that have been set before.
-    varies : bool
-        Whether forces or numbers differ between them, not rows alone.
-    """
-
-    def __init__(self):
-        self.list, self.impulses, self.starts, self.of = [], [], [], []
-        self.packed, self._columns = [], []  # of each set of closed gaps
-        self._kinds, self.changes, self.varies = {}, [], False
-
-    def add(self, begin, rest, end, packed, names, wholes, changes):
-        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end.
-
-        wholes: the packed scene, and that with the parameters of the phase, whose rows are the same.
-        """
-        kind = self._kinds.setdefault(id(packed), len(self.packed))
-        if kind == len(self.packed):
-            of_whole, own = _rows_of(wholes[1]), _rows_of(packed)
-            pairs = [(of_whole[part] + i, own[part] + i) for part, i in _numbered(packed) if part in of_whole]
-            self.packed.append(packed)
-            self._columns.append(np.array(pairs, int).reshape(-1, 2).T)
-        if self.list:
-            self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
-        self.starts.append(begin)
-        self.of.append(kind)
-        self.changes.append(changes)
-        self.varies = self.varies or wholes[0] is not wholes[1] or any(isinstance(item, Force) for item in changes[0])
-        self.list.append((rest, max(rest, end), names))
-
-    def at(self, t):
-        """Numbers of the phases at times t (k,); where one begins, the later one."""
-        return np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
-
-    def of_outputs(self, t):
-        """Numbers of the phases of outputs at times t (k,): of several at one time each is of a phase of its own."""
-        same = np.searchsorted(t, t, side="right") - 1 - np.arange(t.size)
-        return np.maximum(self.at(t) - same, 0)
-
-    def multipliers(self, numbers, m, *arrays):
-        """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
-        out = np.zeros((len(numbers), m))
-        for kind, mine, some in self._gathered(numbers, arrays):
-            rows, columns = self._columns[kind]
-            out[np.ix_(mine, rows)] = reactions.multipliers(self.packed[kind], *some)[:, columns]
-        return out
-
-    def constraint_error(self, numbers, *arrays):
-        """The `ConstraintError` of the rows that hold."""
-        out = np.zeros((3, len(numbers)))
-        for kind, mine, some in self._gathered(numbers, arrays):
-            out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
-        return diagnostics.ConstraintError(*out)
-
-    def packed_at(self, t):
-        """Yield each packed scene of phases at times t (k,), and which times are its."""
-        for kind, mine, _ in self._gathered(self.at(t), ()):
-            yield self.packed[kind], mine
-
-    def phase_at(self, t):
-        """The `StatePhase` at t, s, or of several times; None where actions have changed nothing."""
-        if not any(inactive or values for inactive, values in self.changes):
-            return None
-        numbers = np.unique(self.at(np.atleast_1d(t))).tolist() or [0]
-        inactive, values = self.changes[numbers[-1]]
-        kinds = {self.of[number] for number in numbers}
-        one = kinds.pop() if len(kinds) == 1 else None
-        found = (None, None) if one is None else (self.packed[one], self._columns[one])
-        return StatePhase(tuple(item.name for item in inactive), values, *found)
-
-    def parts(self, solution):
-        """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are."""
-        for kind, mine, _ in self._gathered(solution._phase_of_rows, ()):
-            part = solution._picked(mine)
-            packed = self.packed[kind]
-            part.packed, part.system, part.handles, part._phases = packed, packed.system, handles_of(packed), None
-            yield part, mine
-
-    def active(self, item, numbers):
-        """Whether a part is active in the phases of these numbers (k,)."""
-        return np.array([all(item is not each for each in inactive) for inactive, _ in self.changes])[numbers]
-
-    def name_switched(self, parts):
-        """Name in each phase which of these parts, that come and go, are active in it."""
-        for k, (inactive, _) in enumerate(self.changes):
-            active = [item.name for item in parts if all(item is not each for each in inactive)]
-            self.list[k] = (*self.list[k][:2], (*self.list[k][2], *active))
-
-    def _gathered(self, numbers, arrays):
-        """Yield each set of closed gaps, the entries (j,) of arrays in its phases, and these parts of the arrays."""
-        kinds = np.array(self.of)[numbers]
-        for kind in np.unique(kinds).tolist():
-            mine = np.flatnonzero(kinds == kind)
-            yield kind, mine, [None if array is None else array[mine] for array in arrays]
-
-
-def _rows_of(packed):
-    """The first row of each primitive, by its id."""
-    return {id(part): first for part, first in first_rows(packed.constraints)}
-
-
-def _numbered(packed):
-    """Yield the id of the primitive of each row, and which of its rows it is."""
-    for part in packed.constraints:
-        yield from ((id(part), i) for i in range(part.all_rows))
-
-
-class _Pieces(StepPieces):
-    """Dense output of phases: where one begins, its own."""
-
-    side = "right"
 
 
 def demand_apart(gaps, able, q, angles, tol):
@@ -339,6 +234,25 @@ class Modes:
         """Whether the units are in the same modes, whatever has just opened."""
         return replace(self, opened={}) == replace(other, opened={})
 
+    def saved(self):
+        """Lists of numbers, for JSON: one for each field, of a dict its items."""
+        return [plain(value) for value in vars(self).values()]
+
+    @classmethod
+    def of(cls, record):
+        """As it was when it was saved."""
+        pairs = zip(vars(cls()).items(), record, strict=True)
+        return cls(*(dict(known) if isinstance(value, dict) else known for (_, value), known in pairs))
+
+
+# Numbers of a run that a checkpoint holds as they are, and the names of its arrays
+KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", "replaced", "written", "totals"
+START, PREFIX = ("q", "qd", "remembered"), "phase "
+# What a phase raises that can't begin, after others: whose fault it is
+FAILURES = {
+    InvalidArgument: Status.EVENT_FAILED, InvalidForce: Status.SAMPLING_FAILED, SingularConfiguration: Status.SINGULAR,
+}  # fmt: skip
+
 
 class _ContactRun:
     """One run in the making.
@@ -354,42 +268,60 @@ class _ContactRun:
     run_task : function of a task, a scene and the tolerance of its start
     instead : function of a task and a status
         Returns the method that begins again, or None.
+    archive : Archive, optional
+        What outputs and histories go to.
     """
 
-    def __init__(self, scene, options, call, run_of, run_task, instead):
-        self.scene, self.options, self.call = scene, options, call
+    def __init__(self, scene, options, call, run_of=None, run_task=None, instead=None, archive=None):
+        phase = getattr(call.state, "phase", None)
+        self._take_scene(scene, *(() if phase is None else phase[:2]))
+        self.options, self.call, self.archive = options, call, archive
         self.run_of, self.run_task, self.instead = run_of, run_task, instead
         self.span = interval(call.t_span)
         self.times = output_times(call.t_eval, *self.span)
         self.per_step, self.taken = self.times.size == 0, 0
         kept = prepared(phase_of(scene, []))
         self._demand_served(kept)
-        self.base, self.count = scene, kept.handles.count
-        self.inactive, self.values, self.acted = inactive_of(scene), {}, False
-        self.switched = {id(item): item for item in self.inactive}
-        phase = getattr(call.state, "phase", None)
-        if phase is not None:
-            self.inactive, self.values = tuple(scene[name] for name in phase.inactive), phase.values
-        self.configure()
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(self.gaps, self.able, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
-        self.modes, self.rest = Modes(), self.t
-        self.parts, self.found, self.report = [], [[] for _ in self.users], reporter(call.progress)
-        self.phases, self.counts, self.steps = Phases(), [0] * len(self.users), 0
-        self.reason, self.method, self.at_once, self.judged = "", "", 0, (self.t, 0)
+        self.rest = self.t
+        self.kinds, self.parts, self.found, self.report = [], [], [[] for _ in self.users], reporter(call.progress)
+        self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
+        self.reason, self.methods, self.at_once, self.judged = "", [], 0, (self.t, 0)
+        self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
+        self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
+        self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
+
+    def _take_scene(self, scene, inactive=None, values=None):
+        """What follows from the scene alone, and makes the scenes of its phases.
+
+        inactive, values: names and parameters of what actions have changed, by default nothing.
+        """
+        with_own_parts(scene)
+        self.base, self.count, self.modes, self.acted = scene, handles_of(scene.packed).count, Modes(), False
+        at_first = tuple(item.name for item in inactive_of(scene))
+        self.switched = set(at_first)
+        self.change(at_first if inactive is None else inactive, values or {})
+
+    def change(self, inactive, values):
+        """Take these parts as inactive, by name, and these parameters."""
+        self.inactive, self.values = inactive, values
+        self.switched |= set(inactive)
+        self.scene = hybrid.with_values(self.base, values)
+        self.without = dependent(self.scene, [self.scene[name] for name in inactive])
+        self.gaps, self.frictions = gaps_of(self.scene, self.without), Frictions(self.scene)
+        off = {id(item) for item in self.without}
+        self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]
+        self.off = [i for i, unit in enumerate(self.frictions.units) if id(unit.force) in off]
+
+    def _scene_of(self, rows, holds):
+        return phase_of(self.scene, rows, holds, self.without)
 
     def _demand_served(self, kept):
-        names = [gap for gap, given in (("store", self.call.store), ("checkpoint", self.call.checkpoint)) if given]
-        if names:
-            raise InvalidArgument(f"{names[0]} doesn't serve scenes with contacts yet: keep the outputs in memory.")
-        if kept.sampled:
-            raise InvalidArgument(
-                "sampled controllers don't serve scenes with contacts yet: leave out period, for a continuous one."
-            )
         rough = [load.force.title for load in kept.packed.loads if load.normal >= 0 and load.force.slips]
         if rough and contacts_of(self.scene._added):
             raise InvalidArgument(
@@ -398,59 +330,134 @@ class _ContactRun:
             )
 
     def run(self):
-        """Run to the end; the `Task` of the first phase and the `Outcome` of all."""
-        began, first = clock(), None
+        """Run to the end; the `Task` of the last phase, of the whole scene, and the `Outcome` of all."""
+        began, task, status = clock(), None, None if self.known else self.begin()
+        try:
+            while status is None:
+                task, outcome = self._phase()
+                with deferred_interrupts():
+                    status = self._after(outcome)
+                if outcome.interrupted and status is None:
+                    raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            if self.end is None:
+                raise
+            status = Status.INTERRUPTED
+        except TsdynError as error:
+            if self.end is None:
+                raise
+            status = Status.ACTION_FAILED if self.acted else FAILURES.get(type(error), Status.CONTACT_FAILED)
+            self.reason = str(error)
+        finally:
+            self.report(None)
+        if self.end is None:
+            self.refuse(status)
+        return self._whole(task or self._first_task()), self._outcome(status, began)
+
+    def _whole(self, task):
+        """A task as that of the whole run."""
+        return task._replace(prepared=prepared_numbers(self.base), span=self.span)
+
+    def begin(self):
+        """Impact and closed contacts at the start; the Status if there is no way on, else None."""
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         touching = [i for i in touching if i in self.able]
-        status = self._settle(touching, ()) or self._settle_frictions(Modes(), ())
-        while status is None:
-            try:
-                task, outcome = self._phase()
-            except TsdynError as error:
-                if not self.parts:
-                    raise
-                status, self.reason = Status.ACTION_FAILED if self.acted else Status.SINGULAR, str(error)
-                break
-            first = first or task
-            status = self._after(outcome)
-        if first is None:  # nothing could begin
-            raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
-        self.report(None)
-        return first._replace(prepared=Prepared(self.base, self.base.packed), span=self.span), self._outcome(
-            status, began
-        )
+        return self._settle(touching, ()) or self._settle_frictions(Modes(), ())
+
+    def check(self):
+        """Raise what a run raises before its first step; its `Task`, of the whole scene."""
+        status = self.begin()
+        if status is not None:
+            self.refuse(status)
+        return self._whole(self._first_task())
+
+    def _first_task(self):
+        run, call = self._run_of(self._scene())
+        return run._new_task(call, (self.q, self.qd), self.remembered)
+
+    def refuse(self, status):
+        """Raise that nothing can begin."""
+        raise InconsistentState(f"{status.sentence} {self.reason} {status.remedy}")
 
     # One phase
 
     def _phase(self):
         """Run the next phase: its task and outcome."""
-        end = self.span[1]
-        phase, names = self._scene(), self._names()
-        call, plain = RunCall((self.t, end)), replace(self.options, events=None)
-        run, still = self.run_of(phase, plain, call), self._still(phase)
+        phase, names, known = self._scene(), self._names(), self.known
+        run, call = self._run_of(phase)
+        still = self._still(phase)
         if still.size == self.q.size and self.options.method is None:
             run = run._by(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
         run._prepare_kernels(True)
+        self._enter_archive()
         while True:
             task = run._new_task(call, (self.q, self.qd), self.remembered)
+            if known is not None:  # the checkpoint is of an event later on
+                self.t, self.q, self.qd, self.remembered = known
+            other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(), resume=self._resume,
+                max_steps=self._steps_left(), resume=None if other else self._resume, archive=self.archive,
+                sampling=self._sampling(task.prepared),
             )  # fmt: skip
-            self.names, self.packed, self.settled, self.again = names, phase.packed, None, []
-            outcome = self.run_task(task, phase, self.options.initial_tol)
-            other = self.instead(task, outcome.status)
+            self.names, self.packed, self.settled, self.again, self.known = names, phase.packed, None, [], None
+            if self.archive is not None:
+                self.archive.resting = still, resting[still]
+            if not (other and self.replaced):
+                outcome = self.run_task(task, phase, self.options.initial_tol)
+                other = self.instead(task, outcome.status)
             if other is None:
-                outcome = pinned(outcome, self.q if self.parts else task.q, still)
+                outcome = pinned(outcome, resting, still)
                 if self.settled is None:
                     self._end_phase(outcome.end.reached)
+                said = (outcome.method or repr(task.method)).split(" and ")
+                self.methods += [method for method in said if method not in self.methods]
                 return task, outcome
-            run = run._by(other)
+            run, self.replaced = run._by(other), True
+            if self.archive is not None and self.archive.resumed is None:
+                self.archive.go_back(self.written)
+
+    def _enter_archive(self):
+        """Note how the run of a phase begins; let the archive know, and readers, and write a checkpoint that is due."""
+        archive = self.archive
+        if self.known is None:
+            self.first = self.t, self.q, self.qd, self.remembered
+        if archive is None:
+            return
+        archive.before = self.saved
+        if archive.resumed is None:
+            archive.shift, archive.skips, archive.passed = 0.0, False, []
+            self.written = dict(archive.counts)
+            archive.look_up(lambda: ({"t": self.t, "between": True}, {}))
+
+    def _sampling(self, kept):
+        """The sampled loads of a phase, which go on from those of the one before."""
+        if kept.sampled:
+            goes_on = self.known is not None or self.call.state is not None
+            self.sampling = self.sampling.of(kept) if self.sampling else Sampling(kept, goes_on)
+        return self.sampling
+
+    def _run_of(self, phase):
+        """The `Run` of a phase, and the call of it."""
+        call = RunCall((self.t, self.span[1]))
+        return self.run_of(phase, replace(self.options, events=None), call), call
 
     def _end_phase(self, t):
-        wholes, changes = (self.base.packed, self.scene.packed), (self.inactive, self.values)
-        self.phases.add(self.t, self.rest, t, self.packed, self.names, wholes, changes)
+        kind = self.phases.kind(self.packed, self._record(), self.scene.packed)
+        self.phases.add(kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
+
+    def _record(self):
+        """What the scene of the present phase is made of, for files."""
+        return [self.modes.saved(), self.remembered.tolist(), plain((self.inactive, self.values))]
+
+    def _recorded_scene(self, record):
+        """The scene that such a record tells."""
+        inactive, values = record[2]
+        self.change(tuple(inactive), dict(values))
+        self.modes, self.remembered = Modes.of(record[0]), np.array(record[1], float)
+        demand(self.remembered.shape == (self.count + self.scene.system.memory.size,), "what is remembered")
+        return self._scene()
 
     def _resume(self, t, run, numbers):
         """After events of these numbers: whether the run of the phase goes on, with other velocities.
@@ -469,20 +476,6 @@ class _ContactRun:
         self.closing.open(self.modes.opened)
         self.again.append(t)
         return True
-
-    def configure(self):
-        """Take the scene of the present parameters, and the units that are active."""
-        self.scene = hybrid.with_values(self.base, self.values)
-        self.switched |= {id(item): item for item in self.inactive}
-        inactive = self.inactive if self.scene is self.base else [self.scene[item] for item in self.inactive]
-        self.without = dependent(self.scene, inactive)
-        self.gaps, self.frictions = gaps_of(self.scene, self.without), Frictions(self.scene)
-        off = {id(item) for item in self.without}
-        self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]
-        self.off = [i for i, unit in enumerate(self.frictions.units) if id(unit.force) in off]
-
-    def _scene_of(self, rows, holds):
-        return phase_of(self.scene, rows, holds, self.without)
 
     def _scene(self):
         """The scene of the present modes."""
@@ -506,7 +499,7 @@ class _ContactRun:
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""
         pairs = zip(self.users, self.counts, strict=True)
-        goes_on = bool(self.parts)
+        goes_on = self.end is not None
         found = [
             event._replace(limit=1.0 if event.action else event.limit - count, goes_on=goes_on)
             for event, count in pairs
@@ -529,12 +522,13 @@ class _ContactRun:
             function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
         sticking = list(modes.sticking)
-        sliding = [i for i in range(frictions.count) if i not in sticking and i not in modes.blocked]
         breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
-        slowing = _Slowing(frictions, sliding, modes.begun).over
-        for function, which in ((breaking, sticking), (slowing, sliding)):
-            for k, i in enumerate(which):
-                yield gaps.count + i, Event(Member(function, k), frictions.names[i], 1.0, -1.0)
+        slowing = _Slowing(frictions, modes.begun).over
+        for i in range(frictions.count):
+            if i in modes.blocked:
+                continue
+            function = Member(breaking, sticking.index(i)) if i in modes.sticking else Member(slowing, i)
+            yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
 
     def _still(self, phase):
         """Coordinates of the bodies that rest where frictions stick."""
@@ -553,7 +547,7 @@ class _ContactRun:
     def _reporting(self):
         if self.report is silent:
             return silent
-        (start, end), t, done = self.span, self.t, self.steps
+        (start, end), t, done = self.span, self.first[0], self.steps
 
         def report(fraction, at=0.0, steps=0):
             if fraction is not None:
@@ -565,8 +559,8 @@ class _ContactRun:
 
     def _after(self, outcome):
         """Take the end of a phase; the Status of the run, None if it goes on."""
-        end, part = outcome.end, outcome
-        self.method = outcome.method or self.method
+        self.end, archive, self.replaced = outcome.end, self.archive, False
+        end = self.end
         self.steps += end.counts["steps"]
         times, *states = outcome.events
         for i, mine in enumerate(list(zip(times, *states, strict=True))[: len(self.users)]):
@@ -577,12 +571,18 @@ class _ContactRun:
         ended = any(count >= event.limit for event, count in zip(self.users, self.counts, strict=True))
         ends = outcome.status is Status.EVENT and not ended
         goes_on = ends and end.reached < self.span[1]
-        if not self.per_step and goes_on and len(part.rows) and part.rows[-1, 0] == end.reached:
-            part = part._replace(rows=part.rows[:-1])  # that of the next phase counts
-        if self.again and part.trajectory is not None:
-            part.trajectory.begin_at(self.again)
-        self.parts.append(part)
-        self.taken += len(part.rows)
+        count = len(outcome.rows) if archive is None else archive.counts["outputs"] - self.written["outputs"]
+        if not self.per_step and goes_on and count and self.times[self.taken + count - 1] == end.reached:
+            count -= 1  # the output of the next phase counts
+        self.taken += count
+        if archive is None:
+            if self.again and outcome.trajectory is not None:
+                outcome.trajectory.begin_at(self.again)
+            self.parts.append(outcome._replace(rows=outcome.rows[:count]))
+            self.kinds.append(self.phases.of[-1])
+        else:
+            archive.go_back({**archive.counts, "outputs": self.written["outputs"] + count})
+            self.totals = summed([end.counts] if self.totals is None else [self.totals, end.counts])
         if self.settled is not None:  # within the run of the phase
             return self.settled[0]
         self.t, (self.q, self.qd, _), self.remembered = end.reached, (x.copy() for x in end.last), end.remembered
@@ -596,7 +596,7 @@ class _ContactRun:
     def _is_deep(self):
         """Whether contacts penetrate; says so."""
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        deep = [i for i in self.able if self.gap[i] < -PENETRATION * self.length]
+        deep = [i for i in (self.gap < -PENETRATION * self.length).nonzero()[0].tolist() if i in self.able]
         if deep:
             found = listed([self.gaps.names[i] for i in deep], NAMED)
             self.reason = f"Penetration was not noticed: {found}. Give a max_step."
@@ -611,20 +611,28 @@ class _ContactRun:
         jump = hybrid.carry_out(self, change)
         if jump is None:
             return Status.ACTION_FAILED
-        status = self._transit(fired)
+        if (self.qd != jump.qd).any():  # ratchets don't take hold as they would have
+            fired = [i for i in fired if i not in self.gaps.following]
+        status = self._transit(fired, jump.qd)
         hybrid.report(self, jump)
         return status
 
-    def _transit(self, fired):
-        """From one phase to the next one, after events of the units `fired`; the Status if there is no way on."""
-        self.reason = ""
+    def _transit(self, fired, qd=None):
+        """From one phase to the next one, after events of the units `fired`; the Status if there is no way on.
+
+        qd: velocities (n,) before what actions have done to them.
+        """
+        self.reason, qd = "", self.qd if qd is None else qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        near = np.flatnonzero(self.gap <= TOUCHING * self.length).tolist()
+        (near,) = (self.gap <= TOUCHING * self.length).nonzero()
         count, before = self.gaps.count, self.modes
         hit = [i for i in fired if i < count]
-        touching = {*near, *hit, *before.closed, *before.idle}.intersection(self.able)
+        touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
         status = self._settle(sorted(touching), hit)
+        if self.qd is not qd:
+            energy = diagnostics.kinetic_energy(self.scene.system, np.stack((self.q, self.q)), np.stack((qd, self.qd)))
+            self.phases.gain(energy[1] - energy[0])
         return status or self._settle_frictions(before, [i - count for i in fired if i >= count])
 
     def _is_stuck(self):
@@ -650,10 +658,11 @@ class _ContactRun:
         if not touching:
             return None
         try:
-            inertia = Inertia(self.gaps, self.t, self.q, slots)
+            inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
-            noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
-            if noise:  # a gap that closes with a rate of rounding
+            opening = [i for i in fired if i not in before.closed]
+            noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
+            if noise:  # a gap that closes with a rate of rounding, or a ratchet that takes hold
                 self.qd, rates = held(inertia, self.qd, noise, rates)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
@@ -670,69 +679,66 @@ class _ContactRun:
 
     def _settle_frictions(self, before, fired):
         """Which frictions stick; the Status if there is no way on, else None."""
-        frictions, memory = self.frictions, self.remembered[self.count :].copy()
-        resting, guess = [], {}
+        frictions, count = self.frictions, self.count
+        if not frictions.count:
+            return None
+        place, (v, sizes, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
+        self.remembered, resting, guess = self.remembered.copy(), [], {}
+        memory = self.remembered[count:]  # a part of it
+        self.modes.blocked = self.off
         for i, unit in enumerate(frictions.units):
             if i in self.off:
                 continue
-            v, size = frictions.velocity(i, self.q[None], self.qd[None])
-            speed, single = np.linalg.norm(v[0]), unit.slide.directions == 1
+            speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
             if i in before.blocked and memory[unit.way].any():
-                guess[i] = frictions.read(i, self.q, memory)
-            if speed <= max(AT_REST * size[0], 0.0 if single else STOPPED) or (single and i in fired):
+                guess[i] = place.read(i, memory)
+            if speed <= max(AT_REST * sizes[0, i], 0.0 if signed else STOPPED) or (signed and i in fired):
                 resting.append(i)
                 memory[unit.way] = 0.0
             else:
-                memory[unit.way] = frictions.written(i, self.q, v[0] / speed)
-        self.remembered = np.concatenate((self.remembered[: self.count], memory))
-        self.modes.blocked = self.off
+                memory[unit.way] = place.written(i, v[0, i] / speed)
         if not resting:
             return None
         try:
-            rest, ranks = self._rest(before, resting, {i: way for i, way in guess.items() if i in resting}, fired)
+            rest, ranks = self._rest(place, before, resting, guess, fired)
         except NoRest as error:
             names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
             self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         for i, way in rest.ways.items():
-            unit = frictions.units[i]
-            self.remembered[self.count + unit.slot : self.count + unit.way.stop] = frictions.written(i, self.q, way)
+            memory[frictions.units[i].way] = place.written(i, way)
         self.modes.sticking = {i: ranks[i] for i in rest.sticking}
         self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
-        self.modes.begun = {i: (self.t, rest.rates[i]) for i in rest.ways}
+        self.modes.begun = {i: (self.t, rate) for i, rate in rest.rates.items()}
         return None
 
-    def _rest(self, before, resting, guess, fired):
+    def _rest(self, place, before, resting, guess, fired):
         """The `Rest` of the frictions that are at rest, and how many rows hold each."""
-        frictions, ranks = self.frictions, {}
+        units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
         for i in resting:
-            if i in before.sticking:
-                ranks[i] = before.sticking[i]
-                continue
-            basis = frictions.basis(i, self.q, self._motions_of)
-            ranks[i] = len(basis)
-            numbers = frictions.numbers(i, self.q, basis)
-            for k in range(len(basis)):
-                self.remembered[self.count + np.array(frictions.units[i].held(k))] = numbers[k]
+            ranks[i] = before.sticking.get(i, -1)
+            if ranks[i] < 0:
+                basis = place.basis(i, partial(self._motions_of, place))
+                ranks[i] = len(basis)
+                for k, numbers in enumerate(place.numbers(i, basis)):
+                    memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
         phase = self._scene_of(self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
-        rows = {i: phase.packed.derived.holds[frictions.units[i].slot] for i in free}
-        memory = self.remembered[self.count :]
+        rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
             Phi = values_of(phase.packed, self.t, self.q, memory)
             for i in fresh:
                 for k, row in enumerate(rows[i]):
-                    memory[frictions.units[i].held(k)[-1]] = Phi[row]
-        bases = {i: frictions.directions(i, self.q, self._hold(i, ranks[i]).numbers) for i in free}
-        problem = RestProblem(frictions, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
-        sticking = [i for i in free if i not in guess]
-        return problem.settle(sticking, guess, fired), ranks
+                    memory[units[i].held(k)[-1]] = Phi[row]
+        bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
+        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
+        return problem.settle({i: way for i, way in guess.items() if i in free}, fired), ranks
 
-    def _motions_of(self, i):
+    def _motions_of(self, place, i):
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
-        frictions, unit = self.frictions, self.frictions.units[i]
-        hold = Hold(unit, 3, frictions.numbers(i, self.q, np.eye(3)))
+        unit = self.frictions.units[i]
+        hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
         phase = self._scene_of(self._closed_rows(), [hold])
         memory = self.remembered[self.count :].copy()
         for k in range(3):
@@ -774,40 +780,78 @@ class _ContactRun:
 
     def _lowering(self, inertia, touching, qd, rates):
         """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""
-        opening = [i for i in touching if rates[i] > 0.0]
-        if not opening:
+        opening = np.zeros(self.gaps.count, bool)
+        opening[touching] = rates[touching] > 0.0
+        if not opening.any():
             return np.zeros(self.gaps.count)
         a = -settle(inertia, [i for i in touching if rates[i] == 0.0], qd).accelerations
-        rounding = EPS * np.maximum(self.length, ROUNDED * (np.abs(inertia.J) @ np.abs(self.q)))
+        rounding = EPS * np.maximum(self.length, ROUNDED * inertia.sizes(self.q))
         rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
-        mine = np.isin(np.arange(a.size), opening)
-        return np.where(mine & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
+        return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
 
     # The whole
 
     def _outcome(self, status, began):
-        switched = [item for item in self.switched.values() if not getattr(item, "unilateral", False)]
-        self.phases.name_switched(switched)
-        parts = self.parts
+        parts = [each for each in (*self.base._added, *self.base._forces) if each.name in self.switched]
+        self.phases.name_switched([each for each in parts if not getattr(each, "unilateral", False)])
+        parts, end, archive, events = self.parts, self.end, self.archive, None
         ends = [part.end for part in parts]
-        last = ends[-1]
-        logs = self.options.history is not False
-        rows = np.concatenate([part.rows for part in parts])
-        events = None
+        logs = self.options.history is not False and archive is None
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
             events = tuple([np.concatenate(column[k]) for column in columns] for k in range(3))
         return Outcome(
-            status, self.reason, rows,
+            status, self.reason,
+            range(archive.counts["outputs"]) if archive else np.concatenate([part.rows for part in parts]),
             RunEnd(
-                last.reached, last.last, last.remembered,
-                summed([end.counts for end in ends]),
+                end.reached, end.last, end.remembered, self.totals or summed([end.counts for end in ends]),
                 StepLog([end.steps for end in ends]) if logs else None,
                 ChartLog([end.charts for end in ends]) if logs else None,
             ),
-            _Pieces([part.trajectory for part in parts]) if self.options.dense_output else None,
-            events, began, self.method, (self.phases, self.phases.of_outputs(rows[:, 0])),
+            PhasePieces([part.trajectory for part in parts], self.kinds) if self.options.dense_output else None,
+            events, began, " and ".join(self.methods), self.phases,
         )  # fmt: skip
+
+    # Checkpoints: what a run goes on with, where its present phase begins
+
+    def saved(self):
+        """Numbers and arrays by name."""
+        phases, arrays = self.phases.saved()
+        numbers = {name: getattr(self, name) for name in KEPT} | {"modes": self.modes.saved(), "phases": phases}
+        numbers |= {"changes": plain((self.inactive, self.values)), "switched": sorted(self.switched)}
+        starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
+        for where, (_, *parts) in starts.items():
+            arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
+        numbers["first"] = self.first[0]
+        if self.end is not None:
+            arrays |= {"last": self.end.last, "ended": self.end.remembered}
+            numbers["reached"] = self.end.reached
+        for i, found in enumerate(self.found):
+            columns = zip(*found, strict=True) if found else (np.empty(0), *2 * [np.empty((0, self.q.size))])
+            for name, column in zip(("t", "q", "qd"), columns, strict=True):
+                arrays[f"event {i}.{name}"] = np.concatenate(column) if found else column
+        return {"phases": numbers}, {f"{PREFIX}{name}": array for name, array in arrays.items()}
+
+    def restore(self, numbers, arrays):
+        """As it was when it was saved."""
+        with damaged("the checkpoint"):
+            known, n, arrays = numbers["phases"], self.q.size, _own(arrays)
+            vars(self).update({name: known[name] for name in KEPT})
+            self.phases.restore(known["phases"], arrays, self._recorded_scene)
+            inactive, values = known["changes"]
+            self.change(tuple(inactive), dict(values))
+            self.switched |= set(known["switched"])
+            self.modes = Modes.of(known["modes"])
+            starts = [[arrays[f"{where}{name}"] for name in START] for where in ("first.", "")]
+            for q, qd, memory in starts:
+                demand(q.shape == qd.shape == (n,) and memory.shape == self.remembered.shape, "the start of a phase")
+            self.known = self.t, *starts[1]
+            self.t, self.q, self.qd, self.remembered = self.first = known["first"], *starts[0]
+            if "reached" in known:
+                demand(arrays["last"].shape == (3, n), "the end of a phase")
+                self.end = RunEnd(known["reached"], arrays["last"], arrays["ended"], self.totals, None, None)
+            for i, found in enumerate(self.found):
+                found.append(tuple(arrays[f"event {i}.{name}"] for name in ("t", "q", "qd")))
 
 
 def jumped(inertia, qd, which, before, e, p, law="newton"):
@@ -830,37 +874,62 @@ def held(inertia, qd, which, rates):
     return qd + change, after
 
 
-class _Pinned:
-    """A trajectory with bodies that rest: to the last bit."""
-
-    def __init__(self, trajectory, q, still):
-        self.trajectory, self.q, self.still = trajectory, q, still
-        self.start, self.end, self.edges, self.anchors = (
-            trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
-        )  # fmt: skip
-
-    def __call__(self, t):
-        """As of a `Trajectory`."""
-        states, memory, status = self.trajectory(t)
-        states[:, 0, self.still], states[:, 1:, self.still] = self.q[self.still], 0.0
-        return states, memory, status
-
-
 def pinned(outcome, q, still):
     """The outcome of a phase with bodies that rest at q (n,), to the last bit; still: their coordinates."""
     if not still.size:
         return outcome
     n, last = q.size, outcome.end.last
-    outcome.rows[:, 1 + still] = q[still]
-    outcome.rows[:, 1 + n + still] = outcome.rows[:, 1 + 2 * n + still] = 0.0
+    if isinstance(outcome.rows, np.ndarray):  # else the archive has done so
+        outcome.rows[:, 1 + still] = q[still]
+        outcome.rows[:, 1 + n + still] = outcome.rows[:, 1 + 2 * n + still] = 0.0
     last[0, still], last[1:, still] = q[still], 0.0
-    trajectory = outcome.trajectory and _Pinned(outcome.trajectory, q, still)
+    trajectory = outcome.trajectory and Pinned(outcome.trajectory, q, still)
     return outcome._replace(trajectory=trajectory)
 
 
-def run_contacts(scene, options, call, run_of, run_task, instead):
+def begun(scene, t, state=None):
+    """A `_ContactRun` from a state (None for the start) at t, with the contacts that stay closed there.
+
+    Raises
+    ------
+    InconsistentState
+        If contacts penetrate, or no reactions keep them from penetrating.
+    """
+    run = _ContactRun(scene, RunOptions(), RunCall((t, t + 1.0), state=state))
+    status = run.begin()
+    if status is not None:
+        run.refuse(status)
+    return run
+
+
+def first_task(scene, options, call, run_of):
+    """The `Task` of a run of the scene, with what `run_contacts` raises before the first step."""
+    return _ContactRun(scene, options, call, run_of).check()
+
+
+def run_contacts(scene, options, call, run_of, run_task, instead, archive=None):
     """The `Task` and the `Outcome` of a run of a scene with contacts; the functions are those of `prepared_run`."""
-    return _ContactRun(scene, options, call, run_of, run_task, instead).run()
+    run = _ContactRun(scene, options, call, run_of, run_task, instead, archive)
+    if archive is not None and archive.known is not None:
+        run.restore(*archive.known)
+    return run.run()
+
+
+def recorded(numbers, arrays):
+    """Numbers and arrays of the `Phases` in a checkpoint."""
+    return numbers["phases"]["phases"], _own(arrays)
+
+
+def _own(arrays):
+    return {name.removeprefix(PREFIX): array for name, array in arrays.items() if name.startswith(PREFIX)}
+
+
+def phases_of(scene, numbers, arrays):
+    """The `Phases` of a file, of a run of this scene; raises KeyError, TypeError or ValueError if they are none."""
+    run, phases = object.__new__(_ContactRun), Phases(scene.packed)
+    run._take_scene(scene)
+    phases.restore(numbers, arrays, run._recorded_scene)
+    return phases
 
 
 @fitting
@@ -940,7 +1009,7 @@ def impact(
             e[_chosen(gaps, [item], None)] = _coefficient(value)
     elif restitution is not None:
         e[:] = _coefficient(restitution)
-    inertia = Inertia(gaps, t, q, slots)
+    inertia = Inertia(gaps, t, q, slots, which)
     before = inertia.rates(qd)[which]
     try:
         p = impulses(inertia, which, before, e[which], law)

@@ -72,7 +72,7 @@ class Change:
 
     def __init__(self, scene: Any, t: float, state: State, inactive: Any, values: dict[str, Any]) -> None:
         self.t, self.state = t, state
-        self._scene, self._inactive, self._values = scene, {id(item): item for item in inactive}, dict(values)
+        self._scene, self._inactive, self._values = scene, dict.fromkeys(inactive), dict(values)
         self._activated, self._pushes, self._ends = {}, [], False
 
     def activate(self, item: ItemLike) -> None:
@@ -88,14 +88,15 @@ class Change:
         The run ends with an account where a row of the constraint doesn't hold at the positions of the event.
         """
         item = switchable(self._scene, item)
-        if self._inactive.pop(id(item), None) is not None:
-            self._activated[id(item)] = item
+        if item.name in self._inactive:
+            del self._inactive[item.name]
+            self._activated[item.name] = item
 
     def deactivate(self, item: ItemLike) -> None:
         """Leave out a constraint or force from now on; arguments and errors as of `activate`."""
         item = switchable(self._scene, item)
-        self._activated.pop(id(item), None)
-        self._inactive[id(item)] = item
+        self._activated.pop(item.name, None)
+        self._inactive[item.name] = None
 
     def set(self, parameter: str, value: Any) -> None:
         """Set a parameter of the scene for the rest of the run.
@@ -187,6 +188,13 @@ def ask(run, events, last):
     return change
 
 
+def _deep(run):
+    """The contacts whose gaps are below zero, each with its depth."""
+    tol = run.options.initial_tol * (1.0 + np.abs(run.q).max())
+    values = run.gaps.at(run.q, run.remembered[: run.count])
+    return [f"{run.gaps.names[i]} by {-values[i]:.3g}" for i in run.able if values[i] < -tol]
+
+
 class Jump(NamedTuple):
     """What velocities jump by at an instant, to find the impulses of constraints from."""
 
@@ -201,16 +209,15 @@ def carry_out(run, change):
 
     Contacts that the impulses close are hit after it.
     """
-    run.values, run.inactive = change._values, tuple(change._inactive.values())
-    run.configure()
+    run.change(tuple(change._inactive), change._values)
     activated = list(change._activated.values())
     packed, angles = run.scene.packed, run.remembered[: run.count]
     if activated:
         run.remembered = run.remembered.copy()
         handles = handles_of(packed)
         begin_memory(packed, handles, angles, run.remembered[run.count :], map(handles.own, activated))
-    rows = Rows(run)
-    wrong = rows.violated(run.options.initial_tol)
+    rows = JumpRows(run)
+    wrong = [*rows.violated(run.options.initial_tol), *_deep(run)]
     if wrong:
         run.reason = (
             f"At t = {run.t:.9g} s these rows don't hold, m or rad: {listed(wrong, NAMED)}. Let the event find where "
@@ -232,7 +239,7 @@ def report(run, jump):
     )
     wanted = [item for item in jump.activated if id(own(item)) in members and not getattr(item, "unilateral", False)]
     if wanted:
-        rows = Rows(run)
+        rows = JumpRows(run)
         P = rows.impulses(jump.load - rows.M @ (run.qd - jump.qd), [*run.modes.closed, *run.modes.idle])
         for item in wanted:
             mine = P[members[id(own(item))].rows]
@@ -240,7 +247,7 @@ def report(run, jump):
     run.phases.impulses += found
 
 
-class Rows:
+class JumpRows:
     """Rows and masses at the present state of a run, dense."""
 
     def __init__(self, run):

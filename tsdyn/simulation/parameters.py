@@ -29,6 +29,7 @@ from ..motions.elementary import Constant
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal, numbers_of, with_number
 from ..validation import close, counted, floats, nearest, number
+from .phase_scenes import has_contacts
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -593,6 +594,8 @@ class Family:
         TsdynError
             As the attribute does when it is set.
         """
+        if has_contacts(self.template):  # scenes of its phases are packed of the scene's own rows
+            return None
         edit, groups = Edit(self), {}
         for name, value in values.items():
             field = self.field(name)

@@ -35,6 +35,12 @@ def inactive_of(scene):
     return tuple(each for each in (*scene._added, *scene._forces) if not each.active)
 
 
+def with_own_parts(scene):
+    """Pack a scene of `with_parameters` anew if it is packed with the parts of another: phases take its own."""
+    if scene._bodies and scene.packed.bodies[0] is not scene._bodies[0]:
+        scene.touch()
+
+
 def dependent(scene, items):
     """These items, and friction by reactions of joints among them: a tuple."""
     gone = {id(item) for item in items}
@@ -62,7 +68,7 @@ def phase_of(scene, rows, holds=(), without=None):
             _added=[each for each in scene._added if id(each) not in gone] + [*rows, *chain(*held)],
             _forces=[each for each in scene._forces if id(each) not in gone], _packed=None, _start=None,
             _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
-            _pack=partial(_pack_phase, phase, scene, holds, held),
+            _pack=partial(_pack_phase, phase, scene, holds, held), _whole=scene,
         )  # fmt: skip
     return known[key]
 
@@ -136,50 +142,33 @@ def first_row_of(packed):
 
 
 def at_start(scene):
-    """The scene as it is at its start: contacts that are closed hold, inactive parts are left out."""
+    """The scene as it is at its start: contacts that are closed hold; ratchets and inactive parts are left out."""
     if not has_contacts(scene):
         return scene
     from ..analyses.contact_problem import closed_gaps
 
     gaps, (q, _) = gaps_of(scene), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
-    closed = [gaps.list[i] for i in closed_gaps(gaps, q, angles)]
+    closed = [gaps.list[i] for i in closed_gaps(gaps, q, angles) if i not in gaps.following]
     return phase_of(scene, [gap.side.row for gap in closed if gap.contact.active])
 
 
-def demand_bilateral(scene):
-    """Raise InvalidArgument where a scene has contacts: a run has phases then."""
+def demand_bilateral(scene, who="this analysis"):
+    """Raise InvalidArgument where a scene has contacts."""
     if has_contacts(scene):
+        names = listed([each.name for each in contacts_of(scene._added)], NAMED)
         raise InvalidArgument(
-            "a scene with unilateral constraints is run by ts.simulate: prepared runs, ensembles, benchmarks, profiles "
-            "and analyses along a motion don't serve contacts yet."
+            f"{who} is of one phase of a run, along which {names} may open and close. In a copy of the scene, hold "
+            "those that are closed by unilateral=False, and remove the others."
         )
 
 
 def where_it_stands(function):
     """Decorate a method of scenes: contacts that are closed at the start hold, the others are left out."""
-    own = getattr(function, "__wrapped__", function)  # `fitting` names the method that is called
-
-    @wraps(function)
-    def call(scene, *arguments, **keywords):
-        return own(at_start(scene), *arguments, **keywords)
-
-    return fitting(call)
-
-
-def without_contacts(function):
-    """Decorate a method of scenes that takes constraints as bilateral: refuse scenes with contacts."""
     own = getattr(function, "__wrapped__", function)
 
     @wraps(function)
     def call(scene, *arguments, **keywords):
-        opening = [each.name for each in contacts_of(scene._added) if each.active]
-        if opening:
-            names = listed(opening, NAMED)
-            raise InvalidArgument(
-                f"{function.__name__} is for bilateral constraints, and {names} open{'s' * (',' not in names)}. Remove "
-                "these from a copy of the scene, or hold them closed by unilateral=False."
-            )
         return own(at_start(scene), *arguments, **keywords)
 
     return fitting(call)

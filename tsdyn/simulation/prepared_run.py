@@ -28,11 +28,11 @@ from ..taylor.series_engine import SeriesEngine
 from ..validation import damaged
 from . import stored_runs
 from .local_origin import origin_of, run_near, within_rounding
-from .phase_scenes import demand_bilateral, has_contacts
+from .phase_scenes import at_start, with_own_parts
 from .progress import reporter
 from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented, from_names
 from .scene import Scene
-from .scene_cache import prepared
+from .scene_cache import prepared, prepared_numbers
 from .segments import Turns, run_segments
 from .solution import Solution
 
@@ -172,13 +172,15 @@ class Run:
 
     @fitting
     def __init__(self, scene: Scene, options: RunOptions) -> None:
-        demand_bilateral(scene)
         self.scene, self.options, self._form = scene, options, options.form
+        if options.acts:
+            with_own_parts(scene)
+        self._first = at_start(scene)  # whose method and kernels are those of the first phase
         self._compiled = set()  # with outputs between steps, or not
         self._last = self._seen = None  # the last `_Last`, and state
         self._prepare_kernels(options.dense_output or options.events is not None)
-        self._prepared = kept = prepared(scene)
-        self._start = scene._initial()
+        self._prepared = kept = prepared(self._first)
+        self._packed, self._start = scene.packed, scene._initial()
         self.method = method = first_method(options, kept)
         self._driver = DRIVERS.get(method.driver, method.driver)
 
@@ -215,7 +217,7 @@ class Run:
         scene = self.scene
         if scene._users:
             scene.refresh()
-        if scene._prepared is not self._prepared or scene._start is not self._start:
+        if scene._packed is not self._packed or scene._start is not self._start:
             raise InvalidArgument(
                 "the scene has changed since it was prepared: prepare it again, by ts.prepare(scene, ...), or leave "
                 "the scene as it is and change numbers by run.with_parameters({...})."
@@ -256,6 +258,8 @@ class Run:
         started, is_stored = clock(), call.store is not None or call.checkpoint is not None
         if is_stored and archive is None and found[0] is None:
             stored_runs.demand_storable(call, self.options)
+        if self._has_phases(call):
+            return self._solve_phases(call, found, is_stored)
         task = self._task(call)
         if is_stored:
             return self._stored(task, call, found, archive)
@@ -271,9 +275,48 @@ class Run:
                 return self._by(other)._solve(call)
         return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
+    def _has_phases(self, call):
+        """Whether a run is a sequence of phases: by the scene, by actions of events, or by what these have changed."""
+        acts = self.options.acts or getattr(call.state, "phase", None) is not None
+        return acts or self._first is not self.scene
+
+    def _solve_phases(self, call, found, is_stored):
+        """The same of a run with phases."""
+        from . import contact_run
+
+        started, scene, options, archive, goes_on = clock(), self.scene, self.options, None, ""
+        if is_stored:
+            archive = stored_runs.archive_of(
+                {"scene": scene, **by_name(options, call)}, prepared_numbers(scene), bool(options.history), *found
+            )
+        if archive is not None and found[0] is not None and found[0].get("ended"):
+            task = contact_run.first_task(scene, options, call, _run_of)
+            outcome = self._ended(task, *found, archive)
+            with damaged("the checkpoint"):
+                phases = contact_run.phases_of(scene, *contact_run.recorded(*found))
+            outcome = outcome._replace(phases=phases)
+            return Solution(scene, task, outcome, {"prepare": 0.0, "run": found[0]["seconds"]})
+        try:
+            task, outcome = contact_run.run_contacts(scene, options, call, _run_of, run_task, instead, archive)
+            task, seconds = task._replace(method=self.method), clock() - started
+            outcome = outcome._replace(method=outcome.method if outcome.method != repr(self.method) else "")
+            if archive is not None:
+                outcome = stored_runs.ended(archive, outcome, seconds, task)
+                goes_on = stored_runs.call_to_go_on(archive)
+        finally:
+            if archive is not None:
+                archive.close()
+        timed = {"prepare": outcome.began - started, "run": seconds}
+        return Solution(scene, task, outcome, timed, goes_on)
+
     def _check(self, call: RunCall) -> None:
         """Raise what a call raises before anything is run."""
-        self._task(call)
+        if not self._has_phases(call):
+            self._task(call)
+            return
+        from . import contact_run
+
+        contact_run.first_task(self.scene, self.options, call, _run_of)
 
     def _task(self, call):
         """The `Task` of a call, its start consistent with the constraints.
@@ -313,13 +356,14 @@ class Run:
         within = options.dense_output or options.events is not None or between(times, span)
         self._prepare_kernels(within)
         stops = kept.stops(*span, method.step is None)
+        begins = memory is None and state is None
         memory = remembered(state, kept, span[0], start[0]) if memory is None else memory
         q, qd = kept.start(self.scene, start, span[0], options.initial_tol, memory, options.redundancy == "drop")
         if not self._form.basis_free or method.implicit:
             demand_holonomic(kept.packed, q, span[0], options.formulation)
         choose = sampling = None
         if kept.sampled:  # a sampled controller can't be run again: no turns
-            sampling = Sampling(kept, state is not None)
+            sampling = Sampling(kept, not begins)
         elif options.method is None:
             choose = turns_of(self.scene, kept, method, self._form, span, within)
         history = call.store is None if options.history is None else options.history
@@ -334,7 +378,7 @@ class Run:
         if within not in self._compiled:
             options = self.options
             default = options.rtol, options.atol, options.may_use_series
-            prepare_first_run(self.scene, options.method, self._form, within, default)
+            prepare_first_run(self._first, options.method, self._form, within, default)
             self._compiled.add(within)
 
     def _by(self, method):
@@ -348,9 +392,7 @@ class Run:
         archive = archive or stored_runs.archive_of(given, kept, task.history, numbers, arrays)
         started = clock()
         if numbers is not None and numbers.get("ended"):
-            with damaged("the checkpoint"):
-                slots = kept.handles.count + kept.packed.system.memory.size
-                outcome = stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
+            outcome = self._ended(task, numbers, arrays, archive)
             return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
         try:
             outcome = run_task(task._replace(archive=archive), scene, self.options.initial_tol)
@@ -366,6 +408,14 @@ class Run:
         timed = {"prepare": outcome.began - started, "run": seconds}
         return Solution(scene, task, outcome, timed, stored_runs.call_to_go_on(archive))
 
+    @staticmethod
+    def _ended(task, numbers, arrays, archive):
+        """The `Outcome` of a stored run that has ended."""
+        kept = task.prepared
+        with damaged("the checkpoint"):
+            slots = kept.handles.count + kept.packed.system.memory.size
+            return stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
+
     def __reduce__(self):
         """A Run that is pickled is prepared anew where it is read."""
         return Run, (self.scene, self.options)
@@ -380,7 +430,7 @@ class Run:
                 f"rtol={method.rtol:g}, atol={method.atol:g} of the run; each step is held to rtol={rtol:.2g}, "
                 f"atol={atol:.2g} (safety factor {method.rtol / rtol:.3g})"
             )
-        kernels = kernels_of(self.scene, method, self._form, True in self._compiled)
+        kernels = kernels_of(self._first, method, self._form, True in self._compiled)
         laws = {load.force.name: load.law for load in self._prepared.packed.loads if load.law is not None}
         said = [f"{name} {law.said}" for name, law in laws.items()]
         return {
@@ -576,18 +626,7 @@ def simulate(  # many arguments, by name: each is an option of a run
         max_step, history, chart_interval, law,
     )  # fmt: skip
     call = RunCall(t_span, t_eval, store, checkpoint, progress, state)
-    if has_contacts(scene) or options.acts or getattr(state, "phase", None) is not None:
-        return _solve_contacts(scene, options, call)
     return _run_of(scene, options, call)._solve(call)
-
-
-def _solve_contacts(scene, options, call):
-    """Run a scene with unilateral constraints."""
-    from .contact_run import run_contacts
-
-    started = clock()
-    task, outcome = run_contacts(scene, options, call, _run_of, run_task, instead)
-    return Solution(scene, task, outcome, {"prepare": outcome.began - started, "run": clock() - outcome.began})
 
 
 def _run_of(scene, options, call):
@@ -604,7 +643,7 @@ def _run_of(scene, options, call):
     output_times(call.t_eval, *interval(call.t_span))
     run = Run(scene, options)
     if options.events is None and is_plain(run.method):
-        kept = run._prepared
+        kept = prepared_numbers(scene)
         kept.runs = (run, *kept.runs[: KEPT - 1])  # and not written to: other threads may be reading
     return run
 

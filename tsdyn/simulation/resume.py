@@ -12,7 +12,7 @@ from ..validation import clipped, damaged
 from .prepared_run import Run
 from .run_options import demand_arguments_of_file, from_names
 from .scene import Scene
-from .scene_cache import prepared
+from .scene_cache import prepared_numbers
 from .solution import Solution
 from .stored_runs import Lacking, arguments_of, demand_path, demand_same_place, demand_same_scene
 
@@ -82,7 +82,7 @@ def _resumed(path, numbers, arrays, scene, events=None, progress=None):
         scene = _scene_of(path, numbers, arrays)
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
-    demand_same_scene(path, prepared(scene).packed, numbers["scene"])
+    demand_same_scene(path, prepared_numbers(scene).packed, numbers["scene"])
     with damaged("the checkpoint"):
         given = arguments_of(numbers["arguments"], arrays, scene)
         demand_arguments_of_file({**given, "store": path})

@@ -96,7 +96,6 @@ CHECKS = {  # of values that are not the default; each returns the value as it i
 LAWS = "newton", "poisson"  # of impact
 
 
-
 @fitting_constructor
 @dataclass(frozen=True, repr=False)
 class RunOptions:
@@ -131,8 +130,9 @@ class RunOptions:
         f(t, state) -> float with a `State`. All zeros inside every step are located on the manifold and recorded in
         `solution.t_events`: sign changes, and touches of zero within rounding, which count once. Events never change
         the steps. As for scipy.integrate.solve_ivp, an attribute `direction` > 0 or < 0 selects rising or falling
-        zeros, and `terminal` = True, or a number of occurrences, ends the run. A function that raises, or returns no
-        finite number, ends the run with success=False.
+        zeros, and `terminal` = True, or a number of occurrences, ends the run. An attribute `action`, a function of a
+        `Change`, changes the scene at each occurrence: parts come and go, parameters are set, bodies are hit. A
+        function that raises, or returns no finite number, ends the run with success=False.
     max_steps : int, optional
         Largest number of steps; the run ends there.
     max_step : float, s, optional

@@ -5,28 +5,28 @@ from __future__ import annotations
 import csv
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InvalidArgument, InvalidFile, MissingDependency, Status, StorageError
 from ..files.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
-from ..formulations.locked_orientations import keep_turning
 from ..formulations.registry import formulation
 from ..model.handles import handles_of
 from ..model.packed import has_rates
 from ..observables.channels import channels_of, values_of
 from ..observables.diagnostics import ConstraintError
-from ..rows.graph_builder import graph_of, set_redundant
 from ..rows.interface import redundancy
 from ..runs import step_engine
 from ..runs.dense_output import StepPieces, Trajectory
 from ..runs.run_log import NAMES, RunEnd, demand_noted
 from ..taylor import series_engine
 from ..taylor.layout import series_width
-from ..validation import damaged, demand, demand_numbers, demand_record, text_cell
+from ..validation import damaged, demand, demand_numbers, demand_record, is_count, text_cell
 from ..workspaces import B_CHART, B_DATA, B_END
 from . import local_origin
+from .phases import PhasePieces, Phases, Pinned, derived_record, take_derived
 from .scene_cache import prepared
 from .stored_runs import (
     Lacking,
@@ -57,7 +57,13 @@ def record_of(trajectory):
     if isinstance(trajectory, StepPieces):
         parts = [record_of(part) for part in trajectory.parts]
         arrays = {f"{i}_{name}": array for i, (_, found) in enumerate(parts) for name, array in found.items()}
-        return {"kind": "parts", "parts": [numbers for numbers, _ in parts]}, arrays
+        numbers = {"kind": "parts", "parts": [numbers for numbers, _ in parts]}
+        if isinstance(trajectory, PhasePieces):
+            numbers |= {"kind": "phases", "kinds": trajectory.kinds}
+        return numbers, arrays
+    if isinstance(trajectory, Pinned):
+        numbers, arrays = record_of(trajectory.trajectory)
+        return {"kind": "pinned", "inner": numbers}, {**arrays, "still": trajectory.still, "resting": trajectory.q}
     if isinstance(trajectory, local_origin._Moved):
         numbers, arrays = record_of(trajectory.trajectory)
         return {"kind": "moved", "inner": numbers}, {**arrays, "shift": trajectory.shift}
@@ -71,26 +77,8 @@ def record_of(trajectory):
     return {**found, "start": float(trajectory.start), "derived": derived_record(packed)}, arrays
 
 
-def derived_record(packed):
-    """What a run has found out about its constraint graph: redundant rows, and bodies that count as turning."""
-    rows = packed.derived.redundant
-    turning = sorted(int(body) for body in packed.derived.turning)
-    return {"redundant": None if rows is None else np.asarray(rows).tolist(), "turning": turning}
-
-
-def take_derived(packed, record):
-    """Enter it into a packed scene."""
-    rows, most = record["redundant"], len(graph_of(packed).row)
-    if rows is not None:
-        demand(all(type(row) is int and 0 <= row < most for row in rows), "the redundant rows")
-        set_redundant(packed, np.array(rows, np.int64))
-    if record["turning"]:
-        demand(set(record["turning"]) <= set(range(len(packed.bodies))), "the turning bodies")
-        keep_turning(packed, record["turning"])
-
-
-def trajectory_of(numbers, arrays, scene, packed):
-    """The trajectory of a record.
+def trajectory_of(numbers, arrays, scenes):
+    """The trajectory of a record; scenes: that of the run, or of each kind of its phases.
 
     Raises
     ------
@@ -98,16 +86,28 @@ def trajectory_of(numbers, arrays, scene, packed):
         If its method is a plug-in that isn't known here.
     """
     kind = numbers["kind"]
-    if kind == "parts":
+    if kind in ("parts", "phases"):
         parts = numbers["parts"]
         own = [{name[len(f"{i}_") :]: array for name, array in arrays.items() if name.startswith(f"{i}_")}
                for i in range(len(parts))]  # fmt: skip
-        return StepPieces([trajectory_of(part, found, scene, packed) for part, found in zip(parts, own, strict=True)])
+        if kind == "parts":
+            return StepPieces([trajectory_of(part, found, scenes) for part, found in zip(parts, own, strict=True)])
+        kinds = numbers["kinds"]
+        demand(all(is_count(each) and each < len(scenes) for each in kinds), "the kinds of phases")
+        every = zip(parts, own, [[scenes[each]] for each in kinds], strict=True)
+        return PhasePieces([trajectory_of(*part) for part in every], kinds)
+    (scene,) = scenes
+    packed = scene.packed
+    if kind == "pinned":
+        q, still = arrays["resting"], arrays["still"].astype(int)
+        demand(q.ndim == 1 and np.isin(still, np.arange(q.size)).all(), "the bodies at rest")
+        return Pinned(trajectory_of(numbers["inner"], arrays, scenes), q, still)
     if kind == "moved":
         shift = arrays["shift"]
         demand(shift.shape == (int(packed.system.bodies[:, 1].sum()),), "the origin")
         local = local_origin._local(prepared(scene), scene, shift[:3]).packed
-        return local_origin._Moved(trajectory_of(numbers["inner"], arrays, scene, local), shift)
+        stand_in = SimpleNamespace(packed=local)
+        return local_origin._Moved(trajectory_of(numbers["inner"], arrays, [stand_in]), shift)
     if numbers["derived"] != derived_record(packed):
         take_derived(packed, numbers["derived"])
     blocks, charts, points, first, angles, asked = found = [arrays[name] for name in ARRAYS]
@@ -174,8 +174,6 @@ def save(solution: Solution, path: Place) -> Path:
     demand_path(path, "path")
     path = Path(path).absolute()
     saved_file.format_at(path)
-    if solution._phases is not None:
-        raise InvalidArgument("files don't hold solutions with contacts yet: use to_csv or to_dataframe for outputs.")
     if solution._lacks:
         remembered = solution._width
         content = solution._content
@@ -226,6 +224,9 @@ def _content(solution):
         "derived": derived_record(solution.packed),
         "events": None,
     }
+    if solution._phases is not None:
+        numbers["phases"], found = solution._phases.saved()
+        arrays |= {f"phase_{name}": array for name, array in found.items()}
     if solution.t_events is not None:
         numbers["events"] = len(solution.t_events)
         for name, found in zip(
@@ -398,10 +399,14 @@ def _solution(path, record, arrays, scene, kind, width=None):
         events = [[arrays[f"event_{i}_{name}"] for i in range(record["events"])] for name in ("t", "q", "qd")]
         for t, q, qd in zip(*events, strict=True):
             demand(q.shape == qd.shape == (t.size, n) and t.ndim == 1, "its events")
-    trajectory = None
+    trajectory = phases = None
+    if record.get("phases") is not None:
+        own = {name.removeprefix("phase_"): array for name, array in arrays.items() if name.startswith("phase_")}
+        phases = _phases(scene, record["phases"], own)
     if record.get("trajectory") is not None:
         dense = {name.removeprefix("dense_"): array for name, array in arrays.items() if name.startswith("dense_")}
-        trajectory = trajectory_of(record["trajectory"], dense, scene, packed)
+        scenes = [scene] if phases is None else phases.scenes
+        trajectory = trajectory_of(record["trajectory"], dense, scenes)
     run_end = RunEnd(
         record["reached"], arrays["last"], np.concatenate((arrays["angles"], arrays["memory"])), record["counts"],
         StoredLog.of(outputs, "steps"), StoredLog.of(outputs, "charts"),
@@ -412,11 +417,22 @@ def _solution(path, record, arrays, scene, kind, width=None):
         t_events=events[0], q_events=events[1], qd_events=events[2],
         _method=record["method"], _trajectory=trajectory, _end=run_end, _turned="", _seconds=record["seconds"],
         _energy_error=record["energy_error"], _reason=record["reason"], _message=record["message"],
-        _phases=None, _phase_of_rows=None,
+        _phases=phases,
         _provenance=record["provenance"],
     )  # fmt: skip
     found._take(outputs, n)
     return found
+
+
+def _phases(scene, numbers, arrays):
+    """The `Phases` of a record; of the scene of an outline, in which parts are lacking, times and names alone."""
+    if scene._lacks:
+        phases = Phases(scene.packed)
+        phases.restore(numbers, arrays)
+        return phases
+    from .contact_run import phases_of  # what runs without contacts import none of
+
+    return phases_of(scene, numbers, arrays)
 
 
 # Outputs of a run as labelled arrays and data frames, with the names and units of stores.

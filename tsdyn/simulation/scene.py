@@ -6,6 +6,7 @@ import html
 import os
 from collections import Counter
 from contextlib import suppress
+from functools import wraps
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Never
@@ -39,7 +40,7 @@ from .analyses import linearise as _linearise
 from .analyses import set_start as _set_start
 from .given_motion import inverse_dynamics as _inverse_dynamics
 from .given_motion import kinematics as _kinematics
-from .phase_scenes import where_it_stands, without_contacts
+from .phase_scenes import has_contacts, where_it_stands
 from .scene_cache import preparing
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
 from .variants import activate as _activate
@@ -96,6 +97,31 @@ def _rows(lines):
         yield f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in line)}</tr>"
     if len(lines) > SHOWN:
         yield f"<tr><td>and {len(lines) - SHOWN} more</td><td></td><td></td></tr>"
+
+
+# Methods of scenes with contacts, beside those of other scenes.
+
+
+def _serving(name):
+    """Decorate a method of scenes: where there are contacts, the function of this name in standing.py serves it.
+
+    That is given the scene and the method, and the arguments of the call.
+    """
+
+    def decorate(function):
+        own = getattr(function, "__wrapped__", function)  # `fitting` names the method that is called
+
+        @wraps(function)
+        def call(scene, *arguments, **keywords):
+            if not has_contacts(scene):
+                return own(scene, *arguments, **keywords)
+            from . import standing
+
+            return getattr(standing, name)(scene, own, *arguments, **keywords)
+
+        return fitting(call)
+
+    return decorate
 
 
 # `Scene.save`.
@@ -218,6 +244,7 @@ class Scene:
     _named = None  # of a file with a table `parameters`: its `NamedNumbers`
     _phases = _opens = None  # of a scene with contacts, or inactive parts: see phase_scenes.py
     _pack = pack  # what packs it; of a phase its own
+    _whole = None  # of a phase: the scene
     _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:
@@ -578,14 +605,14 @@ class Scene:
     evaluate = where_it_stands(_evaluate)
     assemble = where_it_stands(_assemble)
     mobility = where_it_stands(_mobility)
-    linearise = where_it_stands(_linearise)
-    equilibrium = without_contacts(_equilibrium)
-    kinematics = without_contacts(_kinematics)
-    inverse_dynamics = without_contacts(_inverse_dynamics)
+    linearise = _serving("linearise")(_linearise)
+    equilibrium = _serving("equilibrium")(_equilibrium)
+    kinematics = _serving("along")(_kinematics)
+    inverse_dynamics = _serving("along")(_inverse_dynamics)
     parameters = _parameters
     with_parameters = _with_parameters
     set = where_it_stands(fitting(set_joint))
-    set_start = _set_start
+    set_start = _serving("set_start")(_set_start)
     remove = _remove
     activate = fitting(_activate)
     deactivate = fitting(_deactivate)

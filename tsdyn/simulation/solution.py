@@ -221,7 +221,10 @@ def work(solution, trajectory, item=None):
     for first in range(0, edges.size - 1, AT_ONCE):
         some = edges[first : first + AT_ONCE + 1]
         pieces = np.append(pieces, _integrals(solution, trajectory, item, some[:-1], some[1:], 0))
-    return np.append(0.0, np.cumsum(pieces))[np.searchsorted(edges, solution.t)]
+    done = np.append(0.0, np.cumsum(pieces))[np.searchsorted(edges, solution.t)]
+    if item is None and solution._phases is not None:  # impacts
+        done += solution._phases.gained()[solution._phase_of_rows]
+    return done
 
 
 def _integrals(solution, trajectory, item, a, b, depth, known=None):
@@ -354,7 +357,7 @@ class Balances:
 
     @cached_property
     def work(self) -> Floats:
-        """Work (k,), J, since the start: of applied and driving forces, less dissipation.
+        """Work (k,), J, since the start: of applied and driving forces, less dissipation and losses of impacts.
 
         energy - work is constant up to the integration error. The work is integrated over the dense output.
 
@@ -490,11 +493,10 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         self.status, self._trajectory = outcome.status, outcome.trajectory
         self.t_events, self.q_events, self.qd_events = outcome.events or (None, None, None)
         self.handles = task.prepared.handles
-        self._phases, self._phase_of_rows = outcome.phases or (None, None)
+        self._phases = outcome.phases
         self._take(outcome.rows, task.q.size)
         self._seconds, self._energy_error, self._end = seconds, None, outcome.end
-        near = outcome.end.near_steps
-        if near:
+        if outcome.end.near_steps and self._phases is None:
             self._energy_error = energy_error(self, task)
         redundant = self.packed.derived.redundant
         self._redundant = 0 if redundant is None else len(redundant)
@@ -691,6 +693,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             If it is none of these.
         """
         item = self.handles.item(control)
+        if reactions.is_idle(self.packed, item):
+            return np.zeros((self.t.size, len(getattr(item, "actuators", "xyz"))))
         load = reactions.loads_of(self.packed).get(id(item))
         if load is None or load.law is None:
             raise InvalidForce(f"actuation: {control!r} is no Control of this scene, nor a load by the scene's state.")

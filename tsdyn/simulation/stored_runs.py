@@ -9,6 +9,7 @@ import json
 import os
 import platform
 import time
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -29,7 +30,7 @@ from ..runs.arguments import state_arrays
 from ..runs.run_log import RunEnd
 from ..runs.task import Outcome
 from ..validation import clipped, damaged, demand, demand_numbers, demand_record, is_count, number, shown
-from .scene_cache import prepared
+from .scene_cache import prepared_numbers
 
 if TYPE_CHECKING:
     from ..hints import Floats, Scene
@@ -77,7 +78,7 @@ def request_of(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
         except InvalidArgument as error:
             numbers["lacks"] = str(error)
     if "scene" not in arrays:
-        found, text = outline_of(scene, prepared(scene).packed)
+        found, text = outline_of(scene, prepared_numbers(scene).packed)
         numbers, arrays = numbers | found, arrays | text
     return numbers, arrays
 
@@ -92,7 +93,7 @@ def arguments_of(numbers: dict[str, Any], arrays: dict[str, Any], scene: Scene) 
         nothing = np.empty(0)
         q, qd, qdd, lam = (nothing if found[name] is None else found[name] for name in STATE[:4])
         parts = numbers["t"], q, qd, qdd, lam
-        anchor, kept = None if found["angles"] is None else Anchor(found["angles"]), prepared(scene)
+        anchor, kept = None if found["angles"] is None else Anchor(found["angles"]), prepared_numbers(scene)
         bare = found["memory"] is None and anchor is None
         state = State(*parts) if bare else RememberingState.of(kept.handles, found["memory"], anchor, *parts)
         given["state"], start = state, state_arrays(state, kept.n)
@@ -197,6 +198,14 @@ class RunOutputs:
             self._set_remembered(np.empty((self._length(), 0)) if found is None else found)
         return self.__dict__[name]
 
+    @cached_property
+    def _phase_of_rows(self):
+        """The number of the phase of each output (k,); None of a run without phases."""
+        if self._phases is None:
+            return None
+        t = self.t if self._stored is None else self._stored.read(_COLUMNS["t"], slice(None))
+        return self._phases.of_outputs(t)[self._slice]
+
     def _length(self):
         """How many outputs there are; of a store without a look at them."""
         return self.t.size if self._stored is None else len(range(self._stored.count)[self._slice])
@@ -224,7 +233,7 @@ class RunOutputs:
         for name in ("t", "q", "qd", "qdd", "_remembers"):
             setattr(other, name, getattr(self, name)[part])
         other.anchor = Anchor(self.anchor.angles[part])
-        if self._phase_of_rows is not None:
+        if self._phases is not None:
             other._phase_of_rows = self._phase_of_rows[part]
         return other
 

@@ -16,7 +16,6 @@ from ..errors import InvalidArgument, InvalidBody
 from ..model.handles import handles_of
 from ..model.packed import classes
 from ..validation import listed
-from .phase_scenes import has_contacts
 from .scene_cache import prepared_numbers
 
 if TYPE_CHECKING:
@@ -192,6 +191,8 @@ def copy(scene: Scene) -> Scene:
         _freeze(vars(item), vars(memo[id(item)]))
         if isinstance(item, PointMass):
             _freeze(item.values, memo[id(item)].values)
+    for body in (twin.ground, *twin._bodies):
+        vars(body)["scene"] = twin  # of the scene of a phase, too
     twin.gravity = scene.gravity
     twin._twins = WeakKeyDictionary((item, memo[id(item)]) for item in own)
     return twin
@@ -320,7 +321,7 @@ def of_numbers(scene, family, changes, packed, start):
     vars(other).update(
         _gravity=packed.system.gravity.copy(), _packed=packed, _start=start, _prepared=kept.like(packed),
         _users=scene._users, _functions=scene._functions, _waiting={}, _titles=None, _names=None, _twins=None,
-        _aliases=None, _opens=has_contacts(scene), _later=(family, changes),
+        _aliases=None, _opens=False, _later=(family, changes),
         **{name: vars(scene)[name] for name in ("imported", "_drawn", "_named") if name in vars(scene)},
     )  # fmt: skip
     other._gravity.setflags(write=False)

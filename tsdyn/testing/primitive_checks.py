@@ -134,6 +134,7 @@ def _check_kernels(constraint, name, rng, par):
     if kind.rows:
         _check_positions(f, name, kind.rows, (x, xd, t), labels)
     if kind.rate_rows:
+        f.anywhere = kind.anywhere
         _check_rates(f, name, kind.rate_rows, (x, xd, t), labels)
 
 
@@ -219,7 +220,7 @@ def _check_rates(f, name, rows, motion, labels):
     later = np.zeros((rows, size), complex)
     f.rate_jacobian(x, t + step, later)
     curl = np.abs(slopes - slopes.transpose(2, 1, 0)).max(axis=(0, 2))
-    curl = np.maximum(curl, np.abs(later.imag / COMPLEX_STEP - drifts).max(axis=1))
+    curl = np.maximum(curl, np.abs(later.imag / COMPLEX_STEP - drifts).max(axis=1)) + f.anywhere
     for i in np.flatnonzero(curl <= ROUNDED * np.maximum(1.0, np.abs(slopes).max(axis=(0, 2)))):
         warnings.warn(
             f"{name}: rate[{i}] is the derivative of a function of positions. Write that function as a row of phi: "

@@ -1,0 +1,171 @@
+"""Analyses of scenes with contacts: what holds at a state, equilibria, motions, prepared runs; against closed forms."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+
+C = ts.constraints
+G = 9.81
+
+
+def ball_on_floor(height=1.0, e=0.5):
+    scene = ts.Scene(gravity=(0, 0, -G))
+    ball = scene.add_point_mass(mass=2.0, position=(0, 0, height), name="ball")
+    scene.add(C.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True, restitution=e, name="floor"))
+    return scene
+
+
+def pendulum(**bounds):
+    """A bar of 2 kg, its centre 1 m below the hinge, with a stop."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    bar = scene.add_body(mass=2.0, inertia=(0.2, 0.2, 0.01), position=(0, 0, -1), name="bar")
+    hinge = scene.add(C.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    scene.set(hinge, angle=1.0)
+    scene.add(C.Stop(hinge, **bounds, name="stop"))
+    return scene
+
+
+def box():
+    scene, size = ts.Scene(gravity=(0, 0, -G)), np.array([1.0, 0.6, 0.4])
+    body = scene.add_body(**ts.shapes.box(size, mass=2.0), position=(0, 0, 0.2), name="box")
+    for i in range(8):
+        corner = size / 2 * [2 * (i & 1) - 1, (i & 2) - 1, (i & 4) / 2 - 1]
+        contact = {"normal_b": (0, 0, 1), "unilateral": True, "name": f"corner {i}"}
+        scene.add(C.PlaneContact(body, scene.ground, point_a=corner, **contact))
+    return scene
+
+
+# prepared runs
+
+
+def test_a_prepared_run_has_the_bits_of_simulate():
+    scene = ball_on_floor()
+    run, whole = ts.prepare(scene, rtol=1e-10), ts.simulate(scene, (0, 2), rtol=1e-10)
+    for _ in range(2):
+        again = run((0, 2))
+        np.testing.assert_array_equal(again.q, whole.q)
+        assert (again.phases, again.impulses) == (whole.phases, whole.impulses)
+    assert "Taylor" in str(run)
+    other = run.with_parameters({"floor.restitution": 0.0})((0, 2))
+    assert len(other.impulses) == 1
+    scene["floor"].restitution = 0.9
+    with pytest.raises(ts.InvalidArgument, match="has changed"):
+        run((0, 2))
+
+
+def test_a_prepared_run_in_threads():
+    run = ts.prepare(pendulum(lower=-0.3, upper=2.0, restitution=0.7))
+    alone = run((0, 3))
+    with ThreadPoolExecutor(4) as pool:
+        for found in pool.map(run, [(0, 3)] * 8):
+            np.testing.assert_array_equal(found.q, alone.q)
+            assert found.impulses == alone.impulses
+
+
+# at a state as it stands
+
+
+def test_a_state_at_rest_is_linearised_with_its_contacts():
+    """A pendulum against its stop has no freedom, away from it that of a pendulum; a ball on a floor slides only."""
+    scene = pendulum(lower=0.3)
+    resting = ts.simulate(scene, (0, 3.0)).state
+    assert scene.linearise(resting).coordinates == ()
+    assert scene.linearise().coordinates == ("hinge.angle",)
+    ball = ball_on_floor()
+    assert ball.linearise(ts.simulate(ball, (0, 3.0)).state).coordinates == ("ball.x", "ball.y")
+
+
+def test_a_state_before_an_impact_is_not_linearised():
+    scene = ball_on_floor()
+    before = ts.State(0.5, np.zeros(3), np.array([0, 0, -1.0]), None, None)
+    with pytest.raises(ts.InconsistentState, match=r"linearise: velocities jump at this state, by the impact of floor"):
+        scene.linearise(before)
+    after, _ = ts.impact(scene, before)
+    assert len(scene.linearise(after).coordinates) == 3
+
+
+def test_a_state_becomes_the_start():
+    scene = ball_on_floor()
+    resting = ts.simulate(scene, (0, 4.0))
+    scene.set_start(resting)
+    assert ts.simulate(scene, (0, 1.0)).phases == [(0.0, 1.0, ("floor",))]
+    with pytest.raises(ts.InconsistentState, match=r"floor by 0\.5"):
+        scene.set_start(resting.state._replace(q=np.array([0, 0, -0.5])))
+    assert scene["ball"].position[2] == resting.q[-1, 2]
+
+
+# equilibria
+
+
+def test_a_ball_rests_on_the_floor():
+    scene = ball_on_floor(height=0.0)
+    found = scene.equilibrium()
+    assert found.stable
+    np.testing.assert_allclose(found.reaction("floor")[0], [0, 0, 2 * G], rtol=1e-13)
+    np.testing.assert_allclose(found.state.reaction("floor")[0], [0, 0, 2 * G], rtol=1e-13)
+    with pytest.raises(ts.NoEquilibrium, match=r"Open contacts don't count: floor\. Start where"):
+        ball_on_floor().equilibrium()
+
+
+def test_a_spring_lifts_a_ball_off_the_floor():
+    """Closed at the guess, its reaction would pull: the contact opens, and the spring carries the weight alone."""
+    scene = ball_on_floor(height=0.0)
+    hook = {"point_b": (0, 0, 1), "free_length": 0.5, "name": "hook"}
+    scene.add(ts.forces.Spring(scene["ball"], scene.ground, **hook, stiffness=100.0))
+    found = scene.equilibrium()
+    np.testing.assert_allclose(found.state.position("ball")[2], 0.5 - 2 * G / 100, atol=1e-12)
+    np.testing.assert_array_equal(found.reaction("floor")[0], 0.0)
+    scene["hook"].stiffness = 10.0  # which doesn't lift it
+    np.testing.assert_allclose(scene.equilibrium().reaction("floor")[0][2], 2 * G - 5.0, rtol=1e-13)
+
+
+def test_a_pendulum_falls_onto_its_stop():
+    """Open at the start: the way down meets the stop, whose torque is m g sin(0.3)."""
+    found = pendulum(lower=0.3, upper=2.0).equilibrium()
+    assert abs(found.state.angle("hinge") - 0.3) < 1e-14
+    np.testing.assert_allclose(found.reaction("stop")[1][1], 2 * G * np.sin(0.3), rtol=1e-12)
+    free = pendulum(lower=-0.3, upper=2.0).equilibrium()
+    assert abs(free.state.angle("hinge")) < 1e-14
+    np.testing.assert_allclose(free.smallest_stiffness, 2 * G / 2.2, rtol=1e-10)
+    np.testing.assert_array_equal(free.reaction("stop")[1], 0.0)
+
+
+def test_redundant_contacts_of_a_box():
+    """Four corners carry the weight, none pulls; pulled up at a side, those of the other side carry more."""
+    scene = box()
+    found = scene.equilibrium()
+    forces = np.array([found.reaction(f"corner {i}")[0][2] for i in range(8)])
+    assert forces.min() > -1e-12
+    np.testing.assert_allclose(forces.sum(), 2 * G, rtol=1e-13)
+    scene.add(ts.forces.PointForce(scene["box"], point_a=(0.5, 0, 0), force=(0, 0, G / 2)))
+    found = scene.equilibrium()
+    forces = np.array([found.reaction(f"corner {i}")[0][2] for i in range(4)])
+    np.testing.assert_allclose([forces.sum(), forces[1] + forces[3]], [1.5 * G, 0.5 * G], rtol=1e-12)
+    assert ts.simulate(scene, (0, 1), state=found.state).phases[0][1] == 1.0
+
+
+# motions
+
+
+def test_inverse_dynamics_off_the_stops():
+    scene, t = pendulum(lower=0.3, upper=2.0), np.linspace(0, 1, 5)
+    motion = scene.inverse_dynamics({"hinge": 1.0 + 0.5 * ts.motions.time}, ["hinge"], t=t)
+    np.testing.assert_allclose(motion.load("hinge"), 2 * G * np.sin(1.0 + 0.5 * t), rtol=1e-12)
+    with pytest.raises(ts.InvalidArgument, match=r"inverse_dynamics takes contacts as open, and at t = 0\.5 s .* stop"):
+        scene.inverse_dynamics({"hinge": 1.0 + 3.0 * ts.motions.time}, ["hinge"], t=t)
+
+
+def test_kinematics_off_the_stops():
+    scene = pendulum(lower=0.3, upper=2.0)
+    scene.add(C.RotationMotor.of(scene["hinge"], angle=1.0 + ts.motions.time))
+    np.testing.assert_allclose(scene.kinematics([0.0, 0.5]).angle("hinge"), [1.0, 1.5], rtol=1e-14)
+    with pytest.raises(ts.InvalidArgument, match="kinematics takes contacts as open, and at t = 2 s this motion meets"):
+        scene.kinematics([0.0, 2.0])
+
+
+def test_a_profile_is_refused_by_name():
+    with pytest.raises(ts.InvalidArgument, match=r"profile is of one phase of a run.*floor"):
+        ts.profile(ball_on_floor(), (0, 1))

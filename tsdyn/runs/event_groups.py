@@ -1,0 +1,171 @@
+"""Event functions that are evaluated together, such as the gaps of contacts: most need no search in a step."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..maths.root_isolation import survey
+from .tolerances import ROOT, ROOT_STEPS, ROUGH_ROOT
+
+# A group is surveyed on a step at once (root_isolation.survey). Of the members that cross zero the earliest is located,
+# by the interpolant and Newton's method; the others are surveyed again up to there. Only members whose zeros are
+# unclear are searched one by one, as events of users are.
+
+
+class States(NamedTuple):
+    """What a group's function is given: k states."""
+
+    t: np.ndarray  # (k,)
+    levels: np.ndarray  # (k, 3, n)  q, qd, qdd
+    memory: np.ndarray  # what forces remember
+    counted: object  # a function that returns the counted angles (k, angles) of joints
+
+    q, qd, qdd = (property(lambda self, i=i: np.ascontiguousarray(self.levels[:, i])) for i in range(3))
+
+
+class Member:
+    """One of several event functions that are evaluated together.
+
+    Parameters
+    ----------
+    over : function
+        Values (k, members) of a `States`.
+    which : int
+        The function's number.
+    """
+
+    def __init__(self, over, which):
+        self.over, self.which = over, which
+
+    def __call__(self, t, instant):
+        """The value at one state."""
+        levels = np.array([[instant.q, instant.qd, instant.qdd]])
+        states = States(np.array([t]), levels, instant.memory, lambda: instant.angles[None])
+        return float(self.over(states)[0, self.which])
+
+
+class Group:
+    """Events whose functions are evaluated by one function.
+
+    Parameters
+    ----------
+    over : function
+    events : list of Event
+        All of the run.
+    numbers : list of int
+        Of its own.
+
+    Attributes
+    ----------
+    value, noise : ndarray (members,)
+        At the end of the last step; rounding error of values, once measured.
+    """
+
+    def __init__(self, over, events, numbers):
+        self.over, self.numbers, self.degree = over, numbers, 0
+        own = [events[i] for i in numbers]
+        self.which = [event.function.which for event in own]
+        # Those that survey and Newton's method serve: changes in one direction end the run
+        self._exact = [event.exact for event in own]
+        self._falls = np.array([event.direction if event.limit == 1.0 else 0.0 for event in own])
+
+    def begin(self, values):
+        """Take the values (members,) at the start of a run."""
+        self.value, self.noise, self._is_new = values, np.zeros(len(values)), True
+        self._odd = np.zeros(len(values), bool)  # whether the `Track` knows more than the value
+
+    def lend(self, track, i, t):
+        """Let the `Track` of member i know what is known at t, the start of the step that has been searched."""
+        value = float(self._first[i])
+        if self._odd[i]:
+            track.value = track.end = value
+        else:
+            track.begin(t, value, not self._was_new or (self._exact[i] and value > 0.0))
+            track.noise = float(self.noise[i])
+
+    def take_back(self, track, i):
+        """Take what a `Track` knows at the end of a step."""
+        self.value[i], self.noise[i] = track.value, track.noise
+        self._odd[i] = track.zero is not None or not track.sign * track.value > 0.0
+
+    def lend_all(self, tracks, t):
+        """Let all tracks know what is known at t, the end of a step."""
+        self._first, self._was_new = self.value, self._is_new
+        for i, number in enumerate(self.numbers):
+            self.lend(tracks[number], i, t)
+
+    def take_all(self, tracks):
+        """Take what all tracks know at the end of a step."""
+        self.begin(np.zeros(len(self.numbers)))
+        self._is_new = False
+        for i, number in enumerate(self.numbers):
+            self.take_back(tracks[number], i)
+
+    def search(self, step, sample):
+        """The first event that ends the run, (number, t) or None; members to be searched one by one, up to there.
+
+        Parameters
+        ----------
+        step : Inside
+        sample : function
+            Values (k, members) at times (k,) within the step.
+        """
+        self._first, self._was_new, self._is_new = self.value, self._is_new, False
+        found, end, last = None, step.t1, self.value.copy()
+        alone, left = {}, np.arange(len(last))
+        while left.size:
+            values, noise = self.value[left], self.noise[left]
+            degree = max(step.degree, self.degree // 2)
+            seen = survey(lambda times, left=left: sample(times)[:, left], step.t0, values, end, degree, noise)
+            self.degree, last[left] = seen.degree, seen.samples[-1]
+            unclear = {j: since for j, since in enumerate(seen.since) if since < math.inf}
+            for j in (
+                self._odd[left].nonzero()[0].tolist()
+            ):  # what they know of zeros is past on the side they fall from
+                self._odd[left[j]] = odd = j in unclear or not self._falls[left[j]] * last[left[j]] < 0.0
+                if odd and j not in unclear:
+                    unclear[j] = step.t0
+            if unclear and noise.any():  # values of rounding alone have no zero
+                quiet = (np.abs(seen.samples).max(axis=0) <= noise).tolist()
+                unclear = {j: since for j, since in unclear.items() if not quiet[j]}
+            roots = {
+                j: seen.root(j)
+                for j, since in unclear.items()
+                if seen.until[j] > since and self._falls[left[j]] * values[j] < 0.0 and not self._odd[left[j]]
+            }
+            first = roots and _earliest(lambda t, left=left: sample(np.array([t]))[0, left], seen, roots)
+            alone |= {int(left[j]): since for j, since in unclear.items() if j not in roots or first is None}
+            if not first:
+                break
+            # What was unclear may be clear up to there
+            j, end = first
+            found = self.numbers[left[j]], end
+            left, alone = np.array([i for i, since in alone.items() if since < end], int), {}
+        self.value = last
+        return found, [i for i, since in alone.items() if since < end]
+
+
+def _earliest(values, seen, roots):
+    """Which function of a `Survey` crosses zero first, and when; None if unsure.
+
+    By Newton's method from the earliest of the roots (t, slope) of interpolants. Where that leaves another function
+    beyond zero, it goes on with that one.
+    """
+    j, before = min(roots, key=roots.__getitem__), math.inf
+    t = roots[j][0]
+    for _ in range(ROOT_STEPS):
+        found = values(t)
+        moves = {k: float(found[k]) / slope for k, (root, slope) in roots.items()}
+        k = max(moves, key=moves.__getitem__)  # the furthest back
+        if k != j:
+            j, before = k, math.inf
+        move = moves[j]
+        # The last digit, or rounding of the values: no step is shorter
+        done = abs(move) <= ROOT * abs(t) or (abs(move) >= 0.5 * before and abs(move) < ROUGH_ROOT * (seen.b - seen.a))
+        before, t = abs(move), t - move
+        if not seen.since[j] <= t <= seen.until[j]:
+            return None
+        if done:
+            return j, t
+    return None

@@ -1,0 +1,269 @@
+"""The phases of a run with contacts: what its solution asks of them, and what files hold of them."""
+
+import json
+
+import numpy as np
+
+from ..formulations.locked_orientations import keep_turning
+from ..model.handles import handles_of
+from ..model.packed import first_rows
+from ..observables import diagnostics, reactions
+from ..observables.state import StatePhase
+from ..rows.graph_builder import graph_of, set_redundant
+from ..runs.dense_output import StepPieces
+from ..validation import demand, demand_record
+
+RECORD = {"modes": list, "derived": list, "names": list, "contacts": list, "changes": list, "changed": list}
+
+
+class Phases:
+    """The phases of a run: when, with which units in which modes, and where their rows are in those of the scene.
+
+    Parameters
+    ----------
+    packed : Packed
+        Of the scene with the rows of all units.
+
+    Attributes
+    ----------
+    list : list of (float, float, tuple of str)
+        Start, end (s) and names of the closed contacts.
+    impulses : list of (float, str, float)
+        Time (s), name, impulse (N s, or N m s of an angle).
+    starts : list of float
+        s; before those of `list` where flights below rounding are left out.
+    gains : dict of int to float
+        Change of the kinetic energy (J) at the beginning of phases, by their numbers: what impacts took.
+    changes : list of (tuple of str, dict)
+        What actions had changed before each phase: names of the parts that are inactive, and parameters by name.
+    """
+
+    def __init__(self, packed):
+        self.whole, self.list, self.impulses = packed, [], []
+        self.starts, self.of, self.gains, self.changes = [], [], {}, []
+        self.packed, self.modes, self._columns, self._known = [], [], [], {}  # of each kind of phase
+        self.scenes = []  # of each kind, of phases that were restored
+
+    @property
+    def varies(self):
+        """Whether forces or numbers differ between phases, not rows alone."""
+        forces = {load.force.name for load in self.whole.loads}
+        return any(values or not forces.isdisjoint(inactive) for inactive, values in self.changes)
+
+    def kind(self, packed, modes, whole):
+        """The number of the kind of phases that are packed so.
+
+        modes: what makes its scene again, for files. whole: the scene with its parameters, packed.
+        """
+        kind = self._known.setdefault(id(packed), len(self.packed))
+        if kind == len(self.packed):
+            self.packed.append(packed)
+            self.modes.append(modes)
+            self._columns.append(shared_rows(whole, packed))
+        return kind
+
+    def add(self, kind, begin, rest, end, names, changes):
+        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
+        self.changes.append(changes)
+        if self.list:
+            self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
+        self.starts.append(begin)
+        self.of.append(kind)
+        self.list.append((rest, max(rest, end), names))
+
+    def gain(self, energy):
+        """Add kinetic energy, J, that is gained where the next phase begins."""
+        number = len(self.list)
+        self.gains[number] = self.gains.get(number, 0.0) + float(energy)
+
+    def gained(self):
+        """Kinetic energy (phases,), J, gained where phases begin, up to each of them."""
+        gains = np.zeros(len(self.list))
+        for number, energy in self.gains.items():
+            gains[min(number, gains.size - 1)] += energy
+        return np.cumsum(gains)
+
+    def at(self, t):
+        """Numbers of the phases at times t (k,); where one begins, the later one."""
+        return np.maximum(np.searchsorted(self.starts, t, side="right") - 1, 0)
+
+    def of_outputs(self, t):
+        """Numbers of the phases of outputs at times t (k,): of several at one time each is of a phase of its own."""
+        same = np.searchsorted(t, t, side="right") - 1 - np.arange(t.size)
+        return np.maximum(self.at(t) - same, 0)
+
+    def multipliers(self, numbers, m, *arrays):
+        """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
+        out = np.zeros((len(numbers), m))
+        for kind, mine, some in self._gathered(numbers, arrays):
+            rows, columns = self._columns[kind]
+            out[np.ix_(mine, rows)] = reactions.multipliers(self.packed[kind], *some)[:, columns]
+        return out
+
+    def constraint_error(self, numbers, *arrays):
+        """The `ConstraintError` of the rows that hold."""
+        out = np.zeros((3, len(numbers)))
+        for kind, mine, some in self._gathered(numbers, arrays):
+            out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
+        return diagnostics.ConstraintError(*out)
+
+    def packed_at(self, t):
+        """Yield each packed scene of phases at times t (k,), and which times are its."""
+        for kind, mine, _ in self._gathered(self.at(t), ()):
+            yield self.packed[kind], mine
+
+    def phase_at(self, t):
+        """The `StatePhase` at t, s, or of several times; None where actions have changed nothing."""
+        if not any(inactive or values for inactive, values in self.changes):
+            return None
+        numbers = np.unique(self.at(np.atleast_1d(t))).tolist() or [0]
+        kinds = {self.of[number] for number in numbers}
+        one = kinds.pop() if len(kinds) == 1 else None
+        found = (None, None) if one is None else (self.packed[one], self._columns[one])
+        return StatePhase(*self.changes[numbers[-1]], *found)
+
+    def parts(self, solution):
+        """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are."""
+        for kind, mine, _ in self._gathered(solution._phase_of_rows, ()):
+            part = solution._picked(mine)
+            packed = self.packed[kind]
+            part.packed, part.system, part.handles, part._phases = packed, packed.system, handles_of(packed), None
+            yield part, mine
+
+    def active(self, item, numbers):
+        """Whether a part is active in the phases of these numbers (k,)."""
+        return np.array([item.name not in inactive for inactive, _ in self.changes])[numbers]
+
+    def name_switched(self, parts):
+        """Name in each phase which of these parts, that come and go, are active in it."""
+        for k, (inactive, _) in enumerate(self.changes):
+            active = [item.name for item in parts if item.name not in inactive]
+            begin, end, names = self.list[k]
+            self.list[k] = begin, end, tuple(dict.fromkeys((*names, *active)))
+
+    def _gathered(self, numbers, arrays):
+        """Yield each kind of phases, the entries (j,) of arrays in its phases, and these parts of the arrays."""
+        kinds = np.array(self.of)[numbers]
+        for kind in np.unique(kinds).tolist():
+            mine = np.flatnonzero(kinds == kind)
+            yield kind, mine, [None if array is None else array[mine] for array in arrays]
+
+    def saved(self):
+        """Numbers (for JSON) and arrays by name, from which `restore` makes the same."""
+        names = list(dict.fromkeys(named for *_, named in self.list))
+        contacts = list(dict.fromkeys(name for _, name, _ in self.impulses))
+        place, number = ({name: i for i, name in enumerate(known)} for known in (names, contacts))
+        derived = [derived_record(packed) for packed in self.packed]
+        changes = list({json.dumps(plain(each)): plain(each) for each in self.changes}.values())
+        changed = [changes.index(plain(each)) for each in self.changes]
+        numbers = {"modes": self.modes, "derived": derived, "names": names, "contacts": contacts}
+        numbers |= {"changes": changes, "changed": changed}
+        phases = [(*span, place[named]) for *span, named in self.list]
+        # Of an impulse with several components a line for each, numbered from one
+        impulses = [
+            (t, number[name], x, i + (np.ndim(p) > 0))
+            for t, name, p in self.impulses
+            for i, x in enumerate(np.atleast_1d(p).tolist())
+        ]
+        return numbers, {
+            "phases": np.column_stack((self.starts, self.of, phases)) if phases else np.zeros((0, 5)),
+            "gains": np.array(list(self.gains.items())).reshape(-1, 2),
+            "impulses": np.array(impulses, float).reshape(-1, 4),
+        }
+
+    def restore(self, numbers, arrays, scene_of=None):
+        """As they were when they were saved; scene_of(modes): the scene of a phase, None where there is none.
+
+        Raises
+        ------
+        KeyError, TypeError or ValueError
+            If they tell none.
+        """
+        demand_record(numbers, RECORD)
+        phases, impulses = arrays["phases"].astype(float), arrays["impulses"].astype(float)
+        names, contacts = [tuple(map(str, named)) for named in numbers["names"]], list(map(str, numbers["contacts"]))
+        demand(phases.ndim == impulses.ndim == 2 and phases.shape[1] == 5 and impulses.shape[1] == 4, "the phases")
+        (of, named), which = phases[:, [1, 4]].T.astype(int), impulses[:, 1]
+        for places, known in ((of, numbers["modes"]), (named, names), (which, contacts)):
+            demand(np.isin(places, np.arange(len(known))).all(), "the numbers of phases")
+        demand(len(numbers["derived"]) == len(numbers["modes"]), "the kinds of phases")
+        self.starts, self.of = phases[:, 0].tolist(), of.tolist()
+        self.list = [(t, end, names[i]) for t, end, i in zip(*phases[:, 2:4].T.tolist(), named, strict=True)]
+        self.gains = {int(number): energy for number, energy in arrays["gains"].astype(float).reshape(-1, 2).tolist()}
+        self.impulses = []
+        for t, i, p, component in impulses.tolist():
+            if component > 1.0:
+                demand(bool(self.impulses) and np.ndim(self.impulses[-1][2]) == 1, "the impulses")
+                p = np.append(self.impulses.pop()[2], p)
+            self.impulses.append((t, contacts[int(i)], np.array([p]) if component == 1.0 else p))
+        demand(len(numbers["changed"]) == len(self.of), "the changes")
+        known = [(tuple(map(str, inactive)), dict(values)) for inactive, values in numbers["changes"]]
+        self.changes = [known[i] for i in numbers["changed"]]
+        for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True) if scene_of else ():
+            scene = scene_of(modes)
+            packed = scene.packed
+            if derived != derived_record(packed):
+                take_derived(packed, derived)
+            self.kind(packed, modes, packed if scene._whole is None else scene._whole.packed)
+            self.scenes.append(scene)
+
+
+class PhasePieces(StepPieces):
+    """Dense output of phases: where one begins, its own. kinds: of the phases of each part, as `Phases` has them."""
+
+    side = "right"
+
+    def __init__(self, parts, kinds):
+        super().__init__(parts)
+        self.kinds = kinds
+
+
+class Pinned:
+    """A trajectory with bodies that rest: to the last bit."""
+
+    def __init__(self, trajectory, q, still):
+        self.trajectory, self.q, self.still = trajectory, q, still
+        self.start, self.end, self.edges, self.anchors = (
+            trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
+        )  # fmt: skip
+
+    def __call__(self, t):
+        """As of a `Trajectory`."""
+        states, memory, status = self.trajectory(t)
+        states[:, 0, self.still], states[:, 1:, self.still] = self.q[self.still], 0.0
+        return states, memory, status
+
+
+def plain(value):
+    """A value of modes, or of what actions have changed, as JSON has it."""
+    if isinstance(value, dict):
+        return [[plain(key), plain(each)] for key, each in value.items()]
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def shared_rows(whole, packed):
+    """Rows of a scene that one of its phases has, and where they are among those of the phase: (2, rows)."""
+    of_whole, own = ({id(part): first for part, first in first_rows(each.constraints)} for each in (whole, packed))
+    mine = [(id(part), i) for part in packed.constraints for i in range(part.all_rows)]
+    pairs = [(of_whole[part] + i, own[part] + i) for part, i in mine if part in of_whole]
+    return np.array(pairs, int).reshape(-1, 2).T
+
+
+def derived_record(packed):
+    """What a run has found out about its constraint graph: redundant rows, and bodies that count as turning."""
+    rows = packed.derived.redundant
+    turning = sorted(int(body) for body in packed.derived.turning)
+    return {"redundant": None if rows is None else np.asarray(rows).tolist(), "turning": turning}
+
+
+def take_derived(packed, record):
+    """Enter it into a packed scene."""
+    rows, most = record["redundant"], len(graph_of(packed).row)
+    if rows is not None:
+        demand(all(type(row) is int and 0 <= row < most for row in rows), "the redundant rows")
+        set_redundant(packed, np.array(rows, np.int64))
+    if record["turning"]:
+        demand(set(record["turning"]) <= set(range(len(packed.bodies))), "the turning bodies")
+        keep_turning(packed, record["turning"])

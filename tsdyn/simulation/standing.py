@@ -1,0 +1,128 @@
+"""Analyses of scenes with unilateral constraints: at a state as it stands, and along motions that leave them open."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
+from ..configuration.tolerances import INITIAL_TOL
+from ..errors import InconsistentState, InvalidArgument, NoEquilibrium
+from ..observables import reactions
+from ..observables.state import RememberingState, remembered
+from ..runs.arguments import state_arrays
+from ..validation import listed, number
+from .contact_run import begun, demand_apart
+from .phase_scenes import NAMED, gaps_of, phase_of
+from .phases import shared_rows
+from .scene_cache import prepared
+
+# What happens at a state is decided as a run from it does: contacts that are closed, at rest and push hold, the others
+# are open.
+
+
+def standing(scene: Any, state: Any, who: str) -> Any:
+    """The scene of the phase that a run begins with at a state, or at the start (None); refuses an impact."""
+    run = begun(scene, 0.0 if state is None else number(getattr(state, "t", 0.0)), state)
+    if run.phases.impulses:
+        names = listed(list(dict.fromkeys(name for _, name, _ in run.phases.impulses)), NAMED)
+        raise InconsistentState(
+            f"{who}: velocities jump at this state, by the impact of {names}. Take the state after it, as "
+            "ts.impact(scene, state) returns it."
+        )
+    return run._scene()
+
+
+def linearise(scene, own, state=None, *arguments, **keywords):
+    """As of scenes without contacts: contacts that push at the state hold."""
+    return own(standing(scene, state, "linearise"), state, *arguments, **keywords)
+
+
+def along(scene, own, *arguments, **keywords):
+    """`kinematics` or `inverse_dynamics` of the scene with open contacts; refuses a motion along which one is met."""
+    motion, who, gaps = own(phase_of(scene, []), *arguments, **keywords), own.__name__, gaps_of(scene)
+    for k, q in enumerate(motion.q):
+        met = closed_gaps(gaps, q, motion.anchor.angles[k])
+        if met:
+            names = listed(list(dict.fromkeys(gaps.names[i] for i in met)), NAMED)
+            raise InvalidArgument(
+                f"{who} takes contacts as open, and at t = {motion.t[k]:.9g} s this motion meets {names}. Keep the "
+                "motion off them, or hold them closed, in a scene with unilateral=False."
+            )
+    return motion
+
+
+def set_start(scene, own, state=None, **keywords):
+    """As of scenes without contacts; refuses a state that penetrates."""
+    state = getattr(state, "state", state)
+    q = scene.start[0] if state is None else state_arrays(state, scene.start[0].size)[0]
+    _demand_apart(scene, state, q)
+    own(phase_of(scene, []), state, **keywords)
+    scene.touch()
+
+
+def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
+    """The `Equilibrium` with closed contacts that push and open ones that don't penetrate.
+
+    From the contacts that are closed at the guess on: of those that the way to the equilibrium meets the first one is
+    closed, and those that would have to pull are opened.
+    """
+    gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
+    q = scene.start[0] if guess is None else np.asarray(getattr(guess, "q", guess), float)
+    closed, seen = closed_gaps(gaps, q, _angles(kept, guess, t, q)), set()
+    while frozenset(closed) not in seen:
+        seen.add(frozenset(closed))
+        phase = phase_of(scene, [gaps.list[i].side.row for i in closed])
+        try:
+            found = own(phase, guess, t, *arguments, **keywords)
+        except NoEquilibrium as error:
+            others = [gaps.names[i] for i in range(gaps.count) if i not in closed]
+            raise NoEquilibrium(
+                f"{error} Open contacts don't count: {listed(list(dict.fromkeys(others)), NAMED)}. Start where those "
+                "that carry are closed, such as from the state of a run that has come to rest."
+                if others
+                else str(error)
+            ) from None
+        state = found.state
+        values, before = gaps.at(state.q, state.angles), gaps.at(q, _angles(kept, guess, t, q))
+        deep = np.flatnonzero(values < -INITIAL_TOL * (1.0 + np.abs(state.q).max()))
+        if deep.size:  # the first that the way meets
+            met = deep[np.argmin(before[deep] / (before[deep] - values[deep]))]
+            closed = sorted([*closed, int(met)])
+            continue
+        inertia = Inertia(gaps, float(t), state.q, state.memory, closed)
+        try:
+            settled = settle(inertia, closed, state.qd)
+        except NoSolution:
+            break
+        pushing = sorted([*settled.closed, *settled.idle])
+        if pushing == closed:
+            return _of_all(scene, found, gaps, settled.closed)
+        guess, q, closed = state, state.q, pushing
+    raise NoEquilibrium(
+        "no set of closed contacts was found that push while the others stay open. Start nearer to the equilibrium, "
+        "with guess=, such as from the state of a run that has come to rest."
+    )
+
+
+def _of_all(scene, found, gaps, closed):
+    """The same `Equilibrium` with multipliers of all rows of the scene, those of these closed contacts among them."""
+    state, phase = found.state, phase_of(scene, [gaps.list[i].side.row for i in closed])
+    levels = state.q[None], state.qd[None], state.qdd[None]
+    own = reactions.multipliers(phase.packed, np.array([state.t]), *levels, state.memory[None])
+    rows, columns = shared_rows(scene.packed, phase.packed)
+    found.multipliers = np.zeros((1, len(scene.packed.system.segments)))
+    found.multipliers[:, rows] = own[:, columns]
+    parts = *state[:4], found.multipliers[0]
+    found.state = RememberingState.of(scene.packed, state.memory, state.anchor, *parts)
+    return found
+
+
+def _angles(kept, state, t, q):
+    return remembered(state if hasattr(state, "memory") else None, kept, float(t), q)[: kept.handles.count]
+
+
+def _demand_apart(scene, state, q):
+    kept = prepared(phase_of(scene, []))
+    demand_apart(gaps_of(scene), q, _angles(kept, state, getattr(state, "t", 0.0), q), INITIAL_TOL)

@@ -332,3 +332,19 @@ def test_momentum_of_a_chain_that_falls_onto_a_floor():
     change = np.diff(solution.linear_momentum[[0, -1], 2])[0]
     assert len(solution.impulses) > 4
     assert abs(impulse + steady - n * 0.1 * G * 0.4 - change) < 1e-9
+
+
+@pytest.mark.parametrize("method", [None, "dop853"])
+def test_a_contact_without_a_reaction_opens_where_it_is_pulled(method):
+    """Two particles drift side by side, their reaction zero for some steps, until a force grows on the one ahead."""
+    scene, pull = ts.Scene(gravity=(0, 0, 0)), ts.Table([0, 0.5, 1.5], [0, 0, 6.0], kind="linear")
+    behind = scene.add_point_mass(mass=1.0, velocity=(0.3, 0, 0))
+    ahead = scene.add_point_mass(mass=2.0, position=(1, 0, 0), velocity=(0.3, 0, 0))
+    scene.add(C.SphereContact(behind, ahead, radius_a=0.5, radius_b=0.5, restitution=0.5, name="touch"))
+    scene.add(ts.forces.PointForce(ahead, force=(pull, 0, 0)))
+    solution = ts.simulate(scene, (0, 1.5), integrator=method, max_step=0.2)
+    assert solution.phases == [(0.0, 0.5, ("touch",)), (0.5, 1.5, ())]
+    assert solution.impulses == []
+    assert np.diff(solution.t).min() >= 0.0
+    np.testing.assert_allclose(solution.position(ahead)[-1, 0], 1.0 + 0.45 + 6.0 / 2.0 / 6.0, atol=1e-13)
+    np.testing.assert_allclose(solution.position(behind)[-1, 0], 0.45, atol=1e-13)

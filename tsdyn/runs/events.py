@@ -535,7 +535,7 @@ class Watch:
             elif abs(value) > track.noise:
                 if track.zero is not None:
                     if track.pending and direction * sign >= 0.0:
-                        found.append(self._leave(i, step, track.zero, (t, value)))
+                        found.append(self._leave(i, step, max(track.zero, step.t0), (t, value)))
                     track.zero, track.passed, track.pending = None, False, False
                 elif sign == -track.sign and direction * sign >= 0.0:
                     found += self._root(i, step, t, value)

@@ -75,17 +75,19 @@ class _Closing:
     """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
-    however soon it comes.
+    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero.
 
     Parameters
     ----------
     gaps : Gaps
     opened : dict
-        Of contacts that have opened with a rate: time, gap and rate there, by their numbers.
+        Of contacts that have opened: time, gap and rate there, by their numbers.
+    rounding : float, m or rad
+        Of a gap.
     """
 
-    def __init__(self, gaps, opened):
-        self.gaps = gaps
+    def __init__(self, gaps, opened, rounding):
+        self.gaps, self.rounding = gaps, rounding
         self.open(opened)
 
     def open(self, opened):
@@ -102,8 +104,9 @@ class _Closing:
             begun, first, rate = map(np.array, self.start)
             since = states.t[:, None] - begun
             later = since > 0.0
-            divided = (values[:, self.which] - first) / np.where(later, since, 1.0)
-            values[:, self.which] = np.where(later, divided, rate)
+            grown = values[:, self.which] - first
+            divided = np.where(later, grown / np.where(later, since, 1.0), rate)
+            values[:, self.which] = np.where(rate > 0.0, divided, grown + self.rounding)
         return values
 
 
@@ -225,7 +228,7 @@ class Modes:
 
     closed: list = field(default_factory=list)  # independent rows, with reactions
     idle: list = field(default_factory=list)  # closed by what others hold
-    opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+    opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened
     sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
@@ -514,7 +517,7 @@ class _ContactRun:
         first = first_row_of(packed)
         sides = [gaps.list[i].side for i in modes.closed]
         leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
-        self.closing = _Closing(gaps, modes.opened)
+        self.closing = _Closing(gaps, modes.opened, TOUCHING * self.length)
         for i in self.able:
             if i in modes.idle:
                 continue
@@ -670,6 +673,7 @@ class _ContactRun:
             opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
             leaving = [i for i in fired if i in before.closed]
             stay = settle(inertia, resting, self.qd, leaving)[:2] if resting else ([], [])
+            opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in stay[0] and i not in stay[1]}
             self.modes = Modes(*stay, opened)
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)

@@ -17,6 +17,7 @@ import numpy as np
 import tsdyn as ts
 from benchmarks import mechanisms
 from benchmarks.peers.heyoka import Heyoka, integrator
+from examples import coin
 from tests.helpers.closed_loops import bricard
 from tsdyn.observables.diagnostics import body_motions
 
@@ -32,6 +33,7 @@ SCENES = {
     "pendulum": lambda: mechanisms.build(mechanisms.of_file("two_body_pendulum_spatial")),
     "chain": _chain,
     "bricard": bricard,
+    "disc": lambda: coin.rolling(0.3, (0.4, 8.0, 1.5)),
 }
 # Components of angular and linear momentum that are conserved: index of the axis; none of Bricard's loop, held twice
 ANGULAR, LINEAR = {"top": [2], "pendulum": [2], "chain": [2]}, {"top": [0, 1]}

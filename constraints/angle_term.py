@@ -100,7 +100,6 @@ class AngleTerm(Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, ratio: float = 1.0, offset: float = 0.0, **places: Any) -> None:
         super().__init__(a, b, **places)
         self.ratio, self.offset = ratio, offset
-        self.check()
 
     def check(self):
         """Finite numbers."""

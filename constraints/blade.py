@@ -10,16 +10,9 @@ Xd and Yd are rates of coordinates in b, so they are those relative to b, wherev
 normal: the blade lies flat.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 
 from ..plugins import PARALLEL, InvalidConstraint, Point, Primitive, Vector, dot, scaled
-
-if TYPE_CHECKING:
-    from ..hints import BodyLike
 
 
 class Blade(Primitive):
@@ -50,10 +43,6 @@ class Blade(Primitive):
     rate_rows = 1
     markers = (Point("a"), Vector("a"), Point("b"), Vector("b", "along_b"), Vector("b", "across_b"))
     slots = 14
-
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
-        super().__init__(a, b, **places)
-        self.check()
 
     def check(self):
         """Refuse directions of the plane that are not across each other."""

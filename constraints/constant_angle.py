@@ -54,7 +54,6 @@ class ConstantAngle(Joint):
             u, v = (rotation_matrix(body.orientation) @ s for body, s in zip((a, b), self.coordinates, strict=True))
             angle = float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
         self.angle = angle
-        self.check()
 
     def check(self):
         """Refuse an angle at which the row is singular."""

@@ -2,6 +2,7 @@
 
     q_0 = offset + ratio_1 q_1 + ratio_2 q_2 + ...          (1)  AngleTerm, DisplacementTerm
     q_0 = offset + f_1(q_1) + f_2(q_2) + ...                (2)  the same of functions
+    q_0 = offset + f(q_1, q_2, ...)                         (3)  and shares of a function of several
 
 One row, the sum of a term for each joint. Angles are counted over turns; a step must rotate each by less than half a
 turn. Never singular: the dependent coordinate stands alone.
@@ -17,6 +18,7 @@ from ..plugins import (
     Angle,
     CoordinateFunction,
     InvalidConstraint,
+    JointFunction,
     Smooth,
     SumRow,
     angles,
@@ -27,9 +29,11 @@ from ..plugins import (
     functions_of,
     label,
     shown,
+    shown_for_handle,
 )
 from .angle_term import AngleTerm, _AngleFunctionTerm
 from .displacement_term import DisplacementTerm, _DisplacementFunctionTerm
+from .joint_function_term import joint_function_term
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Function, Joint, Prescribed
@@ -54,8 +58,8 @@ class Coupler(SumRow):
     polynomial : array_like (n,), optional
         a_0, a_1, ... of q_0 = a_0 + a_1 q_1 + a_2 q_1^2 + ..., in place of a ratio.
     function : one of ts.motions, a ts.Table, a spline of SciPy's, or a function f(q_1, ...), optional
-        The dependent coordinate, in place of a ratio; of several joints a sum of functions of one each. A plain
-        function may use arithmetic and the functions of NumPy, without branches.
+        The dependent coordinate, in place of a ratio; a plain function of several joints, up to five unless it is a
+        sum of functions of one each. It may use arithmetic and the functions of NumPy, without branches.
 
     Raises
     ------
@@ -196,8 +200,12 @@ class Coupler(SumRow):
                     ahead.append(other)
 
     def compose(self):
-        """Eq. (1) or (2): the dependent coordinate, less the others."""
+        """Eq. (1), (2) or (3): the dependent coordinate, less the others."""
         functions = [None, *([None] * len(self.independents) if self.plain else self.functions)]
+        if isinstance(functions[-1], JointFunction):
+            yield self._term(*self.dependent, None, 1.0, -float(self.offset))
+            yield from map(self._share, functions[1:])
+            return
         factors = [1.0, *(-ratio for ratio in self.ratios)] if self.plain else [1.0] + [-1.0] * len(self.independents)
         offsets = [-float(self.offset)] + [0.0] * len(self.independents)
         for (joint, kind, index), *numbers in zip(self._all, functions, factors, offsets, strict=True):
@@ -210,11 +218,25 @@ class Coupler(SumRow):
             own, other, f, g, h = angles(joint)[index]
             cls = AngleTerm if function is None else _AngleFunctionTerm
             term = cls(own, other, reference_a=f, across_a=g, reference_b=h, **given)
-            term.__dict__["counted"] = (joint, index)
+            term.__dict__["counted"] = ((joint, index),)
             return term
         own, other, e, s_own, s_other = displacements(joint)[index]
         cls = DisplacementTerm if function is None else _DisplacementFunctionTerm
         return cls(own, other, axis_a=e, point_a=s_own, point_b=s_other, **given)
+
+    def _share(self, function):
+        """The term of one coordinate in a function of several."""
+        chosen = [self.independents[i] for i in function.order]
+        bodies, places, counted = [], [], []
+        for joint, kind, index in chosen:
+            own, other, *given = (angles if kind == "angle" else displacements)(joint)[index]
+            bodies += own, other
+            places += given
+            counted += [(joint, index)] * (kind == "angle")
+        cls = joint_function_term("".join(kind[0] for _, kind, _ in chosen))
+        term = cls(*bodies[:2], others=tuple(bodies[2:]), function=function, places=places)
+        term.__dict__["counted"] = tuple(counted)
+        return term
 
     @classmethod
     def example(cls, rng, a, b):
@@ -231,8 +253,8 @@ def _chosen(where, given):
     declared = getattr(joint, "joint_coordinates", ())
     if not declared or getattr(joint, "drives", ""):
         raise InvalidConstraint(
-            f"{where}: {shown(joint)} has no angle or displacement to couple; give a joint such as Revolute or "
-            "Translational."
+            f"{where}: couple joints with an angle or a displacement, such as Revolute or Translational, got "
+            f"{shown_for_handle(joint)}."
         )
     kinds = ["angle" if isinstance(each, Angle) else "displacement" for each in declared]
     choices = [(kind, kinds[:i].count(kind)) for i, kind in enumerate(kinds)]

@@ -73,7 +73,6 @@ class CylinderContact(Primitive):
         self.radius = radius
         self.cylinder_radius = cylinder_radius
         self.inside = inside
-        self.check()
 
     def check(self):
         """Refuse a ball that doesn't fit."""

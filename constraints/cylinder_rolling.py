@@ -14,8 +14,6 @@ R is the radius of the ball, negative outside, c that of the cylinder, S = c - R
 Never singular.
 """
 
-from __future__ import annotations
-
 from ..plugins import Vector, dot, scaled
 from .cylinder_contact import B, CylinderContact, F, G, across_axis, cylinder_series
 from .smooth_contact import along
@@ -32,16 +30,6 @@ class CylinderRolling(CylinderContact):
         A right-handed frame of directions at right angles; the last is the axis of the cylinder.
     first_a, second_a, third_a : array_like (3,)
         Any directions at right angles to each other.
-    radius : float, m
-        Of the ball.
-    cylinder_radius : float, m
-    inside : bool
-        True for a ball in a hollow cylinder.
-
-    Raises
-    ------
-    InvalidConstraint
-        If a radius is not positive, the ball doesn't fit into the cylinder, or a place or body is wrong.
 
     Examples
     --------

@@ -6,16 +6,9 @@
 The rows also admit opposed axes; such a start is refused. Never singular.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 from ..plugins import Angle, Displacement, Joint, Point, Vector
 from .parallel import Parallel
 from .point_on_line import PointOnLine
-
-if TYPE_CHECKING:
-    from ..hints import BodyLike
 
 
 class Cylindrical(Joint):
@@ -41,9 +34,6 @@ class Cylindrical(Joint):
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(), Displacement())
-
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
-        super().__init__(a, b, **places)
 
     def compose(self):
         """Eqs. (1), (2)."""

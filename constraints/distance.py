@@ -59,7 +59,6 @@ class Distance(Primitive):
             ends = [ground_point(body, s) for body, s in zip((a, b), self.coordinates, strict=True)]
             length = np.linalg.norm(ends[0] - ends[1])
         self.length = length
-        self.check()
 
     def check(self):
         """Refuse a length that is not positive."""

@@ -63,7 +63,6 @@ class Dot1(Prescribed, Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, value: Prescribed = 0.0, **places: Any) -> None:
         super().__init__(a, b, **places)
         self.value = value
-        self.check()
 
     def check(self):
         """Refuse a value that is no cosine."""

@@ -49,10 +49,6 @@ class Fixed(FramedJoint):
     [ 0.  0. 20.] [  0. -20.   0.]
     """
 
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
-        super().__init__(a, b, **places)
-        self.check()
-
     @Placing
     def at(cls, a: BodyLike, b: BodyLike | None = None, *, point: ArrayLike | None = None, **arguments: Any) -> Self:
         """Make the joint from points and directions in the ground frame; all are optional."""

@@ -6,15 +6,8 @@ The row is on velocities and follows from no row on positions: with it the posit
 the velocities lose one. It keeps no height; PlaneContact does. Singular if axis_a is along the normal.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 from ..plugins import Joint, Point, Vector, across
 from .blade import Blade
-
-if TYPE_CHECKING:
-    from ..hints import BodyLike
 
 
 class KnifeEdge(Joint):
@@ -42,9 +35,6 @@ class KnifeEdge(Joint):
     """
 
     markers = (Point("a"), Vector("a"), Vector("b", "normal_b"))
-
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
-        super().__init__(a, b, **places)
 
     def compose(self):
         """Eq. (1)."""

@@ -6,15 +6,8 @@ The two rows are orthonormal in terms of small relative rotations. They also adm
 refused. Never singular.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 from ..plugins import Angle, Joint, Vector, across
 from .dot1 import Dot1
-
-if TYPE_CHECKING:
-    from ..hints import BodyLike
 
 
 class Parallel(Joint):
@@ -37,9 +30,6 @@ class Parallel(Joint):
 
     markers = (Vector("a"), Vector("b"))
     joint_coordinates = (Angle(),)
-
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
-        super().__init__(a, b, **places)
 
     def compose(self):
         """Eq. (1)."""

@@ -54,7 +54,6 @@ class PointDriver(Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, path: Path | None = None, **places: Any) -> None:
         super().__init__(a, b, **places)
         self.path = path
-        self.check()
 
     def __setattr__(self, name, value):
         """Set an attribute, checked."""

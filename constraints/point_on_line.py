@@ -5,15 +5,8 @@
 Never singular.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 from ..plugins import Displacement, Joint, Point, Vector, across
 from .dot2 import Dot2
-
-if TYPE_CHECKING:
-    from ..hints import BodyLike
 
 
 class PointOnLine(Joint):
@@ -39,9 +32,6 @@ class PointOnLine(Joint):
 
     markers = (Point("a"), Point("b"), Vector("b"))
     joint_coordinates = (Displacement("axis_b"),)
-
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
-        super().__init__(a, b, **places)
 
     def compose(self):
         """Eq. (1)."""

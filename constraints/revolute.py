@@ -6,16 +6,9 @@
 The rows also admit opposed axes; such a start is refused. Never singular.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 from ..plugins import Angle, Joint, Point, Vector
 from .parallel import Parallel
 from .spherical import Spherical
-
-if TYPE_CHECKING:
-    from ..hints import BodyLike
 
 
 class Revolute(Joint):
@@ -41,9 +34,6 @@ class Revolute(Joint):
 
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(),)
-
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
-        super().__init__(a, b, **places)
 
     def compose(self):
         """Eqs. (1), (2)."""

@@ -82,7 +82,6 @@ class RollingBallOnCylinder(Rolls, Joint):
         self.cylinder_radius = cylinder_radius
         self.inside = inside
         self.slip = slip
-        self.check()
 
     def check(self):
         """Refuse a ball that doesn't fit."""

@@ -79,7 +79,6 @@ class RotationMotor(FramedJoint):
         super().__init__(a, b, **places)
         self.angle = angle
         set_apart(self, places, Motion.at_start(self.angle))
-        self.check()
 
     def __setattr__(self, name, value):
         """Set a checked attribute; an angle is always a motion."""

@@ -93,7 +93,6 @@ class SmoothContact(Primitive):
         super().__init__(a, b, **places)
         self.semi_axes = semi_axes
         self.tyre_radius = tyre_radius
-        self.check()
 
     def check(self):
         """Refuse semi-axes that are negative, or of which two are zero."""

@@ -6,7 +6,8 @@
     gamma = (dd.dd - (d.dd)^2 / l^2) / l  (3)
 
 Singular where the points coincide: the span has no direction there. l is not a number below the least length, a share
-of 1e-9 of the rope's; elsewhere least^2 is below rounding.
+of 1e-9 of the rope's; elsewhere least^2 is below rounding. Nor is it one where d has turned by more than a right angle
+since the last accepted step, so no step leads through the singular place: the direction d0 there is remembered.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from ..plugins import Point, Primitive, dot, finite, inverse_root, not_negative,
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
+
+NO_LENGTH = 1e-20  # m^2, for the product of directions where none is remembered: its inverse powers are numbers
 
 
 class Span(Primitive):
@@ -50,12 +53,13 @@ class Span(Primitive):
     rows = 1
     markers = (Point("a"), Point("b"))
     slots = 5
+    memory = 3
+    begins_anew = True
     summed = True
 
     def __init__(self, a: BodyLike, b: BodyLike, *, offset: float = 0.0, least: float = 0.0, **places: Any) -> None:
         super().__init__(a, b, **places)
         self.offset, self.least = offset, least
-        self.check()
 
     def check(self):
         """Finite numbers."""
@@ -63,14 +67,15 @@ class Span(Primitive):
         not_negative(self.least, f"{self.name}: least", self.error)
 
     def parameters(self):
-        """(offset, least^2)."""
+        """(offset, least^2); what is remembered is d."""
         return float(self.offset), float(self.least) ** 2
 
     @staticmethod
     def phi(x, par, t, out):
         """Eq. (1)."""
         d0, d1, d2 = x[3] - x[0], x[4] - x[1], x[5] - x[2]
-        out[0] = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2 - par[1]) + par[0]
+        forward = 0.0 * np.sqrt(d0 * par[2] + d1 * par[3] + d2 * par[4] + NO_LENGTH)
+        out[0] = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2 - par[1]) + forward + par[0]
 
     @staticmethod
     def jacobian(x, par, t, out):
@@ -89,6 +94,12 @@ class Span(Primitive):
             d, dd = x[3 + i] - x[i], xd[3 + i] - xd[i]
             square, along, fast = square + d * d, along + d * dd, fast + dd * dd
         out[0] = (fast - along * along / square) / np.sqrt(square)
+
+    @staticmethod
+    def remember(x, par, t):
+        """d."""
+        par[2], par[3] = x[3] - x[0], x[4] - x[1]
+        return x[5] - x[2]
 
     @staticmethod
     def series(x, par, k, s, out):

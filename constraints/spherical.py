@@ -7,14 +7,7 @@
 Never singular by itself.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 from ..plugins import Point, Primitive
-
-if TYPE_CHECKING:
-    from ..hints import BodyLike
 
 
 class Spherical(Primitive):
@@ -37,9 +30,6 @@ class Spherical(Primitive):
 
     rows = 3
     markers = (Point("a"), Point("b"))
-
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
-        super().__init__(a, b, **places)
 
     @staticmethod
     def phi(x, par, t, out):

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..plugins import InvalidConstraint, Joint, Side, Unilateral, angles, displacements, finite, shown
+from ..plugins import InvalidConstraint, Joint, Side, Unilateral, angles, displacements, finite, shown, shown_for_handle
 from .dot1 import Dot1
 from .dot2 import Dot2
 
@@ -69,13 +69,12 @@ class Stop(Unilateral, Joint):
         found = (angles(joint) or displacements(joint)) if getattr(joint, "joint_coordinates", ()) else []
         if not found:
             raise InvalidConstraint(
-                f"{name or 'Stop'}: joint must be one with an angle or a displacement, got {joint!r}."
+                f"{name or 'Stop'}: joint must be one with an angle or a displacement, got {shown_for_handle(joint)}."
             )
         self.__dict__["joint"] = joint
         super().__init__(*found[0][:2], name=name)
         self.lower, self.upper = lower, upper
         self._set_law(restitution)
-        self.check()
 
     def _untitled(self, bodies):
         return f"{self._kind()}({self.joint.name})"

@@ -54,7 +54,6 @@ class TranslationMotor(Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, displacement: Prescribed = 0.0, **places: Any) -> None:
         super().__init__(a, b, **places)
         self.displacement = displacement
-        self.check()
 
     def __setattr__(self, name, value):
         """Set an attribute, checked."""

@@ -8,17 +8,10 @@ f_a and f_b are the references, made perpendicular to the axes; g = axis x f. Th
 start is refused. Never singular.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 from ..plugins import Displacement, FramedJoint
 from .dot1 import Dot1
 from .parallel import Parallel
 from .point_on_line import PointOnLine
-
-if TYPE_CHECKING:
-    from ..hints import BodyLike
 
 
 class Translational(FramedJoint):
@@ -49,10 +42,6 @@ class Translational(FramedJoint):
     """
 
     joint_coordinates = (Displacement(),)
-
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
-        super().__init__(a, b, **places)
-        self.check()
 
     def compose(self):
         """Eqs. (1) to (3)."""

@@ -53,9 +53,6 @@ class Universal(Joint):
     markers = (Point("a"), Point("b"), Vector("a"), Vector("b"))
     joint_coordinates = (Angle(direction="axis_b"), Angle("axis_b", direction="axis_a"))
 
-    def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
-        super().__init__(a, b, **places)
-
     @Placing
     def at(cls, a: BodyLike, b: BodyLike | None = None, **arguments: Any) -> Self:
         """Make the joint from its point and axes in the ground frame, in the present poses.

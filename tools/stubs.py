@@ -133,12 +133,13 @@ def _imports(body: str, own: set[str]) -> str:
     """The imports of all that the body names."""
     words = {*re.findall(r"\w+", body)} - own
     classes = {name for name in ts.constraints.__all__ if name[0].isupper()}
+    abstract, typed = {"Callable", "Mapping", "Sequence"}, {"Any", "Self"}
     modules = (
-        ("collections.abc", {"Callable", "Mapping", "Sequence"}),
-        ("typing", {"Any", "Self"}),
-        (".", {name for name in ts.__all__ if name[0].isupper()} - {*hints.__all__}),
+        ("collections.abc", abstract),
+        ("typing", typed),
+        (".", {name for name in ts.__all__ if name[0].isupper()} - {*vars(hints)}),
         ("..constraints", classes),
-        ("..hints", {*hints.__all__}),
+        ("..hints", {*vars(hints)} - abstract - typed),
     )
     lines = [
         f"from {'..' if module == '.' else module} import {', '.join(sorted(words & names, key=_as_ruff))}"

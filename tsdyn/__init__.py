@@ -148,8 +148,8 @@ if TYPE_CHECKING:
     from .measuring.benchmark import benchmark
     from .measuring.compare import compare
     from .measuring.profile import profile
-    from .simulation.contact_run import impact
     from .simulation.hybrid import Change
+    from .simulation.impacts import impact
 else:
     from ._discovery import refusing as _refusing
 
@@ -160,7 +160,7 @@ else:
         "compare": ".measuring.compare",
         "ensemble": ".ensembles.ensemble",
         "Change": ".simulation.hybrid",
-        "impact": ".simulation.contact_run",
+        "impact": ".simulation.impacts",
         "plots": ".plots",
         "profile": ".measuring.profile",
         "testing": ".testing",

@@ -396,6 +396,12 @@ def complete_signature(cls):
     """
     signature = inspect.signature(inspect.unwrap(cls.__init__))  # an inherited one has that of the base by now
     parameters = dict(signature.parameters)
+    if parameters.pop("coordinates", None) and cls.markers:  # the base's own: the class has no `__init__`
+        del parameters["name"]
+        if any(marker.body == "b" for marker in cls.markers):
+            parameters["b"] = parameters["b"].replace(default=inspect.Parameter.empty, annotation="BodyLike")
+        else:
+            del parameters["b"]
     for base in cls.__mro__[1:]:
         opened = [name for name, p in parameters.items() if p.kind == OPEN]
         if not opened or opened[0] == PLACES:

@@ -105,13 +105,22 @@ from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
 from .methods.interpolants import linear_second
 from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
 from .motions.expressions import Smooth
+from .motions.of_coordinates import MOST as MOST_COORDINATES
 from .motions.of_coordinates import ROWS as COORDINATE_SLOPE_ROWS
-from .motions.of_coordinates import CoordinateFunction, coordinate_function, functions_of, slope_series
+from .motions.of_coordinates import (
+    CoordinateFunction,
+    JointFunction,
+    coordinate_function,
+    functions_of,
+    joint_function,
+    joint_slope,
+    slope_series,
+)
 from .motions.prescribed import Motion
 from .motions.signals import Signal, numbers_of
 from .motions.tables import is_data
 from .motions.tracing import gate
-from .validation import finite, floats, label, not_negative, number, positive, shown, vector3, whole
+from .validation import finite, floats, label, not_negative, number, positive, shown, shown_for_handle, vector3, whole
 
 __all__ = [
     "AXIS",
@@ -121,6 +130,7 @@ __all__ = [
     "FLAT",
     "GUIDE",
     "HEADING_ROWS",
+    "MOST_COORDINATES",
     "ORIENTATION",
     "PARALLEL",
     "PIN",
@@ -154,6 +164,7 @@ __all__ = [
     "InvalidForce",
     "Joint",
     "JointFriction",
+    "JointFunction",
     "JointLoad",
     "Motion",
     "NystromTableau",
@@ -211,6 +222,8 @@ __all__ = [
     "instants",
     "inverse_root",
     "is_data",
+    "joint_function",
+    "joint_slope",
     "kernel",
     "label",
     "linear_second",
@@ -236,6 +249,7 @@ __all__ = [
     "scene_load",
     "second_embedded_error",
     "shown",
+    "shown_for_handle",
     "sine_cosine",
     "sliding",
     "sliding_series",

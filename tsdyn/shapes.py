@@ -461,7 +461,7 @@ class Shape:
         mass = self.mass + other.mass
         apart = other.centroid - self.centroid
         centroid = self.centroid + (other.mass / mass) * apart
-        inertia = self.inertia + other.inertia + (self.mass * other.mass / mass) * _steiner(apart)
+        inertia = self.inertia + other.inertia + (self.mass * other.mass / mass) * steiner(apart)
         return Shape(mass, inertia, centroid, self.pieces + other.pieces)
 
 
@@ -672,7 +672,8 @@ def _shape(mass, inertia, drawn):
     return Shape(mass, np.diag(inertia), np.zeros(3), (drawn,))
 
 
-def _steiner(d):
+def steiner(d):
+    """d.d I - d d^T."""
     return (d @ d) * np.eye(3) - np.outer(d, d)
 
 

@@ -134,6 +134,11 @@ def shown(value):
     return clipped(text)
 
 
+def shown_for_handle(value):
+    """Return what a message shows of what is given in place of a handle: of a name, how to get the handle."""
+    return f"the name {value!r}; pass the object itself, scene[{value!r}]" if isinstance(value, str) else shown(value)
+
+
 def clipped(text):
     """Return what a message quotes of a text, such as one of a file: of a long one the beginning."""
     return text if len(text) <= LONG else f"{text[:LONG]} ..."

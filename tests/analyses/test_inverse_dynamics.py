@@ -321,6 +321,22 @@ def test_sampled_loads_are_replaced_as_actuators_and_refused_beside_them():
         scene.inverse_dynamics(SWING, ["servo of shoulder", "elbow"], [0.0, 0.2])
 
 
+@pytest.mark.parametrize("by_force", [False, True])
+def test_actuators_of_a_scene_with_other_parameters(by_force):
+    scene = arm()
+    for name in ("shoulder", "elbow") if by_force else ():
+        scene.add(F.JointTorque(scene[name], function=lambda t, angle, rate: 1.0, name=f"servo of {name}"))
+    other = scene.with_parameters({"gravity": (0.0, 0.0, 0.0)})
+    names = [f"servo of {name}" if by_force else name for name in ("shoulder", "elbow")]
+    found = other.inverse_dynamics(SWING, [other[name] for name in names], [0.3])
+    (a, ad, add), (b, bd, bdd) = (ts.Motion(motion).value(0.3) for motion in SWING.values())
+    weight = np.array(arm_torques(a, b, 0.0, 0.0, 0.0, 0.0))
+    torques = np.array(arm_torques(a, b, ad, bd, add, bdd)) - weight
+    np.testing.assert_allclose([found.load(other[name])[0] for name in names], torques, atol=HELD)
+    linear = other.linearise(inputs=[other[name] for name in names])
+    np.testing.assert_allclose(linear.F, np.eye(2), atol=ALGEBRA)
+
+
 def test_times_of_a_solution():
     scene, _ = cart_pole()
     run = ts.simulate(scene, (0.0, 0.5), dense_output=True)

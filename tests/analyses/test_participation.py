@@ -87,6 +87,19 @@ def test_a_mass_set_after_the_linearisation_changes_no_share():
     np.testing.assert_array_equal(linear.modes().participation("chassis"), before)
 
 
+def test_handles_of_a_scene_with_other_parameters():
+    """A point on the chassis, its centroid and its shares, asked by a handle of that scene."""
+    other = car().with_parameters({"chassis.mass": 4.0 * MASS})
+    body = other["chassis"]
+    linear = other.linearise(outputs=[body, (body, (1.0, 0.0, 0.0))])
+    bounce = int(np.argmin(np.abs(linear.modes().frequency - np.sqrt(STIFFNESS / MASS) / (2.0 * np.pi))))
+    np.testing.assert_allclose(linear.modes().participation(body)[bounce], [0, 0, 1, 0, 0, 0], atol=HELD)
+    places = dict(zip(linear.outputs, linear.state_space().C, strict=True))
+    assert places["chassis.z"][linear.coordinates.index("chassis.z")] == pytest.approx(1.0, abs=HELD)
+    along = places["chassis(1.0, 0.0, 0.0).z"][linear.coordinates.index("chassis.rotation y")]
+    assert along == pytest.approx(-1.0, abs=HELD)  # e_z . (e_y x e_x)
+
+
 def test_bodies_that_are_none():
     modes = car().linearise().modes()
     with pytest.raises(ts.InvalidBody, match="did you mean 'chassis'"):

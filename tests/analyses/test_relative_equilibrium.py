@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 import tsdyn as ts
 from tests.helpers.hanging_chains import DOWN, G, pendulums
 from tests.helpers.spinning_tops import spinning_top
-from tests.helpers.tolerances import CLOSE, FINE
+from tests.helpers.tolerances import CLOSE, FINE, HELD
 
 C, F, M = ts.constraints, ts.forces, ts.motions
 X, Y, Z = np.eye(3)
@@ -190,6 +190,15 @@ def test_what_has_no_steady_motion():
         swing.equilibrium(spin=(0, 0, 1.0))
     with pytest.raises(ts.NoEquilibrium, match=r"doesn't look the same|no steady motion"):
         swing.equilibrium(spin=(0, 2.0, 0.0))
+
+
+def test_rotor_of_a_scene_with_another_axis_of_symmetry():
+    """A rate is about the axis of symmetry that the body has with the scene's own numbers."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    scene.add_body(1.0, (1.0, 1.0, 2.0), name="top")
+    other = scene.with_parameters({"top.inertia": (2.0, 1.0, 1.0)})
+    found = other.equilibrium(rotors={other["top"]: 3.0}).state
+    np.testing.assert_allclose(found.angular_velocity("top"), (3.0, 0.0, 0.0), atol=HELD)
 
 
 @pytest.mark.parametrize(

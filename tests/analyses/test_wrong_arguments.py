@@ -37,7 +37,7 @@ CASES = {
         lambda scene: scene.linearise(inputs=["pin 0.x"]),
         "'pin 0' has no component 'x': its input is 'pin 0.angle'",
     ),
-    "an input twice": (lambda scene: scene.linearise(inputs=["pin 0", "pin 0.angle"]), "pin 0.angle is given twice"),
+    "an input twice": (lambda scene: scene.linearise(inputs=["pin 0", "pin 0.angle"]), "angle is given more than once"),
     "a misspelt coordinate": (
         driven({"pim 0.angle": SINE}),
         "there are 'pin 0.angle', 'link 0'; did you mean pin 0.angle",

@@ -191,6 +191,105 @@ def test_a_function_of_several_joints_in_a_chain():
     assert (again.q == solution.q).all()
 
 
+def lift(p, q):
+    return 0.3 * p * q + 0.1 * np.sin(p * q) + 0.02 * p**2
+
+
+def crane(function, axes=(Z, X)):
+    """Two wheels on axes of the ground, of 0.5 and 0.3 kg m^2, lift a body of 2 kg by a function of both angles."""
+    scene = ts.Scene(gravity=(0, 0, -9.81))
+    joints = [wheel(scene, scene.ground, (i, 0, 0), axes[i], (0.5, 0.3)[i], name=f"w{i}")[1] for i in range(2)]
+    body = scene.add_body(2.0, (1, 1, 1), position=(3, 0, 0), name="load")
+    joints.append(scene.add(C.Translational.at(scene.ground, body, point=(3, 0, 0), axis=Z, name="slide")))
+    scene.add(C.Coupler(joints[2], *joints[:2], function=function, name="crane"))
+    return scene, joints
+
+
+@pytest.mark.slow_for("*sdirk54*", "*radau*", "*null-space*")
+@every_method
+def test_a_product_of_two_angles_against_lagrange(options):
+    """(J + m g g^T) q'' = -m g (q'^T G q' + 9.81), g and G the first and second derivatives of the lift."""
+    scene, joints = crane(lift)
+    scene.body("w0").angular_velocity, scene.body("w1").angular_velocity = (0, 0, 9.0), (-3.0, 0, 0)
+    scene.assemble(fixed=["w0", "w1"])
+
+    def rates(t, y):
+        (p, q), u, sine, cosine = y[:2], y[2:], np.sin(y[0] * y[1]), np.cos(y[0] * y[1])
+        g = np.array([q * (0.3 + 0.1 * cosine) + 0.04 * p, p * (0.3 + 0.1 * cosine)])
+        both = 0.3 + 0.1 * cosine - 0.1 * p * q * sine
+        G = np.array([[0.04 - 0.1 * q * q * sine, both], [both, -0.1 * p * p * sine]])
+        forces = -2.0 * g * (u @ G @ u + 9.81)
+        return *u, *np.linalg.solve(np.diag((0.5, 0.3)) + 2.0 * np.outer(g, g), forces)
+
+    solution = ts.simulate(scene, (0.0, 2.0), **options)
+    held(solution)
+    p, q = (solution.angle(joint) for joint in joints[:2])
+    assert np.ptp(p) > 2.0 * np.pi
+    assert np.abs(solution.displacement(joints[2]) - lift(p, q)).max() < 1e-12
+    start = 0.0, 0.0, solution.angle_rate(joints[0])[0], solution.angle_rate(joints[1])[0]
+    known = solve_ivp(rates, (0.0, 2.0), start, method="DOP853", rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose((p[-1], q[-1]), known.y[:2, -1], atol=2e-7 * loose(options) ** 0.5)
+    assert np.ptp(solution.energy) < 1e-6 * loose(options) ** 0.5
+
+
+def test_linearisation_of_a_product():
+    """At p = q = 0 of p^2 + p q + q^2: K = m g [[2, 1], [1, 2]]; the product is off the diagonal."""
+    scene, _ = crane(lambda p, q: p**2 + p * q + q**2)
+    found = scene.linearise()
+    np.testing.assert_allclose(found.M, np.diag((0.5, 0.3)), atol=1e-14)
+    np.testing.assert_allclose(found.K, 2.0 * 9.81 * np.array([[2.0, 1.0], [1.0, 2.0]]), atol=1e-12)
+
+
+def test_a_function_of_angles_and_travels_in_a_chain():
+    """Each joint of a chain of five, of both kinds, is in a product with the others; a run goes on to the bit."""
+    scene, last, joints = ts.Scene(), None, []
+    last = scene.ground
+    for i in range(5):
+        body = scene.add_body(1.0 + i, (0.1, 0.2, 0.15), position=(i + 0.5, 0, 0), name=f"link {i}")
+        kind = (C.Revolute, C.Translational)[i % 2]
+        joints.append(scene.add(kind.at(last, body, point=(i, 0, 0), axis=(X + Y, Y, Z, X, Y)[i], name=f"j{i}")))
+        last = body
+
+    def product(a, x, b, y):
+        return np.exp(0.1 * a * x) * np.cos(b * y) + a * y - 1.0
+
+    coupler = scene.add(C.Coupler(joints[4], *joints[:4], function=product, name="product"))
+    scene.assemble()
+    solution = ts.simulate(scene, (0.0, 1.0), rtol=1e-10, atol=1e-10)
+    held(solution)
+    a, x, b, y, c = (solution.angle(j) if i % 2 == 0 else solution.displacement(j) for i, j in enumerate(joints))
+    assert np.abs(c - product(a, x, b, y)).max() < 1e-12
+    assert np.ptp(solution.energy) < 1e-6
+    assert {body.name for body in coupler.bodies} == {f"link {i}" for i in range(5)}
+    half = ts.simulate(scene, (0.0, 0.5), rtol=1e-10, atol=1e-10)
+    known = ts.simulate(scene, (0.0, 1.0), rtol=1e-10, atol=1e-10, t_eval=[0.5, 1.0])
+    rest = ts.simulate(scene, (half.state.t, 1.0), state=half.state, rtol=1e-10, atol=1e-10)
+    assert np.abs(rest.q[-1] - known.q[-1]).max() < 1e-8
+    again = ts.simulate(pickle.loads(pickle.dumps(crane(lift)[0])), (0.0, 1.0))
+    assert (again.q == ts.simulate(crane(lift)[0], (0.0, 1.0)).q).all()
+
+
+@pytest.mark.parametrize("kinds", ["aa", "da", "dd", "ada"])
+def test_kernels_and_series_of_functions_of_several(kinds):
+    def make(a, b):
+        joints = [
+            a.scene.add(C.Cylindrical(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3))) for _ in "abcd"
+        ]
+        pairs = [(joint, {"a": "angle", "d": "displacement"}[kind]) for joint, kind in zip(joints, kinds, strict=False)]
+        return C.Coupler((joints[3], "angle"), *pairs, offset=0.3, function=SAMPLES[len(kinds)])
+
+    rng = np.random.default_rng(3)
+    ts.testing.check_primitive(make, states=3)
+
+
+SAMPLES = {
+    2: lambda p, q: (
+        np.sin(p * q) + q**3 * p / (1.0 + p**2) + np.exp(-p * q) - np.arctan(p * q) + np.log(9.0 + (p * q) ** 2)
+    ),
+    3: lambda p, q, r: np.sin(p * q * r) - np.sqrt(9.0 + (q * r) ** 2) + np.tanh(0.2 * r * p),
+}
+
+
 @pytest.mark.parametrize("given", [{"ratio": 0.7}, *CAM.values()], ids=["ratio", *CAM])
 def test_kernels_and_series(given):
     """phi, jacobian, gamma and the coefficients of Taylor series, of every kind of term."""
@@ -320,7 +419,7 @@ def test_a_run_resumes_to_the_bit(tmp_path, monkeypatch):
         (lambda j, k, o: ((j, k), {"ratio": np.nan}), "ratio must be a finite number"),
         (lambda j, k, o: ((j, k), {"offset": np.inf}), "offset must be a finite number"),
         (lambda j, k, o: ((j, o), {}), "another scene"),
-        (lambda j, k, o: ((j, 3.0), {}), "3.0 has no angle or displacement"),
+        (lambda j, k, o: ((j, 3.0), {}), "joints with an angle or a displacement, .* got 3.0"),
         (lambda j, k, o: (((j, "displacement"), k), {}), "say which coordinate"),
         (lambda j, k, o: ((j, k), {"polynomial": ()}), "polynomial must be finite coefficients"),
         (lambda j, k, o: ((j, k), {"polynomial": (1.0, np.nan)}), "polynomial must be finite coefficients"),
@@ -338,14 +437,34 @@ def test_what_is_refused(give, said):
         C.Coupler(*joints, **others)
 
 
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda joint: C.Coupler("hinge one", joint),
+        lambda joint: C.Coupler(joint, ("hinge one", "angle")),
+        lambda joint: C.Stop("hinge one", lower=0.0),
+        lambda joint: ts.forces.Armature("hinge one", inertia=1.0),
+        lambda joint: ts.forces.JointTorque("hinge one", function=lambda t, q, rate: 1.0),
+        lambda joint: ts.forces.RevoluteFriction("hinge one", radius=0.1, kinetic=0.1),
+    ],
+)
+def test_a_name_in_place_of_a_joint(make):
+    _, fast, *_ = crossed(1.0, 0.0)
+    with pytest.raises(ts.TsdynError, match=r"the name 'hinge one'; pass the object itself, scene\['hinge one'\]"):
+        make(fast)
+
+
 def test_couplers_in_a_circle_and_products():
     scene, fast, slow, _ = crossed(1.0, 0.0)
     _, third = wheel(scene, scene.ground, (2, 0, 0), Y, name="three")
     scene.add(C.Coupler(third, slow, name="second"))
     with pytest.raises(ts.InvalidConstraint, match=r"'third', .*'second'.*'gear'|'third', 'gear', 'second'"):
         scene.add(C.Coupler(fast, third, name="third"))
-    with pytest.raises(ts.InvalidConstraint, match="sum of functions of one coordinate"):
-        C.Coupler(third, slow, fast, function=lambda a, b: a * b)
+    hinges = [wheel(scene, scene.ground, (3 + i, 0, 0), Y, name=f"w{i}")[1] for i in range(6)]
+    with pytest.raises(ts.InvalidConstraint, match="6 coordinates together; at most 5"):
+        C.Coupler(third, *hinges, function=lambda a, b, c, d, e, f: a * b * c * d * e * f)
+    with pytest.raises(ts.InvalidConstraint, match="too many operations"):
+        C.Coupler(third, slow, fast, function=lambda a, b: sum(np.sin(i * a * b) for i in range(50)))
 
 
 def test_a_start_off_the_row_is_refused_and_assembled():

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 
 import tsdyn as ts
 from tests.helpers.tolerances import ALGEBRA, CLOSE, COARSE, EPS, FINE, HELD, NEAR, ROUNDING
@@ -547,10 +547,45 @@ def test_inverse_dynamics_of_a_motion():
     np.testing.assert_allclose(found.reaction("edge")[0], solution.reaction("edge")[0], rtol=0, atol=FINE)
 
 
-def test_kinematics_refuses_them():
-    scene = sleigh()
-    with pytest.raises(ts.InvalidArgument, match=r"edge.*rows on velocities"):
-        scene.kinematics([0.0, 1.0])
+def cart(left, right, radius=0.2, track=0.8):
+    """A platform on two driven wheels, guided parallel to the floor; its wheels turn by functions of time."""
+    scene = ts.Scene()
+    deck = scene.add_body(10.0, (1.0, 1.0, 2.0), position=(0, 0, radius), name="deck")
+    scene.add(C.Planar.at(scene.ground, deck, point=(0, 0, radius), axis=(0, 0, 1)))
+    motors = []
+    for name, y, turn in (("left", track / 2, left), ("right", -track / 2, right)):
+        wheel = scene.add_body(1.0, (0.01, 0.02, 0.01), position=(0, y, radius), name=name)
+        hinge = scene.add(C.Revolute.at(deck, wheel, point=(0, y, radius), axis=(0, 1, 0), name=f"{name} hinge"))
+        scene.add(C.RollingDisc(wheel, scene.ground, axis_a=(0, 1, 0), radius=radius, normal_b=(0, 0, 1)))
+        motors.append(scene.add(C.RotationMotor.of(hinge, angle=turn, name=f"{name} motor")))
+    return scene, motors
+
+
+def test_kinematics_of_driven_wheels():
+    """Speed R (l' + r') / 2, yaw rate R (r' - l') / track: a clothoid. The motors' work is kinetic energy."""
+    time = ts.motions.time
+    scene, motors = cart(2.0 * time - 0.6 * time**2, 2.0 * time + 0.6 * time**2)
+    t = np.linspace(0.0, 3.0, 7)
+    found = scene.kinematics(t)
+    assert found.success
+    np.testing.assert_array_equal(found.t, t)
+    heading, ways = 0.3 * t**2, []
+    for f in (np.cos, np.sin):
+        ways.append([0.4 * quad(lambda s, f=f: f(0.3 * s * s), 0.0, end, epsabs=1e-13)[0] for end in t])
+    np.testing.assert_allclose(found.position("deck")[:, :2], np.stack(ways, axis=1), atol=FINE)
+    first = found.rotation("deck")[:, :, 0]
+    np.testing.assert_allclose(first[:, :2], np.stack((np.cos(heading), np.sin(heading)), axis=1), atol=FINE)
+    assert max(map(max, found.constraint_error)) < HELD
+    wheels = 2.0 * (0.02 * 1.2**2 + 1.0 * 0.24**2 + 0.01 * 0.6**2)  # spin, path and yaw of both, over t t'
+    power = sum(found.power_of(motor) for motor in motors)
+    np.testing.assert_allclose(power, (2.0 * 0.6**2 + wheels) * t, atol=FINE)
+    with pytest.raises(ts.InvalidArgument, match="t must increase from the start, t = 0 s: with rows on velocities"):
+        scene.kinematics([1.0, 0.5])
+
+
+def test_kinematics_names_the_freedom_that_rows_on_velocities_leave():
+    with pytest.raises(ts.InvalidArgument, match=r"2 degrees of freedom are left"):
+        sleigh().kinematics([0.0, 1.0])
 
 
 def test_a_ball_on_its_head_rolls_over():

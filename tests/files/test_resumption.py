@@ -107,6 +107,35 @@ def test_rows_on_velocities(way, tmp_path):
     stop_and_go_on(sleigh, 1.0, tmp_path / "run.h5", **way)
 
 
+def drawn():
+    """A motor with a rotor turns a wheel, coupled by a product of angles to another, that lifts a load by a cable."""
+    scene, c = ts.Scene(gravity=(0, 0, -9.81)), ts.constraints
+    hinges = []
+    for i in range(3):
+        wheel = scene.add_body(1.0, (0.3, 0.3, 0.3), position=(i, 0, 0), angular_velocity=(0, 0, 4.0 if i < 2 else 0.0))
+        hinges.append(scene.add(c.Revolute.at(scene.ground, wheel, point=(i, 0, 0), axis=(0, 0, 1), name=f"h{i}")))
+    scene.add(c.Coupler(hinges[2], *hinges[:2], function=lambda p, q: 0.1 * p * q + 0.2 * np.sin(p)))
+    scene.assemble(fixed=["body1", "body2"])
+    scene.add(ts.forces.Armature(hinges[0], inertia=0.02, ratio=5.0))
+    load = scene.add_body(0.5, (0.1, 0.1, 0.1), position=(2.3, 0, -1.0), name="load")
+    points = [(scene.bodies[2], (0.3, 0, 0)), (scene.ground, (2.3, 0, 0.5)), (load, (0, 0, 0.1))]
+    scene.add(ts.forces.Cable(points, stiffness=300.0, damping=2.0, free_length=1.5))
+    counter = scene.add_point_mass(mass=0.4, position=(5, 0, -1))
+    weight = scene.add_point_mass(mass=0.5, position=(6, 0, -1.5))
+    over = [(counter, (0, 0, 0)), (scene.ground, (5, 0, 0)), (scene.ground, (6, 0, 0)), (weight, (0, 0, 0))]
+    scene.add(c.Rope(over, always_taut=True))
+    return scene
+
+
+@pytest.mark.slow_but("dop853")
+@pytest.mark.usefixtures("short_slices")
+@pytest.mark.parametrize(
+    "method", [None, "dop853", I.Nystrom4(1e-2), "radau"], ids=["default", "dop853", "nystrom4", "radau"]
+)
+def test_rotors_couplers_cables_and_ropes(method, tmp_path):
+    stop_and_go_on(drawn, 0.7, tmp_path / "run.h5", again=drawn(), integrator=method)
+
+
 @pytest.mark.slow_but("redundant-dop853", "turns-default")
 @pytest.mark.usefixtures("short_slices")
 @pytest.mark.parametrize("method", [None, "dop853", I.Nystrom4(1e-2)], ids=["default", "dop853", "nystrom4"])
@@ -189,7 +218,7 @@ def test_singular_configurations(method, count, tmp_path):
 @pytest.mark.parametrize("count", [2, 5, 8, 11, 13, 15])
 def test_runs_that_turn_to_an_implicit_method(count, tmp_path, monkeypatch):
     """Stopped in segments of either method, of which there are five or more."""
-    monkeypatch.setattr(segments, "PATIENCE", 1)
+    monkeypatch.setattr(segments.limits, "PATIENCE", 1)
     monkeypatch.setattr(segments.Turns, "patience", 1)
     path, options = tmp_path / "run.h5", {"rtol": 1e-7, "atol": 1e-7, "history": True}
     whole = ts.simulate(jointed(), (0.0, 2.0), **options)

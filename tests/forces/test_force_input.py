@@ -77,7 +77,10 @@ CASES = {
         "set torsional_damping=0",
     ),
     "nothing in Coulomb friction": (lambda w: F.CoulombFriction(w.a, w.b), "force or torque"),
-    "slip velocity of zero": (lambda w: F.CoulombFriction(w.a, w.b, force=1, slip_velocity=0), "slip_velocity must be"),
+    "negative slip velocity": (
+        lambda w: F.CoulombFriction(w.a, w.b, force=1, slip_velocity=-1),
+        "slip_velocity must be",
+    ),
     "user function of three": (lambda w: F.UserForce(w.a, function=lambda t, a, out: None), "five arguments"),
     "user parameters of text": (lambda w: F.UserForce(w.a, function=five, parameters="x"), "finite numbers"),
     "force of nothing": (lambda w: ts.Force(w.a), "base of forces"),

@@ -92,6 +92,18 @@ def test_shapes():
     assert ts.Scene().shapes == {}
 
 
+def test_shapes_of_sdf_without_numbers_and_without_extent(tmp_path):
+    shapes = ("<capsule/>", "<sphere/>", "<box><size>1 0 1</size></box>", "<ellipsoid/>")
+    visuals = "".join(f"<visual name='v{i}'><geometry>{shape}</geometry></visual>" for i, shape in enumerate(shapes))
+    ends = "<parent>world</parent><child>a</child>"
+    hinge = f"<joint name='j' type='revolute'>{ends}<axis><xyz>0 1 0</xyz></axis></joint>"
+    content = f"<link name='a'><inertial><mass>1</mass></inertial>{visuals}</link>{hinge}"
+    scene = load(text(tmp_path, f"<sdf version='1.10'><model name='m'>{content}</model></sdf>", "m.sdf"))
+    capsule, sphere = scene.shapes["a"]
+    assert (capsule.radius, capsule.length, sphere.radius) == (0.5, 1.0, 1.0)  # the defaults of the specification
+    assert left_out(scene) == {"shape without extent": ["a"], "shape <ellipsoid>": ["a"]}
+
+
 def test_the_viewer_draws_them(tmp_path):
     scene = load(MODELS / "arm.urdf")
     page = ts.simulate(scene, (0.0, 0.01)).view(tmp_path / "arm.html")

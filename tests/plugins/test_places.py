@@ -47,6 +47,33 @@ def test_a_class_without_init_has_the_arguments_of_its_markers(pin_in_slot):
         pin_in_slot(body, scene.ground)
 
 
+def test_a_class_without_init_is_called_by_its_signature(pin_in_slot):
+    scene = ts.Scene()
+    body = scene.add_body(1.0, (1, 1, 1))
+    assert list(inspect.signature(pin_in_slot).parameters) == ["a", "b", "point_a", "point_b", "slot_b", "name"]
+    with pytest.raises(ts.InvalidCall, match="missing a required argument: 'b'"):
+        pin_in_slot(body)
+    with pytest.raises(
+        ts.InvalidCall, match="takes a, b by position, got 3 arguments there; name the others: point_a="
+    ):
+        pin_in_slot(body, scene.ground, (1, 0, 0))
+    with pytest.raises(ts.InvalidCall, match="It has a, b, point_a, point_b, slot_b, name"):
+        pin_in_slot(body, scene.ground, slots=(0, 0, 1))
+
+
+def test_values_are_checked_when_one_is_made(pin_in_slot):
+    class ShortPin(pin_in_slot):
+        def check(self):
+            if not np.linalg.norm(self.point_a) < 1.0:
+                raise self.error(f"{self.name}: point_a is beyond 1 m.")
+
+    scene = ts.Scene()
+    body = scene.add_body(1.0, (1, 1, 1))
+    ShortPin(body, scene.ground, slot_b=(0, 0, 1), point_a=(0.5, 0, 0))
+    with pytest.raises(ts.InvalidConstraint, match="point_a is beyond 1 m"):
+        ShortPin(body, scene.ground, slot_b=(0, 0, 1), point_a=(1, 0, 0))
+
+
 def test_docstrings_describe_arguments_of_markers_and_of_bases(pin_in_slot):
     text = inspect.getdoc(pin_in_slot)
     assert text.index("Parameters\n") < text.index("Raises\n") < text.index("Notes\n")

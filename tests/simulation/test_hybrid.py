@@ -444,6 +444,18 @@ def test_inactive_parts_in_files_copies_and_analyses(tmp_path):
         ts.load(_edited(tmp_path / "rotors.toml", "active = false", "active = 0"))
 
 
+def test_what_doesnt_hold_at_the_start_is_not_shown_as_violated(tmp_path):
+    scene = ts.Scene()
+    body = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(0, 0, 1), name="body")
+    scene.add(C.PlaneContact(body, scene.ground, normal_b=(0, 0, 1), unilateral=True, name="floor"))
+    scene.add(C.Rope([(scene.ground, (0, 0, 2)), (body, (0, 0, 0))], 3.0, name="rope"))
+    scene.add(C.Fixed(scene.ground, body, point_a=(1, 0, 0), name="dock"))
+    scene.deactivate("dock")
+    assert "Phi = " not in scene.view(tmp_path / "scene").read_text()
+    scene.activate("dock")
+    assert "dock" in scene.view(tmp_path / "scene").read_text().partition("Phi = ")[0]
+
+
 def _edited(path, before, after):
     path.write_text(path.read_text().replace(before, after))
     return path

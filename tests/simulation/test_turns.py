@@ -24,7 +24,7 @@ def level(t, state):
 def impatient():
     """The explicit method is tried after a few steps already, so that runs turn more than once."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(segments, "PATIENCE", 1)
+        patched.setattr(segments.limits, "PATIENCE", 1)
         patched.setattr(segments.Turns, "patience", 1)
         yield
 

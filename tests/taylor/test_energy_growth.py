@@ -27,11 +27,12 @@ def test_errors_of_energy_and_momenta_stay_below_one_rounding_a_step(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "mean"), [("top", 0.3), ("chain", 0.15)])
+@pytest.mark.parametrize(("name", "mean"), [("top", 0.3), ("chain", 0.15), ("disc", 0.3)])
 def test_errors_of_many_starts_are_a_random_walk(name, mean):
     """The mean of the energy error is small against its scatter; constraint errors don't grow.
 
-    With gravity rounded to the last place of larger accelerations the mean of the chain is 0.26.
+    With gravity rounded to the last place of larger accelerations the mean of the chain is 0.26. A disc rolls with rows
+    on velocities: a drift of 0.001 eps a step would be twice what is allowed.
     """
     one = grow(name, 5e4, 16)
     end = one.energy[:, -1]

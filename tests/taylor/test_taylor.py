@@ -285,7 +285,7 @@ def test_an_implicit_method_is_considered_again_at_times_of_the_motion_alone(sli
     """Not for what little seems to be left, which may change. Slices end where the clock wants it."""
     asked = []
     monkeypatch.setattr(driver, "FIRST_SLICE", slices_of)
-    monkeypatch.setattr(segments, "STEP_EVALUATIONS", 1e9)
+    monkeypatch.setattr(segments.limits, "STEP_EVALUATIONS", 1e9)
     own = segments.Turns._to_implicit
     monkeypatch.setattr(
         segments.Turns, "_to_implicit", lambda self, *given: asked.append(given[1]) or own(self, *given)

@@ -21,8 +21,7 @@ from ..observables import reactions
 from ..observables.evaluate import balance, constraint_arrays, mass_matrix_sparse, normal_loads
 from ..observables.generalised_forces import force_loads, inertial_forces, velocity_forces
 from ..validation import sequence
-from .coordinates import arm_by_parameters, named_coordinates, transform_e
-from .linearise import AXES, item_of
+from .coordinates import AXES, arm_by_parameters, item_of, named_coordinates, transform_e
 from .nominal_motion import roots_of_masses
 from .tolerances import ACCEPTED, CONSISTENT, DELTA, DENSE_INSTANT, REGULARISED_SWEEPS
 
@@ -65,27 +64,31 @@ class UnitLoads:
 
     def force(self, body, s, F):
         """F (k, 3) at a point s."""
-        at, dimension = self.handles.where(body)
+        at, dimension = self._where(body)
         arm = arm_by_parameters(self._parameters(body), np.asarray(s, float))
         values = np.concatenate((F, np.einsum("ki,kij->kj", F, arm)), axis=1)
         return np.arange(at, at + dimension), values[:, :dimension]
 
     def torque(self, body, n):
         """A torque (k, 3)."""
-        at, dimension = self.handles.where(body)
+        at, dimension = self._where(body)
         if dimension != 7:
             return np.zeros(0, int), np.zeros((len(n), 0))
         return np.arange(at + 3, at + 7), 2.0 * np.einsum("ki,kij->kj", n, transform_e(self._parameters(body)))
 
+    def _where(self, body):
+        """Where the coordinates of a body are; of a handle of another scene of the family, too."""
+        return self.handles.where(self.handles.own(body))
+
     def _parameters(self, body):
-        at, dimension = self.handles.where(body)
+        at, dimension = self._where(body)
         return self.q[:, at + 3 : at + 7] if dimension == 7 else np.tile(IDENTITY, (len(self.q), 1))
 
     def _direction(self, body, s):
         return rotation_matrix(self._parameters(body)) @ np.asarray(s, float)
 
     def _position(self, body, s):
-        at, dimension = self.handles.where(body)
+        at, dimension = self._where(body)
         if dimension == 3:
             return self.q[:, at : at + 3]
         return self._direction(body, s) + (self.q[:, at : at + 3] if dimension else 0.0)
@@ -96,30 +99,31 @@ def _joined(*loads):
     return np.concatenate(columns), np.concatenate(values, axis=1)
 
 
-# Actuators: what their loads are called, their units, and their generalised forces along a motion.
+# Actuators, and the inputs of `scene.linearise`: their names, units, and generalised forces along a motion.
 #
-# They are the inputs of `scene.linearise`: JointTorque and JointForce, joints, PointForce, Torque, springs.
+# JointTorque and JointForce, joints, PointForce, Torque, springs.
 
 NEWTON, NEWTON_METRE = "N", "N m"
 
 
 class Actuator(NamedTuple):
-    """One unknown load, along a motion of k instants."""
+    """One load, along a motion of k instants."""
 
     name: str
     unit: str
-    item: object
+    item: object  # of the scene whose numbers vary
     columns: np.ndarray  # (c,) of q
     loads: np.ndarray  # (k, c)  generalised forces of a unit of it
+    whole: str = ""  # the load of which it is a component, where all of them were asked for
 
     def rate(self, qd):
         """What its power is the product with (k,): a velocity or an angular velocity."""
         return np.einsum("kc,kc->k", self.loads, qd[:, self.columns])
 
 
-def actuators_of(scene, handles, given, q):
-    """The `Actuator`s of handles and names along q (k, n); what has no load to give is refused."""
-    given = sequence(given, "actuators must be a sequence of handles or names, such as [motor]", InvalidArgument)
+def actuators_of(scene, handles, given, q, what="actuator"):
+    """The `Actuator`s of handles and names along q (k, n); what has no load to give is refused, as no `what`."""
+    given = sequence(given, f"{what}s must be a sequence of handles or names, such as [motor]", InvalidArgument)
     units, coordinates, found = UnitLoads(handles, q), named_coordinates(handles), []
     constraints = [row.item for row in handles.rows if not isinstance(row.item, Force)]
     by_name = {name: (item, geometry) for item in constraints for name, geometry in coordinates[id(item)]}
@@ -129,12 +133,16 @@ def actuators_of(scene, handles, given, q):
             found.append(_of_coordinate(units, one, item, geometry))
             continue
         item, axis = item_of(scene, one, [*scene.forces, *scene.constraints], "force or joint")
-        found += [each for each in _of_item(units, coordinates, item) if axis is None or each.name.endswith(axis)]
+        every = _of_item(units, coordinates, item, what)
+        same = [each for each in every if axis is None or each.name.endswith(axis)]
+        if not same:
+            names = ", ".join(repr(each.name) for each in every)
+            raise InvalidArgument(f"{item.name!r} has no component {axis[1:]!r}: its {what} is {names}.")
+        own = {"item": handles.own(item), "whole": item.name if len(same) > 1 else ""}
+        found += [each._replace(**own) for each in same]
     for name, count in Counter(each.name for each in found).items():
         if count > 1:
-            raise InvalidArgument(f"actuators: {name} is given more than once, or several have this name.")
-    if not found:
-        raise InvalidArgument("actuators: give one at least: a force, or a joint with an angle or a displacement.")
+            raise InvalidArgument(f"{what}s: {name} is given more than once, or several have this name.")
     return found
 
 
@@ -144,7 +152,7 @@ def _of_coordinate(units, name, item, geometry):
     return Actuator(name, NEWTON_METRE if turns else NEWTON, item, *load)
 
 
-def _of_item(units, coordinates, item):
+def _of_item(units, coordinates, item, what):
     if isinstance(item, JointLoad):
         return [_of_coordinate(units, item.name, item, item.geometry)]
     if isinstance(item, Spring):
@@ -153,12 +161,13 @@ def _of_item(units, coordinates, item):
         unit = NEWTON if isinstance(item, PointForce) else NEWTON_METRE
         axes = zip(AXES, np.eye(3), strict=True)
         return [Actuator(item.name + axis, unit, item, *units.component(item, e)) for axis, e in axes]
-    found = [] if isinstance(item, Force) else coordinates.get(id(item), [])
+    found = [] if isinstance(item, Force) else coordinates.get(id(units.handles.own(item)), [])
     if not found:
         raise InvalidArgument(
-            f"{item.name}: a {type(item).__name__} is no actuator. Actuators are JointTorque and JointForce, "
+            f"{item.name}: a {type(item).__name__} is no {what}. {what.capitalize()}s are JointTorque and JointForce, "
             "PointForce and Torque (three components), the actuator of a Spring, and joints with an angle or a "
-            "displacement, for the torque or force along it."
+            "displacement, for the torque or force along it. In place of a motor that prescribes a motion use a "
+            "JointTorque or JointForce."
         )
     return [_of_coordinate(units, name, item, geometry) for name, geometry in found]
 

@@ -16,11 +16,15 @@ from ..errors import SingularConfiguration
 from ..formulations.accelerations import refine_accelerations, solve_accelerations
 from ..jit.kernels import entry, loader, resident
 from ..maths.dense_linalg import copy
+from ..maths.root_isolation import SURVEYING
+from ..maths.vectors import add, spin, subtract
 from ..model.equations import (
     WIDTH,
     acceleration_bias,
     constraint_jacobian,
     constraints,
+    inertia_rows,
+    multiply_inertia_row,
     recall,
     set_time,
     time_derivative,
@@ -120,6 +124,32 @@ def accelerate(context, t, q, qd, out, gamma):
     acceleration_bias(c.rows, q, qd, t, gamma)
 
 
+@entry("pvvvm")
+def gain(context, q, before, after, h):
+    """Kinetic energy that velocities (n,) have more afterwards, J; h (i, 14): scratch for inertia rows.
+
+    v.M v / 2 - u.M u / 2 = (v - u).M (v + u) / 2
+    """
+    s, total = load_contacts(context).free.system, 0.0
+    for b in range(s.bodies.shape[0]):
+        i = s.bodies[b, 0]
+        for c in range(3):
+            total += s.mass[b] * (after[i + c] - before[i + c]) * (after[i + c] + before[i + c])
+        if s.bodies[b, 1] == 7:
+            p = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
+            u = spin(p, (before[i + 3], before[i + 4], before[i + 5], before[i + 6]))
+            v = spin(p, (after[i + 3], after[i + 4], after[i + 5], after[i + 6]))
+            d, m = subtract(v, u), add(v, u)
+            J = s.inertia[b]
+            for j in range(3):
+                total += d[j] * (J[3 * j] * m[0] + J[3 * j + 1] * m[1] + J[3 * j + 2] * m[2])
+    inertia_rows(s, q, h)
+    for e in range(h.shape[0]):
+        u, v = multiply_inertia_row(s, h, e, before), multiply_inertia_row(s, h, e, after)
+        total += (v - u) * (v + u)
+    return 0.5 * total
+
+
 @entry("pvmvm")
 def find_multipliers(context, t, levels, memory, out):
     """out (k, m): multipliers at times t (k,) and states on the manifold, levels (k, 3 n), by the equations of motion.
@@ -142,6 +172,9 @@ def find_multipliers(context, t, levels, memory, out):
         for e in range(f.b.size):
             if graph.row[e] >= 0:
                 out[k, graph.row[e]] = f.b[e] if regular else math.nan
+
+
+KERNELS = find_gaps, find_rows, respond, accelerate, gain, find_multipliers, *SURVEYING
 
 
 class ReactionWorkspace:
@@ -177,7 +210,7 @@ class ContactWorkspace:
         graph = graph_of(free, REDUCED, BIAS)
         own = (each._replace(reals=each.reals.copy()) for each in map(with_short_rows, (free, contacts)))
         (system, rows), self._all = own, np.arange(self.m)
-        self._short = np.zeros((len(rows.segments), WIDTH))
+        self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in (rows.segments, system.inertia_segments))
         self.address, *self._keep = resident(ContactParts(parts(system, graph, self.n), rows))
         self._accelerate = interrupts_answered()(accelerate) if calls_laws(free) else accelerate
 
@@ -209,3 +242,7 @@ class ContactWorkspace:
         qdd, gamma = np.empty(self.n), np.zeros(self.m)
         self._accelerate(self.address, t, q, qd, qdd, gamma)
         return qdd, gamma
+
+    def gain(self, q, before, after):
+        """Kinetic energy that velocities (n,) have more afterwards, J."""
+        return gain(self.address, q, before, after, self._inertias)

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.bodies import transform_g
+from ..elements.bodies import named, transform_g
 from ..elements.element import AngleGeometry
-from ..errors import SingularConfiguration
+from ..errors import InvalidArgument, SingularConfiguration
 from ..maths.tolerances import PIVOT_ROUNDING
 from ..model.handles import handles_of
 from .tolerances import BATCH, CLEAR, DENSE, IN_TURN, INDEPENDENT
@@ -127,6 +127,19 @@ def named_coordinates(handles):
     return found
 
 
+AXES = ".x", ".y", ".z"
+
+
+def item_of(scene, given, things, what):
+    """The thing that a handle or a name means, and an axis ".x" at the end of the name, or None."""
+    if not isinstance(given, str):
+        if not any(given is thing for thing in things):
+            raise InvalidArgument(f"{given!r} is no {what} of this scene: give a handle or a name.")
+        return given, None
+    axis = given[-2:] if given[-2:] in AXES and given not in {thing.name for thing in things} else None
+    return named(things, given[:-2] if axis else given, what), axis
+
+
 class Variation(NamedTuple):
     """One coordinate."""
 
@@ -196,16 +209,8 @@ class Variations:
         rows = product(self.axes, rows, "ij,jk->ik")
         return [Variation(f"{title}.{axis}", columns, rows[:, i], True) for i, axis in enumerate("xyz")]
 
-    def angle(self, geometry):
-        """Columns and jet of an angle atan2(F, E), E = f.v, F = g.v, all in the ground frame."""
-        return self._angles([geometry])[0]
-
-    def displacement(self, geometry):
-        """Columns and jet of e.(x_other - x_own), e a direction of the own body."""
-        return self._displacements([geometry])[0]
-
     def _angles(self, geometries):
-        """The same of several (b), all at once."""
+        """Columns and jets of angles (b) atan2(F, E), E = f.v, F = g.v, all in the ground frame."""
         own, other, f, g, h = zip(*geometries, strict=True)
         (v, v_p), (f, f_p), (g, g_p) = (self._directions(*each) for each in ((other, h), (own, f), (own, g)))
         E, F = product(f, v, "bi,bi->b"), product(g, v, "bi,bi->b")
@@ -216,7 +221,7 @@ class Variations:
         return self._with_columns(jets, (own, 3), (other, 3))
 
     def _displacements(self, geometries):
-        """The same of several (b), all at once."""
+        """Columns and jets of displacements (b) e.(x_other - x_own), e a direction of the own body."""
         own, other, e, s_own, s_other = zip(*geometries, strict=True)
         e, e_p = self._directions(own, e)
         (x, x_p), (y, y_p) = (self._points(*each) for each in ((own, s_own), (other, s_other)))
@@ -242,27 +247,8 @@ class Variations:
             found.append((np.concatenate(columns), jets[:, i, np.concatenate(used)]))
         return found
 
-    def elongation(self, a, s, b, s_b):
-        """Columns and row, at this instant alone, of the distance of two points."""
-        (columns, rows), (columns_b, rows_b) = self._point(a, s), self._point(b, s_b)
-        d = self._position(a, s)[0] - self._position(b, s_b)[0]
-        d = d / np.linalg.norm(d)
-        return np.concatenate((columns, columns_b)), np.concatenate((d @ rows[0], -d @ rows_b[0]))
-
-    def load(self, body, s, e, frame):
-        """Columns and generalised force of a unit force along e at a point s, or of a unit torque where s is None."""
-        e = np.asarray(e, float) if frame == "ground" else self._direction(body, e)[0][0]
-        if s is not None:
-            columns, rows = self._point(body, s)
-            return columns, e @ rows[0]
-        return self._turning(body), 2.0 * e @ transform_e(self._parameters(body)[0])
-
     def _place(self, body):
         return self.handles.where(body)
-
-    def _parameters(self, body):
-        """Jet of p."""
-        return self._all_parameters([body])[:, 0]
 
     def _all_parameters(self, bodies):
         """Jets (3, b, 4) of p; of the ground and of point masses those of a body that doesn't turn."""
@@ -279,11 +265,6 @@ class Variations:
         motion = self.motion
         for level, values in enumerate((motion.q[at], motion.qd[at], 0.5 * motion.qdd[at])):
             jets[level, which] = values
-
-    def _turning(self, body):
-        """Columns of p."""
-        at, dimension = self._place(body)
-        return np.arange(at + 3, at + dimension) if dimension else np.zeros(0, int)
 
     def _direction(self, body, s):
         """Jets of A s and of its derivative with respect to p."""
@@ -303,15 +284,6 @@ class Variations:
         s = [(0.0, 0.0, 0.0) if self._place(body)[1] == 3 else each for body, each in zip(bodies, s, strict=True)]
         value, slope = self._directions(bodies, s)
         return r + value, slope
-
-    def _position(self, body, s):
-        """Jet of r + A s."""
-        at, dimension = self._place(body)
-        if not dimension:
-            return constant(s)
-        motion, span = self.motion, slice(at, at + 3)
-        r = np.stack((motion.q[span], motion.qd[span], 0.5 * motion.qdd[span]))
-        return r + self._direction(body, s)[0] if dimension == 7 else r
 
     def _point(self, body, s):
         """Columns of a body, and the jet of the derivative of a point of it."""

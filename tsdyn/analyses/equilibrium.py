@@ -16,36 +16,12 @@ from ..observables import reactions
 from ..observables.contacts import singular_place
 from ..observables.generalised_forces import force_loads, velocity_forces
 from ..observables.state import RememberingState
+from . import tolerances as limits
 from .coordinates import Variations, chosen
 from .moves import Moves
 from .nominal_motion import NominalMotion
 from .reduction import eigenpairs, equations, stiffnesses
 from .steady import SteadyRest, is_invariant
-from .tolerances import (
-    ACCEPTED,
-    AT_SADDLE,
-    FARTHEST,
-    FEW_NEGATIVE,
-    FINAL,
-    FIRST_MU,
-    IN_VAIN,
-    KICKS,
-    LEAST_MU,
-    MOST_NEWTON,
-    MOST_SADDLES,
-    MOST_STEPS,
-    MOST_TRIES,
-    MOST_TURNED,
-    ROUGH,
-    SEARCH,
-    SLIDING,
-    SMALL,
-    SOFT,
-    SOFTER,
-    STIFF,
-    STIFFER,
-    TOO_FAR,
-)
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Floats, ItemLike
@@ -91,7 +67,7 @@ def _rough(motion, forces):
         if not np.isfinite(Q).all():
             return True
         bend, slope = np.abs(Q[0] - 2.0 * Q[1] + Q[2]).max(), np.abs(Q[2] - Q[0]).max()
-        if bend > ROUGH * slope + NEGLIGIBLE * np.abs(Q).max():
+        if bend > limits.ROUGH * slope + NEGLIGIBLE * np.abs(Q).max():
             return True
     return False
 
@@ -107,9 +83,9 @@ def _rough(motion, forces):
 
 def saddle_free(factors, load):
     """The increment u, by the `Factors` at mu = 0; None where there are too many negative eigenvalues."""
-    if load.size <= SMALL:
+    if load.size <= limits.SMALL:
         return _by_all(factors, load)
-    if factors.negative > FEW_NEGATIVE:
+    if factors.negative > limits.FEW_NEGATIVE:
         return None
     return _by_few(factors, load)
 
@@ -121,7 +97,7 @@ def _by_all(factors, load):
     w, v = np.linalg.eigh(0.5 * Z.T @ (K + K.T) @ Z)
     v, scale = Z @ v, factors.scale
     along = v.T @ (scale * load)
-    along[(np.abs(w) <= SOFT) & (np.abs(along) <= PIVOT_ROUNDING * factors.size_of_loads)] = 0.0  # neutral
+    along[(np.abs(w) <= limits.SOFT) & (np.abs(along) <= PIVOT_ROUNDING * factors.size_of_loads)] = 0.0  # neutral
     return scale * (v @ (along / np.maximum(np.abs(w), HALF_DIGITS)))
 
 
@@ -163,40 +139,44 @@ class Descent(Moves):
 
     def __init__(self, *start):
         super().__init__(*start)
-        self.steps, self.mu = 0, FIRST_MU
+        self.steps, self.mu = 0, limits.FIRST_MU
 
     def report_steps(self):
         """Report progress: digits gained over digits required."""
         left = self.unbalanced
         digits = np.log(left) / np.log(SUM_ROUNDING) if left > 0.0 else 1.0
         self.report(
-            SEARCH * min(max(digits, 0.0), 1.0), f"{self.steps} steps, {left:.1e} of the loads are not balanced"
+            limits.SEARCH * min(max(digits, 0.0), 1.0), f"{self.steps} steps, {left:.1e} of the loads are not balanced"
         )
 
     def balance(self):
         """Take steps until the loads are balanced to rounding; True if they are."""
         vain = 0
-        while self.steps < MOST_STEPS and self.gone < FARTHEST * self.reach and self.turned < MOST_TURNED:
+        while (
+            self.steps < limits.MOST_STEPS
+            and self.gone < limits.FARTHEST * self.reach
+            and self.turned < limits.MOST_TURNED
+        ):
             before = self.unbalanced
             self.report_steps()
             if before <= SUM_ROUNDING or not self._step():
                 break
             self.steps += 1
-            vain = vain + 1 if before <= ACCEPTED and not self.unbalanced < 0.5 * before else 0
-            if vain == IN_VAIN:
+            vain = vain + 1 if before <= limits.ACCEPTED and not self.unbalanced < 0.5 * before else 0
+            if vain == limits.IN_VAIN:
                 break  # rounding
-        return self.unbalanced <= ACCEPTED
+        return self.unbalanced <= limits.ACCEPTED
 
     def _step(self):
         """Take a step; False if no step is left along which the loads do work."""
         quadratic, load = self.rest.quadratic, self.rest.left
-        near = self.unbalanced <= AT_SADDLE
+        near = self.unbalanced <= limits.AT_SADDLE
         if near and (self.relative or quadratic.circulatory):
             u = quadratic.factors(0.0, 0.0).newton(load)
             if u is not None and self.approach_by(u):
                 return True
         mu = 0.0
-        for _ in range(MOST_TRIES):
+        for _ in range(limits.MOST_TRIES):
             factors = quadratic.factors(mu, self._least(mu))
             if factors.positive:
                 u = factors.step(load) if mu > 0.0 else factors.newton(load)
@@ -205,28 +185,30 @@ class Descent(Moves):
                 if u is not None and self._is_fit(u, mu):
                     leaves = near and mu > 0.0 and not self.relative
                     if (leaves and self._leave(factors, u)) or self.advance(u, factors):
-                        self.mu = max(mu * SOFTER, LEAST_MU) if mu > 0.0 else self.mu
+                        self.mu = max(mu * limits.SOFTER, limits.LEAST_MU) if mu > 0.0 else self.mu
                         return True
-                    if self.size(u) <= FINAL:
+                    if self.size(u) <= limits.FINAL:
                         return False
             elif mu == 0.0 and factors.negative > 0:
                 u = saddle_free(factors, load)
-                if u is not None and self.length(u) <= TOO_FAR * self.trust and self.advance(u, factors):
+                if u is not None and self.length(u) <= limits.TOO_FAR * self.trust and self.advance(u, factors):
                     return True
-            mu = max(mu * STIFFER, self.mu)
+            mu = max(mu * limits.STIFFER, self.mu)
         return False
 
     def _least(self, mu):
         """Stiffness, N m, that replaces K where there is none, and where D doesn't suffice."""
         stiffness = self.rest.quadratic.local.max(initial=0.0)
         if stiffness == 0.0:
-            return SLIDING * np.abs(self.rest.left).max() * max(mu, 1.0)
-        return mu * stiffness if mu > STIFF else 0.0
+            return limits.SLIDING * np.abs(self.rest.left).max() * max(mu, 1.0)
+        return mu * stiffness if mu > limits.STIFF else 0.0
 
     def _is_fit(self, u, mu):
         """Whether an increment is short enough to be tried; a larger mu makes it shorter."""
-        slides = self.trust == 1.0 and self.increments.extent(u)[1] <= TOO_FAR * MOST_ROTATION
-        return slides or mu >= 1.0 or self.length(u) <= TOO_FAR * self.trust or not self.rest.quadratic.shift.any()
+        slides = self.trust == 1.0 and self.increments.extent(u)[1] <= limits.TOO_FAR * MOST_ROTATION
+        return (
+            slides or mu >= 1.0 or self.length(u) <= limits.TOO_FAR * self.trust or not self.rest.quadratic.shift.any()
+        )
 
     def _leave(self, factors, step):
         """Leave a saddle nearby along a direction of negative stiffness, if that gains more than a step."""
@@ -235,15 +217,15 @@ class Descent(Moves):
         if u is None:
             return False
         u = u / self.size(u)
-        if not -(KICKS[0] ** 2) * quadratic.along(u) > 2.0 * float(load @ step) - quadratic.along(step):
+        if not -(limits.KICKS[0] ** 2) * quadratic.along(u) > 2.0 * float(load @ step) - quadratic.along(step):
             return False
-        return any(self.attempt(share * u, factors) for share in KICKS)
+        return any(self.attempt(share * u, factors) for share in limits.KICKS)
 
     def kick(self, way):
         """Leave a saddle along a direction dq by a tenth of a radian, or of the size."""
         rest = self.rest
         u = self.increments.of(rest.q, way)
-        for share in KICKS:
+        for share in limits.KICKS:
             q = rest.closed(self.increments.moved(rest.q, share / self.size(u) * u))
             if q is not None:
                 self.rest = self._at(q)
@@ -297,7 +279,7 @@ class SteadyDescent(Descent):
 
     def approach(self):
         """Take Newton steps to the nearest root; True if it is reached."""
-        for _ in range(MOST_NEWTON):
+        for _ in range(limits.MOST_NEWTON):
             before, rest = self.unbalanced, self.rest
             self.report_steps()
             if before <= SUM_ROUNDING:
@@ -308,13 +290,13 @@ class SteadyDescent(Descent):
             self.steps += 1
             if not self.approach_by(u):
                 break
-        return self.unbalanced <= ACCEPTED
+        return self.unbalanced <= limits.ACCEPTED
 
 
 def find_steady(descent):
     """The findings of a relative equilibrium, the descent being moved there."""
     unstable = None
-    for _ in range(MOST_SADDLES):
+    for _ in range(limits.MOST_SADDLES):
         start = descent.rest, descent.memory.copy(), descent.angles.copy()
         found = descent.approach()
         if not found:  # Newton's steps have gone astray
@@ -443,7 +425,7 @@ def find_equilibrium(packed, handles, remembered, t, q, q0, report):
     demand_continuous(packed)
     descent = Descent(packed, handles, remembered, t, q, report)
     _demand_held(descent.frame)
-    for _ in range(MOST_SADDLES):
+    for _ in range(limits.MOST_SADDLES):
         if not descent.balance():
             _refuse(descent)
         place = singular_place(packed, descent.motion.q)

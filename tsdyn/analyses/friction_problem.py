@@ -21,10 +21,10 @@ from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
 from ..errors import SingularConfiguration
 from ..maths.tolerances import RANK_TOL, ROUNDING
-from ..model.kinematics import angular_velocity
 from ..model.packed import coupled_loads, first_rows
 from ..observables.evaluate import ITERATIONS, constraint_arrays, mass_matrix, normal_reaction, unit_force
 from ..observables.generalised_forces import applied_loads, velocity_forces
+from .slip_velocities import ACROSS, ALONG, WHOLE, slip_velocities
 from .tolerances import ASIDE, BROKEN, LEVEL, PIVOTS
 
 if TYPE_CHECKING:
@@ -115,21 +115,21 @@ class Frictions:
                 slot += slide.count
         self.count, self.names = len(self.units), [unit.force.name for unit in self.units]
         # Of each unit the bodies a and b, numbers of rows of System.bodies; the ground is behind them
-        spans = self.packed.system.bodies
-        self.rigid = np.flatnonzero(spans[:, 1] == 7)
+        spans, slides = self.packed.system.bodies, [unit.slide for unit in self.units]
         ends = [(unit.force.a, unit.force.b) for unit in self.units]
         self.ends = np.array([[body.index if body.dimension else len(spans) for body in pair] for pair in ends], int)
         self.ends = self.ends.reshape(-1, 2)
-        # The point of a, and the axis or normal: of a, or of b
-        self.points = np.array([unit.load.coordinates[0] for unit in self.units]).reshape(-1, 3)
-        slides = [unit.slide for unit in self.units]
-        self.axes = np.array([unit.load.coordinates[4] if unit.slide in AXIAL else (0, 0, 0) for unit in self.units])
-        self.axes = self.axes.reshape(-1, 3).astype(float)
-        self.side = np.array([int(slide is PLANE) for slide in slides], int)
+        self.rigid = np.flatnonzero(spans[:, 1] == 7)
         self.turns = np.array([slide.turns for slide in slides], bool)
         self.signed = np.array([slide.directions == 1 for slide in slides], bool)
-        self.plane = np.array([slide is PLANE for slide in slides], bool)
-        self.ways = np.array([range(unit.way.start, unit.way.start + 3) for unit in self.units], int).reshape(-1, 3)
+        part = [ALONG if slide in (PIN, GUIDE) else ACROSS if slide is PLANE else WHOLE for slide in slides]
+        places = np.vstack([spans, (0, 0)])[self.ends].reshape(-1, 4)
+        self.table = np.column_stack([places, self.turns, np.array(part, int)]).astype(np.int64).ravel()
+        # The point of a; the axis of a, or the normal of b
+        self.points = np.array([unit.load.coordinates[0] for unit in self.units], float).ravel()
+        axes = [unit.load.coordinates[4] if one else np.zeros(3) for unit, one in zip(self.units, part, strict=True)]
+        self.axes = np.array(axes, float).ravel()
+        self.ways = np.array([range(unit.slot, unit.slot + 3) for unit in self.units], int).reshape(-1, 3)
         self.ways = np.where(self.signed[:, None], self.ways[:, :1], self.ways)
 
     def frames(self, q):
@@ -141,21 +141,10 @@ class Frictions:
 
     def motions(self, q, qd):
         """Slip velocities or rates (k, units, 3), ground frame, sizes of their terms (k, units), axes; q, qd (k, n)."""
-        spans, A = self.packed.system.bodies, self.frames(q)
-        places = spans[self.rigid, :1] + np.arange(3, 7)
-        w, r, rd = np.zeros((3, len(q), len(spans) + 1, 3))
-        w[:, self.rigid] = np.einsum("kbij,kbj->kbi", A[:, self.rigid], angular_velocity(q[:, places], qd[:, places]))
-        r[:, :-1], rd[:, :-1] = (x[:, spans[:, :1] + np.arange(3)] for x in (q, qd))
-        a, b = self.ends.T
-        s = np.einsum("kuij,uj->kui", A[:, a], self.points)
-        parts = rd[:, a], np.cross(w[:, a], s), rd[:, b], np.cross(w[:, b], r[:, a] + s - r[:, b])
-        turns = self.turns[:, None]
-        v = np.where(turns, w[:, a] - w[:, b], parts[0] + parts[1] - parts[2] - parts[3])
-        sizes = np.where(turns, np.abs(w[:, a]) + np.abs(w[:, b]), sum(map(np.abs, parts))).sum(axis=2)
-        units = np.arange(self.count)
-        axes = np.einsum("kuij,uj->kui", A[:, self.ends[units, self.side]], self.axes)
-        along = (v * axes).sum(axis=2, keepdims=True) * axes
-        return np.where(self.signed[:, None], along, v - along), sizes, axes
+        v, axes = np.zeros((2, len(q), 3 * self.count))
+        sizes = np.zeros((len(q), self.count))
+        slip_velocities(q, qd, self.table, self.points, self.axes, v, sizes, axes)
+        return v.reshape(-1, self.count, 3), sizes, axes.reshape(-1, self.count, 3)
 
     def speeds(self, q, qd, memory):
         """Of those that slide (k, units): velocities along their directions, in a plane less half of the speed."""
@@ -167,9 +156,6 @@ class Frictions:
         """The `Place` at q (n,)."""
         A, (_, _, axes) = self.frames(q[None])[0], self.motions(q[None], np.zeros((1, q.size)))
         return Place(self, axes[0], A)
-
-
-AXIAL = PIN, GUIDE, PLANE
 
 
 class Place:

@@ -44,22 +44,10 @@ from ..rows.graph_builder import graph_of, redundant_rows
 from ..rows.interface import TangentWorkspace, allocate_tangent, constrain, evaluate_bias, note_indicator
 from ..validation import listed, nearest, vector3
 from ..workspaces import Work, parts, plain_context
-from .coordinates import Variations, chosen, named_coordinates
-from .linearise import AXES, item_of
+from . import tolerances as limits
+from .coordinates import AXES, Variations, chosen, item_of, named_coordinates
 from .moves import update_memory
 from .nominal_motion import NominalMotion
-from .tolerances import (
-    CLOSE,
-    CONSISTENT,
-    GROWTH,
-    LARGEST_CHANGE,
-    LEAST_STEPS,
-    MOST_TRIES,
-    NO_CHANGE,
-    SEEN,
-    SHORTEST,
-    SLICE,
-)
 
 # What constraints leave free: the number of degrees of freedom, and their names.
 
@@ -68,17 +56,6 @@ def degrees_of_freedom(packed):
     """Of a packed scene whose redundant rows have been selected."""
     system = packed.system
     return int(system.bodies[:, 1].sum()) - len(system.segments) + len(redundant_rows(packed))
-
-
-def demand_no_rates(packed, who):
-    """Refuse rows on velocities: with them positions are no function of what drives them."""
-    for member in packed.members:
-        if member.constraint.rate_rows:
-            raise InvalidArgument(
-                f"{who}: {member.constraint.title} has rows on velocities, so positions follow from the whole motion "
-                "and not from what drives them at each time. Integrate it with ts.simulate; inverse_dynamics takes the "
-                "Solution."
-            )
 
 
 def demand_driven(packed, memory, t, q, who, remedy):
@@ -96,11 +73,11 @@ def demand_driven(packed, memory, t, q, who, remedy):
 def driven_rates(scene, t, q, who):
     """The smallest velocities qd (n,), in the metric of lengths, with Phi_q qd + Phi_t = 0."""
     packed = scene.packed
-    metric = Metric(packed, None, t, lengths=True)
+    metric = Metric(packed, None, t, lengths=True, rates=True)
     _, Phi_q, Phi_t = metric.arrays(q)
     A, drift = metric.reduced(q, Phi_q[metric.own]), Phi_t[metric.own]
     x = least_step(A, drift)
-    for _ in range(MOST_TRIES if metric.sparse else 0):  # which is regularised
+    for _ in range(limits.MOST_TRIES if metric.sparse else 0):  # which is regularised
         left = A @ x + drift
         if np.abs(left).max() <= NEGLIGIBLE * (1.0 + np.abs(x).max()):
             break
@@ -120,7 +97,7 @@ def demand_consistent(scene, packed, t, q, qd, qdd):
     levels = "position", "velocity", "acceleration"
     for level, residuals, size in zip(levels, constraint_rows(packed, t, q, qd, qdd), (q, qd, qdd), strict=True):
         share = np.abs(residuals) / (1.0 + np.abs(size).max(axis=1, keepdims=True))
-        if not share.max(initial=0.0) <= CONSISTENT:
+        if not share.max(initial=0.0) <= limits.CONSISTENT:
             i, row = np.unravel_index(int(np.nanargmax(share)), share.shape)
             raise InconsistentState(
                 f"inverse_dynamics: the motion violates {scene.row_names()[row]} by {residuals[i, row]:.3g} "
@@ -239,7 +216,7 @@ def _step(c, target):
             ratio = _change(c, h)
     if ratio <= 1.0:
         if abs(h) >= way.h:
-            way.h = min(abs(h) * (GROWTH if ratio < CLOSE else 1.0), way.longest)
+            way.h = min(abs(h) * (limits.GROWTH if ratio < limits.CLOSE else 1.0), way.longest)
         count_turns(c, c.work.q, c.work.qd, h)
         way.t = t
         way.steps += 1
@@ -302,7 +279,7 @@ def _change(c, h):
                 speed = f.poses[at + i]
                 way = max(way, max(abs(f.a[o + i]), abs(h * speed)))
                 off = max(off, abs(h * (speed - c.speeds[o + i] - h * c.gains[o + i])))
-        most = LARGEST_CHANGE * way + NO_CHANGE * (1.0 if part == 1 else c.way.size)
+        most = limits.LARGEST_CHANGE * way + limits.NO_CHANGE * (1.0 if part == 1 else c.way.size)
         worst, allowed = max(worst, off / most), allowed + most
     return max(worst, f.landing.moved / allowed)
 
@@ -354,8 +331,8 @@ def analyse(packed, t0, q, remembered, times, stops):
     way = branch.way
     way.t, way.size = t0, Metric(packed, None, t0).reach(q)
     span = float(np.ptp(np.append(times, t0)))
-    way.longest = way.h = max(span / LEAST_STEPS, np.finfo(float).tiny)
-    way.least = max(SHORTEST * span, SEEN * max(abs(t0), np.abs(times).max()))
+    way.longest = way.h = max(span / limits.LEAST_STEPS, np.finfo(float).tiny)
+    way.least = max(limits.SHORTEST * span, limits.SEEN * max(abs(t0), np.abs(times).max()))
     every, asked = _with_stops(t0, times, stops)
     out = np.zeros((every.size, 1 + 3 * q.size + remembered.size))
     started, done, status = clock(), 0, Status.SLICE_DONE
@@ -373,7 +350,7 @@ def analyse(packed, t0, q, remembered, times, stops):
 
 
 def _slice(n):
-    return max(SLICE // n, 10)
+    return max(limits.SLICE // n, 10)
 
 
 def _branch(packed, q, remembered):

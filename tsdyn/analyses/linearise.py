@@ -9,18 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..calls import fitting_methods
-from ..elements.bodies import PointMass, named, rotation_matrix
-from ..elements.element import AngleGeometry
-from ..elements.force import Force
-from ..elements.loads import JointLoad
+from ..elements.bodies import PointMass, rotation_matrix
 from ..elements.primitive import Primitive
-from ..errors import InvalidArgument, InvalidBody
-from ..forces.point_force import PointForce
-from ..forces.spring import Spring
-from ..forces.torque import Torque
+from ..errors import InvalidArgument
 from ..maths.tolerances import NEGLIGIBLE
+from ..model.handles import handles_of
 from ..validation import vector3
-from .coordinates import Variations, chosen, stacked, transform_e
+from .actuator_loads import actuators_of
+from .coordinates import Variations, chosen, item_of, stacked, transform_e
 from .equilibrium import demand_smooth
 from .nominal_motion import NominalMotion
 from .reduction import Reduced, eigenpairs, equations
@@ -30,45 +26,14 @@ if TYPE_CHECKING:
     from ..hints import Floats
 
 
-# Inputs and outputs of the linearised system: generalised forces of unit inputs, rows of outputs.
+# Inputs of the linearised system, which are the `Actuator`s of inverse dynamics, and rows of outputs.
 
 RATE = " rate"
-AXES = ".x", ".y", ".z"
-
-
-class Input(NamedTuple):
-    """A load of unit size."""
-
-    name: str
-    columns: np.ndarray  # of q
-    load: np.ndarray  # generalised force, N or N m
-    whole: str = ""  # the load of which it is a component, where all of them were asked for
-
-
-def inputs_of(scene, variations, given):
-    """The `Input`s of handles and names: motors, forces and joints."""
-    found = []
-    for one in given:
-        same = [Input(joint.name, joint.columns, joint.jet[0]) for joint in variations.joints if joint.name == one]
-        if not same:
-            item, axis = item_of(scene, one, [*scene.forces, *scene.constraints], "force or joint")
-            loads = _loads_of(variations, item)
-            same = [load for load in loads if axis is None or load.name.endswith(axis)]
-            if not same:
-                names = ", ".join(repr(load.name) for load in loads)
-                raise InvalidArgument(f"{item.name!r} has no component {axis[1:]!r}: its input is {names}.")
-            same = [load._replace(whole=item.name) for load in same] if len(same) > 1 else same
-        found += same
-    names = [one.name for one in found]
-    for name in names:
-        if names.count(name) > 1:
-            raise InvalidArgument(f"the input {name} is given twice; give it once.")
-    return found
 
 
 def demand_effective(inputs, F):
     """Refuse inputs that constraints take up: columns of F (k, inputs) that are zero, but for some of a vector's."""
-    works = np.abs(F).max(axis=0, initial=0.0) > [NEGLIGIBLE * np.abs(one.load).max(initial=0.0) for one in inputs]
+    works = np.abs(F).max(axis=0, initial=0.0) > [NEGLIGIBLE * np.abs(one.loads).max(initial=0.0) for one in inputs]
     vectors = {one.whole for one, moves in zip(inputs, works, strict=True) if moves}
     for one, moves in zip(inputs, works, strict=True):
         if not moves and not (one.whole and one.whole in vectors):
@@ -76,43 +41,6 @@ def demand_effective(inputs, F):
                 f"the input {one.whole or one.name} does no work on any motion that the constraints admit. Where a "
                 "motor drives its coordinate, replace the motor by a JointTorque or JointForce."
             )
-
-
-def item_of(scene, given, things, what):
-    """The thing that a handle or a name means, and an axis ".x" at the end of the name, or None."""
-    if not isinstance(given, str):
-        if not any(given is thing for thing in things):
-            raise InvalidArgument(f"{given!r} is no {what} of this scene: give a handle or a name.")
-        return given, None
-    axis = given[-2:] if given[-2:] in AXES and given not in {thing.name for thing in things} else None
-    return named(things, given[:-2] if axis else given, what), axis
-
-
-def _loads_of(variations, item):
-    if isinstance(item, JointLoad):
-        geometry = item.geometry
-        make = variations.angle if isinstance(geometry, AngleGeometry) else variations.displacement
-        columns, jet = make(geometry)
-        return [Input(item.name, columns, jet[0])]
-    if isinstance(item, Spring):
-        columns, row = variations.elongation(item.a, item.coordinates[0], item.b, item.coordinates[1])
-        return [Input(item.name, columns, -row)]
-    if isinstance(item, (PointForce, Torque)):
-        point = item.coordinates[0] if isinstance(item, PointForce) else None
-        return [
-            Input(item.name + axis, *variations.load(item.a, point, e, item.frame))
-            for axis, e in zip(AXES, np.eye(3), strict=True)
-        ]
-    own = variations.handles.own(item)  # of the scene whose numbers vary
-    rows = [row for row in variations.handles.rows if row.item is own and not isinstance(item, Force)]
-    found = [Input(one.name, one.columns, one.jet[0]) for row in rows for one in variations.of_row(row)]
-    if not found:
-        raise InvalidArgument(
-            f"{item.name}: a {type(item).__name__} has no input. Inputs are JointTorque and JointForce, PointForce and "
-            "Torque (three components), the actuator of a Spring, and joints with an angle or a displacement, for the "
-            "torque or force along it. A motor that prescribes a motion has none: use a JointTorque or JointForce."
-        )
-    return found
 
 
 class OutputMatrices(NamedTuple):
@@ -153,13 +81,13 @@ def _of(scene, variations, given, coordinates):
     if isinstance(given, (tuple, list)) and len(given) == 2:
         body, _ = item_of(scene, given[0], scene.bodies, "body")
         point = vector3(given[1], f"{body.name}: point (m, body frame)", InvalidArgument)
-        return variations.point(body, point, f"{body.name}{tuple(point.tolist())}")
+        return variations.point(variations.handles.own(body), point, f"{body.name}{tuple(point.tolist())}")
     joints = [item for item in scene.constraints if not (isinstance(item, Primitive) and item.normalises)]
     item, axis = item_of(scene, given, [*scene.bodies, *joints], "body or joint")
-    if isinstance(item, PointMass):
-        found = variations.of_body(item)[:3]
+    own = variations.handles.own(item)  # of the scene whose numbers vary
+    if isinstance(own, PointMass):
+        found = variations.of_body(own)[:3]
     else:
-        own = variations.handles.own(item)
         found = [one for row in variations.handles.rows if row.item is own for one in variations.of_row(row)]
     if not found:
         raise InvalidArgument(
@@ -177,9 +105,9 @@ NAMED, LEAST_SHARE = 4, 0.05  # directions of bodies that are named at most; sha
 
 
 class Moving(NamedTuple):
-    """Bodies, and what takes variations of the coordinates to their motion."""
+    """What takes variations of the coordinates to the motion of the bodies."""
 
-    bodies: tuple
+    handles: Any  # `Handles` of the scene
     twists: np.ndarray  # (b, 6, k)
     mass: np.ndarray  # (b,)
     inertia: np.ndarray  # (b, 3, 3), ground frame
@@ -247,12 +175,8 @@ class Modes:
 
     def _index(self, body):
         """The number of a body."""
-        bodies = self._moving.bodies
-        if isinstance(body, str):
-            body = named(bodies, body, "body", InvalidBody)
-        if not any(body is one for one in bodies):
-            raise InvalidBody(f"{body!r} is not a body of this scene.")
-        return [one is body for one in bodies].index(True)
+        own = self._moving.handles.body(body)
+        return [one is own for one in self._moving.handles.bodies].index(True)
 
     @cached_property
     def _shares(self):
@@ -274,7 +198,7 @@ class Modes:
     def _motion(self, shares):
         first = np.argsort(-shares, kind="stable")[:NAMED]
         return ", ".join(
-            f"{self._moving.bodies[i // 6].name}.{DIRECTIONS[i % 6]} {100.0 * shares[i]:.0f} %"
+            f"{self._moving.handles.bodies[i // 6].name}.{DIRECTIONS[i % 6]} {100.0 * shares[i]:.0f} %"
             for i in first
             if i == first[0] or shares[i] >= LEAST_SHARE
         )
@@ -297,18 +221,6 @@ class Modes:
         rows = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in self._rows()]
         body = "".join(f"<tr>{row}</tr>" for row in (head, *rows))
         return f"<table><caption>Modes of {len(self.coordinates)} coordinates</caption>{body}</table>"
-
-
-def modes_of(pairs, moving, coordinates):
-    """The `Modes` of eigenpairs of bodies that are `Moving`."""
-    if not len(coordinates):
-        raise InvalidArgument("modes: the scene has no degrees of freedom.")
-    first, zero = np.flatnonzero(pairs.values.imag >= 0.0), int((pairs.values == 0.0).sum())
-    first = first[zero // 2 :] if zero else first
-    first[: zero - zero // 2] = np.arange(zero - zero // 2)  # zeros are first, and a pair of them is one mode, too
-    values, shapes = pairs.values[first], pairs.vectors[:, first].T
-    lead = shapes[np.arange(len(first)), np.abs(shapes).argmax(axis=1)]
-    return Modes(values, shapes * (np.abs(lead) / lead)[:, None], moving, coordinates)
 
 
 class StateSpace(NamedTuple):
@@ -372,7 +284,7 @@ class Linearisation:
         self.inputs, self.outputs = tuple(one.name for one in inputs), self._outputs.names
         self.F: Floats = np.zeros((len(self.rates), len(inputs)))
         for i, one in enumerate(inputs):
-            load = one.load @ reduced.T[one.columns]
+            load = one.loads[0] @ reduced.T[one.columns]
             self.F[:, i] = load if isinstance(reduced, Reduced) else load @ self.W
         demand_effective(inputs, self.F)
 
@@ -389,7 +301,14 @@ class Linearisation:
 
     def modes(self) -> Modes:
         """Frequencies, damping ratios, shapes, and what moves in each, a `Modes`."""
-        return modes_of(self._pairs, self._moving, self.coordinates)
+        if not len(self.coordinates):
+            raise InvalidArgument("modes: the scene has no degrees of freedom.")
+        first, zero = np.flatnonzero(self._pairs.values.imag >= 0.0), int((self._pairs.values == 0.0).sum())
+        first = first[zero // 2 :] if zero else first
+        first[: zero - zero // 2] = np.arange(zero - zero // 2)  # zeros are first, and a pair of them is one mode, too
+        values, shapes = self._pairs.values[first], self._pairs.vectors[:, first].T
+        lead = shapes[np.arange(len(first)), np.abs(shapes).argmax(axis=1)]
+        return Modes(values, shapes * (np.abs(lead) / lead)[:, None], self._moving, self.coordinates)
 
     def state_space(self) -> StateSpace:
         """A, B, C, D and the names of states, inputs and outputs, a `StateSpace`."""
@@ -435,7 +354,7 @@ def linearise(scene, memory, state, inputs, outputs, report):
             "linearised at rest and where it is steady. Give a state of steady motion, or of an equilibrium."
         )
     variations = Variations(motion, np.zeros(3) if rate is None else rate)
-    ports = inputs_of(scene, variations, inputs)
+    ports = actuators_of(scene, variations.handles, inputs, motion.q[None], "input")
     report(0.2, f"{motion.freedom} coordinates are chosen")
     every = chosen(motion.placed, variations)
     report(0.4, f"the equations are reduced to {motion.freedom} coordinates")
@@ -454,4 +373,4 @@ def _moving(motion, reduced):
     twists[rigid, 3:] = 2.0 * transform_e(p) @ T[bodies[rigid, :1] + np.arange(3, 7)]
     A, inertia = rotation_matrix(p), np.zeros((len(bodies), 3, 3))
     inertia[rigid] = A @ system.inertia[rigid].reshape(-1, 3, 3) @ A.swapaxes(1, 2)
-    return Moving(motion.packed.bodies, twists, system.mass.copy(), inertia)
+    return Moving(handles_of(motion.packed), twists, system.mass.copy(), inertia)

@@ -37,7 +37,8 @@ from .tolerances import DENSE, REDUNDANT_SHARE
 # Derivatives of all constraints and forces, each as a block of the 14 coordinates of its two bodies.
 #
 # The loops of implicit methods write into matrices of n columns. Here n is 14 and the instances' bodies are taken to be
-# two of their own, so one pass fills separate blocks, and storage is O(N).
+# two of their own, so one pass fills separate blocks, and storage is O(N). Terms that read further bodies are the
+# exception: theirs are matrices of n columns, for such terms alone.
 
 STEP = WIDTH * WIDTH + WIDTH  # floats from a block to the next
 
@@ -98,7 +99,9 @@ class Pairs:
         first = np.concatenate((constraints[:, 0], forces[:, 0]))
         for k in range(2):
             table[first + AT + k] = WIDTH * np.arange(len(first)) + k * (WIDTH // 2)
-        self._system = system._replace(table=table)
+        reading = np.array([members[0].others != () for members in instances_of_kinds(packed)], bool)
+        self._reading = system._replace(kinds=system.kinds[reading], forces=system.forces[:0])
+        self._system = system._replace(table=table, kinds=system.kinds[~reading])
         self.columns, self.used = _columns(places)
         self.counts = len(constraints), len(forces)
 
@@ -122,9 +125,21 @@ class Pairs:
             fill_blocks(system, x, lam, rows, *Q, np.zeros(self._size))
         return _whole(rows[0, : STEP * nc]), rows[1:], *(_whole(one[STEP * nc :]) for one in Q)
 
+    def whole(self, motion, lam):
+        """K (n, n), G1 and G2 (m, n) of terms that read further bodies; None without any."""
+        m, n = len(lam), motion.q.size
+        if not self._reading.kinds.size:
+            return None
+        x = np.stack((motion.q, motion.qd, motion.qdd, np.full(n, motion.t)))
+        rows, none = np.zeros((3, max(m, n) * n)), np.zeros(0)
+        fill_blocks(self._reading._replace(reals=motion.system.reals.copy()), x, lam, rows, none, none, none)
+        return rows[0, : n * n].reshape(n, n), *rows[1:, : m * n].reshape(2, m, n)
+
 
 def derivatives(motion):
     """The `Derivatives` at a `NominalMotion`."""
+    from scipy.sparse import csr_array
+
     packed, pairs = motion.packed, Pairs(motion.packed)
     (nc, _), m, n = pairs.counts, len(motion.lam), motion.q.size
     K, rows, Q_q, Q_qd = pairs.blocks(motion, motion.lam)
@@ -138,6 +153,9 @@ def derivatives(motion):
     G1, G2 = (as_csr(packed, one[: WIDTH * (m + nc)].reshape(-1, WIDTH)[lines]) for one in rows)
     K = _scatter(K, pairs.columns[:nc], pairs.used[:nc], n)
     Q_q, Q_qd = (_scatter(one, pairs.columns[nc:], pairs.used[nc:], n) for one in (Q_q, Q_qd))
+    whole = pairs.whole(motion, motion.lam)
+    if whole is not None:
+        K, G1, G2 = (sparse + csr_array(dense) for sparse, dense in zip((K, G1, G2), whole, strict=True))
     return Derivatives(K, G1, G2, Q_q, Q_qd)
 
 

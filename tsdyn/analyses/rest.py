@@ -11,17 +11,7 @@ from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, ROUNDING, TINY
 from ..model.equations import WIDTH, as_csr
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays
 from ..observables.generalised_forces import applied_loads
-from .tolerances import (
-    ACCEPTED,
-    CONSISTENT,
-    MOST_SWEEPS,
-    REGULARISED,
-    REGULARISED_SWEEPS,
-    SHIFTS,
-    SLOWEST,
-    STIFFNESS_ROUNDING,
-    SWEEPS,
-)
+from . import tolerances as limits
 
 # Sparse matrices of one sparsity and many values: sums of blocks, whose places are found once.
 
@@ -190,7 +180,7 @@ class Factors:
 
     def _signed(self, share):
         """Factors, and how many eigenvalues of K + mu D + a share of S are negative."""
-        factors = splu_of(self._matrix(share, REGULARISED), symmetric=True)
+        factors = splu_of(self._matrix(share, limits.REGULARISED), symmetric=True)
         if factors is None or not np.array_equal(factors.perm_r, factors.perm_c):
             return None, -1
         return factors, int((factors.U.diagonal() < 0.0).sum()) - self._quadratic.frame.own.size
@@ -231,7 +221,7 @@ class Factors:
 
     def positive_shift(self):
         """A share of S with which K is positive; None if there is none."""
-        for share in SHIFTS:
+        for share in limits.SHIFTS:
             if self._signed(share)[1] == 0:
                 return share
         return None
@@ -250,7 +240,7 @@ class Factors:
 
     def newton(self, load):
         """The same by factors that are accurate down to a smaller floor."""
-        factors = splu_of(self._matrix(STIFFNESS_ROUNDING, 0.0))
+        factors = splu_of(self._matrix(limits.STIFFNESS_ROUNDING, 0.0))
         return None if factors is None else self._solved(factors, load)
 
     def correction(self, bias):
@@ -272,8 +262,8 @@ class Factors:
     def downhill(self, load, rng):
         """A unit direction u of negative K by inverse iteration, along which a load does work; None without one."""
         u = rng.normal(size=load.size)
-        for i in range(SWEEPS):  # the last by K, which leaves neutral directions out
-            u = self.step(u / self.scale**2 if i < SWEEPS - 1 else self._quadratic.whole @ u)
+        for i in range(limits.SWEEPS):  # the last by K, which leaves neutral directions out
+            u = self.step(u / self.scale**2 if i < limits.SWEEPS - 1 else self._quadratic.whole @ u)
             if u is None:
                 return None
             u = u / np.linalg.norm(u / self.scale)
@@ -369,7 +359,7 @@ class Quadratic:
     @cached_property
     def strain(self):
         """Numbers for `Frame.blocks` of a norm that exceeds K, in which increments of little strain are small."""
-        return self.frame.stiffness(self._structured(self._norms), _diagonal(REGULARISED * self.local))
+        return self.frame.stiffness(self._structured(self._norms), _diagonal(limits.REGULARISED * self.local))
 
     @cached_property
     def rate(self):
@@ -403,7 +393,7 @@ class Quadratic:
     def circulatory(self):
         """Whether loads have no potential: K isn't symmetric."""
         apart = self.whole - self.whole.T
-        return bool(np.abs(apart.data).max(initial=0.0) > STIFFNESS_ROUNDING * np.abs(self.K).max(initial=0.0))
+        return bool(np.abs(apart.data).max(initial=0.0) > limits.STIFFNESS_ROUNDING * np.abs(self.K).max(initial=0.0))
 
     def along(self, u):
         """u.K u."""
@@ -509,7 +499,7 @@ class Rest:
         size = load.size
         right = np.concatenate((self._weights * load, self._scales * np.where(self.left_out, 0.0, bias)))
         found = self._factors.solve(right)
-        for _ in range(REGULARISED_SWEEPS):
+        for _ in range(limits.REGULARISED_SWEEPS):
             found = found + self._factors.solve(right - self._matrix @ found)
         return self._weights * found[:size], self._scales * found[size:]
 
@@ -554,17 +544,17 @@ class Rest:
         """The consistent configuration next to q, by corrections with factors at hand; None where there is none."""
         allowed, correction = 1.0 + np.abs(q).max(), correction or self._shifted
         q, size = self._swept(q, correction, ROUNDING * allowed)
-        if size <= ACCEPTED * allowed:
+        if size <= limits.ACCEPTED * allowed:
             return q
-        return self.frame.closed(q) if size <= CONSISTENT * allowed else None
+        return self.frame.closed(q) if size <= limits.CONSISTENT * allowed else None
 
     def _swept(self, q, correction, limit):
         """Positions after sweeps of simplified Newton, and what is left of the constraints."""
         before = np.inf
-        for _ in range(MOST_SWEEPS):
+        for _ in range(limits.MOST_SWEEPS):
             Phi = self.residuals(q)
             size = np.abs(Phi).max(initial=0.0)
-            if size <= limit or not size < SLOWEST * before:
+            if size <= limit or not size < limits.SLOWEST * before:
                 break
             before, step = size, correction(-Phi[self.frame.own] / self.lengths)
             if not np.isfinite(step).all():

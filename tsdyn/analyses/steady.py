@@ -5,9 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..elements.bodies import Body, named, rotation_matrix
+from ..elements.bodies import Body, rotation_matrix
 from ..errors import InvalidArgument, InvalidBody, TsdynError
 from ..maths.tolerances import HALF_DIGITS, TYPED
+from ..model.handles import handles_of
 from ..observables.evaluate import mass_matrix_sparse
 from ..observables.generalised_forces import velocity_forces
 from ..validation import floats, vector3
@@ -178,22 +179,23 @@ def rotors_of(packed, given):
             f"rotors must be a dict of bodies and their rates, such as {{top: 150.0}}, got {given!r}."
         )
     for key, rate in (given or {}).items():
-        body = named(packed.bodies, key, "body", InvalidBody) if isinstance(key, str) else key
-        if not any(body is one for one in packed.bodies) or not isinstance(body, Body):
+        body = handles_of(packed).body(key)
+        if not isinstance(body, Body):
             raise InvalidBody(f"rotors: {key!r} is no rigid body of this scene.")
-        found[body] = _own_spin(body, rate)
+        i = next(i for i, one in enumerate(packed.bodies) if one is body)
+        found[body] = _own_spin(body, packed.system.inertia[i].reshape(3, 3), rate)
     return found
 
 
-def _own_spin(body, rate):
-    across = asymmetry(body.inertia)
+def _own_spin(body, inertia, rate):
+    across = asymmetry(inertia)
     values = floats(rate)
     if values.shape == ():
         axes = np.linalg.eigh(np.eye(3) - across)
         if not np.isclose(axes[0].sum(), 1.0):
             raise InvalidArgument(
                 f"rotors: {body.name} has no axis of symmetry that a rate could be about: its principal moments are "
-                f"{np.linalg.eigvalsh(body.inertia)}. Give the angular velocity (3,), body frame, of a sphere; any "
+                f"{np.linalg.eigvalsh(inertia)}. Give the angular velocity (3,), body frame, of a sphere; any "
                 "other body looks different while it spins."
             )
         axis = axes[1][:, -1]

@@ -6,21 +6,8 @@ import numpy as np
 
 from ..maths.matrix_rank import row_lengths
 from ..maths.tolerances import NEGLIGIBLE, ROUNDING, TINY
+from . import tolerances as limits
 from .kinetic_metric import least_step, soft_step
-from .tolerances import (
-    DECREASE,
-    LAST_CONVERGED,
-    MOST_CLOSING,
-    MOST_ROTATION,
-    MOST_SETTLING,
-    MOST_SLIDE,
-    NAMED_SHARE,
-    NEAR_SKETCH,
-    SETTLED,
-    STAGE_CONVERGED,
-    STAGES,
-    STEEP,
-)
 
 # Continuation (homotopy) from a sketch to the nearest configuration that satisfies the constraints.
 #
@@ -81,14 +68,14 @@ def approach_sketch(metric, sketch, q):
     """Minimise the distance to the sketch along the constraints. Return q, Phi and the number of steps."""
     steps, last = 0, np.inf
     Phi, A = metric.linear(q)
-    while steps < MOST_SETTLING and metric.columns.size:
+    while steps < limits.MOST_SETTLING and metric.columns.size:
         wish = metric.towards(q, sketch)[1]
-        step = wish + least_step(A, A @ wish, STEEP)
+        step = wish + least_step(A, A @ wish, limits.STEEP)
         size = np.linalg.norm(step)
-        if size <= SETTLED * np.linalg.norm(wish) or size >= DECREASE * last:
+        if size <= limits.SETTLED * np.linalg.norm(wish) or size >= limits.DECREASE * last:
             break
         turn = metric.largest_turn(step)
-        trial, residual, more = close(metric, metric.moved(q, min(1.0, MOST_SLIDE / max(turn, TINY)) * step))
+        trial, residual, more = close(metric, metric.moved(q, min(1.0, limits.MOST_SLIDE / max(turn, TINY)) * step))
         steps += 1 + more
         allowed = 10.0 * np.abs(Phi).max(initial=0.0) + ROUNDING * (1.0 + np.abs(q).max())
         if np.abs(residual).max(initial=0.0) > allowed:
@@ -101,17 +88,23 @@ def approach_sketch(metric, sketch, q):
 def stuck(metric, q, Phi):
     """Return violated rows whose derivative vanishes."""
     size = np.abs(Phi)
-    return np.flatnonzero((row_lengths(metric.linear(q)[1]) == 0.0) & (size > NAMED_SHARE * size.max(initial=0.0)))
+    return np.flatnonzero(
+        (row_lengths(metric.linear(q)[1]) == 0.0) & (size > limits.NAMED_SHARE * size.max(initial=0.0))
+    )
 
 
-def relax(metric, sketch, q, kept=None, stages=STAGES):
+def relax(metric, sketch, q, kept=None, stages=limits.STAGES):
     """Follow the equilibrium from q while the constraint springs stiffen. Return q and the number of steps."""
     Phi, A = metric.linear(q)
     if not (Phi.size and metric.columns.size):
         return q, 0
     steps, relative = 0, None if kept is None else _Relative(metric, sketch, kept)
     lengths = row_lengths(A)
-    if kept is None and q is sketch and _strain(Phi, lengths) < NEAR_SKETCH * metric.reach(q) * metric.root.min():
+    if (
+        kept is None
+        and q is sketch
+        and _strain(Phi, lengths) < limits.NEAR_SKETCH * metric.reach(q) * metric.root.min()
+    ):
         stages = stages[-1:]
 
     def strained(q):
@@ -137,10 +130,10 @@ def relax(metric, sketch, q, kept=None, stages=STAGES):
             *arrays, energy = now
             step = soft_step(arrays[1], arrays[0], arrays[2], arrays[3])
             size = np.linalg.norm(step)
-            if size <= LAST_CONVERGED * np.linalg.norm(arrays[2]):
+            if size <= limits.LAST_CONVERGED * np.linalg.norm(arrays[2]):
                 break
             turn = metric.largest_turn(step)
-            factor = min(1.0, MOST_ROTATION / turn) if turn > 0.0 else 1.0
+            factor = min(1.0, limits.MOST_ROTATION / turn) if turn > 0.0 else 1.0
             steps += 1
             for _ in range(10):
                 trial = metric.moved(q, factor * step)
@@ -151,7 +144,7 @@ def relax(metric, sketch, q, kept=None, stages=STAGES):
             else:
                 break
             q, now = trial, after
-            if softness != stages[-1][0] and size <= STAGE_CONVERGED * (np.linalg.norm(now[2]) + TINY):
+            if softness != stages[-1][0] and size <= limits.STAGE_CONVERGED * (np.linalg.norm(now[2]) + TINY):
                 break
     return q, steps
 
@@ -160,13 +153,13 @@ def close(metric, q):
     """Take Gauss-Newton steps of least kinetic energy, down to rounding. Return q, Phi and the number of steps."""
     Phi, A = metric.linear(q)
     steps = 0
-    while steps < MOST_CLOSING and Phi.size and metric.columns.size:
+    while steps < limits.MOST_CLOSING and Phi.size and metric.columns.size:
         if np.abs(Phi).max() <= ROUNDING * (1.0 + np.abs(q).max()):
             break
         steps += 1
-        step = least_step(A, Phi, STEEP)
+        step = least_step(A, Phi, limits.STEEP)
         turn = metric.largest_turn(step)
-        factor = min(1.0, MOST_ROTATION / turn) if turn > 0.0 else 1.0
+        factor = min(1.0, limits.MOST_ROTATION / turn) if turn > 0.0 else 1.0
         size = np.linalg.norm(Phi)
         for _ in range(12):
             trial = metric.moved(q, factor * step)

@@ -25,6 +25,7 @@ from ..rows.interface import (
 )
 from ..rows.massless_axes import axis_of
 from ..workspaces import parts, words
+from . import tolerances as limits
 from .mobility import check_rank, mobility_at
 from .motor_starts import demand_finite, demand_small, refuse_masses, refuse_vanished
 from .start_kernels import (
@@ -38,16 +39,6 @@ from .start_kernels import (
     land_start,
     select_redundant,
     take_start,
-)
-from .tolerances import (
-    DENSE_ENTRIES,
-    LEAST_NEIGHBOURHOOD,
-    LISTED_ENTRIES,
-    MANY_ROWS,
-    NEIGHBOURHOOD,
-    REDUNDANT_SHARES,
-    SHORTENING,
-    SHORTEST_LEG,
 )
 
 # The workspace in which a start is checked; one that is idle serves the next start of the scene.
@@ -332,7 +323,7 @@ class _Start:
         way[:, :3] *= max(self.packed.size, POINT_SIZE)
         way[-1] = way[:, 3] = way[:, 7] = 0.0
         loose = -1
-        for share in REDUNDANT_SHARES:
+        for share in limits.REDUNDANT_SHARES:
             self.evaluate()
             if select_redundant(self.context, self.t, share) < 0:
                 raise SingularConfiguration(NO_CHOICE)
@@ -346,7 +337,7 @@ class _Start:
         chosen = self.chosen_of_all()
         if chosen.size and self.serve(chosen) and self.hold_near_by(way.ravel()):
             return chosen
-        long = int((row >= 0).sum()) > MANY_ROWS
+        long = int((row >= 0).sum()) > limits.MANY_ROWS
         raise SingularConfiguration(self._singular([names[i] for i in sorted(row[rows])]) + STRAIGHT * long)
 
     def _singular(self, which):
@@ -372,7 +363,7 @@ class _Start:
         """Return the redundant rows by pivoted QR of all rows: for scenes in which block-wise selection fails."""
         graph, q = self.graph, self.q
         joints = np.flatnonzero(graph.row >= 0)
-        if q.size * joints.size > DENSE_ENTRIES or graph.welds.size:
+        if q.size * joints.size > limits.DENSE_ENTRIES or graph.welds.size:
             return np.empty(0, int)
         A = constraint_arrays(self.scene.system, q, self.qd, self.t)[1][graph.row[joints]]
         for at in self.at:  # without the component along p, which the normalisations hold
@@ -386,8 +377,8 @@ class _Start:
 
     def hold_near_by(self, way):
         """Return True if the redundant rows hold along the way to a nearby configuration."""
-        gone, leg = 0.0, NEIGHBOURHOOD
-        while gone < NEIGHBOURHOOD:
+        gone, leg = 0.0, limits.NEIGHBOURHOOD
+        while gone < limits.NEIGHBOURHOOD:
             here = self.tangent.poses.copy()
             status = go_near_by(self.context, self.t, way, leg)
             if status == Status.UNHELD:
@@ -396,9 +387,9 @@ class _Start:
                 gone += leg
                 continue
             self.tangent.poses[:] = here
-            leg *= SHORTENING
-            if leg < SHORTEST_LEG * NEIGHBOURHOOD:
-                return gone >= LEAST_NEIGHBOURHOOD
+            leg *= limits.SHORTENING
+            if leg < limits.SHORTEST_LEG * limits.NEIGHBOURHOOD:
+                return gone >= limits.LEAST_NEIGHBOURHOOD
         return True
 
     def landed(self):
@@ -419,7 +410,7 @@ class _Start:
 def _refuse(scene, start, dependent):
     """Refuse dependent rows, by name; return if dense rank analysis finds none."""
     graph, tangent, q = start.graph, start.tangent, start.q
-    if q.size * len(scene.system.segments) < LISTED_ENTRIES:
+    if q.size * len(scene.system.segments) < limits.LISTED_ENTRIES:
         check_rank(scene, constraint_arrays(scene.system, q, start.qd, start.t)[1])
         return
     if graph.row[dependent] < 0:

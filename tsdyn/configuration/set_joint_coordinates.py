@@ -272,7 +272,7 @@ def _assembled(scene, drivers, t, motors):
 def _follow_turns(scene):
     """Let joints whose angles are coupled count on from the turn that they are on now."""
     handles = handles_of(scene.packed)
-    for joint in dict.fromkeys(part.counted[0] for part in scene.primitives if part.counted):
+    for joint in dict.fromkeys(joint for part in scene.primitives for joint, _ in part.counted):
         row = handles.row(joint, "angle")
         near = np.broadcast_to(np.ravel(joint.angle_near), len(row.angles))
         now = (joint_motion.angle(g, *handles.motions(g, scene.start[:1]), 0) for g in row.angles)

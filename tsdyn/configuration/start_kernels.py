@@ -244,10 +244,12 @@ def go_near_by(context, t, way, far):
     wanted = _farthest(c)
     for _ in range(2):
         project(graph, f.rows, f.Z, f.b)
-    if not rates_hold_along(graph, f, f.Z):
-        return UNHELD
+    # Without freedom what is left of the way is rounding, and says nothing
     found = _farthest(c)
-    scale = far / found if found > UNDIRECTED * wanted else 0.0
+    free = found > UNDIRECTED * wanted
+    if free and not rates_hold_along(graph, f, f.Z):
+        return UNHELD
+    scale = far / found if free else 0.0
     for i in range(f.Z.size):
         f.Z[i] *= scale
     move_by(graph, f, True)

@@ -47,8 +47,9 @@ def idle_forces(admitted):
 
 
 def note(item):
-    """A constraint or force has been made: it waits to be added to its scene, or to become a part of a joint."""
+    """A constraint or force has been made: it is checked, and waits for its scene, or to become a part of a joint."""
     if "a" in vars(item):  # its __init__ has called that of its base
+        item.check()
         if not _may_be_idle.get():
             item.demand_effect()
         item.scene._waiting[id(item)] = item
@@ -244,10 +245,16 @@ ENTRIES = (  # of docstrings
 
 
 def by_name(function: Function) -> Function:
-    """Wrap an `__init__`: a or b may be the name of a body in the scene of the other."""
+    """Wrap an `__init__`: a or b may be the name of a body in the scene of the other.
+
+    That of `Attachment` serves a class that has none of its own: bodies by position, and b where markers are on it.
+    """
 
     @wraps(function)
     def call(self, *arguments, **keywords):
+        lacks_b = len(arguments) < 2 and "b" not in keywords and any(marker.body == "b" for marker in self.markers)
+        if type(self).__init__.plain is Attachment.__init__ and (len(arguments) > 2 or lacks_b):
+            raise TypeError("no call of this class")  # answered with the arguments that there are, see calls.py
         arguments, keywords = _meant(self.error, arguments, keywords)
         return function(self, *arguments, **keywords)
 
@@ -342,8 +349,13 @@ class Attachment:
         super().__init_subclass__(**keywords)
         if not isinstance(cls.markers, (tuple, list)) or not all(isinstance(m, Marker) for m in cls.markers):
             return  # to be refused by name
-        cls.__init__ = fitting(by_name(cls.__init__), then=note)
-        if unwrap(cls.__init__).__code__.co_flags & CO_VARKEYWORDS:
+        beyond = {marker.body for marker in cls.markers} - {"a", "b"}
+        if beyond and not getattr(cls, "others_at", 0):
+            raise cls.error(f"{cls.__name__}: a marker belongs to body 'a' or 'b', not to {min(beyond)}.")
+        plain = getattr(cls.__init__, "plain", cls.__init__)  # an inherited one is wrapped already
+        cls.__init__ = fitting(by_name(plain), then=note)
+        cls.__init__.plain = plain
+        if unwrap(plain).__code__.co_flags & CO_VARKEYWORDS:
             cls.__init__.__signature__ = complete_signature(cls)
         if cls.__new__ is not object.__new__:  # else the signature would be that of __new__
             cls.__signature__ = signature(MethodType(cls.__init__, cls))
@@ -485,7 +497,7 @@ class Attachment:
         """Find by name what it refers to in the scene that it is added to."""
 
     def check(self) -> None:
-        """Raise an error where an attribute has an impossible value; asked again when one is set."""
+        """Raise an error where an attribute has an impossible value; asked when one is made, and when one is set."""
 
     @property
     def referred(self) -> tuple[Any, ...]:
@@ -509,7 +521,9 @@ class Attachment:
 
     def body_of(self, marker: Marker) -> AnyBody:
         """The body that a marker is on."""
-        return self.a if marker.body == "a" else self.b
+        if marker.body in ("a", "b"):
+            return self.a if marker.body == "a" else self.b
+        return self.others[marker.body - 2]
 
     def counted_from(self, t: float, *displacements: float) -> float:
         """The angle, or angles, near which a run that begins at t counts turns: zero, or what `Scene.set` has set."""
@@ -538,12 +552,15 @@ def in_frame(body, marker, value):
 
 def layout(markers):
     """Constants of the loops over all instances of a kind: where each marker is in x, and on which body."""
-    owners = [0 if m.body == "a" else 1 for m in markers]
+    owners = [{"a": 0, "b": 1}.get(m.body, m.body) for m in markers]
+    others = max(1, *owners) - 1
     sizes = [m.size for m in markers]
     return {
         "MARKERS": len(markers),
         "CODES": tuple(m.code for m in markers),
         "OWNERS": tuple(owners),
+        "OTHERS": others,
+        "SPAN": 14 + 7 * others,
         "STARTS": tuple(sum(sizes[:i]) for i in range(len(sizes))),
         "FIRST": tuple(int(owner not in owners[:i]) for i, owner in enumerate(owners)),
         "SIZE": sum(sizes),

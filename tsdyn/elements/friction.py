@@ -12,7 +12,7 @@ from ..errors import InvalidForce
 from ..jit.kernels import kernel
 from ..maths.recurrences import cross, dot, exponential, inverse_root, product, quotient, root, scaled, square
 from ..maths.tolerances import PIVOT_ROUNDING, TINY
-from ..validation import label, not_negative, positive
+from ..validation import label, not_negative, positive, shown_for_handle
 from .markers import TURN, Marker, Point, Turn, Vector
 from .tolerances import LEAST_SLIP, SLIP
 
@@ -412,7 +412,7 @@ class JointFriction:
         name = label(name, kind, InvalidForce)
         if not isinstance(joint, self.joints):
             names = " or ".join(cls.__name__ for cls in self.joints)
-            raise InvalidForce(f"{name or kind}: joint must be a {names} of the scene, got {joint!r}.")
+            raise InvalidForce(f"{name or kind}: joint must be a {names} of the scene, got {shown_for_handle(joint)}.")
         for unknown in geometry.keys() - self.quantities.keys():
             raise unknown_argument(kind, unknown, [*self.quantities, "name"])
         self.__dict__["joint"] = joint

@@ -17,7 +17,7 @@ from ..maths.recurrences import rotated, rotation
 from ..maths.vectors import rotate
 from ..motions.signals import Signal, numbers_of, positional, starred
 from ..motions.tracing import Untraceable, Writer, demand_same, retold, traced
-from ..validation import label, one_of
+from ..validation import label, one_of, shown_for_handle
 from .force import callbacks
 from .laws import Action, SceneLaw, arguments_of, instants, sees_scene
 from .markers import TURN
@@ -446,7 +446,6 @@ class JointLoad:
     ) -> None:
         self._join(joint, which, name)
         self.function, self.period = function, period
-        self.check()
 
     def _join(self, joint, which, name):
         """Attach it to a coordinate of a joint."""
@@ -454,7 +453,9 @@ class JointLoad:
         name = label(name, kind, InvalidForce)
         geometries = self.geometries(joint) if hasattr(joint, "joint_coordinates") else []
         if not geometries:
-            raise InvalidForce(f"{name or kind}: joint must be one with {self.coordinate}, got {joint!r}.")
+            raise InvalidForce(
+                f"{name or kind}: joint must be one with {self.coordinate}, got {shown_for_handle(joint)}."
+            )
         if not isinstance(which, (int, np.integer)) or which not in range(len(geometries)):
             raise InvalidForce(
                 f"{name or kind}: which must be from 0 to {len(geometries) - 1}, as {joint.name!r} has "

@@ -35,9 +35,12 @@ POINT, VECTOR, PARAMETERS, TURN = 0, 1, 2, 3  # codes in kernels
 @fitting_constructor
 @dataclass(frozen=True)
 class Marker:
-    """What one slot of a constraint or force is on: body "a" or "b", and the argument that places it there."""
+    """What one slot of a constraint or force is on: body "a" or "b", and the argument that places it there.
 
-    body: str
+    A term of a sum may read markers of further bodies, 2 for the first of its `others`: rows have no columns there.
+    """
+
+    body: str | int
     argument: str = ""
     code = POINT
     size = 3
@@ -47,10 +50,10 @@ class Marker:
     meaning = "array_like (3,), m\n    A point in the {}; by default the centroid."
 
     def __post_init__(self) -> None:
-        if self.body not in ("a", "b"):
+        if self.body not in ("a", "b") and not (isinstance(self.body, int) and self.body > 1):
             raise InvalidConstraint(f"a marker belongs to body 'a' or 'b', not to {self.body!r}.")
         if not self.argument:
-            object.__setattr__(self, "argument", self.prefix + self.body)
+            object.__setattr__(self, "argument", f"{self.prefix}{self.body}")
 
     def parameter(self) -> Parameter:
         """Return the argument that places it, as one of a signature."""

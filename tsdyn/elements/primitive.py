@@ -83,7 +83,8 @@ class Primitive(Attachment):
     summed : bool
         Whether an instance may be a term of a row that several instances add up to, each on two bodies: see `SumRow`.
     memory : int
-        1 for a primitive that keeps a number from step to step, the last of par: an angle that counts turns.
+        How many numbers it keeps from step to step, the last of par: angles that count turns. `remember` returns the
+        last of them, and writes the others into par.
     a, b : Body or ground
         The bodies; b is None for a primitive that has markers on a only.
     name : str
@@ -126,7 +127,10 @@ class Primitive(Attachment):
     normal = ""
     normal_at = -1  # among the markers
     summed = False
-    counted: Any = None  # (joint, index) of the angle whose turns a term counts
+    begins_anew = False  # whether a run may begin at a state that doesn't say what it remembers
+    counted: Any = ()  # (joint, index) of each angle whose turns a term counts
+    others: tuple[AnyBody, ...] = ()  # bodies beyond a and b that a term of a sum reads
+    others_at = 0  # their first parameter; pack() fills in three for each
     anywhere = False  # whether rows on velocities hold wherever positions are, though they could be integrated
     normalises = False  # whether it does no more than keep the length of p
     prescribed: str | tuple[str, ...] = ""
@@ -155,7 +159,7 @@ class Primitive(Attachment):
             _check_contact(cls, where)
         if getattr(cls, "series_t", None) is not None and not cls.quantities():
             raise InvalidConstraint(f"{where}: series_t is of what is `prescribed`; name its attributes there.")
-        if cls.memory not in (0, 1) or (cls.memory == 1) != (getattr(cls, "remember", None) is not None):
+        if cls.memory < 0 or (cls.memory > 0) != (getattr(cls, "remember", None) is not None):
             raise InvalidConstraint(f"{where}: memory = 1 needs a kernel remember, and remember needs memory = 1.")
         functions = {}
         required = {**(_KERNELS if cls.rows else {}), **(_RATE_KERNELS if cls.rate_rows else {})}
@@ -186,11 +190,10 @@ class Primitive(Attachment):
         return ("",) if self.all_rows == 1 else tuple(f"[{i}]" for i in range(self.all_rows))
 
     @property
-    def first_memory(self) -> float:
-        """What it remembers at first: the angle near which its joint begins to count."""
-        joint, which = self.counted or (self, 0)
-        near = np.ravel(joint.angle_near)
-        return float(near[which if near.size > 1 else 0])
+    def first_memory(self) -> list[float]:
+        """What it remembers at first: the angles near which its joints begin to count."""
+        pairs = [(np.ravel(joint.angle_near), which) for joint, which in self.counted or [(self, 0)] * self.memory]
+        return [float(near[which if near.size > 1 else 0]) for near, which in pairs]
 
     @property
     def rheonomic(self) -> bool:
@@ -283,7 +286,7 @@ def _compile(cls, functions):
     constants = {"ROWS": cls.all_rows, "RATES_FROM": cls.rows, "SUMMED": cls.summed, "kernel_drift": rate_rows.nothing}
     places = [marker.argument for marker in cls.markers]
     constants["NORMAL"] = cls.normal_at = places.index(cls.normal) if cls.normal else -1
-    constants |= layout(cls.markers) | inner
+    constants |= layout(cls.markers) | inner | {"OTHERS_AT": cls.others_at}
     if cls.rate_rows:
         # One kernel of both sorts of rows in place of each
         names = {**rate_rows.NOTHING, **constants}

@@ -304,7 +304,7 @@ def _of_options(study):
     if DEBUG:
         return "TSDYN_DEBUG=1 runs kernels as plain Python, which has no lanes"
     if study.has_phases:
-        return "unilateral constraints, whose rows come and go, have no lanes"
+        return "contacts and exact friction, whose rows come and go, have no lanes"
     changed = [f"{name}={given[name]!r}" for name in PLAIN if given[name] != OPTIONS[name]]
     if changed:
         return f"{' and '.join(changed)} can't be served in lanes"
@@ -335,7 +335,9 @@ def _of_scene(arena):
     if not study.has_arena or arena.pen is None:
         return "the parameters are not all numbers that cases can share arrays for (docs/ensembles.md)"
     found += [f"{each.name} depends on time" for each in packed.constraints if each.rheonomic]
-    found += dict.fromkeys(f"{each.name} counts turns" for each in packed.constraints if each.memory)
+    what = {False: "counts turns", True: "remembers directions from step to step"}
+    found += dict.fromkeys(f"{each.name} {what[each.begins_anew]}" for each in packed.constraints if each.memory)
+    found += dict.fromkeys(f"{each.name} is a function of several joints" for each in packed.constraints if each.others)
     for force_load in packed.loads:
         force = force_load.force
         if any(isinstance(value, Signal) for value in force_load.parameters):

@@ -145,7 +145,9 @@ def _text(node, texts):
     """The text of a node whose operands have theirs."""
     if node._operation == "polynomial":
         return _polynomial_text(node._numbers)
-    operands = [_operand(operand, texts) for operand in node._operands]
+    operands = [
+        repr(float(operand._numbers[0])) if _is_constant(operand) else texts[id(operand)] for operand in node._operands
+    ]
     if node._operation in SYMBOLS:
         if all(_is_constant(operand) for operand in node._operands):
             operands = [f"constant({text})" for text in operands]
@@ -165,10 +167,6 @@ def _polynomial_text(numbers):
     if len(numbers) == 1:
         return f"constant({numbers[0]!r})"
     return f"polynomial({', '.join(map(repr, numbers))})"
-
-
-def _operand(node, texts):
-    return repr(float(node._numbers[0])) if _is_constant(node) else texts[id(node)]
 
 
 def _is_constant(node):

@@ -8,6 +8,7 @@ import numpy as np
 from ..errors import InvalidArgument, TsdynError
 from ..methods.integrator import registered
 from ..observables.channels import channels_of
+from ..runs.arguments import kind_named
 from ..validation import close, unknown_parameter
 from . import types
 from .expressions import Misread
@@ -70,21 +71,19 @@ def output_times(start, end, every):
 
 def _method(value, path, mistakes, names):
     """A method: its name, or a table with its type and arguments."""
-    known = {cls.__name__: cls for cls in registered().values()}
-    kind = value.get("type") if isinstance(value, dict) else value
-    lower = {name.lower(): name for name in known}
-    name = lower.get(str(kind).lower().replace("-", "").replace("_", ""))
-    if name is None:
-        near = close(str(kind).lower(), lower)
-        hint = " or ".join(f'"{lower[word]}"' for word in near) or ", ".join(known)
+    kind, known = str(value.get("type") if isinstance(value, dict) else value), registered()
+    cls = kind_named(kind)
+    if cls is None:
+        near = [known[word].__name__ for word in close(kind.lower(), known)]
+        hint = " or ".join(f'"{name}"' for name in near) or ", ".join(each.__name__ for each in known.values())
         raise Misread(f'unknown method; write {hint}, or a table such as {{ type = "RK45", rtol = 1e-9 }}.')
     if not isinstance(value, dict):
-        return name.lower()
-    arguments = types.arguments_of(known[name])
+        return cls.__name__.lower()
+    arguments = types.arguments_of(cls)
     known_keys(path, value, ("type", *arguments), mistakes)
     given = {key: arguments[key].decode(part, names) for key, part in value.items() if key in arguments}
     try:
-        return known[name](**given)
+        return cls(**given)
     except TsdynError as error:
         raise Misread(str(error)) from error
 

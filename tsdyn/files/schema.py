@@ -69,7 +69,7 @@ def schema(scene, simulate):
         "constraint": _items(types.constraints()),
         "force": _items(types.forces()),
         "start": _start(scene),
-        "run": {"type": "object", "additionalProperties": False, "properties": {**own, **run}},
+        "run": _closed({**own, **run}),
         "ensemble": _ensemble(),
         "output": _closed({"files": NAMES, "plot": {"type": "string"}, "channels": NAMES}),
     }
@@ -84,19 +84,21 @@ def schema(scene, simulate):
     }
 
 
-def _closed(properties):
-    return {"type": "object", "additionalProperties": False, "properties": properties}
+def _closed(properties, required=(), **others):
+    """A table of these keys alone."""
+    wanted = {"required": list(required)} if required else {}
+    return {"type": "object", **wanted, **others, "additionalProperties": False, "properties": properties}
 
 
 def _ensemble():
     pair = {"type": "array", "items": {"$ref": "#/$defs/array"}, "minItems": 2}
     spread = {kind: {**pair, "maxItems": most} for kind, most in run_tables.SPREADS.items()}
-    value = {"anyOf": [{"$ref": "#/$defs/array"}, {**_closed(spread), "minProperties": 1, "maxProperties": 1}]}
+    value = {"anyOf": [{"$ref": "#/$defs/array"}, _closed(spread, minProperties=1, maxProperties=1)]}
     whole = {key: {"type": "integer", "minimum": least} for key, least in run_tables.LEAST.items()}
     keep = {"anyOf": [{"enum": list(run_tables.KEEPS)}, {**NAMES, "minItems": 1}]}
     others = {"grid": {"type": "boolean"}, "keep": keep, "assemble": {"anyOf": [{"type": "boolean"}, NAMES]}}
     parameters = {"type": "object", "additionalProperties": value, "minProperties": 1}
-    return {**_closed({"parameters": parameters, **whole, **others}), "required": ["parameters"]}
+    return _closed({"parameters": parameters, **whole, **others}, ["parameters"])
 
 
 def _property(argument):
@@ -108,32 +110,23 @@ def _body(name, method):
     known = types.of_body(method)
     properties = {key: _property(argument) for key, argument in known.items()}
     drawn = {"type": "array", "items": {"$ref": "#/$defs/drawn"}}
-    kind, required = (
-        {"type": {"const": name}, "drawn": drawn},
-        [argument.name for argument in known.values() if argument.required],
-    )
+    kind, required = {"type": {"const": name}, "drawn": drawn}, _required(known)
+    given = {"required": ["type", *required]}
     if "inertia" in known:
         kind["shape"] = {"oneOf": [_shape(*pair) for pair in types.SHAPES.items()]}
         given = {"anyOf": [{"required": required}, {"required": ["shape"]}]}
-    else:
-        given = {"required": ["type", *required]}
-    return {
-        "type": "object",
-        **given,
-        "additionalProperties": False,
-        "properties": {**kind, "name": {"type": "string"}, **properties},
-    }
+    return _closed({**kind, "name": {"type": "string"}, **properties}, **given)
+
+
+def _required(known):
+    return [argument.name for argument in known.values() if argument.required]
 
 
 def _shape(name, function):
     """The schema of a shape that gives mass and inertia, or is drawn."""
     known = types.of_shape(function)
-    return {
-        "type": "object",
-        "required": ["type", *(argument.name for argument in known.values() if argument.required)],
-        "additionalProperties": False,
-        "properties": {"type": {"const": name}, **{key: _property(argument) for key, argument in known.items()}},
-    }
+    properties = {"type": {"const": name}, **{key: _property(argument) for key, argument in known.items()}}
+    return _closed(properties, ["type", *_required(known)])
 
 
 def _items(classes):
@@ -159,22 +152,20 @@ def _item(name, cls):
         "name": {"type": "string"},
         **{key: {"description": "the name of a body, or ground", "type": "string"} for key in bodies},
         **{key: _property(argument) for key, argument in arguments.items()},
-        "at": {"type": "object", "additionalProperties": False, "properties": dict.fromkeys(at, VECTOR)},
+        "at": _closed(dict.fromkeys(at, VECTOR)),
         "active": {"type": "boolean"},
     }
     if cls.joint_coordinates:
         properties |= {key: {"$ref": "#/$defs/array"} for key in (*BUILT, "angle_near")}
-    required = ["type", *(key for key, needed in bodies.items() if needed)]
-    required += [argument.name for argument in arguments.values() if argument.required]
-    return {"type": "object", "required": required, "additionalProperties": False, "properties": properties}
+    required = ["type", *(key for key, needed in bodies.items() if needed), *_required(arguments)]
+    return _closed(properties, required)
 
 
 def _start(scene):
     known = {name: _property(argument) for name, argument in types.of_body(scene.assemble).items()}
     coordinates = {name: _property(argument) for name, argument in types.of_body(scene.set).items()}
-    each = {"type": "object", "required": ["joint"], "additionalProperties": False, "properties": coordinates}
-    properties = {"assemble": {"type": "boolean"}, "set": {"type": "array", "items": each}, **known}
-    return {"type": "object", "additionalProperties": False, "properties": properties}
+    each = _closed(coordinates, ["joint"])
+    return _closed({"assemble": {"type": "boolean"}, "set": {"type": "array", "items": each}, **known})
 
 
 def text(scene, simulate):

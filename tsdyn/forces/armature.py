@@ -91,7 +91,6 @@ class Armature(JointLoad, Force):
     def __init__(self, joint: Joint, *, inertia: float, ratio: float = 1.0, which: int = 0, name: str = "") -> None:
         self._join(joint, which, name)
         self.inertia, self.ratio = inertia, ratio
-        self.check()
 
     @staticmethod
     def geometries(joint):

@@ -101,7 +101,6 @@ class Bushing(Force):
         super().__init__(a, b, **places)
         self.stiffness, self.damping = stiffness, damping
         self.torsional_stiffness, self.torsional_damping = torsional_stiffness, torsional_damping
-        self.check()
 
     def parameters(self):
         """K, C, K_t, C_t."""

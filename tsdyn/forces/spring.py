@@ -134,7 +134,6 @@ class Spring(Force):
             )
         self.stiffness, self.damping, self.actuator = stiffness, damping, actuator
         self.free_length = length if free_length is None else free_length
-        self.check()
 
     def parameters(self):
         """(k, c, l0, actuator)."""

@@ -136,7 +136,6 @@ class TorsionalSpring(Force):
                 f"{self.name}: reference_b is parallel to the axis at the start; choose a perpendicular one, such as "
                 "the direction that coincides with reference_a at angle zero."
             )
-        self.check()
 
     @Placing
     def at(cls, a: BodyLike, b: BodyLike | None = None, **arguments: Any) -> Self:

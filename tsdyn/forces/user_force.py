@@ -141,7 +141,6 @@ class UserForce(ByState, Force):
         super().__init__(a, b, **places)
         self.values = _numbers(parameters, f"{self.name}: parameters", self.error)
         self.function = function
-        self.check()
 
     def check(self):
         """Refuse all but plain functions of five arguments."""

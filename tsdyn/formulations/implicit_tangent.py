@@ -38,25 +38,13 @@ from ..rows.interface import (
     write_saddle_rows,
 )
 from ..workspaces import load
+from . import tolerances as limits
 from .accelerations import body_forces
 from .chart_coordinates import add_rate_residuals, displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
 from .chart_validity import measure_turns
 from .projection import largest_residual, velocity_floor
 from .saddle_point import add_blocks, degrees, factorise, linearise, reduce, soften, solve, take_solution, turned_back
 from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, weighted_square, write_state
-from .tolerances import (
-    FARTHEST_AHEAD,
-    LAG,
-    LEAST_LAG,
-    LEFT,
-    NORMAL_SWEEPS,
-    REACTION_SWEEPS,
-    REACTIONS_LEFT,
-    REACTIONS_LEFT_COUPLED,
-    SLOW,
-    STALLED,
-    SWEEPS,
-)
 
 # Right-hand side of a Newton correction of a stage: the normal part of accelerations, and the unbalanced loads.
 
@@ -97,7 +85,7 @@ def _refine_normal_part(c):
     l.drift is scratch.
     """
     f, l, s = c.tangent, c.chart, c.saddle
-    for _ in range(NORMAL_SWEEPS):
+    for _ in range(limits.NORMAL_SWEEPS):
         copy(f.b, l.drift)
         # H (a + C n) + gamma
         to_bodies(c.graph, l, s.r, f.Z)
@@ -157,7 +145,7 @@ def _correct_multipliers(c, left):
     """
     w, f, s, graph, least, before, renewed = c.work, c.tangent, c.saddle, c.graph, 0.0, math.inf, False
     raised = is_raised(graph)  # S is of another metric than W
-    for sweep in range(REACTION_SWEEPS):
+    for sweep in range(limits.REACTION_SWEEPS):
         # H W e, the part of the imbalance that multipliers can balance
         copy(s.e, f.Z)
         put(f.Z, 8 * graph.bodies.shape[0], splat(0.0))  # the ground
@@ -174,7 +162,7 @@ def _correct_multipliers(c, left):
             solve_normal(c)
         else:
             # S of an older configuration contracts no more
-            if worst > SLOW * before and not renewed:
+            if worst > limits.SLOW * before and not renewed:
                 w.counters.factorizations += 1
                 if factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0:
                     return False
@@ -253,7 +241,7 @@ def _begin(numbers, s, charts, t):
             s.multipliers[e] = s.before[e] = 0.0
     # Normal velocities belong to a chart
     if numbers.rates_of != charts:
-        numbers.rates_of, numbers.lag = charts, LAG
+        numbers.rates_of, numbers.lag = charts, limits.LAG
         for e in range(s.z.size):
             s.z[e] = 0.0
     if t == numbers.time:
@@ -261,7 +249,7 @@ def _begin(numbers, s, charts, t):
     # Multipliers along the line through the last two stages
     span, ratio = numbers.time - numbers.time_before, 0.0
     if 0.0 < abs(span) < math.inf:
-        ratio = min(max((t - numbers.time) / span, -FARTHEST_AHEAD), FARTHEST_AHEAD)
+        ratio = min(max((t - numbers.time) / span, -limits.FARTHEST_AHEAD), limits.FARTHEST_AHEAD)
     for e in range(s.multipliers.size):
         last = s.multipliers[e]
         s.multipliers[e] += ratio * (last - s.before[e])
@@ -272,7 +260,7 @@ def _begin(numbers, s, charts, t):
 @kernel
 def _renew_normal(c):
     """Factors of N at the present configuration; False if it is singular."""
-    c.linear.numbers.lag = LEAST_LAG
+    c.linear.numbers.lag = limits.LEAST_LAG
     return factorise_normal(c.graph, c.work, c.tangent, c.chart)
 
 
@@ -301,7 +289,7 @@ def _solve_positions(c, t, g, x):
     """
     system, w, f, l, s, graph, numbers = c.system, c.work, c.tangent, c.chart, c.saddle, c.graph, c.linear.numbers
     floor, before, renewed = w.control.floor, math.inf, False
-    for _ in range(SWEEPS):
+    for _ in range(limits.SWEEPS):
         if not displace(graph, l, f.poses):
             return CHART_LOST
         if f.b.size == 0:
@@ -312,12 +300,12 @@ def _solve_positions(c, t, g, x):
         if not worst < math.inf:
             return NOT_FINITE
         # Rounding, or a residual near it that falls no more
-        if worst <= floor or (worst > SLOW * before and worst <= ROUNDING_AT_MOST * floor):
+        if worst <= floor or (worst > limits.SLOW * before and worst <= ROUNDING_AT_MOST * floor):
             return OK
         if before < math.inf:
             # Contraction by factors of an older configuration
-            numbers.lag = max(worst / before, LEAST_LAG)
-            if numbers.lag > SLOW and renewed:
+            numbers.lag = max(worst / before, limits.LEAST_LAG)
+            if numbers.lag > limits.SLOW and renewed:
                 return NEWTON_FAILED
             # Factors at the present H, once
             if not renewed:  # one correction was not enough
@@ -329,7 +317,7 @@ def _solve_positions(c, t, g, x):
         add_to(f.b, w.u)
         w.counters.newton += 1
         # The expected error over g is a velocity below what the stage notices
-        if numbers.lag * _rate_size(c, s.r) <= g * LEFT:
+        if numbers.lag * _rate_size(c, s.r) <= g * limits.LEFT:
             return OK if displace(graph, l, f.poses) else CHART_LOST
         before = worst
     return NEWTON_FAILED
@@ -342,7 +330,7 @@ def _solve_rates(c, t):
     rheonomic, floor, before, renewed = is_rheonomic(system), 0.0, math.inf, False
     if rheonomic:
         evaluate_drift(graph, system, f, t, l.drift)
-    for sweep in range(SWEEPS):
+    for sweep in range(limits.SWEEPS):
         turn_rates(graph, l, l.y, f.poses)
         if f.b.size == 0:
             return OK
@@ -355,10 +343,10 @@ def _solve_rates(c, t):
         worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE
-        if worst <= floor or (worst > STALLED * before and worst <= ROUNDING_AT_MOST * floor):
+        if worst <= floor or (worst > limits.STALLED * before and worst <= ROUNDING_AT_MOST * floor):
             return OK
         # Factors at the present H, once
-        if worst > SLOW * before:
+        if worst > limits.SLOW * before:
             if renewed:
                 return NEWTON_FAILED
             if not _renew_normal(c):
@@ -369,7 +357,7 @@ def _solve_rates(c, t):
         add_to(f.b, s.z)
         # Rows on velocities turn with bodies, so their contraction is not that of positions: it is measured here
         lag = numbers.lag if graph.rates.size == 0 else worst / before if sweep > 0 else 1.0
-        if lag * _rate_size(c, s.r) <= LEFT:
+        if lag * _rate_size(c, s.r) <= limits.LEFT:
             turn_rates(graph, l, l.y, f.poses)
             return OK
         before = worst
@@ -390,7 +378,7 @@ def correct(context, g, k):
     if graph.rates.size > 0:
         square = weighted_square(graph, l, s.r, w.q, c.linear.now[0], 0, numbers.rtol, numbers.atol)
     # [e, dlam] of the saddle-point matrix
-    if not find_imbalance(c, REACTIONS_LEFT):
+    if not find_imbalance(c, limits.REACTIONS_LEFT):
         return math.inf
     solve_saddle(s)
     take_solution(graph, s)
@@ -468,7 +456,7 @@ def balance_stage(context, i, k):
     find_normal_part(c)
     copy(f.b, s.normal[i])
     # F - M (a + C n) - H^T lam
-    if not find_imbalance(c, REACTIONS_LEFT_COUPLED):
+    if not find_imbalance(c, limits.REACTIONS_LEFT_COUPLED):
         return SINGULAR
     copy(s.x, s.right[i])
     # What the correction of this stage needs once all stages are solved
@@ -615,23 +603,6 @@ def _size(c, h, tableau, p):
 # The tangent form for implicit methods: accelerations of a stage, and rates of another configuration, in a chart.
 #
 # Newton's methods for its stages stand above; the matrices are those of saddle_point.py.
-
-__all__ = [  # parts of the form
-    "COLUMNS",
-    "accelerate",
-    "check",
-    "correct",
-    "distance",
-    "error_norm",
-    "factorise",
-    "linearise",
-    "place",
-    "reduce",
-    "residual",
-    "soften",
-    "solve",
-    "start_chart",
-]
 
 
 @callback("p")

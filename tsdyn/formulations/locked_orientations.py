@@ -14,7 +14,7 @@ from ..elements.markers import PARAMETERS, VECTOR
 from ..maths.tolerances import NEGLIGIBLE, ROUNDING
 from ..model.packed import classes, inertia_classes
 from ..motions.prescribed import Motion
-from ..rows.graph_builder import build, graph_of, redundant_rows, with_loops
+from ..rows.graph_builder import build, graph_of, parts_of, redundant_rows, with_loops
 from ..rows.interface import MOST_ROWS
 
 
@@ -63,9 +63,12 @@ def moving_graph(packed, *columns):
 
 
 def moving_parts(packed):
-    """The same graph without addresses of loops, and the classes of its kinds; a graph of the caller's own."""
+    """The same graph without addresses of loops, and the classes of its kinds; its table is the caller's own."""
     found = still(packed)
-    return build(packed, found if found.bodies.size else None)
+    if found.bodies.size:
+        return build(packed, found)
+    graph, kinds = parts_of(packed)
+    return graph._replace(table=graph.table.copy()), kinds
 
 
 def release_loose_bodies(packed, graph, H):

@@ -265,11 +265,14 @@ def run_data(solution: Any, **choices: Any) -> dict[str, Any]:
     return data
 
 
-def scene_data(scene: Scene, t: float, notes: Sequence[str] = (), **choices: Any) -> dict[str, Any]:
-    """All that a page shows of a scene at its start, with the rows that are violated at time t; notes: said, too."""
+def scene_data(scene: Scene, held: Any, t: float, notes: Sequence[str] = (), **choices: Any) -> dict[str, Any]:
+    """All that a page shows of a scene at its start, with the rows that are violated at time t; notes: said, too.
+
+    held: `Packed` with what holds there; open contacts and inactive parts are missing.
+    """
     packed, (q, qd) = scene.packed, scene.start
     violated: dict[Any, list[str]] = {}
-    for constraint, said in _violated(packed, t, q, qd):
+    for constraint, said in _violated(held, t, q, qd):
         violated.setdefault(constraint, []).append(said)
     frames = AnimationFrames(np.array([t]), *_poses(packed, q[None]), None, q[None])
     data = _contents(scene, packed, attached(packed), frames, violated, trails=(), **choices)

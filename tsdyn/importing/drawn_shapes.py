@@ -143,7 +143,8 @@ def _shape(node, name, outside, report, materials):
         return None
     place, shape = HERE if at is None else placed(at), geometry.nodes[0]
     geometry.all(shape.tag)
-    made = _primitive(shape, name, outside, report)
+    uri = shape.demand("filename") if shape.tag == "mesh" else None
+    made = _primitive(shape, name, outside, report, uri, shape.attribute)
     return None if made is None else DrawnShape(*made, place, colour)
 
 
@@ -152,30 +153,27 @@ def placed(node):
     return Frame(node.attribute("xyz", 3, np.zeros(3)), roll_pitch_yaw(node.attribute("rpy", 3, np.zeros(3))))
 
 
-def _primitive(shape, name, outside, report):
-    """Kind and arguments of a shape."""
+SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "capsule": ("radius", "length"), "sphere": ("radius",)}
+
+
+def _primitive(shape, name, outside, report, uri, read):
+    """Kind and arguments of a shape; read(word, count, default) gives its numbers, (count,), and `uri` is of a mesh."""
     if shape.tag == "mesh":
-        uri, scale = shape.demand("filename"), shape.attribute("scale", 3, np.ones(3))
-        return None if report is None else mesh(uri, scale, outside, report, name)
-    if shape.tag == "box":
-        kind, sizes = "Box", shape.attribute("size", 3, np.ones(3))
-        arguments = (sizes,)
-    elif shape.tag in ("cylinder", "capsule"):
-        kind, sizes = shape.tag.capitalize(), np.array([shape.number("radius", 1.0), shape.number("length", 1.0)])
-        arguments = tuple(sizes.tolist())
-    elif shape.tag == "sphere":
-        kind, sizes = "Sphere", np.array([shape.number("radius", 1.0)])
-        arguments = tuple(sizes.tolist())
-    else:
+        scale = read("scale", 3, np.ones(3))
+        return None if report is None or uri is None else mesh(uri, scale, outside, report, name)
+    if shape.tag not in SIZES:
         shape.skip()
         if report is not None:
             report.leave(f"shape <{shape.tag}>", name)
         return None
-    if not (sizes > 0.0).all():
+    radius = 0.5 if shape.tag == "capsule" else 1.0  # of one that says none
+    usual = {"size": np.ones(3), "radius": [radius], "length": [1.0]}
+    sizes = [read(word, len(usual[word]), usual[word]) for word in SIZES[shape.tag]]
+    if not all((size > 0.0).all() for size in sizes):
         if report is not None:
             report.leave("shape without extent", name)
         return None
-    return kind, arguments
+    return shape.tag.capitalize(), tuple(size if size.size == 3 else float(size[0]) for size in sizes)
 
 
 def add_sdf_shapes(link, node, frames, outside, report):
@@ -198,30 +196,9 @@ def _sdf_shape(node, name, frames, outside, report):
         return None
     shape = geometry.nodes[0]
     geometry.all(shape.tag)
-    made = _sdf_primitive(shape, name, outside, report)
+    uri = shape.one("uri") if shape.tag == "mesh" else None
+    made = _primitive(shape, name, outside, report, None if uri is None else uri.text, shape.value)
     return None if made is None else DrawnShape(*made, place, colour)
-
-
-def _sdf_primitive(shape, name, outside, report):
-    """Kind and arguments of a shape."""
-    if shape.tag == "mesh":
-        uri, scale = shape.one("uri"), shape.value("scale", 3, np.ones(3))
-        return None if report is None or uri is None else mesh(uri.text, scale, outside, report, name)
-    sizes = {
-        "box": lambda: (shape.value("size", 3, np.ones(3)),),
-        "cylinder": lambda: (shape.scalar("radius", 1.0), shape.scalar("length", 1.0)),
-        "capsule": lambda: (shape.scalar("radius", 0.5), shape.scalar("length", 1.0)),
-        "sphere": lambda: (shape.scalar("radius", 1.0),),
-    }.get(shape.tag)
-    if sizes is None:
-        shape.skip()
-        if report is not None:
-            report.leave(f"shape <{shape.tag}>", name)
-        return None
-    found = sizes()
-    if not all(np.all(size > 0.0) for size in found):
-        return None
-    return shape.tag.capitalize(), found
 
 
 # Shapes to draw of MJCF: geoms of the groups that MuJoCo's viewer shows; contacts are listed.
@@ -239,7 +216,7 @@ def drop_missing_meshes(mujoco, spec, sources, root, report):
     missing = {
         mesh.name or Path(mesh.file).stem: mesh
         for mesh in spec.meshes
-        if mesh.file and (mesh.file in sources.hidden or not _is_there(mesh, folder))
+        if mesh.file and (mesh.file in sources.hidden or not (exists(folder / mesh.file) or exists(Path(mesh.file))))
     }
     if not missing:
         return
@@ -256,10 +233,6 @@ def drop_missing_meshes(mujoco, spec, sources, root, report):
     for mesh in missing.values():
         mesh.file, mesh.content_type, mesh.uservert = "", "", TETRAHEDRON
     root.mistakes.demand_none()
-
-
-def _is_there(mesh, folder):
-    return exists(folder / mesh.file) or exists(Path(mesh.file))
 
 
 def add_geoms(mujoco, model, found, names, report):

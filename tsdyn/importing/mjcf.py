@@ -43,15 +43,11 @@ def add_forces(mujoco, model, data, found, names, report):
     """Add actuators of joints and springs of tendons; others are listed."""
     joints = {joint.name: joint for joint in found.joints}
     off, bits = model.opt.disableflags, mujoco.mjtDisableBit
-    for i in range(_actuators(model)):
+    for i in range(int(getattr(model, "nactuator", model.nu))):
         if not off & bits.mjDSBL_ACTUATION:
             _add_actuator(mujoco, model, i, joints, names, report)
     for i in range(model.ntendon):
         _add_tendon(mujoco, model, data, i, found, names, report)
-
-
-def _actuators(model):
-    return int(getattr(model, "nactuator", model.nu))
 
 
 def _add_actuator(mujoco, model, i, joints, names, report):

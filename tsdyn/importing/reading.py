@@ -221,7 +221,12 @@ def _add(scene, joint, bodies, report, suffix):
         report.leave("negative stiffness or damping", joint.name, f"{joint.stiffness:g}, {joint.damping:g}")
         return
     if joint.kind in ("revolute", "planar"):
-        _hinge(scene, joint, a, b, name)
+        scene.add(
+            TorsionalSpring.at(
+                a, b, axis=joint.axis, stiffness=joint.stiffness, damping=joint.damping, free_angle=joint.free,
+                actuator=joint.load, name=name,
+            )
+        )  # fmt: skip
     elif joint.kind == "prismatic":
         _slide(scene, joint, a, b, name, report)
     elif joint.kind in ("spherical", "free"):
@@ -233,15 +238,6 @@ def _add(scene, joint, bodies, report, suffix):
             scene.add(ViscousFriction.at(b, a, torsional_damping=joint.damping, **linear, **places, name=name))
     else:
         report.leave(f"stiffness and damping of a {joint.kind} joint", joint.name)
-
-
-def _hinge(scene, joint, a, b, name):
-    scene.add(
-        TorsionalSpring.at(
-            a, b, axis=joint.axis, stiffness=joint.stiffness, damping=joint.damping, free_angle=joint.free,
-            actuator=joint.load, name=name,
-        )
-    )  # fmt: skip
 
 
 def _slide(scene, joint, a, b, name, report):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..maths.tolerances import HALF_DIGITS, TYPED
+from ..shapes import steiner
 from .description import GROUND, Slide
 from .tolerances import HALVINGS, NO_INERTIA, NO_MASS, REACH, SHARE, SLIGHT
 
@@ -79,11 +80,6 @@ def together(parts):
     return mass, centroid, inertia
 
 
-def steiner(d):
-    """d.d I - d d^T."""
-    return (d @ d) * np.eye(3) - np.outer(d, d)
-
-
 def _rename(description, top, report):
     kept = []
     for joint in description.joints:
@@ -121,7 +117,8 @@ def complete(description, report):
     for link in [link for link in description.links.values() if link.mass <= 0.0 and not joints[link.name]]:
         report.leave("link without mass", link.name)
         del description.links[link.name]
-    usual = _usual_mass(description)
+    masses = [link.mass for link in description.links.values() if link.mass > NO_MASS]
+    usual = float(np.median(masses)) if masses else 1.0
     all_poor = poor = [link for link in reversed(description.links.values()) if is_poor(link, SLIGHT * usual)]
     for link in all_poor:
         link.helps = link.mass <= SLIGHT * usual
@@ -136,7 +133,9 @@ def complete(description, report):
             f"without mass or inertia, given a share of what their neighbours carry for them: {', '.join(given)}"
         )
     for link in poor:
-        _add_trifle(link, usual, report)
+        mass, inertia = max(link.mass, HALF_DIGITS * usual), HALF_DIGITS * usual * REACH**2
+        link.mass, link.inertia = mass, link.inertia + inertia * np.eye(3)
+        report.leave("link without mass or inertia, given a trifle", link.name, f"{mass:.2g} kg, {inertia:.2g} kg m^2")
 
 
 def _deeper(before, now):
@@ -194,13 +193,6 @@ def _endow(description, joints, link, usual):
     return not is_poor(link, least)
 
 
-def _add_trifle(link, usual, report):
-    """Give a link that no neighbour can share with as little as rounding allows; that is no longer exact."""
-    mass, inertia = max(link.mass, HALF_DIGITS * usual), HALF_DIGITS * usual * REACH**2
-    link.mass, link.inertia = mass, link.inertia + inertia * np.eye(3)
-    report.leave("link without mass or inertia, given a trifle", link.name, f"{mass:.2g} kg, {inertia:.2g} kg m^2")
-
-
 def _common(joint, link, donor):
     """Second moments (4, 4) of points that both bodies of a joint have, in the frame of the link, of mass 1 kg."""
     if joint.kind in ("revolute", "universal", "spherical"):
@@ -218,11 +210,6 @@ def _reach(link, donor, joint):
         return REACH
     extent = np.sqrt(max(np.trace(donor.inertia), 0.0) / donor.mass)
     return max(float(extent), 1e-3)
-
-
-def _usual_mass(description):
-    masses = [link.mass for link in description.links.values() if link.mass > NO_MASS]
-    return float(np.median(masses)) if masses else 1.0
 
 
 def moments(link):

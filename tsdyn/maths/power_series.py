@@ -1,6 +1,7 @@
 """Truncated power series as numbers: of any order, and of second order (2-jets)."""
 
 import operator
+from types import MappingProxyType
 
 import numpy as np
 
@@ -10,7 +11,43 @@ import numpy as np
 # the value of the argument, f(x_0 + d) = sum_n f_n d^n, where d^n vanishes beyond the order.
 
 
-class Truncated:
+ARITHMETIC = MappingProxyType(
+    {"add": operator.add, "subtract": operator.sub, "multiply": operator.mul, "divide": operator.truediv}
+)
+
+
+class _Series:
+    """Arithmetic that follows from + * ** and -x, and NumPy's functions by name."""
+
+    __slots__ = ()
+    functions, operators = MappingProxyType({}), ARITHMETIC
+
+    def __sub__(self, other):
+        return self + (-self.of(other))
+
+    def __rsub__(self, other):
+        return self.of(other) - self
+
+    def __radd__(self, other):
+        return self + other
+
+    def __rmul__(self, other):
+        return self * other
+
+    def __rtruediv__(self, other):
+        return self.of(other) / self
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
+        """NumPy's functions, and its arithmetic with one on the right."""
+        if method == "__call__" and not keywords:
+            if len(inputs) == 1 and ufunc.__name__ in self.functions:
+                return self.functions[ufunc.__name__](self)
+            if len(inputs) == 2 and ufunc.__name__ in self.operators:
+                return self.operators[ufunc.__name__](self.of(inputs[0]), self.of(inputs[1]))
+        raise TypeError(f"np.{ufunc.__name__} has no Taylor series here; there are {', '.join(self.functions)}.")
+
+
+class Truncated(_Series):
     """A power series in t, c[k] (K,) being the coefficient of t^k; operands have the same K, or are constants."""
 
     __slots__ = ("c",)
@@ -56,20 +93,11 @@ class Truncated:
     def __neg__(self):
         return Truncated(-self.c)
 
-    def __sub__(self, other):
-        return self + (-self.of(other))
-
-    def __rsub__(self, other):
-        return self.of(other) - self
-
     def __mul__(self, other):
         return Truncated(np.convolve(self.c, self.of(other).c)[: self.c.size])
 
     def __truediv__(self, other):
         return self * self.of(other).power(-1.0)
-
-    def __rtruediv__(self, other):
-        return self.of(other) / self
 
     def __pow__(self, n):
         if isinstance(n, int) and n >= 0:
@@ -78,17 +106,6 @@ class Truncated:
                 result = result * self
             return result
         return self.power(n)
-
-    __radd__, __rmul__ = __add__, __mul__
-
-    def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
-        """NumPy's functions of a series, and its arithmetic with one on the right."""
-        if method == "__call__" and not keywords:
-            if len(inputs) == 1 and ufunc.__name__ in _FUNCTIONS:
-                return _FUNCTIONS[ufunc.__name__](self)
-            if len(inputs) == 2 and ufunc.__name__ in _OPERATORS:
-                return _OPERATORS[ufunc.__name__](self.of(inputs[0]), self.of(inputs[1]))
-        raise TypeError(f"np.{ufunc.__name__} has no Taylor series here; there are {', '.join(_FUNCTIONS)}.")
 
 
 def _circular(x, values):
@@ -115,41 +132,26 @@ def _hyperbolic(x, sign):
     return (_exponential(x) + sign * _exponential(-x)) * 0.5
 
 
-def _logarithm(x):
-    return (x.rate / x).integral(np.log(x.c[0]))
-
-
-def _arctangent(x):
-    return (x.rate / (1.0 + x * x)).integral(np.arctan(x.c[0]))
-
-
 def _angle(y, x):
     return ((x * y.rate - y * x.rate) / (x * x + y * y)).integral(np.arctan2(y.c[0], x.c[0]))
 
 
-_FUNCTIONS = {
+Truncated.functions = {
     "sin": _sine,
     "cos": _cosine,
     "tan": lambda x: _sine(x) / _cosine(x),
     "sqrt": lambda x: x.power(0.5),
     "exp": _exponential,
-    "log": _logarithm,
+    "log": lambda x: (x.rate / x).integral(np.log(x.c[0])),
     "sinh": lambda x: _hyperbolic(x, -1.0),
     "cosh": lambda x: _hyperbolic(x, 1.0),
     "tanh": lambda x: _hyperbolic(x, -1.0) / _hyperbolic(x, 1.0),
-    "arctan": _arctangent,
+    "arctan": lambda x: (x.rate / (1.0 + x * x)).integral(np.arctan(x.c[0])),
     "square": lambda x: x * x,
     "negative": lambda x: -x,
     "floor": lambda x: x.of(np.floor(x.c[0])),  # of turns of an angle: piecewise constant
 }
-_OPERATORS = {
-    "add": lambda x, y: x + y,
-    "subtract": lambda x, y: x - y,
-    "multiply": lambda x, y: x * y,
-    "divide": lambda x, y: x / y,
-    "power": lambda x, y: x.power(y.c[0]),
-    "arctan2": _angle,
-}
+Truncated.operators = {**ARITHMETIC, "power": lambda x, y: x.power(y.c[0]), "arctan2": _angle}
 
 
 # Second-order Taylor numbers (2-jets) x + x' t + x'' t^2 / 2: value and two derivatives through any formula.
@@ -158,7 +160,7 @@ _OPERATORS = {
 # constraint errors of a solution are independent of the solver.
 
 
-class Jet:
+class Jet(_Series):
     """Value and first two time derivatives; each an array over the outputs."""
 
     __slots__ = ("x", "xd", "xdd")
@@ -183,12 +185,6 @@ class Jet:
     def __neg__(self):
         return Jet(-self.x, -self.xd, -self.xdd)
 
-    def __sub__(self, other):
-        return self + (-Jet.of(other))
-
-    def __rsub__(self, other):
-        return Jet.of(other) - self
-
     def __mul__(self, other):
         o = Jet.of(other)
         return Jet(self.x * o.x, self.xd * o.x + self.x * o.xd, self.xdd * o.x + 2.0 * self.xd * o.xd + self.x * o.xdd)
@@ -199,9 +195,6 @@ class Jet:
     def __truediv__(self, other):
         return self * Jet.of(other) ** -1
 
-    def __rtruediv__(self, other):
-        return Jet.of(other) / self
-
     def __pow__(self, n):
         x = self.x
         if isinstance(n, int) and n >= 0:
@@ -210,31 +203,10 @@ class Jet:
 
     def _root(self):
         """The square root; a length through zero has the rate sqrt(x'' / 2) just after."""
-        root = self._chain(*_root(self.x))
+        r = np.sqrt(self.x)
+        root = self._chain(r, 0.5 / r, -0.25 / (r * self.x))
         at_zero = (self.x == 0.0) & (self.xd == 0.0)
         return Jet(root.x, np.where(at_zero, np.sqrt(np.where(at_zero, 0.5 * self.xdd, 0.0)), root.xd), root.xdd)
-
-    __radd__, __rmul__ = __add__, __mul__
-
-    def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
-        """NumPy's functions of a Jet, and its arithmetic with one on the right."""
-        if method == "__call__" and not keywords:
-            if ufunc is np.sqrt:
-                return self._root()
-            if len(inputs) == 1 and ufunc.__name__ in _JET_FUNCTIONS:
-                return self._chain(*_JET_FUNCTIONS[ufunc.__name__](self.x))
-            if len(inputs) == 2 and ufunc.__name__ in _JET_OPERATORS:
-                return _JET_OPERATORS[ufunc.__name__](Jet.of(inputs[0]), inputs[1])
-        raise TypeError(f"np.{ufunc.__name__} has no Taylor series here; there are {', '.join(_JET_FUNCTIONS)}.")
-
-
-_JET_OPERATORS = {
-    "add": operator.add,
-    "subtract": operator.sub,
-    "multiply": operator.mul,
-    "divide": operator.truediv,
-    "power": operator.pow,
-}
 
 
 def _jet_sine(x):
@@ -252,22 +224,15 @@ def _tangent(x):
     return t, 1.0 + t * t, 2.0 * t * (1.0 + t * t)
 
 
-def _root(x):
-    r = np.sqrt(x)
-    return r, 0.5 / r, -0.25 / (r * x)
-
-
 def _hyperbolic_tangent(x):
     t = np.tanh(x)
     return t, 1.0 - t * t, -2.0 * t * (1.0 - t * t)
 
 
-# f, its derivative and its second derivative
-_JET_FUNCTIONS = {
+_DERIVATIVES = {  # f, its derivative and its second derivative
     "sin": _jet_sine,
     "cos": _jet_cosine,
     "tan": _tangent,
-    "sqrt": _root,
     "exp": lambda x: (np.exp(x),) * 3,
     "log": lambda x: (np.log(x), 1.0 / x, -1.0 / x**2),
     "sinh": lambda x: (np.sinh(x), np.cosh(x), np.sinh(x)),
@@ -277,3 +242,6 @@ _JET_FUNCTIONS = {
     "square": lambda x: (x * x, 2.0 * x, 2.0),
     "negative": lambda x: (-x, -1.0, 0.0),
 }
+Jet.functions = {name: lambda jet, f=f: jet._chain(*f(jet.x)) for name, f in _DERIVATIVES.items()}
+Jet.functions["sqrt"] = Jet._root
+Jet.operators = {**ARITHMETIC, "power": lambda x, y: x**y.x}

@@ -9,26 +9,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from ..jit.kernels import entry, kernel
-from .tolerances import (
-    AT_ZERO,
-    CLEAR,
-    DEEPEST,
-    EPS,
-    EXTREME,
-    MOST_BISECTIONS,
-    MOST_SCALED,
-    NEAR_ZERO,
-    NEGLIGIBLE,
-    NOISE_RATIO,
-    REAL,
-    ROUGH_SHARE,
-    SAFE,
-    SHORTEST_INTERVAL,
-    TIGHT,
-    UNDERFLOWING,
-    UNRESOLVED,
-    WIDEST_NOISE,
-)
+from . import tolerances as limits
+from .tolerances import CLEAR, EPS, MOST_BISECTIONS, TIGHT, UNDERFLOWING
 
 # Chebyshev interpolation on [-1, 1]; tables are made once for each degree.
 
@@ -85,7 +67,7 @@ def extremes(coefficients):
     if slope.size < 2:
         return np.empty(0)
     roots = chebyshev.chebroots(slope)
-    return np.sort(roots.real[np.abs(roots.imag) < REAL])
+    return np.sort(roots.real[np.abs(roots.imag) < limits.REAL])
 
 
 # Bracketing of zeros: times between which a function changes sign at most once.
@@ -190,7 +172,8 @@ def _look(values, errors, samples, noise, fine, out):
         while k < fine.size and sign * fine[k] > _bend(fine, k) + margin:
             k += 1
         out[j, 0] = k
-        while 0 < k < fine.size and sign * fine[k] < sign * fine[k - 1]:
+        # It falls from point to point by more than it bends
+        while 0 < k < fine.size and sign * (fine[k - 1] - fine[k]) > max(_bend(fine, k - 1), _bend(fine, k)):
             if sign * fine[k] < -_bend(fine, k) - margin:
                 out[j, 1] = k
                 break
@@ -222,6 +205,9 @@ def _cross(c, x0, x1, out):
             break
         x = to if x0 < to < x1 else 0.5 * (x0 + x1)
     out[0], out[1] = x, slope
+
+
+SURVEYING = _look, _cross
 
 
 class Survey(NamedTuple):
@@ -307,12 +293,14 @@ class Search:
 
         Return the degree needed and the value at b. Raises TooFast.
         """
-        self._shortest = max(DEEPEST * (b - a), SHORTEST_INTERVAL * max(abs(a), abs(b)))
-        self._measure_by(SAFE)
-        whole = self._fit(a, b, SAFE * value, None, degree)
-        if whole.scale < UNDERFLOWING:
-            exponent = -math.frexp(whole.scale)[1] if whole.scale else MOST_SCALED  # denormal numbers times SAFE are 0
-            self._measure_by(math.ldexp(SAFE, min(exponent, MOST_SCALED)))
+        self._shortest = max(limits.DEEPEST * (b - a), limits.SHORTEST_INTERVAL * max(abs(a), abs(b)))
+        self._measure_by(limits.SAFE)
+        whole = self._fit(a, b, limits.SAFE * value, None, degree)
+        if whole.scale < limits.UNDERFLOWING:
+            exponent = (
+                -math.frexp(whole.scale)[1] if whole.scale else limits.MOST_SCALED
+            )  # denormal numbers times SAFE are 0
+            self._measure_by(math.ldexp(limits.SAFE, min(exponent, limits.MOST_SCALED)))
             whole = self._fit(a, b, self._unit * value, None, degree)
         self.points.append((a, self._unit * value))
         if not (whole.resolved or whole.off != whole.off):
@@ -344,7 +332,7 @@ class Search:
             samples[1:-1], samples[-1] = self._values(times[1:-1]), last
         while True:
             fit = self._judged(a, b, degree, times, samples)
-            hopeless = degree == LARGEST or (degree == LARGEST // 2 and fit.off > UNRESOLVED * fit.scale)
+            hopeless = degree == LARGEST or (degree == LARGEST // 2 and fit.off > limits.UNRESOLVED * fit.scale)
             if fit.resolved or hopeless or fit.off != fit.off:
                 return fit
             degree *= 2
@@ -355,19 +343,19 @@ class Search:
         fine, errors = grid.values @ samples, np.abs(grid.errors @ samples)
         scale, off = float(np.abs(samples).max()), float(errors[0] + max(errors[-2], errors[-1]))
         clear = max(float(fine.min()), -float(fine.max()), 0.0)
-        resolved = off <= max(TIGHT * scale, self.noise) or CLEAR * float(errors.sum()) <= clear
+        resolved = off <= max(limits.TIGHT * scale, self.noise) or limits.CLEAR * float(errors.sum()) <= clear
         return Fit(a, b, degree, times, samples, fine, off, clear, scale, resolved)
 
     def _rounding(self, fit):
         """Return the rounding error of the values: high coefficients where a smooth function has none."""
-        t, least = fit.a + 0.382 * (fit.b - fit.a), SHORTEST_INTERVAL * max(abs(fit.a), abs(fit.b))
-        half, found = max(ROUGH_SHARE * (fit.b - fit.a), least), np.inf
-        while half < WIDEST_NOISE * (fit.b - fit.a):
+        t, least = fit.a + 0.382 * (fit.b - fit.a), limits.SHORTEST_INTERVAL * max(abs(fit.a), abs(fit.b))
+        half, found = max(limits.ROUGH_SHARE * (fit.b - fit.a), least), np.inf
+        while half < limits.WIDEST_NOISE * (fit.b - fit.a):
             rough = table(8).coefficients[5:] @ self._values(t + half * table(8).nodes)
             found = min(found, 10.0 * float(np.abs(rough).max()))
-            if found <= NEGLIGIBLE * fit.scale or half == least:
+            if found <= limits.NEGLIGIBLE * fit.scale or half == least:
                 break
-            half = max(NOISE_RATIO * half, least)
+            half = max(limits.NOISE_RATIO * half, least)
         return found if found < np.inf else 0.0
 
     def _follow(self, fit, calm):
@@ -390,7 +378,7 @@ class Search:
         if fit.scale <= self.noise:
             return
         found = dict(zip(fit.times.tolist(), fit.samples.tolist(), strict=True))
-        if fit.clear <= NEAR_ZERO * fit.scale:
+        if fit.clear <= limits.NEAR_ZERO * fit.scale:
             grid = fit.a + 0.5 * (fit.b - fit.a) * (table(fit.degree).fine + 1.0)
             grid[-1] = fit.b
             for i, j in self._spans(fit):
@@ -404,10 +392,10 @@ class Search:
         fine[::FINE] = fit.samples[table(fit.degree).at_nodes]
         size, sign = np.abs(fine), np.sign(fine)
         least = (size[1:-1] <= np.minimum(size[:-2], size[2:])) & (sign[:-2] == sign[2:])
-        yield from ((i, i + 2) for i in np.flatnonzero(least & (size[1:-1] <= NEAR_ZERO * fit.scale)).tolist())
+        yield from ((i, i + 2) for i in np.flatnonzero(least & (size[1:-1] <= limits.NEAR_ZERO * fit.scale)).tolist())
         runs = (np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist()
         yield from ((i - 1, j) for i, j in pairwise(runs) if -(-i // FINE) * FINE >= j)  # without a node
-        yield from ((i, i + 1) for i, end in ((0, 0), (last - 1, last)) if size[end] <= AT_ZERO * fit.scale)
+        yield from ((i, i + 1) for i, end in ((0, 0), (last - 1, last)) if size[end] <= limits.AT_ZERO * fit.scale)
 
     def _polish(self, a, b):
         """Return extrema between a and b, and an end that touches zero: values by time."""
@@ -417,8 +405,8 @@ class Search:
         series = table(POLISH).coefficients @ samples
         if not np.isfinite(series).all():
             return {}
-        noise = max(8.0 * float(np.abs(series[-5:]).max()) + EPS * float(np.abs(samples).max()), self.noise)
-        inner, ulps = a + 0.5 * (b - a) * (extremes(series) + 1.0), 8.0 * EPS * max(abs(a), abs(b))
+        noise = max(8.0 * float(np.abs(series[-5:]).max()) + limits.EPS * float(np.abs(samples).max()), self.noise)
+        inner, ulps = a + 0.5 * (b - a) * (extremes(series) + 1.0), 8.0 * limits.EPS * max(abs(a), abs(b))
         inner = np.unique(np.clip(inner[(inner >= a - ulps) & (inner <= b + ulps)], a, b))
         values = self._values(inner)
         touch = np.abs(values) <= noise
@@ -443,10 +431,12 @@ class Search:
         from scipy.optimize import minimize_scalar  # slow to import
 
         value = lambda s: sign * self._values(np.array([a + s]))[0]  # noqa: E731
-        found = minimize_scalar(value, bounds=(0.0, b - a), method="bounded", options={"xatol": EXTREME * (b - a)})
+        found = minimize_scalar(
+            value, bounds=(0.0, b - a), method="bounded", options={"xatol": limits.EXTREME * (b - a)}
+        )
         if not abs(found.fun) < np.inf:
             return {}
-        return {a + float(found.x): 0.0 if abs(found.fun) <= AT_ZERO * scale else sign * float(found.fun)}
+        return {a + float(found.x): 0.0 if abs(found.fun) <= limits.AT_ZERO * scale else sign * float(found.fun)}
 
     def _append(self, found):
         """Add values by time; the first may be known already."""

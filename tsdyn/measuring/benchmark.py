@@ -21,6 +21,7 @@ from ..errors import InvalidArgument, Status
 from ..formulations.registry import formulation as find_formulation
 from ..integrators import DOP853, RK45, SDIRK54
 from ..methods.integrator import Integrator, registered
+from ..runs.arguments import interval, kind_named
 from ..simulation.prepared_run import simulate
 from ..simulation.scene import Scene
 from ..validation import floats, positive, unknown_name, whole
@@ -390,8 +391,9 @@ def benchmark(  # many arguments, by name: those of runs, and of how they are me
     if reference is not None and not isinstance(reference, Reference):
         raise InvalidArgument(f"reference must be a reference_solution.Reference of benchmarking, got {reference!r}.")
     plan = _plan(methods, tolerances, steps, form)
-    t_span = _span(t_span)
-    times = _times(t_eval, t_span) if reference is None else reference.t
+    t_span = interval(t_span)
+    times = np.linspace(*t_span, 101) if t_eval is None else floats(t_eval)
+    times = times if reference is None else reference.t
     run = partial(
         simulate, scene, t_span, t_eval=times, formulation=formulation, constraint_tol=constraint_tol,
         max_steps=max_steps,
@@ -485,10 +487,10 @@ def _plan(methods, tolerances, steps, form):
     plan = []
     for label, method in given:
         if isinstance(method, str):
-            key = method.lower().replace("-", "").replace("_", "")
-            if key not in known:
+            named = kind_named(method)
+            if named is None:
                 raise unknown_name("integrator", method, known)
-            method = known[key]
+            method = named
         if isinstance(method, Integrator) or not callable(method):
             raise InvalidArgument(
                 f"methods must hold names, Integrator classes or callables (rtol, atol) -> instance, got {method!r}; "
@@ -516,15 +518,3 @@ def _positives(values, what, unit=""):
     except TypeError:
         raise InvalidArgument(f"{what} must be a sequence of positive numbers, got {values!r}.") from None
     return [positive(value, f"{what}{unit}: each") for value in values]
-
-
-def _span(t_span):
-    """Checked further by `simulate`; here what the default times need."""
-    span = floats(t_span)
-    if span.shape != (2,) or not np.isfinite(span).all() or not span[1] > span[0]:
-        raise InvalidArgument(f"t_span must be two finite times in s, (start, end), got {t_span!r}.")
-    return tuple(map(float, span))
-
-
-def _times(t_eval, t_span):
-    return np.linspace(*t_span, 101) if t_eval is None else floats(t_eval)

@@ -193,7 +193,15 @@ class Timing:
         """Time the advances of a memory, before its run."""
         self.memory, advance = memory, memory.advance
         if self.half is not None:
-            self._install(memory)
+            records = dict(zip(("kernels", "stages"), memory.called, strict=False))
+            self.notes[HALF] = self.half
+            for i, (name, timer) in enumerate(TIMERS.items()):
+                record, field = name.split(".")
+                address = getattr(records.get(record), field, 0)
+                if address:
+                    self.notes[RECORDS + WIDTH * i] = address
+                    setattr(records[record], field, timer.address)
+            memory.bind(memory.context, (self.notes.ctypes.data,))
 
         def timed(log, most):
             first, began = read(self.notes), time.perf_counter()
@@ -203,17 +211,6 @@ class Timing:
             return status
 
         memory.advance = timed
-
-    def _install(self, memory):
-        records = dict(zip(("kernels", "stages"), memory.called, strict=False))
-        self.notes[HALF] = self.half
-        for i, (name, timer) in enumerate(TIMERS.items()):
-            record, field = name.split(".")
-            address = getattr(records.get(record), field, 0)
-            if address:
-                self.notes[RECORDS + WIDTH * i] = address
-                setattr(records[record], field, timer.address)
-        memory.bind(memory.context, (self.notes.ctypes.data,))
 
     def release(self):
         """Let go of the memory after the run, whose advance refers to this watch."""

@@ -20,24 +20,10 @@ from ..errors import Status
 from ..jit.kernels import callback, caller, kernel
 from ..maths.dense_linalg import copy
 from ..workspaces import load, load_run
+from . import tolerances as limits
 from .collocation import parts_of
 from .diagonally_implicit import call_linearise, call_reduce, call_residual
 from .explicit import STEP, call_norm, combine
-from .tolerances import (
-    COUPLED_ITERATIONS,
-    DIVERGING,
-    FAR_STAGE,
-    FIXED_ITERATIONS,
-    KAPPA,
-    KAPPA_COUPLED,
-    MATRICES,
-    RESIDUAL_FLOOR,
-    SAME_STEP,
-    SAME_TIME,
-    SLOW_COUPLED,
-    STALLED_CORRECTION,
-    TRUSTED,
-)
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
 # start, step and chart of the last attempt; the step before, 0 if unknown; points of predictions; step of the matrices,
@@ -67,7 +53,7 @@ def _keep_stages(c, r, own, t, h):
     s, n, charts = c.saddle, r.x.size, float(c.work.counters.charts)
     before = r.memory[_rest(r) + 2 * n :]
     # The last attempt ended at t: its stages are those of the step before. They serve on the same chart only
-    if own[H_LAST] > 0.0 and abs(own[T_LAST] + own[H_LAST] - t) <= SAME_TIME * h:
+    if own[H_LAST] > 0.0 and abs(own[T_LAST] + own[H_LAST] - t) <= limits.SAME_TIME * h:
         own[H_BEFORE] = own[H_LAST] if own[CHART_LAST] == charts else 0.0
         for i in range(s.stages.shape[0]):
             copy(r.memory[(2 * i + 5) * n :][:n], before[i * n :])
@@ -218,15 +204,19 @@ def _iterate(context, c, r, own, t, h):
     moved, zeros, adaptive = r.memory[_rest(r) :][:n], r.memory[_rest(r) + n :][:n], r.numbers.adaptive == 1
     # Sizes of corrections are error norms: rounding of 1 + |value| is RESIDUAL_FLOOR / tol
     tol = numbers.rtol + numbers.atol
-    floor, stalled, kappa = RESIDUAL_FLOOR / tol, STALLED_CORRECTION / tol, KAPPA_COUPLED if adaptive else KAPPA
+    floor, stalled, kappa = (
+        limits.RESIDUAL_FLOOR / tol,
+        limits.STALLED_CORRECTION / tol,
+        limits.KAPPA_COUPLED if adaptive else limits.KAPPA,
+    )
     for e in range(n):
         moved[e] = zeros[e] = 0.0
     before, theta, rate, renewals, fresh, newest = math.inf, 0.0, 1.0, 0, False, False
     # Matrices of nearly the same step are kept
-    level = -1 if abs(h - own[MADE_FOR]) <= SAME_STEP * h else 0
+    level = -1 if abs(h - own[MADE_FOR]) <= limits.SAME_STEP * h else 0
     if own[RENEW] > 0.0 or own[MADE_FOR] == 0.0 or numbers.known == 0:
         level = 1
-    most = COUPLED_ITERATIONS if adaptive else FIXED_ITERATIONS
+    most = limits.COUPLED_ITERATIONS if adaptive else limits.FIXED_ITERATIONS
     for left in range(most - 1, -1, -1):
         # Equations of all stages, then one correction of all of them
         status = _sweep(context, c, r, own, t, h, level)
@@ -246,24 +236,25 @@ def _iterate(context, c, r, own, t, h):
         if before < math.inf:
             # Contraction
             rate = size / before
-            if rate > TRUSTED and size <= stalled:  # rounding of large forces
+            if rate > limits.TRUSTED and size <= stalled:  # rounding of large forces
                 floor = stalled
             else:
                 theta = max(theta, rate)
             # Diverging, or too slow for the iterations that are left: renew the matrices, next time with new
             # derivatives
-            late = rate > DIVERGING or size * rate**left > kappa * (1.0 - rate)
-            if size > floor and (late or (rate > TRUSTED and not newest)):
-                if renewals == MATRICES:
+            late = rate > limits.DIVERGING or size * rate**left > kappa * (1.0 - rate)
+            if size > floor and (late or (rate > limits.TRUSTED and not newest)):
+                if renewals == limits.MATRICES:
                     return STAGE_FAILED
                 level = 2 if fresh else 1
         # small corrections say nothing by themselves: where stiffness has gone, old matrices make them so
         if size <= floor or (before < math.inf and level < 0 and size * rate <= kappa * (1.0 - rate)):
             # Solved. Slow contraction renews the matrices of the next step
-            own[RENEW] = 1.0 if theta > SLOW_COUPLED else 0.0
+            own[RENEW] = 1.0 if theta > limits.SLOW_COUPLED else 0.0
             if (
                 adaptive
-                and not call_norm(linear.kernels.distance, context, moved, zeros, linear.now, 1.0, 1.0) < FAR_STAGE
+                and not call_norm(linear.kernels.distance, context, moved, zeros, linear.now, 1.0, 1.0)
+                < limits.FAR_STAGE
             ):
                 return STAGE_FAILED
             return 0

@@ -7,34 +7,8 @@ from ..jit.kernels import ANY, callback, caller, kernel, stack, vector
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import ROUNDING_AT_MOST
 from ..workspaces import load, load_run
+from . import tolerances as limits
 from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combine
-from .tolerances import (
-    AGEING,
-    APART,
-    APART_AT_LEAST,
-    APART_SLIPPING,
-    DIVERGING,
-    EAGER_LOST,
-    EAGER_SPARSE,
-    EAGER_STAGES,
-    FAR_STAGE,
-    FIXED_ITERATIONS,
-    FORGET,
-    GUESS,
-    ITERATIONS,
-    KAPPA,
-    KAPPA_SPARSE,
-    LEAST,
-    LEAST_FIXED,
-    LEAST_LEFT,
-    MATRICES,
-    RESIDUAL_FLOOR,
-    SAME_STEP,
-    SAME_TIME,
-    SLOW_DENSE,
-    SLOW_SPARSE,
-    WORSE_CONTRACTION,
-)
 
 # First guesses of the stages of a step, k_i = vdd, on the polynomial through stages that are known already.
 #
@@ -66,7 +40,7 @@ def begin_prediction(memory, own, stages, n, t, h, charts):
     if own[CHART_LAST] != charts:
         own[STEP_BEFORE] = 0.0
     # The last attempt ended at t: its stages are those of the step before
-    elif own[H_LAST] > 0.0 and abs(own[T_LAST] + own[H_LAST] - t) <= SAME_TIME * h:
+    elif own[H_LAST] > 0.0 and abs(own[T_LAST] + own[H_LAST] - t) <= limits.SAME_TIME * h:
         own[STEP_BEFORE] = own[H_LAST]
         copy(memory[2 * n :][: 2 * stages * n], own[BEFORE:])
     # Neither accepted nor repeated
@@ -94,7 +68,7 @@ def predict(tableau, memory, own, i, ratio, points, part, k):  # eight: what is 
             distance = abs(tau - target)
             # Times that nearly coincide make Lagrange's weights large
             for m in range(found):
-                if abs(tau - times[m]) <= (APART_AT_LEAST * max(ratio, 1.0) if ratio > 0.0 else 0.0):
+                if abs(tau - times[m]) <= (limits.APART_AT_LEAST * max(ratio, 1.0) if ratio > 0.0 else 0.0):
                     distance = math.inf
             if distance < least:
                 least, place, time = distance, j, tau
@@ -256,7 +230,7 @@ def _is_near(context, c, g, k, guess, f, dx):
         f[i] = 0.0  # of velocities a stiff transient may change any amount
         dx[i] = g * g * (k[i] - guess[i])
     norm = linear.kernels.distance if _is_direct(c) else linear.kernels.error_norm
-    return call_norm(norm, context, dx, f, linear.now, 1.0, 1.0) < FAR_STAGE
+    return call_norm(norm, context, dx, f, linear.now, 1.0, 1.0) < limits.FAR_STAGE
 
 
 @kernel
@@ -264,7 +238,7 @@ def _expected(numbers, size, adaptive):
     """Error expected after a first correction of this size: as last measured, growing with the square of the size."""
     # A first correction leaves an error in proportion to its square, as far as the matrix is exact
     share = max(1.0, size / numbers.first)
-    return max(numbers.left * share * share, (LEAST if adaptive else LEAST_FIXED) * size)
+    return max(numbers.left * share * share, (limits.LEAST if adaptive else limits.LEAST_FIXED) * size)
 
 
 @kernel
@@ -276,10 +250,10 @@ def _learn(numbers, first, second, renewed):
     if renewed:
         numbers.left = math.inf
     elif second < math.inf:
-        numbers.left = max(second, FORGET * numbers.left if numbers.left < math.inf else 0.0)
+        numbers.left = max(second, limits.FORGET * numbers.left if numbers.left < math.inf else 0.0)
         numbers.first = first
     else:
-        numbers.left *= AGEING
+        numbers.left *= limits.AGEING
 
 
 @kernel
@@ -288,9 +262,9 @@ def _begin_iteration(c, r):
     numbers, one = c.linear.numbers, c.linear.iteration
     _restart(one)
     one.first, one.trusted, one.renewed, one.poor, one.diverged = 0.0, 1, 0, 0, 0
-    one.floor = RESIDUAL_FLOOR / (numbers.rtol + numbers.atol)
+    one.floor = limits.RESIDUAL_FLOOR / (numbers.rtol + numbers.atol)
     # What stages of fixed steps leave adds up over thousands of steps
-    one.limit = SLOW_SPARSE if numbers.every_chart == 1 and r.numbers.adaptive == 1 else SLOW_DENSE
+    one.limit = limits.SLOW_SPARSE if numbers.every_chart == 1 and r.numbers.adaptive == 1 else limits.SLOW_DENSE
     one.eager = 1 if numbers.eager > 0 else 0
     numbers.eager -= 1
 
@@ -298,7 +272,7 @@ def _begin_iteration(c, r):
 @kernel
 def _restart(one):
     """Measure contraction afresh: the matrix is new."""
-    one.before, one.theta, one.measured, one.second = math.inf, GUESS, 0, math.inf
+    one.before, one.theta, one.measured, one.second = math.inf, limits.GUESS, 0, math.inf
 
 
 @kernel
@@ -309,19 +283,19 @@ def _renew_if_needed(context, c, t, g, f):
     one.eager = 0
     off_chart = not sparse and numbers.chart != c.work.counters.charts
     poor = one.measured == 1 and one.theta > max(one.limit, numbers.slow)
-    stale = eager or off_chart or abs(g - numbers.g) > SAME_STEP * g
+    stale = eager or off_chart or abs(g - numbers.g) > limits.SAME_STEP * g
     if not (stale or poor):
         return True
     if not stale:
         # The first poor contraction: the stages to come begin with matrices of their own
         if one.poor == 0 and one.renewed == 0:
-            lost = EAGER_LOST if one.theta > DIVERGING else EAGER_SPARSE
-            numbers.eager = lost if sparse else EAGER_STAGES
+            lost = limits.EAGER_LOST if one.theta > limits.DIVERGING else limits.EAGER_SPARSE
+            numbers.eager = lost if sparse else limits.EAGER_STAGES
         one.poor += 1
     # The last matrix of a stage has new stiffness and damping
     here = eager or poor or not sparse or numbers.g == 0.0 or numbers.known == 0
     one.renewed = 1
-    if _renew_matrix(context, c, t, g, f, slips or one.poor == MATRICES, here) != 0:
+    if _renew_matrix(context, c, t, g, f, slips or one.poor == limits.MATRICES, here) != 0:
         return False
     if not slips:  # where friction changes within a correction, Newton's own contraction counts
         _restart(one)
@@ -341,10 +315,10 @@ def _measure(c, size):
     one.theta, one.measured = size / one.before, 1
     # No other matrix contracts better: that much contraction has to do
     sparse, slips = numbers.every_chart == 1, numbers.slips == 1
-    if sparse and not slips and one.poor == MATRICES and numbers.slow == 0.0:
-        numbers.slow = min(WORSE_CONTRACTION * one.theta, DIVERGING)
-    one.diverged += 1 if one.renewed == 1 and one.theta > DIVERGING else 0
-    return one.diverged < (APART_SLIPPING if slips else APART)
+    if sparse and not slips and one.poor == limits.MATRICES and numbers.slow == 0.0:
+        numbers.slow = min(limits.WORSE_CONTRACTION * one.theta, limits.DIVERGING)
+    one.diverged += 1 if one.renewed == 1 and one.theta > limits.DIVERGING else 0
+    return one.diverged < (limits.APART_SLIPPING if slips else limits.APART)
 
 
 @kernel
@@ -355,7 +329,7 @@ def _is_solved(c, size, adaptive, is_last):
     """
     numbers, one, theta = c.linear.numbers, c.linear.iteration, c.linear.iteration.theta
     # Rounding
-    if size <= one.floor or (theta > DIVERGING and size <= ROUNDING_AT_MOST * one.floor):
+    if size <= one.floor or (theta > limits.DIVERGING and size <= ROUNDING_AT_MOST * one.floor):
         return True
     # What is left: the sum of the corrections to come, or what first corrections have left before
     left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
@@ -373,7 +347,7 @@ def _solve_stage(context, c, r, i, t, g):
     guess, adaptive = scratch[H_BEFORE * n + 1 :][:n], r.numbers.adaptive == 1
     copy(k, guess)
     _begin_iteration(c, r)
-    for _ in range(ITERATIONS if adaptive else FIXED_ITERATIONS):
+    for _ in range(limits.ITERATIONS if adaptive else limits.FIXED_ITERATIONS):
         # The equations at v_i, vd_i of the iterate
         _set_stage(g, k, known, xs, ys)
         status = _evaluate(context, c, r, t, g, xs, ys, k, f)
@@ -480,11 +454,11 @@ def prepare_implicit(linear, method, addresses, every_chart, slips):
     """
     numbers = linear.numbers
     numbers.every_chart = int(every_chart)
-    numbers.rtol, numbers.atol = (LEAST_LEFT, LEAST_LEFT) if method.step else method.step_tolerances()
+    numbers.rtol, numbers.atol = (limits.LEAST_LEFT, limits.LEAST_LEFT) if method.step else method.step_tolerances()
     numbers.slips = int(slips)
-    numbers.kappa = KAPPA_SPARSE if every_chart and not method.step else KAPPA
+    numbers.kappa = limits.KAPPA_SPARSE if every_chart and not method.step else limits.KAPPA
     if slips:
-        numbers.kappa = min(numbers.kappa, LEAST_LEFT / (numbers.rtol + numbers.atol))
+        numbers.kappa = min(numbers.kappa, limits.LEAST_LEFT / (numbers.rtol + numbers.atol))
     numbers.left, numbers.first, numbers.t_before = math.inf, 1.0, -math.inf
     for name, address in addresses.items():
         setattr(linear.kernels, name, address)

@@ -107,17 +107,19 @@ def angle(geometry, own, other, level):
     return second / (E * E + F * F)
 
 
-def all_angles(handles, q):
-    """The angles of all joints of some `Handles` at q (n,), in (-pi, pi], (count,)."""
-    p = []
+def all_angles(handles, q, qd=None):
+    """The angles of all joints of some `Handles` at q (n,), in (-pi, pi], and their rates with qd (n,); (count,)."""
+    motions = []
     for at, dimension in (handles.joints[:, :2].T, handles.joints[:, 2:].T):
-        own = np.tile(IDENTITY, (handles.count, 1))
-        turns = dimension == 7
-        own[turns] = q[at[turns, None] + np.arange(3, 7)]
-        p.append(tuple(own.T))
+        p, pd, turns = np.tile(IDENTITY, (handles.count, 1)), np.zeros((handles.count, 4)), dimension == 7
+        for own, x in ((p, q), (pd, qd))[: 1 if qd is None else 2]:
+            own[turns] = x[at[turns, None] + np.arange(3, 7)]
+        motions.append((tuple(p.T), tuple(pd.T)))
     f, g, h = (tuple(handles.frames[:, i : i + 3].T) for i in (0, 3, 6))
-    v = seen(*p, h)
-    return np.arctan2(dot(g, v), dot(f, v))
+    (p, pd), (o, od) = motions
+    v = seen(p, o, h)
+    found = np.arctan2(dot(g, v), dot(f, v))
+    return found if qd is None else (found, rate_of(f, g, v, subtract(seen(p, o, spin(o, od)), spin(p, pd))))
 
 
 def displacement(geometry, own, other, level):
@@ -216,7 +218,7 @@ class Handles:
             return named(self.bodies, body, "body", InvalidBody)
         body = self.own(body)
         if not isinstance(body, PointMass) or body not in self._where:
-            raise InvalidBody(f"{body!r} is not a body of this solution's scene{self._elsewhere(body)}.")
+            raise InvalidBody(f"{body!r} is not a body of this scene{self._elsewhere(body)}.")
         return body
 
     def _elsewhere(self, body):

@@ -1,7 +1,5 @@
 """Laws that see the whole scene, traced and packed: the state that they get, and what loops/laws.py runs."""
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import math

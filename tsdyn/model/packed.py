@@ -3,6 +3,7 @@
 import os
 from collections import Counter
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -453,7 +454,7 @@ class Packed(NamedTuple):
     size: float  # largest number among the coordinates; of small scenes the largest length, m
     loads: tuple  # a packed_forces.Load for each force, in the order added
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
-    slots: tuple  # of System.memory, for each constraint; -1 for none
+    slots: tuple  # of System.memory, the first of each constraint; -1 for none
     inertias: tuple  # primitives whose rows add inertia to a joint coordinate, in the order of their forces
     derived: Derived  # what has been worked out from it
 
@@ -540,14 +541,15 @@ def pack(scene, handles=None):
         tails=np.array([row for part, row in first_rows(primitives) if not part.all_rows], np.int64),
         forces=forces,
         signals=signals,
-        memory=np.array([*memory, *kept.values()], np.int64),
+        memory=np.array([*memory, *(at for places in kept.values() for at in places)], np.int64),
         normals=np.array(normals, np.int64),
         inertias=inertias,
         inertia_segments=np.array(_segments(added, where), np.int64).reshape(-1, 4),
     )
     coordinates = tuple(constraint.coordinates for constraint in primitives)
     size = size_of(primitives, coordinates)
-    order = {constraint: len(memory) + i for i, constraint in enumerate(kept)}
+    firsts = accumulate(map(len, kept.values()), initial=len(memory))
+    order = dict(zip(kept, firsts, strict=False))
     slots = tuple(order.get(constraint, -1) for constraint in primitives)
     given = tuple(parameters.values())
     whole = system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, tuple(added), derived
@@ -594,10 +596,10 @@ def first_rows(primitives):
 def _pack_constraints(parameters, n, where, table, reals):
     """Append the instances, kind by kind, to `table` and `reals`.
 
-    Returns rows of System.kinds, of System.motions each with its Motion, {constraint: place of what it remembers}, and
+    Returns rows of System.kinds, of System.motions each with its Motion, {constraint: places of what it remembers}, and
     of each CoordinateFunction where its parameters begin and where it is.
     """
-    groups = {}
+    groups, order = {}, {body: i for i, body in enumerate(where)}
     for constraint, row in first_rows(parameters):
         groups.setdefault(type(constraint), []).append((constraint, row))
     kinds, motions, kept, functions = [], [], {}, []
@@ -607,9 +609,12 @@ def _pack_constraints(parameters, n, where, table, reals):
             begin = len(reals)
             table += _places(constraint, at_row, n, where)
             _append_reals(constraint, parameters[constraint], reals, motions, functions)
+            for i, body in enumerate(constraint.others):
+                at = begin + 3 * len(kind.markers) + kind.others_at + 3 * i
+                reals[at : at + 3] = *where.get(id(body), (0, 0)), order.get(id(body), len(order))
             if kind.memory:
-                kept[constraint] = len(reals)
-                reals.append(constraint.first_memory)
+                kept[constraint] = range(len(reals), len(reals) + kind.memory)
+                reals += constraint.first_memory
             if begin == first[1]:
                 stride = len(reals) - begin
             if len(reals) - begin != stride:

@@ -76,7 +76,8 @@ def _groups(packed, t, q, qd, qdd, time_rate, memory):
             )
             continue
         if slot >= 0:
-            values = *values, np.zeros(t.size) if memory is None else memory[:, slot]
+            kept = range(slot, slot + constraint.memory)
+            values = *values, *(np.zeros(t.size) if memory is None else memory[:, i] for i in kept)
         bodies = tuple(constraint.body_of(marker) for marker in constraint.markers)
         form = (
             type(constraint),

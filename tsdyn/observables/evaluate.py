@@ -71,8 +71,7 @@ def normal_loads(packed, t, q, qd, Phi_q, lam):
 def unit_force(system, load, t, q, qd, remembered=None):
     """Return the generalised forces g (n,) of one friction for unit normal load."""
     memory = np.zeros((1, system.memory.size + system.normals.size))
-    if remembered is not None:
-        memory[0, : system.memory.size] = remembered
+    memory[0, : system.memory.size] = system.reals[system.memory] if remembered is None else remembered
     memory[0, system.memory.size + load.normal] = 1.0
     return force_loads(system._replace(forces=load.alone), np.array([t]), q[None], qd[None], memory)[0]
 
@@ -153,6 +152,7 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
     Notes
     -----
     Haug 2018, Eqs. 1-4. Multipliers and accelerations solve [M, Phi_q^T; Phi_q, 0] (qdd, lam) = (Q_A + Q_v, -gamma).
+    Friction of the exact law that sticks at the state adds the rows that hold it, behind those of the constraints.
 
     Examples
     --------
@@ -169,7 +169,7 @@ def evaluate(scene: Scene, q: ArrayLike | None = None, qd: ArrayLike | None = No
     if not np.isfinite(number(t)):
         raise InvalidArgument(f"t must be a finite time in s, got {t!r}.")
     with np.errstate(over="ignore", invalid="ignore"):
-        found = (_evaluate_sparse if q.size > LARGE else _evaluate_dense)(packed, q, qd, float(t))
+        found = _evaluate(packed, q, qd, float(t), q.size > LARGE)
     _demand_finite(accelerations=found.qdd)
     return found
 
@@ -182,45 +182,38 @@ def _demand_finite(**arrays):
             )
 
 
-def _evaluate_dense(packed, q, qd, t):
-    system = packed.system
-    Phi, Phi_q, Phi_t, gamma = constraint_arrays(system, q, qd, t)
-    M, Q_v = mass_matrix(system, q), velocity_forces(system, q[None], qd[None])[0]
+def _evaluate(packed, q, qd, t, sparse):
+    system, n = with_short_rows(packed) if sparse else packed.system, q.size
+    Phi, rows, Phi_t, gamma = constraint_arrays(system, q, qd, t, WIDTH if sparse else None)
+    M = (mass_matrix_sparse if sparse else mass_matrix)(system, q)
+    Q_v = velocity_forces(system, q[None], qd[None])[0]
     Q_A = applied_loads(system, np.array([t]), q[None], qd[None])[0]
-    _demand_finite(Phi=Phi, Phi_q=Phi_q, Phi_t=Phi_t, gamma=gamma, M=M, Q_A=Q_A, Q_v=Q_v)
-    m, n = Phi_q.shape
-    kkt = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
+    masses = M.data if sparse else M
+    _demand_finite(Phi=Phi, Phi_q=rows, Phi_t=Phi_t, gamma=gamma, M=masses, Q_A=Q_A, Q_v=Q_v)
+    Phi_q = as_csr(packed, rows) if sparse else rows
+    regular = (_sparse_solver if sparse else _dense_solver)(M, Phi_q)
 
     def solve(friction):
-        try:
-            return equilibrated_solve(kkt, np.concatenate((Q_A + Q_v + friction, -gamma)))
-        except np.linalg.LinAlgError:
-            return _of_independent_rows(packed, M, Phi_q, Q_A + Q_v + friction, gamma)
+        load = Q_A + Q_v + friction
+        if regular is not None:
+            return regular(load, gamma)
+        if sparse:
+            return _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t)
+        return _of_independent_rows(packed, M, Phi_q, load, gamma)
 
-    friction, solution = _with_friction(packed, t, q, qd, Phi_q, solve)
+    joined = packed.system.normals.size > 0
+    friction, solution = balance(packed, t, q, qd, Phi_q, solve) if joined else (0.0, solve(0.0))
     return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, Q_v, solution[n:], solution[:n])
-
-
-def _with_friction(packed, t, q, qd, Phi_q, solve):
-    """Return friction forces of joints (n,), and solve(friction) with them."""
-    if not packed.system.normals.size:
-        return 0.0, solve(0.0)
-
-    return balance(packed, float(t), q, qd, Phi_q, solve)
 
 
 def _of_independent_rows(packed, M, Phi_q, load, gamma):
     """Return (qdd, lam) with NaN for redundant rows, which hold all the same."""
     redundant = dependent(Phi_q * coordinate_scales(packed))
-    if not redundant.size:
-        raise SingularConfiguration(NOT_UNIQUE)
     kept = np.setdiff1d(np.arange(len(Phi_q)), redundant)
-    kkt = np.block([[M, Phi_q[kept].T], [Phi_q[kept], np.zeros((kept.size, kept.size))]])
-    try:
-        found = equilibrated_solve(kkt, np.concatenate((load, -gamma[kept])))
-    except np.linalg.LinAlgError as error:
-        raise SingularConfiguration(NOT_UNIQUE) from error
-    return _with_gaps(found, kept, Phi_q, gamma)
+    solve = _dense_solver(M, Phi_q[kept]) if redundant.size else None
+    if solve is None:
+        raise SingularConfiguration(NOT_UNIQUE)
+    return _with_gaps(solve(load, gamma[kept]), kept, Phi_q, gamma)
 
 
 def _with_gaps(found, kept, Phi_q, gamma):
@@ -232,26 +225,6 @@ def _with_gaps(found, kept, Phi_q, gamma):
     lam = np.full(m, np.nan)
     lam[kept] = found[n:]
     return np.concatenate((found[:n], lam))
-
-
-def _evaluate_sparse(packed, q, qd, t):
-    system = with_short_rows(packed)
-    n = q.size
-    Phi, rows, Phi_t, gamma = constraint_arrays(system, q, qd, t, WIDTH)
-    Phi_q, M = as_csr(packed, rows), mass_matrix_sparse(system, q)
-    Q_v = velocity_forces(system, q[None], qd[None])[0]
-    Q_A = applied_loads(system, np.array([t]), q[None], qd[None])[0]
-    _demand_finite(Phi=Phi, Phi_q=rows, Phi_t=Phi_t, gamma=gamma, Q_A=Q_A, Q_v=Q_v)
-    regular = _sparse_solver(M, Phi_q)
-
-    def solve(friction):
-        load = Q_A + Q_v + friction
-        if regular is None:
-            return _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t)
-        return regular(load, gamma)
-
-    friction, solution = _with_friction(packed, t, q, qd, Phi_q, solve)
-    return Evaluation(Phi, Phi_q, Phi_t, gamma, M, Q_A + friction, Q_v, solution[n:], solution[:n])
 
 
 def _of_independent_short_rows(packed, M, Phi_q, load, gamma, q, t):
@@ -312,13 +285,15 @@ def _sparse_solver(M, Phi_q, lost=PIVOT_ROUNDING):
     return lambda load, gamma: scale * factors.solve(scale * np.concatenate((load, -gamma)))
 
 
-def equilibrated_solve(A, b):
-    """Solve a symmetric system scaled to unit rows; LinAlgError if it is numerically singular."""
-    scale = 1.0 / np.sqrt(np.maximum(np.abs(A).max(axis=1), TINY))
-    scaled = A * scale[:, None] * scale
-    if A.size and np.linalg.cond(scaled) > 1.0 / SUM_ROUNDING:
-        raise np.linalg.LinAlgError
-    return np.linalg.solve(scaled, b * scale) * scale
+def _dense_solver(M, Phi_q):
+    """Return the same solver of a matrix scaled to unit rows."""
+    m = len(Phi_q)
+    kkt = np.block([[M, Phi_q.T], [Phi_q, np.zeros((m, m))]])
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(kkt).max(axis=1), TINY))
+    scaled = kkt * scale[:, None] * scale
+    if kkt.size and np.linalg.cond(scaled) > 1.0 / SUM_ROUNDING:
+        return None
+    return lambda load, gamma: np.linalg.solve(scaled, np.concatenate((load, -gamma)) * scale) * scale
 
 
 def constraint_arrays(system, q, qd, t, width=None):

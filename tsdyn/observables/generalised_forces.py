@@ -36,7 +36,7 @@ def force_loads(system, t, q, qd, memory=None):
     out = np.zeros_like(q)
     if len(system.forces):
         system = system._replace(reals=system.reals.copy())  # signals and memory are written to
-        memory = np.zeros((t.size, system.memory.size)) if memory is None else memory
+        memory = np.tile(system.reals[system.memory], (t.size, 1)) if memory is None else memory
         with interrupts_answered():
             sum_forces(system, t, q, qd, memory, out)
     return out

@@ -24,7 +24,7 @@ from ..maths.dense_linalg import copy
 from ..maths.tolerances import LAST_PLACE, RANK_TOL, TINY
 from ..model.equations import WIDTH, added_inertia, constraint_jacobian, recall, set_time, with_short_rows
 from ..model.handles import handles_of
-from ..model.packed import classes, index_of, member_of, no_system
+from ..model.packed import classes, first_rows, index_of, member_of, no_system
 from ..rows.constraint_graph import REDUCED
 from ..rows.graph_builder import graph_of
 from ..rows.interface import (
@@ -383,6 +383,18 @@ def find_rows(graph, s, f, q, t, whole):
     return regular
 
 
+@entry("pdvvm")
+def _self_stresses(context, t, q, whole, out):
+    """out (count, rows): a self-stress of each redundant row."""
+    c = load_parts(context)
+    graph, s, f = c.graph, c.system, c.tangent
+    find_rows(graph, s, f, q, t, whole)
+    for d in range(min(count_self_stresses(f), out.shape[0])):
+        self_stress(graph, f, whole, d)
+        for e in range(out.shape[1]):
+            out[d, e] = f.b[e]
+
+
 @entry("pvmwwvv")
 def free_loads(context, t, q, rows, sides, whole, out):
     """out (k,): the largest load on a body by these sides of H in a unit self-stress, relative to their size.
@@ -526,11 +538,36 @@ def contact_point(motion, item):
     return _contact(motion, handles_of(motion.packed).item(item))[0]
 
 
+def shared(motion):
+    """The motion with the multipliers (k, m) of least sum of squares at contacts, as equal tyres on one axle share it.
+
+    lam + z x solves the same equations for self-stresses z, whichever rows are dropped.
+    """
+    packed, lam = motion.packed, particular(motion.multipliers)
+    graph = graph_of(packed, REDUCED)
+    if not redundancy(graph):
+        return motion
+    contacts = [(part, row) for part, row in first_rows(packed.constraints) if hasattr(type(part), "contact")]
+    rows = np.concatenate([np.arange(row, row + part.all_rows) for part, row in contacts])
+    own, stresses = np.flatnonzero(graph.row >= 0), np.zeros((len(lam), redundancy(graph), len(graph.row)))
+    system = motion.system._replace(reals=motion.system.reals.copy())
+    context, *_keep = resident(parts(system, graph, motion.q.shape[1]))
+    for i, t in enumerate(motion.t):
+        _self_stresses(context, t, motion.q[i], np.zeros(16 * len(graph.sides)), stresses[i])
+    z = np.zeros((len(lam), lam.shape[1], redundancy(graph)))
+    z[:, graph.row[own]] = stresses[:, :, own].swapaxes(1, 2)
+    z[~np.isfinite(z).all(axis=(1, 2))] = 0.0  # at a singular configuration
+    x = np.linalg.pinv(z[:, rows], rcond=RANK_TOL) @ lam[:, rows, None]
+    names = "packed", "system", "t", "q", "qd", "_memory"
+    given = {name: getattr(motion, name) for name in names}
+    return SimpleNamespace(**given, multipliers=lam - (z @ x)[:, :, 0])
+
+
 def friction_demand(motion, item):
     """Tangential over normal force (k,); infinite where the surfaces would have to pull."""
     item = handles_of(motion.packed).item(item)
     _, normal = _contact(motion, item)
-    force, _ = exerted(motion, item, item.on)
+    force, _ = exerted(shared(motion), item, item.on)
     force = force if item.on is item.a else -force
     push = np.einsum("ki,ki->k", normal, force)
     tangential = np.linalg.norm(force - push[:, None] * normal, axis=1)
@@ -543,7 +580,7 @@ def _contact(motion, item):
     if contact is None:
         raise InvalidConstraint(
             f"{item.name} has no contact point; RollingDisc, RollingBall, RollingEllipsoid and RollingBallOnCylinder "
-            "have one."
+            "have one, and contacts with friction."
         )
     return contact
 

@@ -145,7 +145,8 @@ def remembered(state, prepared, t, q):
         return NOTHING
     slots = prepared.packed.system.memory.size
     taken = sum(load.force.taken for load in prepared.packed.loads)  # a run sets these
-    if memory is None and state is not None and slots > taken:
+    anew = taken + sum(part.memory for part in prepared.packed.constraints if part.begins_anew)
+    if memory is None and state is not None and slots > anew:
         raise InvalidArgument(
             "parts of the scene count turns or hold a load, and this state doesn't say how many: give solution.state, "
             "what solution.at(t) returns or what an event function is given, as they are or changed by _replace."
@@ -178,6 +179,5 @@ def begin_memory(packed, handles, angles, memory, items=None):
                 memory[load.slot] = angles[row.first + load.force.which]
     for part, slot in zip(packed.constraints, packed.slots, strict=True) if memory.size else ():
         if slot >= 0 and (chosen is None or not chosen.isdisjoint((id(part), id(part.owner)))):
-            joint, which = part.counted or (None, 0)
-            if joint is not None:
-                memory[slot] = angles[handles.row(joint, "angle").first + which]
+            for i, (joint, which) in enumerate(part.counted):
+                memory[slot + i] = angles[handles.row(joint, "angle").first + which]

@@ -494,10 +494,16 @@ def graph_of(packed, *columns):
     """The graph of a packed scene with the addresses of these loops, made and loaded once."""
     known = packed.derived
     if columns not in known.graphs:
-        if known.graph is None:
-            known.graph = build(packed)
-        known.graphs[columns] = with_loops(*known.graph, *columns)
+        known.graphs[columns] = with_loops(*parts_of(packed), *columns)
     return known.graphs[columns]
+
+
+def parts_of(packed):
+    """The graph without addresses of loops, not to be written to, and the classes of its kinds; made once."""
+    known = packed.derived
+    if known.graph is None:
+        known.graph = build(packed)
+    return known.graph
 
 
 def set_redundant(packed, rows):

@@ -10,6 +10,7 @@ from ..jit.kernels import ANY, DEBUG, callback, caller, image_of, kernel, loader
 from ..jit.predicates import below, choose, either, every, most
 from ..jit.simd import get
 from ..maths.tolerances import PIVOT_ROUNDING
+from . import tolerances as limits
 from .block_operations import eliminate, subtract_products
 from .constraint_graph import ConstraintGraph, no_graph
 from .evaluation import evaluate_all, evaluate_every_row
@@ -25,21 +26,6 @@ from .schur_complement import (
     solve_rows,
     weigh,
     weigh_rows,
-)
-from .tolerances import (
-    FEWER,
-    FIRST_SHARE,
-    HARDLY_CONDITIONED,
-    HELD,
-    ILL_CONDITIONED,
-    LEAST_SHARE,
-    NEAR,
-    NEXT_TO,
-    NO_RATE,
-    ONE_DIGIT,
-    RESTING,
-    WITHIN_A_STEP,
-    WORST_CONDITIONED,
 )
 
 # Selection of independent rows of H among redundant ones, by rank-revealing elimination of S.
@@ -240,7 +226,7 @@ def select(graph, f, rows, wanted, least):
         count = _choose_of_all(graph, rows.H, rows.Y, wanted, share, f.chosen, f.block, f.order)
         return _accept(f, count, wanted)
     # Many rows: within the blocks of the elimination order, with an ever smaller share until the number is right
-    share = FIRST_SHARE if wanted >= 0 else least
+    share = limits.FIRST_SHARE if wanted >= 0 else least
     while True:
         weigh_rows(graph, rows.H, rows.Y)
         form_schur_complement(graph, rows.H, rows.Y, rows.S)
@@ -248,7 +234,7 @@ def select(graph, f, rows, wanted, least):
         count = _eliminate_choosing(graph, rows.S, share, f.chosen, f.block, f.order)
         if _accept(f, count, wanted):
             return True
-        share *= FEWER
+        share *= limits.FEWER
         if count < wanted or share < least:
             return False
 
@@ -276,28 +262,28 @@ def note_indicator(graph, f, rows):
 @kernel
 def is_near_singular(f, share):
     """Return True if a configuration with this indicator is near a singular one."""
-    return share < NEAR * f.indicator.largest
+    return share < limits.NEAR * f.indicator.largest
 
 
 @kernel
 def refinements(indicator):
     """How often multipliers are refined for the condition of S."""
     # S loses digits in proportion to the reciprocal of the indicator
-    if indicator > WORST_CONDITIONED:
-        return 0 if indicator > ILL_CONDITIONED else 1
-    return 2 if indicator > HARDLY_CONDITIONED else 4
+    if indicator > limits.WORST_CONDITIONED:
+        return 0 if indicator > limits.ILL_CONDITIONED else 1
+    return 2 if indicator > limits.HARDLY_CONDITIONED else 4
 
 
 @kernel
 def is_next_to_singular(f):
     """Return True if the recorded indicator says that a step method can't go on."""
-    return f.indicator.start < NEXT_TO * f.indicator.largest
+    return f.indicator.start < limits.NEXT_TO * f.indicator.largest
 
 
 @kernel
 def is_singular_within_a_step(f):
     """Return True if a singular configuration may be within a fixed step."""
-    return f.indicator.start < WITHIN_A_STEP * f.indicator.largest
+    return f.indicator.start < limits.WITHIN_A_STEP * f.indicator.largest
 
 
 # Whether redundant rows hold: their residuals at three levels, relative to the sizes of their terms.
@@ -321,7 +307,7 @@ def has_redundant_rows(f):
 @kernel
 def redundant_rows_hold(graph, f, floor):
     """Return True if the redundant rows hold on the manifold, by the residuals of the last evaluation."""
-    return f.dropped[0] == 0 or f.selection.excess <= floor + HELD * LEAST_SHARE * _extent(graph, f)
+    return f.dropped[0] == 0 or f.selection.excess <= floor + limits.HELD * limits.LEAST_SHARE * _extent(graph, f)
 
 
 @kernel
@@ -332,7 +318,7 @@ def rates_hold(graph, f, q, qd, size):
     # Velocities of a scene at rest are compared with those of a fall through its extent
     speed, spin = _largest(graph, qd)
     far = _reach(graph, f, size)
-    speed = max(speed, RESTING * math.sqrt(f.selection.push * far) + NO_RATE * far)
+    speed = max(speed, limits.RESTING * math.sqrt(f.selection.push * far) + limits.NO_RATE * far)
     return _hold(graph, f, f.redundant.drift, q, qd, speed + far * spin, spin + speed / far)
 
 
@@ -348,7 +334,7 @@ def accelerations_hold(graph, f, q, qd, qdd, size):
     push, twist = _largest(graph, qdd)
     speed, spin = _largest(graph, qd)
     far = _reach(graph, f, size)
-    push = max(push, f.selection.push) + spin * (speed + far * spin) + NO_RATE * far
+    push = max(push, f.selection.push) + spin * (speed + far * spin) + limits.NO_RATE * far
     twist = max(twist, f.selection.twist) + spin * spin
     return _hold(graph, f, f.redundant.gamma, q, qdd, push + far * twist, twist + push / far)
 
@@ -419,7 +405,7 @@ def _hold(graph, f, known, q, rates, most, fastest):
                 e = graph.row.shape[0] + j
                 more, size = _pair_terms(graph, f, e, e, q, rates, most, fastest)
                 residual, terms = residual + more, terms + size
-        if not abs(residual) <= HELD * terms:
+        if not abs(residual) <= limits.HELD * terms:
             return False
     return True
 
@@ -435,7 +421,7 @@ def _pair_terms(graph, f, e, place, q, rates, most, fastest):
         # H_r rd
         k = graph.bodies[b, 0]
         residual += H[at] * rates[k] + H[at + 1] * rates[k + 1] + H[at + 2] * rates[k + 2]
-        terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + LEAST_SHARE * most * length(H, at)
+        terms += _terms(H, at, rates[k], rates[k + 1], rates[k + 2]) + limits.LEAST_SHARE * most * length(H, at)
         if graph.bodies[b, 1] == 7:
             # H_pi' omega'
             e0, e1, e2, e3 = q[k + 3], q[k + 4], q[k + 5], q[k + 6]
@@ -445,7 +431,7 @@ def _pair_terms(graph, f, e, place, q, rates, most, fastest):
             z = -e3 * d0 + e2 * d1 - e1 * d2 + e0 * d3
             residual += 2.0 * (H[at + 4] * x + H[at + 5] * y + H[at + 6] * z)
             spin = 2.0 * math.sqrt(d0 * d0 + square(rates, k + 4))
-            terms += length(H, at + 4) * (spin + LEAST_SHARE * fastest)
+            terms += length(H, at + 4) * (spin + limits.LEAST_SHARE * fastest)
     return residual, terms
 
 
@@ -530,7 +516,7 @@ def selection_serves(graph, f, rows):
         # A pivot may grow: its largest value is the measure
         share = _share(graph, rows.S, e)
         f.best[e] = max(f.best[e], share)  # a selection next to a singular configuration is no measure
-        serves = serves and share >= ONE_DIGIT * f.best[e]
+        serves = serves and share >= limits.ONE_DIGIT * f.best[e]
     return serves
 
 

@@ -306,7 +306,10 @@ class _SaddleBuilder:
         return found
 
     def _constraints(self):
-        """The same of every constraint that is no normalisation."""
+        """The same of every constraint that is no normalisation.
+
+        The second derivatives of terms that read further bodies are left out.
+        """
         found, taken, later = [], {}, {e: iter(ends) for e, ends in self.ends.items()}
         items = [*self.packed.constraints, *self.packed.inertias]
         kinds = dict(zip(dict.fromkeys(map(type, items)), [*self.system.kinds, *self.system.inertias], strict=True))
@@ -318,6 +321,8 @@ class _SaddleBuilder:
             if constraint.normalises or e is None:
                 continue
             pair = tuple(self._body(b) for b in self.graph.sides[next(later[e])])
+            if constraint.others:
+                continue
             own, reals = self._places(kind.table + CONSTRAINT_INTS * i), kind.reals + kind.stride * i
             loops = kind.stiffness, kind.jacobian
             found.append((pair, (1, kind.stride, SPAN, *loops, reals, *own, 0, e, constraint.all_rows or 1)))

@@ -110,7 +110,12 @@ class Slices:
                 self.recorder.begin_slice(rows)
                 self._adapt(rows, self._advance(rows))
             else:
-                self._go_on(first)
+                # From the end of a first slice
+                self.recorder.adopt(first.log)
+                if first.status is None:
+                    raise KeyboardInterrupt
+                self._end_slice(first.status)
+                self._adapt(first.rows, clock() - first.began)
                 first = None
             self._look_up()
             if self.status is SLICE_DONE:
@@ -136,14 +141,6 @@ class Slices:
         seconds = time.perf_counter() - started
         self._end_slice(status)
         return seconds
-
-    def _go_on(self, first):
-        """From the end of a first slice."""
-        self.recorder.adopt(first.log)
-        if first.status is None:
-            raise KeyboardInterrupt
-        self._end_slice(first.status)
-        self._adapt(first.rows, clock() - first.began)
 
     def _end_slice(self, status):
         """Take the status of a slice; refuse a run that could not begin."""
@@ -325,6 +322,17 @@ class Sampling:
         other.last = self.last
         return other
 
+    def saved(self):
+        """When each function was evaluated last, and what it keeps."""
+        return {"last": self.last, "begun": self.begun, "kept": [_kept(load.force.function) for load in self.loads]}
+
+    def restore(self, numbers):
+        """As it was when it was saved."""
+        self.last, self.begun = numbers["last"], numbers["begun"]
+        for load, kept in zip(self.loads, numbers["kept"], strict=True):
+            for name, (kind, value) in kept.items():
+                vars(load.force.function)[name] = np.array(value, kind)[()] if kind else value
+
     def ask(self, memory, t, q, qd):
         """Evaluate the functions that are due at t, and hold their values."""
         for i, load in enumerate(self.loads):
@@ -376,16 +384,32 @@ class Sampled:
         self.reason = ""
 
     def saved(self):
-        """When each function was evaluated last, and what it keeps."""
-        kept = [_kept(load.force.function) for load in self.sampling.loads]
-        return {"last": self.sampling.last, "begun": self.sampling.begun, "kept": kept}
+        """What the `Sampling` saves."""
+        return self.sampling.saved()
 
     def restore(self, numbers):
         """As it was when it was saved."""
-        self.sampling.last, self.sampling.begun = numbers["last"], numbers["begun"]
-        for load, kept in zip(self.sampling.loads, numbers["kept"], strict=True):
-            for name, (kind, value) in kept.items():
-                vars(load.force.function)[name] = np.array(value, kind)[()] if kind else value
+        self.sampling.restore(numbers)
+
+    def step(self, log):
+        """Make one step. What is due at its end is left to `answer`: the step may have gone past an event."""
+        return self.memory.advance(log, 1)
+
+    def answer(self, log):
+        """Ask the functions that are due where the run is; the Status."""
+        if not self.run.numbers.waiting:
+            return Status.SLICE_DONE
+        try:
+            return self._answer(log)
+        except Failed as failure:
+            self.reason = str(failure)
+            return Status.SAMPLING_FAILED
+
+    def _answer(self, log):
+        """New values, and accelerations with them."""
+        run = self.run
+        self.sampling.ask(self.memory, float(run.clock.t), run.now[0].copy(), run.now[1].copy())
+        return self.memory.advance(log, 0)
 
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver's `advance`."""
@@ -402,9 +426,7 @@ class Sampled:
                 status = self.memory.advance(log, most - done if most > 0 else most)
                 if status != Status.SLICE_DONE or not numbers.waiting:
                     return status
-                # New values, and accelerations with them
-                self.sampling.ask(self.memory, float(run.clock.t), run.now[0].copy(), run.now[1].copy())
-                status = self.memory.advance(log, 0)
+                status = self._answer(log)
                 if status != Status.SLICE_DONE or numbers.history - first >= most:
                     return status
         except Failed as failure:

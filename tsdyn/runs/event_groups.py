@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..maths.root_isolation import survey
-from .tolerances import ROOT, ROOT_STEPS, ROUGH_ROOT
+from .tolerances import FALLEN, FROM_REST, ROOT, ROOT_STEPS, ROUGH_ROOT
 
 # A group is surveyed on a step at once (root_isolation.survey). Of the members that cross zero the earliest is located,
 # by the interpolant and Newton's method; the others are surveyed again up to there. Only members whose zeros are
@@ -68,6 +68,7 @@ class Group:
         self.which = [event.function.which for event in own]
         # Those that survey and Newton's method serve: changes in one direction end the run
         self._exact = [event.exact for event in own]
+        self._may_fall = np.array([event.falls for event in own])
         self._falls = np.array([event.direction if event.limit == 1.0 else 0.0 for event in own])
 
     def begin(self, values):
@@ -102,6 +103,13 @@ class Group:
         for i, number in enumerate(self.numbers):
             self.take_back(tracks[number], i)
 
+    def _fallen(self, samples, left):
+        """A member, of those `left`, that falls from zero within rounding at the start, or None."""
+        scale = np.abs(samples).max(initial=0.0)
+        zero = self._may_fall[left] & (np.abs(samples[0]) <= FROM_REST * scale)
+        falls = zero & (samples.max(axis=0) <= FROM_REST * scale) & (samples[-1] < -FALLEN * scale)
+        return int(left[falls.argmax()]) if falls.any() else None
+
     def search(self, step, sample):
         """The first event that ends the run, (number, t) or None; members to be searched one by one, up to there.
 
@@ -126,6 +134,8 @@ class Group:
                 self._odd[left[j]] = odd = j in unclear or not self._falls[left[j]] * last[left[j]] < 0.0
                 if odd and j not in unclear:
                     unclear[j] = step.t0
+            if self._was_new and (fallen := self._fallen(seen.samples, left)) is not None:
+                return (self.numbers[fallen], step.t0), []
             if unclear and noise.any():  # values of rounding alone have no zero
                 quiet = (np.abs(seen.samples).max(axis=0) <= noise).tolist()
                 unclear = {j: since for j, since in unclear.items() if not quiet[j]}

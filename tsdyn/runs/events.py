@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
-from ..model.handles import handles_of
+from ..model.handles import all_angles, counted, handles_of
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import reactions
 from ..observables.reactions import Exerting
@@ -30,6 +30,7 @@ class Event(NamedTuple):
     limit: float  # occurrences that end the run; inf for never
     direction: float  # of the changes that count; 0 for both
     exact: bool = False  # whether a value at the start that is positive is no rounding of zero
+    falls: bool = False  # of a `Member`: whether it may begin at zero within rounding, and falls from there at once
     action: object = None  # a function of a `Change` that each occurrence calls, or None
     goes_on: bool = False  # whether a zero at the start has been counted before
 
@@ -268,7 +269,7 @@ class Watch:
                 self._begin(run, self.tracks is None)
             except EventFailed as failure:
                 raise InvalidArgument(f"events: {failure}") from failure.__cause__
-        stiff = run.numbers.stiff
+        stiff, answer = run.numbers.stiff, getattr(memory, "answer", None)  # of sampled loads
         # One step at a time, searched before the next one
         for _ in range(most):
             if self.begins_again:
@@ -277,7 +278,7 @@ class Watch:
                     return status, reason
                 continue  # it has written an output
             done = run.numbers.steps
-            status = memory.advance(log, 1)
+            status = memory.advance(log, 1) if answer is None else memory.step(log)
             if run.numbers.steps > done:
                 try:
                     last = self._search_step(run, log)
@@ -290,6 +291,8 @@ class Watch:
                     status, reason = self._begin_again(memory, log)
                     if status != Status.SLICE_DONE:
                         return status, reason
+            if answer is not None and status == Status.SLICE_DONE:
+                status = answer(log)
             full = run.numbers.chart_rows + 2 >= len(log.charts)
             if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
@@ -386,6 +389,14 @@ class Watch:
         parts = (np.ascontiguousarray(states[:, i]) for i in range(3))
         return RememberingState.of(self.packed, self.memory[self.angles :], anchor, t, *parts, None)
 
+    def _angles(self, t, state):
+        """Counted angles (angles,) at a state within the step, by the rates at its start and here."""
+        t0, (q, qd, _), angles = self.beside
+        handles = handles_of(self.packed)
+        found, rates = all_angles(handles, *state[:2])
+        before, others = all_angles(handles, q, qd)
+        return counted(found, counted(before, angles) + 0.5 * (t - t0) * (others + rates))
+
     def _value(self, i, t, state):
         event = self.events[i]
         if isinstance(event.function, Member):
@@ -404,11 +415,17 @@ class Watch:
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
         self._note_start()
-        before, self.memory = self.memory, run.remembered.copy()
+        known = self.t, self.state, self.memory
+        self.memory = run.remembered.copy()
         try:
             return self._locate(run, log, Inside(self.reader, run, log, self.t, self.state))
         except KeyboardInterrupt:
-            self.memory = before
+            self.memory = known[2]
+            raise
+        except EventFailed:
+            if self._groups:  # beyond a failure nobody looks for the ends of a phase
+                self.t, self.state, self.memory = known
+                self.go_back(run, log)
             raise
 
     def _locate(self, run, log, step):
@@ -450,7 +467,7 @@ class Watch:
             if len(self.list[each.index]) >= self.events[each.index].limit:
                 self._add_beside(step, each)
                 if self.angles:
-                    run.remembered[: self.angles] = self._instant(each.t, each.state).angles
+                    run.remembered[: self.angles] = self._angles(each.t, each.state)
                 self._end(run, log, each.t, each.state, step.t0)
                 self.t, self.state = each.t, each.state
                 return each
@@ -506,8 +523,8 @@ class Watch:
 
     def _degree(self, step):
         """The degree that the interpolant and the fastest turn of a body ask for."""
-        pd = np.array([step.at(t)[1, self._p] for t in (step.t0, step.t1)])
-        turn = 2.0 * math.sqrt(np.einsum("kbi,kbi->kb", pd, pd).max(initial=0.0)) * (step.t1 - step.t0)
+        squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
+        turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
         return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
 
     def _walk(self, i, step, points):
@@ -629,7 +646,8 @@ class Watch:
             while run.numbers.rows > 0 and log.out[run.numbers.rows - 1, 0] > t:
                 run.numbers.rows -= 1
         elif t > start:
-            log.out[run.numbers.rows - 1] = [t, *state.ravel(), *run.remembered]
+            row = log.out[run.numbers.rows - 1]
+            row[0], row[1 : 1 + state.size], row[1 + state.size :] = t, state.ravel(), run.remembered
         else:
             run.numbers.rows -= 1
         if run.numbers.dense == STORED:

@@ -193,8 +193,17 @@ class Memory:
                 self._enter_start(task)
         self.context.system.reals[...] = self.reals  # motions, signals and what forces remember are written there
         if task.remembered.size:
-            self._remember(task.remembered, task.prepared.handles)
-        self._enter_span(task)
+            # Angles of joints, and what forces remember
+            own, run = self.context.system, self.run
+            enter_joints(run, task.prepared.handles, task.remembered)
+            if own.memory.size:
+                own.reals[own.memory] = task.remembered[len(run.joints) :]
+        # The interval, s, and how many fixed steps it takes
+        clock, step = self.run.clock, task.method.step
+        clock.t = clock.t_origin = task.span[0]
+        clock.t_end = task.span[1]
+        if step is not None:
+            self.run.numbers.steps_wanted = step_count(*task.span, step)
 
     def entered(self):
         """The arrays that `enter` sets."""
@@ -237,21 +246,6 @@ class Memory:
         work.q[...], work.qd[...] = task.q, task.qd
         run.now[0], run.now[1] = task.q, task.qd
         hold(work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
-
-    def _remember(self, remembered, handles):
-        """Angles of joints, and what forces remember."""
-        own, run = self.context.system, self.run
-        enter_joints(run, handles, remembered)
-        if own.memory.size:
-            own.reals[own.memory] = remembered[len(run.joints) :]
-
-    def _enter_span(self, task):
-        """The interval, s, and how many fixed steps it takes."""
-        clock, step = self.run.clock, task.method.step
-        clock.t = clock.t_origin = task.span[0]
-        clock.t_end = task.span[1]
-        if step is not None:
-            self.run.numbers.steps_wanted = step_count(*task.span, step)
 
     @property
     def begins_again(self):

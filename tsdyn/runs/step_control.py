@@ -7,49 +7,22 @@ from ..jit.kernels import kernel
 from ..methods.diagonally_implicit import call_soften
 from ..methods.explicit import call_error, call_norm
 from ..methods.tolerances import SAME_TIME
+from . import tolerances as limits
 from .dense_output import evaluate
-from .tolerances import (
-    AT_LONGEST,
-    FIRST_ERROR,
-    FIRST_GROWTH,
-    FIRST_LEAST,
-    FIRST_PART,
-    FIRST_SEEN,
-    FROM_ZERO,
-    GROW,
-    HARDLY,
-    LEAST_BEFORE,
-    LEAST_ERROR,
-    MILD_STEPS,
-    NO_SLOPE,
-    PI_BEFORE,
-    PI_ERROR,
-    SAFETY,
-    SAME_FROM,
-    SAME_TO,
-    SECOND_ESTIMATE,
-    SHORTEST,
-    SHRINK,
-    STIFF_STEPS,
-    STILL_STEPS,
-    STRETCH,
-    TOO_SMALL,
-    TRIAL,
-)
 
 
 @kernel
 def gets_on(r, t0, t1):
     """Whether a step from t0 to t1 is more than the rounding of t."""
-    return t1 > t0 + SHORTEST * max(abs(t0), FROM_ZERO * (r.clock.t_end - r.clock.t_origin))
+    return t1 > t0 + limits.SHORTEST * max(abs(t0), limits.FROM_ZERO * (r.clock.t_end - r.clock.t_origin))
 
 
 @kernel
 def stretch(h, longest):
     """How much longer than h the last step of a run may be, so that no tiny one is left."""
     # Below max_step the last step may be a little longer; at max_step by rounding only
-    if h < AT_LONGEST * longest or longest == math.inf:
-        return STRETCH * h
+    if h < limits.AT_LONGEST * longest or longest == math.inf:
+        return limits.STRETCH * h
     return max(longest - h, SAME_TIME * h)
 
 
@@ -67,7 +40,10 @@ def first_step(context, w, r):
     d0 = math.sqrt(d0 / (2 * n))
     d1 = call_norm(r.kernels.error_norm, context, first, r.yd, r.now, rtol, atol)
     span = r.clock.t_end - r.clock.t
-    h = min(FIRST_ERROR * d0 / d1 if d1 * span > TOO_SMALL and d0 > TOO_SMALL else TRIAL * span, FIRST_PART * span)
+    h = min(
+        limits.FIRST_ERROR * d0 / d1 if d1 * span > limits.TOO_SMALL and d0 > limits.TOO_SMALL else limits.TRIAL * span,
+        limits.FIRST_PART * span,
+    )
     # d2 = |(x'', y'')|, by an Euler step of h
     for i in range(r.x.size):
         r.xs[i] = r.x[i] + h * first[i]
@@ -82,9 +58,9 @@ def first_step(context, w, r):
         r.dy[i] = r.yds[i] - r.yd[i]
     d2 = call_norm(r.kernels.error_norm, context, r.dx, r.dy, r.now, rtol, atol) / h
     # h^(order + 1) max(d1, d2) = FIRST_ERROR
-    size, most = max(d1, d2), FIRST_GROWTH * h
-    h = min(most, (FIRST_ERROR / size) ** r.clock.exponent if size * span > NO_SLOPE else most, span)
-    return max(h, FIRST_LEAST * span, FIRST_SEEN * SHORTEST * abs(r.clock.t))
+    size, most = max(d1, d2), limits.FIRST_GROWTH * h
+    h = min(most, (limits.FIRST_ERROR / size) ** r.clock.exponent if size * span > limits.NO_SLOPE else most, span)
+    return max(h, limits.FIRST_LEAST * span, limits.FIRST_SEEN * limits.SHORTEST * abs(r.clock.t))
 
 
 @kernel
@@ -112,22 +88,22 @@ def accept(context, linear, r, h):
         _estimate(r, r.kernels.second_error, h, end)
         second = _size(context, r)
         if error != 0.0:
-            error *= error / math.hypot(error, SECOND_ESTIMATE * second)
+            error *= error / math.hypot(error, limits.SECOND_ESTIMATE * second)
     # Rejected: h SAFETY error^-power, at least SHRINK h
     power = r.clock.exponent
     if not error <= 1.0:
-        factor = SAFETY * error**-power if error < math.inf else SHRINK
-        r.clock.h = h * max(factor, SHRINK)
+        factor = limits.SAFETY * error**-power if error < math.inf else limits.SHRINK
+        r.clock.h = h * max(factor, limits.SHRINK)
         r.numbers.rejected_last = 1
         return False
     # Accepted: PI control with the error before; no growth right after a rejection
-    error = max(error, LEAST_ERROR)
-    factor = SAFETY * error ** (-PI_ERROR * power) * r.clock.error_before ** (PI_BEFORE * power)
-    factor = min(max(factor, SHRINK), 1.0 if r.numbers.rejected_last != 0 else GROW)
+    error = max(error, limits.LEAST_ERROR)
+    factor = limits.SAFETY * error ** (-limits.PI_ERROR * power) * r.clock.error_before ** (limits.PI_BEFORE * power)
+    factor = min(max(factor, limits.SHRINK), 1.0 if r.numbers.rejected_last != 0 else limits.GROW)
     # An unchanged step keeps the matrix
-    if linear.numbers.g > 0.0 and SAME_FROM <= factor <= SAME_TO:
+    if linear.numbers.g > 0.0 and limits.SAME_FROM <= factor <= limits.SAME_TO:
         factor = 1.0
-    r.clock.error_before = max(error, LEAST_BEFORE)
+    r.clock.error_before = max(error, limits.LEAST_BEFORE)
     r.clock.h = min(h * factor, r.clock.max_step)
     r.numbers.rejected_last = 0
     return True
@@ -151,16 +127,16 @@ def watch_stiffness(bodies, w, r, h):
     if h * h * rates > limit * limit * speeds:
         r.numbers.at_limit += 1
         r.numbers.below_limit = 0
-        found = r.numbers.at_limit == STIFF_STEPS
+        found = r.numbers.at_limit == limits.STIFF_STEPS
     # Below it for MILD_STEPS steps: forget
     elif r.numbers.at_limit > 0:
         r.numbers.below_limit += 1
-        if r.numbers.below_limit == MILD_STEPS:
+        if r.numbers.below_limit == limits.MILD_STEPS:
             r.numbers.at_limit = 0
     # Short steps in which nothing moves are stiff, too
-    if r.numbers.leave_when_stiff == 1 and h < AT_LONGEST * r.clock.max_step:
+    if r.numbers.leave_when_stiff == 1 and h < limits.AT_LONGEST * r.clock.max_step:
         r.numbers.still = r.numbers.still + 1 if _hardly_moves(bodies, w, h) else 0
-        if r.numbers.still == STILL_STEPS:
+        if r.numbers.still == limits.STILL_STEPS:
             r.numbers.at_limit = max(r.numbers.at_limit, 1)
             found = True
     if found:
@@ -171,7 +147,7 @@ def watch_stiffness(bodies, w, r, h):
 @kernel
 def _hardly_moves(bodies, w, h):
     """Whether nothing turns or moves by more than HARDLY in a step of h."""
-    far = HARDLY * extent(w) / h
+    far = limits.HARDLY * extent(w) / h
     for b in range(bodies.shape[0]):
         at = bodies[b, 0]
         # Displacement beside the size of the scene, rotation 2 |pd| h
@@ -179,6 +155,6 @@ def _hardly_moves(bodies, w, h):
             if abs(w.qd[at + c]) > far:
                 return False
         for c in range(3, bodies[b, 1]):
-            if 2.0 * abs(w.qd[at + c]) * h > HARDLY:
+            if 2.0 * abs(w.qd[at + c]) * h > limits.HARDLY:
                 return False
     return True

@@ -22,6 +22,7 @@ from ..rows.interface import (
     note_selection,
 )
 from ..workspaces import AGAIN, load, load_run
+from . import tolerances as limits
 from .dense_output import (
     bring_back,
     call_chart,
@@ -37,20 +38,6 @@ from .dense_output import (
 from .path_loads import call_watch
 from .run_log import close_chart, is_full, no_log, note_accepted, note_try, open_chart
 from .step_control import accept, first_step, gets_on, stretch, watch_stiffness
-from .tolerances import (
-    CUT_SHORT,
-    HALVED,
-    HARDLY_TURNED,
-    LANDING,
-    LITTLE,
-    MOST_TURN,
-    QUARTERED,
-    SHRINK,
-    SLIDES,
-    SLIVER,
-    TURN_GAIN,
-    TURNED_TOO_FAR,
-)
 
 # Rotation limit of a step in driven scenes.
 #
@@ -72,9 +59,9 @@ def longest_step(bodies, now):
             gain = 2.0 * math.sqrt(max(gain - speed * speed, 0.0))  # pdd is pd.pd along p, alpha / 2 across
             speed = 2.0 * math.sqrt(speed)
             # MOST_TURN = speed h + gain h^2 / 2, solved for h without cancellation
-            fast = speed + math.sqrt(speed * speed + 2.0 * gain * MOST_TURN)
+            fast = speed + math.sqrt(speed * speed + 2.0 * gain * limits.MOST_TURN)
             if fast > 0.0:
-                longest = min(longest, 2.0 * MOST_TURN / fast)
+                longest = min(longest, 2.0 * limits.MOST_TURN / fast)
     return longest
 
 
@@ -88,7 +75,7 @@ def too_far(bodies, now, qd, h):
             for c in range(bodies[b, 0] + 3, bodies[b, 0] + 7):
                 one += now[1, c] * now[1, c]
                 other += qd[c] * qd[c]
-            if (math.sqrt(one) + math.sqrt(other)) * h > TURNED_TOO_FAR:
+            if (math.sqrt(one) + math.sqrt(other)) * h > limits.TURNED_TOO_FAR:
                 return True
     return False
 
@@ -123,7 +110,7 @@ def fixed_end(r, stop):
     last = done == r.numbers.steps_wanted
     t1 = r.clock.t_end if last else r.clock.t_origin + done * h
     # A stop within a sliver of the grid point replaces it
-    near = max(SLIVER * h, TOGETHER * abs(t1))
+    near = max(limits.SLIVER * h, TOGETHER * abs(t1))
     if stop < t1 - near or (last and stop < t1):
         return stop, False, True
     return stop if stop < t1 + near and not last else t1, last, False
@@ -192,7 +179,7 @@ def begin_chart(context, c, r, log, reason):
 @kernel
 def has_hardly_turned(c):
     """Whether bodies have rotated on the present chart, by a small angle."""
-    return 0.0 < turned_most(c.chart) < HARDLY_TURNED
+    return 0.0 < turned_most(c.chart) < limits.HARDLY_TURNED
 
 
 # Where friction brings a joint to rest: there its force changes at once, and an implicit step is to end just before.
@@ -236,13 +223,13 @@ def until_rest(c, r, h):
         # mu |v| now
         now = _friction_power(c, friction, r, 1.0, 0.0)
         # At rest, friction grows faster than in proportion to velocity
-        if not _friction_power(c, friction, r, 2.0, 0.0) < SLIDES * now:
+        if not _friction_power(c, friction, r, 2.0, 0.0) < limits.SLIDES * now:
             r.numbers.still += 1
         elif now < math.inf:
             # Deceleration by a small part of the step: rest is at h now / slowing parts from here
-            slowing = now - _friction_power(c, friction, r, 1.0, LITTLE * h)
-            if slowing > LITTLE * now:
-                h = min(h, LANDING * LITTLE * h * now / slowing)
+            slowing = now - _friction_power(c, friction, r, 1.0, limits.LITTLE * h)
+            if slowing > limits.LITTLE * now:
+                h = min(h, limits.LANDING * limits.LITTLE * h * now / slowing)
     copy(r.now[1], c.work.qd)
     return h
 
@@ -451,7 +438,7 @@ def _halve(c, r, h):
     if r.numbers.rejected_last == AGAIN:
         c.linear.numbers.known = 0
     r.numbers.rejected_last = AGAIN
-    r.clock.h = HALVED * h
+    r.clock.h = limits.HALVED * h
 
 
 @kernel
@@ -474,7 +461,7 @@ def _change_chart(context, c, r, log, shorter, status, driven):
         r.numbers.failed = status
         r.clock.h = shorter
         if driven:  # nothing else keeps the next step from being as long
-            r.clock.turn_share *= HALVED
+            r.clock.turn_share *= limits.HALVED
     # Rows may have become dependent
     doubt_selection(c.tangent)
     return begin_chart(context, c, r, log, BY_FAILURE)
@@ -485,7 +472,7 @@ def _move_on(c, r, t1, cut, implicit):
     """The end of an accepted step is where the run is now."""
     w, t0 = c.work, r.clock.t
     r.numbers.failed = 0
-    r.clock.turn_share = min(TURN_GAIN * r.clock.turn_share, 1.0)
+    r.clock.turn_share = min(limits.TURN_GAIN * r.clock.turn_share, 1.0)
     # Predictions and interpolants use the point before
     if implicit or r.numbers.first_order == 1:
         for j in range(3):
@@ -551,7 +538,7 @@ def advance(context, run, log, most):
             status = 0
             continue
         # Rejected: the step left its chart
-        shorter = QUARTERED * h
+        shorter = limits.QUARTERED * h
         if status == 0:
             status, reason = _judge_chart(context, c, r, h, driven)
             if c.work.control.contraction >= CONTRACTION_LOST:
@@ -563,12 +550,12 @@ def advance(context, run, log, most):
         if adaptive and not _is_accepted(context, run, c, r, t1, h):
             r.numbers.rejected += 1
             if t0 + r.clock.h >= t1:  # rounding would propose the same step for ever
-                r.clock.h = SHRINK * h
+                r.clock.h = limits.SHRINK * h
             _go_back(r)
             continue
         # Accepted. A step cut short by a stop doesn't predict the next one
         note_accepted(r, log)
-        if adaptive and t1 == stop and h < CUT_SHORT * wanted:
+        if adaptive and t1 == stop and h < limits.CUT_SHORT * wanted:
             r.clock.h, r.clock.error_before = max(r.clock.h, wanted), before
         if adaptive and r.numbers.in_chart == 0:
             r.clock.h = min(r.clock.h, _reach(c, h))

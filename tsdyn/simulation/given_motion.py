@@ -9,21 +9,27 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
 
-from ..analyses.tolerances import CONSISTENT
+from ..analyses.tolerances import CONSISTENT, FOLLOWED
 from ..calls import fitting, fitting_methods
 from ..configuration.tolerances import INITIAL_TOL
 from ..drawing import Drawn, new_figure
 from ..elements.force import Force
 from ..errors import InvalidArgument, Status
+from ..formulations.registry import FORMULATIONS
+from ..integrators import DOP853
 from ..jit.compiled import clock
+from ..model.packed import has_rates
 from ..observables import diagnostics, reactions
 from ..observables.reactions import acted
 from ..observables.state import remembered
 from ..runs.arguments import state_arrays
 from ..runs.run_log import NAMES, RunEnd
-from ..runs.task import Outcome
+from ..runs.step_engine import StepEngine
+from ..runs.task import Outcome, Task
 from ..validation import counted, finite_times, floats, unknown_name
+from .progress import silent
 from .scene_cache import prepared
+from .segments import run_segments
 from .solution import Solution
 from .termination import suspect
 
@@ -86,21 +92,41 @@ def follow(scene, times, state, who, remedy):
     from ..analyses.kinematic_analysis import (  # imported here: a run needs none of it
         analyse,
         demand_driven,
-        demand_no_rates,
         driven_rates,
     )
 
     kept = prepared(scene)
-    demand_no_rates(kept.packed, who)
     given = scene._initial() if state is None else state_arrays(state, kept.n)
     t0 = _start_time(kept, given[0], times) if state is None else float(state.t)
     every = np.append(times, t0)
     stops = kept.stops(every.min(), every.max())[:, 0]
     memory = remembered(state, kept, t0, given[0])
     _demand_consistent(scene, kept, given[0], t0)
-    q, _ = kept.start(scene, (given[0], driven_rates(scene, t0, given[0], who)), t0, INITIAL_TOL, memory, True)
+    q, qd = kept.start(scene, (given[0], driven_rates(scene, t0, given[0], who)), t0, INITIAL_TOL, memory, True)
     demand_driven(kept.packed, memory[kept.handles.count :], t0, q.copy(), who, remedy)
+    if has_rates(kept.packed):
+        return kept, _rolled(kept, times, t0, q.copy(), qd.copy(), memory, who)
     return kept, analyse(kept.packed, t0, q, memory, times, stops)
+
+
+def _rolled(kept, times, t0, q, qd, memory, who):
+    """The motion of a scene without freedom of velocities: with rows on velocities it is integrated, as `Followed`."""
+    from ..analyses.kinematic_analysis import Followed
+
+    if not (np.diff(times) > 0.0).all() or not times[0] >= t0:
+        raise InvalidArgument(
+            f"{who}: t must increase from the start, t = {t0:g} s: with rows on velocities (rolling, knife edges) "
+            "positions follow from the motion before."
+        )
+    span, method, form = (
+        (t0, max(float(times[-1]), np.nextafter(t0, np.inf))),
+        DOP853(FOLLOWED, FOLLOWED),
+        FORMULATIONS["tangent"],
+    )
+    own = method, form, span, q, qd, memory, times, True, False, None, FOLLOWED, None, 0, silent, False, None
+    found = run_segments(Task(kept, *own, kept.stops(*span)), engine=StepEngine)
+    end, counts = found.end, (found.end.counts[name] for name in ("steps", "rejected", "newton_iterations"))
+    return Followed(found.status, found.rows, end.reached, end.last, end.remembered, *counts, 0, clock() - found.began)
 
 
 def _demand_consistent(scene, kept, q, t):
@@ -168,7 +194,7 @@ def kinematics(scene: Scene, t: ArrayLike, state: State | None = None) -> Kinema
     Parameters
     ----------
     t : array_like (k,), s
-        Times in any order; they are visited in the order given.
+        Times in any order, visited in the order given; increasing ones in a scene with rows on velocities.
     state : State, optional
         Configuration to start from, at its time; default: the poses of the bodies, at t[0] if they are consistent then,
         else at t = 0.
@@ -196,7 +222,8 @@ def kinematics(scene: Scene, t: ArrayLike, state: State | None = None) -> Kinema
     branch is followed in steps that are predicted from velocities and accelerations, and halved where positions or
     velocities come out far from that: so angles count turns, and the mechanism stays on its branch. Redundant rows are
     dropped as in a run. The cost is O(N) for chains and trees. Driving forces and torques are reactions of the motors.
-    Velocities of the start don't matter.
+    Velocities of the start don't matter. With rows on velocities (rolling, knife edges) that leave the velocities no
+    freedom, positions follow from the motion before: velocities are integrated, to a tolerance of 1e-12.
 
     Examples
     --------
@@ -328,8 +355,8 @@ class InverseDynamics(Drawn, GivenMotion):
 
     def _of(self, item, required=False):
         """The actuators of a handle or a name; with `required` there is one."""
-        name = item if isinstance(item, str) else None
-        found = [one for one in self._every if one.item is item or name in (one.name, one.item.name)]
+        name, own = item if isinstance(item, str) else None, self.handles.own(item)
+        found = [one for one in self._every if one.item is own or name in (one.name, one.item.name)]
         if not found and required:
             raise unknown_name("actuator", item, self.actuators)
         return found
@@ -433,6 +460,8 @@ def inverse_dynamics(
         memory = rows[0, 1 + 3 * n : 1 + 3 * n + angles + kept.packed.system.memory.size].copy()
         kept.start(scene, (start, rows[0, 1 + n : 1 + 2 * n].copy()), float(rows[0, 0]), CONSISTENT, memory, True)
     every = actuators_of(scene, kept.handles, actuators, rows[:, 1 : 1 + n].copy())
+    if not every:
+        raise InvalidArgument("actuators: give one at least: a force, or a joint with an angle or a displacement.")
     demand_continuous(kept.packed, [one.item for one in every])
     wanted = np.size(given.t) if t is None else np.size(t)
     followed = followed._replace(seconds=clock() - started)

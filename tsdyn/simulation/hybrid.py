@@ -8,7 +8,7 @@ import numpy as np
 
 from ..calls import fitting_methods
 from ..elements.bodies import START, PointMass, named, rotation_matrix, transform_g
-from ..errors import InvalidArgument, InvalidBody
+from ..errors import InvalidArgument, InvalidBody, SingularConfiguration
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import handles_of
 from ..observables.evaluate import constraint_arrays, mass_matrix
@@ -154,11 +154,6 @@ class Change:
             raise InvalidArgument(f"change.impulse: {body.name} is a point mass; leave out point.")
         self._pushes.append(Push(body, impulse, point))
 
-    @property
-    def ends(self) -> bool:
-        """Whether the run ends at the event."""
-        return self._ends
-
     def end(self) -> None:
         """End the run at the event; nothing else that actions of this instant ask for is carried out."""
         self._ends = True
@@ -233,17 +228,14 @@ def carry_out(run, change):
 def report(run, jump):
     """List the impulses of the user's and of constraints that have become active, when contacts have been hit, too."""
     found = [(run.t, push.body.name, push.impulse) for push in jump.pushes]
-    members, own = (
-        {id(member.constraint): member for member in run.scene.packed.members},
-        handles_of(run.scene.packed).own,
-    )
-    wanted = [item for item in jump.activated if id(own(item)) in members and not getattr(item, "unilateral", False)]
-    if wanted:
+    names = [item.name for item in jump.activated if not getattr(item, "unilateral", False)]
+    members = [member for member in run.scene.packed.members if member.constraint.name in names]
+    if members:
         rows = JumpRows(run)
         P = rows.impulses(jump.load - rows.M @ (run.qd - jump.qd), [*run.modes.closed, *run.modes.idle])
-        for item in wanted:
-            mine = P[members[id(own(item))].rows]
-            found.append((run.t, item.name, float(mine[0]) if mine.size == 1 else mine))
+        for member in members:
+            mine = P[member.rows]
+            found.append((run.t, member.constraint.name, float(mine[0]) if mine.size == 1 else mine))
     run.phases.impulses += found
 
 
@@ -303,7 +295,11 @@ class JumpRows:
             rates = -(B @ qd + self.Phi_t[self.bilateral])[order[:rank]]
             change = Q[:, :rank] @ solve_triangular(R[:rank, :rank], rates, trans="T")
         if Z.size:
-            change = change + Z @ cho_solve(cho_factor(Z.T @ self.M @ Z), Z.T @ (load - self.M @ change))
+            try:
+                factor = cho_factor(Z.T @ self.M @ Z)
+            except np.linalg.LinAlgError as error:
+                raise SingularConfiguration("a direction that the constraints leave free has no inertia.") from error
+            change = change + Z @ cho_solve(factor, Z.T @ (load - self.M @ change))
         return qd + change
 
     def impulses(self, load, closed):

@@ -162,15 +162,13 @@ def function_of(value):
 def attributes_of(cls):
     """The names of the attributes of a class that may be set: those checked, and arguments that are kept."""
     if issubclass(cls, PointMass):
-        return tuple(name for base in reversed(cls.__mro__) for name, it in vars(base).items() if _is_attribute(it))
+        return tuple(
+            name for base in reversed(cls.__mro__) for name, it in vars(base).items() if isinstance(it, Attribute)
+        )
     checked = getattr(cls, "quantities", ())
     checked = checked() if callable(checked) else checked
     known = dict.fromkeys([*inspect.signature(cls).parameters, *checked])
     return tuple(name for name in known if name not in ("a", "b", "name", *cls.permanent))
-
-
-def _is_attribute(value):
-    return isinstance(value, Attribute)
 
 
 def _is_own(owner, attribute):
@@ -294,7 +292,7 @@ class Edit:
         if isinstance(owner, TableNumbers):
             return False
         if owner is self.family.template:
-            self._array("gravity")[:] = with_gravity(owner, changes)
+            self._array("gravity")[:] = type(owner)(changes["gravity"]).gravity
             return True
         if isinstance(owner, PointMass):
             self._enter_body(owner, changes)
@@ -450,11 +448,6 @@ def with_attributes(item, changes):
     other.check()
     vars(other)["added"] = item.added
     return other
-
-
-def with_gravity(scene, changes):
-    """Return a checked acceleration of free fall."""
-    return type(scene)(changes["gravity"]).gravity
 
 
 # A scene of a file with other numbers of its table `parameters`: made of the file again, then edited as the scene was.

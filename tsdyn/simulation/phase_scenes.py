@@ -6,6 +6,7 @@ from itertools import chain
 import numpy as np
 
 from ..calls import fitting
+from ..elements.force import Force
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument
 from ..model.handles import handles_of
@@ -49,7 +50,7 @@ def dependent(scene, items):
 
 
 def phase_of(scene, rows, holds=(), without=None):
-    """The scene with these rows, primitives, in place of its contacts; kept until the scene changes.
+    """The scene with these rows, primitives, and forces in place of its contacts; kept until the scene changes.
 
     holds: rows with numbers that the run remembers, as `friction_problem.Hold`. without: constraints and forces left
     out, by default those that are inactive at the start.
@@ -61,22 +62,17 @@ def phase_of(scene, rows, holds=(), without=None):
     key = frozenset(map(id, rows)), frozenset(map(id, without)), frozenset(hold.key for hold in holds)
     if key not in known:
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
+        constraints, forces = ([each for each in rows if isinstance(each, Force) is given] for given in (False, True))
         held = [hold.rows() for hold in holds]
         phase = known[key] = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
-            _added=[each for each in scene._added if id(each) not in gone] + [*rows, *chain(*held)],
-            _forces=[each for each in scene._forces if id(each) not in gone], _packed=None, _start=None,
+            _added=[each for each in scene._added if id(each) not in gone] + [*constraints, *chain(*held)],
+            _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None, _start=None,
             _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
             _pack=partial(_pack_phase, phase, scene, holds, held), _whole=scene,
         )  # fmt: skip
     return known[key]
-
-
-def last_phase(scene, phases):
-    """The scene of the phase that a run has ended in."""
-    packed = phases.packed[phases.of[-1]]
-    return next(phase for phase in scene._phases.values() if phase.packed is packed)
 
 
 def _pack_phase(phase, scene, holds, held):
@@ -118,7 +114,10 @@ def gaps_of(scene, without=None):
     """The `Gaps` of a scene, of its inactive contacts too; `without` as of `phase_of`."""
     from ..analyses.contact_problem import Gaps
 
-    rows = [side.row for contact in contacts_of(scene._added) for side in contact.sides]
+    sides = [(contact, side) for contact in contacts_of(scene._added) for side in contact.sides]
+    rows = [side.grip.gap if side.grip else side.row for _, side in sides]
+    rubbing = [part for contact, side in sides if side.grip for part in contact.parts]
+    rows += [part for part in rubbing if not any(part is row for row in rows)]
     alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
     return Gaps(scene.packed, alone.packed, phase_of(scene, [], without=without).packed)
 
@@ -142,7 +141,7 @@ def first_row_of(packed):
 
 
 def at_start(scene):
-    """The scene as it is at its start: contacts that are closed hold; ratchets and inactive parts are left out."""
+    """The scene at its start: closed contacts hold, without friction; ratchets and inactive parts are left out."""
     if not has_contacts(scene):
         return scene
     from ..analyses.contact_problem import closed_gaps
@@ -150,16 +149,32 @@ def at_start(scene):
     gaps, (q, _) = gaps_of(scene), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
     closed = [gaps.list[i] for i in closed_gaps(gaps, q, angles) if i not in gaps.following]
-    return phase_of(scene, [gap.side.row for gap in closed if gap.contact.active])
+    sides = [gap.side for gap in closed if gap.contact.active]
+    return phase_of(scene, [side.grip.gap if side.grip else side.row for side in sides])
 
 
 def demand_bilateral(scene, who="this analysis"):
-    """Raise InvalidArgument where a scene has contacts."""
+    """Raise InvalidArgument where a scene has contacts or exact friction."""
     if has_contacts(scene):
-        names = listed([each.name for each in contacts_of(scene._added)], NAMED)
+        demand_regular(scene, who)
         raise InvalidArgument(
-            f"{who} is of one phase of a run, along which {names} may open and close. In a copy of the scene, hold "
-            "those that are closed by unilateral=False, and remove the others."
+            f"{who} is of one phase of a run, along which {named(contacts_of(scene._added))} may open and close. In a "
+            "copy of the scene, hold those that are closed by unilateral=False, and remove the others."
+        )
+
+
+def named(items):
+    """Names of contacts, in a message."""
+    return listed(list(dict.fromkeys(item.name for item in items)), NAMED)
+
+
+def demand_regular(scene, who):
+    """Raise InvalidArgument where a scene has friction of the exact law."""
+    exact = [force for force in scene._forces if getattr(force, "slides", ())]
+    if exact:
+        raise InvalidArgument(
+            f"{who} doesn't serve friction of the exact law, which sticks and slides: {named(exact)}. Give "
+            "slip_velocity (slip_rate of a torque), such as 1e-3 m/s, for the regularised law."
         )
 
 

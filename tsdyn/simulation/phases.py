@@ -1,9 +1,11 @@
 """The phases of a run with contacts: what its solution asks of them, and what files hold of them."""
 
 import json
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..errors import StorageError
 from ..formulations.locked_orientations import keep_turning
 from ..model.handles import handles_of
 from ..model.packed import first_rows
@@ -12,6 +14,58 @@ from ..observables.state import StatePhase
 from ..rows.graph_builder import graph_of, set_redundant
 from ..runs.dense_output import StepPieces
 from ..validation import demand, demand_record
+from .grips import add_friction, losses
+
+
+@dataclass
+class Modes:
+    """The modes of the units of a scene: numbers of gaps, and of frictions. All others are open, or slide."""
+
+    closed: list = field(default_factory=list)  # independent rows, with reactions
+    idle: list = field(default_factory=list)  # closed by what others hold
+    opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+    sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
+    blocked: list = field(default_factory=list)  # frictions without motion that others hold
+    begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
+
+    grips: dict = field(default_factory=dict)  # of closed contacts with friction: see grips.py
+    held: dict = field(default_factory=dict)
+
+    def turned(self, other):
+        """Whether these are the modes of another but for directions of slips."""
+        mine, theirs = (
+            (modes.closed, modes.idle, modes.held, [i for i, d in modes.grips.items() if d is None])
+            for modes in (self, other)
+        )
+        return not self.opened and mine == theirs and self.sticking == other.sticking
+
+    def same(self, other):
+        """Whether the units are in the same modes, whatever has just opened."""
+        return {**vars(self), "opened": 0} == {**vars(other), "opened": 0}
+
+    def saved(self):
+        """Lists of numbers, for JSON: one for each field, of a dict its items."""
+        return [plain(value) for value in vars(self).values()]
+
+    @classmethod
+    def of(cls, record):
+        """As it was when it was saved."""
+        pairs = zip(vars(cls()).items(), record, strict=True)
+        return cls(*(_entries(known) if isinstance(value, dict) else known for (_, value), known in pairs))
+
+
+def _entries(pairs):
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in pairs}
+
+
+def plain(value):
+    """A value of modes, or of what actions have changed, as JSON has it."""
+    if isinstance(value, dict):
+        return [[plain(key), plain(each)] for key, each in value.items()]
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
 
 RECORD = {"modes": list, "derived": list, "names": list, "contacts": list, "changes": list, "changed": list}
 
@@ -23,6 +77,7 @@ class Phases:
     ----------
     packed : Packed
         Of the scene with the rows of all units.
+    gaps : Gaps
 
     Attributes
     ----------
@@ -38,8 +93,8 @@ class Phases:
         What actions had changed before each phase: names of the parts that are inactive, and parameters by name.
     """
 
-    def __init__(self, packed):
-        self.whole, self.list, self.impulses = packed, [], []
+    def __init__(self, packed, gaps):
+        self.whole, self.gaps, self.list, self.impulses = packed, gaps, [], []
         self.starts, self.of, self.gains, self.changes = [], [], {}, []
         self.packed, self.modes, self._columns, self._known = [], [], [], {}  # of each kind of phase
         self.scenes = []  # of each kind, of phases that were restored
@@ -97,7 +152,46 @@ class Phases:
         out = np.zeros((len(numbers), m))
         for kind, mine, some in self._gathered(numbers, arrays):
             rows, columns = self._columns[kind]
-            out[np.ix_(mine, rows)] = reactions.multipliers(self.packed[kind], *some)[:, columns]
+            lam, own = reactions.multipliers(self.packed[kind], *some), np.zeros((mine.size, m))
+            own[:, rows] = lam[:, columns]
+            modes = self._modes(kind)
+            if modes.grips:
+                add_friction(self.gaps, modes, self.packed[kind], *some[:3], lam, own)
+            out[mine] = own
+        return out
+
+    def _modes(self, kind):
+        return Modes.of(self.modes[kind][0])
+
+    def told(self):
+        """The `list`, in which phases are one that differ in nothing, or in the directions of slips alone."""
+        found, before, hit = [], None, {t for t, *_ in self.impulses}
+        for (start, end, names), begun, kind in zip(self.list, self.starts, self.of, strict=True):
+            modes = self._modes(kind)
+            if before is not None and begun not in hit and modes.turned(before):
+                found[-1] = (found[-1][0], end, names)
+            else:
+                found.append((start, end, names))
+            before = modes
+        return found
+
+    @property
+    def lose(self):
+        """Whether energy is lost by impacts or friction of contacts."""
+        return bool(self.impulses) or bool(self.gaps.rubs.any())
+
+    def sticking(self, numbers, i):
+        """Whether a contact with friction sticks (k,); i: the number of its gap."""
+        sticks = np.array([self._modes(kind).grips.get(i, ()) is None for kind in range(len(self.modes))])
+        return sticks[np.array(self.of)[numbers]]
+
+    def losses(self, numbers, lam, t, q, qd):
+        """Power (k, gaps), W, that contacts with friction dissipate; lam (k, m) of the scene."""
+        out = np.zeros((len(numbers), self.gaps.count))
+        for kind, mine, (own, *some) in self._gathered(numbers, (lam, t, q, qd)):
+            which = [i for i, d in self._modes(kind).grips.items() if d is not None]
+            if which:
+                out[np.ix_(mine, which)] = losses(self.gaps, which, own, *some)
         return out
 
     def constraint_error(self, numbers, *arrays):
@@ -124,6 +218,8 @@ class Phases:
 
     def parts(self, solution):
         """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are."""
+        if not self.packed:
+            raise StorageError("phases differ in forces or parameters, and the file has no scene: pass scene=.")
         for kind, mine, _ in self._gathered(solution._phase_of_rows, ()):
             part = solution._picked(mine)
             packed = self.packed[kind]
@@ -227,20 +323,15 @@ class Pinned:
             trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
         )  # fmt: skip
 
+    def begin_at(self, times):
+        """As of a `Trajectory`."""
+        self.trajectory.begin_at(times)
+
     def __call__(self, t):
         """As of a `Trajectory`."""
         states, memory, status = self.trajectory(t)
         states[:, 0, self.still], states[:, 1:, self.still] = self.q[self.still], 0.0
         return states, memory, status
-
-
-def plain(value):
-    """A value of modes, or of what actions have changed, as JSON has it."""
-    if isinstance(value, dict):
-        return [[plain(key), plain(each)] for key, each in value.items()]
-    if isinstance(value, (list, tuple)):
-        return [plain(each) for each in value]
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
 def shared_rows(whole, packed):

@@ -40,7 +40,7 @@ from .analyses import linearise as _linearise
 from .analyses import set_start as _set_start
 from .given_motion import inverse_dynamics as _inverse_dynamics
 from .given_motion import kinematics as _kinematics
-from .phase_scenes import has_contacts, where_it_stands
+from .phase_scenes import at_start, has_contacts, where_it_stands
 from .scene_cache import preparing
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
 from .variants import activate as _activate
@@ -599,10 +599,10 @@ class Scene:
             said = elsewhere(packed, t, q, qd)
         except InconsistentState as error:
             said = [str(error)]
-        return show(scene_data(self, t, said, shapes=shapes, camera=camera, follow=follow), path)
+        return show(scene_data(self, at_start(self).packed, t, said, shapes=shapes, camera=camera, follow=follow), path)
 
     place = _place
-    evaluate = where_it_stands(_evaluate)
+    evaluate = _serving("evaluate")(_evaluate)
     assemble = where_it_stands(_assemble)
     mobility = where_it_stands(_mobility)
     linearise = _serving("linearise")(_linearise)

@@ -24,25 +24,9 @@ from ..runs.tolerances import SLIVER
 from ..taylor.series_engine import SeriesEngine
 from ..taylor.tolerances import SHARP_TOL
 from ..validation import damaged, demand, demand_numbers, is_count
+from . import tolerances as limits
 from .local_origin import within_rounding
 from .progress import silent
-from .tolerances import (
-    AGAIN,
-    COST,
-    FINEST,
-    FIRST_WINDOW,
-    GOT_ON,
-    PASSES,
-    PATIENCE,
-    RESTING,
-    RISKED,
-    SERIES_COST,
-    SETTLED,
-    SHARP_COST,
-    STEP_EVALUATIONS,
-    STIFF_SAFETY,
-    TRIED,
-)
 
 # Turns of the default method: from its explicit method to the implicit one where the motion is stiff, and back.
 #
@@ -63,7 +47,7 @@ def implicit(method, prepared, form):
     most = SHARP_TOL if coupled and prepared.sharp else math.inf
     found = (Radau if coupled else SDIRK54)(min(method.rtol, most), min(method.atol, most), max_step=method.max_step)
     if not coupled:
-        found.safety = STIFF_SAFETY
+        found.safety = limits.STIFF_SAFETY
     return frozen(found)
 
 
@@ -90,7 +74,7 @@ class Turns:
 
     ask = 0
     known = 0.0  # work of the method before for a second of motion
-    patience = PATIENCE  # implicit steps before the explicit method is tried
+    patience = limits.PATIENCE  # implicit steps before the explicit method is tried
     taken, tried = 0, False  # explicit steps so far; whether the explicit method is on trial
     jacobians = 0  # of the implicit method's first steps
     began = lasted = 0.0  # s: of the segment, and length of the one before
@@ -109,26 +93,26 @@ class Turns:
     @cached_property
     def _cost(self):
         """Of an evaluation by the implicit method."""
-        return SERIES_COST if isinstance(self.method, Taylor) else COST
+        return limits.SERIES_COST if isinstance(self.method, Taylor) else limits.COST
 
     @cached_property
     def _first(self):
         """Steps of the implicit method over which work is measured first."""
-        return RESTING if self.prepared.slips else FIRST_WINDOW
+        return limits.RESTING if self.prepared.slips else limits.FIRST_WINDOW
 
     @cached_property
     def _step(self):
         """Work of a step of the explicit method."""
         series = isinstance(self.method, Taylor)
-        return self.method.stages * (SHARP_COST if series and self.prepared.sharp else 1.0)
+        return self.method.stages * (limits.SHARP_COST if series and self.prepared.sharp else 1.0)
 
     def begin(self, to_implicit, t, turned):
         """A segment begins at t: after a turn, or after a singular configuration."""
-        self.window, self.ask = (t, 0.0), self._first if to_implicit else FIRST_WINDOW
+        self.window, self.ask = (t, 0.0), self._first if to_implicit else limits.FIRST_WINDOW
         if to_implicit:
             prepare_first_run(self.scene, self.implicit, self.form, self.within, None)
         elif not self.tried:
-            self.ask = FIRST_WINDOW if self.prepared.slips else (AGAIN - 1) * self.taken
+            self.ask = limits.FIRST_WINDOW if self.prepared.slips else (limits.AGAIN - 1) * self.taken
         if turned:
             self.lasted, self.began = t - self.began, t
 
@@ -152,18 +136,18 @@ class Turns:
 
     def _to_implicit(self, run, steps, t, ours):
         """Whether the implicit method is to go on where the explicit one takes `ours` for a second; not for little."""
-        self.ask = AGAIN * steps
+        self.ask = limits.AGAIN * steps
         if run.numbers.at_limit == 0 or not self._pays(ours, t):
             return False
         self.known, self.taken = ours, self.taken + steps
         if self.lasted > 0.0:  # the implicit method has been left for longer than it had lasted, or in vain
             longer = self.prepared.slips or t - self.began > self.lasted
-            self.patience = PATIENCE if longer else AGAIN * self.patience
+            self.patience = limits.PATIENCE if longer else limits.AGAIN * self.patience
         return True
 
     def _pays(self, rate, t):
         """Whether what is left at this rate is worth a turn."""
-        return rate * (self.end - t) > self._cost * TRIED * STEP_EVALUATIONS
+        return rate * (self.end - t) > self._cost * limits.TRIED * limits.STEP_EVALUATIONS
 
     def _back(self, memory, steps, rate):
         """Whether the explicit method is to go on: it would take less work for the rest, or is to be tried.
@@ -175,26 +159,26 @@ class Turns:
         if steps <= self._first:
             self.jacobians = jacobians
         may_pay = memory.run.numbers.still == 0 if rough else jacobians > self.jacobians
-        may_win = rough or (rate <= self.known and RISKED * rate * left > self.most_lost)
-        patience = self.patience if may_pay else AGAIN * self.patience
+        may_win = rough or (rate <= self.known and limits.RISKED * rate * left > self.most_lost)
+        patience = self.patience if may_pay else limits.AGAIN * self.patience
         self.tried = steps >= patience and may_win and self._pays(rate, memory.run.clock.t)
         if self.tried:
             self.known = rate
-        later = steps + PATIENCE if rough else 2 * steps
+        later = steps + limits.PATIENCE if rough else 2 * steps
         self.ask = later if steps >= self.patience else min(later, self.patience)
-        dear = rate > max(SETTLED / steps, 1.0) ** 2 * self.known
-        return bool(self.tried or (dear and (rough or self.lost > RISKED * self.known * left)))
+        dear = rate > max(limits.SETTLED / steps, 1.0) ** 2 * self.known
+        return bool(self.tried or (dear and (rough or self.lost > limits.RISKED * self.known * left)))
 
     def _tried(self, steps, rate):
         """Whether the explicit method, after some steps, has failed to take less work."""
         self.ask = 2 * steps
-        if steps < TRIED and rate < AGAIN * self.known:
+        if steps < limits.TRIED and rate < limits.AGAIN * self.known:
             return False
         self.tried = False
         if rate < self.known:
             self.ask = 0
             return False
-        self.patience, self.taken, self.known = AGAIN * self.patience, self.taken + steps, rate
+        self.patience, self.taken, self.known = limits.AGAIN * self.patience, self.taken + steps, rate
         return True
 
     def saved(self):
@@ -218,7 +202,9 @@ class Turns:
 
 def by_series(task):
     """The `Task` of a crossing."""
-    rtol, atol = (FINEST if tol is None else min(tol, FINEST) for tol in (task.method.rtol, task.method.atol))
+    rtol, atol = (
+        limits.FINEST if tol is None else min(tol, limits.FINEST) for tol in (task.method.rtol, task.method.atol)
+    )
     return task._replace(
         method=Taylor(rtol=rtol, atol=atol, max_step=task.method.max_step), form=formulation("tangent"), choose=None
     )
@@ -450,7 +436,9 @@ class _Segments:
         role, parts = self.roles[-1], self.parts
         if status is PASSAGE:
             t0, t1 = self.task.span
-            if len(parts) > PASSES and parts[-1].end.reached - parts[-1 - PASSES].end.reached < GOT_ON * (t1 - t0):
+            if len(parts) > limits.PASSES and parts[-1].end.reached - parts[
+                -1 - limits.PASSES
+            ].end.reached < limits.GOT_ON * (t1 - t0):
                 parts[-1] = parts[-1]._replace(status=Status.STEP_COLLAPSED)
                 return None
             return CROSSING if role != CROSSING else self.roles[-2]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import time
-from functools import cached_property, wraps
+from functools import cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -21,6 +21,7 @@ from ..observables.generalised_forces import law_values
 from ..observables.reactions import acted, exerted, member, with_normal_loads
 from ..observables.state import RememberingState
 from ..validation import counted, floats
+from .by_phase import gathered, in_phases
 from .records import Records
 from .stored_runs import RunOutputs
 from .termination import account, cause_of
@@ -185,7 +186,7 @@ def energy_error(solution, task):
     Outputs and the last state are compared.
     """
     system, packed = solution.system, solution.packed
-    if system.rheonomic[0] or system.normals.size:
+    if system.rheonomic[0] or system.normals.size or (solution._phases is not None and solution._phases.lose):
         return None
     some, slots = solution[:: max(solution._length() // MOST_OUTPUTS, 1)], system.memory.size
     t = np.concatenate(([task.span[0]], some.t, [solution.reached]))
@@ -271,7 +272,8 @@ def _power(solution, trajectory, item, t):
                 *([packed] if varies else []), *some, slots
             )
         power[mine] = _supplied(at, item)
-    return power
+    losses = solution._losses_at(t, *levels, memory)
+    return power - (losses.sum(axis=1) if item is None else solution._losses_of(item, losses))
 
 
 def _supplied(at, item):
@@ -284,35 +286,6 @@ def _supplied(at, item):
         return np.zeros(at.t.size)
     load = reactions.loads_of(at.packed).get(id(item))
     return diagnostics.power_of(at, member(at.packed, item) if load is None else load)
-
-
-# What follows from the packed scene is asked of that of each phase, where phases differ in forces or numbers.
-
-
-def in_phases(method):
-    """Decorate a method that returns arrays over the outputs, a tuple of them, or a named tuple."""
-
-    @wraps(method)
-    def call(self, *arguments, **keywords):
-        phases = getattr(self, "_phases", None)
-        if phases is None or not phases.varies:
-            return method(self, *arguments, **keywords)
-        return _gathered(self, lambda part: method(part, *arguments, **keywords))
-
-    return call
-
-
-def _gathered(solution, ask):
-    """What the outputs of each packed scene say, in the order of the outputs."""
-    found, order = [], []
-    for part, mine in solution._phases.parts(solution):
-        found.append(ask(part))
-        order.append(mine)
-    back = np.argsort(np.concatenate(order), kind="stable")
-    if isinstance(found[0], tuple):
-        columns = [np.concatenate(column)[back] for column in zip(*found, strict=True)]
-        return type(found[0])(*columns) if hasattr(found[0], "_fields") else tuple(columns)
-    return np.concatenate(found)[back]
 
 
 # Balances of a run: energies, powers and momenta, mixed into `Solution`.
@@ -353,7 +326,7 @@ class Balances:
     @property
     def dissipation(self) -> Floats:
         """Power (k,), W, dissipated by dampers and friction; not negative."""
-        return self._force_powers.dissipation
+        return self._force_powers.dissipation + self._losses().sum(axis=1)
 
     @cached_property
     def work(self) -> Floats:
@@ -375,7 +348,8 @@ class Balances:
         Of a motor or a driver: the power of its force or torque along the prescribed motion. Of a force: the power of
         its loads and actuators, less dissipation; stored energy of a spring doesn't count. Of other constraints: zero.
         """
-        return _supplied(self, self._part(item))
+        part = self._part(item)
+        return _supplied(self, part) - self._losses_of(part, self._losses())
 
     def work_of(self, item: ItemLike) -> Floats:
         """Work (k,), J, since the start, of one constraint or force: the integral of `power_of`.
@@ -627,7 +601,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
 
         These are closed contacts, frictions that stick, and those active of the parts that come and go by actions.
         """
-        return [(self.span[0], self.reached, ())] if self._phases is None else list(self._phases.list)
+        return [(self.span[0], self.reached, ())] if self._phases is None else self._phases.told()
 
     @property
     def impulses(self) -> list[tuple[float, str, float]]:
@@ -671,6 +645,23 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             return reactions.multipliers(self.packed, t, q, qd, qdd, memory)
         numbers = self._phases.at(t) if numbers is None else numbers
         return self._phases.multipliers(numbers, len(self.system.segments), t, q, qd, qdd, memory)
+
+    def _losses(self):
+        """Power (k, contacts), W, that contacts with friction dissipate."""
+        return self._losses_at(self.t, self.q, self.qd, self.qdd, self._memory, self._phase_of_rows)
+
+    def _losses_at(self, t, q, qd, qdd, memory, numbers=None):
+        """The same at times of the run, by number or by time of their phases."""
+        if self._phases is None or not self._phases.gaps.rubs.any():
+            return np.zeros((t.size, 1))
+        numbers = self._phases.at(t) if numbers is None else numbers
+        lam = self._multipliers_at(t, q, qd, qdd, memory, numbers)
+        return self._phases.losses(numbers, lam, t, q, qd)
+
+    def _losses_of(self, part, losses):
+        """The part (k,) of losses (k, contacts) that is of a constraint or force."""
+        mine = [] if self._phases is None else self._phases.gaps.of_contact(part)
+        return losses[:, mine].sum(axis=1)
 
     @cached_property
     def constraint_error(self) -> ConstraintError:
@@ -727,15 +718,16 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         phases = self._phases
         if phases is None or not (phases.varies or getattr(self.handles.item(item), "slides", ())):
             return exerted(self, item, on)
-        return _gathered(self, lambda part: exerted(part, item, on))
+        return gathered(self, lambda part: exerted(part, item, on))
 
     def sticking(self, friction: ItemLike) -> Bools:
         """Whether a friction of the exact law sticks: (k,).
 
         Parameters
         ----------
-        friction : friction, or name of one
-            A joint friction or CoulombFriction whose slip velocity is zero.
+        friction : friction or contact, or name of one
+            A joint friction or CoulombFriction whose slip velocity is zero, or a unilateral contact with friction,
+            which sticks where it is closed and doesn't slip.
 
         Raises
         ------
@@ -751,15 +743,18 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> block = scene.add_point_mass(mass=2.0, velocity=(1, 0, 0))
         >>> brake = scene.add(ts.forces.CoulombFriction(block, scene.ground, force=4.0, name="brake"))
         >>> solution = ts.simulate(scene, (0, 1), t_eval=[0.25, 0.75])
-        >>> print(solution.sticking("brake"), solution.phases[-1])
-        [False  True] (0.5, 1.0, ('brake',))
+        >>> print(solution.sticking("brake"), [names for _, _, names in solution.phases])
+        [False  True] [(), ('brake',)]
         """
         item = self.handles.item(friction)
+        mine = [] if self._phases is None else self._phases.gaps.of_contact(item)
+        if any(self._phases.gaps.rubs[mine]):
+            return self._phases.sticking(self._phase_of_rows, mine[0])
         load = reactions.loads_of(self.packed).get(id(item))
         if load is None or not getattr(item, "slides", ()):
             raise InvalidForce(
                 f"sticking: {friction!r} is no friction of the exact law: RevoluteFriction, TranslationalFriction, "
-                "ContactFriction and CoulombFriction are, with slip_velocity=0."
+                "ContactFriction and CoulombFriction are, with slip_velocity=0, and unilateral contacts with kinetic."
             )
         slot, rests = load.slot + item.memory, np.ones(self.t.size, bool)
         for slide in item.slides:
@@ -793,7 +788,9 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def friction_demand(self, constraint: ItemLike) -> Floats:
         """Tangential over normal force at a contact, (k,): the coefficient of friction that rolling needs at least.
 
-        Infinite where the surfaces would have to pull. Arguments and errors as of `contact_point`.
+        Infinite where the surfaces would have to pull. Contacts that share a load in many ways, such as the lateral
+        forces of two wheels on one axle, share it with the least sum of squares of their forces. Arguments and errors
+        as of `contact_point`.
 
         Examples
         --------
@@ -828,8 +825,11 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         sweeps = f", {counted(s.newton_iterations, 'Newton sweep')}" if s.newton_iterations else ""
         if sweeps and s.placements:  # series place none
             sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement"
+        known = self._phases
+        phases = f"{counted(len(known.list), 'phase')}, {counted(len(known.impulses), 'impulse')}" if known else ""
         return {
             "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self._length(), 'output')}",
+            **({"phases": phases} if phases else {}),
             "method": f"{self.method}, formulation {self.formulation}",
             "steps": f"{s.steps}, {s.rejected} rejected, {counted(s.charts, 'chart')}",
             "work": f"{counted(s.evaluations, 'evaluation')}, {counted(s.placements, 'placement')}{sweeps}",

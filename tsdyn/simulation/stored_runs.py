@@ -200,7 +200,7 @@ class RunOutputs:
 
     @cached_property
     def _phase_of_rows(self):
-        """The number of the phase of each output (k,); None of a run without phases."""
+        """The number of the phase of each output (k,); None without phases."""
         if self._phases is None:
             return None
         t = self.t if self._stored is None else self._stored.read(_COLUMNS["t"], slice(None))

@@ -8,8 +8,7 @@ import numpy as np
 from ..configuration.mobility import weakest_row
 from ..errors import Status, TsdynError
 from ..formulations.dependent_rows import dependent_rows
-from ..maths.root_isolation import EPS
-from ..maths.tolerances import TINY
+from ..maths.tolerances import EPS, TINY
 from ..model.handles import BodyMotion, handles_of
 from ..observables.contacts import singular_place
 from ..observables.evaluate import constraint_arrays
@@ -20,19 +19,7 @@ from ..rows.tolerances import UNEQUAL_MASSES
 from ..runs.tolerances import AT_LONGEST
 from ..taylor.layout import without_series
 from ..validation import counted
-from .phase_scenes import last_phase
-from .tolerances import (
-    AT_ONCE,
-    BLOW_UP,
-    CLEAR,
-    COARSE,
-    MOST_SINGULAR,
-    NEAR_BY,
-    NEARLY_SINGULAR,
-    NO_SPAN,
-    SHORTENED,
-    TRIALS,
-)
+from . import tolerances as limits
 
 # What has kept the steps of a run short, where it isn't the motion: a `max_step`, or rounding of the forces.
 #
@@ -61,7 +48,7 @@ def step_limit(solution):
         sentence = f"The steps are as long as max_step={longest:g} s allows."
         return StepLimit(sentence, "Give a longer max_step, or leave it out: the tolerances choose the steps then.")
     with np.errstate(all="ignore"):
-        said = _rounding(solution, method) if min(method.rtol, method.atol) < COARSE else ""
+        said = _rounding(solution, method) if min(method.rtol, method.atol) < limits.COARSE else ""
     if said:
         return StepLimit(None, said)
     return StepLimit(None, "Raise max_steps, or loosen rtol and atol." if status is Status.MAX_STEPS else None)
@@ -81,7 +68,7 @@ def _rounding(solution, method):
     bodies = packed.system.bodies
     at = np.repeat(np.arange(len(bodies)), bodies[:, 1])
     dq = EPS * np.maximum.reduceat(np.abs(q), bodies[:, 0])[at]
-    near = q + np.random.default_rng(0).choice((-1.0, 1.0), (TRIALS, q.size)) * dq
+    near = q + np.random.default_rng(0).choice((-1.0, 1.0), (limits.TRIALS, q.size)) * dq
 
     def compared(da):
         """Rates w (n,), and changes of velocities da / w over the tolerances (n,)."""
@@ -94,12 +81,13 @@ def _rounding(solution, method):
     da = _of_motion(solution, t, q, qd, near)
     rates, ratios = compared(da)
     worst, share = int(ratios.argmax()), _norm(ratios)
-    if not 1.0 <= share < np.inf or h * rates[worst] > SHORTENED:
+    if not 1.0 <= share < np.inf or h * rates[worst] > limits.SHORTENED:
         return ""
     return (
         "The tolerances are below what rounding of the forces allows: a last digit of the positions changes the "
         f"acceleration of {packed.bodies[at[worst]].name} by {da[worst]:.1e}, and steps are {h:.1e} s long. Loosen to "
-        f"rtol={CLEAR * share * method.rtol:.0e} and atol={CLEAR * share * method.atol:.0e}, or soften the forces."
+        f"rtol={limits.CLEAR * share * method.rtol:.0e} and atol={limits.CLEAR * share * method.atol:.0e}, or soften "
+        "the forces."
     )
 
 
@@ -163,7 +151,12 @@ def account(solution, scene, reason, goes_on=""):
     if not found and solution.status in (Status.STEP_COLLAPSED, Status.MAX_STEPS):
         found = _jump(solution)
     if not found and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
-        found = _growth(solution)
+        # Report that the motion is stiff, or that its velocities diverge
+        said = "The motion is stiff: an implicit method, such as SDIRK54, may succeed. " if solution.stats.stiff else ""
+        first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (solution[:1].qd, solution._last[1]))
+        if last > limits.BLOW_UP * (1.0 + first):
+            said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion diverges."
+        found = said.strip()
     parts = (limit.sentence or solution.status.sentence, reason, where, found, remedy)
     return " ".join(part for part in parts if part)
 
@@ -218,7 +211,7 @@ def _vanished(solution):
         places = [BodyMotion(*handles.where(body), (q,)).point(s, 0) for body, s in points]
         lengths = [np.linalg.norm(np.subtract(*pair)) for pair in pairwise(places)]
         for (a, b), length in zip(pairwise(points), lengths, strict=True):
-            if length < NO_SPAN * sum(lengths):
+            if length < limits.NO_SPAN * sum(lengths):
                 found.append(
                     f"The span of {item.name!r} between {a[0].name!r} and {b[0].name!r} shrinks to length zero"
                 )
@@ -228,7 +221,7 @@ def _vanished(solution):
 def _jump(solution):
     """Name the forces whose law has no direction where the motion has come to rest."""
     (q, qd, _), t = solution._last, solution._reached
-    names = jumping(solution.packed, t, q, qd, solution._remembered, (AT_ONCE, NEAR_BY))
+    names = jumping(solution.packed, t, q, qd, solution._remembered, (limits.AT_ONCE, limits.NEAR_BY))
     if not names:
         return ""
     return (
@@ -237,30 +230,20 @@ def _jump(solution):
     )
 
 
-def _growth(solution):
-    """Report that the motion is stiff, or that its velocities diverge."""
-    said = "The motion is stiff: an implicit method, such as SDIRK54, may succeed. " if solution.stats.stiff else ""
-    first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (solution[:1].qd, solution._last[1]))
-    if last > BLOW_UP * (1.0 + first):
-        said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion diverges."
-    return said.strip()
-
-
 def suspect(solution, scene):
     """Name the nearly singular item at the last state."""
     if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
         return ""
-    if solution._phases is not None:
-        scene = last_phase(scene, solution._phases)
-    packed = scene.packed
-    place = singular_place(packed, solution._last[0])
+    place = singular_place(solution.packed, solution._last[0])
     if place:
         return f"{place}: a singular configuration."
-    if solution._last.shape[1] > MOST_SINGULAR:
+    if solution._phases is not None:  # not all rows hold
+        return ""
+    if solution._last.shape[1] > limits.MOST_SINGULAR:
         return _suspect_of_many(solution, scene)
-    _, Phi_q, _, _ = constraint_arrays(packed.system, solution._last[0], solution._last[1], solution._reached)
-    rows, share = weakest_row(scene, Phi_q, len(redundant_rows(packed)))
-    if not share < NEARLY_SINGULAR:
+    _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)
+    rows, share = weakest_row(scene, Phi_q, len(redundant_rows(solution.packed)))
+    if not share < limits.NEARLY_SINGULAR:
         return ""
     return (
         f"Phi_q is near to losing rank there (its smallest singular value is {share:.1e} of the largest, rows "
@@ -270,8 +253,8 @@ def suspect(solution, scene):
 
 def _suspect_of_many(solution, scene):
     """Do the same by elimination, in O(N)."""
-    packed = scene.packed
-    rows = dependent_rows(packed, solution._last[0], solution._reached, NEARLY_SINGULAR**2)
+    packed = solution.packed
+    rows = dependent_rows(packed, solution._last[0], solution._reached, limits.NEARLY_SINGULAR**2)
     redundant = len(redundant_rows(packed))
     if rows is None or len(rows) <= redundant:
         return ""

@@ -38,20 +38,11 @@ from ..rows.interface import (
 from ..runs.step_control import stretch
 from ..runs.tolerances import FROM_ZERO, HALVED, SHORTEST
 from ..workspaces import plain_context
+from . import tolerances as limits
 from .coefficients import begin, expand
 from .layout import Expansion, SeriesContext, empty_series
 from .step_end import Tops, keep_start, project_rates, sum_series
 from .step_length import size_of_order, weights
-from .tolerances import (
-    FAINT,
-    HALVINGS,
-    SMALL,
-    SMALL_STEPS,
-    STEP_COST,
-    STIFF_RATES,
-    STILL,
-    WARY,
-)
 
 # Memory of a batch of lanes: the context of a run by series, its numbers arrays of lanes, and the state of each.
 
@@ -240,7 +231,12 @@ class LaneMemory:
         many.expansion.forces["loop"], many.expansion.forces["margin"] = force_loops(packed, width).T
         if spinning:
             many.graph.spins[many.graph.bodies[:, 1] == 7] = 1
-        self._set_numbers(memory.run)
+        clock, numbers = memory.run.clock, self.context.numbers
+        numbers.atol, numbers.rtol = clock.atol, clock.rtol
+        numbers.max_step, numbers.first_step = clock.max_step, clock.h
+        numbers.t_start, numbers.t_end = clock.t_origin, clock.t_end
+        numbers.first_top = self.context.expansion.order.next
+        numbers.leave_when_stiff = memory.run.numbers.leave_when_stiff
         self.poses = values_of(many.tangent.poses)
         self.where, *self._keep = resident(many)
         pairs = [
@@ -256,14 +252,6 @@ class LaneMemory:
         arrays = [(array, values_of(array)[:, 0].copy()) for array in lane_arrays(many)]
         self.arrays = np.array([(a.ctypes.data, image.ctypes.data, a.size) for a, image in arrays], np.int64)
         self._keep += arrays
-
-    def _set_numbers(self, run):
-        clock, numbers = run.clock, self.context.numbers
-        numbers.atol, numbers.rtol = clock.atol, clock.rtol
-        numbers.max_step, numbers.first_step = clock.max_step, clock.h
-        numbers.t_start, numbers.t_end = clock.t_origin, clock.t_end
-        numbers.first_top = self.context.expansion.order.next
-        numbers.leave_when_stiff = run.numbers.leave_when_stiff
 
 
 # Projection of each lane onto the constraint manifold, as formulations/projection.py has it for one case.
@@ -319,7 +307,7 @@ def _radii(c, least, most, far, fast):
         size = size_of_order(x.bodies, nb, x.order.room, k, far, fast)
         here = choose(below(0.0, size), binary_log(max(size, TINY)) * ((top + 1.0) / k), -math.inf)
         likely = max(likely, here)
-    finite = choose(both(below(-math.inf, likely), below(likely, math.log2(FAINT))), 0.0, finite)
+    finite = choose(both(below(-math.inf, likely), below(likely, math.log2(limits.FAINT))), 0.0, finite)
     return choose(below(0.5, finite), rho, -math.inf), lower
 
 
@@ -327,7 +315,7 @@ def _radii(c, least, most, far, fast):
 def _held(h, rate, k):
     """As of taylor/step_length.py; h as log2."""
     # Velocity error over its bound, as log2
-    share = binary_log(STIFF_RATES * rate / k) + h
+    share = binary_log(limits.STIFF_RATES * rate / k) + h
     return binary_power(choose(below(share, 0.0), h + 2.0 * share / k, h))
 
 
@@ -344,7 +332,7 @@ def propose(c, least, most):
     if order.highest > order.lowest:
         # Higher order if it advances further per unit of work
         other = _held(lower + accuracy / top, rate, top)
-        rises = below(other * (top + STEP_COST), h * (top + (STEP_COST - 2.0)))
+        rises = below(other * (top + limits.STEP_COST), h * (top + (limits.STEP_COST - 2.0)))
         step = choose(rises, 1.0, -1.0 + 0.0 * top)
         let(s, NEXT, min(max(top + step, float(order.lowest)), float(order.highest)))
     h = min(h, n.max_step)
@@ -437,8 +425,8 @@ def _keep_away(c, most):
             # Share of what laws divide by
             let(s, LEFT, 0.0 * get(s, H) + 1.0)
             call_margin(kind.margin, most, kind, s[H:], x.loads[kind.values :], s[LEFT:])
-            short = below(STIFF_RATES * get(s, H), get(s, TOP))
-            _find_lost(c, opposite(below(choose(short, STILL, 0.0 * get(s, H)), get(s, LEFT))))
+            short = below(limits.STIFF_RATES * get(s, H), get(s, TOP))
+            _find_lost(c, opposite(below(choose(short, limits.STILL, 0.0 * get(s, H)), get(s, LEFT))))
 
 
 @kernel
@@ -452,10 +440,10 @@ def try_step(c):
     propose(c, least, most)
     _set_ends(c)
     _keep_away(c, most)
-    for i in range(HALVINGS + 1):
+    for i in range(limits.HALVINGS + 1):
         # Halve the steps that miss the manifold, then give these lanes up
         reach(c, least, most)
-        if not _is_missed(c, i < HALVINGS):
+        if not _is_missed(c, i < limits.HALVINGS):
             break
     return least, most
 
@@ -464,21 +452,21 @@ def try_step(c):
 def accept(c):
     """The end of each lane's step is where its next one begins; LOST where that is not like any other."""
     s, x, h = c.state, c.expansion, get(c.state, H)
-    far, poses = SMALL * get(s, FLOOR) / (ROUNDING * h), c.tangent.poses
+    far, poses = limits.SMALL * get(s, FLOOR) / (ROUNDING * h), c.tangent.poses
     rest, still = 0.0 * h, below(-1.0, 0.0 * h)
     for b in range(c.graph.bodies.shape[0]):
         for i in range(3):
             # Steps in which nothing moves; numbers that aren't finite
             spin, speed = abs(get(poses, b * POSE + OMEGA + i)), abs(get(poses, b * POSE + RD + i))
-            still = both(still, opposite(either(below(SMALL, spin * h), below(far, speed))))
+            still = both(still, opposite(either(below(limits.SMALL, spin * h), below(far, speed))))
             rest += 0.0 * spin + 0.0 * speed
     let(s, SLOW, choose(still, get(s, SLOW) + 1.0, 0.0))
     if c.numbers.leave_when_stiff == 1:
-        _find_lost(c, below(SMALL_STEPS - 0.5, get(s, SLOW)))
+        _find_lost(c, below(limits.SMALL_STEPS - 0.5, get(s, SLOW)))
     _find_lost(c, opposite(below(-1.0, rest)))
     # Near a singular configuration a case is run alone
     indicator = singularity_indicator(c.graph, c.tangent.rows)
-    _find_lost(c, opposite(below(max(ILL_CONDITIONED, WARY * get(s, INDICATOR)), indicator)))
+    _find_lost(c, opposite(below(max(ILL_CONDITIONED, limits.WARY * get(s, INDICATOR)), indicator)))
     let(s, INDICATOR, max(get(s, INDICATOR), indicator))
     # The state moves on
     let(s, T, get(s, T_NEXT))

@@ -8,7 +8,7 @@ import numpy as np
 from ..elements.bodies import Ground
 from ..elements.element import address
 from ..elements.loops import force_series
-from ..elements.loops.constraint_rows import BODY, INTS, MASK, STILL
+from ..elements.loops.constraint_rows import INTS, MASK, STILL
 from ..elements.loops.constraint_series import BODY_ROW, GROUND, UNTURNED, force_at, instance_width, scratch_at
 from ..elements.loops.friction import FRICTION_ROWS, REACTION
 from ..elements.loops.ground_contacts import is_ground_contact
@@ -18,7 +18,7 @@ from ..formulations.locked_orientations import instances
 from ..jit.arrays import zeros
 from ..jit.kernels import Record, loader, records, twin
 from ..model.equations import changes_with_state
-from ..model.packed import System, coupled_loads, members_of
+from ..model.packed import System, coupled_loads, index_of, members_of
 from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.program import run_program
@@ -538,24 +538,29 @@ def masks(graph, packed):
     constant. So do columns that the primitive's own series leaves constant in a random motion. Returns how many markers
     have constant columns.
     """
-    constant, lengths = 0, np.append(graph.bodies[:, 1], 0)
+    constant, lengths = 0, graph.bodies[:, 1]
     for row, (kind, members) in zip(graph.kinds, instances(packed, graph), strict=True):
         motions, patterns, series = {}, {}, twin(kind.series)
         for i, (constraint, par) in enumerate(members):
             entry = graph.table[row.table + i * INTS :][:INTS]
             # Directions of bodies that never turn are like those of the ground
-            length = [lengths[entry[BODY + (marker.body == "b")]] for marker in kind.markers]
+            bodies = [constraint.body_of(marker) for marker in kind.markers]
+            length = [0 if isinstance(body, Ground) else lengths[index_of(packed, body)] for body in bodies]
             grounded = tuple(
-                isinstance(constraint.body_of(marker), Ground) or (size == STILL and marker.code != POINT)
-                for marker, size in zip(kind.markers, length, strict=True)
+                isinstance(body, Ground) or (size == STILL and marker.code != POINT)
+                for marker, body, size in zip(kind.markers, bodies, length, strict=True)
             )
             key = grounded, (*Motion.numbers(par), *[0.0] * kind.memory)
             if key not in patterns:
                 if grounded not in motions:
-                    motions[grounded] = _random_motion(grounded)
+                    # The first coefficients of x, those of the ground constant
+                    x = np.random.default_rng(0).normal(size=(4, len(grounded), 3))
+                    x[1:, np.array(grounded)] = 0.0
+                    motions[grounded] = x.reshape(4, -1).tolist()
                 patterns[key] = _mask(kind, series, key[1], grounded, motions[grounded])
             # Instances with the same numbers have the same pattern
             mask = patterns[key]
+            mask |= sum(1 << (GROUND + j) for j, marker in enumerate(kind.markers) if marker.body not in ("a", "b"))
             entry[MASK] = mask | sum(int(size != 7) << (UNTURNED + j) for j, size in enumerate(length))
             constant += len(kind.markers) - (mask & ((1 << GROUND) - 1)).bit_count()
     return constant
@@ -573,13 +578,6 @@ def with_ground_contacts(graph, kinds):
         if not graph.kinds[i].drift and is_ground_contact(kind, masks_of(graph, i)):
             graph.kinds["reduced"][i] = address(kind.kernels, "contact_rows", kind.__name__, InvalidConstraint)
     return graph
-
-
-def _random_motion(grounded):
-    """The first coefficients of x, those of the ground constant."""
-    x = np.random.default_rng(0).normal(size=(4, len(grounded), 3))
-    x[1:, np.array(grounded)] = 0.0
-    return x.reshape(4, -1).tolist()
 
 
 def _mask(kind, series, par, grounded, motion):

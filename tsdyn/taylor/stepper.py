@@ -18,36 +18,10 @@ from ..runs.step_control import gets_on, stretch
 from ..runs.stepper import amend, fixed_end, is_sampled, next_stop, take_pieces
 from ..runs.tolerances import AT_LONGEST, FROM_ZERO, HALVED, MOST_TURN, SHORTEST, TRIES
 from ..workspaces import B_DATA, load_run
+from . import tolerances as limits
 from .layout import load_series
 from .step_length import finite_top, is_near, longest, loosest, radius, step_length, weights
 from .step_parts import call_expand, call_laws, call_reach, hold_accelerations, is_singular, set_floor, state_within
-from .tolerances import (
-    AT_REST,
-    AVOID,
-    AVOIDING,
-    CLOSE,
-    CLOSER,
-    FASTER,
-    HOP,
-    HOP_APART,
-    LEAST_STEPS,
-    LOOSER,
-    MINUTE,
-    MOST_HOPS,
-    PASSED,
-    PLACES,
-    RATES,
-    SHARP_STEPS,
-    SHARP_TOL,
-    SMALL,
-    SMALL_STEPS,
-    SPARE,
-    STILL,
-    STILL_STEP,
-    TIGHTER,
-    TIGHTEST,
-    WARY,
-)
 
 # Stops of a Taylor run: continuation after a step that ends at a stop.
 
@@ -132,13 +106,13 @@ def _propose(c, r, tol):
     s.spacing = (r.clock.t_end - r.clock.t_origin) / SAMPLES
     # By a tighter tolerance and any order
     if is_near_singular(c.tangent, c.tangent.indicator.start):
-        s.tol = max(TIGHTER * tol, min(tol, TIGHTEST))
+        s.tol = max(limits.TIGHTER * tol, min(tol, limits.TIGHTEST))
         s.h = longest(c, r, s.tol, s.highest)
     # Bounds that no coefficient knows of: sharp laws, counted turns, the first step
     s.limit = r.clock.max_step
     if s.sharp == 1:
-        s.h *= min(1.0, RATES * s.h / (order.top + 2)) ** (1.0 / (order.top + 2))
-        s.limit = min(s.limit, (r.clock.t_end - r.clock.t_origin) / LEAST_STEPS)
+        s.h *= min(1.0, limits.RATES * s.h / (order.top + 2)) ** (1.0 / (order.top + 2))
+        s.limit = min(s.limit, (r.clock.t_end - r.clock.t_origin) / limits.LEAST_STEPS)
     if c.system.memory.size > 0:  # what counts turns must see each of them
         s.limit = min(s.limit, MOST_TURN / max(_fastest(c), TINY))
     if r.numbers.steps == 0 and r.clock.h > 0.0:
@@ -189,10 +163,10 @@ def _is_taken(c, landed):
     if not landed:
         return False
     # Taken: shortened often enough, or the last one, or far enough from a singular configuration
-    if s.shorter == AVOIDING or s.last == 1 or not is_near(c, CLOSER if s.looser == 1 else CLOSE):
+    if s.shorter == limits.AVOIDING or s.last == 1 or not is_near(c, limits.CLOSER if s.looser == 1 else limits.CLOSE):
         return True
     # or it has passed: the indicator rises again
-    return s.looser == 1 and c.tangent.indicator.end > s.share and not is_near(c, PASSED)
+    return s.looser == 1 and c.tangent.indicator.end > s.share and not is_near(c, limits.PASSED)
 
 
 @kernel
@@ -200,12 +174,12 @@ def _choose_next(c, r, landed, tol):
     """Choose the next step to try; False if there is none better than the last one."""
     s, order = c.trial, c.expansion.order
     # The first try ends at a distance that can be gone on from
-    if landed and s.share == math.inf and not is_near(c, CLOSE):
+    if landed and s.share == math.inf and not is_near(c, limits.CLOSE):
         s.serves = 1
     # Lengthen, at a looser tolerance, to end beyond the singular configuration
     longer = 0.0
-    if s.looser == 1 and landed and LOOSER * s.tol <= loosest(c, tol):
-        s.share, s.tol = c.tangent.indicator.end, LOOSER * s.tol
+    if s.looser == 1 and landed and limits.LOOSER * s.tol <= loosest(c, tol):
+        s.share, s.tol = c.tangent.indicator.end, limits.LOOSER * s.tol
         longer = min(longest(c, r, s.tol, s.highest), s.limit)
     if longer > s.h:
         s.h = longer
@@ -218,7 +192,7 @@ def _choose_next(c, r, landed, tol):
     # Shorten: to stay away from it, or because the end was not reached
     if s.serves == 0:
         s.shorter += 1 if landed else 0
-        s.h *= AVOID if landed else HALVED
+        s.h *= limits.AVOID if landed else HALVED
     s.serves = 0
     return True
 
@@ -247,7 +221,7 @@ def _follows_laws(context, c, r):
     if s.good == 0.0 and _lower_order(c, r):
         return False
     # To the last place where they agree
-    s.h = max(s.good, 0.5 / PLACES) * h
+    s.h = max(s.good, 0.5 / limits.PLACES) * h
     s.limit, s.own_h = min(s.limit, s.h), min(s.own_h, s.h)
     if s.sharp == 0:
         order.next = min(order.top + 2, order.highest)
@@ -259,9 +233,9 @@ def _hop(context, c, r, log, stop):
     """Cross a point where a law is not analytic: r + rd h + rdd h^2 / 2, and likewise rotations. Status."""
     s, t = c.trial, r.clock.t
     # A few units in the last place of t; twice as long right after another one
-    s.h = HOP * SHORTEST * max(abs(t), FROM_ZERO * (r.clock.t_end - r.clock.t_origin))
-    s.hops = 0 if t > s.hopped + HOP_APART * s.h else s.hops + 1
-    if s.hops > MOST_HOPS or s.check == 0 or r.numbers.adaptive == 0:
+    s.h = limits.HOP * SHORTEST * max(abs(t), FROM_ZERO * (r.clock.t_end - r.clock.t_origin))
+    s.hops = 0 if t > s.hopped + limits.HOP_APART * s.h else s.hops + 1
+    if s.hops > limits.MOST_HOPS or s.check == 0 or r.numbers.adaptive == 0:
         return STEP_COLLAPSED
     s.h *= 2.0**s.hops
     s.hopped, c.expansion.order.top = t, 1
@@ -297,7 +271,7 @@ def make_step(context, c, r, log, stop):
         if not adaptive and c.system.memory.size > 0 and (s.t1 - r.clock.t) * _fastest(c) > 0.5 * math.pi:
             return CHART_LOST
         if not adaptive and s.check != 0:
-            call_laws(s.check, context, r.clock.t, s.t1 - r.clock.t, SHARP_TOL, SHARP_TOL)
+            call_laws(s.check, context, r.clock.t, s.t1 - r.clock.t, limits.SHARP_TOL, limits.SHARP_TOL)
             if s.good < 1.0:
                 return SERIES_ENDED
         if adaptive and s.check != 0 and not _follows_laws(context, c, r):
@@ -406,10 +380,10 @@ def _mind_singular(c, r):
     """Near a singular configuration: the rest of the run has a tighter tolerance."""
     indicator, clock = c.tangent.indicator, r.clock
     # Once per run: tighter tolerances from here on
-    if min(indicator.end, indicator.start) < WARY * indicator.largest:
+    if min(indicator.end, indicator.start) < limits.WARY * indicator.largest:
         if r.numbers.near_steps == 0:
             tol = clock.atol + clock.rtol
-            spare = max(SPARE, min(TIGHTEST / tol, 1.0))
+            spare = max(limits.SPARE, min(limits.TIGHTEST / tol, 1.0))
             clock.atol, clock.rtol = spare * clock.atol, spare * clock.rtol
         r.numbers.near_steps += 1
         clock.largest_landing = max(clock.largest_landing, c.tangent.landing.moved)
@@ -421,19 +395,19 @@ def _watch_stiffness(c, r, h):
     # Largest rotation of the step, rad, and displacement over the size of the scene
     far, p, most = extent(c.work) / h, c.tangent.poses, 0.0
     # A law close to its singularity limits the step, not stiffness
-    if not c.trial.left > STILL:
+    if not c.trial.left > limits.STILL:
         most = math.inf
     for b in range(c.graph.bodies.shape[0]):
         at = b * POSE
         for i in range(3):
             most = max(most, abs(p[at + OMEGA + i]) * h, abs(p[at + RD + i]) / far)
-        if most > SMALL:
+        if most > limits.SMALL:
             r.numbers.at_limit = 0
             return False
     # Steps in which little moves are counted; with sharp forces many more are needed
-    before, enough, tiny, faster = r.numbers.at_limit, SMALL_STEPS, STILL_STEP, FASTER
+    before, enough, tiny, faster = r.numbers.at_limit, limits.SMALL_STEPS, limits.STILL_STEP, limits.FASTER
     if c.trial.sharp == 1:
-        enough, tiny, faster = SHARP_STEPS, MINUTE, AT_REST
+        enough, tiny, faster = limits.SHARP_STEPS, limits.MINUTE, limits.AT_REST
     r.numbers.at_limit += faster if most < tiny else 1
     if before < enough <= r.numbers.at_limit:
         r.numbers.stiff = 1

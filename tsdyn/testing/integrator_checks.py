@@ -14,30 +14,9 @@ from ..methods.integrator import Integrator
 from ..observables.diagnostics import ConstraintError, constraint_error
 from ..runs.tolerances import STRETCH
 from ..simulation.prepared_run import simulate
+from . import tolerances as limits
 from .integrator_scenes import GRID, cases, distance
 from .series_checks import demand_kind
-from .tolerances import (
-    BOUNDED,
-    BY_ORDER,
-    COARSEST,
-    DENSE_TOLERANCE,
-    FACTOR,
-    FEWEST,
-    FINEST,
-    HIGH_ORDER,
-    HIGH_TOLERANCE,
-    ITERATION_TRACE,
-    LEVELS,
-    MOST,
-    NO_TRACE,
-    ORDER_TOLERANCE,
-    POINTS,
-    RATIO,
-    REJECTED,
-    REPEATED,
-    ROUNDING,
-    SETTLED,
-)
 
 
 def mean_distance(found, expected):
@@ -93,7 +72,7 @@ def demand_levels(solution, where, state=None):
     found = constraint_error(solution.packed, s.t, s.q, s.qd, s.qdd)
     first = int(FORMULATIONS[solution.formulation].first_order)  # Maggi/Kane drifts in position
     for name, level, values, factor in list(
-        zip(ConstraintError._fields, found, (s.q, s.qd, s.qdd), LEVELS, strict=True)
+        zip(ConstraintError._fields, found, (s.q, s.qd, s.qdd), limits.LEVELS, strict=True)
     )[first:]:
         excess = level / (EPS * (1.0 + np.abs(values).max(axis=1)))
         worst = int(np.argmax(excess))
@@ -134,11 +113,11 @@ def fixed_steps(method, case, form, order, where):
 
     There are more than MOST steps only where the order observed falls short of `order` and still changes.
     """
-    steps, off, between, count = [], [], [], FEWEST
-    while (number := GRID * round(count)) <= FINEST:
-        if number > MOST and not (steps and _falls_short(steps, off, order, case.trusted)):
+    steps, off, between, count = [], [], [], limits.FEWEST
+    while (number := GRID * round(count)) <= limits.FINEST:
+        if number > limits.MOST and not (steps and _falls_short(steps, off, order, case.trusted)):
             break
-        count *= RATIO
+        count *= limits.RATIO
         if steps and number == steps[-1]:
             continue
         try:
@@ -158,12 +137,12 @@ def fixed_steps(method, case, form, order, where):
         if off[-1] < _floor(case.trusted):
             break
     if not steps:
-        raise CheckFailed(f"{where}: no run of up to {MOST} steps reached the end of {case.end:g} s: {failure}")
+        raise CheckFailed(f"{where}: no run of up to {limits.MOST} steps reached the end of {case.end:g} s: {failure}")
     return np.array(steps), np.array(off), np.array(between)
 
 
 def _floor(trusted):
-    return max(ROUNDING, 100.0 * trusted)
+    return max(limits.ROUNDING, 100.0 * trusted)
 
 
 def _error(q, qd, q_expected, qd_expected):
@@ -173,15 +152,15 @@ def _error(q, qd, q_expected, qd_expected):
 def _fits(steps, off, trusted):
     """Orders fitted to the errors of the finest steps above rounding; none for less than three."""
     steps, off = np.array(steps), np.array(off)
-    good = (off > _floor(trusted)) & (off < COARSEST)
+    good = (off > _floor(trusted)) & (off < limits.COARSEST)
     steps, off = np.log(steps[good]), np.log(off[good])
-    return [-np.polyfit(steps[-n:], off[-n:], 1)[0] for n in POINTS] if good.sum() > 2 else []
+    return [-np.polyfit(steps[-n:], off[-n:], 1)[0] for n in limits.POINTS] if good.sum() > 2 else []
 
 
 def _falls_short(steps, off, order, trusted):
     """Whether the order observed is too low, and changes with the number of steps."""
     slopes = _fits(steps, off, trusted)
-    return not slopes or (max(slopes) < order - slack(order) and np.ptp(slopes) > SETTLED)
+    return not slopes or (max(slopes) < order - slack(order) and np.ptp(slopes) > limits.SETTLED)
 
 
 def _slopes(steps, off, trusted, where):
@@ -196,7 +175,7 @@ def _slopes(steps, off, trusted, where):
 
 def slack(order):
     """Return by how much an observed order may fall short."""
-    return ORDER_TOLERANCE if order <= HIGH_ORDER else HIGH_TOLERANCE
+    return limits.ORDER_TOLERANCE if order <= limits.HIGH_ORDER else limits.HIGH_TOLERANCE
 
 
 def observed_order(steps, off, order, where, trusted):
@@ -214,7 +193,7 @@ def observed_order(steps, off, order, where, trusted):
 def observed_dense_order(steps, off, order, where, trusted):
     """Return the fitted order of dense output; refuse one that is too low."""
     found = max(_slopes(steps, off, trusted, f"{where}, between the steps"))
-    if found < order - DENSE_TOLERANCE:
+    if found < order - limits.DENSE_TOLERANCE:
         raise CheckFailed(
             f"{where}: dense output has the observed order {found:.2f} and should have {order} (error {off[-1]:.1e} "
             f"between {steps[-1]} steps)."
@@ -227,7 +206,7 @@ def observed_dense_order(steps, off, order, where, trusted):
 
 def check_tolerances(method, case, form, where, order):
     """Check that errors follow the tolerance, and steps the order of the estimate."""
-    tolerances, found, asked, steps = BY_ORDER[order >= 4], [], [], []
+    tolerances, found, asked, steps = limits.BY_ORDER[order >= 4], [], [], []
     for tol in tolerances:
         made = make_method(method, rtol=tol, atol=tol)
         at = f"{where}, tolerance {tol:g}"
@@ -237,10 +216,10 @@ def check_tolerances(method, case, form, where, order):
         found.append(max(distance(solution.q, case.q), distance(solution.qd, case.qd)))
         asked.append(made.step_tolerances()[0])
         steps.append(solution.stats.steps)
-        if found[-1] > FACTOR * tol + 10.0 * case.trusted:
+        if found[-1] > limits.FACTOR * tol + 10.0 * case.trusted:
             raise CheckFailed(
-                f"{at}: the error is {found[-1]:.2g}, {found[-1] / tol:.0f} times the tolerance; {FACTOR:.0f} times "
-                "are allowed. The error estimate is too small, or the method's `safety` factor."
+                f"{at}: the error is {found[-1]:.2g}, {found[-1] / tol:.0f} times the tolerance; {limits.FACTOR:.0f} "
+                "times are allowed. The error estimate is too small, or the method's `safety` factor."
             )
     if not (np.diff(found) < 0.0).all():
         pairs = ", ".join(f"{off:.1e} at {tol:g}" for tol, off in zip(tolerances, found, strict=True))
@@ -268,27 +247,29 @@ def _history(solution, where):
 
 def check_rejections(method, case, form, where):
     """Check that the step after a rejection is the step without one."""
-    bold = make_method(method, rtol=REJECTED, atol=REJECTED)
+    bold = make_method(method, rtol=limits.REJECTED, atol=limits.REJECTED)
     bold.first_step = case.end / 10.0
     after = run_case(case, bold, form, max_steps=1)
     if not after.stats.steps:
         raise CheckFailed(f"{where}: after a first step of {bold.first_step:g} s: {after.message}")
     if not after.stats.rejected:
-        raise CheckFailed(f"{where}: a first step of {bold.first_step:g} s is accepted at a tolerance of {REJECTED:g}.")
-    plain = make_method(method, rtol=REJECTED, atol=REJECTED)
+        raise CheckFailed(
+            f"{where}: a first step of {bold.first_step:g} s is accepted at a tolerance of {limits.REJECTED:g}."
+        )
+    plain = make_method(method, rtol=limits.REJECTED, atol=limits.REJECTED)
     plain.first_step = float(after.steps.h[after.steps.accepted][0])
     before = run_case(case, plain, form, max_steps=1)
     if before.stats.rejected:
         raise CheckFailed(f"{where}: a step of {plain.first_step:g} s is accepted after a rejection, and not at once.")
     gap = max(distance(after.state.q, before.state.q), distance(after.state.qd, before.state.qd))
-    left = ITERATION_TRACE * max(bold.step_tolerances()) if bold.implicit else NO_TRACE
+    left = limits.ITERATION_TRACE * max(bold.step_tolerances()) if bold.implicit else limits.NO_TRACE
     if not gap < left:
         raise CheckFailed(f"{where}: rejected steps leave a trace of {gap:.1e} in the step that is accepted.")
 
 
 def check_bounds(method, case, form, where):
     """Check that first_step and max_step are respected."""
-    made = make_method(method, rtol=BOUNDED, atol=BOUNDED)
+    made = make_method(method, rtol=limits.BOUNDED, atol=limits.BOUNDED)
     made.first_step, made.max_step = case.end / 1000.0, case.end / 400.0
     steps = finished(run_case(case, made, form), where).steps
     if steps.h[0] != made.first_step:
@@ -384,7 +365,9 @@ def check_integrator(
             errors = ()
             if adaptive:
                 errors = check_tolerances(method, case, form, where, order)
-                demand_repeatable(lambda: make_method(method, rtol=REPEATED, atol=REPEATED), case, form, where)
+                demand_repeatable(
+                    lambda: make_method(method, rtol=limits.REPEATED, atol=limits.REPEATED), case, form, where
+                )
                 if kind.driver == "steps":  # series know a step's error before it is made
                     check_rejections(method, case, form, where)
                 check_bounds(method, case, form, where)

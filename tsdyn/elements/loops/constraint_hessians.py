@@ -18,14 +18,14 @@ from ..markers import PARAMETERS, chain_rule, rate
 from ..tolerances import CONSTRAINT_STEP
 from .coordinate_rows import INTS, ROW, STRIDE
 from .template import (
-    AT,
     CODES,
-    DIMENSION,
     MARKERS,
+    OTHERS,
     OWNERS,
     RATES_FROM,
     ROWS,
     SIZE,
+    SPAN,
     STARTS,
     SUMMED,
     differentiate,
@@ -34,11 +34,11 @@ from .template import (
     kernel_jacobian,
     move_markers,
     place_markers,
+    place_of,
 )
 
 STIFFNESS = "iipppdpp"  # count, stride, table, reals, q, t, lam, K
 SLOPES = "iipppppdpp"  # count, stride, table, reals, q, qd, qdd, t, G1, G2
-SPAN = 14  # coordinates of two bodies
 
 
 class Slopes(NamedTuple):
@@ -65,8 +65,9 @@ def _accelerate_markers(q, qdd, own, real, xdd):
     """xdd += x_q qdd."""
     pushed = stack(4)
     for j in range(MARKERS):
-        k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-        rate(CODES[j], own[DIMENSION + k], own[AT + k], q, qdd, s, pushed)
+        c, s = STARTS[j], real[3 * j : 3 * j + 3]
+        at, dimension = place_of(own, real, OWNERS[j])
+        rate(CODES[j], dimension, at, q, qdd, s, pushed)
         for b in range(4 if CODES[j] == PARAMETERS else 3):
             xdd[c + b] += pushed[b]
 
@@ -138,20 +139,20 @@ def _derive_reaction(x, par, t, lam, J, H):
 
 @part
 def _fill_row(q, qd, own, real, along_x, along_second, out):
-    """out (n,) = along_x x_q + along_second x_qq qd, for one row of G1 or G2, at its two bodies; added to a sum."""
+    """out (n,) = along_x x_q + along_second x_qq qd, for one row of G1 or G2, at its bodies; added to a sum."""
     row = stack(SPAN)
     for i in range(SPAN):
         row[i] = 0.0
     for j in range(MARKERS):
         # First order: along_x x_q. Second order: along_second x_qq qd
         k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-        code, dimension, at = CODES[j], own[DIMENSION + k], own[AT + k]
+        code, (at, dimension) = CODES[j], place_of(own, real, k)
         chain_rule(code, dimension, at, q, s, along_x[c:], 0, row[7 * k :])
         _chain_second(code, dimension, at, qd, s, along_second[c:], row[7 * k :])
-    for side in range(2):
-        for i in range(own[DIMENSION + side]):
-            at = own[AT + side] + i
-            out[at] = out[at] + row[7 * side + i] if SUMMED else row[7 * side + i]
+    for body in range(2 + OTHERS):
+        first, dimension = place_of(own, real, body)
+        for i in range(dimension):
+            out[first + i] = out[first + i] + row[7 * body + i] if SUMMED else row[7 * body + i]
 
 
 @part
@@ -167,17 +168,19 @@ def _pull_back(q, own, real, H, XHX):
             HX[i, d] = 0.0
         for j in range(MARKERS):
             k, s = OWNERS[j], real[3 * j : 3 * j + 3]
-            chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, H[i, STARTS[j] :], 0, HX[i, 7 * k :])
+            at, dimension = place_of(own, real, k)
+            chain_rule(CODES[j], dimension, at, q, s, H[i, STARTS[j] :], 0, HX[i, 7 * k :])
     # x_q^T HX, column by column
     for d in range(SPAN):
         for j in range(MARKERS):
             k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
+            at, dimension = place_of(own, real, k)
             for b in range(4):
                 where[b] = HX[c + b, d] if c + b < SIZE else 0.0
             for b in range(7):
                 row[b] = 0.0
-            chain_rule(CODES[j], own[DIMENSION + k], own[AT + k], q, s, where, 0, row)
-            for b in range(own[DIMENSION + k]):
+            chain_rule(CODES[j], dimension, at, q, s, where, 0, row)
+            for b in range(dimension):
                 XHX[7 * k + b, d] += row[b]
 
 
@@ -187,7 +190,7 @@ def _add_geometric(own, real, lam, J, XHX):
     where, e = stack(4), stack(4)
     for j in range(MARKERS):
         k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-        if own[DIMENSION + k] == 7 and CODES[j] != PARAMETERS:
+        if place_of(own, real, k)[1] == 7 and CODES[j] != PARAMETERS:
             # f = Phi_x^T lam, the force on the marker
             x, y, z = 0.0, 0.0, 0.0
             for r in range(ROWS):
@@ -216,11 +219,12 @@ def geometric_stiffness(count, stride, table, reals, q, t, lam, K):
         # K += x_q^T H x_q + f x_qq
         _pull_back(q, own, real, H, XHX)
         _add_geometric(own, real, own_lam, J, XHX)
-        for one in range(2):
-            for other in range(2):
-                for e in range(own[DIMENSION + one]):
-                    for d in range(own[DIMENSION + other]):
-                        K[(own[AT + one] + e) * n + own[AT + other] + d] += XHX[7 * one + e, 7 * other + d]
+        for one in range(2 + OTHERS):
+            for other in range(2 + OTHERS):
+                (at, dimension), (to, width) = place_of(own, real, one), place_of(own, real, other)
+                for e in range(dimension):
+                    for d in range(width):
+                        K[(at + e) * n + to + d] += XHX[7 * one + e, 7 * other + d]
     return 0
 
 
@@ -242,7 +246,7 @@ def rate_slopes(count, stride, table, reals, q, qd, qdd, t, G1, G2):
             _fill_row(q, qd, own, real, a1[r], J[r], G1[row:])
             _fill_row(q, qd, own, real, a2[r], g_xd[r], G2[row:])
             for j in range(MARKERS):
-                k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-                at = own[AT + k]
-                _chain_second(CODES[j], own[DIMENSION + k], at, qdd, s, J[r, c:], G2[row + at :])
+                c, s = STARTS[j], real[3 * j : 3 * j + 3]
+                at, dimension = place_of(own, real, OWNERS[j])
+                _chain_second(CODES[j], dimension, at, qdd, s, J[r, c:], G2[row + at :])
     return 0

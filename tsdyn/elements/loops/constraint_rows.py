@@ -6,6 +6,8 @@ from ..markers import PARAMETERS, POINT
 from .template import (
     CODES,
     MARKERS,
+    OTHERS,
+    OTHERS_AT,
     OWNERS,
     ROOM,
     ROWS,
@@ -246,10 +248,19 @@ BODY, ROW, MASK, PAIR, INTS = 0, 2, 3, 4, 5
 
 
 @part
+def pose_of(table, own, reals, real, k):
+    """Place of body k of an instance among the poses."""
+    if OTHERS > 0 and k > 1:
+        return int(get(reals, real + 3 * MARKERS + OTHERS_AT + 3 * (k - 2) + 2))
+    return get(table, own + k)
+
+
+@part
 def _place_markers(table, own, reals, real, poses, x):
     """Set x (ROOM,) from the poses."""
     for j in range(MARKERS):
-        marker_position(CODES[j], poses, get(table, own + OWNERS[j]) * POSE, reals, real + 3 * j, x, STARTS[j])
+        at = pose_of(table, own, reals, real, OWNERS[j]) * POSE
+        marker_position(CODES[j], poses, at, reals, real + 3 * j, x, STARTS[j])
 
 
 def values(count, stride, table, reals, poses, unused, t, out, H):
@@ -275,7 +286,8 @@ def reduced(count, stride, table, reals, poses, unused, t, out, H):
         own, real = i * INTS, i * stride
         _place_markers(table, own, reals, real, poses, x)
         for j in range(MARKERS):
-            marker_frame(CODES[j], poses, get(table, own + OWNERS[j]) * POSE, reals, real + 3 * j, frames[j])
+            at = pose_of(table, own, reals, real, OWNERS[j]) * POSE
+            marker_frame(CODES[j], poses, at, reals, real + 3 * j, frames[j])
         par = reals[real + 3 * MARKERS :]
         # Phi and Phi_x of the primitive
         kernel_phi(x, par, t, f)
@@ -286,6 +298,8 @@ def reduced(count, stride, table, reals, poses, unused, t, out, H):
             # H = Phi_x x_(r, pi'), marker by marker
             a = b = na = nb = splat(0.0)
             for j in range(MARKERS):
+                if OWNERS[j] > 1:
+                    continue
                 force, torque = gradient(CODES[j], frames[j], g[r], STARTS[j])
                 if OWNERS[j] == 0:
                     a, na = add(a, force), add(na, torque)
@@ -308,7 +322,7 @@ def bias(count, stride, table, reals, poses, unused, t, out, H):
         own, real = i * INTS, i * stride
         for j in range(MARKERS):
             # gamma + Phi_x xdd at (rdd, omega'd) = 0
-            at = get(table, own + OWNERS[j]) * POSE
+            at = pose_of(table, own, reals, real, OWNERS[j]) * POSE
             marker_motion(CODES[j], poses, at, reals, real + 3 * j, x, xd, xdd, STARTS[j])
         row = get(table, own + ROW)
         acceleration_bias(x, xd, xdd, reals[real + 3 * MARKERS :], t, f, g, out[row:])

@@ -25,7 +25,7 @@ import numpy as np
 from ...jit.kernels import ANY, caller, data_of, integers, kernel, matrix, part, stack, stack2, vector
 from ...jit.simd import add, cross, fetch, fma, four, get, lanes, let, put, splat, times, total
 from ..markers import POINT
-from .constraint_rows import INTS, MASK, ROW, turned
+from .constraint_rows import INTS, MASK, ROW, pose_of, turned
 from .template import (
     AHEAD,
     CODES,
@@ -48,8 +48,8 @@ S_OMEGA, S_R, S_SPIN, BODY_ROW = 12, 16, 20, 24
 SIGNATURE = "iippppppp"  # mode, k, extent, table, reals, bodies, values, b, Z
 call_series = caller(SIGNATURE)
 ADVANCE, RESIDUAL = range(2)
-# bits of the mask: from 0 on the markers whose columns vary, from 16 on those that are on the ground, from 32 on those
-# whose body has no use for a torque
+# bits of the mask: from 0 on the markers whose columns vary, from 16 on those that are on the ground or on other bodies
+# than a and b, from 32 on those whose body has no use for a torque
 GROUND, UNTURNED = 16, 32
 
 
@@ -121,7 +121,7 @@ def offsets(orders):
 def _marker_coefficient(j, k, one):
     """Coefficient k of x of a marker."""
     orders, table, own, reals, real, bodies, _, _ = one
-    body, s = get(table, own + OWNERS[j]) * BODY_ROW * orders, real + 3 * j
+    body, s = pose_of(table, own, reals, real, OWNERS[j]) * BODY_ROW * orders, real + 3 * j
     x = turned(bodies, body + 12 * k, get(reals, s), get(reals, s + 1), get(reals, s + 2))
     return add(x, four(bodies, body + S_R * orders + 4 * k)) if CODES[j] == POINT else x
 
@@ -132,6 +132,8 @@ def _fetch_next(mode, k, orders, table, own, bodies, values, at):
     wide, (F, _L, _X, _J, _scratch) = 4 * orders, offsets(orders)
     fetch(values, at, F)
     for j in range(MARKERS):
+        if OWNERS[j] > 1:
+            continue
         body = get(table, own + OWNERS[j]) * BODY_ROW * orders
         if mode == ADVANCE:
             fetch(bodies, body, 12 * (k + 1))

@@ -67,6 +67,8 @@ def jacobian(count, stride, table, reals, q, qd, t, out):
             for j in range(MARKERS):
                 # Phi_x x_q at the coordinates of the marker's body
                 k = OWNERS[j]
+                if k > 1:
+                    continue
                 block = own[BLOCK + k] + r * own[STRIDE]
                 s, row = real[3 * j : 3 * j + 3], f[r, STARTS[j] :]
                 fresh = 0 if SUMMED else FIRST[j]

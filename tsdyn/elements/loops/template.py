@@ -144,7 +144,10 @@ RATES_FROM = 1  # number of rows on positions, which those on velocities follow
 SIZE = ROOM = 1  # length of x, the concatenated marker coordinates; and with room for a store of four at its end
 CODES = OWNERS = STARTS = FIRST = (
     0,
-)  # of each marker: its kind, its body (0 a, 1 b), its place in x, first of its body
+)  # of each marker: its kind, its body (0 a, 1 b, others from 2), its place in x, first of its body
+OTHERS = 0  # bodies beyond a and b that an instance reads: three of its parameters each, see `place_of`
+OTHERS_AT = 0  # where these begin among the parameters
+SPAN = 14  # coordinates of all its bodies
 SLOTS = 1  # rows of scratch memory of `series`
 AHEAD = False  # whether each instance has the next one's numbers brought into the cache
 DRIVEN = False  # whether the series depend on time
@@ -178,19 +181,32 @@ extent = record_at(Extent)
 
 
 @part
+def place_of(own, real, k):
+    """Where the coordinates of body k of an instance begin, and how many they are.
+
+    The table has those of a and b; those of others, and their places among the poses, are parameters.
+    """
+    if OTHERS > 0 and k > 1:
+        i = 3 * MARKERS + OTHERS_AT + 3 * (k - 2)
+        return int(real[i]), int(real[i + 1])
+    return own[AT + k], own[DIMENSION + k]
+
+
+@part
 def place_markers(q, own, real, x):
     """Set x (SIZE,) from q."""
     for j in range(MARKERS):
-        k = OWNERS[j]
-        position(CODES[j], own[DIMENSION + k], own[AT + k], q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
+        at, dimension = place_of(own, real, OWNERS[j])
+        position(CODES[j], dimension, at, q, real[3 * j : 3 * j + 3], x[STARTS[j] :])
 
 
 @part
 def move_markers(q, qd, own, real, x, xd, xdd):
     """Set x, xd and, for qdd = 0, xdd."""
     for j in range(MARKERS):
-        k, c, s = OWNERS[j], STARTS[j], real[3 * j : 3 * j + 3]
-        motion(CODES[j], own[DIMENSION + k], own[AT + k], q, qd, s, x[c:], xd[c:], xdd[c:])
+        c, s = STARTS[j], real[3 * j : 3 * j + 3]
+        at, dimension = place_of(own, real, OWNERS[j])
+        motion(CODES[j], dimension, at, q, qd, s, x[c:], xd[c:], xdd[c:])
 
 
 @part

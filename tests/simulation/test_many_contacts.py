@@ -1,0 +1,209 @@
+"""Many contacts and many events: stacks, chains, long rows of impacts; outputs across impacts of one run."""
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tests.helpers.tolerances import EPS
+
+C = ts.constraints
+G = 9.81
+FLOOR = {"normal_b": (0, 0, 1), "unilateral": True}
+BOX = np.array([0.5, 0.5, 0.25])
+
+
+def stack(count):
+    """Tilted boxes above each other; 4 contacts each."""
+    scene, rng = ts.Scene(gravity=(0, 0, -G)), np.random.default_rng(1)
+    below, top = scene.ground, 0.0
+    for i in range(count):
+        half = 0.01 * rng.normal()
+        box = scene.add_body(
+            **ts.shapes.box(2 * BOX, mass=1.0),
+            position=(0, 0, BOX[2] + 0.03 + 0.53 * i),
+            orientation=(np.cos(half), np.sin(half), 0, 0),
+            name=f"box {i}",
+        )
+        for corner in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            at = {"point_a": BOX * [*corner, -1], "point_b": (0, 0, top), "name": f"corner {corner} of {i}"}
+            scene.add(C.PlaneContact(box, below, **at, **FLOOR, restitution=0.2))
+        below, top = box, BOX[2]
+    return scene
+
+
+@pytest.mark.parametrize("count", [3, pytest.param(10, marks=pytest.mark.slow)])
+def test_a_stack_of_boxes_falls_and_comes_to_rest(count):
+    """Contacts are redundant; the forces between boxes are the weights above, where the boxes rest."""
+    scene = stack(count)
+    solution = ts.simulate(scene, (0, 2.0), rtol=1e-10, atol=1e-10)
+    assert solution.success
+    assert np.diff(solution.energy).max() < 1e-12 * count**2 * G
+    assert solution.constraint_error.position.max() < 1e-14 * count
+    assert solution.constraint_error.velocity.max() < 1e-14 * count
+    state = solution.state
+    for i in range(count):
+        # Rest, each box on the one below
+        assert abs(state.position(f"box {i}")[2] - BOX[2] * (2 * i + 1)) < 1e-12
+        assert np.abs(state.velocity(f"box {i}")[2]) < 1e-12
+        corners = [contact.name for contact in scene.constraints if contact.name.endswith(f"of {i}")]
+        force = sum(solution.reaction(name)[0][-1] for name in corners)
+        np.testing.assert_allclose(force, [0, 0, (count - i) * G], atol=1e-9 * count)
+
+
+def chain(links):
+    """A chain along an inclined line, its lower end near the floor; a contact at each lower end of a link."""
+    scene, length, angle = ts.Scene(gravity=(0, 0, -G)), 0.1, 0.5
+    along, before = np.array([np.cos(angle), 0, np.sin(angle)]), None
+    for i in range(links):
+        middle = [0, 0, 0.05] + (i + 0.5) * length * along
+        orientation = (np.cos(angle / 2), 0, -np.sin(angle / 2), 0)
+        inertia = (1e-5, 0.1 * length**2 / 12, 0.1 * length**2 / 12)
+        link = scene.add_body(mass=0.1, inertia=inertia, position=middle, orientation=orientation)
+        if before is not None:
+            scene.add(C.Revolute.at(before, link, point=middle - 0.5 * length * along, axis=(0, 1, 0)))
+        scene.add(C.PlaneContact(link, scene.ground, point_a=(-length / 2, 0, 0), **FLOOR, name=f"link {i}"))
+        before = link
+    return scene
+
+
+@pytest.mark.parametrize(("links", "end"), [(6, 0.6), pytest.param(100, 0.4, marks=pytest.mark.slow)])
+def test_a_chain_falls_on_a_floor(links, end):
+    """Momentum changes at impacts by their impulses alone, and the floor never pulls."""
+    scene = chain(links)
+    solution = ts.simulate(scene, (0, end), rtol=1e-10, atol=1e-10)
+    assert solution.success
+    momentum, impulses = solution.linear_momentum, {}
+    unseen = 0.1 * links * np.sqrt(2 * G * 16 * EPS)  # kg m/s: of flights lower than rounding of a gap
+    for t, _, impulse in solution.impulses:
+        impulses[t] = impulses.get(t, 0.0) + impulse
+    assert len(impulses) > 2
+    for t, impulse in impulses.items():
+        (at,) = np.nonzero(solution.t == t)
+        change = momentum[at[-1]] - momentum[at[0]]
+        np.testing.assert_allclose(change, [0, 0, impulse], atol=unseen)
+    assert np.diff(solution.energy).max() < 1e-8
+    for i in range(links):
+        assert solution.reaction(f"link {i}")[0][:, 2].min() > -1e-9 * links * G
+    points = [solution.position(body, point=(-0.05, 0, 0))[:, 2].min() for body in scene.bodies]
+    assert min(points) > -1e-12
+    assert max(solution.constraint_error.position.max(), solution.constraint_error.velocity.max()) < 1e-12
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_impacts_leave_the_constraints_as_they_are():
+    """A bob on a rod flies to and fro between two walls; its speed and the time between impacts stay."""
+    scene, speed = ts.Scene(gravity=(0, 0, 0)), 500.0
+    bob = scene.add_point_mass(mass=1.0, position=(0, 0, 1), velocity=(speed, 0, 0), name="bob")
+    scene.add(C.Distance(bob, scene.ground))
+    for side in (1, -1):
+        wall = {"point_b": (0.1 * side, 0, 0), "normal_b": (-side, 0, 0), "unilateral": True, "restitution": 1.0}
+        scene.add(C.PlaneContact(bob, scene.ground, **wall))
+    between = 2 * np.arcsin(0.1) / speed
+    solution = ts.simulate(scene, (0, 1e5 * between))
+    times = np.array([t for t, *_ in solution.impulses])
+    assert times.size == 100_000
+    assert np.abs(times - between * (0.5 + np.arange(times.size))).max() < 1e-8
+    assert max(solution.constraint_error.position.max(), solution.constraint_error.velocity.max() / speed) < 1e-14
+    np.testing.assert_allclose(solution.kinetic_energy, 0.5 * speed**2, rtol=1e-9)
+
+
+# outputs across impacts, which a run goes on from in its memory
+
+
+def bouncing(e=1.0, balls=1):
+    scene = ts.Scene(gravity=(0, 0, -G))
+    for i in range(balls):
+        ball = scene.add_point_mass(mass=1.0, position=(i, 0, 1 + 0.1 * i), velocity=(1, 0, 0), name=f"ball {i}")
+        scene.add(C.PlaneContact(ball, scene.ground, **FLOOR, restitution=e, name=f"floor {i}"))
+    return scene
+
+
+def height(t, start):
+    """Of a ball that bounces without loss from `start`, and its velocity."""
+    fall = np.sqrt(2 * start / G)
+    s = (t + fall) % (2 * fall) - fall
+    return start - G / 2 * s**2, -G * s
+
+
+METHODS = [None, ts.integrators.DOP853(1e-10, 1e-10), ts.integrators.RK45(1e-10, 1e-10)]
+OTHERS = [ts.integrators.Nystrom4(step=2e-3), ts.integrators.Radau(1e-9, 1e-9)]
+
+
+@pytest.mark.parametrize("method", [*METHODS, *(pytest.param(each, marks=pytest.mark.slow) for each in OTHERS)])
+def test_outputs_between_and_at_many_impacts(method):
+    """Times asked for, dense output on both sides of each impact, phases, and the rows of each step."""
+    scene, end = bouncing(balls=2), 8.0
+    fall = np.sqrt(2 / G)
+    times = np.unique(np.concatenate((np.linspace(0, end, 101), fall * np.arange(1, 16, 2))))
+    asked = ts.simulate(scene, (0, end), t_eval=times, integrator=method)
+    np.testing.assert_array_equal(asked.t, times)
+    solution = ts.simulate(scene, (0, end), dense_output=True, integrator=method)
+    for i in range(2):
+        z, zd = height(times, 1 + 0.1 * i)
+        away = np.abs(np.abs(zd) - np.sqrt(2 * G * (1 + 0.1 * i))) > 1e-6  # velocities jump at impacts
+        for found in (asked, solution.at(times)):
+            np.testing.assert_allclose(found.position(f"ball {i}")[:, 2], z, atol=1e-9)
+            np.testing.assert_allclose(found.velocity(f"ball {i}")[away, 2], zd[away], atol=1e-8)
+        mine = np.array([t for t, name, _ in solution.impulses if name == f"floor {i}"])
+        exact = np.sqrt(2 * (1 + 0.1 * i) / G) * np.arange(1, 2 * mine.size, 2)
+        np.testing.assert_allclose(mine, exact, atol=1e-9)
+        later, before = (solution.at(t).velocity(f"ball {i}")[:, 2] for t in (mine, np.nextafter(mine, 0.0)))
+        np.testing.assert_allclose(later, -before, atol=1e-8)
+    starts = np.array([start for start, *_ in solution.phases])
+    np.testing.assert_array_equal(starts[1:], sorted(t for t, *_ in solution.impulses))
+    # Every impact has a row before it and one after it
+    for t in starts[1:]:
+        assert (solution.t == t).sum() == 2
+    assert np.ptp(solution.energy) < 1e-8
+
+
+def test_events_of_a_user_across_many_impacts():
+    """The top of each flight, beside impacts that the run goes on from; a count of them ends the run."""
+
+    def top(t, state):
+        return state.velocity("ball 0")[2]
+
+    top.direction = -1
+    fall = np.sqrt(2 / G)
+    solution = ts.simulate(bouncing(), (0, 9.0), events=top)
+    np.testing.assert_allclose(solution.t_events[0], 2 * fall * np.arange(solution.t_events[0].size), atol=1e-12)
+    assert solution.t_events[0].size == 10
+    top.terminal = 6
+    ended = ts.simulate(bouncing(), (0, 9.0), events=top)
+    assert ended.status is ts.Status.EVENT
+    assert abs(ended.reached - 10 * fall) < 1e-12
+    assert len(ended.impulses) == 5
+
+
+def test_limits_of_steps_and_progress_across_impacts():
+    seen = []
+    solution = ts.simulate(bouncing(), (0, 9.0), max_steps=5, progress=lambda fraction, *_: seen.append(fraction))
+    assert solution.status is ts.Status.MAX_STEPS
+    assert solution.stats.steps == 5
+    assert 0.0 < solution.reached < 9.0
+
+
+def test_the_same_numbers_in_a_second_run_and_after_others():
+    """A run that goes on in its memory leaves nothing behind for the next one."""
+    scene = bouncing(0.7, balls=3)
+    first = ts.simulate(scene, (0, 3.0), dense_output=True)
+    ts.simulate(scene, (0, 1.0), t_eval=[0.5])
+    again = ts.simulate(scene, (0, 3.0), dense_output=True)
+    np.testing.assert_array_equal(first.t, again.t)
+    np.testing.assert_array_equal(first.q, again.q)
+    assert first.impulses == again.impulses
+    assert first.phases == again.phases
+
+
+def test_a_step_over_many_contacts_finds_the_first():
+    """Gaps that close within one step, in any order; ties are one event."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    heights = np.array([1.0, 0.3, 0.7, 0.3, 0.9, 0.5, 0.300001, 2.0])
+    for i, z in enumerate(heights):
+        ball = scene.add_point_mass(mass=1.0, position=(i, 0, z), name=f"ball {i}")
+        scene.add(C.PlaneContact(ball, scene.ground, **FLOOR, name=f"floor {i}"))
+    solution = ts.simulate(scene, (0, 2.0))
+    times = {name: t for t, name, _ in solution.impulses}
+    np.testing.assert_allclose([times[f"floor {i}"] for i in range(8)], np.sqrt(2 * heights / G), rtol=4 * EPS)
+    assert times["floor 1"] == times["floor 3"]
+    assert len(solution.phases) == 8

@@ -1,0 +1,31 @@
+"""What follows from the packed scene, asked of that of each phase of a run."""
+
+from functools import wraps
+
+import numpy as np
+
+
+def in_phases(method):
+    """Decorate a method that returns arrays over the outputs, a tuple of them, or a named tuple."""
+
+    @wraps(method)
+    def call(self, *arguments, **keywords):
+        phases = getattr(self, "_phases", None)
+        if phases is None or not phases.varies:
+            return method(self, *arguments, **keywords)
+        return gathered(self, lambda part: method(part, *arguments, **keywords))
+
+    return call
+
+
+def gathered(solution, ask):
+    """What the outputs of each packed scene say, in the order of the outputs."""
+    found, order = [], []
+    for part, mine in solution._phases.parts(solution):
+        found.append(ask(part))
+        order.append(mine)
+    back = np.argsort(np.concatenate(order), kind="stable")
+    if isinstance(found[0], tuple):
+        columns = [np.concatenate(column)[back] for column in zip(*found, strict=True)]
+        return type(found[0])(*columns) if hasattr(found[0], "_fields") else tuple(columns)
+    return np.concatenate(found)[back]

@@ -117,7 +117,7 @@ def test_an_elbow_with_a_stop(e, end):
 # a block on smooth ground: its centre moves along a vertical
 
 
-def block(b, h, tilt, e=0.0):
+def block(b, h, tilt, e=0.0, **friction):
     """Half width b, half height h; tilted about one of its lower edges."""
     scene, mass = ts.Scene(gravity=(0, 0, -G)), 2.0
     inertia, height = mass * (b * b + h * h) / 3, h * np.cos(tilt) + b * np.sin(tilt)
@@ -126,7 +126,7 @@ def block(b, h, tilt, e=0.0):
     scene.add(C.Parallel(body, scene.ground, axis_a=(0, 1, 0), axis_b=(0, 1, 0)))
     for i, corner in enumerate([(-b, 0, -h), (b, 0, -h), (b, 0, h)]):
         contact = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": e, "name": f"edge {i}"}
-        scene.add(C.PlaneContact(body, scene.ground, point_a=corner, **contact))
+        scene.add(C.PlaneContact(body, scene.ground, point_a=corner, **contact, **friction))
     return scene
 
 
@@ -170,6 +170,24 @@ def test_a_block_rocks_on_smooth_ground():
     assert [names for *_, names in solution.phases[:3]] == [("edge 1",), ("edge 0",), ("edge 1",)]
     assert solution.phases[-1][2] == ("edge 0", "edge 1")  # in finite time
     assert np.ptp(solution.position("block")[:, 0]) < 1e-13
+
+
+def test_a_block_rocks_on_rough_ground():
+    """Housner 1963: about an edge that sticks, the rate falls by 1 - 3/2 sin^2 at each impact; times by quadrature."""
+    b, h, top, times, t = 0.2, 0.5, 0.1, [], 0.0
+    solution = ts.simulate(block(b, h, top, kinetic=0.6), (0, 0.8), **TIGHT)
+    smooth, whole, factor = Smooth(b, h), 4 / 3 * (b * b + h * h), 1 - 1.5 * b * b / (b * b + h * h)
+
+    def swing(top):
+        return quad(lambda u: 2 * u * np.sqrt(whole / (2 * G * smooth.fall(top, top - u * u))), 0, np.sqrt(top))[0]
+
+    for _ in range(3):
+        times.append(t + swing(top))
+        height = factor**2 * smooth.fall(top, 0.0)
+        top = brentq(lambda x, height=height: smooth.fall(x, 0.0) - height, 0, top, xtol=1e-15)
+        t = times[-1] + swing(top)
+    np.testing.assert_allclose([t for t, *_ in solution.impulses[:3]], times, atol=1e-9)
+    assert [name for _, name, _ in solution.impulses[:3]] == ["edge 0", "edge 1", "edge 0"]
 
 
 def test_a_flat_block_rests_at_once():

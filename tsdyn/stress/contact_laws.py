@@ -28,10 +28,14 @@ def unilateral(solution):
 
 
 def impacts(solution):
-    """What an impact changes are the momenta of its impulses, and of those of the bilateral constraints."""
-    if solution._phases is None:
+    """What an impact changes are the momenta of its impulses, and of those of the bilateral constraints.
+
+    Impulses of friction aren't among those that a run tells.
+    """
+    contacts = [] if solution._phases is None else list(_contacts(solution.packed))
+    if not contacts or any(getattr(contact, "kinetic", 0.0) for contact, _ in contacts):
         return
-    system, contacts = solution.packed.system, list(_contacts(solution.packed))
+    system = solution.packed.system
     rows, fastest = [row for _, own in contacts for row in own], np.abs(solution.qd).max(axis=0)
     before, after = _events(solution)
     hit = [k for k, i in enumerate(before) if any(t == solution.t[i] for t, *_ in solution.impulses)]

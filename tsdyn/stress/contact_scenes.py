@@ -9,7 +9,7 @@ from .. import constraints as joints
 from ..shapes import box
 
 UP = (0.0, 0.0, 1.0)
-RESTITUTIONS = 0.0, 0.0, 0.3, 0.8, 1.0
+RESTITUTIONS, FRICTIONS = (0.0, 0.0, 0.3, 0.8, 1.0), (0.0, 0.0, 0.2, 0.6)
 
 
 def _upright(d):
@@ -28,10 +28,10 @@ def _thrown(d, share):
     return size * d.rng.normal(size=3) * d.length / d.time, size * 3.0 * d.rng.normal(size=3) / d.time
 
 
-def _floor(d, body, point, e, base=None, at=(0.0, 0.0, 0.0)):
+def _floor(d, body, point, e, kinetic, base=None, at=(0.0, 0.0, 0.0)):
     base = base or d.scene.ground
     given = {"point_a": point, "point_b": at, "normal_b": UP, "unilateral": True}
-    d.scene.add(joints.PlaneContact(body, base, **given, **_law(d, e)))
+    d.scene.add(joints.PlaneContact(body, base, **given, **_law(d, e), kinetic=kinetic))
 
 
 def balls(d, n):
@@ -69,6 +69,7 @@ def cradle(d, n):
 def stack(d, n):
     """Boxes on each other, at rest or with gaps, straight or shifted; or one that is thrown, with all its corners."""
     e, base, top, half, n = _upright(d), d.scene.ground, np.zeros(3), 0.0, min(n, 4)
+    kinetic = float(d.rng.choice(FRICTIONS))
     gap, is_straight = d.rng.choice((0.0, 0.05)) * d.length, n > 1 and d.rng.random() < 0.5
     for _ in range(n):
         size = d.length * (np.array((0.6, 0.5, 0.4)) if is_straight else d.rng.uniform(0.3, 1.0, 3))
@@ -81,7 +82,7 @@ def stack(d, n):
             body.position, body.orientation = (0.0, 0.0, d.length), Rotation.from_rotvec(d.rng.normal(size=3))
             body.velocity, body.angular_velocity = _thrown(d, 0.8)
         for corner in corners if n == 1 else corners[corners[:, 2] < 0.0]:
-            _floor(d, body, corner, e, base, (0.0, 0.0, half))
+            _floor(d, body, corner, e, kinetic, base, (0.0, 0.0, half))
         base, top, half = body, body.position + np.array((0.0, 0.0, size[2] / 2)), size[2] / 2
 
 
@@ -89,7 +90,7 @@ def chain_over_floor(d, n):
     """Links over a floor, free or hung up, straight or bent, with stops between them."""
     e, L, last = _upright(d), 0.4 * d.length, d.scene.ground
     is_planar, is_free, has_stops, is_bent = d.rng.integers(2, size=4)
-    tip = np.array((0.0, 0.0, d.rng.uniform(0.1, 0.8) * d.length))
+    tip, kinetic = np.array((0.0, 0.0, d.rng.uniform(0.1, 0.8) * d.length)), float(d.rng.choice(FRICTIONS))
     for i in range(min(n, 8)):
         along = np.array((1.0, 0.0, is_bent * d.rng.uniform(0.0, 1.0)))
         along *= L / np.linalg.norm(along)
@@ -104,7 +105,7 @@ def chain_over_floor(d, n):
                 bounds = -d.rng.uniform(0.1, 1.0), d.rng.uniform(0.1, 1.0)
                 d.scene.add(joints.Stop(joint, *bounds, **_law(d, e)))
         for x in (-L / 2, L / 2) if i == 0 and is_free else (L / 2,):
-            _floor(d, link, (x, 0.0, 0.0), e)
+            _floor(d, link, (x, 0.0, 0.0), e, kinetic)
         last, tip = link, tip + along
 
 

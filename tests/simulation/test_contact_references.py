@@ -366,3 +366,17 @@ def test_a_contact_without_a_reaction_opens_where_it_is_pulled(method):
     assert np.diff(solution.t).min() >= 0.0
     np.testing.assert_allclose(solution.position(ahead)[-1, 0], 1.0 + 0.45 + 6.0 / 2.0 / 6.0, atol=1e-13)
     np.testing.assert_allclose(solution.position(behind)[-1, 0], 0.45, atol=1e-13)
+
+
+@pytest.mark.parametrize("method", [None, "dop853"])
+def test_a_contact_that_is_pulled_from_the_start_opens_there(method):
+    """The reaction, zero at t = 0, has its event there: a time that no relative step changes."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    behind, ahead = (scene.add_point_mass(mass=2.0, position=(x, 0, 0)) for x in (0, 1))
+    scene.add(C.SphereContact(behind, ahead, radius_a=0.5, radius_b=0.5, name="touch"))
+    scene.add(ts.forces.PointForce(ahead, force=(6.0 * ts.motions.time, 0, 0)))
+    solution = ts.simulate(scene, (0, 1.0), integrator=method)
+    assert solution.phases[-1][1:] == (1.0, ())
+    assert solution.phases[-1][0] < 1e-30
+    np.testing.assert_allclose(solution.position(ahead)[-1, 0], 1.5, atol=1e-14)
+    np.testing.assert_array_equal(solution.position(behind)[-1], 0.0)

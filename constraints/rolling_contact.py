@@ -15,10 +15,13 @@ Singular where SmoothContact is.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..plugins import Side, Unilateral, Vector, across, dot, scaled, shown
 from .smooth_contact import E, P, SmoothContact, Z, along, axes, contact_series, moves, scaled_plane, support
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 T, U = 18, 21  # where t_1 and t_2 begin in x
 
@@ -191,7 +194,7 @@ class RollsOnPlane(Unilateral, Rolls):
         """Directions of the semi-axes (3, 3), semi-axes (3,) and tyre radius, m."""
         raise NotImplementedError
 
-    def rolling(self):
+    def rolling(self) -> Iterator[tuple[str, Any]]:
         """The parts: the contact row and, where it rolls, the two of the slip."""
         places, sizes = self._geometry()
         if self.slip or (self.unilateral and not self.rubs):

@@ -7,9 +7,9 @@
     u_i   = t_i.w                                                     (5)  to t_i; [m/s], zero without slip
     u_x   = t_i^T for x_a, -f (d.e_j) t_i^T for e_j, -t_i^T for x_b, -(1 - f) (d.h_j) t_i^T for h_j        (6)
     ud    = td_i.w + t_i.wd,  wd = -f sum (d.e_j)' ed_j - (1 - f) sum (d.h_j)' hd_j                        (7)
-    td_i  = -cd_i (n + r_3) - c_i nd,  cd_i = (r_i.nd - c_i r_3.nd) / (1 + r_3.n)                          (8)
+    td_i  = rd_i - cd_i (n + r_3) - c_i (nd + rd_3),  cd_i = ((r_i.n)' - c_i (r_3.n)') / (1 + r_3.n)       (8)
 
-Singular where x_a = x_b, and where n = -r_3, a direction of the ground that is no axis.
+r_i are at right angles, fixed to b. Singular where x_a = x_b, and where n = -r_3, a direction of b that is no axis.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..hints import BodyLike
 
 E, B, H = 3, 12, 15  # where e_1, x_b and h_1 begin in x
-THIRD = (0.48, 0.6, 0.64)  # r_3
+THIRD = (0.48, 0.6, 0.64)  # r_3, along h_j
 
 
 class SphereRolling(Primitive):
@@ -64,7 +64,7 @@ class SphereRolling(Primitive):
         Point("b", "center_b"),
         *(Vector("b", name) for name in ("first_b", "second_b", "third_b")),
     )
-    slots = 42
+    slots = 51
 
     def __init__(self, a: BodyLike, b: BodyLike, *, distance: float, share: float, **places: Any) -> None:
         names = [marker.argument for marker in self.markers if marker.argument[:6] != "center"]
@@ -79,7 +79,7 @@ class SphereRolling(Primitive):
             raise self.error(f"{self.name}: distance (m) of the centres must be positive, got {self.distance!r}.")
 
     def parameters(self):
-        """(L, f, r_1, r_2, r_3)."""
+        """(L, f, r_1, r_2, r_3), the last along h_j."""
         first, second = across(THIRD)
         return float(self.distance), float(self.share), *first.tolist(), *second.tolist(), *THIRD
 
@@ -112,18 +112,22 @@ class SphereRolling(Primitive):
         for i in range(3):
             n = (x[i] - x[B + i]) / L
             w = xd[i] - xd[B + i]
+            r1, r2, r3 = 0.0, 0.0, 0.0
             for j in range(3):
                 a, h, p, q = E + 3 * j, H + 3 * j, 0.0, 0.0
+                r1 += par[2 + j] * x[h + i]
+                r2 += par[5 + j] * x[h + i]
+                r3 += par[8 + j] * x[h + i]
                 for l in range(3):
                     p += (x[l] - x[B + l]) * x[a + l]
                     q += (x[l] - x[B + l]) * x[h + l]
                 w -= f * p * xd[a + i] + (1.0 - f) * q * xd[h + i]
-            one += par[2 + i] * w
-            two += par[5 + i] * w
-            three += (n + par[8 + i]) * w
-            rest += par[8 + i] * n
-            c += par[2 + i] * n
-            g += par[5 + i] * n
+            one += r1 * w
+            two += r2 * w
+            three += (n + r3) * w
+            rest += r3 * n
+            c += r1 * n
+            g += r2 * n
         out[0] = one - c / rest * three
         out[1] = two - g / rest * three
 
@@ -134,12 +138,19 @@ class SphereRolling(Primitive):
         rest, c, g = 1.0, 0.0, 0.0
         for i in range(3):
             n = (x[i] - x[B + i]) / L
-            rest += par[8 + i] * n
-            c += par[2 + i] * n
-            g += par[5 + i] * n
+            for j in range(3):
+                h = x[H + 3 * j + i]
+                c += par[2 + j] * h * n
+                g += par[5 + j] * h * n
+                rest += par[8 + j] * h * n
         for i in range(3):
-            m = (x[i] - x[B + i]) / L + par[8 + i]
-            one, two = par[2 + i] - c / rest * m, par[5 + i] - g / rest * m
+            one, two, m = 0.0, 0.0, (x[i] - x[B + i]) / L
+            for j in range(3):
+                h = x[H + 3 * j + i]
+                one += par[2 + j] * h
+                two += par[5 + j] * h
+                m += par[8 + j] * h
+            one, two = one - c / rest * m, two - g / rest * m
             out[0, i], out[0, B + i], out[1, i], out[1, B + i] = one, -one, two, -two
             for j in range(3):
                 a, h, p, q = E + 3 * j, H + 3 * j, 0.0, 0.0
@@ -150,25 +161,34 @@ class SphereRolling(Primitive):
 
     @staticmethod
     def rate_gamma(x, xd, par, t, out):
-        """Eq. (7)."""
+        """Eqs. (7), (8)."""
         L, f = par[0], par[1]
         rest, c, g, restd, cd, gd = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(3):
             n, nd = (x[i] - x[B + i]) / L, (xd[i] - xd[B + i]) / L
-            rest += par[8 + i] * n
-            c += par[2 + i] * n
-            g += par[5 + i] * n
-            restd += par[8 + i] * nd
-            cd += par[2 + i] * nd
-            gd += par[5 + i] * nd
+            for j in range(3):
+                h, hd = x[H + 3 * j + i], xd[H + 3 * j + i]
+                c += par[2 + j] * h * n
+                g += par[5 + j] * h * n
+                rest += par[8 + j] * h * n
+                cd += par[2 + j] * (hd * n + h * nd)
+                gd += par[5 + j] * (hd * n + h * nd)
+                restd += par[8 + j] * (hd * n + h * nd)
         c, g = c / rest, g / rest
         cd, gd = (cd - c * restd) / rest, (gd - g * restd) / rest
         out[0], out[1] = 0.0, 0.0
         for i in range(3):
-            m, nd = (x[i] - x[B + i]) / L + par[8 + i], (xd[i] - xd[B + i]) / L
+            m, md = (x[i] - x[B + i]) / L, (xd[i] - xd[B + i]) / L
             w, wd = xd[i] - xd[B + i], 0.0
+            one, two, oned, twod = 0.0, 0.0, 0.0, 0.0
             for j in range(3):
                 a, h, p, q, pd, qd = E + 3 * j, H + 3 * j, 0.0, 0.0, 0.0, 0.0
+                one += par[2 + j] * x[h + i]
+                two += par[5 + j] * x[h + i]
+                m += par[8 + j] * x[h + i]
+                oned += par[2 + j] * xd[h + i]
+                twod += par[5 + j] * xd[h + i]
+                md += par[8 + j] * xd[h + i]
                 for l in range(3):
                     d, dd = x[l] - x[B + l], xd[l] - xd[B + l]
                     p += d * x[a + l]
@@ -177,23 +197,25 @@ class SphereRolling(Primitive):
                     qd += dd * x[h + l] + d * xd[h + l]
                 w -= f * p * xd[a + i] + (1.0 - f) * q * xd[h + i]
                 wd -= f * pd * xd[a + i] + (1.0 - f) * qd * xd[h + i]
-            out[0] += (par[2 + i] - c * m) * wd - (cd * m + c * nd) * w
-            out[1] += (par[5 + i] - g * m) * wd - (gd * m + g * nd) * w
+            out[0] += (one - c * m) * wd + (oned - cd * m - c * md) * w
+            out[1] += (two - g * m) * wd + (twod - gd * m - g * md) * w
 
     @staticmethod
     def series(x, par, k, s, out):
-        """Of Eqs. (2), (6); rows of e_j, h_j, n, n + r_3, d.e_j, d.h_j, r_i.n, 1 + r_3.n, -c_i, t_i."""
+        """Of Eqs. (2), (6); rows of e_j, h_j, n, n + r_3, d.e_j, d.h_j, r_i.n, 1 + r_3.n, -c_i, t_i, r_i."""
         L, f = par[0], par[1]
         for i in range(9):
             s[i, k], s[9 + i, k] = x[E + i], x[H + i]
-        s[30, k], s[31, k], s[32, k] = 0.0, 0.0, (1.0 if k == 0 else 0.0)
         for i in range(3):
             n = (x[i] - x[B + i]) / L
-            s[18 + i, k], s[21 + i, k] = n, n + (par[8 + i] if k == 0 else 0.0)
-            out[0, i], out[0, B + i] = n, -n
-            s[30, k] -= par[2 + i] * n
-            s[31, k] -= par[5 + i] * n
-            s[32, k] += par[8 + i] * n
+            s[18 + i, k], out[0, i], out[0, B + i] = n, n, -n
+            for row in range(3):
+                s[42 + 3 * row + i, k] = 0.0
+                for j in range(3):
+                    s[42 + 3 * row + i, k] += par[2 + 3 * row + j] * x[H + 3 * j + i]
+            s[21 + i, k] = n + s[48 + i, k]
+        s[30, k], s[31, k] = -dot(s, 42, 18, k), -dot(s, 45, 18, k)
+        s[32, k] = dot(s, 48, 18, k) + (1.0 if k == 0 else 0.0)
         for j in range(3):
             s[24 + j, k] = -f * L * dot(s, 18, 3 * j, k)
             s[27 + j, k] = -(1.0 - f) * L * dot(s, 18, 9 + 3 * j, k)
@@ -201,7 +223,7 @@ class SphereRolling(Primitive):
             c, first = 33 + row, 36 + 3 * row
             s[c, k] = quotient(s[30 + row], s[32], s[c], k)
             for i in range(3):
-                t = product(s[21 + i], s[c], k) + (par[2 + 3 * row + i] if k == 0 else 0.0)
+                t = product(s[21 + i], s[c], k) + s[42 + 3 * row + i, k]
                 s[first + i, k] = t
                 out[1 + row, i], out[1 + row, B + i] = t, -t
             for j in range(3):

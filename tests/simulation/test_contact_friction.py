@@ -338,6 +338,30 @@ def test_the_same_bits_again_and_from_a_file(tmp_path):
         np.testing.assert_array_equal(one.q, ts.simulate(other, (0, 0.2)).q)
 
 
+def test_other_questions():
+    """Friction is no constraint; it holds what a run from there would hold."""
+    scene = slope(0.5, 0.4)
+    assert scene.mobility().degrees_of_freedom == 2
+    assert scene.evaluate().Phi.shape == (1,)
+    assert scene.with_parameters({"floor.kinetic": 0.0})["floor"].rows == 1
+    slides = scene.with_parameters({"floor.kinetic": 0.3})
+    down = G * (np.sin(0.4) - 0.3 * np.cos(0.4)) / 2
+    assert abs(ts.simulate(slides, (0, 1)).position("block")[-1, 0] - down) < 1e-13
+    with pytest.raises(ts.InvalidArgument, match="floor"):
+        scene.equilibrium()
+
+
+def test_a_store_and_a_file_hold_them(tmp_path):
+    scene = boxes(1, mu=0.3, velocity=(1, 0.5, 0), spin=1.0)
+    plain = ts.simulate(scene, (0, 1))
+    stored = ts.simulate(scene, (0, 1), store=tmp_path / "run.h5", checkpoint=0.0)
+    plain.save(tmp_path / "saved.h5")
+    for other in (stored, ts.load(tmp_path / "run.h5"), ts.load(tmp_path / "saved.h5")):
+        np.testing.assert_array_equal(other.multipliers, plain.multipliers)
+        np.testing.assert_array_equal(other.dissipation, plain.dissipation)
+        assert other.phases == plain.phases
+
+
 def test_bad_coefficients():
     scene = slope(0.3, 0.0)
     block, ground = scene.body("block"), scene.ground

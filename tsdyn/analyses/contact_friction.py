@@ -16,9 +16,9 @@ import numpy as np
 
 from ..elements.tolerances import LEAST_SLIP
 from ..maths.coulomb_cone import OPEN, STICKS, solve_cone
-from ..maths.tolerances import RANK_TOL
+from ..maths.tolerances import RANK_TOL, TINY
 from .contact_problem import NoSolution, Settled, depends, energy_gain
-from .tolerances import AT_BOUND, LEVEL, WITHIN_BOUND
+from .tolerances import AT_BOUND, DEPENDENT, LEVEL, WITHIN_BOUND
 
 
 def rows_of(inertia, which):
@@ -123,7 +123,29 @@ def settle_grips(inertia, resting, qd, fired=()):
                 grips[i] = None
             else:
                 grips[i] = inertia.along(i, -T[j] / length)
-    return Settled(*_carried(inertia, closed, idle, grips, N, resting), gdd, grips)
+    closed, idle = _carried(inertia, closed, idle, grips, N, resting)
+    return Settled(closed, idle, gdd, grips, _independent(inertia, closed, grips))
+
+
+def _independent(inertia, closed, grips):
+    """Which rows (2,) of the slips of closed contacts that stick are independent of the gaps and of those before."""
+    sticks = [i for i in closed if grips.get(i, ()) is None]
+    if not sticks:
+        return {}
+    rows = np.concatenate([inertia.J[closed], inertia.tangents[sticks].reshape(2 * len(sticks), -1)])
+    loads, kept = inertia.free(rows.T).T, np.ones(len(rows), bool)
+    for k in range(len(rows)):  # Gram-Schmidt in the metric of kinetic energy
+        size = rows[k] @ loads[k]
+        for j in np.flatnonzero(kept[:k]):
+            share = rows[k] @ loads[j]
+            rows[k] -= share * rows[j]
+            loads[k] -= share * loads[j]
+        left = rows[k] @ loads[k]
+        kept[k] = k < len(closed) or left > DEPENDENT * size
+        if kept[k]:
+            rows[k] /= np.sqrt(max(left, TINY))
+            loads[k] /= np.sqrt(max(left, TINY))
+    return dict(zip(sticks, kept[len(closed) :].reshape(-1, 2).tolist(), strict=True))
 
 
 def _demand_unique(G, d, mu, mode):

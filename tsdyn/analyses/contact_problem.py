@@ -294,6 +294,7 @@ class Settled(NamedTuple):
     idle: list  # those that stay closed by themselves, as a fourth leg does
     accelerations: np.ndarray  # (count,) of all gaps
     grips: dict = MappingProxyType({})  # of those with friction, see contact_friction.py
+    rows: dict = MappingProxyType({})  # of closed ones that stick: which of the two rows of the slip are independent
 
 
 def settle(inertia, resting, qd, fired=()):

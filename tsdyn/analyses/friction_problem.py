@@ -330,6 +330,8 @@ class RestProblem:
         self.qdd[:, 0] += fixed
         G = self.J @ self.qdd
         self.c, self.G, self.D = G[:, 0] + self.gamma, G[:, 1:count], G[:, count:]
+        self.dead = dead = np.linalg.norm(self.J @ Z, axis=1) <= RANK_TOL * np.linalg.norm(self.J, axis=1)
+        self.G[dead], self.G[:, dead], self.D[dead] = 0.0, 0.0, 0.0  # rates that no motion changes, as at a dead centre
         self.l, self.L, self.K = lam[:, 0], lam[:, 1:count], lam[:, count:]
         self.reactions = [normal_reaction(packed, load, q, qd, Phi_q) for load in frictions]
         places = np.cumsum([0, *(len(each) for each in rows.values())])
@@ -337,14 +339,14 @@ class RestProblem:
 
     def solve(self, ways):
         """Multipliers x of the rows, and normal loads, where units slide in these directions and the others stick."""
-        stick = np.concatenate([*(self.at[i] for i in self.rows if i not in ways), np.zeros(0, int)]).astype(int)
+        stick = self._held(i for i in self.rows if i not in ways and i not in self.idle)
         x, P = np.zeros(len(self.c)), np.zeros((len(self.c), self.normals))
         for i, way in ways.items():
             share, force = self.units[i].sliding
             x[self.at[i]] = force * (self.bases[i] @ way)
             if share:
                 P[self.at[i], self.units[i].load.normal] = share * (self.bases[i] @ way)
-        if stick.size:  # of rows that depend on one another, the least
+        if stick.size:
             right = np.column_stack([self.c + self.G @ x, self.D + self.G @ P])[stick]
             held = -np.linalg.lstsq(self.G[np.ix_(stick, stick)], right, rcond=RANK_TOL**2)[0]
             x[stick], P[stick] = held[:, 0], held[:, 1:]
@@ -371,14 +373,15 @@ class RestProblem:
         """
         ways, fired, seen = dict(ways), set(fired), set()
         for count in range(PIVOTS * (1 + len(self.rows))):
+            self.idle = self._idle(ways)
             x, N = self.solve(ways)
             a = self.c + self.G @ x + self.D @ N
             small = self._rounding(x, N)
             wrong = self._wrong(ways, x, N, a, small, fired)
             if not wrong:
-                sticking = [i for i in self.rows if i not in ways]
+                sticking = [i for i in self.rows if i not in ways and i not in self.idle]
                 blocked = [i for i in ways if self._is_blocked(i, sticking)]
-                return Rest(sticking, ways, blocked, N, self._rates(ways, a, small))
+                return Rest(sticking, ways, blocked + self.idle, N, self._rates(ways, a, small))
             known = tuple((i, *np.sign(np.round(d, 3))) for i, d in sorted(ways.items()))
             one_by_one = known in seen or count >= PIVOTS
             seen.add(known)
@@ -393,20 +396,23 @@ class RestProblem:
     def _rounding(self, x, N):
         """Accelerations of the rows that are zero to rounding."""
         qdd = self.qdd @ np.concatenate(([1.0], x, N))
-        return LEVEL * (np.abs(self.J) @ np.abs(qdd) + np.abs(self.gamma))
+        terms = np.abs(self.c) + np.abs(self.G) @ np.abs(x) + np.abs(self.D) @ N
+        return LEVEL * (np.abs(self.J) @ np.abs(qdd) + np.abs(self.gamma) + terms)
 
     def _wrong(self, ways, x, N, a, small, fired):
         """Units that can't be as they are, with the way in which they slide instead; None if they stick."""
         found = {}
         for i, at in self.at.items():
-            basis = self.bases[i]
+            basis, size = self.bases[i], np.linalg.norm(a[at])
             if i not in ways:
                 (share, bound), force = self.units[i].bound, np.linalg.norm(x[at])
                 bound += share * N[self.units[i].load.normal] if share else 0.0
                 if force > bound * (BROKEN if i in fired else 1.0 + LEVEL):
                     found[i] = x[at] @ basis / force
+                elif self.dead[at].all() and size > small[at].max():  # nothing holds it
+                    found[i] = a[at] @ basis / size
                 continue
-            along, size = a[at] @ basis @ ways[i], np.linalg.norm(a[at])
+            along = a[at] @ basis @ ways[i]
             if along < -small[at].max():
                 found[i] = None
             elif len(at) > 1 and size > small[at].max() and along < size * (1.0 - ASIDE):
@@ -422,9 +428,21 @@ class RestProblem:
             found[i] = float(rate) if rate > small[at].max() else 0.0
         return found
 
+    def _held(self, units):
+        """The rows of some units."""
+        return np.concatenate([*(self.at[i] for i in units), np.zeros(0, int)]).astype(int)
+
+    def _idle(self, ways):
+        """Units that stick by what others hold: with rows of their own the reactions wouldn't be unique."""
+        sticking, idle = [], []
+        for i in self.rows:
+            if i not in ways:
+                (idle if sticking and self._is_blocked(i, sticking) else sticking).append(i)
+        return idle
+
     def _is_blocked(self, i, sticking):
         """Whether a unit can't move where others stick, or at all."""
-        stick = np.concatenate([*(self.at[k] for k in sticking), np.zeros(0, int)]).astype(int)
+        stick = self._held(sticking)
         own = self.G[np.ix_(self.at[i], self.at[i])]
         held = np.linalg.lstsq(self.G[np.ix_(stick, stick)], self.G[np.ix_(stick, self.at[i])], rcond=RANK_TOL**2)[0]
         left = np.diag(own - self.G[np.ix_(self.at[i], stick)] @ held)

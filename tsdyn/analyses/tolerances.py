@@ -129,6 +129,8 @@ AT_BOUND, WITHIN_BOUND = 1e-9, 1.0 - 1e-10
 # m/s or rad/s: a body that slides in a plane, more slowly, has come to rest where its direction turns: ten times the
 # velocity below which its direction is kept.
 STOPPED = 1e-8
+# Roundings of the time within which an acceleration changes velocities by none: an event's time is right to some ten.
+RESTS = 100.0
 # Rounds of pivoting over those for all units at once; after as many, or where modes come back, one unit at a time.
 PIVOTS = 30
 # Reaction over the bound from which on a unit whose event has come slides.

@@ -89,7 +89,7 @@ class Unilateral:
         return bool(self.kinetic or self.static)
 
     def _grip(self, gap: Primitive, **geometry: Any) -> Grip:
-        """Its friction, on the row of its gap; geometry as of `Sliding`."""
+        """Its friction, on the row of its gap; geometry: arguments of the law of sliding, see sliding.py."""
         stop_waiting(gap)
         kind = _SlidingSurface if "semi_axes" in geometry else _Sliding
         sliding = kind(gap, kinetic=self.kinetic, **geometry, name=self.name)

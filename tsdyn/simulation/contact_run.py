@@ -13,7 +13,7 @@ from ..analyses.contact_friction import halted, settle_grips
 from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
 from ..analyses.contact_rows import KERNELS, ReactionWorkspace
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
-from ..analyses.tolerances import AT_REST, STOPPED
+from ..analyses.tolerances import AT_REST, RESTS, STOPPED
 from ..elements.unilateral import contacts_of
 from ..errors import (
     InconsistentState,
@@ -261,6 +261,7 @@ class _ContactRun:
         self._demand_served(kept)
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
+        self.qdd = np.zeros(kept.n)  # before the present transition
         self.remembered = remembered(call.state, kept, self.t, self.q)
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(self.gaps, self.able, self.q, self.remembered[: self.count], options.initial_tol)
@@ -455,7 +456,7 @@ class _ContactRun:
         """
         self._end_phase(t)
         before = self.modes
-        self.t, (self.q, self.qd, _), self.remembered = t, run.now.copy(), run.remembered.copy()
+        self.t, (self.q, self.qd, self.qdd), self.remembered = t, run.now.copy(), run.remembered.copy()
         remembered = self.remembered
         self.settled = (self._transit([self.watched[i] for i in numbers]),)
         changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
@@ -494,9 +495,12 @@ class _ContactRun:
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
+        memory, units = self.remembered[self.count :], self.frictions.units
+        idle = [i for i in self.modes.blocked if not memory[units[i].way].any()]
+        rest = sorted([*self.modes.sticking, *idle])
         names = [self.gaps.names[i] for i in held]
         names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
-        names += [self.frictions.names[i] for i in sorted(self.modes.sticking)]
+        names += [self.frictions.names[i] for i in rest]
         return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
@@ -603,7 +607,8 @@ class _ContactRun:
             self.totals = summed([end.counts] if self.totals is None else [self.totals, end.counts])
         if self.settled is not None:  # within the run of the phase
             return self.settled[0]
-        self.t, (self.q, self.qd, _), self.remembered = end.reached, (x.copy() for x in end.last), end.remembered
+        self.t, self.remembered = end.reached, end.remembered
+        self.q, self.qd, self.qdd = (x.copy() for x in end.last)
         self.reason = outcome.reason
         if goes_on:
             return self._act(acting, fired, end.last) if acting else self._transit(fired)
@@ -718,6 +723,8 @@ class _ContactRun:
         if not frictions.count:
             return None
         place, (v, sizes, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
+        # Velocities that change within rounding of the time are at rest, too
+        gained = RESTS * EPS * abs(self.t) * frictions.motions(self.q[None], self.qdd[None])[1][0]
         self.remembered, resting, guess = self.remembered.copy(), [], {}
         memory = self.remembered[count:]  # a part of it
         self.modes.blocked = self.off
@@ -727,7 +734,7 @@ class _ContactRun:
             speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
             if i in before.blocked and memory[unit.way].any():
                 guess[i] = place.read(i, memory)
-            if speed <= max(AT_REST * sizes[0, i], 0.0 if signed else STOPPED) or (signed and i in fired):
+            if speed <= max(AT_REST * sizes[0, i], gained[i], 0.0 if signed else STOPPED) or (signed and i in fired):
                 resting.append(i)
                 memory[unit.way] = 0.0
             else:

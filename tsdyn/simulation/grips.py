@@ -19,8 +19,9 @@ from .tolerances import SAME_WAY, SLOW
 # A closed contact with friction sticks or slides. Where it sticks, all its rows hold; those of the slip of a point are
 # rows on positions, which hold it where it came to rest. Where it slides, the row of the gap holds, and a force in
 # proportion to its reaction acts (elements/sliding.py), with a direction d near the slip; the next phase takes another
-# one where the slip has turned too far. `grips` has for each such contact, by the number of its gap, None
-# where it sticks, else d (3,), ground frame; `held` where in b, m, the point of a is that sticks.
+# one where the slip has turned too far. `grips` has for each such contact, by the number of its gap, None where it
+# sticks, else d (3,), ground frame; `held` where in b, m, the point of a is that sticks, and which of the two rows of
+# its slip are independent of others.
 
 
 def phase_with_friction(scene, gaps, modes, holds, without=None):
@@ -31,8 +32,10 @@ def phase_with_friction(scene, gaps, modes, holds, without=None):
         if not gaps.rubs[i]:
             items.append(gap.side.row)
         elif modes.grips[i] is None:
-            items += gap.contact.parts
-            numbers |= {part: modes.held[i] for part in gap.contact.parts[1:]}
+            first, *others = gap.contact.parts
+            kept = [part for part, held in zip(others, modes.held.get(i, ())[3:], strict=True) if held]
+            items += [first, *kept]
+            numbers |= {part: modes.held[i][:3] for part in kept}
         else:
             items += gap.side.grip[:2]
             numbers[gap.side.grip.sliding] = modes.grips[i]
@@ -41,7 +44,7 @@ def phase_with_friction(scene, gaps, modes, holds, without=None):
 
 
 def _with_numbers(scene, numbers):
-    """The scene with other numbers (3,): of a `Sliding` its direction, of a row the point of b."""
+    """The scene with other numbers (3,): of the law of sliding its direction, of a row the point of b."""
     kept = prepared_numbers(scene)
     _ = kept.refusal, kept.pays, kept.sharp, kept.slips, kept.sampled  # for `Prepared.like`
     packed, begins = scene.packed, begins_of(scene.packed)
@@ -87,8 +90,9 @@ def renewed(gaps, before, settled, q):
         old = before.grips.get(i, ())
         parts = gaps.list[i].contact.parts
         if d is None:
-            if len(parts) > 1:
-                held[i] = before.held[i] if old is None else held_point(gaps.packed, parts[1], q)
+            if len(parts) > 1 and i in settled.rows:
+                known = before.held[i][:3] if old is None and i in before.held else held_point(gaps.packed, parts[1], q)
+                held[i] = (*known, *map(int, settled.rows[i]))
             grips[i] = None
         else:
             grips[i] = old if old and np.dot(old, d) > SAME_WAY else tuple(d.tolist())
@@ -111,7 +115,7 @@ class Reactions:
         self.sticks = [i for i in modes.closed if modes.grips.get(i, ()) is None]
         first = _first(packed)
         self.normal = [first[id(_gap_row(gaps, modes, i))] for i in self.closed]
-        self.slip = np.array([slip_rows(gaps.list[i].contact, first) for i in self.sticks], int).reshape(-1, 2)
+        self.slip = np.array([_slip_columns(gaps.list[i].contact, first) for i in self.sticks], int).reshape(-1, 2)
         self.which = [self.closed.index(i) for i in self.sticks]
 
     def over(self, states):
@@ -120,7 +124,8 @@ class Reactions:
         lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
         N = -self.gaps.sign[self.closed] * lam[:, self.normal]
         held = N[:, self.which]
-        T = carried(self.gaps, self.sticks, states.t, states.q, held, -lam[:, self.slip])
+        T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
+        T = carried(self.gaps, self.sticks, states.t, states.q, held, T)
         return np.hstack([N, self.gaps.static[self.sticks] * held - np.hypot(*np.moveaxis(T, 2, 0))])
 
 
@@ -128,6 +133,13 @@ def _gap_row(gaps, modes, i):
     """The primitive whose first row is the gap of a closed contact in a phase."""
     gap = gaps.list[i]
     return gap.side.grip.gap if modes.grips.get(i) is not None else gap.side.row
+
+
+def _slip_columns(contact, first):
+    """The rows (2,) of the slip of a contact that sticks, -1 of one that depends on others."""
+    if len(contact.parts) == 1:
+        return slip_rows(contact, first)
+    return [first.get(id(part), -1) for part in contact.parts[1:]]
 
 
 def _first(packed):
@@ -195,6 +207,8 @@ def add_friction(gaps, modes, packed, t, q, qd, lam, out):
     sticks = [j for j, i in enumerate(rubbing) if modes.grips[i] is None]
     if sticks:
         T = -out[:, rows[sticks]]
+        for j, i in enumerate(sticks):
+            T[:, j, [k for k, held in enumerate(modes.held.get(rubbing[i], ())[3:]) if not held]] = np.nan
         which = [rubbing[j] for j in sticks]
         out[:, rows[sticks]] = -carried(gaps, which, t, q, N[:, sticks], T)
     slip = np.einsum("kcin,kn->kci", tangents, qd)

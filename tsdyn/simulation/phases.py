@@ -31,14 +31,6 @@ class Modes:
     grips: dict = field(default_factory=dict)  # of closed contacts with friction: see grips.py
     held: dict = field(default_factory=dict)
 
-    def turned(self, other):
-        """Whether these are the modes of another but for directions of slips."""
-        mine, theirs = (
-            (modes.closed, modes.idle, modes.held, [i for i, d in modes.grips.items() if d is None])
-            for modes in (self, other)
-        )
-        return not self.opened and mine == theirs and self.sticking == other.sticking
-
     def same(self, other):
         """Whether the units are in the same modes, whatever has just opened."""
         return {**vars(self), "opened": 0} == {**vars(other), "opened": 0}
@@ -164,15 +156,14 @@ class Phases:
         return Modes.of(self.modes[kind][0])
 
     def told(self):
-        """The `list`, in which phases are one that differ in nothing, or in the directions of slips alone."""
+        """The `list`, in which phases are one where the same hold as before, and no impact or action is between."""
         found, before, hit = [], None, {t for t, *_ in self.impulses}
-        for (start, end, names), begun, kind in zip(self.list, self.starts, self.of, strict=True):
-            modes = self._modes(kind)
-            if before is not None and begun not in hit and modes.turned(before):
+        for (start, end, names), begun, changes in zip(self.list, self.starts, self.changes, strict=True):
+            if found and names == found[-1][2] and changes == before and begun not in hit:
                 found[-1] = (found[-1][0], end, names)
             else:
                 found.append((start, end, names))
-            before = modes
+            before = changes
         return found
 
     @property
@@ -193,6 +184,14 @@ class Phases:
             if which:
                 out[np.ix_(mine, which)] = losses(self.gaps, which, own, *some)
         return out
+
+    def with_normal_loads(self, numbers, t, q, qd, qdd, memory):
+        """As `reactions.with_normal_loads`: the rows that hold frictions in a phase take their part of the loads."""
+        out = [None] * len(numbers)
+        for kind, mine, some in self._gathered(numbers, (t, q, qd, qdd, memory)):
+            for i, row in zip(mine, reactions.with_normal_loads(self.packed[kind], *some), strict=True):
+                out[i] = row
+        return np.array(out).reshape(len(numbers), -1)
 
     def constraint_error(self, numbers, *arrays):
         """The `ConstraintError` of the rows that hold."""

@@ -265,7 +265,9 @@ def _power(solution, trajectory, item, t):
     varies = phases is not None and phases.varies
     for packed, mine in phases.packed_at(t) if varies else [(solution.packed, slice(None))]:
         some = t[mine], *(level[mine] for level in levels)
-        slots = with_normal_loads(packed, *some, memory[mine])
+        slots = (
+            with_normal_loads(packed, *some, memory[mine]) if varies else solution._with_normal_loads(*some, memory)
+        )
         at = SimpleNamespace(t=some[0], q=some[1], qd=some[2], _memory=slots, packed=packed, system=packed.system)
         if packed.system.rheonomic[0]:
             at.multipliers = (reactions.multipliers if varies else solution._multipliers_at)(
@@ -632,7 +634,15 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     @cached_property
     def _memory(self):
         """Memory of forces and normal loads of joint friction, (k, ...)."""
-        return with_normal_loads(self.packed, self.t, self.q, self.qd, self.qdd, self._remembers)
+        motion = self.t, self.q, self.qd, self.qdd, self._remembers
+        return self._with_normal_loads(*motion, self._phase_of_rows)
+
+    def _with_normal_loads(self, t, q, qd, qdd, memory, numbers=None):
+        """Memory of forces and normal loads of joint friction, (k, ...), at times of the run."""
+        if self._phases is None or not self.system.normals.size:
+            return with_normal_loads(self.packed, t, q, qd, qdd, memory)
+        numbers = self._phases.at(t) if numbers is None else numbers
+        return self._phases.with_normal_loads(numbers, t, q, qd, qdd, memory)
 
     @cached_property
     def multipliers(self) -> Floats:

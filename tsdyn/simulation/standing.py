@@ -90,6 +90,12 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
     """
     demand_regular(scene, "equilibrium")
     gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
+    if gaps.rubs.any():
+        names = listed(list(dict.fromkeys(gaps.names[i] for i in np.flatnonzero(gaps.rubs))), NAMED)
+        raise InvalidArgument(
+            f"equilibrium: contacts with friction ({names}) rest at more than one place. Run the scene from where it "
+            "stands: solution.sticking tells whether it rests; or set kinetic=0 and static=None."
+        )
     q = scene.start[0] if guess is None else np.asarray(getattr(guess, "q", guess), float)
     closed, seen = closed_gaps(gaps, q, _angles(kept, guess, t, q)), set()
     while frozenset(closed) not in seen:

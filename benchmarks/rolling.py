@@ -1,8 +1,10 @@
-"""Rolling in tsdyn, MuJoCo and Exudyn: error against time, of two motions whose closed forms are known.
+"""Rolling in tsdyn, MuJoCo and Exudyn: error against time.
 
-A coin in a steady turn (examples/coin.py) for one turn of 2.5 s, and a ball on a turntable (examples/turntable.py) for
-one of its turns, pi s. MuJoCo holds rolling by contact with friction, as stiff as the step allows; Exudyn has a joint
-of a rolling disc, none of a ball. Engines that aren't installed are left out.
+A coin in a steady turn (examples/coin.py) for one turn of 2.5 s; the same coin, which nods as it rolls, as long; and a
+ball on a turntable (examples/turntable.py) for one of its turns, pi s. References are closed forms, and of the coin
+that nods Newton's and Euler's equations about its contact point, by DOP853 at 1e-13. MuJoCo holds rolling by contact
+with friction, as stiff as the step allows; Exudyn has a joint of a rolling disc, none of a ball. Engines that aren't
+installed are left out.
 
 Run it: python -m benchmarks.rolling
 """
@@ -11,6 +13,7 @@ import importlib.util
 import time
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
@@ -19,6 +22,8 @@ from examples import coin, turntable
 STEPS, TOLERANCES, ROUNDS = (1e-2, 1e-3, 1e-4), (1e-4, 1e-8, 1e-12), 3
 LEAN, TURN = 0.5, 2.5
 COIN_END, BALL_END = 2.0 * np.pi / TURN, np.pi
+NODDING = 0.5, (0.6, 7.0, 1.5)  # lean, rad, and angular velocity, rad/s
+UP = np.array([0.0, 0.0, 1.0])
 
 
 def ours(build, name, end, tol):
@@ -56,9 +61,41 @@ def mujoco(world, speeds, name, end, step):
     return time.perf_counter() - began, data.body(name).xpos.copy()
 
 
-def coin_state():
-    """The coin of the example: mass, inertia, position, velocity, quaternion, omega in its frame."""
-    body = coin.build(LEAN, TURN)["coin"]
+def steady():
+    """The coin in a steady turn."""
+    return coin.build(LEAN, TURN)
+
+
+def nodding():
+    """The coin in a motion that is not steady."""
+    return coin.rolling(*NODDING)
+
+
+def after_nodding():
+    """Where its centre is at the end: (I - m rho x rho x) omega' = m rho x (rho' x omega + g) - omega x I omega.
+
+    rho: from the centre to the contact point; I = A 1 + (J - A) n n^T with the axis n.
+    """
+    body, a, m = nodding()["coin"], coin.RADIUS, coin.MASS
+    A = Rotation.from_quat(np.roll(body.orientation, -1))
+
+    def rates(_, y):
+        n, omega, turned = y[:3], y[3:6], np.cross(y[3:6], y[:3])
+        u, du = UP - n[2] * n, -turned[2] * n - n[2] * turned
+        size = np.linalg.norm(u)
+        rho, drho = -a * u / size, -a * (du / size - u * (u @ du) / size**3)
+        inertia = coin.ACROSS * np.eye(3) + (coin.ALONG - coin.ACROSS) * np.outer(n, n)
+        whole = inertia + m * ((rho @ rho) * np.eye(3) - np.outer(rho, rho))
+        load = m * np.cross(rho, np.cross(drho, omega) + coin.GRAVITY * UP) - np.cross(omega, inertia @ omega)
+        return np.concatenate([turned, np.linalg.solve(whole, load), np.cross(rho, omega)])
+
+    start = np.concatenate([A.apply((0, 1, 0)), A.apply(np.array(body.angular_velocity)), body.position])
+    return solve_ivp(rates, (0.0, COIN_END), start, "DOP853", rtol=1e-13, atol=1e-13).y[6:, -1]
+
+
+def coin_state(build):
+    """A coin: mass, inertia, position, velocity, quaternion, omega in its frame."""
+    body = build()["coin"]
     return (
         coin.MASS,
         (coin.ACROSS, coin.ALONG, coin.ACROSS),
@@ -66,10 +103,10 @@ def coin_state():
     )
 
 
-def mujoco_coin(step):
+def mujoco_coin(step, build):
     """A thin cylinder about y."""
     geom = f'<geom type="cylinder" size="{coin.RADIUS} 1e-4" euler="90 0 0"/>'
-    body, speeds = free_body("coin", *coin_state(), geom)
+    body, speeds = free_body("coin", *coin_state(build), geom)
     return mujoco(f'<geom type="plane" size="5 5 1"/>{body}', speeds, "coin", COIN_END, step)
 
 
@@ -87,13 +124,13 @@ def mujoco_ball(step):
     return mujoco(table + body, (turntable.RATE, *speeds), "ball", BALL_END, step)
 
 
-def exudyn_coin(step):
+def exudyn_coin(step, build):
     """A joint of a rolling disc, by the generalised-alpha method."""
     import exudyn as exu
     from exudyn import utilities as ex
 
     mbs = exu.SystemContainer().AddSystem()
-    mass, inertia, position, velocity, quaternion, omega = coin_state()
+    mass, inertia, position, velocity, quaternion, omega = coin_state(build)
     made = mbs.CreateRigidBody(
         referencePosition=list(position), initialVelocity=list(velocity), gravity=[0, 0, -coin.GRAVITY],
         referenceRotationMatrix=Rotation.from_quat(np.roll(quaternion, -1)).as_matrix(),
@@ -120,14 +157,15 @@ def exudyn_coin(step):
 
 def contenders():
     """(motion, program, name of the setting, settings, run, exact end)."""
-    start = coin.build(LEAN, TURN)["coin"].position
+    coins = ("coin", steady, steady()["coin"].position), ("nodding", nodding, after_nodding())
     ball = np.append(turntable.circle(np.array([BALL_END]))[0], turntable.RADIUS)
     tolerance = "tolerance", TOLERANCES
-    yield "coin", "tsdyn", *tolerance, lambda tol: ours(lambda: coin.build(LEAN, TURN), "coin", COIN_END, tol), start
-    if importlib.util.find_spec("exudyn"):
-        yield "coin", "Exudyn", "step", STEPS, exudyn_coin, start
-    if importlib.util.find_spec("mujoco"):
-        yield "coin", "MuJoCo", "step", STEPS, mujoco_coin, start
+    for motion, build, end in coins:
+        yield motion, "tsdyn", *tolerance, lambda tol, build=build: ours(build, "coin", COIN_END, tol), end
+        if importlib.util.find_spec("exudyn"):
+            yield motion, "Exudyn", "step", STEPS, lambda step, build=build: exudyn_coin(step, build), end
+        if importlib.util.find_spec("mujoco"):
+            yield motion, "MuJoCo", "step", STEPS, lambda step, build=build: mujoco_coin(step, build), end
     yield "turntable", "tsdyn", *tolerance, lambda tol: ours(turntable.build, "ball", BALL_END, tol), ball
     if importlib.util.find_spec("mujoco"):
         yield "turntable", "MuJoCo", "step", STEPS, mujoco_ball, ball

@@ -27,6 +27,7 @@ exclude_patterns = ["**/.ipynb_checkpoints"]
 html_theme = "furo"
 html_title = f"tsdyn {version}"
 html_static_path = []
+html_extra_path = ["files"]  # animations of the gallery
 myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
@@ -66,5 +67,5 @@ def with_every_page(index):
 def setup(app):
     """Write the pages that are made from the code."""
     class_pages.write(HERE / "reference")
-    gallery_pages.write(HERE / "gallery")
+    gallery_pages.write(HERE / "gallery", HERE / "files")
     app.connect("source-read", within_site)

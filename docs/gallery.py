@@ -24,6 +24,7 @@ class Entry(NamedTuple):
     run: Callable | None = None  # module -> Solution, where it is not a run of build()
     shapes: dict | None = None  # of bodies, by name, where the derived ones hide the mechanism
     draw: Callable | None = None  # (module, figure), where there is no scene to paint
+    animated: bool = False  # whether its page shows the run, too
 
     @property
     def module(self):
@@ -148,6 +149,7 @@ SECTIONS = {
             "lean (rad)",
             lambda m, s: m.lean(s),
             (0.0, 0.15),
+            animated=True,
         ),
         Entry(
             "coin",
@@ -156,11 +158,26 @@ SECTIONS = {
             "contact point (m)",
             lambda m, s: s.contact_point("contact")[:, :2],
             (0.0, 0.3, 0.6),
+            animated=True,
         ),
         Entry(
-            "turntable", "Ball on a turntable", np.pi, "x, y (m)", lambda m, s: s.position("ball")[:, :2], (0.0, 0.5)
+            "turntable",
+            "Ball on a turntable",
+            np.pi,
+            "x, y (m)",
+            lambda m, s: s.position("ball")[:, :2],
+            (0.0, 0.5),
+            animated=True,
         ),
-        Entry("rattleback", "A rattleback turns back", 5.0, "spin (rad/s)", lambda m, s: m.spin(s), (0.0, 0.6)),
+        Entry(
+            "rattleback",
+            "A rattleback turns back",
+            5.0,
+            "spin (rad/s)",
+            lambda m, s: m.spin(s),
+            (0.0, 0.6),
+            animated=True,
+        ),
         Entry(
             "two_wheeled_robot",
             "A robot on two wheels",
@@ -181,6 +198,15 @@ SECTIONS = {
         Entry("hoist", "Hoist with a rope", 3.0, "tension (N)", lambda m, s: m.tension(s), (0.0, 0.2)),
         Entry("screw_press", "Screw press", 1.5, "platen (m)", lambda m, s: s.position("platen")[:, 2]),
         Entry("stick_slip", "Stick-slip", 2.0, "slide (m)", lambda m, s: s.position("slide")[:, 0]),
+    ),
+    "Contact": (
+        Entry(
+            "bouncing_balls", "Bouncing balls", 5.0, "height (m)", lambda m, s: m.heights(s), (0.0, 0.4), animated=True
+        ),
+        Entry("cradle", "Newton's cradle", 1.2, "first, last (m)", lambda m, s: m.ends(s), (0.0, 0.5), animated=True),
+        Entry(
+            "box_stack", "A stack of boxes", 1.0, "heights (m)", lambda m, s: m.heights(s), (0.0, 0.5), animated=True
+        ),
     ),
     "Control": (
         Entry(

@@ -17,6 +17,7 @@ from tsdyn.drawing import new_figure
 
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images" / "gallery"
+ANIMATIONS = "animations"  # folder of the site
 WIDTH, HEIGHT = 6.6, 2.5
 
 
@@ -58,11 +59,21 @@ def page(entry):
     parts = [
         f"# {entry.title}",
         f"![{escaped(entry.title)}](/images/gallery/{entry.name}.png)",
+        *[player(entry)] * entry.animated,
         paragraphs(text),
         fenced(f"python examples/{entry.name}.py", "sh"),
         fenced(source.strip(), "python"),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def player(entry):
+    """The animation of an example, as the site shows it."""
+    source, title = f"../{ANIMATIONS}/{entry.name}.html", escaped(entry.title)
+    frame = (
+        f'<iframe src="{source}" title="{title}" width="100%" height="420" loading="lazy" style="border: 0"></iframe>'
+    )
+    return f"```{{raw}} html\n{frame}\n```"
 
 
 def index():
@@ -81,10 +92,13 @@ def index():
     return "\n\n".join([*parts, f"```{{toctree}}\n:hidden:\n\n{names}\n```"]) + "\n"
 
 
-def write(folder):
-    """Write all pages into a folder."""
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+def write(folder, files):
+    """Write all pages into a folder, and animations into a folder of files that the site has as they are."""
+    folder, animations = Path(folder), Path(files) / ANIMATIONS
+    for each in (folder, animations):
+        each.mkdir(parents=True, exist_ok=True)
     for entry in ENTRIES:
         write_text(folder / f"{entry.name}.md", page(entry))
+        if entry.animated:
+            entry.solution().view(animations / f"{entry.name}.html", shapes=entry.shapes or {})
     write_text(folder / "index.md", index())

@@ -84,6 +84,7 @@ Progress: TypeAlias = bool | Callable[[float], object]
 
 Formulation: TypeAlias = Literal["tangent", "null-space", "maggi-kane"]
 Redundancy: TypeAlias = Literal["drop", "refuse"]
+ImpactLaw: TypeAlias = Literal["newton", "poisson"]
 Folds: TypeAlias = Literal["keep", "free"]
 Frame: TypeAlias = Literal["ground", "body"]
 Axis: TypeAlias = Literal["x", "y", "z"]

@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Any
 from .calls import fitting
 from .drawing import BLUE, GREY, VERMILION, ZERO, largest, new_figure, save
 from .errors import InvalidArgument
-from .graphics.curves import charts, constraint_error, energy, phase_portrait, poincare_section, reaction, steps
+from .graphics.curves import (
+    charts,
+    constraint_error,
+    contacts,
+    energy,
+    phase_portrait,
+    poincare_section,
+    reaction,
+    steps,
+)
 from .graphics.ensembles import final_map, quantile_bands
 from .graphics.modes import mode_shapes
 from .measuring.haug_tables import DURATION, LEVELS
@@ -131,6 +140,7 @@ def _draw(ax, t, error, colour):
 __all__ = [
     "charts",
     "constraint_error",
+    "contacts",
     "energy",
     "final_map",
     "mode_shapes",

@@ -75,6 +75,21 @@ def test_reactions_have_components_and_norm(run):
         np.testing.assert_array_equal(curve(ax, "norm"), np.linalg.norm(values, axis=1))
 
 
+def test_contacts_are_bars_with_ticks_of_impacts():
+    """A ball that falls for 1 s, rebounds for 1 s, and rests from 3 s; the overview has it in place of charts."""
+    scene = ts.Scene(gravity=(0, 0, -10))
+    ball = scene.add_point_mass(mass=1.0, position=(0, 0, 5.0), name="ball")
+    contact = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": 0.5, "name": "floor"}
+    scene.add(ts.constraints.PlaneContact(ball, scene.ground, **contact))
+    solution = ts.simulate(scene, (0, 4.0))
+    ax = solution.plot()[1, 1]
+    (bar,) = ax.collections[0].get_paths()
+    np.testing.assert_allclose(bar.vertices[:, 0].min(), 3.0, atol=1e-6)
+    np.testing.assert_allclose(bar.vertices[:, 0].max(), 4.0)
+    np.testing.assert_allclose(ax.lines[0].get_xdata()[:3], [1.0, 2.0, 2.5], atol=1e-9)
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["floor"]
+
+
 def test_phase_portraits_and_sections_are_of_the_coordinate(run):
     ax = ts.plots.phase_portrait(run, "pin 0")
     assert labelled(ax)

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import tsdyn as ts
 from examples import door, four_bar
 from tests.helpers.pages import Tags, array, decoded, place
-from tsdyn.graphics.run_data import FRAMES, HOLDS_BACK, PUSHES, run_data
+from tsdyn.graphics.run_data import FLASH, FRAMES, HIT, HOLDS_BACK, OPEN, PUSHES, run_data
 from tsdyn.graphics.view import Painter
 
 C, S = ts.constraints, ts.shapes
@@ -588,6 +588,28 @@ def test_contact_points_and_their_paths():
     assert {trail["body"] for trail in data["trails"]} == {0, 1}
     assert [part["kind"] for part in data["parts"] if part["body"] == 1] == ["sphere"]
     assert {arrow["body"] for arrow in data["arrows"] if arrow["name"] == "on"} == {1}
+
+
+def test_contacts_that_open_and_close():
+    """A ball of 0.1 m falls by G / 2 m in 1 s, rebounds with half its rate for 1 s, and rests from 3 s."""
+    scene = ts.Scene(gravity=(0, 0, -10))
+    ball = scene.add_point_mass(mass=1.0, position=(0, 0, 5.1), name="ball")
+    floor = {"radius_a": 0.1, "normal_b": (0, 0, 1), "restitution": 0.5, "name": "floor"}
+    scene.add(C.SphereContact(ball, scene.ground, **floor))
+    data = decoded(view(ts.simulate(scene, (0.0, 5.0), dense_output=True)))
+    t = np.linspace(0.0, 5.0, data.frames)
+    states = np.frombuffer(base64.b64decode(data.contacts[0]), "u1")
+    hit = (t >= 1.0) & (t < 1.0 + FLASH * 5.0)
+    away = np.abs(t[:, None] - [1.0, 1.0 + FLASH * 5.0, 2.0, 3.0 + FLASH * 5.0]).min(axis=1) > 0.01
+    first = away & (t < 2.0)
+    np.testing.assert_array_equal(states[first], np.where(hit, HIT, OPEN)[first])
+    assert {*states[t > 3.2]} == {PUSHES}
+    words = np.array(data.said["words"])[np.frombuffer(base64.b64decode(data.said["of"]), "<u2")]
+    assert ({*words[t < 2.9]}, {*words[t > 3.1]}) == ({""}, {"closed: floor"})
+    surface, mark = [part for part in data.parts if part["kind"] == "sphere"][-2:]
+    np.testing.assert_allclose(np.diag(np.reshape(surface["matrix"][:9], (3, 3))), 0.1)
+    assert (surface["body"], mark["body"], mark["contact"]) == (0, 1, 0)
+    np.testing.assert_allclose(data.positions[:, 1], data.positions[:, 0] - [0, 0, 0.1], atol=SEEN)
 
 
 def test_rolling_surfaces_are_drawn_with_marks():

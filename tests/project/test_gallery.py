@@ -11,6 +11,8 @@ from docs.gallery_pages import IMAGES, ROOT, index, page
 from examples import (
     andrews_squeezer,
     bicycle,
+    bouncing_balls,
+    box_stack,
     bricard,
     cardan_shaft,
     catapult,
@@ -18,6 +20,7 @@ from examples import (
     clutch,
     coin,
     compass_walker,
+    cradle,
     delta_robot,
     docking,
     double_pendulum,
@@ -45,8 +48,9 @@ ROUGH = {  # an end that shows what a run at 1e-3 does wrong
     scotch_yoke: 1.0,
 }
 FURTHER = (
-    bicycle, cardan_shaft, catapult, chebyshev_linkage, clutch, coin, compass_walker, delta_robot, docking,
-    flyball_governor, leg_with_rods, rattleback, stewart_platform, suspension, turntable, two_wheeled_robot,
+    bicycle, bouncing_balls, box_stack, cardan_shaft, catapult, chebyshev_linkage, clutch, coin, compass_walker, cradle,
+    delta_robot, docking, flyball_governor, leg_with_rods, rattleback, stewart_platform, suspension, turntable,
+    two_wheeled_robot,
 )  # fmt: skip
 
 
@@ -72,6 +76,13 @@ def test_pictures_are_small(entry):
 def test_examples_check_themselves(module, capsys):
     module.main()
     assert re.search("ended +(success|event)", capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("name", ["coin", "cradle"])
+def test_pages_of_animated_examples_show_the_run(name):
+    entry = next(each for each in ENTRIES if each.name == name)
+    assert f'<iframe src="../animations/{name}.html"' in page(entry)
+    assert "<iframe" not in page(next(each for each in ENTRIES if each.name == "bricard"))
 
 
 @pytest.mark.slow

@@ -78,6 +78,51 @@ def test_energy_that_is_lost_is_found():
     assert laws.energy_left(solution)[0] > 1e-5 * size
 
 
+def bounces():
+    """A ball on a floor, with e = 0.5, and a rod between stops: closed and open contacts, impacts."""
+    scene = ts.Scene()
+    ball = scene.add_point_mass(1.0, position=(0, 0, 0.3), name="ball")
+    scene.add(C.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True, restitution=0.5, name="floor"))
+    rod = scene.add_body(1.0, (0.1, 0.1, 0.01), position=(2, 0, -1), name="rod")
+    hinge = scene.add(C.Revolute.at(scene.ground, rod, point=(2, 0, 0), axis=(0, 1, 0), name="hinge"))
+    scene.set(hinge, angle=0.5)
+    scene.add(C.Stop(hinge, lower=-0.2, restitution=0.0, name="stop"))
+    return scene
+
+
+def bounced():
+    return ts.simulate(bounces(), (0.0, 1.0), dense_output=True).raise_if_failed()
+
+
+def test_a_sound_run_with_contacts_keeps_all_laws():
+    solution = bounced()
+    assert {found.law for found in laws.findings(solution)} >= {
+        "penetration", "reactions that pull", "reactions of open contacts", "momenta at an impact",
+    }  # fmt: skip
+    assert not broken(solution)
+
+
+def test_faults_of_contacts_are_found():
+    """A floor that is too high, reactions of open contacts, impulses that are off, energy gained at an impact."""
+    solution = bounced()
+    solution.packed.members[0].constraint.point_b = (0, 0, 1e-3)
+    assert "penetration" in broken(solution)
+    solution = bounced()
+    solution.multipliers[1, 0] = 1.0  # in flight: it pulls
+    assert broken(solution) == {"reactions that pull", "reactions of open contacts"}
+    solution = bounced()
+    t, name, impulse = solution._phases.impulses[0]
+    solution._phases.impulses[0] = t, name, 1.001 * impulse
+    assert broken(solution) == {"momenta at an impact"}
+    solution = bounced()
+    sound, size = laws.energy_left(solution)
+    assert sound < 1e-8 * size
+    after = np.flatnonzero(np.diff(solution.t) == 0.0)[0] + 1
+    solution.qd[after, 2] *= 2.1  # more than it came with
+    del solution.kinetic_energy
+    assert laws.energy_left(solution)[0] > 1e-2 * size
+
+
 def test_momenta_of_a_fall():
     assert max(laws.momentum_left(run(held=False))) < 1e-9
     assert max(laws.momentum_left(run())) > 1e-2  # the ground pushes

@@ -26,8 +26,6 @@ from ..model.packed import first_rows, index_of
 from .contact_rows import ContactWorkspace
 from .tolerances import AT_REST, DEPENDENT, LEVEL
 
-LAWS = "newton", "poisson"
-
 
 class Gap(NamedTuple):
     """One inequality of the scene."""

@@ -207,6 +207,7 @@ ENUMERATIONS = {  # by the aliases of hints.py
     "Axis": ("x", "y", "z"),
     "Formulation": ("tangent", "null-space", "maggi-kane"),
     "Redundancy": ("drop", "refuse"),
+    "ImpactLaw": ("newton", "poisson"),
 }
 
 NUMBER, WHOLE, FLAG, TEXT, ARRAY, MOTION_TYPE, VECTOR, FUNCTION, REFERENCE, NAMES, VALUES, ANY, COORDINATE, POINTS = (

@@ -145,6 +145,42 @@ def charts(solution: Solution, ax: Any = None) -> Any:
     return finished(ax, "condition of the chart (1)")
 
 
+@figure_of("phases", "impulses")
+def contacts(solution: Solution, ax: Any = None) -> Any:
+    """Draw when contacts, stops and ropes are closed, a bar for each, with its impacts. Arguments as for `energy`.
+
+    Examples
+    --------
+    >>> import tsdyn as ts
+    >>> ball = (scene := ts.Scene()).add_point_mass(mass=1.0, position=(0, 0, 1))
+    >>> floor = scene.add(
+    ...     ts.constraints.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True, name="floor")
+    ... )
+    >>> from matplotlib.figure import Figure
+    >>> ax = ts.plots.contacts(ts.simulate(scene, (0, 1)), Figure().subplots())
+    >>> [label.get_text() for label in ax.get_yticklabels()]
+    ['floor']
+    """
+    ax, bars, hits = axes_of(ax), {}, {}
+    for start, end, names in solution.phases:
+        for name in names:
+            mine = bars.setdefault(name, [])
+            if mine and mine[-1][1] == start:  # it stays closed
+                start, _ = mine.pop()
+            mine.append((start, end))
+    for t, name, _ in solution.impulses:
+        hits.setdefault(name, []).append(t)
+    names = list(dict.fromkeys([*hits, *bars]))
+    for i, name in enumerate(names):
+        ax.broken_barh([(start, end - start) for start, end in bars.get(name, [])], (i - 0.3, 0.6), color=GREEN)
+        ax.plot(mine := hits.get(name, []), [i] * len(mine), "|", color=VERMILION, markersize=9)
+    ax.set_yticks(range(len(names)), names)
+    ax.set_xlabel("time (s)")
+    ax.set_title("closed (bars), impacts (ticks)", loc="left", fontsize="small")
+    bare(ax)
+    return ax
+
+
 def finished(ax: Any, label: str) -> Any:
     """Label the axes of a quantity over time."""
     ax.set_xlabel("time (s)")
@@ -207,7 +243,7 @@ def constraint_error(solution: Solution, ax: Any = None) -> Any:
     return ax
 
 
-# `solution.plot()`: constraint errors, energies, steps and charts of a run.
+# `solution.plot()`: constraint errors, energies and steps of a run, and its contacts, or charts where it has none.
 
 SIZE = 11.0, 7.5  # inches
 
@@ -217,7 +253,7 @@ def overview(solution: Solution, path: Any = None) -> Any:
     axes = axes_of(None, 2, 2, figsize=SIZE, sharex=True)
     constraint_error(solution, axes[0, 0])
     energy(solution, axes[0, 1])
-    for ax, draw in ((axes[1, 0], steps), (axes[1, 1], charts)):
+    for ax, draw in ((axes[1, 0], steps), (axes[1, 1], charts if solution._phases is None else contacts)):
         try:
             draw(solution, ax)
         except InvalidArgument:  # no histories

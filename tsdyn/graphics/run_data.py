@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .._version import __version__
-from ..constraints import PlaneContact
+from ..constraints import SphereContact
 from ..elements.bodies import rotation_matrix
 from ..errors import InvalidArgument, StepFailure
 from ..maths.tolerances import TINY
@@ -115,28 +115,74 @@ def _beside(solution, times):
 # Contact points of rolling surfaces: to the page they are bodies without parts of their own, after the others.
 
 
-def _contact_points(packed, frames):
-    """Constraint -> contact points (k, 3), of those that have one."""
+def _contact_points(packed, frames, constraints):
+    """Constraint -> contact points (k, 3), of those that have one; of an open ball, where it is nearest."""
+    balls = {id(each.item): _nearest(frames, each) for each in constraints if isinstance(each.item, SphereContact)}
     found = {member.constraint: touching(packed, member, frames.q) for member in packed.members}
-    return {item: contact[0] for item, contact in found.items() if contact is not None}
+    return {
+        item: balls[id(item)] if contact is None else contact[0]
+        for item, contact in found.items()
+        if contact is not None or id(item) in balls
+    }
 
 
-# States of contacts: whether a plane pushes on its point, or holds it back, where a one-sided contact would open.
+def _nearest(frames, each):
+    """Points (k, 3) of the ball of a SphereContact."""
+    centre = _place(frames, each.a, each.point("a"))
+    if each.item.radius_b is None:
+        towards = -_turned(frames, each.b, each.item.normal_b)
+    else:
+        towards = _place(frames, each.b, each.point("b")) - centre
+        towards = towards / np.maximum(np.linalg.norm(towards, axis=-1, keepdims=True), TINY)
+        towards = -towards if each.item.inside else towards
+    return centre + each.item.radius_a * towards
 
-OPEN, HOLDS_BACK, PUSHES = 0, 1, 2  # as the page colours them
+
+# States of contacts. Of one that opens: whether it is closed, or has just been hit. Of a plane that holds its point on
+# both sides: whether it pushes, or holds back, where one that opens would do so.
+
+OPEN, HOLDS_BACK, PUSHES, HIT = range(4)
+TONES = "#3f464e", "#d33a2c", "#2f9e44", "#f2b705"
 NO_CONTACT = 1e-6  # of the largest force of the contact: below it there is none
+FLASH = 0.02  # of the animation, how long a hit is shown
+NAMED = 4  # closed contacts that are named
 
 
 def contact_states(frames: AnimationFrames, constraints: list[Attached]) -> list[Any]:
-    """The states (k,) of each PlaneContact at the frames."""
-    return [_states(frames, each.item) for each in constraints if isinstance(each.item, PlaneContact)]
+    """The states (k,) of each contact at the frames."""
+    closed = _closed(frames)
+    return [
+        _of_phases(frames, item.name, closed) if getattr(item, "unilateral", False) else _of_plane(frames, item)
+        for item in (each.item for each in constraints if each.contact is not None)
+    ]
 
 
-def _states(frames, item):
+def _of_plane(frames, item):
     """From the sign of the multiplier: the force along the normal is -lam; NaN, of a dropped row, is none."""
     lam = np.nan_to_num(frames.interpolated(frames.run.multipliers[:, frames.run.rows(item).start]))
     none = NO_CONTACT * np.abs(lam).max(initial=0.0)
     return np.where(np.abs(lam) <= none, OPEN, np.where(lam < 0.0, PUSHES, HOLDS_BACK))
+
+
+def _closed(frames):
+    """The names of the closed contacts at each frame."""
+    phases = frames.run.phases
+    number = np.searchsorted([start for start, *_ in phases], frames.times, side="right") - 1
+    return [phases[max(i, 0)][2] for i in number]
+
+
+def _of_phases(frames, name, closed):
+    states = np.where([name in names for names in closed], PUSHES, OPEN)
+    hits = np.array([-np.inf, *(t for t, hit, _ in frames.run.impulses if hit == name)])
+    last = hits[np.searchsorted(hits, frames.times, side="right") - 1]
+    states[frames.times - last <= FLASH * np.ptp(frames.times)] = HIT
+    return states
+
+
+def said_of(names: Sequence[str]) -> str:
+    """Closed contacts in words."""
+    more = f", {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"closed: {', '.join(names[:NAMED])}{more}" if names else ""
 
 
 # Arrows: reactions of constraints and applied forces, with their torques, at the points where they act.
@@ -208,9 +254,13 @@ def run_data(solution: Any, **choices: Any) -> dict[str, Any]:
     data = _contents(solution.scene, packed, (constraints, forces), frames, {}, **choices)
     data["method"] = f"{solution.method}, formulation {solution.formulation}"
     data["note"] = _note(frames, solution)
-    data["contacts"] = [encoded(states, "<u1") for states in contact_states(frames, constraints)]  # of parts in turn
+    data["contacts"] = [encoded(states, "<u1") for states in contact_states(frames, constraints)]
+    words = [said_of(names) for names in _closed(frames)]
+    known = {word: i for i, word in enumerate(dict.fromkeys(words))}
+    data["said"] = {"words": list(known), "of": encoded([known[word] for word in words], "<u2")}
     if not getattr(solution, "_lacks", ""):
-        points = {id(item): len(packed.bodies) + i for i, item in enumerate(_contact_points(packed, frames))}
+        points = _contact_points(packed, frames, constraints)
+        points = {id(item): len(packed.bodies) + i for i, item in enumerate(points)}
         data |= _loads(arrows(frames, constraints, forces, float(np.median(data["reach"])), points))
     return data
 
@@ -277,10 +327,15 @@ def _contents(scene, packed, attachments, frames, violated, *, shapes=None, trai
             index = each.a if each.a >= 0 else each.b
             labels.append(_label(each.item.name, "joints", index, each.point(letter), wrong))
         parts += drawn
-    contacts, count = _contact_points(packed, frames), len(packed.bodies)
-    sizes = [SYMBOL * float(np.median(reach))] * len(contacts)
-    parts += [contact_mark(count + i, 0.5 * size) for i, size in enumerate(sizes)]
-    paths = [{"body": count + i, "point": [0.0, 0.0, 0.0]} for i in range(len(contacts))] if trails is None else []
+    contacts, count = _contact_points(packed, frames, constraints), len(packed.bodies)
+    sizes, number = (
+        [SYMBOL * float(np.median(reach))] * len(contacts),
+        {id(each.item): each.contact for each in constraints},
+    )
+    marked = list(enumerate(zip(contacts, sizes, strict=True), count))
+    parts += [contact_mark(i, 0.5 * size, number[id(item)]) for i, (item, size) in marked]
+    rolling = [i for i, (item, _) in marked if number[id(item)] is None] if trails is None else []
+    paths = [{"body": i, "point": [0.0, 0.0, 0.0]} for i in rolling]
     poses = np.stack([*np.moveaxis(frames.position, 1, 0), *contacts.values()], axis=1)
     turns = np.zeros((len(frames.times), count + len(contacts), 4))
     turns[:, :, 0], turns[:, :count] = 1.0, frames.orientation
@@ -309,6 +364,8 @@ def _contents(scene, packed, attachments, frames, violated, *, shapes=None, trai
         "links": [link.data() for link in links],
         "meshes": [{"vertices": encoded(m.vertices, "<f4"), "faces": encoded(m.faces, "<u4")} for m in meshes],
         "contacts": [],
+        "tones": TONES,
+        "said": None,
         **_loads([]),
         **seen,
         **_fit(packed, frames, bulk, links, origin, seen["up"], seen["eye"] is not None, follow),
@@ -359,14 +416,18 @@ def _bulk(parts, meshes, reach):
 def _apart(frames, each):
     """Distance of the first points of an element on its two bodies, at the start, m."""
     a, b = (_place(frames, index, each.point(letter)) for index, letter in ((each.a, "a"), (each.b, "b")))
-    return float(np.linalg.norm(a - b))
+    return float(np.linalg.norm(a[0] - b[0]))
 
 
 def _place(frames, index, point):
-    """Where a point of a body is at the start."""
-    if index < 0:
-        return point
-    return frames.position[0, index] + rotation_matrix(frames.orientation[0, index]) @ point
+    """Where a point of a body is at the frames, (k, 3)."""
+    return _turned(frames, index, point) + (0.0 if index < 0 else frames.position[:, index])
+
+
+def _turned(frames, index, vector):
+    """A vector of a body in the ground frame, (k, 3)."""
+    vector = np.asarray(vector, float)
+    return vector[None] if index < 0 else rotation_matrix(frames.orientation[:, index]) @ vector
 
 
 def _loads(found):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..constraints import PlaneContact
 from ..elements.joint import across
 from ..elements.markers import POINT
 from ..errors import InvalidArgument
@@ -35,7 +36,7 @@ class Part(NamedTuple):
     position: Any  # (3,), m
     rotation: Any  # (3, 3)
     size: Any  # (3,), m
-    contact: bool = False  # whether the state of a contact colours it
+    contact: int | None = None  # number of the contact whose state colours it
 
     @property
     def reach(self) -> float:
@@ -54,7 +55,7 @@ class Part(NamedTuple):
         columns = (np.asarray(self.rotation) * np.asarray(self.size)).T
         matrix = rounded([*columns.ravel(), *self.position])
         data = {"layer": self.layer, "kind": self.kind, "body": self.body, "colour": self.colour, "matrix": matrix}
-        return data | {"contact": True} if self.contact else data
+        return data if self.contact is None else data | {"contact": self.contact}
 
 
 class Connector(NamedTuple):
@@ -230,10 +231,16 @@ class Attached(NamedTuple):
     places: dict[str, Any]  # argument of each marker -> coordinates (3,), frame of its body
     points: dict[str, Any]  # "a", "b" -> the first point there; absent where it has none
     path: tuple[tuple[int, Any], ...] = ()  # of a rope or cable: the body and the place of each point
+    contact: int | None = None  # its number, of a contact
 
     def point(self, letter: str) -> Any:
         """The first point on a body, its centroid where there is none."""
         return self.points.get(letter, np.zeros(3))
+
+
+def shows_state(item: Any) -> bool:
+    """Whether a constraint has a state along a run: it opens, or it is a plane that ought to push."""
+    return isinstance(item, PlaneContact) or getattr(item, "unilateral", False)
 
 
 def attached(packed: Any) -> tuple[list[Attached], list[Attached]]:
@@ -248,6 +255,9 @@ def attached(packed: Any) -> tuple[list[Attached], list[Attached]]:
 
     constraints = [one(member.constraint, member.coordinates) for member in packed.members]
     constraints = [each for each in constraints if not getattr(each.item, "normalises", False)]
+    has_state = [i for i, each in enumerate(constraints) if shows_state(each.item)]
+    for number, i in enumerate(has_state):
+        constraints[i] = constraints[i]._replace(contact=number)
     return constraints, [one(load.force, load.coordinates) for load in packed.loads]
 
 
@@ -407,7 +417,7 @@ def _plane(each, r):
 def _contact(each, r):
     """A plane, and a ball that shows whether it pushes."""
     plate, ball = _plane(each, r)
-    return [plate, ball._replace(contact=True)]
+    return [plate, ball._replace(contact=each.contact)]
 
 
 THIN, MARK = 0.03, 0.06  # of a disc's radius: thickness of a thin one, and what marks it
@@ -461,9 +471,20 @@ def _ball_on_cylinder(each, r):
     return [cylinder, *_ellipsoid(each, np.eye(3), (each.item.radius,) * 3)]
 
 
-def contact_mark(index, radius):
-    """A ball where surfaces touch; index of the point, that is listed after the bodies."""
-    return Part("joints", "sphere", index, VIOLATED, np.zeros(3), np.eye(3), np.full(3, radius))
+def _sphere_contact(each, r):
+    """The balls, in the colours of their bodies, and the plane of a body; a hollow ball isn't drawn."""
+    parts = _floor(each, r) if each.item.radius_b is None else []
+    for letter, index in (("a", each.a), ("b", each.b)):
+        radius = getattr(each.item, f"radius_{letter}")
+        if radius is not None and not (letter == "b" and each.item.inside):
+            colour = PLANE if index < 0 else COLOURS[index % len(COLOURS)]
+            parts.append(_ball(each, radius, letter)._replace(layer="bodies", colour=colour))
+    return parts
+
+
+def contact_mark(index, radius, contact):
+    """A ball where surfaces touch; index of the point, that is listed after the bodies; contact: as of `Part`."""
+    return Part("joints", "sphere", index, VIOLATED, np.zeros(3), np.eye(3), np.full(3, radius), contact)
 
 
 def _line(each, r):
@@ -487,6 +508,7 @@ DRAWN: dict[str, Any] = {
     "Fixed": _fixed,
     "Distance": _distance,
     "PlaneContact": _contact,
+    "SphereContact": _sphere_contact,
     "Planar": _plane,
     "PointOnLine": _line,
     "RollingDisc": _rolling_disc,

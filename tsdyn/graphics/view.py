@@ -198,7 +198,7 @@ def _mesh(data):
 
 
 def _array(text, kind):
-    return np.frombuffer(base64.b64decode(text), kind).astype(float if kind != "<u4" else int)
+    return np.frombuffer(base64.b64decode(text), kind).astype(int if "u" in kind else float)
 
 
 UNIT_FACES = {"box": _box(), "cylinder": _cylinder(), "sphere": _sphere(), "coil": _coil()}
@@ -218,6 +218,7 @@ class Painter:
         self.position = _array(data["positions"], "<f4").reshape(*shape, 3) + np.array(data["origin"])
         p = np.roll(_array(data["rotations"], "<i2").reshape(*shape, 4) / FULL, 1, axis=2)
         self.rotation = rotation_matrix(p / np.linalg.norm(p, axis=2, keepdims=True))
+        self.states = [_array(states, "<u1") for states in data["contacts"]]
         self.faces = UNIT_FACES | {f"mesh{i}": _mesh(mesh) for i, mesh in enumerate(data["meshes"])}
         towards = np.array(data["view"]) / np.linalg.norm(data["view"])
         right = np.cross(data["up"], towards)
@@ -264,9 +265,11 @@ class Painter:
         for part in self.data["parts"]:
             if part["layer"] in layers:
                 columns, shift = np.reshape(part["matrix"][:9], (3, 3)), np.array(part["matrix"][9:])
-                r, A = self.pose(k, part["body"])
+                (r, A), colour = self.pose(k, part["body"]), part["colour"]
+                if self.states and "contact" in part:
+                    colour = self.data["tones"][self.states[part["contact"]][k]]
                 for faces in self.faces[part["kind"]]:
-                    yield r + (faces @ columns + shift) @ A.T, part["colour"]
+                    yield r + (faces @ columns + shift) @ A.T, colour
         for link in self.data["links"]:
             a, b = (self.place(k, link[letter], link[f"point_{letter}"]) for letter in "ab")
             length = np.linalg.norm(b - a)

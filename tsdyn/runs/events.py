@@ -436,7 +436,8 @@ class Watch:
             first, alone = group.search(step, lambda times, group=group: self._sample(group, times, step.levels(times)))
             if first is not None:
                 i, t = first
-                t = self._beyond(i, step, t, ROOT * abs(t), end, self.events[i].direction)
+                shift = self._least_time(step, step.t0, end) + ROOT * abs(t)
+                t = self._beyond(i, step, t, shift, end, self.events[i].direction)
                 found.append(Occurrence(t, i, step.at(t)))
                 end = min(end, t)
             for i in alone:
@@ -552,7 +553,7 @@ class Watch:
             elif abs(value) > track.noise:
                 if track.zero is not None:
                     if track.pending and direction * sign >= 0.0:
-                        found.append(self._leave(i, step, track.zero, (t, value)))
+                        found.append(self._leave(i, step, max(track.zero, step.t0), (t, value)))
                     track.zero, track.passed, track.pending = None, False, False
                 elif sign == -track.sign and direction * sign >= 0.0:
                     found += self._root(i, step, t, value)
@@ -620,9 +621,14 @@ class Watch:
             return unit * (known[t] if t in known else self._at(i, step, t))
 
         # Brent's method, as near as numbers of this size allow
-        least = max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
+        least = self._least_time(step, t0, t1)
         root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
         return self._beyond(i, step, root, least + ROOT * abs(root), t1, b)
+
+    @staticmethod
+    def _least_time(step, t0, t1):
+        """By how much times between t0 and t1 differ at least, s: never zero."""
+        return max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
 
     def _beyond(self, i, step, root, shift, t1, b):
         """A root, or a time after it up to t1 where event i has the sign of b.

@@ -28,7 +28,7 @@ from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS
 from ..model.handles import handles_of
-from ..observables import reactions
+from ..observables import diagnostics, reactions
 from ..observables.state import remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
@@ -37,12 +37,8 @@ from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
-<<<<<<< HEAD
-from ..validation import damaged, demand, listed
-from . import hybrid
-=======
 from ..validation import counted, damaged, demand, listed
->>>>>>> stick2
+from . import hybrid
 from .grips import Halting, Reactions, phase_with_friction, renewed
 from .impacts import held, impact_of, jumped
 from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
@@ -79,17 +75,19 @@ class _Closing:
     """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
-    however soon it comes.
+    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero.
 
     Parameters
     ----------
     gaps : Gaps
     opened : dict
-        Of contacts that have opened with a rate: time, gap and rate there, by their numbers.
+        Of contacts that have opened: time, gap and rate there, by their numbers.
+    rounding : float, m or rad
+        Of a gap.
     """
 
-    def __init__(self, gaps, opened):
-        self.gaps = gaps
+    def __init__(self, gaps, opened, rounding):
+        self.gaps, self.rounding = gaps, rounding
         self.open(opened)
 
     def open(self, opened):
@@ -106,8 +104,9 @@ class _Closing:
             begun, first, rate = map(np.array, self.start)
             since = states.t[:, None] - begun
             later = since > 0.0
-            divided = (values[:, self.which] - first) / np.where(later, since, 1.0)
-            values[:, self.which] = np.where(later, divided, rate)
+            grown = values[:, self.which] - first
+            divided = np.where(later, grown / np.where(later, since, 1.0), rate)
+            values[:, self.which] = np.where(rate > 0.0, divided, grown + self.rounding)
         return values
 
 
@@ -505,20 +504,12 @@ class _ContactRun:
     def _names(self):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
-<<<<<<< HEAD
         memory, units = self.remembered[self.count :], self.frictions.units
         idle = [i for i in self.modes.blocked if not memory[units[i].way].any()]
         rest = sorted([*self.modes.sticking, *idle])
         names = [self.gaps.names[i] for i in held]
         names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
         names += [self.frictions.names[i] for i in rest]
-=======
-        names = [self.gaps.names[i] for i in held]
-        names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
-        memory, units = self.remembered[self.count :], self.frictions.units
-        idle = [i for i in self.modes.blocked if not memory[units[i].way].any()]
-        names += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
->>>>>>> stick2
         return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
@@ -542,7 +533,7 @@ class _ContactRun:
             first = first_row_of(packed)
             sides = [gaps.list[i].side for i in modes.closed]
             leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
-        self.closing = _Closing(gaps, modes.opened)
+        self.closing = _Closing(gaps, modes.opened, TOUCHING * self.length)
         for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
@@ -734,6 +725,8 @@ class _ContactRun:
                 self.modes = Modes(settled.closed, settled.idle, opened, grips=grips, held=places)
             elif resting:
                 self.modes = Modes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
+            kept = {*self.modes.closed, *self.modes.idle}
+            opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
         except SingularConfiguration as error:
             self.reason = str(error)
             return Status.SINGULAR
@@ -847,11 +840,11 @@ class _ContactRun:
 
     def _jump(self, inertia, touching, before, e, qd=None):
         """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
-        qd = self.qd if qd is None else qd
-        p, change, share = impact_of(inertia, touching, qd, before, e)
+        qd, law = self.qd if qd is None else qd, self.options.law
+        p, change, share = impact_of(inertia, touching, qd, before, e, law)
         if share < 1.0:
             self.lowered.add(self.t)
-        return p, *jumped(inertia, qd, change, touching, before, share * e, p)
+        return p, *jumped(inertia, qd, change, touching, before, share * e, p, law)
 
     def _lowering(self, inertia, touching, qd, rates):
         """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""

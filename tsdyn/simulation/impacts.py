@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analyses.contact_friction import strike
-from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses
+from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, impulses
 from ..calls import fitting
 from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint
@@ -15,6 +15,7 @@ from ..observables.state import RememberingState, remembered
 from ..runs.arguments import state_arrays
 from ..validation import floats, listed
 from .phase_scenes import NAMED, gaps_of, has_contacts, phase_of
+from .run_options import LAWS
 from .scene_cache import prepared
 
 if TYPE_CHECKING:

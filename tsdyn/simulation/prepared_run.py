@@ -39,7 +39,7 @@ from .solution import Solution
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from ..hints import ArrayLike, Event, Formulation, Method, Place, Progress, Redundancy, Span, State
+    from ..hints import ArrayLike, Event, Formulation, ImpactLaw, Method, Place, Progress, Redundancy, Span, State
 
 
 # Choice of the default method: Taylor; DOP853 where a part of the scene has no series; implicit where it is stiff.
@@ -484,6 +484,7 @@ def prepare(
     max_step: float | None = None,
     history: bool | None = None,
     chart_interval: int | None = None,
+    law: ImpactLaw = "newton",
 ) -> Run:
     """Prepare runs of a scene: method, kernels and workspace are chosen once, for any number of calls.
 
@@ -522,7 +523,7 @@ def prepare(
         scene,
         RunOptions(
             integrator, rtol, atol, formulation, constraint_tol, initial_tol, redundancy, dense_output, events,
-            max_steps, max_step, history, chart_interval,
+            max_steps, max_step, history, chart_interval, law,
         ),
     )  # fmt: skip
 
@@ -582,6 +583,7 @@ def simulate(  # many arguments, by name: each is an option of a run
     checkpoint: float | None = None,
     progress: Progress | None = None,
     chart_interval: int | None = None,
+    law: ImpactLaw = "newton",
     state: State | None = None,
 ) -> Solution:
     """Integrate a scene over an interval of time; the scene is not changed.
@@ -622,7 +624,7 @@ def simulate(  # many arguments, by name: each is an option of a run
     demand_scene(scene)
     options = RunOptions(
         integrator, rtol, atol, formulation, constraint_tol, initial_tol, redundancy, dense_output, events, max_steps,
-        max_step, history, chart_interval,
+        max_step, history, chart_interval, law,
     )  # fmt: skip
     call = RunCall(t_span, t_eval, store, checkpoint, progress, state)
     return _run_of(scene, options, call)._solve(call)

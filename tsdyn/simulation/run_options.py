@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         Event,
         Formulation,
         Function,
+        ImpactLaw,
         Integrator,
         Method,
         Place,
@@ -63,6 +64,10 @@ def _choice(value, name):
     return one_of(value, ("drop", "refuse"), name)
 
 
+def _law(value, name):
+    return one_of(value, LAWS, name)
+
+
 def _events(value, name):
     prepare(value)
     return value if callable(value) else tuple(value)
@@ -86,7 +91,9 @@ CHECKS = {  # of values that are not the default; each returns the value as it i
     "max_step": _seconds,
     "history": _flag,
     "chart_interval": whole,
+    "law": _law,
 }
+LAWS = "newton", "poisson"  # of impact
 
 
 @fitting_constructor
@@ -137,6 +144,10 @@ class RunOptions:
     chart_interval : int, optional
         Number of steps after which a new chart is made regardless of the criteria; for experiments. If it is given,
         explicit methods place every stage on the manifold in the tangent form, too, as the paper does.
+    law : {"newton", "poisson"}
+        Law of impact of unilateral constraints. "newton", in Moreau's form: gd+ = -e gd- where a contact pushes.
+        "poisson": the impulse of restitution is e times that of compression. They differ where several contacts are
+        hit at once.
 
     Attributes
     ----------
@@ -168,6 +179,7 @@ class RunOptions:
     max_step: float | None = None
     history: bool | None = None
     chart_interval: int | None = None
+    law: ImpactLaw = "newton"
     method: Integrator | None = field(init=False)
 
     def __post_init__(self) -> None:

@@ -108,7 +108,8 @@ class Showing:
         Parameters
         ----------
         channels : str or sequence of str, optional
-            Names of channels, see below. By default constraint errors, energies, steps and charts are drawn.
+            Names of channels, see below. By default constraint errors, energies, steps and charts are drawn; of a run
+            with contacts, when they are closed in place of charts.
         path : str or Path, optional
             A file to write the figure to, in the format of its suffix. A lone text that ends like a file of a picture,
             such as "run.png", is a path.

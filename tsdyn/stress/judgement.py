@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument, TsdynError
 from ..integrators import Nystrom4
 from ..maths.tolerances import EPS
 from ..simulation.prepared_run import simulate
 from . import random_scenes
+from .findings import Finding
 from .laws import (
-    Finding,
     bodies_of,
     energy_left,
     findings,
@@ -129,7 +130,8 @@ def _mobility(scene):
     return found.degrees_of_freedom, found.rank, [row.name for row in found.redundant]
 
 
-ALL = (other_masses, another_method, implicit_methods, another_form, once_more, stopped, output_times)
+OF_THE_SAME = once_more, stopped, output_times
+ALL = other_masses, another_method, implicit_methods, another_form, *OF_THE_SAME
 
 
 def _tolerance(case):
@@ -234,12 +236,17 @@ def judge_scene(seed, least=None, most=None):
     """Return the `Judgement` of the scene of a seed; one in PASSAGES passes places where a law is not analytic."""
     if least is None and seed % PASSAGES == PASSAGES - 1:
         return judge_case(random_scenes.draw(seed), (another_method,), seed)
-    return judge_case(generate(seed, least, most), comparison(np.random.default_rng((seed, 1))), seed)
+    case = generate(seed, least, most)
+    return judge_case(case, comparison(np.random.default_rng((seed, 1)), case), seed)
 
 
-def comparison(rng):
-    """Return the comparison by which a case is judged besides the laws of its run, in a tuple, or none."""
-    return (ALL[rng.integers(len(ALL))],) if rng.random() < COMPARED else ()
+def comparison(rng, case):
+    """Return the comparison by which a case is judged besides the laws of its run, in a tuple, or none.
+
+    Motions with impacts at one instant don't depend continuously on their start: methods may differ.
+    """
+    served = OF_THE_SAME if contacts_of(case.scene.constraints) else ALL
+    return (served[rng.integers(len(served))],) if rng.random() < COMPARED else ()
 
 
 def judge_case(case, others, seed=None):

@@ -21,6 +21,8 @@ from ..observables.evaluate import constraint_arrays
 from ..simulation.prepared_run import Run, simulate
 from ..simulation.resume import resume
 from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
+from .contact_laws import energy_of_phases, impacts, unilateral
+from .findings import Finding, extent, radius_of_gyration, some
 from .tolerances import (
     BODIES,
     FLOOR,
@@ -34,32 +36,6 @@ from .tolerances import (
     ROW_SHARE,
     SMALL_SCENE,
 )
-
-# What a law of a run has found.
-
-
-class Finding(NamedTuple):
-    """What a law found."""
-
-    law: str
-    size: float
-    limit: float
-    where: str = ""
-
-    @property
-    def broken(self):
-        """True if the size exceeds the limit, or is no number."""
-        return not self.size <= self.limit
-
-    def __str__(self):
-        where = f" ({self.where})" if self.where else ""
-        return f"{self.law}: {self.size:.2e}, at most {self.limit:.2e}{where}"
-
-
-def some(count, most):
-    """Return indices of the first, the last, and some between, `most` at most."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
-
 
 # A run that is stopped at its first checkpoint and goes on from there.
 
@@ -149,20 +125,22 @@ def constraints(solution):
     if not solution.success:  # its message says what broke
         return
     at = some(solution.t.size, OUTPUTS)
-    q, qd, qdd = (array[at] for array in (solution.q, solution.qd, solution.qdd))
-    memory = solution._memory[at]
-    errors = constraint_rows(solution.packed, solution.t[at], q, qd, qdd, memory=memory)
-    floors = FLOOR / ROW_SHARE * _scales(solution)
-    states = zip(solution.t[at], q, qd, qdd, strict=True)
-    terms = np.array([row_terms(solution.packed, *state, floors) for state in states])
-    if not terms.size:
-        return
-    limit = ROW_SHARE + rounding_of_places(solution)
-    for level, error, sums in zip(LEVELS, errors, terms.swapaxes(0, 1), strict=True):
-        share = np.abs(error) / np.where(sums > 0.0, sums, 1.0)
-        worst = np.unravel_index(share.argmax(), share.shape)
-        where = f"t = {solution.t[at][worst[0]]:.9g} s, {_row_name(solution.packed, worst[1])}"
-        yield Finding(f"constraints, {level}", float(share[worst]), limit, where)
+    arrays = [array[at] for array in (solution.t, solution.q, solution.qd, solution.qdd, solution._memory)]
+    floors, limit = FLOOR / ROW_SHARE * _scales(solution), ROW_SHARE + rounding_of_places(solution)
+    parts = [(solution.packed, arrays)]
+    phases = solution._phases
+    if phases is not None:  # the rows that hold
+        parts = [(phases.packed[i], x) for i, _, x in phases._gathered(solution._phase_of_rows[at], arrays)]
+    for packed, (t, *states, memory) in parts:
+        terms = np.array([row_terms(packed, *state, floors) for state in zip(t, *states, strict=True)])
+        if not terms.size:
+            continue
+        errors = constraint_rows(packed, t, *states, memory=memory)
+        for level, error, sums in zip(LEVELS, errors, terms.swapaxes(0, 1), strict=True):
+            share = np.abs(error) / np.where(sums > 0.0, sums, 1.0)
+            worst = np.unravel_index(share.argmax(), share.shape)
+            where = f"t = {t[worst[0]]:.9g} s, {_row_name(packed, worst[1])}"
+            yield Finding(f"constraints, {level}", float(share[worst]), limit, where)
 
 
 def _scales(solution):
@@ -288,25 +266,13 @@ def bodies_of(item):
     return item.bodies if isinstance(item, Force) else [body for part in item.parts for body in (part.a, part.b)]
 
 
-def extent(solution):
-    """Size of a scene, m: distances of the bodies from their middle at the start, and their radii of gyration."""
-    bodies = solution.scene.bodies
-    places = np.array([solution.position(body)[0] for body in bodies])
-    radii = [_radius_of_gyration(body) for body in bodies]
-    return float(np.linalg.norm(places - places.mean(axis=0), axis=1).max() + max(radii, default=0.0))
-
-
-def _radius_of_gyration(body):
-    return np.sqrt(np.trace(np.asarray(body.inertia)) / body.mass) if body.dimension == 7 else 0.0
-
-
 def rounding_of_places(solution):
     """Rounding of positions, relative to the distance of neighbours: large far from the origin."""
     bodies = solution.scene.bodies
     if not bodies:
         return 0.0
     places = np.array([solution.position(body)[0] for body in bodies])
-    radii = np.array([_radius_of_gyration(body) for body in bodies])
+    radii = np.array([radius_of_gyration(body) for body in bodies])
     nearest = cKDTree(places).query(places, k=[min(2, len(bodies))])[0][:, 0]
     return ROUNDINGS * EPS * float(_farthest(solution) / (np.median(np.maximum(nearest, radii)) or 1.0))
 
@@ -348,7 +314,8 @@ def dense_output(solution):
     """Dense output at the outputs of a run gives the outputs, to what the rows there do to rounding."""
     if solution._trajectory is None or not solution.success:
         return
-    at = some(solution.t.size, OUTPUTS)
+    once = np.flatnonzero(np.append(np.diff(solution.t) > 0.0, True))  # at an event the later side
+    at = once[some(once.size, OUTPUTS)]
     state = solution.at(solution.t[at])
     limit = off_steps(solution)
     amplified = np.minimum(ROUNDED_ROWS * EPS / weakest_rows(solution, at) ** 2, NEAR_SINGULAR_ENDS)
@@ -386,7 +353,7 @@ def is_near_singular(solution):
     return solution.stats.steps_near_singular > 0 or not np.nanmax(condition, initial=0.0) < ILL_CONDITIONED
 
 
-LAWS = (finite, constraints, newton_euler, dense_output, motors)
+LAWS = (finite, constraints, newton_euler, dense_output, motors, unilateral, impacts)
 
 
 def findings(solution, laws=LAWS):
@@ -398,10 +365,14 @@ def findings(solution, laws=LAWS):
 
 
 def energy_left(solution):
-    """Largest change of energy less work since the start, J, and the size of the energies, J; needs dense output."""
+    """Largest change of energy less work since the start, J, and the size of the energies, J; needs dense output.
+
+    With contacts: within a phase, or gained at an event.
+    """
     left = solution.energy - solution.work
     size = solution.kinetic_energy.max(initial=0.0) + np.ptp(solution.potential_energy) + np.abs(solution.work).max()
-    return float(np.abs(left - left[0]).max(initial=0.0)), float(size)
+    change = np.abs(left - left[0]).max(initial=0.0) if solution._phases is None else energy_of_phases(left, solution)
+    return float(change), float(size)
 
 
 def momentum_left(solution):

@@ -10,6 +10,7 @@ from ..integrators import Nystrom4
 from ..motions import Sine, time
 from ..motions.tables import Table
 from ..simulation.scene import Scene
+from .contact_scenes import CONTACTS
 
 # Bodies, joints, motors, springs, ropes, rollers and friction of the random scenes, in random units.
 
@@ -334,7 +335,7 @@ FIRST = {
     )
 }  # fmt: skip
 LATER = {each.__name__: each for each in (coupled, rolling)}
-KINDS = FIRST | LATER
+KINDS = FIRST | LATER | CONTACTS
 
 
 def generate(seed, least=None, most=None):
@@ -342,7 +343,8 @@ def generate(seed, least=None, most=None):
 
     Kinds that were added later have seeds of their own, so that scenes of known seeds stay the same.
     """
-    return drawn(np.random.default_rng(seed), least, most, LATER if seed % 10 in (0, 4) else FIRST)
+    kinds = {0: LATER, 4: CONTACTS}.get(seed % 10, FIRST)
+    return drawn(np.random.default_rng(seed), least, most, kinds)
 
 
 def drawn(rng, least=None, most=None, kinds=KINDS):
@@ -356,7 +358,8 @@ def drawn(rng, least=None, most=None, kinds=KINDS):
     if rng.random() < 0.3:
         for body in d.scene.bodies[:: max(n // 5, 1)]:
             spring(d, body)
-    moving(d)
+    if name not in CONTACTS:
+        moving(d)
     method = str(rng.choice(METHODS))
     options = {} if method == "default" else {"integrator": method}
     if method == "nystrom4":
@@ -365,7 +368,7 @@ def drawn(rng, least=None, most=None, kinds=KINDS):
         options |= {"rtol": 1e-8, "atol": 1e-8 * min(d.length, 1.0)}
     if rng.random() < 0.1 and len(d.scene.bodies) < 15 and method != "taylor" and d.is_si:
         options["formulation"] = "null-space"
-    span = 0.0, float(rng.uniform(0.02, 0.5)) * d.time
+    span = 0.0, float(rng.uniform(0.02, 0.5)) * d.time * (3.0 if name in CONTACTS else 1.0)
     return DrawnCase(f"{name}, {len(d.scene.bodies)} bodies, {method}", d.scene, span, options, d.assembled, d.length)
 
 

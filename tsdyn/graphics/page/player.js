@@ -25,8 +25,9 @@ const arrows = run.arrows.map((arrow, index) => {
 });
 instantiate([...parts, ...run.links, ...arrows.flatMap((arrow) => [arrow.shaft, arrow.head])]);
 
-const contacts = parts.filter((part) => part.contact && run.contacts.length).map((part, i) => ({ ...part, shown: -1, states: new Uint8Array(bytes(run.contacts[i])) }));
-const ofContact = ["#3f464e", "#d33a2c", "#2f9e44"].map((colour) => new THREE.Color(colour)); // open, holds back, pushes
+const contacts = parts.filter((part) => part.contact in run.contacts).map((part) => ({ ...part, shown: -1, states: new Uint8Array(bytes(run.contacts[part.contact])) }));
+const ofContact = run.tones.map((colour) => new THREE.Color(colour));
+const said = run.said && new Uint16Array(bytes(run.said.of));
 
 let frame = 0, playing = run.frames > 1, before = null, scriptTime = 0;
 let seen = null; // where what the camera follows was at the last frame
@@ -55,6 +56,7 @@ function drawContact(contact) {
 function draw() {
   pose(frame);
   contacts.forEach(drawContact);
+  if (said) field("closed").textContent = run.said.words[said[Math.floor(frame)]];
   for (const part of parts) if (layers[part.layer].visible) follow(part);
   for (const link of run.links) stretch(link, placed(link.a, link.point_a, p), placed(link.b, link.point_b, q), link.radius);
   const longest = 0.5 * run.radius * 2 ** field("scale").value;
@@ -104,7 +106,7 @@ function labels() {
   const largest = Object.entries(run.scales).filter(([, x]) => x > 0).map(([unit, x]) => `${x.toPrecision(3)} ${unit === "force" ? "N" : "N m"}`);
   field("legend").textContent = `grid ${Number(step.toPrecision(1))} m${largest.length ? `\nlongest arrows ${largest.join(", ")}` : ""}`
     + (run.arrows.every((arrow) => arrow.unique) ? "" : "\ngrey: reactions that are not unique")
-    + (contacts.length ? "\ncontacts: green pushes, red holds back" : "");
+    + (contacts.length ? "\ncontacts: green pushes, red holds back, yellow is hit" : "");
   const usual = duration >= 1.5 && duration <= 60 ? 1 : Number((duration / 10).toPrecision(1)) || 1;
   for (const factor of [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10]) {
     const rate = Number((factor * usual).toPrecision(2));

@@ -1,0 +1,243 @@
+"""Contacts in tsdyn, MuJoCo and Drake: error against time.
+
+- ball: it falls from 1 m and bounces with e = 0.8; the error is that of its height after 1.5 s, in the third flight.
+- rocking: a slender block rocks on smooth ground, by plastic impacts of its edges; the error is that of its tilt after
+  0.2 s, between the first and the second impact. The reference: the closed form of the impact, DOP853 before and after.
+- slope: a block rests on a slope below the angle of friction; the error is how far it has moved after 10 s.
+
+Contacts of MuJoCo and Drake are compliant, here as stiff as the step allows; Drake has no coefficient of restitution.
+Engines that aren't installed are left out.
+
+Run it: python -m benchmarks.contacts
+"""
+
+import importlib.util
+import time
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+import tsdyn as ts
+
+STEPS, TOLERANCES, ROUNDS = (1e-3, 1e-4), (1e-4, 1e-8, 1e-12), 2
+G, E, BALL_END = 9.81, 0.8, 1.5
+HALF_WIDTH, HALF_HEIGHT, TILT, ROCKING_END = 0.2, 0.5, 0.1, 0.2  # m, m, rad, s
+ANGLE, FRICTION, SLOPE_END = 0.3, 0.5, 10.0  # rad, -, s
+MASS = 2.0
+INERTIA = MASS * (HALF_WIDTH**2 + HALF_HEIGHT**2) / 3
+HEIGHT = HALF_HEIGHT * np.cos(TILT) + HALF_WIDTH * np.sin(TILT)
+
+
+def timed(run):
+    """Seconds of a call, and what it returns."""
+    began = time.perf_counter()
+    found = run()
+    return time.perf_counter() - began, found
+
+
+# The references
+
+
+def ball():
+    """Height of a ball, by its flights."""
+    fall = np.sqrt(2 / G)
+    t, rate = BALL_END - fall, E * G * fall
+    while t > 2 * rate / G:
+        t, rate = t - 2 * rate / G, E * rate
+    return rate * t - G * t * t / 2
+
+
+def rocking():
+    """Tilt of the block: energy to the impact, the rate after it, and the equation of motion about the other edge."""
+    b, h, own = HALF_WIDTH, HALF_HEIGHT, INERTIA / MASS
+
+    def rates(_, y):
+        x, rate = y
+        arm, drop = b * np.cos(x) - h * np.sin(x), -b * np.sin(x) - h * np.cos(x)
+        return rate, -arm * (G + drop * rate**2) / (own + arm * arm)
+
+    def flat(_, y):
+        return y[0]
+
+    flat.terminal = True
+    options = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-15}
+    first = solve_ivp(rates, (0.0, 1.0), (TILT, 0.0), events=flat, **options)
+    rate = -first.y[1, -1] * (own - b * b) / (own + b * b)
+    return -solve_ivp(rates, (first.t[-1], ROCKING_END), (0.0, rate), **options).y[0, -1]
+
+
+# The same in tsdyn
+
+
+def ours(build, end, tol):
+    """Seconds, and the solution at the end; kernels and phases are prepared by a first run."""
+    scene = build()
+    ts.simulate(scene, (0.0, end), rtol=tol, atol=tol)
+    return timed(lambda: ts.simulate(scene, (0.0, end), t_eval=[end], rtol=tol, atol=tol))
+
+
+def ours_ball(tol):
+    """A point mass over a plane."""
+
+    def build():
+        scene = ts.Scene(gravity=(0, 0, -G))
+        body = scene.add_point_mass(1.0, (0, 0, 1.0), name="ball")
+        contact = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": E}
+        scene.add(ts.constraints.PlaneContact(body, scene.ground, **contact))
+        return scene
+
+    seconds, solution = ours(build, BALL_END, tol)
+    return seconds, solution.position("ball")[-1, 2]
+
+
+def ours_rocking(tol):
+    """A block with two edges."""
+
+    def build():
+        scene, turned = ts.Scene(gravity=(0, 0, -G)), (np.cos(TILT / 2), 0, np.sin(TILT / 2), 0)
+        block = scene.add_body(MASS, (INERTIA,) * 3, (0, 0, HEIGHT), turned, name="block")
+        scene.add(ts.constraints.Parallel(block, scene.ground, axis_a=(0, 1, 0), axis_b=(0, 1, 0)))
+        for x in (-HALF_WIDTH, HALF_WIDTH):
+            edge = {"point_a": (x, 0, -HALF_HEIGHT), "normal_b": (0, 0, 1), "unilateral": True}
+            scene.add(ts.constraints.PlaneContact(block, scene.ground, **edge))
+        return scene
+
+    seconds, solution = ours(build, ROCKING_END, tol)
+    return seconds, 2 * np.arctan2(*solution.orientation("block")[-1, [2, 0]])
+
+
+def ours_slope(tol):
+    """A block that slides in a plane, with friction by its normal force."""
+
+    def build():
+        scene = ts.Scene(gravity=(G * np.sin(ANGLE), 0, -G * np.cos(ANGLE)))
+        block = scene.add_body(MASS, (INERTIA,) * 3, name="block")
+        scene.add(ts.constraints.Parallel(block, scene.ground, axis_a=(0, 0, 1), axis_b=(0, 0, 1)))
+        table = scene.add(ts.constraints.PlaneContact(block, scene.ground, normal_b=(0, 0, 1)))
+        scene.add(ts.forces.ContactFriction(table, kinetic=FRICTION))
+        return scene
+
+    seconds, solution = ours(build, SLOPE_END, tol)
+    return seconds, solution.position("block")[-1, 0]
+
+
+# In MuJoCo: contacts of a time constant and a damping ratio
+
+PLANAR = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 1 0"/>'
+BOX = f'<geom type="box" size="{HALF_WIDTH} 0.3 {HALF_HEIGHT}"/>'
+
+
+def mujoco(step, end, contact, body, gravity=(0, 0, -G), start=(0, 0, 0)):
+    """Coordinates x, z (from where the body is put) and tilt of a body in a plane, at the end."""
+    import mujoco
+
+    text = (
+        f'<mujoco><option timestep="{step}" gravity="{" ".join(map(str, gravity))}" cone="elliptic" impratio="100"/>'
+        f'<default><geom solimp="0.9999 0.9999 1e-3" {contact}/></default><worldbody><geom type="plane" size="9 9 1"/>'
+        f'<body pos="0 0 {body[0]}">{PLANAR}<inertial pos="0 0 0" mass="{MASS}" diaginertia="{INERTIA} {INERTIA} '
+        f'{INERTIA}"/>{body[1]}</body></worldbody></mujoco>'
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    data.qpos[:] = start
+
+    def run():
+        for _ in range(round(end / step)):
+            mujoco.mj_step(model, data)
+        return data.qpos.copy()
+
+    return timed(run)
+
+
+def mujoco_ball(step):
+    """A sphere; e gives the damping ratio, and the time constant has five steps to a radian of the oscillation."""
+    ratio = -np.log(E) / np.hypot(np.pi, np.log(E))
+    contact = f'solref="{5 * step / ratio} {ratio}" condim="1"'
+    seconds, x = mujoco(step, BALL_END, contact, (1.1, '<geom type="sphere" size="0.1"/>'))
+    return seconds, x[1] + 1.0
+
+
+def mujoco_rocking(step):
+    """A box without friction."""
+    contact = f'solref="{2 * step} 1" condim="1"'
+    seconds, x = mujoco(step, ROCKING_END, contact, (0.0, BOX), start=(0, HEIGHT, TILT))
+    return seconds, x[2]
+
+
+def mujoco_slope(step):
+    """A box with friction; gravity is turned."""
+    contact = f'solref="{2 * step} 1" friction="{FRICTION} 0 0"'
+    gravity = G * np.sin(ANGLE), 0, -G * np.cos(ANGLE)
+    seconds, x = mujoco(step, SLOPE_END, contact, (HALF_WIDTH, BOX.replace(str(HALF_HEIGHT), str(HALF_WIDTH))), gravity)
+    return seconds, x[0]
+
+
+# In Drake: its discrete solver, small spheres at the corners of a box
+
+
+def drake(step, end, half_height, friction, gravity, height, tilt=0.0):
+    """Coordinates x and tilt of a block at the end."""
+    import pydrake.all as d
+
+    builder = d.DiagramBuilder()
+    plant, _ = d.AddMultibodyPlantSceneGraph(builder, time_step=step)
+    plant.mutable_gravity_field().set_gravity_vector(gravity)
+    inertia = d.SpatialInertia(MASS, np.zeros(3), d.UnitInertia(*(INERTIA / MASS,) * 3))
+    block, law = plant.AddRigidBody("block", inertia), d.CoulombFriction(friction, friction)
+    radius = 1e-6
+    for i, (x, y) in enumerate([(1, 1), (1, -1), (-1, -1), (-1, 1)]):
+        place = d.RigidTransform([x * HALF_WIDTH, 0.3 * y, radius - half_height])
+        plant.RegisterCollisionGeometry(block, place, d.Sphere(radius), f"corner {i}", law)
+    plant.RegisterCollisionGeometry(plant.world_body(), d.RigidTransform(), d.HalfSpace(), "ground", law)
+    plant.Finalize()
+    simulator = d.Simulator(builder.Build())
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    pose = d.RigidTransform(d.RotationMatrix.MakeYRotation(tilt), [0, 0, height])
+    plant.SetFreeBodyPose(context, block, pose)
+    simulator.Initialize()
+
+    def run():
+        simulator.AdvanceTo(end)
+        found = plant.EvalBodyPoseInWorld(context, block)
+        R = found.rotation().matrix()
+        return found.translation()[0], np.arctan2(R[0, 2], R[0, 0])
+
+    return timed(run)
+
+
+def drake_rocking(step):
+    """Without friction."""
+    seconds, found = drake(step, ROCKING_END, HALF_HEIGHT, 0.0, (0, 0, -G), HEIGHT, TILT)
+    return seconds, found[1]
+
+
+def drake_slope(step):
+    """A low block, gravity turned."""
+    gravity = G * np.sin(ANGLE), 0, -G * np.cos(ANGLE)
+    seconds, found = drake(step, SLOPE_END, HALF_WIDTH, FRICTION, gravity, HALF_WIDTH)
+    return seconds, found[0]
+
+
+RUNS = {
+    "ball": (ball, {"tsdyn": ours_ball, "mujoco": mujoco_ball}),
+    "rocking": (rocking, {"tsdyn": ours_rocking, "mujoco": mujoco_rocking, "pydrake": drake_rocking}),
+    "slope": (lambda: 0.0, {"tsdyn": ours_slope, "mujoco": mujoco_slope, "pydrake": drake_slope}),
+}
+
+
+def main():
+    """Print the error at the end, and milliseconds, the least of some rounds."""
+    print("motion   program  setting        error   time (ms)")
+    for motion, (reference, runs) in RUNS.items():
+        exact = reference()
+        for program, run in runs.items():
+            if not importlib.util.find_spec(program):
+                continue
+            for value in TOLERANCES if program == "tsdyn" else STEPS:
+                found = [run(value) for _ in range(ROUNDS)]
+                error, seconds = abs(found[-1][1] - exact), min(s for s, _ in found)
+                print(f"{motion:8} {program:8} {value:7.0e} {error:12.1e} {1e3 * seconds:11.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""Random scenes with contacts, stops and ropes that go slack: stacks, cradles, chains over a floor, pins with play."""
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from .. import constraints as joints
+from ..shapes import box
+
+UP = (0.0, 0.0, 1.0)
+RESTITUTIONS, FRICTIONS = (0.0, 0.0, 0.3, 0.8, 1.0), (0.0, 0.0, 0.2, 0.6)
+
+
+def _upright(d):
+    """Let gravity act down, and return a coefficient of restitution that all contacts share, or None: each its own."""
+    d.scene.gravity = (0.0, 0.0, -9.81 * d.length / d.time**2)
+    return float(d.rng.choice(RESTITUTIONS)) if d.rng.random() < 0.7 else None
+
+
+def _law(d, e):
+    return {"restitution": float(d.rng.choice(RESTITUTIONS)) if e is None else e}
+
+
+def _thrown(d, share):
+    """Velocities of a body: of a random direction, in this share of the scenes."""
+    size = d.rng.random() < share
+    return size * d.rng.normal(size=3) * d.length / d.time, size * 3.0 * d.rng.normal(size=3) / d.time
+
+
+def _floor(d, body, point, e, kinetic, base=None, at=(0.0, 0.0, 0.0)):
+    base = base or d.scene.ground
+    given = {"point_a": point, "point_b": at, "normal_b": UP, "unilateral": True}
+    d.scene.add(joints.PlaneContact(body, base, **given, **_law(d, e), kinetic=kinetic))
+
+
+def balls(d, n):
+    """Balls above each other, exactly or nearly, perhaps in a large ball."""
+    e, radius, found = _upright(d), 0.1 * d.length, []
+    shell = {"radius_a": radius, "radius_b": 3.0 * d.length, "inside": True}
+    shift, is_in_shell = 0.02 * d.rng.choice((0.0, 1.0)), d.rng.random() < 0.5
+    pitch = 0.3 if shift else d.rng.choice((0.2, 0.3))
+    for i in range(min(n, 6)):
+        place = np.append(shift * d.rng.uniform(-1.0, 1.0, 2), 0.3 + pitch * i)
+        ball = d.body(place, rigid=bool(d.rng.integers(2)))
+        ball.velocity = _thrown(d, 0.5)[0]
+        d.scene.add(joints.SphereContact(ball, d.scene.ground, radius_a=radius, normal_b=UP, **_law(d, e)))
+        if is_in_shell:
+            d.scene.add(joints.SphereContact(ball, d.scene.ground, **shell, **_law(d, e)))
+        for other in found:
+            d.scene.add(joints.SphereContact(ball, other, radius_a=radius, radius_b=radius, **_law(d, e)))
+        found.append(ball)
+
+
+def cradle(d, n):
+    """Balls on rods beside each other, that touch or don't; the first one is drawn aside."""
+    e, radius, last = _upright(d), 0.1 * d.length, None
+    gap = d.rng.choice((0.0, 1e-3)) * d.length
+    for i in range(max(min(n, 7), 2)):
+        x, tilt = i * (2.0 * radius + gap), d.rng.uniform(0.2, 1.0) * (i == 0)
+        place = np.array((x - d.length * np.sin(tilt), 0.0, -d.length * np.cos(tilt)))
+        ball = d.scene.add_point_mass(d.mass * d.rng.choice((1.0, d.rng.uniform(0.2, 3.0))), place)
+        d.scene.add(joints.Distance(ball, d.scene.ground, point_b=(x, 0.0, 0.0)))
+        if last is not None:
+            d.scene.add(joints.SphereContact(last, ball, radius_a=radius, radius_b=radius, **_law(d, e)))
+        last = ball
+
+
+def stack(d, n):
+    """Boxes on each other, at rest or with gaps, straight or shifted; or one that is thrown, with all its corners."""
+    e, base, top, half, n = _upright(d), d.scene.ground, np.zeros(3), 0.0, min(n, 4)
+    kinetic = float(d.rng.choice(FRICTIONS))
+    gap, is_straight = d.rng.choice((0.0, 0.05)) * d.length, n > 1 and d.rng.random() < 0.5
+    for _ in range(n):
+        size = d.length * (np.array((0.6, 0.5, 0.4)) if is_straight else d.rng.uniform(0.3, 1.0, 3))
+        solid = box(size, mass=d.mass * d.rng.uniform(0.5, 3.0))
+        shift = np.zeros(2) if is_straight else 0.1 * size[:2] * d.rng.uniform(-1.0, 1.0, 2)
+        body = d.scene.add_body(**solid)
+        body.position = top + np.append(shift, gap + size[2] / 2)
+        corners = size / 2 * np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T
+        if n == 1:
+            body.position, body.orientation = (0.0, 0.0, d.length), Rotation.from_rotvec(d.rng.normal(size=3))
+            body.velocity, body.angular_velocity = _thrown(d, 0.8)
+        for corner in corners if n == 1 else corners[corners[:, 2] < 0.0]:
+            _floor(d, body, corner, e, kinetic, base, (0.0, 0.0, half))
+        base, top, half = body, body.position + np.array((0.0, 0.0, size[2] / 2)), size[2] / 2
+
+
+def chain_over_floor(d, n):
+    """Links over a floor, free or hung up, straight or bent, with stops between them."""
+    e, L, last = _upright(d), 0.4 * d.length, d.scene.ground
+    is_planar, is_free, has_stops, is_bent = d.rng.integers(2, size=4)
+    tip, kinetic = np.array((0.0, 0.0, d.rng.uniform(0.1, 0.8) * d.length)), float(d.rng.choice(FRICTIONS))
+    for i in range(min(n, 8)):
+        along = np.array((1.0, 0.0, is_bent * d.rng.uniform(0.0, 1.0)))
+        along *= L / np.linalg.norm(along)
+        turned = Rotation.from_euler("y", -np.arctan2(along[2], along[0]))
+        link = d.scene.add_body(
+            d.mass, np.array((0.001, 0.0133, 0.0133)) * d.mass * d.length**2, tip + along / 2, turned
+        )
+        if i or not is_free:
+            kind, axis = (joints.Revolute, {"axis": (0, 1, 0)}) if is_planar else (joints.Spherical, {})
+            joint = d.scene.add(kind.at(last, link, point=tip, **axis))
+            if is_planar and has_stops and d.rng.integers(2):
+                bounds = -d.rng.uniform(0.1, 1.0), d.rng.uniform(0.1, 1.0)
+                d.scene.add(joints.Stop(joint, *bounds, **_law(d, e)))
+        for x in (-L / 2, L / 2) if i == 0 and is_free else (L / 2,):
+            _floor(d, link, (x, 0.0, 0.0), e, kinetic)
+        last, tip = link, tip + along
+
+
+def stops(d, n):
+    """Hinges and slides, each with one stop or two, one after the other."""
+    e, last, place = _upright(d), d.scene.ground, np.zeros(3)
+    for _ in range(min(n, 5)):
+        place = place + d.unit()
+        body = d.body(place, rigid=True)
+        is_hinge, axis = d.rng.random() < 0.7, d.unit()
+        kind = joints.Revolute if is_hinge else joints.Translational
+        joint = d.scene.add(kind.at(last, body, point=d.place(place - 0.5 * d.unit()), axis=axis))
+        unit = 1.0 if is_hinge else d.length
+        lower, upper = -d.rng.uniform(0.0, 0.5) * unit, d.rng.uniform(0.01, 0.5) * unit
+        which = d.rng.integers(3)
+        d.scene.add(joints.Stop(joint, lower if which < 2 else None, upper if which else None, **_law(d, e)))
+        last = body
+
+
+def ropes(d, n):
+    """Bodies on ropes that are slack at first, or taut: from the ground, from each other, or over a pulley."""
+    e, last, place = _upright(d), d.scene.ground, np.zeros(3)
+    for _ in range(min(n, 5)):
+        place = place + np.array((*(0.3 * d.rng.normal(size=2)), -d.rng.uniform(0.3, 1.0)))
+        body = d.body(place)
+        body.velocity = _thrown(d, 0.5)[0]
+        start = d.place(np.zeros(3)) if last is d.scene.ground else np.zeros(3)
+        points = [(last, start), (body, np.zeros(3))]
+        if d.rng.random() < 0.3:
+            points.insert(1, (d.scene.ground, d.place(place + np.array((0.7, 0.0, 0.8)))))
+        ends = [s if one is d.scene.ground else np.asarray(one.position) for one, s in points]
+        length = sum(np.linalg.norm(b - a) for a, b in pairwise(ends))
+        d.scene.add(
+            joints.Rope(points, length=length * d.rng.choice((1.0, 1.0 + d.rng.uniform(0.0, 0.3))), **_law(d, e))
+        )
+        last = body
+
+
+def play(d, n):
+    """A pendulum whose pin has play in its eye; others hang on it by joints."""
+    e, last, place = _upright(d), d.scene.ground, np.zeros(3)
+    clearance = 10.0 ** d.rng.uniform(-3.0, -1.0) * d.length
+    for i in range(min(n, 4)):
+        body = d.body(place + np.array((0.5, 0.0, 0.0)), rigid=True)
+        body.orientation = (1.0, 0.0, 0.0, 0.0)
+        pin = np.array((-0.5, 0.0, 0.0)) * d.length
+        if i == 0:
+            given = {
+                "center_a": pin,
+                "radius_a": 0.1 * d.length,
+                "radius_b": 0.1 * d.length + clearance,
+                "inside": True,
+            }
+            d.scene.add(joints.SphereContact(body, last, **given, **_law(d, e)))
+        else:
+            d.scene.add(joints.Spherical.at(last, body, point=d.place(place)))
+        last, place = body, place + np.array((1.0, 0.0, 0.0))
+
+
+CONTACTS = {each.__name__: each for each in (balls, cradle, stack, chain_over_floor, stops, ropes, play)}

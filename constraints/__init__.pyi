@@ -141,6 +141,21 @@ class Span(Points, Primitive):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., offset: float = ..., least: float = ..., name: str = ...) -> Self: ...
 
+class SphereRolling(Primitive):
+    center_a: Attribute[ArrayLike, Floats]
+    first_a: Attribute[ArrayLike, Floats]
+    second_a: Attribute[ArrayLike, Floats]
+    third_a: Attribute[ArrayLike, Floats]
+    center_b: Attribute[ArrayLike, Floats]
+    first_b: Attribute[ArrayLike, Floats]
+    second_b: Attribute[ArrayLike, Floats]
+    third_b: Attribute[ArrayLike, Floats]
+    distance: float
+    share: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., center_b: ArrayLike = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., third_b: ArrayLike | None = ..., distance: float, share: float, name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., third: ArrayLike | None = ..., center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., center_b: ArrayLike = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., third_b: ArrayLike | None = ..., distance: float, share: float, name: str = ...) -> Self: ...
+
 class Spherical(Points, Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., name: str = ...) -> None: ...
     @classmethod
@@ -235,17 +250,7 @@ class PlaneContact(Points, Primitive):
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., normal: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., unilateral: bool = ..., restitution: float = ..., kinetic: float = ..., static: float | None = ..., name: str = ...) -> Self: ...
     @property
-    def sides(self) -> tuple[Any, ...]: ...
-
-class RollingBall(Joint):
-    center_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    normal_b: Attribute[ArrayLike, Floats]
-    radius: float
-    slip: bool
-    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., slip: bool = ..., name: str = ...) -> None: ...
-    @classmethod
-    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., slip: bool = ..., name: str = ...) -> Self: ...
+    def rubs(self) -> bool: ...
 
 class RollingBallOnCylinder(Joint):
     center_a: Attribute[ArrayLike, Floats]
@@ -273,29 +278,6 @@ class RollingContact(SmoothContact):
     def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., first: ArrayLike | None = ..., second: ArrayLike | None = ..., third: ArrayLike | None = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., first_a: ArrayLike | None = ..., second_a: ArrayLike | None = ..., third_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., first_b: ArrayLike | None = ..., second_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., tyre_radius: float = ..., name: str = ...) -> Self: ...
-
-class RollingDisc(Joint):
-    center_a: Attribute[ArrayLike, Floats]
-    axis_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    normal_b: Attribute[ArrayLike, Floats]
-    radius: float
-    tyre_radius: float
-    slip: bool
-    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., tyre_radius: float = ..., slip: bool = ..., name: str = ...) -> None: ...
-    @classmethod
-    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., axis: ArrayLike | None = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., tyre_radius: float = ..., slip: bool = ..., name: str = ...) -> Self: ...
-
-class RollingEllipsoid(Joint):
-    center_a: Attribute[ArrayLike, Floats]
-    point_b: Attribute[ArrayLike, Floats]
-    normal_b: Attribute[ArrayLike, Floats]
-    semi_axes: Attribute[ArrayLike, Floats]
-    axes_a: Orientation
-    slip: bool
-    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., axes_a: Orientation | None = ..., slip: bool = ..., name: str = ...) -> None: ...
-    @classmethod
-    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., axes_a: Orientation | None = ..., slip: bool = ..., name: str = ...) -> Self: ...
 
 class Rope(Joint):
     @property
@@ -344,6 +326,8 @@ class SphereContact(Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., center_b: ArrayLike = ..., radius_a: float, radius_b: float | None = ..., normal_b: ArrayLike | None = ..., inside: bool = ..., restitution: float = ..., kinetic: float = ..., static: float | None = ..., name: str = ...) -> None: ...
     @classmethod
     def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., center_a: ArrayLike = ..., center_b: ArrayLike = ..., radius_a: float, radius_b: float | None = ..., normal_b: ArrayLike | None = ..., inside: bool = ..., restitution: float = ..., kinetic: float = ..., static: float | None = ..., name: str = ...) -> Self: ...
+    @property
+    def rubs(self) -> bool: ...
 
 class Stop(Joint):
     joint: Joint
@@ -355,6 +339,8 @@ class Stop(Joint):
     def at(cls, joint: Joint, lower: float | None = ..., upper: float | None = ..., restitution: float = ..., name: str = ...) -> Self: ...
     @property
     def geometry(self) -> Any: ...
+    @property
+    def rubs(self) -> bool: ...
 
 class Translational(Points, Axes, References, Joint):
     def __init__(self, a: BodyLike, b: BodyLike, *, point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., name: str = ...) -> None: ...
@@ -362,6 +348,63 @@ class Translational(Points, Axes, References, Joint):
     def at(cls, a: BodyLike, b: BodyLike, *, point: ArrayLike = ..., axis: ArrayLike | None = ..., reference: ArrayLike | None = ..., point_a: ArrayLike = ..., point_b: ArrayLike = ..., axis_a: ArrayLike | None = ..., axis_b: ArrayLike | None = ..., reference_a: ArrayLike | None = ..., reference_b: ArrayLike | None = ..., name: str = ...) -> Self: ...
     @property
     def frames(self) -> tuple[Any, ...]: ...
+
+class RollingBall(Joint):
+    center_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    normal_b: Attribute[ArrayLike, Floats]
+    radius: float
+    slip: bool
+    kinetic: float
+    static: float
+    restitution: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., slip: bool = ..., kinetic: float | None = ..., static: float | None = ..., restitution: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., slip: bool = ..., kinetic: float | None = ..., static: float | None = ..., restitution: float = ..., name: str = ...) -> Self: ...
+    def rolling(self) -> Iterator[tuple[str, Any]]: ...
+    @property
+    def rubs(self) -> bool: ...
+    @property
+    def unilateral(self) -> bool: ...
+
+class RollingDisc(Joint):
+    center_a: Attribute[ArrayLike, Floats]
+    axis_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    normal_b: Attribute[ArrayLike, Floats]
+    radius: float
+    tyre_radius: float
+    slip: bool
+    kinetic: float
+    static: float
+    restitution: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., tyre_radius: float = ..., slip: bool = ..., kinetic: float | None = ..., static: float | None = ..., restitution: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., axis: ArrayLike | None = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., axis_a: ArrayLike | None = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., radius: float | None = ..., tyre_radius: float = ..., slip: bool = ..., kinetic: float | None = ..., static: float | None = ..., restitution: float = ..., name: str = ...) -> Self: ...
+    def rolling(self) -> Iterator[tuple[str, Any]]: ...
+    @property
+    def rubs(self) -> bool: ...
+    @property
+    def unilateral(self) -> bool: ...
+
+class RollingEllipsoid(Joint):
+    center_a: Attribute[ArrayLike, Floats]
+    point_b: Attribute[ArrayLike, Floats]
+    normal_b: Attribute[ArrayLike, Floats]
+    semi_axes: Attribute[ArrayLike, Floats]
+    axes_a: Orientation
+    slip: bool
+    kinetic: float
+    static: float
+    restitution: float
+    def __init__(self, a: BodyLike, b: BodyLike, *, center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., axes_a: Orientation | None = ..., slip: bool = ..., kinetic: float | None = ..., static: float | None = ..., restitution: float = ..., name: str = ...) -> None: ...
+    @classmethod
+    def at(cls, a: BodyLike, b: BodyLike, *, center: ArrayLike = ..., point: ArrayLike = ..., normal: ArrayLike | None = ..., center_a: ArrayLike = ..., point_b: ArrayLike = ..., normal_b: ArrayLike | None = ..., semi_axes: ArrayLike | None = ..., axes_a: Orientation | None = ..., slip: bool = ..., kinetic: float | None = ..., static: float | None = ..., restitution: float = ..., name: str = ...) -> Self: ...
+    def rolling(self) -> Iterator[tuple[str, Any]]: ...
+    @property
+    def rubs(self) -> bool: ...
+    @property
+    def unilateral(self) -> bool: ...
 
 def registered() -> tuple[type[Primitive], ...]: ...
 

@@ -5,21 +5,23 @@
     Phi_x = [ n^T, -n^T, d^T ]        (2)  for (x_a, x_b, n)
     gamma = 2 nd.dd                   (3)
 
-Never singular by itself. A unilateral contact has the gap Phi >= 0.
+Never singular by itself. A unilateral contact has the gap Phi >= 0; with friction two more rows of Eq. (1), along
+directions in the plane, hold the point where it sticks.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import InvalidConstraint, Point, Primitive, Unilateral, Vector
+from ..plugins import InvalidConstraint, Point, Primitive, Side, Unilateral, Vector, across, stop_waiting
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
 
 
 class PlaneContact(Unilateral, Primitive):
-    """A point of one body in a plane fixed to another, or on one side of it: contact without friction.
+    """A point of one body in a plane fixed to another, or on one side of it: contact, with friction if it opens.
 
     Parameters
     ----------
@@ -29,12 +31,14 @@ class PlaneContact(Unilateral, Primitive):
     restitution : float, 0 to 1
         Coefficient of restitution e of a unilateral contact: 0 for plastic impacts, 1 for elastic ones.
     kinetic, static : float, float or None
-        Coefficients of friction of a unilateral contact; not available yet.
+        Coefficients of Coulomb friction of a unilateral contact: while the point slides, and the bound of sticking, by
+        default the same. `ContactFriction` is the friction of a bilateral one.
 
     Notes
     -----
     Body a carries the point point_a, b the plane through point_b with the normal normal_b. The force
-    on a is -lam n: the plane pushes where lam < 0.
+    on a is -lam n: the plane pushes where lam < 0. With friction there are three rows: gap, and two of the slip, whose
+    multipliers are the friction force, opposite in sign, along two directions in the plane.
 
     Examples
     --------
@@ -81,10 +85,45 @@ class PlaneContact(Unilateral, Primitive):
             raise InvalidConstraint(f"{self.name}: unilateral must be True or False, got {unilateral!r}.")
         self.unilateral = unilateral
         self._set_law(restitution, kinetic, static)
+        self.check()
+
+    def __setattr__(self, name, value):
+        """Set an attribute, checked; the rows follow."""
+        super().__setattr__(name, value)
+        self.__dict__.pop("_three", None)
 
     def check(self):
         """Refuse inadmissible coefficients of impact and friction."""
         self._check_law()
+        rows = 3 if self.rubs else 1
+        self.__dict__.update(rows=rows, all_rows=rows)
+
+    @cached_property
+    def _three(self):
+        """With friction: the rows along the normal and two directions in the plane."""
+        found = []
+        for normal, label in zip((self.normal_b, *across(self.normal_b)), self.row_labels, strict=True):
+            places = {"point_a": self.point_a, "point_b": self.point_b, "normal_b": normal}
+            part = PlaneContact(self.a, self.b, **places)
+            stop_waiting(part)
+            part.__dict__.update(owner=self, name=f"{self.name}{label}")
+            found.append(part)
+        return tuple(found), self._grip(found[0], point_a=self.point_a, point_b=self.point_b, normal_b=self.normal_b)
+
+    @property
+    def parts(self):
+        """Itself, or with friction its three rows."""
+        return self._three[0] if self.rubs else (self,)
+
+    @property
+    def sides(self):
+        """One."""
+        return (Side(*self.parts[:1], 1.0, grip=self._three[1] if self.rubs else None),)
+
+    @property
+    def row_labels(self):
+        """What follows its title in the names of its rows."""
+        return (" gap", " slip[0]", " slip[1]") if self.rubs else ("",)
 
     @staticmethod
     def phi(x, par, t, out):

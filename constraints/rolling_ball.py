@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..plugins import Joint, Point, Vector, positive
-from .rolling_contact import Rolls, on_plane
+from .rolling_contact import RollsOnPlane
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
 
 
-class RollingBall(Rolls, Joint):
+class RollingBall(RollsOnPlane, Joint):
     """A ball of one body rolls on a plane of another, without slip.
 
     Parameters
@@ -28,6 +28,11 @@ class RollingBall(Rolls, Joint):
         Of the ball.
     slip : bool
         True for contact without friction: the ball touches the plane and slides.
+    kinetic, static : float, optional
+        Coefficients of Coulomb friction: while it slides, and the bound of rolling, by default the same. With kinetic,
+        0 or more, the contact opens, rolls and slips; without it is held to the plane and never slips.
+    restitution : float, 0 to 1
+        Coefficient of restitution of impacts, where the contact opens.
 
     Raises
     ------
@@ -56,21 +61,31 @@ class RollingBall(Rolls, Joint):
     markers = (Point("a", "center_a"), Point("b"), Vector("b", "normal_b"))
 
     def __init__(
-        self, a: BodyLike, b: BodyLike, *, radius: float | None = None, slip: bool = False, **places: Any
+        self,
+        a: BodyLike,
+        b: BodyLike,
+        *,
+        radius: float | None = None,
+        slip: bool = False,
+        kinetic: float | None = None,
+        static: float | None = None,
+        restitution: float = 0.0,
+        **places: Any,
     ) -> None:
         super().__init__(a, b, **places)
         self.radius = radius
-        self.slip = slip
-        self.check()
+        self._set_rolling(slip, restitution, kinetic, static)
 
     def check(self):
         """Refuse a radius that is not positive."""
         super().check()
         positive(self.radius, f"{self.name}: radius (m)", self.error)
 
-    def compose(self):
-        """Eqs. (1) and (2)."""
-        yield "contact", on_plane(self, np.eye(3), [float(self.radius)] * 3)
+    compose = RollsOnPlane.rolling
+
+    def surface(self):
+        """Of the contact."""
+        return np.eye(3), [float(self.radius)] * 3, 0.0
 
     @classmethod
     def example(cls, rng, a, b):

@@ -14,10 +14,14 @@ Singular where SmoothContact is.
 
 from __future__ import annotations
 
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
-from ..plugins import Vector, across, dot, scaled, shown
+from ..plugins import Side, Unilateral, Vector, across, dot, scaled, shown
 from .smooth_contact import E, P, SmoothContact, Z, along, axes, contact_series, moves, scaled_plane, support
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 T, U = 18, 21  # where t_1 and t_2 begin in x
 
@@ -176,12 +180,64 @@ class Rolls:
         return (" contact",) if self.slip else (" contact", " slip[0]", " slip[1]")
 
 
-def on_plane(joint, axes, semi_axes, tyre_radius=0.0):
-    """The part of a joint that rolls, or slides, on a plane; axes (3, 3): a row for each semi-axis."""
-    places = dict(zip(("first_a", "second_a", "third_a"), axes, strict=True))
-    places |= {name: getattr(joint, name) for name in ("center_a", "point_b", "normal_b")}
-    sizes = {"semi_axes": semi_axes, "tyre_radius": tyre_radius}
-    if joint.slip:
-        return SmoothContact(joint.a, joint.b, **places, **sizes)
-    first, second = across(joint.normal_b)
-    return RollingContact(joint.a, joint.b, **places, **sizes, first_b=first, second_b=second)
+class RollsOnPlane(Unilateral, Rolls):
+    """Mixed into those on a plane: with `kinetic` they roll, slip and lift off."""
+
+    def _set_rolling(self, slip: bool, restitution: float, kinetic: float | None, static: float | None) -> None:
+        """Take slip and the coefficients, at the end of `__init__`."""
+        self.slip = slip
+        self._set_law(restitution, kinetic, static)
+        self.check()
+
+    @property
+    def unilateral(self) -> bool:
+        """Whether the contact opens: where it has a coefficient of friction."""
+        return self.kinetic is not None
+
+    def check(self) -> None:
+        """Refuse inadmissible coefficients, and slip=True with them."""
+        Rolls.check(self)
+        self._check_law()
+        if self.slip and self.unilateral:
+            raise self.error(f"{self.name}: with kinetic the contact slips where it must; leave out slip=True.")
+
+    def surface(self) -> tuple[Any, Any, float]:
+        """Directions of the semi-axes (3, 3), semi-axes (3,) and tyre radius, m."""
+        raise NotImplementedError
+
+    def rolling(self) -> Iterator[tuple[str, Any]]:
+        """The parts: the contact row and, where it rolls, the two of the slip."""
+        places, sizes = self._geometry()
+        if self.slip or (self.unilateral and not self.rubs):
+            yield "contact", SmoothContact(self.a, self.b, **places, **sizes)
+        else:
+            first, second = across(self.normal_b)
+            yield "contact", RollingContact(self.a, self.b, **places, **sizes, first_b=first, second_b=second)
+
+    def _geometry(self):
+        axes, semi_axes, tyre_radius = self.surface()
+        places = dict(zip(("first_a", "second_a", "third_a"), axes, strict=True))
+        places |= {name: getattr(self, name) for name in ("center_a", "point_b", "normal_b")}
+        return places, {"semi_axes": semi_axes, "tyre_radius": tyre_radius}
+
+    def __setattr__(self, name, value):
+        """Set an attribute, checked; the rows follow."""
+        super().__setattr__(name, value)
+        self.__dict__.pop("_friction", None)
+
+    @cached_property
+    def _friction(self):
+        """Its `Grip`."""
+        places, sizes = self._geometry()
+        gap = SmoothContact(self.a, self.b, **places, **sizes)
+        return self._grip(gap, point_a=places.pop("center_a"), **places, **sizes)
+
+    @property
+    def sides(self):
+        """One where it opens."""
+        return (Side(self.parts[0], 1.0, grip=self._friction if self.rubs else None),)
+
+    @property
+    def row_labels(self) -> tuple[str, ...]:
+        """What follows its title in the names of its rows."""
+        return (" contact", " slip[0]", " slip[1]")[: self.all_rows]

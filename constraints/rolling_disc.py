@@ -11,13 +11,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..plugins import Joint, Point, Vector, across, not_negative, positive
-from .rolling_contact import Rolls, on_plane
+from .rolling_contact import RollsOnPlane
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
 
 
-class RollingDisc(Rolls, Joint):
+class RollingDisc(RollsOnPlane, Joint):
     """A disc of one body rolls on a plane of another: a coin, a wheel; with `tyre_radius` a torus.
 
     Parameters
@@ -28,6 +28,11 @@ class RollingDisc(Rolls, Joint):
         Radius of the round section of a torus; 0 for a thin disc.
     slip : bool
         True for contact without friction: the disc touches the plane and slides.
+    kinetic, static : float, optional
+        Coefficients of Coulomb friction: while it slides, and the bound of rolling, by default the same. With kinetic,
+        0 or more, the contact opens, rolls and slips; without it is held to the plane and never slips.
+    restitution : float, 0 to 1
+        Coefficient of restitution of impacts, where the contact opens.
 
     Raises
     ------
@@ -65,13 +70,15 @@ class RollingDisc(Rolls, Joint):
         radius: float | None = None,
         tyre_radius: float = 0.0,
         slip: bool = False,
+        kinetic: float | None = None,
+        static: float | None = None,
+        restitution: float = 0.0,
         **places: Any,
     ) -> None:
         super().__init__(a, b, **places)
         self.radius = radius
         self.tyre_radius = tyre_radius
-        self.slip = slip
-        self.check()
+        self._set_rolling(slip, restitution, kinetic, static)
 
     def check(self):
         """Refuse a radius that is not positive."""
@@ -79,10 +86,11 @@ class RollingDisc(Rolls, Joint):
         positive(self.radius, f"{self.name}: radius (m)", self.error)
         not_negative(self.tyre_radius, f"{self.name}: tyre_radius (m)", self.error)
 
-    def compose(self):
-        """Eqs. (1) and (2)."""
-        radius, axes = float(self.radius), (*across(self.axis_a), self.axis_a)
-        yield "contact", on_plane(self, axes, (radius, radius, 0.0), self.tyre_radius)
+    compose = RollsOnPlane.rolling
+
+    def surface(self):
+        """Of the contact."""
+        return (*across(self.axis_a), self.axis_a), (float(self.radius), float(self.radius), 0.0), self.tyre_radius
 
     @classmethod
     def example(cls, rng, a, b):

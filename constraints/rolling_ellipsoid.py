@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..plugins import RIGHT_ANGLED, Joint, Placing, Point, Vector, floats, rotation_matrix, shown
-from .rolling_contact import Rolls, on_plane
+from .rolling_contact import RollsOnPlane
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Orientation
 
 
-class RollingEllipsoid(Rolls, Joint):
+class RollingEllipsoid(RollsOnPlane, Joint):
     """An ellipsoid of one body rolls on a plane of another, without slip: a rattleback (celt), an egg.
 
     Parameters
@@ -31,6 +31,11 @@ class RollingEllipsoid(Rolls, Joint):
         x, y, z of the frame of a.
     slip : bool
         True for contact without friction: the ellipsoid touches the plane and slides.
+    kinetic, static : float, optional
+        Coefficients of Coulomb friction: while it slides, and the bound of rolling, by default the same. With kinetic,
+        0 or more, the contact opens, rolls and slips; without it is held to the plane and never slips.
+    restitution : float, 0 to 1
+        Coefficient of restitution of impacts, where the contact opens.
 
     Raises
     ------
@@ -67,13 +72,15 @@ class RollingEllipsoid(Rolls, Joint):
         semi_axes: ArrayLike | None = None,
         axes_a: Orientation | None = None,
         slip: bool = False,
+        kinetic: float | None = None,
+        static: float | None = None,
+        restitution: float = 0.0,
         **places: Any,
     ) -> None:
         super().__init__(a, b, **places)
         self.semi_axes = semi_axes
         self.axes_a = np.eye(3) if axes_a is None else axes_a
-        self.slip = slip
-        self.check()
+        self._set_rolling(slip, restitution, kinetic, static)
 
     def __setattr__(self, name, value):
         """Set a checked attribute; axes_a of a Rotation are its rows."""
@@ -104,9 +111,11 @@ class RollingEllipsoid(Rolls, Joint):
                 f"scipy Rotation; got {shown(axes)}."
             )
 
-    def compose(self):
-        """Eqs. (1) and (2)."""
-        yield "contact", on_plane(self, self.axes_a, self.semi_axes)
+    compose = RollsOnPlane.rolling
+
+    def surface(self):
+        """Of the contact."""
+        return self.axes_a, self.semi_axes, 0.0
 
     @classmethod
     def example(cls, rng, a, b):

@@ -5,23 +5,27 @@
     gap   = (R_b - R_a) - |d|         (2)  inside: the same with L = R_b - R_a, the gap is -Phi
     gap   = n.d - R_a                 (3)  plane: PlaneContact
 
-Eq. (2) is open where the centres coincide, so the row is never singular where the gap is closed.
+Eq. (2) is open where the centres coincide, so the row is never singular where the gap is closed. With friction the rows
+are those of RollingContact, (3), and of SphereRolling, (1) and (2).
 """
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import InvalidConstraint, Joint, Point, Side, Unilateral, Vector, positive
+from ..plugins import InvalidConstraint, Joint, Point, Side, Unilateral, Vector, across, positive
 from .distance import Distance
 from .plane_contact import PlaneContact
+from .rolling_contact import RollingContact
+from .sphere_rolling import SphereRolling
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike
 
 
 class SphereContact(Unilateral, Joint):
-    """Contact without friction of a ball with another ball, with a plane, or within a hollow ball; it only pushes.
+    """Contact of a ball with another ball, with a plane, or within a hollow ball; it only pushes.
 
     Parameters
     ----------
@@ -36,11 +40,13 @@ class SphereContact(Unilateral, Joint):
     restitution : float, 0 to 1
         Coefficient of restitution: 0 for plastic impacts, 1 for elastic ones.
     kinetic, static : float, float or None
-        Coefficients of friction; not available yet.
+        Coefficients of Coulomb friction: while the balls slide on each other, and the bound of rolling, by default the
+        same. The friction turns the balls; a point mass can't turn and has friction on planes only.
 
     Notes
     -----
-    One row: gap. `solution.reaction(contact)` is the force on a at the centre of its ball.
+    One row: gap. `solution.reaction(contact)` is the force on a at the centre of its ball. With friction there are two
+    rows on velocities beside it, slip[0] and slip[1], and the reaction is about the contact point.
 
     Examples
     --------
@@ -83,6 +89,7 @@ class SphereContact(Unilateral, Joint):
         if name == "normal_b" and value is not None:
             value = Vector("b", name).coordinates(self.b, value, self.name)
         super().__setattr__(name, value)
+        self.__dict__.pop("_friction", None)
 
     def check(self):
         """Refuse radii that are none, and two shapes of b at once."""
@@ -95,6 +102,12 @@ class SphereContact(Unilateral, Joint):
             )
         if self.radius_b is not None:
             positive(self.radius_b, f"{self.name}: radius_b (m)", InvalidConstraint)
+        if self.rubs and self.radius_b is not None and 3 in (self.a.dimension, self.b.dimension):
+            body = self.a if self.a.dimension == 3 else self.b
+            raise InvalidConstraint(
+                f"{self.name}: friction between balls can't turn the point mass {body.name!r}; use add_body, or leave "
+                "out kinetic and static."
+            )
         if self.inside and not (self.radius_b is not None and self.radius_a < self.radius_b):
             raise InvalidConstraint(
                 f"{self.name}: inside=True needs radius_b, larger than radius_a = {self.radius_a:g} m."
@@ -102,18 +115,57 @@ class SphereContact(Unilateral, Joint):
 
     def compose(self):
         """Eqs. (1) to (3)."""
+        if self.rubs:
+            yield from self._gripping()
+        else:
+            yield "gap", self._gap()
+
+    def _gap(self):
         if self.radius_b is None:
             point = self.center_b + self.radius_a * self.normal_b
-            part = PlaneContact(self.a, self.b, point_a=self.center_a, point_b=point, normal_b=self.normal_b)
+            return PlaneContact(self.a, self.b, point_a=self.center_a, point_b=point, normal_b=self.normal_b)
+        return Distance(self.a, self.b, point_a=self.center_a, point_b=self.center_b, length=self._distance)
+
+    def _gripping(self):
+        """The parts with friction."""
+        if self.radius_b is not None:
+            share = (-1.0 if self.inside else 1.0) * self.radius_a / self._distance
+            centers = {"center_a": self.center_a, "center_b": self.center_b}
+            yield "contact", SphereRolling(self.a, self.b, **centers, distance=self._distance, share=share)
+        elif self.a.dimension == 3:
+            for normal in (self.normal_b, *across(self.normal_b)):
+                point = self.center_b + self.radius_a * self.normal_b
+                yield "contact", PlaneContact(self.a, self.b, point_a=self.center_a, point_b=point, normal_b=normal)
         else:
-            length = self.radius_b - self.radius_a if self.inside else self.radius_a + self.radius_b
-            part = Distance(self.a, self.b, point_a=self.center_a, point_b=self.center_b, length=length)
-        yield "gap", part
+            first, second = across(self.normal_b)
+            places = {"center_a": self.center_a, "point_b": self.center_b, "normal_b": self.normal_b}
+            frame = {"first_a": (1, 0, 0), "second_a": (0, 1, 0), "third_a": (0, 0, 1)}
+            plane = {"first_b": first, "second_b": second}
+            yield "contact", RollingContact(self.a, self.b, **places, **frame, **plane, semi_axes=[self.radius_a] * 3)
+
+    @property
+    def _distance(self):
+        return self.radius_b - self.radius_a if self.inside else self.radius_a + self.radius_b
+
+    @cached_property
+    def _friction(self):
+        """Its `Grip`."""
+        balls = 0.0 if self.radius_b is None else -1.0 if self.inside else 1.0
+        radius = 0.0 if self.a.dimension == 3 else self.radius_a
+        normal = (0.0, 0.0, 1.0) if self.normal_b is None else self.normal_b
+        point = self.center_b if balls else self.center_b + (self.radius_a - radius) * normal
+        places = {"point_a": self.center_a, "point_b": point, "normal_b": normal}
+        return self._grip(self._gap(), tyre_radius=radius, balls=balls, **places)
+
+    @property
+    def row_labels(self):
+        """What follows its title in the names of its rows."""
+        return (" gap", " slip[0]", " slip[1]") if self.rubs else super().row_labels
 
     @property
     def sides(self):
         """One."""
-        return (Side(self.parts[0], -1.0 if self.inside else 1.0),)
+        return (Side(self.parts[0], -1.0 if self.inside else 1.0, grip=self._friction if self.rubs else None),)
 
     @classmethod
     def example(cls, rng, a, b):

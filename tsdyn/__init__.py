@@ -147,7 +147,7 @@ if TYPE_CHECKING:
     from .measuring.benchmark import benchmark
     from .measuring.compare import compare
     from .measuring.profile import profile
-    from .simulation.contact_run import impact
+    from .simulation.impacts import impact
 else:
     from ._discovery import refusing as _refusing
 
@@ -157,7 +157,7 @@ else:
         "benchmark": ".measuring.benchmark",
         "compare": ".measuring.compare",
         "ensemble": ".ensembles.ensemble",
-        "impact": ".simulation.contact_run",
+        "impact": ".simulation.impacts",
         "plots": ".plots",
         "profile": ".measuring.profile",
         "testing": ".testing",

@@ -106,5 +106,5 @@ def test_processes():
 
 
 def test_lanes_are_refused_by_name():
-    with pytest.raises(ts.InvalidArgument, match="lanes=4: unilateral constraints"):
+    with pytest.raises(ts.InvalidArgument, match="lanes=4: contacts and exact friction"):
         ts.ensemble(bouncing(), {"floor.restitution": [0.1, 0.2]}, (0, 1), lanes=4)

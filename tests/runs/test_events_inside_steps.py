@@ -237,6 +237,22 @@ def test_a_function_with_too_many_turns_says_so(monkeypatch):
     assert ts.simulate(thrown(), (0.0, 1.0), events=hum(), max_step=0.05).t_events[0].size == 200
 
 
+@pytest.mark.parametrize("start", [0.0, 0.9030472819714618])
+def test_a_zero_in_the_middle_of_a_step(start):
+    """The top of a flight, which a sample meets to the last digit: no zero of the start, whatever rounding leaves."""
+
+    def rate(t, state):
+        return state.qd[2]
+
+    rate.direction = -1
+    scene = ts.Scene(gravity=(0, 0, -9.81))
+    for speed in np.linspace(0.1, 5.0, 50).tolist():
+        scene = ts.Scene(gravity=(0, 0, -9.81))
+        scene.add_point_mass(mass=1.0, velocity=(0, 0, speed))
+        solution = ts.simulate(scene, (start, start + 2 * speed / 9.81), events=rate)
+        np.testing.assert_allclose(solution.t_events[0], [start + speed / 9.81], rtol=1e-14)
+
+
 # the search itself
 
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tests.files.test_resumption import Stop
+from tsdyn.runs import driver
 
 C = ts.constraints
 G = 9.81
@@ -169,3 +171,137 @@ def test_kinematics_off_the_stops():
 def test_a_profile_is_refused_by_name():
     with pytest.raises(ts.InvalidArgument, match=r"profile is of one phase of a run.*floor"):
         ts.profile(ball_on_floor(), (0, 1))
+
+
+# friction of the exact law
+
+
+def braked(stretch):
+    """A block on a guide, with a spring of 10 N/m stretched so far, and a brake of 2 N."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    block = scene.add_body(1.0, (1, 1, 1), name="block")
+    guide = C.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, 0), name="guide")
+    scene.add(guide)
+    spring = {"point_b": (-1, 0, 0), "stiffness": 10.0, "free_length": 1.0 - stretch}
+    scene.add(ts.forces.Spring(block, scene.ground, **spring))
+    scene.add(ts.forces.CoulombFriction(block, scene.ground, force=2.0, name="brake"))
+    return scene
+
+
+def test_a_brake_that_holds_leaves_no_freedom():
+    assert braked(0.1).linearise().coordinates == ()
+    scene = braked(0.1)
+    scene.set("guide", rate=1.0)
+    assert scene.linearise().coordinates == ("guide.displacement",)
+
+
+def test_friction_at_rest_is_refused_by_name():
+    scene = braked(0.1)
+    with pytest.raises(ts.InvalidArgument, match=r"inverse_dynamics .* brake\. Give slip_velocity"):
+        scene.inverse_dynamics({"guide": ts.motions.time}, ["guide"], t=[0.0, 1.0])
+    with pytest.raises(ts.InvalidArgument, match=r"profile .* brake\. Give slip_velocity"):
+        ts.profile(scene, (0, 1))
+
+
+# sampled controllers across events
+
+
+class Pull:
+    """A sampled PI controller of a slide, which notes when it is asked and what it sees."""
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        self.sum, self.asked = 0.0, []
+
+    def __call__(self, t, state):
+        x = float(state.displacement("slide"))
+        self.asked.append((t, x))
+        self.sum += 0.1 * (1.0 - x)
+        return 30.0 * (1.0 - x) + 2.0 * self.sum
+
+
+def servo():
+    scene, pull = ts.Scene(), Pull()
+    block = scene.add_body(1.0, (1, 1, 1), name="block")
+    slide = scene.add(C.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, 0), name="slide"))
+    scene.add(C.Stop(slide, lower=-0.5, upper=1.3, restitution=0.6, name="stop"))
+    scene.add(ts.forces.Control(pull, actuators=["slide"], period=0.1, name="servo"))
+    return scene, pull
+
+
+def test_a_sampled_controller_across_impacts():
+    """It is asked once at each instant, sees where the slide is then, and its value is held over impacts."""
+    scene, pull = servo()
+    for _ in range(2):  # the function is reset at each start
+        solution = ts.simulate(scene, (0, 5.0), dense_output=True)
+        times, seen = np.array(pull.asked).T
+        np.testing.assert_allclose(times, 0.1 * np.arange(50), atol=1e-15)
+        np.testing.assert_array_equal(solution.at(times).displacement("slide"), seen)
+    assert len(solution.impulses) > 3
+    assert solution.displacement("slide").max() < 1.3 + 1e-14
+    held = solution.actuation("servo")[:, 0]
+    for t, *_ in solution.impulses:
+        assert len(set(held[solution.t == t])) == 1
+    assert np.ptp(solution.energy - solution.work) < 1e-12
+
+
+def test_a_sampled_controller_is_not_asked_beyond_an_event():
+    def half(t, state):
+        return state.displacement("slide") - 0.5
+
+    half.terminal = True
+    scene, pull = servo()
+    solution = ts.simulate(scene, (0, 5.0), events=half)
+    assert pull.asked[-1][0] <= solution.reached < pull.asked[-1][0] + 0.1
+
+
+def test_a_servo_goes_on_from_a_checkpoint(tmp_path, monkeypatch):
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
+    whole = ts.simulate(servo()[0], (0, 5.0))
+    for stop in (2, 5, 9):
+        path = tmp_path / f"run {stop}.h5"
+        stopped = ts.simulate(servo()[0], (0, 5.0), store=path, checkpoint=0.0, progress=Stop(stop))
+        assert stopped.status is ts.Status.INTERRUPTED
+        resumed = ts.resume(path, scene=servo()[0])
+        np.testing.assert_array_equal(resumed.q, whole.q)
+        assert (resumed.phases, resumed.impulses) == (whole.phases, whole.impulses)
+
+
+# ends before the end
+
+
+def test_ctrl_c_keeps_all_phases(monkeypatch):
+    """In a phase, at its end, and between two."""
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
+    scene = ball_on_floor()
+    whole = ts.simulate(scene, (0, 3.0))
+    for stop in (1, 2, 5):
+        solution = ts.simulate(scene, (0, 3.0), progress=Stop(stop))
+        assert solution.status is ts.Status.INTERRUPTED
+        count = len(solution.t)
+        assert 0 < count < len(whole.t)
+        np.testing.assert_array_equal(solution.q, whole.q[:count])
+        rest = ts.simulate(scene, (solution.reached, 3.0), state=solution.state)
+        np.testing.assert_allclose(rest.q[-1], whole.q[-1], atol=1e-14)
+
+
+def test_failures_in_a_later_phase_return_the_ones_before():
+    def fails(t, state):
+        if t > 1.0:
+            raise ValueError("no more")
+        return 1.0
+
+    solution = ts.simulate(ball_on_floor(), (0, 3.0), events=fails)
+    assert solution.status is ts.Status.EVENT_FAILED
+    assert "no more" in solution.message
+    assert 0.9 < solution.reached <= 1.0
+    assert len(solution.phases) == 3
+    few = ts.simulate(ball_on_floor(), (0, 3.0), max_steps=5)
+    assert few.status is ts.Status.MAX_STEPS
+    assert few.stats.steps == 5
+    done = []
+    ts.simulate(ball_on_floor(), (0, 3.0), progress=done.append)
+    assert done == sorted(done)
+    assert done[-1] == 1.0

@@ -10,6 +10,7 @@ M~ f are the accelerations that loads f make where the bilateral rows hold. lam 
 from __future__ import annotations
 
 import math
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import angle as angle_of
 from ..model.handles import counted, handles_of
+from ..model.packed import first_rows, index_of
 from .contact_rows import ContactWorkspace
 from .tolerances import AT_REST, DEPENDENT, LEVEL
 
@@ -42,7 +44,8 @@ class Gaps:
     packed : Packed
         Of the scene, whose unilateral constraints are all among its rows.
     contacts, free : Packed
-        Of its contacts' rows alone, in the order of the gaps; of the scene with all contacts open.
+        Of its contacts' rows alone, the gaps first in their order, and other rows of contacts with friction; of the
+        scene with all contacts open.
 
     Attributes
     ----------
@@ -51,7 +54,11 @@ class Gaps:
         In the order of the rows; count is their number.
     names : list of str
         Of their constraints.
-    restitution : ndarray (count,)
+    restitution, kinetic, static : ndarray (count,)
+    rubs : ndarray (count,), bool
+        Whether there is friction.
+    slip_rows : ndarray (count, 2)
+        Rows of Phi of the slips, where there is friction.
     """
 
     def __init__(self, packed, contacts, free):
@@ -63,6 +70,15 @@ class Gaps:
         self.rows = np.array([gap.row for gap in self.list], int)
         self.sign = np.array([gap.side.sign for gap in self.list])
         self.restitution = np.array([gap.contact.restitution for gap in self.list], float)
+        grips = [gap.side.grip for gap in self.list]
+        self.rubs = np.array([grip is not None for grip in grips], bool)
+        self.kinetic = np.array([grip.kinetic if grip else 0.0 for grip in grips], float)
+        self.static = np.array([grip.static if grip else 0.0 for grip in grips], float)
+        self.slip_rows = np.where(self.rubs, self.rows, 0)[:, None] + [1, 2]
+        own = {id(part): first for part, first in first_rows(contacts.constraints)}
+        self._slips = np.zeros((self.count, 2), int)  # among the rows of `contacts`
+        for i in np.flatnonzero(self.rubs):
+            self._slips[i] = slip_rows(self.list[i].contact, own)
         self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
 
@@ -90,9 +106,41 @@ class Gaps:
                 found[:, i] = value(q, angles)
         return found
 
+    def of_contact(self, contact):
+        """The numbers of the gaps of a constraint."""
+        return [i for i, gap in enumerate(self.list) if gap.contact is contact]
+
+    def slopes(self, t, q, which):
+        """Rows (k, 2, n) of the slips of the gaps `which`, which have friction."""
+        return self.workspace.rows(t, q, self._slips[which].ravel())[0].reshape(len(which), 2, -1)
+
+    def biases(self, gamma):
+        """Of the accelerations of slips (count, 2), from those of all rows; zero without friction."""
+        return np.where(self.rubs[:, None], gamma[self._slips], 0.0)
+
+    def across(self, i, tangents, d):
+        """Components (..., 2) of a direction d (3,), ground frame, along the slips of a gap; tangents (..., 2, n)."""
+        return self._along(i, tangents) @ np.asarray(d)
+
+    def along(self, i, tangents, d):
+        """The direction (3,), ground frame, of components d (2,)."""
+        return d @ self._along(i, tangents)
+
+    def _along(self, i, tangents):
+        """Directions (..., 2, 3) of the slips of a gap: the rows at the point of one of the bodies."""
+        part = self.list[i].side.row
+        body, sign = (part.a, 1.0) if part.a.dimension else (part.b, -1.0)
+        at = self.packed.system.bodies[index_of(self.packed, body), 0]
+        return sign * tangents[..., at : at + 3]
+
     def at(self, q, angles, t=0.0):
         """Gaps (count,) at one state."""
         return self.values(np.array([t]), q[None], lambda: angles[None])[0]
+
+
+def slip_rows(contact, first):
+    """The rows (2,) of the slip of a contact with friction; first: the first row of each primitive, by its id."""
+    return [first[id(part)] + i for part in contact.parts for i in range(part.all_rows)][1:3]
 
 
 def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):
@@ -120,6 +168,8 @@ class Inertia:
     ----------
     J : ndarray (count, n)
     G : ndarray (count, count)
+    tangents : ndarray (count, 2, n)
+        Rows of the slips; zero without friction.
     """
 
     def __init__(self, gaps, t, q, slots, which, held=()):
@@ -130,7 +180,10 @@ class Inertia:
         response = gaps.workspace.respond(t, q, slots, self._rows)
         self.J[self.which], self.response[self.which] = self._rows, response  # M~ J^T, transposed
         self.G[self.which[:, None], self.which] = self._rows @ response.T
-        self._sizes = np.abs(self._rows)
+        self._sizes, self.tangents = np.abs(self._rows), np.zeros((gaps.count, 2, q.size))
+        rubbing = self.which[gaps.rubs[self.which]]
+        if rubbing.size:
+            self.tangents[rubbing] = gaps.slopes(t, q, rubbing)
 
     def among(self, which):
         """G of some gaps."""
@@ -164,6 +217,24 @@ class Inertia:
         """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
         own = np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
         return self.pushed(which, -own)
+
+    def slips(self, qd):
+        """Velocities (count, 2) of the slips, zero where they are rounding."""
+        found, terms = self.tangents @ qd, np.abs(self.tangents) @ np.abs(qd)
+        return np.where(np.abs(found) <= AT_REST * terms, 0.0, found)
+
+    def slip_accelerations(self, qd):
+        """Accelerations (count, 2) of the slips where all gaps are open."""
+        qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
+        return self.tangents @ qdd + self.gaps.biases(gamma)
+
+    def across(self, i, d):
+        """Components (2,) of a direction d (3,), ground frame, along the slips of a gap."""
+        return self.gaps.across(i, self.tangents[i], d)
+
+    def along(self, i, d):
+        """The direction (3,), ground frame, of components d (2,)."""
+        return self.gaps.along(i, self.tangents[i], d)
 
     def accelerations(self, qd):
         """Accelerations of the gaps (count,) where all are open, at velocities qd (n,); and their terms (count,)."""
@@ -213,6 +284,7 @@ class Settled(NamedTuple):
     closed: list  # of gaps: independent rows, with reactions
     idle: list  # those that stay closed by themselves, as a fourth leg does
     accelerations: np.ndarray  # (count,) of all gaps
+    grips: dict = MappingProxyType({})  # of those with friction, see contact_friction.py
 
 
 def settle(inertia, resting, qd, fired=()):
@@ -250,14 +322,14 @@ def settle(inertia, resting, qd, fired=()):
     for i in resting:
         if i in closed or gdd[i] > small[i]:
             continue
-        if _depends(inertia, closed, i):
+        if depends(inertia, closed, i):
             idle.append(i)
         else:
             closed.append(i)
     return Settled(sorted(closed), idle, gdd)
 
 
-def _depends(inertia, closed, i):
+def depends(inertia, closed, i):
     """Whether the row of a gap depends on those of closed ones and on the bilateral rows."""
     own, alone = inertia.response[i], inertia.J[i]
     if not closed:

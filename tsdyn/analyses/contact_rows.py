@@ -17,11 +17,14 @@ from ..formulations.accelerations import refine_accelerations, solve_acceleratio
 from ..jit.kernels import entry, loader, resident
 from ..maths.dense_linalg import copy
 from ..maths.root_isolation import SURVEYING
+from ..maths.vectors import add, spin, subtract
 from ..model.equations import (
     WIDTH,
     acceleration_bias,
     constraint_jacobian,
     constraints,
+    inertia_rows,
+    multiply_inertia_row,
     recall,
     set_time,
     time_derivative,
@@ -121,6 +124,32 @@ def accelerate(context, t, q, qd, out, gamma):
     acceleration_bias(c.rows, q, qd, t, gamma)
 
 
+@entry("pvvvm")
+def gain(context, q, before, after, h):
+    """Kinetic energy that velocities (n,) have more afterwards, J; h (i, 14): scratch for inertia rows.
+
+    v.M v / 2 - u.M u / 2 = (v - u).M (v + u) / 2
+    """
+    s, total = load_contacts(context).free.system, 0.0
+    for b in range(s.bodies.shape[0]):
+        i = s.bodies[b, 0]
+        for c in range(3):
+            total += s.mass[b] * (after[i + c] - before[i + c]) * (after[i + c] + before[i + c])
+        if s.bodies[b, 1] == 7:
+            p = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
+            u = spin(p, (before[i + 3], before[i + 4], before[i + 5], before[i + 6]))
+            v = spin(p, (after[i + 3], after[i + 4], after[i + 5], after[i + 6]))
+            d, m = subtract(v, u), add(v, u)
+            J = s.inertia[b]
+            for j in range(3):
+                total += d[j] * (J[3 * j] * m[0] + J[3 * j + 1] * m[1] + J[3 * j + 2] * m[2])
+    inertia_rows(s, q, h)
+    for e in range(h.shape[0]):
+        u, v = multiply_inertia_row(s, h, e, before), multiply_inertia_row(s, h, e, after)
+        total += (v - u) * (v + u)
+    return 0.5 * total
+
+
 @entry("pvmvm")
 def find_multipliers(context, t, levels, memory, out):
     """out (k, m): multipliers at times t (k,) and states on the manifold, levels (k, 3 n), by the equations of motion.
@@ -145,7 +174,7 @@ def find_multipliers(context, t, levels, memory, out):
                 out[k, graph.row[e]] = f.b[e] if regular else math.nan
 
 
-KERNELS = find_gaps, find_rows, respond, accelerate, find_multipliers, *SURVEYING
+KERNELS = find_gaps, find_rows, respond, accelerate, gain, find_multipliers, *SURVEYING
 
 
 class ReactionWorkspace:
@@ -177,13 +206,21 @@ class ContactWorkspace:
     """
 
     def __init__(self, contacts, free):
-        self.n, self.m = int(contacts.system.bodies[:, 1].sum()), len(contacts.system.segments)
-        graph = graph_of(free, REDUCED, BIAS)
-        own = (each._replace(reals=each.reals.copy()) for each in map(with_short_rows, (free, contacts)))
-        (system, rows), self._all = own, np.arange(self.m)
-        self._short = np.zeros((len(rows.segments), WIDTH))
-        self.address, *self._keep = resident(ContactParts(parts(system, graph, self.n), rows))
+        self.n, self.m, self._free = int(contacts.system.bodies[:, 1].sum()), len(contacts.system.segments), free
+        rows, self._graph = with_short_rows(contacts), None
+        self._rows, self._all = rows._replace(reals=rows.reals.copy()), np.arange(self.m)
+        spans = rows.segments, free.system.inertia_segments
+        self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in spans)
         self._accelerate = interrupts_answered()(accelerate) if calls_laws(free) else accelerate
+        self._enter()
+
+    def _enter(self):
+        """Take the constraint graph as it is now: a start may have shown that bilateral rows are redundant."""
+        graph = graph_of(self._free, REDUCED, BIAS)
+        if graph is not self._graph:
+            system = with_short_rows(self._free)
+            free = parts(system._replace(reals=system.reals.copy()), graph, self.n)
+            self._graph, (self.address, *self._keep) = graph, resident(ContactParts(free, self._rows))
 
     def gaps(self, t, q):
         """Phi (k, m) of the rows at times t (k,), positions q (k, n), rows of which may go on."""
@@ -204,6 +241,7 @@ class ContactWorkspace:
     def respond(self, t, q, memory, loads):
         """Accelerations (k, n) by loads (k, n), which must be contiguous."""
         out = np.empty_like(loads)
+        self._enter()
         if not respond(self.address, t, q, memory, loads, out):
             raise SingularConfiguration("a direction that the constraints leave free carries no inertia.")
         return out
@@ -213,3 +251,7 @@ class ContactWorkspace:
         qdd, gamma = np.empty(self.n), np.zeros(self.m)
         self._accelerate(self.address, t, q, qd, qdd, gamma)
         return qdd, gamma
+
+    def gain(self, q, before, after):
+        """Kinetic energy that velocities (n,) have more afterwards, J."""
+        return gain(self.address, q, before, after, self._inertias)

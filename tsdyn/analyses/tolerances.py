@@ -121,6 +121,9 @@ LEVEL = 1e-11
 # Part of a row that is independent of others, up to which it depends on them: sines of angles, squares of which are
 # found to 1e-14.
 DEPENDENT = 1e-7
+# What the friction of a contact lacks of its bound, of that, where it has reached it: reactions are right to ten digits
+# at an event. Share of the bound that decides then: the contact slides, though its acceleration is rounding.
+AT_BOUND, WITHIN_BOUND = 1e-9, 1.0 - 1e-10
 
 # --- friction at rest ------------------------------------------------------------------------------------------------
 # m/s or rad/s: a body that slides in a plane, more slowly, has come to rest where its direction turns: ten times the

@@ -36,3 +36,7 @@ SLIP = 1e-9
 LEAST_SLIP = 1e-11
 # m/s: the Stribeck velocity where neither it nor the slip velocity is given; 0.001 to 0.1 are those of most contacts.
 STRIBECK = 0.01
+# m/s: the slip of a contact below which its friction keeps a direction. Where slip begins slowly, as v = c t^2 / 2, and
+# its direction turns, the friction turns v within v / (mu g): from 1e-6 m/s on that takes some hundred steps, from 1e-9
+# on 30 times as many; the place is right to v sqrt(2 v / c), 1e-9 m.
+AHEAD = 1e-6

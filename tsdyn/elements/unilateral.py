@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import InvalidConstraint
 from ..validation import number, shown
+from .element import stop_waiting
+from .sliding import _Sliding, _SlidingSurface
 
 if TYPE_CHECKING:
     from .element import Attachment
     from .primitive import Primitive
 
 
+class Grip(NamedTuple):
+    """Coulomb friction of a contact: what its phases are made of beside its parts, which hold where it sticks."""
+
+    gap: Primitive  # the row of the gap alone, where the contact slides
+    sliding: _Sliding  # and its friction then
+    kinetic: float
+    static: float
+
+
 class Side(NamedTuple):
     """One inequality of a unilateral constraint: gap >= 0, and Phi = 0 of its row where the gap is closed."""
 
-    row: Primitive
+    row: Primitive  # Phi is its first row; with friction the next two rows of the constraint are of the slip
     sign: float  # of the gap over Phi, where the gap is small
     joint: Any = None  # whose counted angle the gap is measured by, sign (angle - bound); else the gap is sign Phi
     which: int = 0  # angle of the joint
     bound: float = 0.0  # rad
+    grip: Grip | None = None
 
 
 class Unilateral:
@@ -31,12 +44,16 @@ class Unilateral:
         Whether the constraint opens. A closed one is the bilateral constraint of its rows.
     restitution : float
         Coefficient e of an impact: 0 for plastic, 1 for elastic.
+    kinetic, static : float, float or None
+        Coefficients of friction: while it slides, and the bound of sticking.
     """
 
     unilateral = True
     restitution: float
+    kinetic: float | None
+    static: float | None
 
-    def _set_law(self, restitution: float, kinetic: float = 0.0, static: float | None = None) -> None:
+    def _set_law(self, restitution: float, kinetic: float | None = 0.0, static: float | None = None) -> None:
         """Take the coefficients of impact and friction, at the end of `__init__`."""
         self.restitution, self.kinetic, self.static = restitution, kinetic, static
         self._check_law()
@@ -48,12 +65,33 @@ class Unilateral:
                 f"{self.name}: restitution must be a number from 0 (plastic) to 1 (elastic), got "
                 f"{shown(self.restitution)}."
             )
-        if self.kinetic != 0.0 or self.static is not None:
+        kinetic, static = self.kinetic or 0.0, self.static
+        if not 0.0 <= number(kinetic) < math.inf:
             raise InvalidConstraint(
-                f"{self.name}: friction of unilateral contacts is not available yet: leave out kinetic and static."
+                f"{self.name}: kinetic must be a coefficient of friction, 0 or more, got {shown(kinetic)}."
             )
-        if not self.unilateral and self.restitution != 0.0:
-            raise InvalidConstraint(f"{self.name}: restitution is of a contact that opens; set unilateral=True.")
+        if static is not None and not kinetic <= number(static) < math.inf:
+            raise InvalidConstraint(
+                f"{self.name}: static must be at least kinetic = {kinetic:g}, got {shown(static)}; leave it out where "
+                "they are the same."
+            )
+        for what, given in (("restitution", self.restitution != 0.0), ("kinetic", self.rubs)):
+            if given and not self.unilateral:
+                raise InvalidConstraint(f"{self.name}: {what} is of a contact that opens; set unilateral=True.")
+
+    @property
+    def rubs(self) -> bool:
+        """Whether it has friction."""
+        return bool(self.kinetic or self.static)
+
+    def _grip(self, gap: Primitive, **geometry: Any) -> Grip:
+        """Its friction, on the row of its gap; geometry: arguments of the law of sliding, see sliding.py."""
+        stop_waiting(gap)
+        kind = _SlidingSurface if "semi_axes" in geometry else _Sliding
+        sliding = kind(gap, kinetic=self.kinetic, **geometry, name=self.name)
+        stop_waiting(sliding)
+        gap.__dict__.update(owner=self, name=self.name)
+        return Grip(gap, sliding, self.kinetic, self.kinetic if self.static is None else self.static)
 
     @property
     def sides(self) -> tuple[Any, ...]:

@@ -304,7 +304,7 @@ def _of_options(study):
     if DEBUG:
         return "TSDYN_DEBUG=1 runs kernels as plain Python, which has no lanes"
     if study.has_phases:
-        return "unilateral constraints, whose rows come and go, have no lanes"
+        return "contacts and exact friction, whose rows come and go, have no lanes"
     changed = [f"{name}={given[name]!r}" for name in PLAIN if given[name] != OPTIONS[name]]
     if changed:
         return f"{' and '.join(changed)} can't be served in lanes"

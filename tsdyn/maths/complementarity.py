@@ -37,6 +37,8 @@ def complement(M, q, guess=()):
     z, held = np.zeros(q.size), np.zeros(q.size, bool)
     if q.size == 0 or q.min() >= 0.0:
         return z, held
+    if q.size == 1:
+        return (-q / M[0], ~held) if M[0, 0] > 0.0 else (None, held)
     # Rows and columns scaled to a unit diagonal, q to one
     scale = 1.0 / np.sqrt(np.where(np.diag(M) > 0.0, np.diag(M), 1.0))
     size = np.abs(q * scale).max()

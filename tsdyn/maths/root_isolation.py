@@ -190,7 +190,8 @@ def _look(values, errors, samples, noise, fine, out):
         while k < fine.size and sign * fine[k] > _bend(fine, k) + margin:
             k += 1
         out[j, 0] = k
-        while 0 < k < fine.size and sign * fine[k] < sign * fine[k - 1]:
+        # It falls from point to point by more than it bends
+        while 0 < k < fine.size and sign * (fine[k - 1] - fine[k]) > max(_bend(fine, k - 1), _bend(fine, k)):
             if sign * fine[k] < -_bend(fine, k) - margin:
                 out[j, 1] = k
                 break

@@ -46,6 +46,10 @@ ORTHOGONAL, CONVERGED = 1e-15, 1e-10
 LEAST_PIVOT, WITHOUT_SOLUTION = 1e-11, 1e-8
 # Rows that enter, for each row: about one does; more are rounding.
 MOST_ENTRIES = 20
+# Newton's method on Coulomb's cone: residual over its terms at the end, some dozen roundings; steps at most; steps
+# without half the residual after which it has stalled; sweeps over the contacts before each start; factors of u.
+CONE_ROUNDING, CONE_STEPS, CONE_STALLED = 1e-14, 60, 8
+CONE_SWEEPS, CONE_FACTORS = (0, 3, 30, 300, 3000), (1.0, 3.0, 10.0, 0.3)
 
 # Rows of a sparse matrix from which a factorisation may take more than 0.1 s.
 LONG_LU = 1 << 15

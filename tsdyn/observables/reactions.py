@@ -534,7 +534,7 @@ def _contact(motion, item):
     if contact is None:
         raise InvalidConstraint(
             f"{item.name} has no contact point; RollingDisc, RollingBall, RollingEllipsoid and RollingBallOnCylinder "
-            "have one."
+            "have one, and contacts with friction."
         )
     return contact
 

@@ -391,6 +391,11 @@ class StepPieces:
         """The steps' ends (k,), s."""
         return np.unique(np.concatenate([part.edges for part in self.parts]))
 
+    def begin_at(self, times):
+        """As of a `Trajectory`."""
+        for part in self.parts:
+            part.begin_at(times)
+
     def __call__(self, t):
         """As of a `Trajectory`."""
         states, memory, status = self._gathered(t, lambda part, times: part(times))

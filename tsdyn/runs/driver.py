@@ -325,6 +325,17 @@ class Sampling:
         other.last = self.last
         return other
 
+    def saved(self):
+        """When each function was evaluated last, and what it keeps."""
+        return {"last": self.last, "begun": self.begun, "kept": [_kept(load.force.function) for load in self.loads]}
+
+    def restore(self, numbers):
+        """As it was when it was saved."""
+        self.last, self.begun = numbers["last"], numbers["begun"]
+        for load, kept in zip(self.loads, numbers["kept"], strict=True):
+            for name, (kind, value) in kept.items():
+                vars(load.force.function)[name] = np.array(value, kind)[()] if kind else value
+
     def ask(self, memory, t, q, qd):
         """Evaluate the functions that are due at t, and hold their values."""
         for i, load in enumerate(self.loads):
@@ -376,16 +387,12 @@ class Sampled:
         self.reason = ""
 
     def saved(self):
-        """When each function was evaluated last, and what it keeps."""
-        kept = [_kept(load.force.function) for load in self.sampling.loads]
-        return {"last": self.sampling.last, "begun": self.sampling.begun, "kept": kept}
+        """What the `Sampling` saves."""
+        return self.sampling.saved()
 
     def restore(self, numbers):
         """As it was when it was saved."""
-        self.sampling.last, self.sampling.begun = numbers["last"], numbers["begun"]
-        for load, kept in zip(self.sampling.loads, numbers["kept"], strict=True):
-            for name, (kind, value) in kept.items():
-                vars(load.force.function)[name] = np.array(value, kind)[()] if kind else value
+        self.sampling.restore(numbers)
 
     def step(self, log):
         """Make one step. What is due at its end is left to `answer`: the step may have gone past an event."""

@@ -16,7 +16,7 @@ from ..observables.reactions import Exerting
 from ..observables.state import RememberingState
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
-from .event_groups import Group, Member, States
+from .event_groups import Group, GroupMember, States
 from .tolerances import FAST_TURN, LEAST_TIME, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
 
 # Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp.
@@ -30,6 +30,7 @@ class Event(NamedTuple):
     limit: float  # occurrences that end the run; inf for never
     direction: float  # of the changes that count; 0 for both
     exact: bool = False  # whether a value at the start that is positive is no rounding of zero
+    falls: bool = False  # of a `GroupMember`: whether it may begin at zero within rounding, and fall at once
 
     def value(self, t, instant):
         """The function's value; raises `EventFailed`."""
@@ -232,7 +233,7 @@ class Watch:
         self._n = int(packed.system.bodies[:, 1].sum())
         groups = {}  # numbers of events, by the function that evaluates them together
         for i, event in enumerate(events):
-            if isinstance(event.function, Member):
+            if isinstance(event.function, GroupMember):
                 groups.setdefault(event.function.over, []).append(i)
         self._groups = [Group(over, events, numbers) for over, numbers in groups.items()]
         self._members = [i for numbers in groups.values() for i in numbers]
@@ -305,7 +306,7 @@ class Watch:
 
     def _is_resumed(self, memory, last):
         """Whether the run goes on from the event that ends it, in the same memory, with other velocities."""
-        run, is_member = memory.run, isinstance(self.events[last.index].function, Member)
+        run, is_member = memory.run, isinstance(self.events[last.index].function, GroupMember)
         if self.resume is None or not is_member or not memory.begins_again or last.t >= run.clock.t_end:
             return False
         self.begins_again = self.resume(last.t, run, [i for i in self._members if self.list[i]])
@@ -386,7 +387,7 @@ class Watch:
 
     def _value(self, i, t, state):
         event = self.events[i]
-        if isinstance(event.function, Member):
+        if isinstance(event.function, GroupMember):
             over, which = event.function.over, event.function.which
             return float(over(self._states(np.array([t]), state[None]))[0, which])
         return event.value(t, self._instant(t, state))
@@ -468,7 +469,7 @@ class Watch:
 
         def sample(times):
             values, function = np.full(times.size, np.nan), self.events[i].function
-            if isinstance(function, Member):
+            if isinstance(function, GroupMember):
                 return function.over(self._states(times, step.levels(times)))[:, function.which]
             states = step.states(times)
             for k, (t, state) in enumerate(zip(times.tolist(), states, strict=True)):
@@ -497,8 +498,8 @@ class Watch:
 
     def _degree(self, step):
         """The degree that the interpolant and the fastest turn of a body ask for."""
-        pd = np.array([step.at(t)[1, self._p] for t in (step.t0, step.t1)])
-        turn = 2.0 * math.sqrt(np.einsum("kbi,kbi->kb", pd, pd).max(initial=0.0)) * (step.t1 - step.t0)
+        squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
+        turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
         return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
 
     def _walk(self, i, step, points):
@@ -619,7 +620,8 @@ class Watch:
             while run.numbers.rows > 0 and log.out[run.numbers.rows - 1, 0] > t:
                 run.numbers.rows -= 1
         elif t > start:
-            log.out[run.numbers.rows - 1] = [t, *state.ravel(), *run.remembered]
+            row = log.out[run.numbers.rows - 1]
+            row[0], row[1 : 1 + state.size], row[1 + state.size :] = t, state.ravel(), run.remembered
         else:
             run.numbers.rows -= 1
         if run.numbers.dense == STORED:

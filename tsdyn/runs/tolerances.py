@@ -95,6 +95,9 @@ START_ZERO = 64.0 * EPS
 SHAKEN, NOISE = 4.0 * EPS, 4.0
 
 # Of the time: how near to a zero Brent's method comes, as near as it can. s: the least distance there, a normal number.
+# Of the largest value of a group: one at the start that is rounding of zero, as reactions are that the complementarity
+# problem finds; and one at the end of the first step that no rounding makes.
+FROM_REST, FALLEN = 1e-11, 1e-6
 # Steps of Newton's method from the root of an interpolant; share of the step up to which a move that doesn't get
 # shorter is rounding.
 ROOT_STEPS, ROUGH_ROOT = 6, 1e-8

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..ahead import compile_ahead
-from ..analyses.contact_problem import LAWS, Inertia, NoSolution, closed_gaps, impulses, settle
+from ..analyses.contact_friction import halted, settle_grips
+from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
 from ..analyses.contact_rows import KERNELS, ReactionWorkspace
 from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
 from ..analyses.tolerances import AT_REST, RESTS, STOPPED
-from ..calls import fitting
 from ..elements.unilateral import contacts_of
 from ..errors import (
     InconsistentState,
     InvalidArgument,
-    InvalidConstraint,
     InvalidForce,
     SingularConfiguration,
     Status,
@@ -29,18 +28,20 @@ from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS
 from ..model.handles import handles_of
-from ..observables import diagnostics, reactions
-from ..observables.state import RememberingState, remembered
+from ..observables import reactions
+from ..observables.state import remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
-from ..runs.event_groups import Member
+from ..runs.event_groups import GroupMember
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
-from ..validation import damaged, demand, floats, listed
-from .phase_scenes import NAMED, first_row_of, gaps_of, has_contacts, phase_of
-from .phases import PhasePieces, Phases, Pinned
+from ..validation import damaged, demand, listed
+from .grips import Halting, Reactions, phase_with_friction, renewed
+from .impacts import held, impact_of, jumped
+from .phase_scenes import NAMED, first_row_of, gaps_of, phase_of
+from .phases import Modes, PhasePieces, Phases, Pinned
 from .progress import reporter, silent
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
@@ -57,9 +58,7 @@ from .tolerances import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from ..hints import ItemLike, Scene
+    pass
 
 # A run with contacts is a sequence of phases. A scene has units: gaps, each open or closed. A phase is a run of the
 # scene with the units in their modes, the closed gaps as bilateral rows, and ends at the first zero of what a unit
@@ -217,41 +216,6 @@ def demand_apart(gaps, q, angles, tol):
         )
 
 
-@dataclass
-class Modes:
-    """The modes of the units of a scene: numbers of gaps, and of frictions. All others are open, or slide."""
-
-    closed: list = field(default_factory=list)  # independent rows, with reactions
-    idle: list = field(default_factory=list)  # closed by what others hold
-    opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
-    sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
-    blocked: list = field(default_factory=list)  # frictions without motion that others hold
-    begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
-
-    def same(self, other):
-        """Whether the units are in the same modes, whatever has just opened."""
-        return replace(self, opened={}) == replace(other, opened={})
-
-    def saved(self):
-        """Lists of numbers, for JSON: one for each field, of a dict its items."""
-        return [plain(value) for value in vars(self).values()]
-
-    @classmethod
-    def of(cls, record):
-        """As it was when it was saved."""
-        pairs = zip(vars(cls()).items(), record, strict=True)
-        return cls(*(dict(known) if isinstance(value, dict) else known for (_, value), known in pairs))
-
-
-def plain(value):
-    """A value of modes as JSON has it."""
-    if isinstance(value, dict):
-        return [[plain(key), plain(each)] for key, each in value.items()]
-    if isinstance(value, (list, tuple)):
-        return [plain(each) for each in value]
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
-
-
 # Numbers of a run that a checkpoint holds as they are, and the names of its arrays
 KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", "replaced", "written", "totals"
 START, PREFIX = ("q", "qd", "remembered"), "phase "
@@ -286,18 +250,20 @@ class _ContactRun:
         self.span = interval(call.t_span)
         self.times = output_times(call.t_eval, *self.span)
         self.per_step, self.taken = self.times.size == 0, 0
-        kept = prepared(phase_of(scene, []))
+        kept = prepared(free := phase_of(scene, []))
         self._demand_served(kept)
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.qdd = np.zeros(kept.n)  # before the present transition
         self.remembered = remembered(call.state, kept, self.t, self.q)
+        start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
+        kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol)
         self.users = prepared_events(options.events) or []
         self.rest = self.t
         self.kinds, self.parts, self.found, self.report = [], [], [[] for _ in self.users], reporter(call.progress)
-        self.phases, self.counts, self.steps = Phases(scene.packed), [0] * len(self.users), 0
+        self.phases, self.counts, self.steps = Phases(scene.packed, self.gaps), [0] * len(self.users), 0
         self.reason, self.methods, self.at_once, self.judged = "", [], 0, (self.t, 0)
         self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
         self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
@@ -317,6 +283,13 @@ class _ContactRun:
                 "contacts: leave out slip_velocity, for the exact law."
             )
 
+        if self.frictions.count and self.gaps.rubs.any():
+            names = listed(list(dict.fromkeys(self.frictions.names)), NAMED)
+            raise InvalidArgument(
+                f"exact friction of joints ({names}) doesn't serve scenes in which contacts have friction, too: use "
+                "ViscousFriction, or CoulombFriction with a slip_velocity, or leave out kinetic of the contacts."
+            )
+
     def run(self):
         """Run to the end; the `Task` of the last phase, of the whole scene, and the `Outcome` of all."""
         began, task, status = clock(), None, None if self.known else self.begin()
@@ -331,6 +304,10 @@ class _ContactRun:
             if self.end is None:
                 raise
             status = Status.INTERRUPTED
+        except OSError as error:
+            if self.end is None or self.archive is None:
+                raise
+            status, self.reason = Status.STORE_FAILED, f"{error.strerror or error}."
         except TsdynError as error:
             if self.end is None:
                 raise
@@ -462,7 +439,10 @@ class _ContactRun:
 
     def _scene(self):
         """The scene of the present modes."""
-        return phase_of(self.scene, self._closed_rows(), [self._hold(i, r) for i, r in self.modes.sticking.items()])
+        holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
+        if self.modes.grips:
+            return phase_with_friction(self.scene, self.gaps, self.modes, holds)
+        return phase_of(self.scene, self._closed_rows(), holds)
 
     def filled(self):
         """The same, with what the run remembers among its packed numbers."""
@@ -487,8 +467,9 @@ class _ContactRun:
         held = sorted([*self.modes.closed, *self.modes.idle])
         memory, units = self.remembered[self.count :], self.frictions.units
         idle = [i for i in self.modes.blocked if not memory[units[i].way].any()]
-        rest = sorted([*self.modes.sticking, *idle])
-        names = [self.gaps.names[i] for i in held] + [self.frictions.names[i] for i in rest]
+        names = [self.gaps.names[i] for i in held]
+        names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
+        names += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
         return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
@@ -502,30 +483,45 @@ class _ContactRun:
     def _watches(self, phase):
         """Yield the units that may end a phase, gaps and then frictions, each with its event."""
         gaps, frictions, modes, packed = self.gaps, self.frictions, self.modes, phase.packed
-        first = first_row_of(packed)
-        sides = [gaps.list[i].side for i in modes.closed]
-        leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
+        if modes.grips:
+            yield from self._rubbing(packed)
+        else:
+            first = first_row_of(packed)
+            sides = [gaps.list[i].side for i in modes.closed]
+            leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
         self.closing = _Closing(gaps, modes.opened)
         for i in range(gaps.count):
-            if i in modes.idle:
+            if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
             is_open = i not in modes.closed
-            function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
-            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open)
+            function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
+            yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
         breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
         slowing = _Slowing(frictions, modes.begun).over
         for i in range(frictions.count):
             if i in modes.blocked:
                 continue
-            function = Member(breaking, sticking.index(i)) if i in modes.sticking else Member(slowing, i)
+            function = GroupMember(breaking, sticking.index(i)) if i in modes.sticking else GroupMember(slowing, i)
             yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
 
     def _still(self, phase):
         """Coordinates of the bodies that rest where frictions stick."""
-        if not self.modes.sticking or self.q.size > MOST_PINNED:
+        grip = any(d is None for d in self.modes.grips.values())
+        if not (self.modes.sticking or grip) or self.q.size > MOST_PINNED:
             return np.zeros(0, int)
         return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
+
+    def _rubbing(self, packed):
+        """The same of closed contacts where there is friction: their reactions, their bounds, their slips."""
+        gaps, modes = self.gaps, self.modes
+        pushing, grips = Reactions(gaps, modes, packed), gaps.count + self.frictions.count
+        for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
+            yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
+        slides = [i for i in modes.closed if modes.grips.get(i) is not None]
+        halting = Halting(packed, [gaps.list[i].side.grip.sliding for i in slides])
+        for k, i in enumerate(slides):
+            yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 
     def _times(self):
         left = self.times[self.taken :]
@@ -599,13 +595,12 @@ class _ContactRun:
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
         (near,) = (self.gap <= TOUCHING * self.length).nonzero()
-        count, before = self.gaps.count, self.modes
+        count, own, before = self.gaps.count, self.frictions.count, self.modes
         hit = [i for i in fired if i < count]
         status = self._settle(sorted({*near.tolist(), *hit, *before.closed, *before.idle}), hit)
         if self.qd is not qd:
-            energy = diagnostics.kinetic_energy(self.scene.system, np.stack((self.q, self.q)), np.stack((qd, self.qd)))
-            self.phases.gain(energy[1] - energy[0])
-        return status or self._settle_frictions(before, [i - count for i in fired if i >= count])
+            self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
+        return status or self._settle_frictions(before, [i - count for i in fired if count <= i < count + own])
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -632,19 +627,38 @@ class _ContactRun:
         try:
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
-            noise = [i for i in fired if i not in before.closed and rates[i] > 0.0]
+            # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
+            small = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max()
+            rates[[i for i in before.closed if abs(rates[i]) <= small[i]]] = 0.0
+            grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0]
+            noise = [i for i in grazing if rates[i] > 0.0]
             if noise:  # a gap that closes with a rate of rounding
                 self.qd, rates = held(inertia, self.qd, noise, rates)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
             opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
-            leaving = [i for i in fired if i in before.closed]
-            stay = settle(inertia, resting, self.qd, leaving)[:2] if resting else ([], [])
-            self.modes = Modes(*stay, opened)
+            # What grazes without a reaction has left: its gap was rounding
+            leaving = [i for i in fired if i in before.closed or i in grazing]
+            self.modes = Modes(opened=opened)
+            if self.gaps.rubs[resting].any():
+                self.qd = halted(inertia, self.qd, resting)
+                settled = settle_grips(inertia, resting, self.qd, leaving)
+                grips, places = renewed(self.gaps, before, settled, self.q)
+                self.modes = Modes(settled.closed, settled.idle, opened, grips=grips, held=places)
+            elif resting:
+                self.modes = Modes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
+        except SingularConfiguration as error:
+            self.reason = str(error)
+            return Status.SINGULAR
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
+            if self.gaps.rubs[touching].any():
+                self.reason += (
+                    " With much friction rigid bodies that slide may have none, or several (Painleve's paradox): lower "
+                    "kinetic, or use a compliant contact."
+                )
             return Status.CONTACT_FAILED
         return None
 
@@ -744,8 +758,9 @@ class _ContactRun:
 
     def _jump(self, inertia, touching, before, e, qd=None):
         """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
-        p = impulses(inertia, touching, before, e)
-        return p, *jumped(inertia, self.qd if qd is None else qd, touching, before, e, p)
+        qd = self.qd if qd is None else qd
+        p, change, share = impact_of(inertia, touching, qd, before, e)
+        return p, *jumped(inertia, qd, change, touching, before, share * e, p)
 
     def _lowering(self, inertia, touching, qd, rates):
         """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""
@@ -753,7 +768,8 @@ class _ContactRun:
         opening[touching] = rates[touching] > 0.0
         if not opening.any():
             return np.zeros(self.gaps.count)
-        a = -settle(inertia, [i for i in touching if rates[i] == 0.0], qd).accelerations
+        resting = [i for i in touching if rates[i] == 0.0]
+        a = -(settle_grips if self.gaps.rubs[resting].any() else settle)(inertia, resting, qd).accelerations
         rounding = EPS * np.maximum(self.length, ROUNDED * inertia.sizes(self.q))
         rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
         return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
@@ -788,7 +804,7 @@ class _ContactRun:
         starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
         for where, (_, *parts) in starts.items():
             arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
-        numbers["first"] = self.first[0]
+        numbers |= {"first": self.first[0], "sampling": self.sampling and self.sampling.saved()}
         if self.end is not None:
             arrays |= {"last": self.end.last, "ended": self.end.remembered}
             numbers["reached"] = self.end.reached
@@ -805,6 +821,9 @@ class _ContactRun:
             vars(self).update({name: known[name] for name in KEPT})
             self.phases.restore(known["phases"], arrays, self._recorded_scene)
             self.modes = Modes.of(known["modes"])
+            if known["sampling"] is not None:
+                self.sampling = Sampling(prepared(phase_of(self.scene, [])), True)
+                self.sampling.restore(known["sampling"])
             starts = [[arrays[f"{where}{name}"] for name in START] for where in ("first.", "")]
             for q, qd, memory in starts:
                 demand(q.shape == qd.shape == (n,) and memory.shape == self.remembered.shape, "the start of a phase")
@@ -815,26 +834,6 @@ class _ContactRun:
                 self.end = RunEnd(known["reached"], arrays["last"], arrays["ended"], self.totals, None, None)
             for i, found in enumerate(self.found):
                 found.append(tuple(arrays[f"event {i}.{name}"] for name in ("t", "q", "qd")))
-
-
-def jumped(inertia, qd, which, before, e, p, law="newton"):
-    """Velocities (n,) after impulses p (k,) of the gaps `which`, and the rates (count,) of all gaps then."""
-    change = inertia.pushed(which, p)
-    after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
-    after[which] = np.maximum(after[which], 0.0)  # but for rounding
-    if law == "newton":  # without rounding where the impact acts
-        for k, i in enumerate(which):
-            if p[k] > 0.0:
-                after[i] = -e[k] * min(before[k], 0.0)
-    return qd + change, after
-
-
-def held(inertia, qd, which, rates):
-    """Velocities (n,) and rates (count,) after the least change, by kinetic energy, that ends some rates."""
-    change = inertia.hold(which, rates[which])
-    after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
-    after[which] = 0.0
-    return qd + change, after
 
 
 def pinned(outcome, q, still):
@@ -889,118 +888,8 @@ def _own(arrays):
 
 def phases_of(scene, numbers, arrays):
     """The `Phases` of a file, of a run of this scene; raises KeyError, TypeError or ValueError if they are none."""
-    run, phases = object.__new__(_ContactRun), Phases(scene.packed)
+    run = object.__new__(_ContactRun)
     run._take_scene(scene)
+    phases = Phases(scene.packed, run.gaps)
     phases.restore(numbers, arrays, run._recorded_scene)
     return phases
-
-
-@fitting
-def impact(
-    scene: Scene,
-    state: Any,
-    contacts: Sequence[ItemLike] | None = None,
-    restitution: float | Mapping[Any, float] | None = None,
-    law: str = "newton",
-) -> tuple[RememberingState, dict[str, float]]:
-    """Return the state after an impact of all closed contacts at once, in the metric of kinetic energy.
-
-    Parameters
-    ----------
-    scene : Scene
-        With unilateral constraints.
-    state : State
-        At the impact, such as `solution.state`; its positions are kept.
-    contacts : sequence of unilateral constraints or names, optional
-        Those that are closed; by default those whose gap is zero at the state, to 1e-9.
-    restitution : float, or mapping of contacts or names to floats, optional
-        Coefficients in place of those of the contacts.
-    law : {"newton", "poisson"}
-        Newton's law in Moreau's form, gd+ = -e gd- where a contact pushes; or Poisson's law: the impulse of restitution
-        is e times that of compression. Both keep or lower the energy.
-
-    Returns
-    -------
-    state : State
-    impulses : dict of str to float
-        By names of the contacts; N s, or N m s of an angle.
-
-    Raises
-    ------
-    InvalidArgument
-        If law, state or a coefficient is inadmissible, or the scene has no contacts.
-    InvalidConstraint
-        If a contact is none of the scene.
-    InconsistentState
-        If no impulses keep the contacts from penetrating.
-
-    Notes
-    -----
-    The bilateral constraints hold during the impact. With 0 <= v+ + e v-, 0 <= p complementary, v+ is unique; the
-    impulses p of redundant contacts are one of the possible solutions.
-
-    Examples
-    --------
-    The first of three equal balls in contact is hit; plastic impacts leave all with the same velocity:
-
-    >>> import tsdyn as ts
-    >>> scene = ts.Scene(gravity=(0, 0, 0))
-    >>> balls = [scene.add_point_mass(mass=1.0, position=(0.1 * i, 0, 0), name=f"ball {i}") for i in range(3)]
-    >>> balls[0].velocity = (1, 0, 0)
-    >>> for i in range(2):
-    ...     gap = ts.constraints.SphereContact(balls[i], balls[i + 1], radius_a=0.05, radius_b=0.05, name=f"gap {i}")
-    ...     _ = scene.add(gap)
-    >>> q, qd = scene.start
-    >>> after, impulses = ts.impact(scene, ts.State(0.0, q, qd), restitution=0.0)
-    >>> print(after.qd[::3].round(6), {name: round(p, 6) for name, p in impulses.items()})
-    [0.333333 0.333333 0.333333] {'gap 0': 0.666667, 'gap 1': 0.333333}
-    """
-    if law not in LAWS:
-        raise InvalidArgument(f"law must be 'newton' or 'poisson', got {law!r}.")
-    if not has_contacts(scene):
-        raise InvalidArgument("impact: the scene has no unilateral constraints, such as PlaneContact(unilateral=True).")
-    gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
-    q, qd = state_arrays(state, kept.n)
-    t = float(getattr(state, "t", 0.0))
-    memory = remembered(state, kept, t, q)
-    angles, slots = memory[: kept.handles.count], memory[kept.handles.count :]
-    near = closed_gaps(gaps, q, angles)
-    which = near if contacts is None else _chosen(gaps, contacts, near)
-    e = gaps.restitution.copy()
-    if isinstance(restitution, dict):
-        for item, value in restitution.items():
-            e[_chosen(gaps, [item], None)] = _coefficient(value)
-    elif restitution is not None:
-        e[:] = _coefficient(restitution)
-    inertia = Inertia(gaps, t, q, slots, which)
-    before = inertia.rates(qd)[which]
-    try:
-        p = impulses(inertia, which, before, e[which], law)
-    except NoSolution as error:
-        names = listed(list(dict.fromkeys(gaps.names[i] for i in which)), NAMED)
-        raise InconsistentState(f"impact: no impulses keep these contacts from penetrating: {names}.") from error
-    after, _ = jumped(inertia, qd, which, before, e[which], p, law)
-    found = {gaps.names[i]: 0.0 for i in which}
-    for i, x in zip(which, p, strict=True):
-        found[gaps.names[i]] += float(x)
-    anchor = getattr(state, "anchor", None)
-    levels = np.zeros(kept.n), np.zeros(len(scene.packed.system.segments))
-    return RememberingState.of(scene.packed, slots, anchor, t, q.copy(), after, *levels), found
-
-
-def _chosen(gaps, items, near):
-    """Numbers of the gaps of some contacts; of a stop with two bounds the one that is near."""
-    found = []
-    for item in items:
-        mine = [i for i, gap in enumerate(gaps.list) if item is gap.contact or item == gap.contact.name]
-        if not mine:
-            raise InvalidConstraint(f"impact: {item!r} is no unilateral constraint of the scene.")
-        found += mine if near is None or len(mine) == 1 else [i for i in mine if i in near]
-    return sorted(set(found))
-
-
-def _coefficient(value):
-    e = floats(value)
-    if e.shape != () or not 0.0 <= e <= 1.0:
-        raise InvalidArgument(f"impact: restitution must be from 0 to 1, got {value!r}.")
-    return float(e)

@@ -6,6 +6,7 @@ from itertools import chain
 import numpy as np
 
 from ..calls import fitting
+from ..elements.force import Force
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument
 from ..model.handles import handles_of
@@ -24,13 +25,12 @@ NAMED = 5  # contacts in a message
 def has_contacts(scene):
     """Whether runs of a scene have phases, by contacts or exact friction; looked up once until the scene changes."""
     if scene._opens is None:
-        slides = any(getattr(force, "slides", ()) for force in scene._forces)
-        scene._opens = slides or bool(contacts_of(scene._added))
+        scene._opens = bool(any(getattr(force, "slides", ()) for force in scene._forces) or contacts_of(scene._added))
     return scene._opens
 
 
 def phase_of(scene, rows, holds=(), without=()):
-    """The scene with these rows, primitives, in place of its contacts; kept until the scene changes.
+    """The scene with these rows, primitives, and forces in place of its contacts; kept until the scene changes.
 
     holds: rows with numbers that the run remembers, as `friction_problem.Hold`. without: constraints and forces left
     out.
@@ -41,12 +41,13 @@ def phase_of(scene, rows, holds=(), without=()):
     key = frozenset((*map(id, (*rows, *without)), *(hold.key for hold in holds)))
     if key not in known:
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
+        constraints, forces = ([each for each in rows if isinstance(each, Force) is given] for given in (False, True))
         held = [hold.rows() for hold in holds]
         phase = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
-            _added=[each for each in scene._added if id(each) not in gone] + [*rows, *chain(*held)],
-            _forces=[each for each in scene._forces if id(each) not in gone], _packed=None, _start=None,
+            _added=[each for each in scene._added if id(each) not in gone] + [*constraints, *chain(*held)],
+            _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None, _start=None,
             _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
         )  # fmt: skip
         if holds:
@@ -59,7 +60,10 @@ def gaps_of(scene):
     """The `Gaps` of a scene with contacts."""
     from ..analyses.contact_problem import Gaps
 
-    rows = [side.row for contact in contacts_of(scene._added) for side in contact.sides]
+    sides = [(contact, side) for contact in contacts_of(scene._added) for side in contact.sides]
+    rows = [side.grip.gap if side.grip else side.row for _, side in sides]
+    rubbing = [part for contact, side in sides if side.grip for part in contact.parts]
+    rows += [part for part in rubbing if not any(part is row for row in rows)]
     alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
     return Gaps(scene.packed, alone.packed, phase_of(scene, []).packed)
 
@@ -83,25 +87,30 @@ def first_row_of(packed):
 
 
 def at_start(scene):
-    """The scene with those contacts closed that are so at its start; a scene without contacts as it is."""
+    """The scene with those contacts closed, without friction, that are so at its start; without contacts as it is."""
     if not has_contacts(scene):
         return scene
     from ..analyses.contact_problem import closed_gaps
 
     gaps, (q, _) = gaps_of(scene), scene.start
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
-    return phase_of(scene, [gaps.list[i].side.row for i in closed_gaps(gaps, q, angles)])
+    closed = [gaps.list[i].side for i in closed_gaps(gaps, q, angles)]
+    return phase_of(scene, [side.grip.gap if side.grip else side.row for side in closed])
 
 
 def demand_bilateral(scene, who="this analysis"):
     """Raise InvalidArgument where a scene has contacts or exact friction."""
     if has_contacts(scene):
         demand_regular(scene, who)
-        names = listed([each.name for each in contacts_of(scene._added)], NAMED)
         raise InvalidArgument(
-            f"{who} is of one phase of a run, along which {names} may open and close. In a copy of the scene, hold "
-            "those that are closed by unilateral=False, and remove the others."
+            f"{who} is of one phase of a run, along which {named(contacts_of(scene._added))} may open and close. In a "
+            "copy of the scene, hold those that are closed by unilateral=False, and remove the others."
         )
+
+
+def named(items):
+    """Names of contacts, in a message."""
+    return listed(list(dict.fromkeys(item.name for item in items)), NAMED)
 
 
 def demand_regular(scene, who):
@@ -109,9 +118,8 @@ def demand_regular(scene, who):
     exact = [force for force in scene._forces if getattr(force, "slides", ())]
     if exact:
         raise InvalidArgument(
-            f"{who} doesn't serve friction of the exact law, which sticks and slides: "
-            f"{listed([force.name for force in exact], NAMED)}. Give slip_velocity (slip_rate of a torque), such as "
-            "1e-3 m/s, for the regularised law."
+            f"{who} doesn't serve friction of the exact law, which sticks and slides: {named(exact)}. Give "
+            "slip_velocity (slip_rate of a torque), such as 1e-3 m/s, for the regularised law."
         )
 
 

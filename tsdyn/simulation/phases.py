@@ -1,5 +1,6 @@
 """The phases of a run with contacts: what its solution asks of them, and what files hold of them."""
 
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,50 @@ from ..observables import diagnostics, reactions
 from ..rows.graph_builder import graph_of, set_redundant
 from ..runs.dense_output import StepPieces
 from ..validation import demand, demand_record
+from .grips import add_friction, losses
+
+
+@dataclass
+class Modes:
+    """The modes of the units of a scene: numbers of gaps, and of frictions. All others are open, or slide."""
+
+    closed: list = field(default_factory=list)  # independent rows, with reactions
+    idle: list = field(default_factory=list)  # closed by what others hold
+    opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+    sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
+    blocked: list = field(default_factory=list)  # frictions without motion that others hold
+    begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
+
+    grips: dict = field(default_factory=dict)  # of closed contacts with friction: see grips.py
+    held: dict = field(default_factory=dict)
+
+    def same(self, other):
+        """Whether the units are in the same modes, whatever has just opened."""
+        return {**vars(self), "opened": 0} == {**vars(other), "opened": 0}
+
+    def saved(self):
+        """Lists of numbers, for JSON: one for each field, of a dict its items."""
+        return [plain(value) for value in vars(self).values()]
+
+    @classmethod
+    def of(cls, record):
+        """As it was when it was saved."""
+        pairs = zip(vars(cls()).items(), record, strict=True)
+        return cls(*(_entries(known) if isinstance(value, dict) else known for (_, value), known in pairs))
+
+
+def _entries(pairs):
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in pairs}
+
+
+def plain(value):
+    """A value of modes as JSON has it."""
+    if isinstance(value, dict):
+        return [[plain(key), plain(each)] for key, each in value.items()]
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
 
 RECORD = {"modes": list, "derived": list, "names": list, "contacts": list}
 
@@ -21,6 +66,7 @@ class Phases:
     ----------
     packed : Packed
         Of the scene with the rows of all units.
+    gaps : Gaps
 
     Attributes
     ----------
@@ -34,8 +80,10 @@ class Phases:
         Change of the kinetic energy (J) at the beginning of phases, by their numbers: what impacts took.
     """
 
-    def __init__(self, packed):
-        self.whole, self.list, self.impulses = packed, [], []
+    ARRAYS = "phases", "impulses", "gains"  # that are saved
+
+    def __init__(self, packed, gaps):
+        self.whole, self.gaps, self.list, self.impulses = packed, gaps, [], []
         self.starts, self.of, self.gains = [], [], {}
         self.packed, self.modes, self._columns, self._known = [], [], [], {}  # of each kind of phase
         self.scenes = []  # of each kind, of phases that were restored
@@ -83,7 +131,39 @@ class Phases:
         out = np.zeros((len(numbers), m))
         for kind, mine, some in self._gathered(numbers, arrays):
             rows, columns = self._columns[kind]
-            out[np.ix_(mine, rows)] = reactions.multipliers(self.packed[kind], *some)[:, columns]
+            lam, own = reactions.multipliers(self.packed[kind], *some), np.zeros((mine.size, m))
+            own[:, rows] = lam[:, columns]
+            modes = self._modes(kind)
+            if modes.grips:
+                add_friction(self.gaps, modes, self.packed[kind], *some[:3], lam, own)
+            out[mine] = own
+        return out
+
+    def _modes(self, kind):
+        return Modes.of(self.modes[kind][0])
+
+    def told(self):
+        """The `list`, in which phases are one where the same hold as before, and no impact is between."""
+        found, hit = [], {t for t, *_ in self.impulses}
+        for (start, end, names), begun in zip(self.list, self.starts, strict=True):
+            if found and names == found[-1][2] and begun not in hit:
+                found[-1] = (found[-1][0], end, names)
+            else:
+                found.append((start, end, names))
+        return found
+
+    def sticking(self, numbers, i):
+        """Whether a contact with friction sticks (k,); i: the number of its gap."""
+        sticks = np.array([self._modes(kind).grips.get(i, ()) is None for kind in range(len(self.modes))])
+        return sticks[np.array(self.of)[numbers]]
+
+    def losses(self, numbers, lam, t, q, qd):
+        """Power (k, gaps), W, that contacts with friction dissipate; lam (k, m) of the scene."""
+        out = np.zeros((len(numbers), self.gaps.count))
+        for kind, mine, (own, *some) in self._gathered(numbers, (lam, t, q, qd)):
+            which = [i for i, d in self._modes(kind).grips.items() if d is not None]
+            if which:
+                out[np.ix_(mine, which)] = losses(self.gaps, which, own, *some)
         return out
 
     def with_normal_loads(self, numbers, t, q, qd, qdd, memory):
@@ -156,7 +236,10 @@ class Phases:
         self.list = [(t, end, names[i]) for t, end, i in zip(*phases[:, 2:4].T.tolist(), named, strict=True)]
         self.gains = {int(number): energy for number, energy in arrays["gains"].astype(float).reshape(-1, 2).tolist()}
         self.impulses = [(t, contacts[int(i)], p) for t, i, p in impulses.tolist()]
-        for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True) if scene_of else ():
+        if scene_of is None:
+            self.modes = numbers["modes"]
+            return
+        for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True):
             scene = scene_of(modes)
             packed = scene.packed
             if derived != derived_record(packed):
@@ -183,6 +266,10 @@ class Pinned:
         self.start, self.end, self.edges, self.anchors = (
             trajectory.start, trajectory.end, trajectory.edges, trajectory.anchors,
         )  # fmt: skip
+
+    def begin_at(self, times):
+        """As of a `Trajectory`."""
+        self.trajectory.begin_at(times)
 
     def __call__(self, t):
         """As of a `Trajectory`."""

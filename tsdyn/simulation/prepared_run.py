@@ -425,7 +425,7 @@ class Run:
             )
         kernels = kernels_of(self._first, method, self._form, True in self._compiled)
         laws = {load.force.name: load.law for load in self._prepared.packed.loads if load.law is not None}
-        said = [f"{name} {law.said}" for name, law in laws.items()]
+        said, phased = [f"{name} {law.said}" for name, law in laws.items()], self._first is not self.scene
         return {
             "method": f"{method!r}: {why}",
             "steps": tolerances,
@@ -433,6 +433,7 @@ class Run:
             "options": repr(options),
             "kernels": f"{len(kernels)}: {_listed(kernels)}",
             **({"laws": "; ".join(said)} if said else {}),
+            **({"phases": "the first one; each begins by a method and kernels of its own"} if phased else {}),
         }
 
     def __str__(self) -> str:

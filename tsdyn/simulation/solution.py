@@ -264,9 +264,11 @@ def _power(solution, trajectory, item, t):
         at.multipliers = solution._multipliers_at(t, q, qd, qdd, memory)
     if item is not None:
         power = diagnostics.power_of(at, item)
+        power = power - solution._losses_of(item, solution._losses_at(t, q, qd, qdd, memory))
     else:
         powers = diagnostics.force_powers(at)
         power = powers.applied + diagnostics.driving_power(at) - powers.dissipation
+        power = power - solution._losses_at(t, q, qd, qdd, memory).sum(axis=1)
     return power if status == 0 else np.full(t.size, np.nan)
 
 
@@ -304,7 +306,7 @@ class Balances:
     @property
     def dissipation(self) -> Floats:
         """Power (k,), W, dissipated by dampers and friction; not negative."""
-        return self._force_powers.dissipation
+        return self._force_powers.dissipation + self._losses().sum(axis=1)
 
     @cached_property
     def work(self) -> Floats:
@@ -325,7 +327,8 @@ class Balances:
         Of a motor or a driver: the power of its force or torque along the prescribed motion. Of a force: the power of
         its loads and actuators, less dissipation; stored energy of a spring doesn't count. Of other constraints: zero.
         """
-        return diagnostics.power_of(self, self._part(item))
+        part = self._part(item)
+        return diagnostics.power_of(self, part) - self._losses_of(part, self._losses())
 
     def work_of(self, item: ItemLike) -> Floats:
         """Work (k,), J, since the start, of one constraint or force: the integral of `power_of`.
@@ -564,7 +567,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     @property
     def phases(self) -> list[tuple[float, float, tuple[str, ...]]]:
         """Start and end (s) of each phase, and names of the contacts closed and the frictions that stick in it."""
-        return [(self.span[0], self.reached, ())] if self._phases is None else list(self._phases.list)
+        return [(self.span[0], self.reached, ())] if self._phases is None else self._phases.told()
 
     @property
     def impulses(self) -> list[tuple[float, str, float]]:
@@ -612,6 +615,23 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             return reactions.multipliers(self.packed, t, q, qd, qdd, memory)
         numbers = self._phases.at(t) if numbers is None else numbers
         return self._phases.multipliers(numbers, len(self.system.segments), t, q, qd, qdd, memory)
+
+    def _losses(self):
+        """Power (k, contacts), W, that contacts with friction dissipate."""
+        return self._losses_at(self.t, self.q, self.qd, self.qdd, self._memory, self._phase_of_rows)
+
+    def _losses_at(self, t, q, qd, qdd, memory, numbers=None):
+        """The same at times of the run, by number or by time of their phases."""
+        if self._phases is None or not self._phases.gaps.rubs.any():
+            return np.zeros((t.size, 1))
+        numbers = self._phases.at(t) if numbers is None else numbers
+        lam = self._multipliers_at(t, q, qd, qdd, memory, numbers)
+        return self._phases.losses(numbers, lam, t, q, qd)
+
+    def _losses_of(self, part, losses):
+        """The part (k,) of losses (k, contacts) that is of a constraint or force."""
+        mine = [] if self._phases is None else self._phases.gaps.of_contact(getattr(part, "constraint", None))
+        return losses[:, mine].sum(axis=1)
 
     @cached_property
     def constraint_error(self) -> ConstraintError:
@@ -671,8 +691,9 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
 
         Parameters
         ----------
-        friction : friction, or name of one
-            A joint friction or CoulombFriction whose slip velocity is zero.
+        friction : friction or contact, or name of one
+            A joint friction or CoulombFriction whose slip velocity is zero, or a unilateral contact with friction,
+            which sticks where it is closed and doesn't slip.
 
         Raises
         ------
@@ -692,11 +713,14 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         [False  True] [(), ('brake',)]
         """
         item = self.handles.item(friction)
+        mine = [] if self._phases is None else self._phases.gaps.of_contact(item)
+        if mine and self._phases.gaps.rubs[mine].any():
+            return self._phases.sticking(self._phase_of_rows, mine[0])
         load = reactions.loads_of(self.packed).get(id(item))
         if load is None or not getattr(item, "slides", ()):
             raise InvalidForce(
                 f"sticking: {friction!r} is no friction of the exact law: RevoluteFriction, TranslationalFriction, "
-                "ContactFriction and CoulombFriction are, with slip_velocity=0."
+                "ContactFriction and CoulombFriction are, with slip_velocity=0, and unilateral contacts with kinetic."
             )
         slot, rests = load.slot + item.memory, np.ones(self.t.size, bool)
         for slide in item.slides:
@@ -764,8 +788,11 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         sweeps = f", {counted(s.newton_iterations, 'Newton sweep')}" if s.newton_iterations else ""
         if sweeps and s.placements:  # series place none
             sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement"
+        known = self._phases
+        phases = f"{counted(len(known.list), 'phase')}, {counted(len(known.impulses), 'impulse')}" if known else ""
         return {
             "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self._length(), 'output')}",
+            **({"phases": phases} if phases else {}),
             "method": f"{self.method}, formulation {self.formulation}",
             "steps": f"{s.steps}, {s.rejected} rejected, {counted(s.charts, 'chart')}",
             "work": f"{counted(s.evaluations, 'evaluation')}, {counted(s.placements, 'placement')}{sweeps}",

@@ -9,12 +9,13 @@ import numpy as np
 from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
 from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InconsistentState, InvalidArgument, NoEquilibrium
+from ..model.kinematics import Anchor
 from ..observables import reactions
 from ..observables.state import RememberingState, State, remembered
 from ..runs.arguments import state_arrays
 from ..validation import finite_vector, listed, number
 from .contact_run import begun, demand_apart
-from .phase_scenes import NAMED, at_start, demand_regular, gaps_of, phase_of
+from .phase_scenes import NAMED, at_start, demand_regular, gaps_of, named, phase_of
 from .phases import shared_rows
 from .scene_cache import prepared
 
@@ -22,8 +23,11 @@ from .scene_cache import prepared
 # are open.
 
 
-def standing(scene: Any, state: Any, who: str) -> Any:
-    """The scene of the phase that a run begins with at a state, or at the start (None); refuses an impact."""
+def standing(scene: Any, state: Any, who: str) -> tuple[Any, RememberingState]:
+    """The scene of the phase that a run begins with at a state, or at the start (None), and the state of that run.
+
+    Refuses an impact.
+    """
     run = begun(scene, 0.0 if state is None else number(getattr(state, "t", 0.0)), state)
     if run.phases.impulses:
         names = listed(list(dict.fromkeys(name for _, name, _ in run.phases.impulses)), NAMED)
@@ -31,7 +35,10 @@ def standing(scene: Any, state: Any, who: str) -> Any:
             f"{who}: velocities jump at this state, by the impact of {names}. Take the state after it, as "
             "ts.impact(scene, state) returns it."
         )
-    return run._scene()
+    angles, slots = run.remembered[: run.count], run.remembered[run.count :]
+    levels = np.zeros_like(run.q), np.zeros(0)
+    phase = run._scene()
+    return phase, RememberingState.of(phase.packed, slots, Anchor(angles), run.t, run.q, run.qd, *levels)
 
 
 def evaluate(scene, own, q=None, qd=None, t=0.0):
@@ -46,21 +53,21 @@ def evaluate(scene, own, q=None, qd=None, t=0.0):
 
 def linearise(scene, own, state=None, *arguments, **keywords):
     """As of scenes without contacts: contacts that push at the state hold."""
-    demand_regular(scene, "linearise")
-    return own(standing(scene, state, "linearise"), state, *arguments, **keywords)
+    return own(*standing(scene, state, "linearise"), *arguments, **keywords)
 
 
 def along(scene, own, *arguments, **keywords):
     """`kinematics` or `inverse_dynamics` of the scene with open contacts; refuses a motion along which one is met."""
-    if own.__name__ != "kinematics":
-        demand_regular(scene, own.__name__)
-    motion, who, gaps = own(phase_of(scene, []), *arguments, **keywords), own.__name__, gaps_of(scene)
+    who = own.__name__
+    if who != "kinematics":
+        demand_regular(scene, who)
+    motion, gaps = own(phase_of(scene, []), *arguments, **keywords), gaps_of(scene)
     for k, q in enumerate(motion.q):
         met = closed_gaps(gaps, q, motion.anchor.angles[k])
         if met:
-            names = listed(list(dict.fromkeys(gaps.names[i] for i in met)), NAMED)
             raise InvalidArgument(
-                f"{who} takes contacts as open, and at t = {motion.t[k]:.9g} s this motion meets {names}. Keep the "
+                f"{who} takes contacts as open, and at t = {motion.t[k]:.9g} s this motion meets "
+                f"{named(gaps.list[i].contact for i in met)}. Keep the "
                 "motion off them, or hold them closed, in a scene with unilateral=False."
             )
     return motion
@@ -83,6 +90,12 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
     """
     demand_regular(scene, "equilibrium")
     gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
+    if gaps.rubs.any():
+        names = listed(list(dict.fromkeys(gaps.names[i] for i in np.flatnonzero(gaps.rubs))), NAMED)
+        raise InvalidArgument(
+            f"equilibrium: contacts with friction ({names}) rest at more than one place. Run the scene from where it "
+            "stands: solution.sticking tells whether it rests; or set kinetic=0 and static=None."
+        )
     q = scene.start[0] if guess is None else np.asarray(getattr(guess, "q", guess), float)
     closed, seen = closed_gaps(gaps, q, _angles(kept, guess, t, q)), set()
     while frozenset(closed) not in seen:

@@ -251,6 +251,8 @@ def suspect(solution, scene):
     place = singular_place(solution.packed, solution._last[0])
     if place:
         return f"{place}: a singular configuration."
+    if solution._phases is not None:  # not all rows hold
+        return ""
     if solution._last.shape[1] > MOST_SINGULAR:
         return _suspect_of_many(solution, scene)
     _, Phi_q, _, _ = constraint_arrays(solution.system, solution._last[0], solution._last[1], solution._reached)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..calls import fitting
 from ..elements.bodies import START, Ground, PointMass, named
+from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument, InvalidBody
 from ..model.handles import handles_of
 from ..model.packed import classes
@@ -243,7 +244,7 @@ def with_parameters(scene: Scene, values: Mapping[str, Any]) -> Scene:
         )
     family, changes = family_of(scene)
     changes = {**changes, **values}
-    found = family.numbers(changes)
+    found = None if contacts_of(scene._added) else family.numbers(changes)  # phases have rows of the scene's own
     return packed_anew(family, changes) if found is None else of_numbers(scene, family, changes, *found)
 
 

@@ -1,0 +1,388 @@
+"""Contacts with Coulomb friction against closed forms: sticking, sliding, rolling, impacts, openings; refusals."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+from scipy.special import ellipk
+
+import tsdyn as ts
+
+C = ts.constraints
+G = 10.0
+FLOOR = {"normal_b": (0, 0, 1), "unilateral": True}
+
+
+def slope(mu, angle, velocity=(0, 0, 0), static=None):
+    """A particle on a plane whose normal is z, tilted about y by the direction of gravity."""
+    scene = ts.Scene(gravity=(G * np.sin(angle), 0, -G * np.cos(angle)))
+    block = scene.add_point_mass(mass=2.0, velocity=velocity, name="block")
+    scene.add(C.PlaneContact(block, scene.ground, **FLOOR, kinetic=mu, static=static, name="floor"))
+    return scene
+
+
+def ball(kind, velocity=(0, 0, 0), spin=(0, 0, 0), mu=0.2, e=0.0, height=0.5, angle=0.0):
+    """A solid ball of 0.5 m on the floor."""
+    scene = ts.Scene(gravity=(G * np.sin(angle), 0, -G * np.cos(angle)))
+    body = scene.add_body(1.0, (0.1, 0.1, 0.1), (0, 0, height), velocity=velocity, angular_velocity=spin, name="ball")
+    law = {"kinetic": mu, "restitution": e, "name": "floor", "normal_b": (0, 0, 1)}
+    if kind == "sphere":
+        scene.add(C.SphereContact(body, scene.ground, radius_a=0.5, **law))
+    else:
+        scene.add(C.RollingBall(body, scene.ground, radius=0.5, **law))
+    return scene
+
+
+def boxes(count, angle=0.0, mu=0.5, size=(0.6, 0.4, 0.2), velocity=(0, 0, 0), spin=0.0):
+    """A stack, each box on four corners."""
+    scene = ts.Scene(gravity=(G * np.sin(angle), 0, -G * np.cos(angle)))
+    size, below = np.array(size), scene.ground
+    for i in range(count):
+        start = {"velocity": velocity, "angular_velocity": (0, 0, spin)}
+        box = scene.add_body(
+            **ts.shapes.box(size, mass=1.0), position=(0, 0, (i + 0.5) * size[2]), **start, name=f"{i}"
+        )
+        top = (0, 0, 0.0 if below is scene.ground else size[2] / 2)
+        for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+            corner = np.array([x, y, -1]) * size / 2
+            scene.add(C.PlaneContact(box, below, point_a=corner, point_b=top, **FLOOR, kinetic=mu))
+        below = box
+    return scene
+
+
+def motion(solution):
+    """The largest change of any coordinate from output to output."""
+    return np.ptp(solution.q, axis=0).max()
+
+
+# a particle on a slope
+
+
+def test_a_block_below_its_angle_does_not_move_by_one_rounding():
+    solution = ts.simulate(slope(0.5, 0.4), (0, 1000))
+    assert motion(solution) == 0.0
+    assert solution.sticking("floor").all()
+    assert solution.phases == [(0.0, 1000.0, ("floor", "floor sticks"))]
+    np.testing.assert_allclose(solution.reaction("floor")[0][-1], [-2 * G * np.sin(0.4), 0, 2 * G * np.cos(0.4)])
+    assert abs(solution.friction_demand("floor")[-1] - np.tan(0.4)) < 1e-15
+
+
+def test_a_block_above_its_angle_slides():
+    solution = ts.simulate(slope(0.3, 0.4), (0, 2))
+    a = G * (np.sin(0.4) - 0.3 * np.cos(0.4))
+    np.testing.assert_allclose(solution.position("block")[-1], [2 * a, 0, 0], atol=1e-13)
+    np.testing.assert_allclose(solution.reaction("floor")[0][-1], 2 * G * np.cos(0.4) * np.array([-0.3, 0, 1]))
+    assert not solution.sticking("floor").any()
+
+
+@pytest.mark.parametrize("static", [None, 0.8])
+def test_a_block_that_slides_up_stops_or_comes_back(static):
+    """tan(0.6) = 0.684: with 0.8 at rest it stays at the top, with 0.5 it comes back."""
+    solution = ts.simulate(slope(0.5, 0.6, (-3, 0, 0), static), (0, 4))
+    up, down = (G * (np.sin(0.6) + sign * 0.5 * np.cos(0.6)) for sign in (1, -1))
+    top = 3 / up
+    if static:
+        assert abs(solution.phases[0][1] - top) < 1e-13
+    place = -9 / (2 * up) + (0.0 if static else down * (4 - top) ** 2 / 2)
+    assert abs(solution.position("block")[-1, 0] - place) < 1e-12
+    assert solution.sticking("floor")[-1] == (static is not None)
+
+
+def test_slip_across_a_slope_turns_down_it():
+    """With mu = tan(angle) the speed and the velocity down the slope have a constant sum; it ends in half of it."""
+    solution = ts.simulate(slope(np.tan(0.3), 0.3, (0, 2, 0)), (0, 30), rtol=1e-11, atol=1e-12)
+    v = solution.velocity("block")
+    speed = np.hypot(v[:, 0], v[:, 1])
+    np.testing.assert_allclose(speed + v[:, 0], 2.0, atol=1e-9)
+    assert abs(v[-1, 0] - 1.0) < 1e-6
+
+
+def test_energy_is_balanced_with_the_work_of_friction():
+    solution = ts.simulate(slope(0.5, 0.4, (1, 2, 0)), (0, 6), dense_output=True)
+    np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=1e-12)
+    assert solution.dissipation[0] == pytest.approx(0.5 * 2 * G * np.cos(0.4) * 5**0.5, rel=1e-13)
+    np.testing.assert_allclose(solution.work_of("floor")[-1], solution.work[-1], atol=1e-13)
+
+
+# balls
+
+
+@pytest.mark.parametrize("kind", ["sphere", "rolling"])
+@pytest.mark.parametrize("spin", [0.0, -6.0])
+def test_a_ball_slides_and_then_rolls(kind, spin):
+    """Rolls from t = 2 (v - R w) / 7 mu g on with (5 v + 2 R w) / 7."""
+    solution = ts.simulate(ball(kind, (2, 0, 0), (0, spin, 0)), (0, 4))
+    begin = 2 * (2 - 0.5 * spin) / (7 * 0.2 * G)
+    (_, end, sliding), (_, _, rolling) = solution.phases
+    assert abs(end - begin) < 1e-14
+    assert (sliding, rolling) == (("floor",), ("floor", "floor sticks"))
+    np.testing.assert_allclose(solution.velocity("ball")[-1], [(10 + spin) / 7, 0, 0], atol=1e-14)
+    np.testing.assert_allclose(solution.reaction("floor")[0][[0, -1]], [[-2, 0, 10], [0, 0, 10]], atol=1e-13)
+    np.testing.assert_allclose(solution.contact_point("floor")[-1, 2], 0.0, atol=1e-15)
+
+
+def test_a_bowling_ball_runs_on_a_parabola():
+    v, w = np.array([2.0, 0, 0]), np.array([4.0, 1, 0])
+    slip = v + np.cross(w, [0, 0, -0.5])
+    d, begin = slip / np.linalg.norm(slip), 2 * np.linalg.norm(slip) / (7 * 0.2 * G)
+    solution = ts.simulate(ball("sphere", v, w), (0, 3))
+    after = v - 0.2 * G * begin * d
+    place = v * begin - 0.1 * G * begin**2 * d + after * (3 - begin)
+    assert abs(solution.phases[0][1] - begin) < 1e-13
+    np.testing.assert_allclose(solution.position("ball")[-1], place + np.array([0, 0, 0.5]), atol=1e-12)
+    np.testing.assert_allclose(solution.velocity("ball")[-1], after, atol=1e-13)
+
+
+@pytest.mark.parametrize(("mu", "rolls"), [(0.1, False), (0.5, True)])
+def test_a_ball_on_a_slope(mu, rolls):
+    solution = ts.simulate(ball("rolling", mu=mu, angle=0.6), (0, 2))
+    a = 5 / 7 * G * np.sin(0.6) if rolls else G * (np.sin(0.6) - mu * np.cos(0.6))
+    np.testing.assert_allclose(solution.position("ball")[-1], [2 * a, 0, 0.5], atol=1e-12)
+    assert solution.sticking("floor")[-1] == rolls
+
+
+def test_a_ball_rolls_off_a_ball():
+    """Slips where 2 sin = mu (17 cos - 10 cos_0)."""
+    scene, mu, start, reach = ts.Scene(gravity=(0, 0, -G)), 0.5, 0.05, 1.25
+    place = (reach * np.sin(start), 0, reach * np.cos(start))
+    body = scene.add_body(1.0, (0.025, 0.025, 0.025), position=place, name="ball")
+    scene.add(C.SphereContact(body, scene.ground, radius_a=0.25, radius_b=1.0, kinetic=mu, name="globe"))
+    solution = ts.simulate(scene, (0, 1.6), rtol=1e-12, atol=1e-12, dense_output=True)
+    slips = brentq(lambda a: 2 * np.sin(a) - mu * (17 * np.cos(a) - 10 * np.cos(start)), 0.1, 1.0)
+    (_, t, rolling), (_, _, sliding), (_, _, flying) = solution.phases
+    assert (rolling, sliding, flying) == (("globe", "globe sticks"), ("globe",), ())
+    x = solution.at(np.nextafter(t, 0)).position(body)
+    assert abs(np.arctan2(x[0], x[2]) - slips) < 1e-13
+    assert np.ptp(solution.energy[solution.t <= t]) < 1e-13
+
+
+def test_a_ball_rocks_in_a_bowl():
+    """Rolls without slip: a pendulum of 7/5 of the length."""
+    scene, reach = ts.Scene(gravity=(0, 0, -G)), 0.75
+    place = (reach * np.sin(0.5), 0, -reach * np.cos(0.5))
+    body = scene.add_body(1.0, (0.025, 0.025, 0.025), position=place, name="ball")
+    scene.add(C.SphereContact(body, scene.ground, radius_a=0.25, radius_b=1.0, inside=True, kinetic=1.0))
+    solution = ts.simulate(scene, (0, 5), events=lambda t, state: state.position(body)[0], rtol=1e-12, atol=1e-12)
+    period = 4 * np.sqrt(1.4 * reach / G) * ellipk(np.sin(0.25) ** 2)
+    expected = period * (0.25 + 0.5 * np.arange(len(solution.t_events[0])))
+    np.testing.assert_allclose(solution.t_events[0], expected, atol=1e-12)
+
+
+# impacts
+
+
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+@pytest.mark.parametrize("mu", [0.05, 0.5])
+def test_an_oblique_impact_of_a_ball(mu, law):
+    """It slides through the impact with mu (1 + e) v_n, or leaves with no slip: impulse 2/7 of the slip."""
+    scene = ball("sphere", (2, 0, -3), (0, -4, 0), mu=mu, e=0.6)
+    after, impulses = ts.impact(scene, ts.State(0.0, *scene.start), law=law)
+    p, slip = 3 * 1.6, 2 + 0.5 * 4
+    T = min(mu * p, 2 / 7 * slip)
+    assert abs(impulses["floor"] - p) < 1e-14
+    np.testing.assert_allclose(after.velocity("ball"), [2 - T, 0, 1.8], atol=1e-14)
+    np.testing.assert_allclose(after.angular_velocity("ball"), [0, -4 + 0.5 * T / 0.1, 0], atol=1e-13)
+
+
+@pytest.mark.parametrize("mu", [0.02, 0.4])
+def test_a_rod_hits_a_plane(mu):
+    """Routh's rod: one end at 45 degrees, by the two equations of its impact."""
+    scene, s = ts.Scene(gravity=(0, 0, 0)), 2**-0.5
+    tilted = Rotation.from_euler("y", -np.pi / 4)
+    rod = scene.add_body(1.0, (1e-3, 1 / 3, 1 / 3), (s, 0, s), orientation=tilted, velocity=(-0.4, 0, -1), name="rod")
+    scene.add(C.PlaneContact(rod, scene.ground, point_a=(-1, 0, 0), **FLOOR, kinetic=mu, restitution=0.5, name="tip"))
+    after, impulses = ts.impact(scene, ts.State(0.0, *scene.start))
+    # Of the tip: (x, z) velocities by impulses (T, N), arm (-s, -s) from the centre, inertia 1/3
+    B = np.array([[1 + 3 * s * s, -3 * s * s], [-3 * s * s, 1 + 3 * s * s]])
+    T, N = np.linalg.solve(B, [0.4, 1.5])  # sticks
+    if abs(T) > mu * N:
+        N = 1.5 / (B[1, 1] + mu * B[1, 0])
+        T = mu * N
+    assert abs(impulses["tip"] - N) < 1e-14
+    np.testing.assert_allclose(after.velocity("rod"), [-0.4 + T, 0, -1 + N], atol=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_impacts_keep_the_laws(seed):
+    """Of a box with five contacts: no approach, impulses that push, no energy gained, by both laws."""
+    rng = np.random.default_rng(seed)
+    scene = ts.Scene()
+    start = {"velocity": rng.normal(size=3), "angular_velocity": rng.normal(size=3)}
+    box = scene.add_body(mass=2.0, inertia=(1, 2, 2.5), **start)
+    other = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(2, 0, 0), velocity=rng.normal(size=3))
+    law = {"restitution": rng.uniform(), "kinetic": rng.choice([0.1, 0.5, 1.0])}
+    scene.add(C.SphereContact(box, other, radius_a=1.0, radius_b=1.0, **law))
+    for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        law = {"restitution": rng.uniform(), "kinetic": rng.choice([0.0, 0.3, 0.8])}
+        corner = {"point_a": (x, y, -1), "point_b": (0, 0, -1)}
+        scene.add(C.PlaneContact(box, scene.ground, **corner, **FLOOR, **law))
+    before, M = ts.State(0.0, *scene.start), scene.evaluate().M
+    for kind in ("newton", "poisson"):
+        after, impulses = ts.impact(scene, before, law=kind)
+        assert min(impulses.values()) >= 0.0
+        assert after.qd @ M @ after.qd <= before.qd @ M @ before.qd * (1 + 1e-13)
+        again, _ = ts.impact(scene, after, restitution=0.0, law=kind)
+        assert again.qd @ M @ again.qd <= after.qd @ M @ after.qd * (1 + 1e-13)
+
+
+def test_a_ball_that_bounces_with_backspin_comes_back():
+    """Without slip after the first impact: v = (5 v_0 + 2 R w_0) / 7."""
+    solution = ts.simulate(ball("sphere", (1, 0, 0), (0, -9, 0), mu=0.6, e=0.7, height=1.5), (0, 6))
+    assert len(solution.impulses) > 10
+    np.testing.assert_allclose(solution.velocity("ball")[-1], [(5 - 9) / 7, 0, 0], atol=1e-13)
+    assert np.diff(solution.energy).max() < 1e-13
+    assert solution.phases[-1][2] == ("floor", "floor sticks")
+
+
+# boxes: redundant contacts
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_stack_on_a_slope_stands_still(count):
+    scene = boxes(count, angle=0.4)
+    solution = ts.simulate(scene, (0, 1000))
+    assert motion(solution) == 0.0
+    assert len(solution.phases) == 1
+    assert all(solution.sticking(contact).all() for contact in scene.constraints[: 4 * count])
+
+
+def test_a_box_on_a_slope_slides():
+    scene = boxes(1, angle=0.4, mu=0.3)
+    solution = ts.simulate(scene, (0, 1))
+    a = G * (np.sin(0.4) - 0.3 * np.cos(0.4))
+    np.testing.assert_allclose(solution.position("0")[-1], [a / 2, 0, 0.1], atol=1e-11)
+    total = sum(solution.reaction(contact)[0][-1] for contact in scene.constraints[:4])
+    np.testing.assert_allclose(total, G * np.cos(0.4) * np.array([-0.3, 0, 1]), atol=1e-11)
+
+
+def test_a_sliding_box_stops():
+    solution = ts.simulate(boxes(1, mu=0.3, velocity=(2, 1, 0)), (0, 2))
+    assert abs(solution.phases[0][1] - 5**0.5 / 3) < 1e-12
+    np.testing.assert_allclose(solution.position("0")[-1], [5**0.5 / 3, 5**0.5 / 6, 0.1], atol=1e-11)
+
+
+@pytest.mark.parametrize(("mu", "tips"), [(1.0, True), (0.3, False)])
+def test_a_tall_box_tips_or_slides(mu, tips):
+    """At tan(0.5) = 0.546, with 1/3 as half of its width over half of its height."""
+    scene = boxes(1, angle=0.5, mu=mu, size=(0.2, 0.2, 0.6))
+    solution = ts.simulate(scene, (0, 0.2))
+    turned = np.abs(solution.angular_velocity("0")[-1, 1])
+    if tips:  # about its lower edge: inertia m (b^2 + h^2) / 3
+        alpha = G * (0.3 * np.sin(0.5) - 0.1 * np.cos(0.5)) / ((0.04 + 0.36) / 3)
+        assert abs(solution.angular_acceleration("0")[0, 1] - alpha) < 1e-12
+        assert len(solution.phases[0][2]) == 4  # two corners, which stick
+    else:
+        assert turned < 1e-10
+        assert abs(solution.acceleration("0")[-1, 0] - G * (np.sin(0.5) - 0.3 * np.cos(0.5))) < 1e-10
+
+
+# discs, belts, Painleve
+
+
+def test_a_coin_slips_and_rolls():
+    """Set down upright without spin at 2 m/s: a disc rolls with 2/3 of it."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    coin = scene.add_body(1.0, (0.0625, 0.125, 0.0625), position=(0, 0, 0.5), velocity=(2, 0, 0), name="coin")
+    contact = C.RollingDisc(coin, scene.ground, radius=0.5, axis_a=(0, 1, 0), normal_b=(0, 0, 1), kinetic=0.1)
+    scene.add(contact)
+    solution = ts.simulate(scene, (0, 2))
+    assert abs(solution.phases[0][1] - 2 / (3 * 0.1 * G)) < 1e-13
+    np.testing.assert_allclose(solution.velocity("coin")[-1], [4 / 3, 0, 0], atol=1e-13)
+
+
+def test_a_block_on_a_belt():
+    """Carried along from rest until it sticks to the belt, at v / mu g."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    belt = scene.add_body(1.0, (1, 1, 1), velocity=(1.5, 0, 0), name="belt")
+    slide = scene.add(C.Translational.at(scene.ground, belt, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(C.TranslationMotor.of(slide, displacement=1.5 * ts.motions.time))
+    block = scene.add_point_mass(1.0, name="block")
+    scene.add(C.PlaneContact(block, belt, **FLOOR, kinetic=0.3, name="grip"))
+    solution = ts.simulate(scene, (0, 2))
+    assert abs(solution.phases[0][1] - 0.5) < 1e-13
+    assert abs(solution.position("block")[-1, 0] - (0.375 + 1.5 * 1.5)) < 1e-12
+    assert solution.phases[-1][2] == ("grip", "grip sticks")
+
+
+def test_painleves_rod_ends_with_an_account():
+    """A rod that slides with its upper end ahead and mu > 4/3 has no reaction: 1 + 3 cos (cos - mu sin) < 0."""
+    scene, a = ts.Scene(gravity=(0, 0, -G)), 1.0
+    tilted = Rotation.from_euler("y", -a)
+    place = (np.cos(a), 0, np.sin(a))
+    rod = scene.add_body(1.0, (1e-3, 1 / 3, 1 / 3), place, orientation=tilted, velocity=(-1, 0, 0))
+    contact = C.PlaneContact(rod, scene.ground, point_a=(-1, 0, 0), **FLOOR, kinetic=2.0, name="tip")
+    scene.add(contact)
+    assert 1 + 3 * np.cos(a) * (np.cos(a) - 2 * np.sin(a)) < 0
+    with pytest.raises(ts.InconsistentState, match=r"tip.*Painleve"):
+        ts.simulate(scene, (0, 1))
+    contact.kinetic = 0.5
+    assert ts.simulate(scene, (0, 0.1)).success
+
+
+# methods, files, refusals
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["dop853", "rk45", "sdirk54", "taylor"])
+def test_every_method(method):
+    scene = ball("rolling", (2, 0, 0), (0, -6, 0))
+    solution = ts.simulate(scene, (0, 2), integrator=method, rtol=1e-10, atol=1e-10)
+    assert abs(solution.phases[0][1] - 5 / 7) < 1e-9
+    np.testing.assert_allclose(solution.velocity("ball")[-1], [4 / 7, 0, 0], atol=1e-8)
+
+
+def test_the_same_bits_again_and_from_a_file(tmp_path):
+    scene = boxes(1, mu=0.3, velocity=(1, 0.5, 0), spin=2.0)
+    scene.add(C.SphereContact("0", scene.ground, radius_a=0.05, normal_b=(0, 0, 1), kinetic=0.2, static=0.3, name="x"))
+    one = ts.simulate(scene, (0, 0.2))
+    for other in (scene, ts.load(scene.save(tmp_path / "box.toml"))):
+        np.testing.assert_array_equal(one.q, ts.simulate(other, (0, 0.2)).q)
+
+
+def test_other_questions():
+    """Friction is no constraint; it holds what a run from there would hold."""
+    scene = slope(0.5, 0.4)
+    assert scene.mobility().degrees_of_freedom == 2
+    assert scene.evaluate().Phi.shape == (1,)
+    assert scene.with_parameters({"floor.kinetic": 0.0})["floor"].rows == 1
+    slides = scene.with_parameters({"floor.kinetic": 0.3})
+    down = G * (np.sin(0.4) - 0.3 * np.cos(0.4)) / 2
+    assert abs(ts.simulate(slides, (0, 1)).position("block")[-1, 0] - down) < 1e-13
+    with pytest.raises(ts.InvalidArgument, match="floor"):
+        scene.equilibrium()
+
+
+def test_a_store_and_a_file_hold_them(tmp_path):
+    scene = boxes(1, mu=0.3, velocity=(1, 0.5, 0), spin=1.0)
+    plain = ts.simulate(scene, (0, 1))
+    stored = ts.simulate(scene, (0, 1), store=tmp_path / "run.h5", checkpoint=0.0)
+    plain.save(tmp_path / "saved.h5")
+    for other in (stored, ts.load(tmp_path / "run.h5"), ts.load(tmp_path / "saved.h5")):
+        np.testing.assert_array_equal(other.multipliers, plain.multipliers)
+        np.testing.assert_array_equal(other.dissipation, plain.dissipation)
+        assert other.phases == plain.phases
+
+
+def test_bad_coefficients():
+    scene = slope(0.3, 0.0)
+    block, ground = scene.body("block"), scene.ground
+    for arguments, match in (
+        ({"kinetic": -0.1}, "kinetic must be"),
+        ({"kinetic": np.nan}, "kinetic must be"),
+        ({"kinetic": 0.3, "static": 0.2}, "static must be at least kinetic = 0.3"),
+    ):
+        with pytest.raises(ts.InvalidConstraint, match=match):
+            C.PlaneContact(block, ground, **FLOOR, **arguments)
+    with pytest.raises(ts.InvalidConstraint, match="unilateral=True"):
+        C.PlaneContact(block, ground, normal_b=(0, 0, 1), kinetic=0.3)
+    with pytest.raises(ts.InvalidConstraint, match="can't turn the point mass 'block'"):
+        C.SphereContact(block, ground, radius_a=0.1, radius_b=0.2, kinetic=0.3)
+    brake = scene.add(ts.forces.CoulombFriction(block, ground, force=1.0, name="brake"))
+    with pytest.raises(ts.InvalidArgument, match=r"brake.*slip_velocity"):
+        ts.simulate(scene, (0, 1))
+    scene.remove(brake)
+    body = scene.add_body(1.0, (1, 1, 1), position=(0, 0, 3))
+    with pytest.raises(ts.InvalidConstraint, match="leave out slip=True"):
+        C.RollingBall(body, ground, radius=0.5, normal_b=(0, 0, 1), slip=True, kinetic=0.3)
+    with pytest.raises(ts.InvalidForce, match="no friction of the exact law"):
+        ts.simulate(scene, (0, 0.1)).sticking(scene.add(ts.forces.PointForce(block, force=(0, 0, 0.1))))

@@ -1,0 +1,195 @@
+"""Contacts with Coulomb friction at one state: impacts, and which stick, slide and open.
+
+    u = G p + b    rates of gaps and slips, normal and two tangential rows a contact, the bilateral rows eliminated
+    impact         b = (gd- + e min(gd-, 0), v-): Newton's law along normals, in tangents the cone of kinetic friction
+    accelerations  b = (gdd, vd) of open contacts; a contact that slides has T = -mu N v / |v|, one at rest the cone
+
+See maths/coulomb_cone.py for the cone. With friction Newton's law can add energy: coefficients of restitution are
+lowered together until it doesn't; without restitution it never does.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.tolerances import LEAST_SLIP
+from ..maths.coulomb_cone import OPEN, STICKS, solve_cone
+from ..maths.tolerances import RANK_TOL
+from .contact_problem import NoSolution, Settled, depends, energy_gain
+from .tolerances import AT_BOUND, LEVEL, WITHIN_BOUND
+
+
+def rows_of(inertia, which):
+    """Rows (3 k, n) of the gaps `which` and of their slips."""
+    return np.concatenate([inertia.J[which][:, None], inertia.tangents[which]], axis=1).reshape(3 * len(which), -1)
+
+
+class Struck(NamedTuple):
+    """What an impact with friction does."""
+
+    p: np.ndarray  # (k,) normal impulses
+    change: np.ndarray  # (n,) of velocities
+    share: float  # of the coefficients of restitution that act
+
+
+def strike(inertia, which, qd, rates, restitution, law="newton"):
+    """The `Struck` of an impact of the gaps `which`; rates (k,) before, restitution (k,). Raises NoSolution."""
+    rows = rows_of(inertia, which)
+    response = inertia.free(rows.T)
+    G, mu = rows @ response, inertia.gaps.kinetic[which]
+    before = np.column_stack([rates, inertia.slips(qd)[which]]).ravel()
+    normal = np.arange(0, before.size, 3)
+
+    def solved(given, b):
+        p = solve_cone(G, b, mu, given=given)[0]
+        if p is None:
+            raise NoSolution
+        return p
+
+    none = np.zeros(len(which))
+    compressed = solved(none, before) if law == "poisson" else None
+    share = 1.0
+    while True:
+        e = share * restitution
+        if compressed is None:
+            b = before.copy()
+            b[normal] += e * np.minimum(rates, 0.0)
+            p = solved(none, b)
+        else:
+            released = np.zeros(before.size)
+            released[normal] = e * compressed[normal]
+            p = compressed + released + solved(released[normal], before + G @ (compressed + released))
+        if energy_gain(G, before, p) <= LEVEL * (np.abs(before) @ np.abs(p)) or share == 0.0:
+            return Struck(p[normal], response @ p, share)
+        share = share / 2.0 if share > LEVEL else 0.0
+
+
+def settle_grips(inertia, resting, qd, fired=()):
+    """Which of the gaps that are closed and at rest stay so, and which stick or slide; arguments as of `settle`.
+
+    Slips that are rounding have been ended in qd, see `halted`.
+
+    Returns
+    -------
+    Settled
+        With `grips`: for each closed gap with friction None where it sticks, or the direction (3,) of its slip, ground
+        frame.
+
+    Raises
+    ------
+    NoSolution
+        Where no reactions keep the contacts from penetrating, or several do: with much friction (Painleve).
+    """
+    gaps, resting = inertia.gaps, list(resting)
+    rows = rows_of(inertia, resting)
+    response = inertia.free(rows.T)
+    G, k = rows @ response, len(resting)
+    c, terms = inertia.accelerations(qd)
+    b = np.column_stack([c[resting], inertia.slip_accelerations(qd)[resting]]).ravel()
+    slips = inertia.slips(qd)[resting]
+    speeds = np.hypot(*slips.T)
+    slides = speeds > LEAST_SLIP
+    d = np.full((k, 2), np.nan)
+    d[slides] = slips[slides] / speeds[slides, None]
+    mu = np.where(slides, gaps.kinetic[resting], gaps.static[resting])
+    # Contacts at rest whose friction reaches the bound slide by the kinetic coefficient
+    for _ in range(k + 1):
+        p, mode = solve_cone(G, b, mu, d)
+        if p is None:
+            raise NoSolution
+        N, T = p[::3], p.reshape(-1, 3)[:, 1:]
+        bound = np.hypot(*T.T) >= (1.0 - AT_BOUND) * mu * N
+        leave = bound & ~slides & (mode != OPEN) & gaps.rubs[resting] & (mu > gaps.kinetic[resting] * WITHIN_BOUND)
+        if not leave.any():
+            break
+        mu = np.where(leave, gaps.kinetic[resting] * WITHIN_BOUND, mu)
+    _demand_unique(G, d, mu, mode)
+    gdd = c + inertia.J @ (response @ p)
+    small = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p))
+    closed, idle, grips = [], [], {}
+    for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
+        i = resting[j]
+        pushes = N[j] * G[3 * j, 3 * j] > small[i]
+        if not pushes and (gdd[i] > small[i] or i in fired):
+            continue
+        (idle if depends(inertia, closed, i) else closed).append(i)
+        if gaps.rubs[i]:
+            length = np.hypot(*T[j])
+            if slides[j]:
+                grips[i] = inertia.along(i, d[j])
+            elif mode[j] == STICKS or not pushes or not length > 0.0:
+                grips[i] = None
+            else:
+                grips[i] = inertia.along(i, -T[j] / length)
+    return Settled(*_carried(inertia, closed, idle, grips, N, resting), gdd, grips)
+
+
+def _demand_unique(G, d, mu, mode):
+    """Raise NoSolution where the reactions of contacts that slide would be one of several solutions."""
+    known = np.isfinite(d).all(axis=1)
+    if not (known & (mode != OPEN)).any():
+        return
+    load = np.zeros((mode.size, 3, 3))  # p by the unknowns of each contact
+    for j in range(mode.size):
+        load[j] = np.eye(3)
+        if known[j]:
+            load[j, 1:, 0] = -mu[j] * d[j]
+    held = [3 * j + i for j in np.flatnonzero(mode != OPEN) for i in range(1 if mode[j] != STICKS else 3)]
+    own = G.reshape(G.shape[0], -1, 3)
+    A = np.einsum("rji,jik->rjk", own, load).reshape(G.shape)[np.ix_(held, held)]
+    scale = np.sqrt(np.diag(G)[held])
+    A = A / scale[:, None] / scale
+    values = np.linalg.eigvals(A)
+    if (values.real < -RANK_TOL).any():
+        raise NoSolution
+
+
+def _carried(inertia, closed, idle, grips, N, resting):
+    """closed and idle with the idle ones exchanged so that all reactions of closed ones push."""
+    if not idle:
+        return sorted(closed), idle
+    from scipy.optimize import nnls
+
+    which = [*closed, *idle]
+    loads = inertia.J[which].copy()
+    for j, i in enumerate(which):
+        if grips.get(i) is not None:
+            loads[j] -= inertia.gaps.kinetic[i] * inertia.across(i, grips[i]) @ inertia.tangents[i]
+    columns = inertia.free(loads.T)
+    size = np.linalg.norm(columns, axis=0)
+    given = np.array([max(N[resting.index(i)], 0.0) for i in which])
+    shares, _ = nnls(columns / size, columns @ given)
+    closed, idle = [], []
+    for j in np.argsort(-shares):
+        (idle if depends(inertia, closed, which[j]) else closed).append(which[j])
+    return sorted(closed), sorted(idle)
+
+
+def halted(inertia, qd, resting):
+    """Velocities (n,) with the slips ended that are rounding, of the gaps `resting` with friction."""
+    slow = [i for i in resting if inertia.gaps.rubs[i] and 0.0 < np.hypot(*inertia.slips(qd)[i]) <= LEAST_SLIP]
+    if not slow:
+        return qd
+    rows = np.concatenate([inertia.J[resting], inertia.tangents[slow].reshape(2 * len(slow), -1)])
+    response = inertia.free(rows.T)
+    left = np.concatenate([np.zeros(len(resting)), (inertia.tangents[slow] @ qd).ravel()])
+    return qd - response @ np.linalg.lstsq(rows @ response, left, rcond=RANK_TOL**2)[0]
+
+
+def spread(N, tangents, T):
+    """The same friction (k, c, 2) of c contacts at k states as N (k, c) would carry it where rows depend.
+
+    tangents (k, c, 2, n): of the least sum of |T|^2 / N with the same loads. A box on a plane that doesn't turn has
+    T / N alike at all corners.
+    """
+    k, c = N.shape
+    weight = np.repeat(np.sqrt(np.maximum(N, 0.0)), 2, axis=1)
+    rows = tangents.reshape(k, 2 * c, -1)
+    loads = np.einsum("kr,krn->kn", T.reshape(k, 2 * c), rows)
+    found = [
+        w * np.linalg.lstsq((w[:, None] * A).T, load, rcond=RANK_TOL)[0]
+        for w, A, load in zip(weight, rows, loads, strict=True)
+    ]
+    return np.array(found).reshape(k, c, 2)

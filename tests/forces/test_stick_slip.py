@@ -263,6 +263,11 @@ def test_evaluate_says_what_a_run_does():
         np.testing.assert_allclose(ts.simulate(scene, (0.0, 0.1)).qdd[0], scene.evaluate().qdd, atol=TIGHT)
 
 
+def test_what_sticks_has_no_modes():
+    assert on_a_slope(0.9).linearise().eigenvalues().size == 0
+    np.testing.assert_allclose(on_a_slope(1.1).linearise().eigenvalues(), [0.0, 0.0], atol=TIGHT)
+
+
 def test_an_equilibrium_asks_for_a_slip_velocity():
     with pytest.raises(ts.InvalidArgument, match=r"friction.*slip_velocity"):
         on_a_slope(0.5).equilibrium()

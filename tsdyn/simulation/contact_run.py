@@ -158,7 +158,7 @@ class _Breaking:
     ----------
     packed : Packed
         Of the phase.
-    units : list of friction_problem.Unit
+    units : list of friction_problem.FrictionUnit
     """
 
     def __init__(self, packed, units):
@@ -697,7 +697,7 @@ class _ContactRun:
         return None
 
     def _rest(self, place, before, resting, guess, fired):
-        """The `Rest` of the frictions that are at rest, and how many rows hold each."""
+        """The `FrictionAtRest` that are at rest, and how many rows hold each."""
         units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
         for i in resting:
             ranks[i] = before.sticking.get(i, -1)

@@ -108,8 +108,8 @@ def test_wrong_arguments():
         (lambda: F.RevoluteFriction(pin, radius=0.1, kinetic=0.0), "zero at all times"),
         (lambda: F.RevoluteFriction(pin, radius=0.1, kinetic=0.3, static=0.2), "static must be at least kinetic"),
         (
-            lambda: F.RevoluteFriction(pin, radius=0.1, kinetic=0.3, slip_velocity=0.0),
-            "slip_velocity must be a positive",
+            lambda: F.RevoluteFriction(pin, radius=0.1, kinetic=0.3, slip_velocity=-1.0),
+            "slip_velocity must be a finite number",
         ),
         (lambda: F.RevoluteFriction(pin, radius=0.1, kinetic=0.3, length=-1.0), "length must be a positive"),
         (lambda: F.RevoluteFriction(pin, radius=0.1, kinetic=0.3, preload="much"), "preload must be a finite number"),

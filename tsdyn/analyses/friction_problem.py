@@ -28,15 +28,15 @@ from .slip_velocities import ACROSS, ALONG, WHOLE, slip_velocities
 from .tolerances import ASIDE, BROKEN, LEVEL, PIVOTS
 
 if TYPE_CHECKING:
-    from ..elements.friction import Slide
+    from ..elements.friction import Sliding
 
 
-class Unit(NamedTuple):
+class FrictionUnit(NamedTuple):
     """One slide of a friction of a packed scene."""
 
     load: Any  # a packed.Load
     force: Any  # its force, with the bodies of the scene
-    slide: Slide
+    slide: Sliding
     slot: int  # of the memory of the run, where its numbers begin
 
     @property
@@ -69,7 +69,7 @@ class Unit(NamedTuple):
 class Hold(NamedTuple):
     """The rows that hold a unit, in the directions in which it may slide: of `phase_scenes.phase_of`."""
 
-    unit: Unit
+    unit: FrictionUnit
     rank: int
     numbers: Any  # (rank, row numbers), for the rows that are packed
 
@@ -102,7 +102,7 @@ class Frictions:
 
     Attributes
     ----------
-    units : list of Unit
+    units : list of FrictionUnit
     names : list of str
     """
 
@@ -111,7 +111,7 @@ class Frictions:
         for force, load in zip(scene._forces, self.packed.loads, strict=True):
             slot = load.slot + force.memory
             for slide in getattr(force, "slides", ()):
-                self.units.append(Unit(load, force, slide, slot))
+                self.units.append(FrictionUnit(load, force, slide, slot))
                 slot += slide.count
         self.count, self.names = len(self.units), [unit.force.name for unit in self.units]
         # Of each unit the bodies a and b, numbers of rows of System.bodies; the ground is behind them
@@ -153,12 +153,12 @@ class Frictions:
         return (v * ways).sum(axis=2) - np.where(self.signed, 0.0, 0.5) * np.linalg.norm(v, axis=2)
 
     def at(self, q):
-        """The `Place` at q (n,)."""
+        """The `FrictionFrames` at q (n,)."""
         A, (_, _, axes) = self.frames(q[None])[0], self.motions(q[None], np.zeros((1, q.size)))
-        return Place(self, axes[0], A)
+        return FrictionFrames(self, axes[0], A)
 
 
-class Place:
+class FrictionFrames:
     """The frictions of a scene in one configuration: axes (units, 3) and rotation matrices (bodies, 3, 3)."""
 
     def __init__(self, frictions, axes, A):
@@ -259,7 +259,7 @@ def _null_space(rows):
     return Q[:, int((size > RANK_TOL * size.max(initial=0.0)).sum()) :]
 
 
-class Rest(NamedTuple):
+class FrictionAtRest(NamedTuple):
     """What becomes of the units that are at rest."""
 
     sticking: list  # units whose rows hold
@@ -286,7 +286,7 @@ class RestProblem:
 
     Parameters
     ----------
-    place : Place
+    place : FrictionFrames
     packed : Packed
         Of a phase with the rows of these units.
     rows : dict of int to ndarray
@@ -367,7 +367,7 @@ class RestProblem:
         return x + P @ N, N
 
     def settle(self, ways, fired):
-        """The `Rest` of the units, by pivoting from a guess: directions of those that slide.
+        """The `FrictionAtRest` of the units, by pivoting from a guess: directions of those that slide.
 
         fired: units whose reactions have just reached their bounds. Raises `NoRest`.
         """
@@ -381,7 +381,7 @@ class RestProblem:
             if not wrong:
                 sticking = [i for i in self.rows if i not in ways and i not in self.idle]
                 blocked = [i for i in ways if self._is_blocked(i, sticking)]
-                return Rest(sticking, ways, blocked + self.idle, N, self._rates(ways, a, small))
+                return FrictionAtRest(sticking, ways, blocked + self.idle, N, self._rates(ways, a, small))
             known = tuple((i, *np.sign(np.round(d, 3))) for i, d in sorted(ways.items()))
             one_by_one = known in seen or count >= PIVOTS
             seen.add(known)

@@ -249,7 +249,8 @@ def kinetic_rows(system, q, rates):
     shifts = np.sqrt(system.mass)[:, None, None] * rates[bodies[:, :1] + np.arange(3)]
     turns = 2.0 * (roots @ _transforms(q[p])) @ rates[p]
     added = [h @ rates[columns] for columns, h, _ in added_inertia(system, q[None], np.zeros((1, q.size)))]
-    return np.concatenate((shifts.reshape(-1, rates.shape[1]), turns.reshape(-1, rates.shape[1]), *added))
+    parts = [part.reshape(3 * len(part), rates.shape[1]) for part in (shifts, turns)]
+    return np.concatenate((*parts, *added))
 
 
 def least_energy(metric, q, A, x, drift):

@@ -162,7 +162,7 @@ def slip_of(given):
     return max(given, LEAST_SLIP) if given > 0.0 else SLIP
 
 
-class Slide(NamedTuple):
+class Sliding(NamedTuple):
     """Where a friction of the exact law sticks or slides: a unit of the phases of a run.
 
     A run sets its numbers among those that the force has taken: of the direction in which it slides, zero while it
@@ -184,8 +184,8 @@ class Slide(NamedTuple):
         return self.directions + self.freedom * self.row_numbers
 
 
-PIN, GUIDE, PLANE = Slide(True, 1, 1), Slide(False, 1, 1), Slide(False, 3, 2)
-POINT_OF_BODY, ORIENTATION = Slide(False, 3, 3), Slide(True, 3, 3)
+PIN, GUIDE, PLANE = Sliding(True, 1, 1), Sliding(False, 1, 1), Sliding(False, 3, 2)
+POINT_OF_BODY, ORIENTATION = Sliding(False, 3, 3), Sliding(True, 3, 3)
 
 
 class BodyFriction:
@@ -384,7 +384,7 @@ class JointFriction:
     markers: tuple[Marker, ...] = ()
     particles = True
     sharp = True  # where a part of the normal load passes zero
-    place: Slide | None = None  # of an exact law, where `law` has one
+    place: Sliding | None = None  # of an exact law, where `law` has one
     quantities: Mapping[str, Callable[..., Any]] = MappingProxyType(
         {
             "kinetic": not_negative,
@@ -464,7 +464,7 @@ class JointFriction:
         return not self.slides
 
     @property
-    def slides(self) -> tuple[Slide, ...]:
+    def slides(self) -> tuple[Sliding, ...]:
         """Where it sticks or slides by the exact law."""
         return (self.place,) if self.place is not None and self.slip_velocity == 0.0 else ()
 

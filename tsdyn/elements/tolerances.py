@@ -28,14 +28,12 @@ FORCE_QUOTIENT = 7e-4
 # velocity, m/s or rad/s, below which terms that cancel within a law count.
 OFF, OFF_SELDOM, LAW_TOLERANCE = 1000.0, 200.0, 1e-12
 
-# m/s and rad/s: velocity at which friction is 71% of its magnitude, where none is given. A joint under nine tenths of
-# its friction creeps by 2e-7 m in 100 s. Less costs more: chains with friction in all joints twice as much at 1e-10.
+# m/s and rad/s: velocity of the exact law below which the direction of sliding is kept; way and time of a stop from
+# there are rounding. The default slip velocity of a friction plug-in without an exact law, with 71% of the friction.
 SLIP = 1e-9
 # The least that acts, m/s and rad/s: iterations of stages leave 1e-13 of velocities; less than a hundred times that is
 # noise.
 LEAST_SLIP = 1e-11
-# m/s: the Stribeck velocity where neither it nor the slip velocity is given; 0.001 to 0.1 are those of most contacts.
-STRIBECK = 0.01
 # m/s: the slip of a contact below which its friction keeps a direction. Where slip begins slowly, as v = c t^2 / 2, and
 # its direction turns, the friction turns v within v / (mu g): from 1e-6 m/s on that takes some hundred steps, from 1e-9
 # on 30 times as many; the place is right to v sqrt(2 v / c), 1e-9 m.

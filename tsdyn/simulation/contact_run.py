@@ -165,7 +165,7 @@ class _Breaking:
     ----------
     packed : Packed
         Of the phase.
-    units : list of friction_problem.Unit
+    units : list of friction_problem.FrictionUnit
     """
 
     def __init__(self, packed, units):
@@ -506,10 +506,9 @@ class _ContactRun:
         held = sorted([*self.modes.closed, *self.modes.idle])
         memory, units = self.remembered[self.count :], self.frictions.units
         idle = [i for i in self.modes.blocked if not memory[units[i].way].any()]
-        rest = sorted([*self.modes.sticking, *idle])
         names = [self.gaps.names[i] for i in held]
         names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
-        names += [self.frictions.names[i] for i in rest]
+        names += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
         return tuple(dict.fromkeys(names))
 
     def _events(self, phase):
@@ -779,7 +778,7 @@ class _ContactRun:
         return None
 
     def _rest(self, place, before, resting, guess, fired):
-        """The `Rest` of the frictions that are at rest, and how many rows hold each."""
+        """The `FrictionAtRest` that are at rest, and how many rows hold each."""
         units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
         for i in resting:
             ranks[i] = before.sticking.get(i, -1)

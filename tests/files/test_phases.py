@@ -1,5 +1,8 @@
 """Stores, checkpoints and saved solutions of runs with contacts and friction: to the bits of a run never stopped."""
 
+import shutil
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -36,6 +39,16 @@ def belt():
     return scene
 
 
+def thrown():
+    """A ball with backspin: it bounces, slides and rolls."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    start = {"position": (0, 0, 0.3), "velocity": (1, 0, 0), "angular_velocity": (0, -20, 0)}
+    ball = scene.add_body(1.0, (0.004, 0.004, 0.004), **start, name="ball")
+    floor = {"radius_a": 0.1, "normal_b": (0, 0, 1), "restitution": 0.4, "kinetic": 0.2}
+    scene.add(C.SphereContact(ball, scene.ground, **floor, name="floor"))
+    return scene
+
+
 def low(t, state):
     return state.q[2] - 0.15
 
@@ -57,6 +70,7 @@ RUNS = {
     "stop, radau": (swing, 3.0, {"integrator": "radau"}),
     "box": (tumbling, 1.0, {}),
     "box, null-space": (tumbling, 1.0, {"formulation": "null-space"}),
+    "backspin": (thrown, 1.0, {}),
     "stick-slip": (belt, 4.0, {}),
     "stick-slip, times": (belt, 4.0, {"t_eval": np.linspace(0.0, 4.0, 41), "integrator": "dop853"}),
 }
@@ -82,7 +96,7 @@ def test_a_run_that_was_stopped_goes_on(run, stop, tmp_path, monkeypatch):
         alike(whole, ts.load(path))
 
 
-@pytest.mark.slow_but("bouncing-h5", "stick-slip-zarr")
+@pytest.mark.slow_but("bouncing-h5", "stick-slip-zarr", "backspin-h5")
 @pytest.mark.parametrize("suffix", ["h5", "zarr"])
 @pytest.mark.parametrize("run", RUNS.values(), ids=RUNS)
 def test_a_saved_solution(run, suffix, tmp_path):
@@ -107,6 +121,48 @@ def test_a_store_tells_what_memory_does(tmp_path):
     np.testing.assert_array_equal(stored.reaction("floor")[0], whole.reaction("floor")[0])
     np.testing.assert_array_equal(stored[2:7].multipliers, whole[2:7].multipliers)
     np.testing.assert_array_equal(stored[2:7].to_dataframe(), whole[2:7].to_dataframe())
+
+
+def test_another_restitution_is_another_scene(tmp_path):
+    path = tmp_path / "run.h5"
+    ts.simulate(ball(), (0, 1), store=path, checkpoint=60.0)
+    with pytest.raises(ts.StorageError, match="the scene is another one"):
+        ts.resume(path, scene=bouncing(0.6)[0])
+
+
+def test_a_disk_that_fills_up_in_a_later_phase(tmp_path, monkeypatch):
+    path, free = tmp_path / "run.h5", iter([1 << 30] * 6)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 4)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=next(free, 1 << 20)))
+    solution = ts.simulate(tumbling(), (0.0, 1.0), store=path, checkpoint=0.0)
+    assert solution.status == ts.Status.STORE_FAILED
+    assert len(solution.phases) > 1
+    monkeypatch.undo()
+    np.testing.assert_array_equal(ts.resume(path).q, ts.simulate(tumbling(), (0.0, 1.0)).q)
+
+
+def drag(t, a, b, par, out):
+    out[0] = -0.1 * a[7]
+
+
+@pytest.mark.slow
+def test_a_scene_of_which_a_part_is_missing(tmp_path):
+    """A file keeps no code: phases and impulses are there without, reactions with the scene."""
+
+    def build():
+        scene = ball()
+        scene.add(ts.forces.UserForce(scene["ball"], function=drag, name="drag"))
+        return scene
+
+    stored = ts.simulate(build(), (0, 3), store=tmp_path / "run.h5", checkpoint=60.0)
+    saved = ts.simulate(build(), (0, 3)).save(tmp_path / "saved.h5")
+    for path in (tmp_path / "run.h5", saved):
+        outline, whole = ts.load(path), ts.load(path, scene=build())
+        assert (outline.phases, outline.impulses) == (stored.phases, stored.impulses)
+        assert whole.phases == stored.phases
+        np.testing.assert_array_equal(whole.multipliers, stored.multipliers)
+        with pytest.raises(ts.StorageError, match="drag"):
+            outline.sticking("floor")
 
 
 def test_work_has_the_losses_of_impacts():

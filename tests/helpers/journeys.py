@@ -167,6 +167,13 @@ class Tour:
     def friction_demand(self):
         self._of_contacts(self.on.friction_demand, ())
 
+    def sticking(self):
+        for item in self.items():
+            if getattr(item, "slides", ()) or (getattr(item, "unilateral", False) and item.rubs):
+                assert self.on.sticking(item).shape == self.leading
+            else:
+                with_message(ts.InvalidForce, lambda item=item: self.on.sticking(item))
+
     def _of_contacts(self, method, size):
         for item in self.items():
             if "Rolling" in type(item).__name__:

@@ -94,7 +94,7 @@ def test_a_state_becomes_the_start():
     resting = ts.simulate(scene, (0, 4.0))
     scene.set_start(resting)
     assert ts.simulate(scene, (0, 1.0)).phases == [(0.0, 1.0, ("floor",))]
-    with pytest.raises(ts.InconsistentState, match=r"floor by 0\.5"):
+    with pytest.raises(ts.InconsistentState, match=r"floor penetrates by 0\.5"):
         scene.set_start(resting.state._replace(q=np.array([0, 0, -0.5])))
     assert scene["ball"].position[2] == resting.q[-1, 2]
 

@@ -201,6 +201,22 @@ def test_a_rod_hits_a_plane(mu):
     np.testing.assert_allclose(after.velocity("rod"), [-0.4 + T, 0, -1 + N], atol=1e-14)
 
 
+def test_restitution_is_lowered_where_friction_would_add_energy():
+    """A rod that hits the floor at a steep angle, elastically: Newton's law would give it energy."""
+    scene, a, w = ts.Scene(gravity=(0, 0, 0)), 1.2443, 1.3122
+    start = {"velocity": (0.24285, 0, -1.65635), "angular_velocity": (0, -w, 0)}
+    tilted, place = Rotation.from_euler("y", -a), (np.cos(a), 0, np.sin(a) + 0.01)
+    rod = scene.add_body(1.0, (1e-3, 0.05, 0.05), place, orientation=tilted, **start)
+    law = {"kinetic": 0.6, "restitution": 1.0, "name": "tip"}
+    scene.add(C.PlaneContact(rod, scene.ground, point_a=(-1, 0, 0), **FLOOR, **law))
+    solution = ts.simulate(scene, (0, 0.05))
+    assert solution.success
+    assert len(solution.impulses) >= 1
+    assert "Restitution was lowered at 1 impact" in solution.message
+    assert np.diff(solution.energy).max() <= 1e-13
+    assert 0 < solution.energy[-1] <= solution.energy[0]
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_random_impacts_keep_the_laws(seed):
     """Of a box with five contacts: no approach, impulses that push, no energy gained, by both laws."""
@@ -316,6 +332,61 @@ def test_painleves_rod_ends_with_an_account():
         ts.simulate(scene, (0, 1))
     contact.kinetic = 0.5
     assert ts.simulate(scene, (0, 0.1)).success
+
+
+# random scenes
+
+
+def thrown_box(rng):
+    """A box with eight corners, any friction and restitution."""
+    scene, size = ts.Scene(), rng.uniform(0.2, 1.0, 3)
+    start = {"velocity": rng.normal(size=3), "angular_velocity": 3 * rng.normal(size=3)}
+    turned = Rotation.from_rotvec(rng.normal(size=3))
+    box = scene.add_body(**ts.shapes.box(size, mass=2.0), position=(0, 0, 1), orientation=turned, **start)
+    law = {"restitution": float(rng.choice([0.0, 0.3, 0.7])), "kinetic": float(rng.choice([0.1, 0.3, 0.8]))}
+    for i in range(8):
+        corner = size / 2 * [2 * (i & 1) - 1, (i & 2) - 1, (i & 4) / 2 - 1]
+        scene.add(C.PlaneContact(box, scene.ground, point_a=corner, **FLOOR, **law))
+    return scene
+
+
+def thrown_coin(rng):
+    """A torus on edge, tilted, with any spin."""
+    scene, tilted = ts.Scene(), Rotation.from_rotvec([rng.uniform(-0.6, 0.6), 0, 0])
+    start = {"velocity": rng.normal(size=3) * [1, 1, 0], "angular_velocity": 4 * rng.normal(size=3)}
+    coin = scene.add_body(1.0, (0.0625, 0.125, 0.0625), (0, 0, 0.7), orientation=tilted, **start)
+    law = {"restitution": float(rng.choice([0, 0.5])), "kinetic": float(rng.choice([0.05, 0.3, 0.8]))}
+    sizes = {"radius": 0.5, "tyre_radius": 0.02, "axis_a": (0, 1, 0), "normal_b": (0, 0, 1)}
+    scene.add(C.RollingDisc(coin, scene.ground, **sizes, **law))
+    return scene
+
+
+def heaped_balls(rng):
+    """Balls one above the other, with friction between them and on the floor."""
+    scene, found = ts.Scene(), []
+    for i in range(rng.integers(2, 5)):
+        mass, place = rng.uniform(0.1, 3.0), (*rng.uniform(-0.02, 0.02, 2), 0.3 + 0.3 * i)
+        start = {"velocity": rng.normal(size=3), "angular_velocity": 10 * rng.normal(size=3)}
+        ball = scene.add_body(mass, [0.004 * mass] * 3, place, **start)
+        for other in [None, *found]:
+            law = {"restitution": float(rng.choice([0.0, 0.3, 0.8])), "kinetic": float(rng.choice([0, 0.1, 0.3, 0.8]))}
+            shape = {"normal_b": (0, 0, 1)} if other is None else {"radius_b": 0.1}
+            scene.add(C.SphereContact(ball, other or scene.ground, radius_a=0.1, **shape, **law))
+        found.append(ball)
+    return scene
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("build", [thrown_box, thrown_coin, heaped_balls])
+def test_random_scenes_keep_the_laws(build, seed):
+    solution = ts.simulate(build(np.random.default_rng(seed)), (0, 1.5))
+    assert solution.success, solution.message
+    size = 1.0 + np.abs(solution.energy).max()
+    assert np.diff(solution.energy).max() < 1e-7 * size  # the tolerance of the run
+    assert solution.constraint_error.position.max() < 1e-11
+    assert solution.dissipation.min() > -1e-9 * size
+    assert min((impulse for *_, impulse in solution.impulses), default=1.0) > 0.0
 
 
 # methods, files, refusals

@@ -350,6 +350,35 @@ def test_a_run_goes_on_from_a_state_of_a_phase():
     assert [names for _, _, names in ts.simulate(scene, (1.5, 1.8), state=half.state).phases] == [("clutch",)]
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_energy_less_work_is_kept_through_random_actions(seed):
+    """A chain over a floor: hinges open, a mass and the stiffness of a spring change, bodies are hit."""
+    rng = np.random.default_rng(seed)
+    scene, last, events = ts.Scene(gravity=(0, 0, -G)), None, []
+    for i in range(3):
+        body = scene.add_body(1.0 + rng.random(), (0.1, 0.12, 0.15), position=(i + 0.5, 0, 0), name=f"body {i}")
+        joint = C.Revolute.at(last or scene.ground, body, point=(i, 0, 0), axis=(0, 1, 0), name=f"hinge {i}")
+        last = scene.add(joint) and body
+    scene.add(F.Spring(scene.ground, last, point_a=(3, 0, 1), stiffness=20.0, name="spring"))
+    scene.add(F.ViscousFriction(scene.bodies[0], scene.ground, damping=0.1, name="drag"))
+    given = {"point_b": (0, 0, -1), "normal_b": (0, 0, 1), "unilateral": True, "restitution": 0.6}
+    scene.add(C.PlaneContact(last, scene.ground, **given, name="floor"))
+    actions = [
+        lambda change: change.set("body 1.mass", 1.7),
+        lambda change: change.set("spring.stiffness", 35.0),
+        lambda change: change.impulse("body 0", rng.normal(size=3), point=(0.1, 0.2, 0.3)),
+        lambda change: change.deactivate(f"hinge {rng.integers(3)}"),
+        lambda change: change.deactivate("spring"),
+        lambda change: change.activate("spring"),
+    ]
+    events = [at(time, action) for time, action in zip(np.sort(rng.uniform(0.1, 1.4, 6)), actions, strict=True)]
+    solution = ts.simulate(scene, (0, 1.5), events=events, dense_output=True, rtol=1e-11, atol=1e-11)
+    assert solution.success
+    assert np.ptp(solution.energy - solution.work) < 1e-7
+    assert max(level.max() for level in solution.constraint_error) < FINE
+    assert [len(times) for times in solution.t_events] == [1] * 6
+
+
 def test_the_same_bits_again():
     scene, _ = rotors()
     runs = [ts.simulate(scene, (0, 3), events=at(1.0, engage)) for _ in range(2)]

@@ -207,3 +207,27 @@ def test_a_step_over_many_contacts_finds_the_first():
     np.testing.assert_allclose([times[f"floor {i}"] for i in range(8)], np.sqrt(2 * heights / G), rtol=4 * EPS)
     assert times["floor 1"] == times["floor 3"]
     assert len(solution.phases) == 8
+
+
+def test_a_stop_of_a_linkage_with_redundant_joints():
+    """A planar loop in space: one degree of freedom, so that an impact leaves e^2 of the kinetic energy."""
+    scene = ts.Scene(gravity=(4.0, 0, -G))
+    points = [np.array(p, float) for p in ((0, 0, 0), (0, 0, 1), (2, 0, 1.5), (2, 0, 0))]
+    links = [
+        scene.add_body(mass=1.0, inertia=(0.1, 0.1, 0.1), position=(points[i] + points[i + 1]) / 2) for i in range(3)
+    ]
+    ends = [scene.ground, *links, scene.ground]
+    hinges = [scene.add(C.Revolute.at(ends[i], ends[i + 1], point=points[i], axis=(0, 1, 0))) for i in range(4)]
+    scene.add(C.Stop(hinges[0], lower=-0.4, upper=0.6, restitution=0.5, name="stop"))
+    solution = ts.simulate(scene, (0, 1.0))
+    t, name, impulse = solution.impulses[0]
+    (at,) = np.nonzero(solution.t == t)
+    before, after = solution.kinetic_energy[at]
+    rates = solution.angle_rate(hinges[0])[at]
+    assert name == "stop"
+    assert abs(after / before - 0.25) < 1e-12
+    assert abs(rates[1] + 0.5 * rates[0]) < 1e-12
+    # Impulse times the mean of the rates is the energy lost
+    assert abs(impulse * rates.mean() - (before - after)) < 1e-11
+    again, _ = ts.impact(scene, ts.State(0.0, *scene.start), ["stop"])
+    np.testing.assert_array_equal(again.qd, 0.0)

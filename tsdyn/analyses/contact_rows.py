@@ -206,13 +206,21 @@ class ContactWorkspace:
     """
 
     def __init__(self, contacts, free):
-        self.n, self.m = int(contacts.system.bodies[:, 1].sum()), len(contacts.system.segments)
-        graph = graph_of(free, REDUCED, BIAS)
-        own = (each._replace(reals=each.reals.copy()) for each in map(with_short_rows, (free, contacts)))
-        (system, rows), self._all = own, np.arange(self.m)
-        self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in (rows.segments, system.inertia_segments))
-        self.address, *self._keep = resident(ContactParts(parts(system, graph, self.n), rows))
+        self.n, self.m, self._free = int(contacts.system.bodies[:, 1].sum()), len(contacts.system.segments), free
+        rows, self._graph = with_short_rows(contacts), None
+        self._rows, self._all = rows._replace(reals=rows.reals.copy()), np.arange(self.m)
+        spans = rows.segments, free.system.inertia_segments
+        self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in spans)
         self._accelerate = interrupts_answered()(accelerate) if calls_laws(free) else accelerate
+        self._enter()
+
+    def _enter(self):
+        """Take the constraint graph as it is now: a start may have shown that bilateral rows are redundant."""
+        graph = graph_of(self._free, REDUCED, BIAS)
+        if graph is not self._graph:
+            system = with_short_rows(self._free)
+            free = parts(system._replace(reals=system.reals.copy()), graph, self.n)
+            self._graph, (self.address, *self._keep) = graph, resident(ContactParts(free, self._rows))
 
     def gaps(self, t, q):
         """Phi (k, m) of the rows at times t (k,), positions q (k, n), rows of which may go on."""
@@ -233,6 +241,7 @@ class ContactWorkspace:
     def respond(self, t, q, memory, loads):
         """Accelerations (k, n) by loads (k, n), which must be contiguous."""
         out = np.empty_like(loads)
+        self._enter()
         if not respond(self.address, t, q, memory, loads, out):
             raise SingularConfiguration("a direction that the constraints leave free carries no inertia.")
         return out

@@ -24,7 +24,7 @@ class States(NamedTuple):
     q, qd, qdd = (property(lambda self, i=i: np.ascontiguousarray(self.levels[:, i])) for i in range(3))
 
 
-class Member:
+class GroupMember:
     """One of several event functions that are evaluated together.
 
     Parameters
@@ -123,37 +123,39 @@ class Group:
         found, end, last = None, step.t1, self.value.copy()
         alone, left = {}, np.arange(len(last))
         while left.size:
-            values, noise = self.value[left], self.noise[left]
-            degree = max(step.degree, self.degree // 2)
+            values, noise, degree = self.value[left], self.noise[left], max(step.degree, self.degree // 2)
             seen = survey(lambda times, left=left: sample(times)[:, left], step.t0, values, end, degree, noise)
             self.degree, last[left] = seen.degree, seen.samples[-1]
-            unclear = {j: since for j, since in enumerate(seen.since) if since < math.inf}
-            for j in (
-                self._odd[left].nonzero()[0].tolist()
-            ):  # what they know of zeros is past on the side they fall from
-                self._odd[left[j]] = odd = j in unclear or not self._falls[left[j]] * last[left[j]] < 0.0
-                if odd and j not in unclear:
-                    unclear[j] = step.t0
             if self._was_new and (fallen := self._fallen(seen.samples, left)) is not None:
                 return (self.numbers[fallen], step.t0), []
-            if unclear and noise.any():  # values of rounding alone have no zero
-                quiet = (np.abs(seen.samples).max(axis=0) <= noise).tolist()
-                unclear = {j: since for j, since in unclear.items() if not quiet[j]}
-            roots = {
-                j: seen.root(j)
-                for j, since in unclear.items()
-                if seen.until[j] > since and self._falls[left[j]] * values[j] < 0.0 and not self._odd[left[j]]
-            }
+            unclear = self._unclear(seen, left, noise)
+            falls = (self._falls[left] * values < 0.0) & ~self._odd[left]
+            roots = {j: seen.root(j) for j, since in unclear.items() if seen.until[j] > since and falls[j]}
             first = roots and _earliest(lambda t, left=left: sample(np.array([t]))[0, left], seen, roots)
-            alone |= {int(left[j]): since for j, since in unclear.items() if j not in roots or first is None}
+            alone = {int(left[j]): since for j, since in unclear.items() if j not in roots or first is None}
             if not first:
                 break
             # What was unclear may be clear up to there
             j, end = first
             found = self.numbers[left[j]], end
-            left, alone = np.array([i for i, since in alone.items() if since < end], int), {}
+            left = np.array([i for i, since in alone.items() if since < end], int)
         self.value = last
         return found, [i for i, since in alone.items() if since < end]
+
+    def _unclear(self, seen, left, noise):
+        """Of the members `left` those that may have a zero, and up to which time they have none."""
+        unclear = {j: since for j, since in enumerate(seen.since) if since < math.inf}
+        # What a `Track` knows of zeros is of no interest where the member is clear, on the side that it falls from
+        for j in self._odd[left].nonzero()[0].tolist():
+            if j in unclear or not self._falls[left[j]] * seen.samples[-1, j] < 0.0:
+                unclear.setdefault(j, seen.a)
+            else:
+                self._odd[left[j]] = False
+        # Values of rounding alone have no zero
+        if unclear and noise.any():
+            quiet = (np.abs(seen.samples).max(axis=0) <= noise).tolist()
+            unclear = {j: since for j, since in unclear.items() if not quiet[j]}
+        return unclear
 
 
 def _earliest(values, seen, roots):

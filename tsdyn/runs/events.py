@@ -16,7 +16,7 @@ from ..observables.reactions import Exerting
 from ..observables.state import RememberingState
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
-from .event_groups import Group, Member, States
+from .event_groups import Group, GroupMember, States
 from .tolerances import FAST_TURN, LEAST_TIME, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
 
 # Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp.
@@ -30,7 +30,7 @@ class Event(NamedTuple):
     limit: float  # occurrences that end the run; inf for never
     direction: float  # of the changes that count; 0 for both
     exact: bool = False  # whether a value at the start that is positive is no rounding of zero
-    falls: bool = False  # of a `Member`: whether it may begin at zero within rounding, and falls from there at once
+    falls: bool = False  # of a `GroupMember`: whether it may begin at zero within rounding, and fall at once
     action: object = None  # a function of a `Change` that each occurrence calls, or None
     goes_on: bool = False  # whether a zero at the start has been counted before
 
@@ -239,7 +239,7 @@ class Watch:
         self._n = int(packed.system.bodies[:, 1].sum())
         groups = {}  # numbers of events, by the function that evaluates them together
         for i, event in enumerate(events):
-            if isinstance(event.function, Member):
+            if isinstance(event.function, GroupMember):
                 groups.setdefault(event.function.over, []).append(i)
         self._groups = [Group(over, events, numbers) for over, numbers in groups.items()]
         self._members = [i for numbers in groups.values() for i in numbers]
@@ -316,7 +316,7 @@ class Watch:
 
     def _is_resumed(self, memory, last):
         """Whether the run goes on from the event that ends it, in the same memory, with other velocities."""
-        run, is_member = memory.run, isinstance(self.events[last.index].function, Member)
+        run, is_member = memory.run, isinstance(self.events[last.index].function, GroupMember)
         if self.resume is None or not is_member or not memory.begins_again or last.t >= run.clock.t_end:
             return False
         if any(found and event.action for event, found in zip(self.events, self.list, strict=True)):
@@ -399,7 +399,7 @@ class Watch:
 
     def _value(self, i, t, state):
         event = self.events[i]
-        if isinstance(event.function, Member):
+        if isinstance(event.function, GroupMember):
             over, which = event.function.over, event.function.which
             return float(over(self._states(np.array([t]), state[None]))[0, which])
         return event.value(t, self._instant(t, state))
@@ -495,7 +495,7 @@ class Watch:
 
         def sample(times):
             values, function = np.full(times.size, np.nan), self.events[i].function
-            if isinstance(function, Member):
+            if isinstance(function, GroupMember):
                 return function.over(self._states(times, step.levels(times)))[:, function.which]
             states = step.states(times)
             for k, (t, state) in enumerate(zip(times.tolist(), states, strict=True)):

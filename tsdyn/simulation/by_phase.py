@@ -6,16 +6,19 @@ import numpy as np
 
 
 def in_phases(method):
-    """Decorate a method that returns arrays over the outputs, a tuple of them, or a named tuple."""
+    """Decorate a method without arguments that returns arrays over the outputs, a tuple of them, or a named tuple."""
 
     @wraps(method)
-    def call(self, *arguments, **keywords):
-        phases = getattr(self, "_phases", None)
-        if phases is None or not phases.varies:
-            return method(self, *arguments, **keywords)
-        return gathered(self, lambda part: method(part, *arguments, **keywords))
+    def call(self):
+        return by_phase(self, method)
 
     return call
+
+
+def by_phase(solution, ask):
+    """What a solution says; where phases differ in forces or numbers, what the outputs of each packed scene say."""
+    phases = getattr(solution, "_phases", None)
+    return ask(solution) if phases is None or not phases.varies else gathered(solution, ask)
 
 
 def gathered(solution, ask):

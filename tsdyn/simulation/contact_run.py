@@ -28,16 +28,16 @@ from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
 from ..maths.tolerances import EPS
 from ..model.handles import handles_of
-from ..observables import reactions
+from ..observables import diagnostics, reactions
 from ..observables.state import remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
-from ..runs.event_groups import Member
+from ..runs.event_groups import GroupMember
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
-from ..validation import damaged, demand, listed
+from ..validation import counted, damaged, demand, listed
 from . import hybrid
 from .grips import Halting, Reactions, phase_with_friction, renewed
 from .impacts import held, impact_of, jumped
@@ -211,9 +211,11 @@ class _Slowing:
         return values
 
 
-def demand_apart(gaps, able, q, angles, tol):
-    """Raise InconsistentState where gaps, of those that are able to close, are below zero."""
+def demand_apart(gaps, q, angles, tol, able=None):
+    """Raise InconsistentState where gaps are below zero, of those that are able to close: by default, at the start."""
     values = gaps.at(q, angles)
+    if able is None:
+        able = [i for i, gap in enumerate(gaps.list) if gap.contact.active]
     deep = [i for i in able if values[i] < -tol * (1.0 + np.abs(q).max())]
     if deep:
         found = listed([f"{gaps.names[i]} {gaps.list[i].contact.excess} by {-values[i]:.3g}" for i in deep], NAMED)
@@ -257,14 +259,16 @@ class _ContactRun:
         self.span = interval(call.t_span)
         self.times = output_times(call.t_eval, *self.span)
         self.per_step, self.taken = self.times.size == 0, 0
-        kept = prepared(phase_of(scene, []))
+        kept = prepared(free := phase_of(scene, []))
         self._demand_served(kept)
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
         self.qdd = np.zeros(kept.n)  # before the present transition
         self.remembered = remembered(call.state, kept, self.t, self.q)
+        start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
+        kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
-        demand_apart(self.gaps, self.able, self.q, self.remembered[: self.count], options.initial_tol)
+        demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol, self.able)
         self.users = prepared_events(options.events) or []
         self.rest = self.t
         self.kinds, self.parts, self.found, self.report = [], [], [[] for _ in self.users], reporter(call.progress)
@@ -272,6 +276,7 @@ class _ContactRun:
         self.reason, self.methods, self.at_once, self.judged = "", [], 0, (self.t, 0)
         self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
         self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
+        self.lowered = set()  # times of impacts at which less than the coefficients of restitution acts
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
 
     def _take_scene(self, scene, inactive=None, values=None):
@@ -333,6 +338,10 @@ class _ContactRun:
             if self.end is None:
                 raise
             status = Status.INTERRUPTED
+        except OSError as error:
+            if self.end is None or self.archive is None:
+                raise
+            status, self.reason = Status.STORE_FAILED, f"{error.strerror or error}."
         except TsdynError as error:
             if self.end is None:
                 raise
@@ -529,7 +538,7 @@ class _ContactRun:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
             is_open = i not in modes.closed
-            function = Member(self.closing.over, i) if is_open else Member(leaving, modes.closed.index(i))
+            function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
         breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
@@ -537,7 +546,7 @@ class _ContactRun:
         for i in range(frictions.count):
             if i in modes.blocked:
                 continue
-            function = Member(breaking, sticking.index(i)) if i in modes.sticking else Member(slowing, i)
+            function = GroupMember(breaking, sticking.index(i)) if i in modes.sticking else GroupMember(slowing, i)
             yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
 
     def _still(self, phase):
@@ -552,11 +561,11 @@ class _ContactRun:
         gaps, modes = self.gaps, self.modes
         pushing, grips = Reactions(gaps, modes, packed), gaps.count + self.frictions.count
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
-            yield i, Event(Member(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
+            yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.grips.get(i) is not None]
         halting = Halting(packed, [gaps.list[i].side.grip.sliding for i in slides])
         for k, i in enumerate(slides):
-            yield grips + i, Event(Member(halting.over, k), gaps.names[i], 1.0, -1.0, False)
+            yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 
     def _times(self):
         left = self.times[self.taken :]
@@ -610,6 +619,7 @@ class _ContactRun:
         self.t, self.remembered = end.reached, end.remembered
         self.q, self.qd, self.qdd = (x.copy() for x in end.last)
         self.reason = outcome.reason
+        self.acted = goes_on and bool(acting)
         if goes_on:
             return self._act(acting, fired, end.last) if acting else self._transit(fired)
         if self._is_deep():
@@ -630,22 +640,33 @@ class _ContactRun:
         change = hybrid.ask(self, events, last)
         if change is None or change._ends:
             return Status.ACTION_FAILED if change is None else Status.EVENT
-        self.acted = True
+        before = self._energy(self.packed)
         jump = hybrid.carry_out(self, change)
         if jump is None:
             return Status.ACTION_FAILED
         if (self.qd != jump.qd).any():  # ratchets don't take hold as they would have
             fired = [i for i in fired if i not in self.gaps.following]
-        status = self._transit(fired, jump.qd)
+        status = self._transit(fired, False)
         hybrid.report(self, jump)
+        if status is None:
+            self.phases.gain(self._energy(self._scene().packed) - before)
         return status
 
-    def _transit(self, fired, qd=None):
+    def _energy(self, packed):
+        """Kinetic and potential energy, J, of a phase at the present state."""
+        t, q, qd, memory = np.array([self.t]), self.q[None], self.qd[None], self.remembered[None, self.count :]
+        energy = diagnostics.kinetic_energy(packed.system, q, qd) + diagnostics.potential_energy(packed.system, q)
+        for load in packed.loads:
+            if getattr(load.force, "potential", None) or hasattr(load.force, "powers"):
+                energy = energy + diagnostics.load_powers(packed, load, t, q, qd, memory)[0]
+        return float(energy[0])
+
+    def _transit(self, fired, measured=True):
         """From one phase to the next one, after events of the units `fired`; the Status if there is no way on.
 
-        qd: velocities (n,) before what actions have done to them.
+        measured: whether the energy that impacts take is noted.
         """
-        self.reason, qd = "", self.qd if qd is None else qd
+        self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
         (near,) = (self.gap <= TOUCHING * self.length).nonzero()
@@ -653,7 +674,7 @@ class _ContactRun:
         hit = [i for i in fired if i < count]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
         status = self._settle(sorted(touching), hit)
-        if self.qd is not qd:
+        if measured and self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status or self._settle_frictions(before, [i - count for i in fired if count <= i < count + own])
 
@@ -706,6 +727,9 @@ class _ContactRun:
                 self.modes = Modes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
             kept = {*self.modes.closed, *self.modes.idle}
             opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
+        except SingularConfiguration as error:
+            self.reason = str(error)
+            return Status.SINGULAR
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
@@ -818,6 +842,8 @@ class _ContactRun:
         """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
         qd, law = self.qd if qd is None else qd, self.options.law
         p, change, share = impact_of(inertia, touching, qd, before, e, law)
+        if share < 1.0:
+            self.lowered.add(self.t)
         return p, *jumped(inertia, qd, change, touching, before, share * e, p, law)
 
     def _lowering(self, inertia, touching, qd, rates):
@@ -843,8 +869,14 @@ class _ContactRun:
         if self.options.events is not None:
             columns = [list(zip(*known, strict=True)) for known in self.found]
             events = tuple([np.concatenate(column[k]) for column in columns] for k in range(3))
+        reason = self.reason
+        if self.lowered:
+            reason += (
+                f" Restitution was lowered at {counted(len(self.lowered), 'impact')}, the first at t = "
+                f"{min(self.lowered):.9g} s: with friction they would have added energy."
+            )
         return Outcome(
-            status, self.reason,
+            status, reason.strip(),
             range(archive.counts["outputs"]) if archive else np.concatenate([part.rows for part in parts]),
             RunEnd(
                 end.reached, end.last, end.remembered, self.totals or summed([end.counts for end in ends]),

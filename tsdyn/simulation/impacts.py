@@ -9,6 +9,7 @@ import numpy as np
 from ..analyses.contact_friction import strike
 from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, impulses
 from ..calls import fitting
+from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import state_arrays
@@ -94,6 +95,10 @@ def impact(
     The bilateral constraints hold during the impact. With 0 <= v+ + e v-, 0 <= p complementary, v+ is unique; the
     impulses p of redundant contacts are one of the possible solutions.
 
+    With friction the tangential impulses of a contact are within the kinetic coefficient times p, and against its slip
+    where that doesn't vanish; the impulses returned are normal ones. Coefficients of restitution are lowered together
+    where the energy would grow.
+
     Examples
     --------
     The first of three equal balls in contact is hit; plastic impacts leave all with the same velocity:
@@ -114,10 +119,11 @@ def impact(
         raise InvalidArgument(f"law must be 'newton' or 'poisson', got {law!r}.")
     if not has_contacts(scene):
         raise InvalidArgument("impact: the scene has no unilateral constraints, such as PlaneContact(unilateral=True).")
-    gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
+    gaps, kept = gaps_of(scene), prepared(free := phase_of(scene, []))
     q, qd = state_arrays(state, kept.n)
     t = float(getattr(state, "t", 0.0))
     memory = remembered(state, kept, t, q)
+    kept.start(free, (q, qd), t, INITIAL_TOL, memory, True)  # finds redundant bilateral rows
     angles, slots = memory[: kept.handles.count], memory[kept.handles.count :]
     near = closed_gaps(gaps, q, angles)
     which = near if contacts is None else _chosen(gaps, contacts, near)

@@ -90,7 +90,7 @@ def _remembering(packed, whole):
     found = _slots(whole)
     for item, slots in own.items():
         memory[found[item]] = packed.system.memory[slots]
-    if (memory == packed.system.memory).all() if memory.size == packed.system.memory.size else False:
+    if np.array_equal(memory, packed.system.memory):
         return packed
     first = {item: slots.start for item, slots in found.items()}
     pairs = zip(packed.constraints, packed.slots, strict=True)

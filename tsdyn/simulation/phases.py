@@ -85,6 +85,8 @@ class Phases:
         What actions had changed before each phase: names of the parts that are inactive, and parameters by name.
     """
 
+    ARRAYS = "phases", "impulses", "gains"  # that are saved
+
     def __init__(self, packed, gaps):
         self.whole, self.gaps, self.list, self.impulses = packed, gaps, [], []
         self.starts, self.of, self.gains, self.changes = [], [], {}, []
@@ -165,11 +167,6 @@ class Phases:
                 found.append((start, end, names))
             before = changes
         return found
-
-    @property
-    def lose(self):
-        """Whether energy is lost by impacts or friction of contacts."""
-        return bool(self.impulses) or bool(self.gaps.rubs.any())
 
     def sticking(self, numbers, i):
         """Whether a contact with friction sticks (k,); i: the number of its gap."""
@@ -294,7 +291,10 @@ class Phases:
         demand(len(numbers["changed"]) == len(self.of), "the changes")
         known = [(tuple(map(str, inactive)), dict(values)) for inactive, values in numbers["changes"]]
         self.changes = [known[i] for i in numbers["changed"]]
-        for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True) if scene_of else ():
+        if scene_of is None:
+            self.modes = numbers["modes"]
+            return
+        for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True):
             scene = scene_of(modes)
             packed = scene.packed
             if derived != derived_record(packed):

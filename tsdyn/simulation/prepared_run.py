@@ -176,6 +176,7 @@ class Run:
         if options.acts:
             with_own_parts(scene)
         self._first = at_start(scene)  # whose method and kernels are those of the first phase
+        self._in_phases = options.acts or self._first is not scene
         self._compiled = set()  # with outputs between steps, or not
         self._last = self._seen = None  # the last `_Last`, and state
         self._prepare_kernels(options.dense_output or options.events is not None)
@@ -277,8 +278,7 @@ class Run:
 
     def _has_phases(self, call):
         """Whether a run is a sequence of phases: by the scene, by actions of events, or by what these have changed."""
-        acts = self.options.acts or getattr(call.state, "phase", None) is not None
-        return acts or self._first is not self.scene
+        return self._in_phases or (call.state is not None and getattr(call.state, "phase", None) is not None)
 
     def _solve_phases(self, call, found, is_stored):
         """The same of a run with phases."""

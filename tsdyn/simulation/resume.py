@@ -191,7 +191,7 @@ def _refused(name):
 
 
 LOADS = "reaction", "reaction_unique", "contact_point", "friction_demand"
-for _name in ("actuation", *LOADS, "rows", "at", "power_of", "work_of"):
+for _name in ("actuation", *LOADS, "rows", "sticking", "at", "power_of", "work_of"):
     setattr(Outline, _name, _refused(_name))
 for _name in ("state", "work", "dissipation"):
     setattr(Outline, _name, property(_refused(_name)))

@@ -361,6 +361,9 @@ def outlined_run(path, numbers, arrays, why, kinds):
     held = {"last": arrays["last"], "angles": remembered[:angles], "memory": remembered[angles:]}
     for i in range(numbers.get("watched", 0)):
         held |= {f"event_{i}_{name}": arrays[f"event {i}.{name}"] for name in ("t", "q", "qd")}
+    if "phases" in numbers:
+        record["phases"] = numbers["phases"]["phases"]
+        held |= {f"phase_{name}": arrays[f"phase {name}"] for name in Phases.ARRAYS}
     found = _solution(path, record, held, scene, kinds[1], known["width"])
     complete(found, known)
     count, rows = found._length(), len(known["rows"])
@@ -427,7 +430,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
 def _phases(scene, numbers, arrays):
     """The `Phases` of a record; of the scene of an outline, in which parts are lacking, times and names alone."""
     if scene._lacks:
-        phases = Phases(scene.packed)
+        phases = Phases(scene.packed, None)
         phases.restore(numbers, arrays)
         return phases
     from .contact_run import phases_of  # what runs without contacts import none of

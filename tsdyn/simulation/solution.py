@@ -21,7 +21,7 @@ from ..observables.generalised_forces import law_values
 from ..observables.reactions import acted, exerted, member, with_normal_loads
 from ..observables.state import RememberingState
 from ..validation import counted, floats
-from .by_phase import gathered, in_phases
+from .by_phase import by_phase, gathered, in_phases
 from .records import Records
 from .stored_runs import RunOutputs
 from .termination import account, cause_of
@@ -186,7 +186,7 @@ def energy_error(solution, task):
     Outputs and the last state are compared.
     """
     system, packed = solution.system, solution.packed
-    if system.rheonomic[0] or system.normals.size or (solution._phases is not None and solution._phases.lose):
+    if system.rheonomic[0] or system.normals.size:
         return None
     some, slots = solution[:: max(solution._length() // MOST_OUTPUTS, 1)], system.memory.size
     t = np.concatenate(([task.span[0]], some.t, [solution.reached]))
@@ -265,9 +265,7 @@ def _power(solution, trajectory, item, t):
     varies = phases is not None and phases.varies
     for packed, mine in phases.packed_at(t) if varies else [(solution.packed, slice(None))]:
         some = t[mine], *(level[mine] for level in levels)
-        slots = (
-            with_normal_loads(packed, *some, memory[mine]) if varies else solution._with_normal_loads(*some, memory)
-        )
+        slots = with_normal_loads(packed, *some, memory[mine]) if varies else solution._with_normal_loads(*some, memory)
         at = SimpleNamespace(t=some[0], q=some[1], qd=some[2], _memory=slots, packed=packed, system=packed.system)
         if packed.system.rheonomic[0]:
             at.multipliers = (reactions.multipliers if varies else solution._multipliers_at)(
@@ -343,15 +341,14 @@ class Balances:
         """
         return self._integrated(None)
 
-    @in_phases
     def power_of(self, item: ItemLike) -> Floats:
         """Power (k,), W, supplied by one constraint or force (or its name): its share of dE/dt.
 
         Of a motor or a driver: the power of its force or torque along the prescribed motion. Of a force: the power of
         its loads and actuators, less dissipation; stored energy of a spring doesn't count. Of other constraints: zero.
         """
-        part = self._part(item)
-        return _supplied(self, part) - self._losses_of(part, self._losses())
+        supplied = by_phase(self, lambda part: _supplied(part, part._part(item)))
+        return supplied - self._losses_of(self._part(item), self._losses())
 
     def work_of(self, item: ItemLike) -> Floats:
         """Work (k,), J, since the start, of one constraint or force: the integral of `power_of`.
@@ -681,7 +678,6 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             return self._phases.constraint_error(self._phase_of_rows, *motion)
         return diagnostics.constraint_error(self.packed, *motion)
 
-    @in_phases
     def actuation(self, control: ItemLike) -> Floats:
         """The values (k, actuators) of the function of a Control at the outputs; those held if it has a period.
 
@@ -693,6 +689,9 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         InvalidForce
             If it is none of these.
         """
+        return by_phase(self, lambda part: part._actuation(control))
+
+    def _actuation(self, control):
         item = self.handles.item(control)
         if reactions.is_idle(self.packed, item):
             return np.zeros((self.t.size, len(getattr(item, "actuators", "xyz"))))
@@ -758,7 +757,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """
         item = self.handles.item(friction)
         mine = [] if self._phases is None else self._phases.gaps.of_contact(item)
-        if any(self._phases.gaps.rubs[mine]):
+        if mine and self._phases.gaps.rubs[mine].any():
             return self._phases.sticking(self._phase_of_rows, mine[0])
         load = reactions.loads_of(self.packed).get(id(item))
         if load is None or not getattr(item, "slides", ()):
@@ -794,7 +793,6 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """
         return reactions.contact_point(self, constraint)
 
-    @in_phases
     def friction_demand(self, constraint: ItemLike) -> Floats:
         """Tangential over normal force at a contact, (k,): the coefficient of friction that rolling needs at least.
 
@@ -812,7 +810,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> print(f"{ts.simulate(scene, (0, 1)).friction_demand(contact)[-1]:.6f}")
         0.285714
         """
-        return reactions.friction_demand(self, constraint)
+        return by_phase(self, lambda part: reactions.friction_demand(part, constraint))
 
     def reaction_unique(self, item: ItemLike, on: BodyLike | None = None) -> Bools:
         """Return True where `reaction` is unique, at each output: bool (k,).

@@ -17,6 +17,7 @@ import numpy as np
 
 from .._version import __version__
 from ..calls import lacking
+from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument, Status, StorageError
 from ..jit.code_hash import is_ours, platform_hash
 from ..jit.compilers import machine
@@ -473,6 +474,9 @@ def hash_of(packed):
             digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(repr([type(item).__qualname__ for item in packed.constraints]).encode())
     digest.update(repr([type(load.force).__qualname__ for load in packed.loads]).encode())
+    for contact in contacts_of(member.constraint for member in packed.members):  # no row has these numbers
+        laws = (getattr(contact, name, None) for name in ("restitution", "kinetic", "static"))
+        digest.update(repr([law if law is None else float(law) for law in laws]).encode())
     return digest.hexdigest()
 
 

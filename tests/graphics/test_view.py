@@ -513,7 +513,7 @@ def test_a_stored_run_is_shown(tmp_path):
 def test_wrong_shapes_and_paths_are_refused(run, tmp_path):
     with pytest.raises(ts.InvalidBody, match=r"no body is named 'crnk'; did you mean 'crank'"):
         run.view(tmp_path / "a", shapes={"crnk": S.Sphere(1.0)})
-    with pytest.raises(ts.InvalidBody, match="not a body of this solution"):
+    with pytest.raises(ts.InvalidBody, match="not a body of this scene"):
         run.view(tmp_path / "a", shapes={ts.Scene().add_point_mass(mass=1.0): S.Sphere(1.0)})
     with pytest.raises(ts.InvalidArgument, match=r"ts\.shapes"):
         run.view(tmp_path / "a", shapes={"crank": "box"})

@@ -204,7 +204,7 @@ def test_results_of_what_is_no_body_of_the_scene(query):
     solution = run(max_steps=1)(w)
     late = w.scene.add_body(1.0, (1.0, 1.0, 1.0), name="late")
     for body in (None, 0, w.ground, w.stranger, late):
-        refuse(lambda body=body: getattr(solution, query)(body), ts.InvalidBody, ("not a body of this solution",))
+        refuse(lambda body=body: getattr(solution, query)(body), ts.InvalidBody, ("not a body of this scene",))
     refuse(lambda: getattr(solution, query)("late"), ts.InvalidBody, ("no body is named 'late'",))
     if query in ("position", "velocity", "acceleration"):
         assert getattr(solution, query)(w.bead).shape == (2, 3)

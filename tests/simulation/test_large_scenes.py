@@ -124,10 +124,10 @@ def test_a_hub_is_cut():
     assert small.welds.shape[0] == 0
 
 
-@pytest.mark.parametrize("large", [start.LISTED_ENTRIES, 0], ids=["by name", "without matrices"])
+@pytest.mark.parametrize("large", [start.limits.LISTED_ENTRIES, 0], ids=["by name", "without matrices"])
 def test_rows_that_depend_on_each_other_at_a_hub(large, monkeypatch):
     """Fifty rods hold the hub in its place, of which six would do."""
-    monkeypatch.setattr(start, "LISTED_ENTRIES", large)
+    monkeypatch.setattr(start.limits, "LISTED_ENTRIES", large)
     scene = ts.Scene()
     hub = scene.add_body(1.0, (0.1, 0.1, 0.1))
     rng = np.random.default_rng(1)

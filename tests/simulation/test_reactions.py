@@ -81,7 +81,7 @@ def test_bodies_of_another_scene_are_said_to_be():
         with pytest.raises(ts.InvalidBody, match=r"it belongs to another scene\.$"):
             ask(unlike)
     loose = scene.add_point_mass(1.0, position=(3, 3, 3), name="loose")  # after the run
-    with pytest.raises(ts.InvalidBody, match=r"not a body of this solution's scene\.$"):
+    with pytest.raises(ts.InvalidBody, match=r"not a body of this scene\.$"):
         solution.position(loose)
 
 

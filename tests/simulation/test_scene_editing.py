@@ -56,7 +56,7 @@ def test_bodies_after_a_removed_one_keep_their_results():
         np.testing.assert_array_equal(one, other)
     assert before.position(links[0]).shape == (before.t.size, 3)
     np.testing.assert_allclose(after.position(free)[-1], before.position(free)[-1], atol=HELD)
-    with pytest.raises(ts.InvalidBody, match="not a body of this solution"):
+    with pytest.raises(ts.InvalidBody, match="not a body of this scene"):
         after.position(links[0])
 
 

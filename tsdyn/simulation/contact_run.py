@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..ahead import compile_ahead
-from ..analyses.contact_friction import halted, settle_grips
-from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
-from ..analyses.contact_rows import KERNELS, ReactionWorkspace
-from ..analyses.friction_problem import Frictions, Hold, NoRest, RestProblem, free_motions, immobile, values_of
-from ..analyses.tolerances import AT_REST, RESTS, STOPPED
+from ..analyses.contact_problem import closed_gaps
+from ..analyses.contact_rows import KERNELS
+from ..analyses.friction_problem import Frictions, Hold, immobile
 from ..elements.unilateral import contacts_of
 from ..errors import (
     InconsistentState,
@@ -26,9 +23,8 @@ from ..errors import (
 from ..integrators import DOP853
 from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
-from ..maths.tolerances import EPS
 from ..model.handles import handles_of
-from ..observables import diagnostics, reactions
+from ..observables import diagnostics
 from ..observables.state import remembered
 from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
@@ -39,24 +35,20 @@ from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import counted, damaged, demand, listed
 from . import hybrid
-from .grips import Halting, Reactions, phase_with_friction, renewed
-from .impacts import held, impact_of, jumped
+from .grips import Halting, Reactions, phase_with_friction
 from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
-from .phases import Modes, PhasePieces, Phases, Pinned, plain
+from .phases import PhasePieces, Phases, Pinned, UnitModes, plain
 from .progress import reporter, silent
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
 from .tolerances import (
-    CREEPING,
-    ENDLESS,
-    EVENTS_JUDGED,
-    MOST_AT_AN_INSTANT,
     MOST_PINNED,
     PENETRATION,
-    ROUNDED,
     TOUCHING,
 )
+from .transitions import Transitions
+from .unit_events import Breaking, Closing, Leaving, Slowing
 
 if TYPE_CHECKING:
     pass
@@ -68,147 +60,7 @@ if TYPE_CHECKING:
 # says; and the next phase begins. Closed gaps whose rows depend on others, such as that of a fourth leg, are left out
 # of the rows: the others hold them.
 #
-# `Modes` has all that a phase follows from, beside t, q, qd and what the run remembers: a checkpoint needs no more.
-
-
-class _Closing:
-    """The gaps of open contacts, as event functions.
-
-    The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
-    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero.
-
-    Parameters
-    ----------
-    gaps : Gaps
-    opened : dict
-        Of contacts that have opened: time, gap and rate there, by their numbers.
-    rounding : float, m or rad
-        Of a gap.
-    """
-
-    def __init__(self, gaps, opened, rounding):
-        self.gaps, self.rounding = gaps, rounding
-        self.open(opened)
-
-    def open(self, opened):
-        """Take other contacts that have just opened."""
-        self.which = [i for i in opened if i not in self.gaps.following]
-        self.start = tuple(zip(*(opened[i] for i in self.which), strict=True))
-
-    def over(self, states):
-        """Values (k, count) of `States`."""
-        values = self.gaps.values(states.t, states.levels, states.counted)
-        for i, rate in self.gaps.following.items():
-            values[:, i] = rate(states.q, states.qd)
-        if self.which:
-            begun, first, rate = map(np.array, self.start)
-            since = states.t[:, None] - begun
-            later = since > 0.0
-            grown = values[:, self.which] - first
-            divided = np.where(later, grown / np.where(later, since, 1.0), rate)
-            values[:, self.which] = np.where(rate > 0.0, divided, grown + self.rounding)
-        return values
-
-
-class _Loads:
-    """Multipliers and normal loads of a phase, shared by its events."""
-
-    def __init__(self, packed):
-        self.packed, self._last = packed, (None, None)
-
-    def at(self, states):
-        """Multipliers (k, m), NaN of redundant rows, and normal loads (k, frictions) of one state or of several."""
-        t, q, qd, qdd = np.atleast_1d(states.t), *map(np.atleast_2d, (states.q, states.qd, states.qdd))
-        key, (last, found) = (t.tobytes(), q.tobytes()), self._last
-        if key != last:
-            memory = np.tile(states.memory, (t.size, 1))
-            wide = reactions.with_normal_loads(self.packed, t, q, qd, qdd, memory)
-            found = reactions.multipliers(self.packed, t, q, qd, qdd, wide), wide[:, memory.shape[1] :]
-            self._last = key, found
-        return found
-
-
-class _Leaving:
-    """The reactions of closed contacts, positive where they push, as event functions.
-
-    Parameters
-    ----------
-    packed : Packed
-        Of the phase.
-    rows : list of int
-    signs : list of float
-        Of the gaps over Phi.
-    """
-
-    def __init__(self, packed, rows, signs):
-        self.packed, self.rows, self.signs = packed, rows, np.array(signs)
-
-    @cached_property
-    def workspace(self):
-        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
-        return None if self.packed.system.normals.size else ReactionWorkspace(self.packed)
-
-    def over(self, states):
-        """Values (k, closed) of `States`."""
-        if self.workspace is not None:
-            lam = self.workspace.multipliers(states.t, states.levels, states.memory)
-        else:
-            memory = np.tile(states.memory, (states.t.size, 1))
-            lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
-        return -self.signs * lam[:, self.rows]
-
-
-class _Breaking:
-    """What the reactions of frictions that stick are below their bounds, as event functions.
-
-    Parameters
-    ----------
-    packed : Packed
-        Of the phase.
-    units : list of friction_problem.FrictionUnit
-    """
-
-    def __init__(self, packed, units):
-        self.packed, self.units = packed, units
-
-    def over(self, states):
-        """Values (k, units) of states at k times."""
-        memory = np.tile(states.memory, (states.t.size, 1))
-        motion = states.t, states.q, states.qd, states.qdd
-        wide = reactions.with_normal_loads(self.packed, *motion, memory)
-        lam = reactions.particular(reactions.multipliers(self.packed, *motion, wide))
-        values = np.zeros((states.t.size, len(self.units)))
-        for unit, value in zip(self.units, values.T, strict=True):
-            share, bound = unit.bound
-            value += bound - np.linalg.norm(lam[:, self.packed.derived.holds[unit.slot]], axis=1)
-            if share:
-                value += share * wide[:, memory.shape[1] + unit.load.normal]
-        return values
-
-
-class _Slowing:
-    """The velocities of frictions, along the directions in which they slide, as event functions.
-
-    In a plane half of the speed is taken off: where the direction has turned by 60 degrees, it is taken anew. The
-    velocity of one that has just begun to slide is divided by the time since.
-
-    Parameters
-    ----------
-    frictions : Frictions
-    begun : dict
-        Of those that have just begun to slide: time and acceleration there, by their numbers.
-    """
-
-    def __init__(self, frictions, begun):
-        self.frictions, self.begun = frictions, begun
-
-    def over(self, states):
-        """Values (k, frictions) of states at k times."""
-        values = self.frictions.speeds(states.q, states.qd, states.memory)
-        for i, (begun, first) in self.begun.items():
-            later = states.t > begun
-            values[:, i] = np.where(later, values[:, i] / np.where(later, states.t - begun, 1.0), first)
-        return values
+# `UnitModes` has all that a phase follows from, beside t, q, qd and what the run remembers: a checkpoint needs no more.
 
 
 def demand_apart(gaps, q, angles, tol, able=None):
@@ -233,7 +85,7 @@ FAILURES = {
 }  # fmt: skip
 
 
-class _ContactRun:
+class _ContactRun(Transitions):
     """One run in the making.
 
     Parameters
@@ -286,7 +138,7 @@ class _ContactRun:
         """
         compile_ahead(KERNELS)
         with_own_parts(scene)
-        self.base, self.count, self.modes, self.acted = scene, handles_of(scene.packed).count, Modes(), False
+        self.base, self.count, self.modes, self.acted = scene, handles_of(scene.packed).count, UnitModes(), False
         at_first = tuple(item.name for item in inactive_of(scene))
         self.switched = set(at_first)
         self.change(at_first if inactive is None else inactive, values or {})
@@ -362,7 +214,7 @@ class _ContactRun:
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         touching = [i for i in touching if i in self.able]
-        return self._settle(touching, ()) or self._settle_frictions(Modes(), ())
+        return self._settle(touching, ()) or self._settle_frictions(UnitModes(), ())
 
     def check(self):
         """Raise what a run raises before its first step; its `Task`, of the whole scene."""
@@ -454,7 +306,7 @@ class _ContactRun:
         """The scene that such a record tells."""
         inactive, values = record[2]
         self.change(tuple(inactive), dict(values))
-        self.modes, self.remembered = Modes.of(record[0]), np.array(record[1], float)
+        self.modes, self.remembered = UnitModes.of(record[0]), np.array(record[1], float)
         demand(self.remembered.shape == (self.count + self.scene.system.memory.size,), "what is remembered")
         return self._scene()
 
@@ -531,8 +383,8 @@ class _ContactRun:
         else:
             first = first_row_of(packed)
             sides = [gaps.list[i].side for i in modes.closed]
-            leaving = _Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
-        self.closing = _Closing(gaps, modes.opened, TOUCHING * self.length)
+            leaving = Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
+        self.closing = Closing(gaps, modes.opened, TOUCHING * self.length)
         for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
@@ -540,8 +392,8 @@ class _ContactRun:
             function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
-        breaking = _Breaking(packed, [frictions.units[i] for i in sticking]).over
-        slowing = _Slowing(frictions, modes.begun).over
+        breaking = Breaking(packed, [frictions.units[i] for i in sticking]).over
+        slowing = Slowing(frictions, modes.begun).over
         for i in range(frictions.count):
             if i in modes.blocked:
                 continue
@@ -660,203 +512,6 @@ class _ContactRun:
                 energy = energy + diagnostics.load_powers(packed, load, t, q, qd, memory)[0]
         return float(energy[0])
 
-    def _transit(self, fired, measured=True):
-        """From one phase to the next one, after events of the units `fired`; the Status if there is no way on.
-
-        measured: whether the energy that impacts take is noted.
-        """
-        self.reason, qd = "", self.qd
-        if self._is_deep() or self._is_stuck():
-            return Status.CONTACT_FAILED
-        (near,) = (self.gap <= TOUCHING * self.length).nonzero()
-        count, own, before = self.gaps.count, self.frictions.count, self.modes
-        hit = [i for i in fired if i < count]
-        touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
-        status = self._settle(sorted(touching), hit)
-        if measured and self.qd is not qd:
-            self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
-        return status or self._settle_frictions(before, [i - count for i in fired if count <= i < count + own])
-
-    def _is_stuck(self):
-        """Whether events no longer let time go on; says so."""
-        since, count = self.judged
-        length = self.t - self.phases.starts[-1]
-        self.at_once = self.at_once + 1 if length <= 16.0 * EPS * max(abs(self.t), EPS) else 0
-        self.judged = since, count + 1
-        if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count + self.frictions.count:
-            self.reason = f"There are {self.at_once} events at t = {self.t:.9g} s."
-            return True
-        if count + 1 >= EVENTS_JUDGED:
-            if (self.span[1] - self.t) > CREEPING * (self.t - since):
-                self.reason = f"The last {count + 1} events took {self.t - since:.3g} s: they accumulate."
-                return True
-            self.judged = self.t, 0
-        return False
-
-    def _settle(self, touching, fired):
-        """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
-        slots, values = self.remembered[self.count :], self.gap
-        before, self.modes, self.rest = self.modes, Modes(), self.t
-        if not touching:
-            return None
-        try:
-            inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
-            rates = inertia.rates(self.qd)
-            # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
-            small = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max()
-            rates[[i for i in before.closed if abs(rates[i]) <= small[i]]] = 0.0
-            grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
-            opening = [i for i in fired if i not in before.closed]
-            noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
-            if noise:  # a gap that closes with a rate of rounding, or a ratchet that takes hold
-                self.qd, rates = held(inertia, self.qd, noise, rates)
-            if (rates[touching] < 0.0).any():
-                rates = self._hit(inertia, touching, rates)
-            resting = [i for i in touching if rates[i] == 0.0]
-            opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
-            # What grazes without a reaction has left: its gap was rounding
-            leaving = [i for i in fired if i in before.closed or i in grazing]
-            self.modes = Modes(opened=opened)
-            if self.gaps.rubs[resting].any():
-                self.qd = halted(inertia, self.qd, resting)
-                settled = settle_grips(inertia, resting, self.qd, leaving)
-                grips, places = renewed(self.gaps, before, settled, self.q)
-                self.modes = Modes(settled.closed, settled.idle, opened, grips=grips, held=places)
-            elif resting:
-                self.modes = Modes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
-            kept = {*self.modes.closed, *self.modes.idle}
-            opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
-        except SingularConfiguration as error:
-            self.reason = str(error)
-            return Status.SINGULAR
-        except NoSolution:
-            names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
-            self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
-            if self.gaps.rubs[touching].any():
-                self.reason += (
-                    " With much friction rigid bodies that slide may have none, or several (Painleve's paradox): lower "
-                    "kinetic, or use a compliant contact."
-                )
-            return Status.CONTACT_FAILED
-        return None
-
-    def _settle_frictions(self, before, fired):
-        """Which frictions stick; the Status if there is no way on, else None."""
-        frictions, count = self.frictions, self.count
-        if not frictions.count:
-            return None
-        place, (v, sizes, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
-        # Velocities that change within rounding of the time are at rest, too
-        gained = RESTS * EPS * abs(self.t) * frictions.motions(self.q[None], self.qdd[None])[1][0]
-        self.remembered, resting, guess = self.remembered.copy(), [], {}
-        memory = self.remembered[count:]  # a part of it
-        self.modes.blocked = self.off
-        for i, unit in enumerate(frictions.units):
-            if i in self.off:
-                continue
-            speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
-            if i in before.blocked and memory[unit.way].any():
-                guess[i] = place.read(i, memory)
-            if speed <= max(AT_REST * sizes[0, i], gained[i], 0.0 if signed else STOPPED) or (signed and i in fired):
-                resting.append(i)
-                memory[unit.way] = 0.0
-            else:
-                memory[unit.way] = place.written(i, v[0, i] / speed)
-        if not resting:
-            return None
-        try:
-            rest, ranks = self._rest(place, before, resting, guess, fired)
-        except NoRest as error:
-            names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
-            self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
-            return Status.CONTACT_FAILED
-        for i, way in rest.ways.items():
-            memory[frictions.units[i].way] = place.written(i, way)
-        self.modes.sticking = {i: ranks[i] for i in rest.sticking}
-        self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
-        self.modes.begun = {i: (self.t, rate) for i, rate in rest.rates.items()}
-        return None
-
-    def _rest(self, place, before, resting, guess, fired):
-        """The `FrictionAtRest` that are at rest, and how many rows hold each."""
-        units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
-        for i in resting:
-            ranks[i] = before.sticking.get(i, -1)
-            if ranks[i] < 0:
-                basis = place.basis(i, partial(self._motions_of, place))
-                ranks[i] = len(basis)
-                for k, numbers in enumerate(place.numbers(i, basis)):
-                    memory[np.array(units[i].held(k))] = numbers
-        free = [i for i in resting if ranks[i]]
-        phase = self._scene_of(self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
-        rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
-        fresh = [i for i in free if i not in before.sticking]
-        if fresh:  # their rows hold to the last bit where they are
-            Phi = values_of(phase.packed, self.t, self.q, memory)
-            for i in fresh:
-                for k, row in enumerate(rows[i]):
-                    memory[units[i].held(k)[-1]] = Phi[row]
-        bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
-        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
-        return problem.settle({i: way for i, way in guess.items() if i in free}, fired), ranks
-
-    def _motions_of(self, place, i):
-        """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
-        unit = self.frictions.units[i]
-        hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
-        phase = self._scene_of(self._closed_rows(), [hold])
-        memory = self.remembered[self.count :].copy()
-        for k in range(3):
-            memory[np.array(unit.held(k))] = hold.numbers[k]
-        return free_motions(phase.packed, self.t, self.q, memory, phase.packed.derived.holds[unit.slot])
-
-    def _hit(self, inertia, touching, rates):
-        """Jump of velocities at an impact; the rates (count,) afterwards."""
-        e, before = self.gaps.restitution[touching].copy(), rates[touching]
-        p, qd, after = self._jump(inertia, touching, before, e)
-        # Impacts that are followed by flights below rounding are the last ones
-        a = self._lowering(inertia, touching, qd, after)
-        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and p[k] > 0.0 and e[k] > 0.0]
-        if last:
-            flights = [2.0 * after[touching[k]] / (a[touching[k]] * (1.0 - e[k])) for k in last if e[k] < 1.0]
-            self.rest = float(max([self.rest, *(self.t + T for T in flights)]))
-            e[last] = 0.0
-            p, qd, after = self._jump(inertia, touching, before, e)
-            a = self._lowering(inertia, touching, qd, after)
-        # Contacts that another impact lifts by less than rounding stay closed
-        for _ in touching:
-            if not a.any():
-                break
-            qd, after = held(inertia, qd, [i for i in touching if a[i] > 0.0 or after[i] == 0.0], after)
-            if (after[touching] < 0.0).any():
-                more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
-                p = p + more
-            a = self._lowering(inertia, touching, qd, after)
-        self.qd = qd
-        named = zip(touching, p, strict=True)
-        self.phases.impulses += [(self.t, self.gaps.names[i], float(x)) for i, x in named if x > 0.0]
-        return after
-
-    def _jump(self, inertia, touching, before, e, qd=None):
-        """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
-        qd, law = self.qd if qd is None else qd, self.options.law
-        p, change, share = impact_of(inertia, touching, qd, before, e, law)
-        if share < 1.0:
-            self.lowered.add(self.t)
-        return p, *jumped(inertia, qd, change, touching, before, share * e, p, law)
-
-    def _lowering(self, inertia, touching, qd, rates):
-        """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""
-        opening = np.zeros(self.gaps.count, bool)
-        opening[touching] = rates[touching] > 0.0
-        if not opening.any():
-            return np.zeros(self.gaps.count)
-        resting = [i for i in touching if rates[i] == 0.0]
-        a = -(settle_grips if self.gaps.rubs[resting].any() else settle)(inertia, resting, qd).accelerations
-        rounding = EPS * np.maximum(self.length, ROUNDED * inertia.sizes(self.q))
-        rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
-        return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
-
     # The whole
 
     def _outcome(self, status, began):
@@ -915,7 +570,7 @@ class _ContactRun:
             inactive, values = known["changes"]
             self.change(tuple(inactive), dict(values))
             self.switched |= set(known["switched"])
-            self.modes = Modes.of(known["modes"])
+            self.modes = UnitModes.of(known["modes"])
             if known["sampling"] is not None:
                 self.sampling = Sampling(prepared(phase_of(self.scene, [])), True)
                 self.sampling.restore(known["sampling"])

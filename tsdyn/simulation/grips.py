@@ -105,7 +105,7 @@ class Reactions:
     Parameters
     ----------
     gaps : Gaps
-    modes : Modes
+    modes : UnitModes
     packed : Packed
         Of the phase.
     """

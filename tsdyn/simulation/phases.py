@@ -18,7 +18,7 @@ from .grips import add_friction, losses
 
 
 @dataclass
-class Modes:
+class UnitModes:
     """The modes of the units of a scene: numbers of gaps, and of frictions. All others are open, or slide."""
 
     closed: list = field(default_factory=list)  # independent rows, with reactions
@@ -155,7 +155,7 @@ class Phases:
         return out
 
     def _modes(self, kind):
-        return Modes.of(self.modes[kind][0])
+        return UnitModes.of(self.modes[kind][0])
 
     def told(self):
         """The `list`, in which phases are one where the same hold as before, and no impact or action is between."""

@@ -1,0 +1,229 @@
+"""From one phase of a run to the next one: impacts, and which contacts close, frictions stick or slide."""
+
+from functools import partial
+
+import numpy as np
+
+from ..analyses.contact_friction import halted, settle_grips
+from ..analyses.contact_problem import Inertia, NoSolution, settle
+from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
+from ..analyses.tolerances import AT_REST, RESTS, STOPPED
+from ..errors import (
+    SingularConfiguration,
+    Status,
+)
+from ..maths.tolerances import EPS
+from ..validation import listed
+from .grips import renewed
+from .impacts import held, impact_of, jumped
+from .phase_scenes import NAMED
+from .phases import UnitModes
+from .tolerances import (
+    CREEPING,
+    ENDLESS,
+    EVENTS_JUDGED,
+    MOST_AT_AN_INSTANT,
+    ROUNDED,
+    TOUCHING,
+)
+
+
+class Transitions:
+    """Mixed into `_ContactRun`: what it does between two phases."""
+
+    def _transit(self, fired, measured=True):
+        """From one phase to the next one, after events of the units `fired`; the Status if there is no way on.
+
+        measured: whether the energy that impacts take is noted.
+        """
+        self.reason, qd = "", self.qd
+        if self._is_deep() or self._is_stuck():
+            return Status.CONTACT_FAILED
+        (near,) = (self.gap <= TOUCHING * self.length).nonzero()
+        count, own, before = self.gaps.count, self.frictions.count, self.modes
+        hit = [i for i in fired if i < count]
+        touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
+        status = self._settle(sorted(touching), hit)
+        if measured and self.qd is not qd:
+            self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
+        return status or self._settle_frictions(before, [i - count for i in fired if count <= i < count + own])
+
+    def _is_stuck(self):
+        """Whether events no longer let time go on; says so."""
+        since, count = self.judged
+        length = self.t - self.phases.starts[-1]
+        self.at_once = self.at_once + 1 if length <= 16.0 * EPS * max(abs(self.t), EPS) else 0
+        self.judged = since, count + 1
+        if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count + self.frictions.count:
+            self.reason = f"There are {self.at_once} events at t = {self.t:.9g} s."
+            return True
+        if count + 1 >= EVENTS_JUDGED:
+            if (self.span[1] - self.t) > CREEPING * (self.t - since):
+                self.reason = f"The last {count + 1} events took {self.t - since:.3g} s: they accumulate."
+                return True
+            self.judged = self.t, 0
+        return False
+
+    def _settle(self, touching, fired):
+        """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
+        slots, values = self.remembered[self.count :], self.gap
+        before, self.modes, self.rest = self.modes, UnitModes(), self.t
+        if not touching:
+            return None
+        try:
+            inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
+            rates = inertia.rates(self.qd)
+            # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
+            small = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max()
+            rates[[i for i in before.closed if abs(rates[i]) <= small[i]]] = 0.0
+            grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
+            opening = [i for i in fired if i not in before.closed]
+            noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
+            if noise:  # a gap that closes with a rate of rounding, or a ratchet that takes hold
+                self.qd, rates = held(inertia, self.qd, noise, rates)
+            if (rates[touching] < 0.0).any():
+                rates = self._hit(inertia, touching, rates)
+            resting = [i for i in touching if rates[i] == 0.0]
+            opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
+            # What grazes without a reaction has left: its gap was rounding
+            leaving = [i for i in fired if i in before.closed or i in grazing]
+            self.modes = UnitModes(opened=opened)
+            if self.gaps.rubs[resting].any():
+                self.qd = halted(inertia, self.qd, resting)
+                settled = settle_grips(inertia, resting, self.qd, leaving)
+                grips, places = renewed(self.gaps, before, settled, self.q)
+                self.modes = UnitModes(settled.closed, settled.idle, opened, grips=grips, held=places)
+            elif resting:
+                self.modes = UnitModes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
+            kept = {*self.modes.closed, *self.modes.idle}
+            opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
+        except SingularConfiguration as error:
+            self.reason = str(error)
+            return Status.SINGULAR
+        except NoSolution:
+            names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
+            self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
+            if self.gaps.rubs[touching].any():
+                self.reason += (
+                    " With much friction rigid bodies that slide may have none, or several (Painleve's paradox): lower "
+                    "kinetic, or use a compliant contact."
+                )
+            return Status.CONTACT_FAILED
+        return None
+
+    def _settle_frictions(self, before, fired):
+        """Which frictions stick; the Status if there is no way on, else None."""
+        frictions, count = self.frictions, self.count
+        if not frictions.count:
+            return None
+        place, (v, sizes, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
+        # Velocities that change within rounding of the time are at rest, too
+        gained = RESTS * EPS * abs(self.t) * frictions.motions(self.q[None], self.qdd[None])[1][0]
+        self.remembered, resting, guess = self.remembered.copy(), [], {}
+        memory = self.remembered[count:]  # a part of it
+        self.modes.blocked = self.off
+        for i, unit in enumerate(frictions.units):
+            if i in self.off:
+                continue
+            speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
+            if i in before.blocked and memory[unit.way].any():
+                guess[i] = place.read(i, memory)
+            if speed <= max(AT_REST * sizes[0, i], gained[i], 0.0 if signed else STOPPED) or (signed and i in fired):
+                resting.append(i)
+                memory[unit.way] = 0.0
+            else:
+                memory[unit.way] = place.written(i, v[0, i] / speed)
+        if not resting:
+            return None
+        try:
+            rest, ranks = self._rest(place, before, resting, guess, fired)
+        except NoRest as error:
+            names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
+            self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
+            return Status.CONTACT_FAILED
+        for i, way in rest.ways.items():
+            memory[frictions.units[i].way] = place.written(i, way)
+        self.modes.sticking = {i: ranks[i] for i in rest.sticking}
+        self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
+        self.modes.begun = {i: (self.t, rate) for i, rate in rest.rates.items()}
+        return None
+
+    def _rest(self, place, before, resting, guess, fired):
+        """The `FrictionAtRest` that are at rest, and how many rows hold each."""
+        units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
+        for i in resting:
+            ranks[i] = before.sticking.get(i, -1)
+            if ranks[i] < 0:
+                basis = place.basis(i, partial(self._motions_of, place))
+                ranks[i] = len(basis)
+                for k, numbers in enumerate(place.numbers(i, basis)):
+                    memory[np.array(units[i].held(k))] = numbers
+        free = [i for i in resting if ranks[i]]
+        phase = self._scene_of(self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
+        rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
+        fresh = [i for i in free if i not in before.sticking]
+        if fresh:  # their rows hold to the last bit where they are
+            Phi = values_of(phase.packed, self.t, self.q, memory)
+            for i in fresh:
+                for k, row in enumerate(rows[i]):
+                    memory[units[i].held(k)[-1]] = Phi[row]
+        bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
+        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
+        return problem.settle({i: way for i, way in guess.items() if i in free}, fired), ranks
+
+    def _motions_of(self, place, i):
+        """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
+        unit = self.frictions.units[i]
+        hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
+        phase = self._scene_of(self._closed_rows(), [hold])
+        memory = self.remembered[self.count :].copy()
+        for k in range(3):
+            memory[np.array(unit.held(k))] = hold.numbers[k]
+        return free_motions(phase.packed, self.t, self.q, memory, phase.packed.derived.holds[unit.slot])
+
+    def _hit(self, inertia, touching, rates):
+        """Jump of velocities at an impact; the rates (count,) afterwards."""
+        e, before = self.gaps.restitution[touching].copy(), rates[touching]
+        p, qd, after = self._jump(inertia, touching, before, e)
+        # Impacts that are followed by flights below rounding are the last ones
+        a = self._lowering(inertia, touching, qd, after)
+        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and p[k] > 0.0 and e[k] > 0.0]
+        if last:
+            flights = [2.0 * after[touching[k]] / (a[touching[k]] * (1.0 - e[k])) for k in last if e[k] < 1.0]
+            self.rest = float(max([self.rest, *(self.t + T for T in flights)]))
+            e[last] = 0.0
+            p, qd, after = self._jump(inertia, touching, before, e)
+            a = self._lowering(inertia, touching, qd, after)
+        # Contacts that another impact lifts by less than rounding stay closed
+        for _ in touching:
+            if not a.any():
+                break
+            qd, after = held(inertia, qd, [i for i in touching if a[i] > 0.0 or after[i] == 0.0], after)
+            if (after[touching] < 0.0).any():
+                more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
+                p = p + more
+            a = self._lowering(inertia, touching, qd, after)
+        self.qd = qd
+        named = zip(touching, p, strict=True)
+        self.phases.impulses += [(self.t, self.gaps.names[i], float(x)) for i, x in named if x > 0.0]
+        return after
+
+    def _jump(self, inertia, touching, before, e, qd=None):
+        """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
+        qd, law = self.qd if qd is None else qd, self.options.law
+        p, change, share = impact_of(inertia, touching, qd, before, e, law)
+        if share < 1.0:
+            self.lowered.add(self.t)
+        return p, *jumped(inertia, qd, change, touching, before, share * e, p, law)
+
+    def _lowering(self, inertia, touching, qd, rates):
+        """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""
+        opening = np.zeros(self.gaps.count, bool)
+        opening[touching] = rates[touching] > 0.0
+        if not opening.any():
+            return np.zeros(self.gaps.count)
+        resting = [i for i in touching if rates[i] == 0.0]
+        a = -(settle_grips if self.gaps.rubs[resting].any() else settle)(inertia, resting, qd).accelerations
+        rounding = EPS * np.maximum(self.length, ROUNDED * inertia.sizes(self.q))
+        rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
+        return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)

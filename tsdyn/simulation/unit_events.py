@@ -1,0 +1,148 @@
+"""What ends a phase of a run, as event functions: gaps and reactions of contacts, holds and slips of frictions."""
+
+from functools import cached_property
+
+import numpy as np
+
+from ..analyses.contact_rows import ReactionWorkspace
+from ..observables import reactions
+
+
+class Closing:
+    """The gaps of open contacts, as event functions.
+
+    The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
+    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero.
+
+    Parameters
+    ----------
+    gaps : Gaps
+    opened : dict
+        Of contacts that have opened: time, gap and rate there, by their numbers.
+    rounding : float, m or rad
+        Of a gap.
+    """
+
+    def __init__(self, gaps, opened, rounding):
+        self.gaps, self.rounding = gaps, rounding
+        self.open(opened)
+
+    def open(self, opened):
+        """Take other contacts that have just opened."""
+        self.which = [i for i in opened if i not in self.gaps.following]
+        self.start = tuple(zip(*(opened[i] for i in self.which), strict=True))
+
+    def over(self, states):
+        """Values (k, count) of `States`."""
+        values = self.gaps.values(states.t, states.levels, states.counted)
+        for i, rate in self.gaps.following.items():
+            values[:, i] = rate(states.q, states.qd)
+        if self.which:
+            begun, first, rate = map(np.array, self.start)
+            since = states.t[:, None] - begun
+            later = since > 0.0
+            grown = values[:, self.which] - first
+            divided = np.where(later, grown / np.where(later, since, 1.0), rate)
+            values[:, self.which] = np.where(rate > 0.0, divided, grown + self.rounding)
+        return values
+
+
+class _Loads:
+    """Multipliers and normal loads of a phase, shared by its events."""
+
+    def __init__(self, packed):
+        self.packed, self._last = packed, (None, None)
+
+    def at(self, states):
+        """Multipliers (k, m), NaN of redundant rows, and normal loads (k, frictions) of one state or of several."""
+        t, q, qd, qdd = np.atleast_1d(states.t), *map(np.atleast_2d, (states.q, states.qd, states.qdd))
+        key, (last, found) = (t.tobytes(), q.tobytes()), self._last
+        if key != last:
+            memory = np.tile(states.memory, (t.size, 1))
+            wide = reactions.with_normal_loads(self.packed, t, q, qd, qdd, memory)
+            found = reactions.multipliers(self.packed, t, q, qd, qdd, wide), wide[:, memory.shape[1] :]
+            self._last = key, found
+        return found
+
+
+class Leaving:
+    """The reactions of closed contacts, positive where they push, as event functions.
+
+    Parameters
+    ----------
+    packed : Packed
+        Of the phase.
+    rows : list of int
+    signs : list of float
+        Of the gaps over Phi.
+    """
+
+    def __init__(self, packed, rows, signs):
+        self.packed, self.rows, self.signs = packed, rows, np.array(signs)
+
+    @cached_property
+    def workspace(self):
+        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
+        return None if self.packed.system.normals.size else ReactionWorkspace(self.packed)
+
+    def over(self, states):
+        """Values (k, closed) of `States`."""
+        if self.workspace is not None:
+            lam = self.workspace.multipliers(states.t, states.levels, states.memory)
+        else:
+            memory = np.tile(states.memory, (states.t.size, 1))
+            lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        return -self.signs * lam[:, self.rows]
+
+
+class Breaking:
+    """What the reactions of frictions that stick are below their bounds, as event functions.
+
+    Parameters
+    ----------
+    packed : Packed
+        Of the phase.
+    units : list of friction_problem.FrictionUnit
+    """
+
+    def __init__(self, packed, units):
+        self.packed, self.units = packed, units
+
+    def over(self, states):
+        """Values (k, units) of states at k times."""
+        memory = np.tile(states.memory, (states.t.size, 1))
+        motion = states.t, states.q, states.qd, states.qdd
+        wide = reactions.with_normal_loads(self.packed, *motion, memory)
+        lam = reactions.particular(reactions.multipliers(self.packed, *motion, wide))
+        values = np.zeros((states.t.size, len(self.units)))
+        for unit, value in zip(self.units, values.T, strict=True):
+            share, bound = unit.bound
+            value += bound - np.linalg.norm(lam[:, self.packed.derived.holds[unit.slot]], axis=1)
+            if share:
+                value += share * wide[:, memory.shape[1] + unit.load.normal]
+        return values
+
+
+class Slowing:
+    """The velocities of frictions, along the directions in which they slide, as event functions.
+
+    In a plane half of the speed is taken off: where the direction has turned by 60 degrees, it is taken anew. The
+    velocity of one that has just begun to slide is divided by the time since.
+
+    Parameters
+    ----------
+    frictions : Frictions
+    begun : dict
+        Of those that have just begun to slide: time and acceleration there, by their numbers.
+    """
+
+    def __init__(self, frictions, begun):
+        self.frictions, self.begun = frictions, begun
+
+    def over(self, states):
+        """Values (k, frictions) of states at k times."""
+        values = self.frictions.speeds(states.q, states.qd, states.memory)
+        for i, (begun, first) in self.begun.items():
+            later = states.t > begun
+            values[:, i] = np.where(later, values[:, i] / np.where(later, states.t - begun, 1.0), first)
+        return values

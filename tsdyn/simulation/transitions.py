@@ -95,6 +95,7 @@ class Transitions:
                 self.modes = UnitModes(settled.closed, settled.idle, opened, grips=grips, held=places)
             elif resting:
                 self.modes = UnitModes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
+            self._begin_anew([i for i in self.modes.closed if i not in before.closed])
             kept = {*self.modes.closed, *self.modes.idle}
             opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
         except SingularConfiguration as error:
@@ -110,6 +111,18 @@ class Transitions:
                 )
             return Status.CONTACT_FAILED
         return None
+
+    def _begin_anew(self, closed):
+        """Let rows of gaps that have just closed forget what they remembered of an earlier phase."""
+        parts = {
+            id(part) for i in closed for part in getattr(self.gaps.list[i].side.row, "parts", ()) if part.begins_anew
+        }
+        if not parts:
+            return
+        self.remembered = self.remembered.copy()
+        for part, slot in zip(self.scene.packed.constraints, self.scene.packed.slots, strict=True):
+            if id(part) in parts:
+                self.remembered[self.count + slot : self.count + slot + part.memory] = 0.0
 
     def _settle_frictions(self, before, fired):
         """Which frictions stick; the Status if there is no way on, else None."""

@@ -70,6 +70,7 @@ class Phases:
     packed : Packed
         Of the scene with the rows of all units.
     gaps : Gaps
+        Of this scene. Phases with other parameters have their own.
 
     Attributes
     ----------
@@ -90,7 +91,7 @@ class Phases:
     def __init__(self, packed, gaps):
         self.whole, self.gaps, self.list, self.impulses = packed, gaps, [], []
         self.starts, self.of, self.gains, self.changes = [], [], {}, []
-        self.packed, self.modes, self._columns, self._known = [], [], [], {}  # of each kind of phase
+        self.packed, self.modes, self._gaps, self._columns, self._known = [], [], [], [], {}  # of each kind of phase
         self.scenes = []  # of each kind, of phases that were restored
 
     @property
@@ -99,15 +100,16 @@ class Phases:
         forces = {load.force.name for load in self.whole.loads}
         return any(values or not forces.isdisjoint(inactive) for inactive, values in self.changes)
 
-    def kind(self, packed, modes, whole):
+    def kind(self, packed, modes, whole, gaps):
         """The number of the kind of phases that are packed so.
 
-        modes: what makes its scene again, for files. whole: the scene with its parameters, packed.
+        modes: what makes its scene again, for files. whole, gaps: of the scene with its parameters, packed.
         """
         kind = self._known.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
             self.packed.append(packed)
             self.modes.append(modes)
+            self._gaps.append(gaps)
             self._columns.append(shared_rows(whole, packed))
         return kind
 
@@ -150,7 +152,7 @@ class Phases:
             own[:, rows] = lam[:, columns]
             modes = self._modes(kind)
             if modes.grips:
-                add_friction(self.gaps, modes, self.packed[kind], *some[:3], lam, own)
+                add_friction(self._gaps[kind], modes, self.packed[kind], *some[:3], lam, own)
             out[mine] = own
         return out
 
@@ -179,7 +181,7 @@ class Phases:
         for kind, mine, (own, *some) in self._gathered(numbers, (lam, t, q, qd)):
             which = [i for i, d in self._modes(kind).grips.items() if d is not None]
             if which:
-                out[np.ix_(mine, which)] = losses(self.gaps, which, own, *some)
+                out[np.ix_(mine, which)] = losses(self._gaps[kind], which, own, *some)
         return out
 
     def with_normal_loads(self, numbers, t, q, qd, qdd, memory):
@@ -264,7 +266,7 @@ class Phases:
         }
 
     def restore(self, numbers, arrays, scene_of=None):
-        """As they were when they were saved; scene_of(modes): the scene of a phase, None where there is none.
+        """As they were when they were saved; scene_of(modes): the scene of a phase and its gaps, None where there is none.
 
         Raises
         ------
@@ -295,11 +297,11 @@ class Phases:
             self.modes = numbers["modes"]
             return
         for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True):
-            scene = scene_of(modes)
+            scene, gaps = scene_of(modes)
             packed = scene.packed
             if derived != derived_record(packed):
                 take_derived(packed, derived)
-            self.kind(packed, modes, packed if scene._whole is None else scene._whole.packed)
+            self.kind(packed, modes, packed if scene._whole is None else scene._whole.packed, gaps)
             self.scenes.append(scene)
 
 

@@ -211,17 +211,22 @@ class Phases:
         numbers = np.unique(self.at(np.atleast_1d(t))).tolist() or [0]
         kinds = {self.of[number] for number in numbers}
         one = kinds.pop() if len(kinds) == 1 else None
-        found = (None, None) if one is None else (self.packed[one], self._columns[one])
+        found = 3 * (None,) if one is None else (self.packed[one], self._columns[one], self._gaps[one].packed)
         return StatePhase(*self.changes[numbers[-1]], *found)
 
-    def parts(self, solution):
-        """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are."""
+    def parts(self, solution, whole):
+        """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are.
+
+        whole: with all constraints of the scene, not with the rows and forces of the phase.
+        """
         if not self.packed:
             raise StorageError("phases differ in forces or parameters, and the file has no scene: pass scene=.")
         for kind, mine, _ in self._gathered(solution._phase_of_rows, ()):
             part = solution._picked(mine)
-            packed = self.packed[kind]
+            packed = self._gaps[kind].packed if whole else self.packed[kind]
             part.packed, part.system, part.handles, part._phases = packed, packed.system, handles_of(packed), None
+            if whole:
+                part.multipliers = solution.multipliers[mine]
             yield part, mine
 
     def active(self, item, numbers):

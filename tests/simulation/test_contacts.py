@@ -4,22 +4,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 
 import tsdyn as ts
+from tests.helpers.contacts import G, bouncing, box, pendulum
 from tests.helpers.tolerances import EPS
 
 C = ts.constraints
-G = 9.81
-
-
-def bouncing(e, height=1.0, vx=1.0):
-    scene = ts.Scene(gravity=(0, 0, -G))
-    ball = scene.add_point_mass(mass=0.5, position=(0, 0, height), velocity=(vx, 0, 0), name="ball")
-    contact = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": e, "name": "floor"}
-    scene.add(C.PlaneContact(ball, scene.ground, **contact))
-    return scene, np.sqrt(2 * height / G)
 
 
 def penetration(scene, solution):
@@ -206,15 +197,6 @@ def test_impacts_never_add_energy(seed):
 # stops
 
 
-def pendulum(e):
-    scene = ts.Scene(gravity=(0, 0, -G))
-    bar = scene.add_body(mass=2.0, inertia=(0.2, 0.2, 0.01), position=(0, 0, -1), name="bar")
-    hinge = scene.add(C.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
-    scene.set(hinge, angle=1.0)
-    scene.add(C.Stop(hinge, lower=0.0, restitution=e, name="stop"))
-    return scene, 4 * ellipk(np.sin(0.5) ** 2) / np.sqrt(2.0 * G / 2.2)
-
-
 def test_a_pendulum_with_a_stop_at_its_lowest_place():
     """Half periods by the complete elliptic integral, with the amplitude that each rebound leaves."""
     scene, period = pendulum(1.0)
@@ -258,18 +240,6 @@ def test_a_stop_of_a_slide():
 
 
 # boxes: redundant contacts
-
-
-def box(tilt, e, spin=(0, 0, 0)):
-    scene, size = ts.Scene(gravity=(0, 0, -G)), np.array([1.0, 0.6, 0.4])
-    orientation = Rotation.from_euler("xyz", (tilt, 0.7 * tilt, 0.3))
-    solid = ts.shapes.box(size, mass=2.0)
-    body = scene.add_body(**solid, position=(0, 0, 1.0), orientation=orientation, angular_velocity=spin, name="box")
-    for i in range(8):
-        corner = size / 2 * [2 * (i & 1) - 1, (i & 2) - 1, (i & 4) / 2 - 1]
-        contact = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": e, "name": f"corner {i}"}
-        scene.add(C.PlaneContact(body, scene.ground, point_a=corner, **contact))
-    return scene
 
 
 @pytest.mark.parametrize(("tilt", "e", "spin"), [(0.0, 0.3, (0, 0, 0)), (0.2, 0.3, (0, 0, 0)), (0.5, 0.0, (1, 1, -2))])
@@ -375,6 +345,11 @@ def test_coefficients_and_bounds():
             C.Stop(scene["hinge"], *bounds)
     with pytest.raises(ts.InvalidConstraint, match="angle or a displacement"):
         C.Stop(scene.body("bar"), 0.0)
+    place = {"point": (0, 0, 0), "axis": (0, 1, 0), "name": "loose"}
+    loose = C.Revolute.at(scene.ground, scene.body("bar"), **place)
+    for item in (C.Stop, C.Ratchet):
+        with pytest.raises(ts.InvalidConstraint, match="add its joint 'loose' to the scene first"):
+            item(loose, 1)
 
 
 def test_radii():
@@ -412,6 +387,17 @@ def test_what_impacts_refuse():
         ts.impact(scene, ts.State(0.0, *scene.start), law="stronge")
     with pytest.raises(ts.InvalidConstraint, match="wall"):
         ts.impact(scene, ts.State(0.0, *scene.start), contacts=["wall"])
+    with pytest.raises(ts.InvalidConstraint, match="'wall'"):
+        ts.impact(scene, ts.State(0.0, *scene.start), contacts="wall")
+
+
+def test_an_impact_of_one_contact_by_its_name_or_itself():
+    scene, _ = bouncing(0.5)
+    state = ts.State(0.0, scene.start[0], np.array([1.0, 0.0, -2.0]))
+    for contacts in ("floor", scene["floor"], ["floor"]):
+        after, impulses = ts.impact(scene, state, contacts)
+        np.testing.assert_allclose(after.qd, [1.0, 0.0, 1.0], rtol=4 * EPS)
+        np.testing.assert_allclose(impulses["floor"], 0.5 * 3.0, rtol=4 * EPS)
 
 
 def test_a_scene_of_a_file(tmp_path):

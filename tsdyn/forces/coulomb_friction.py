@@ -124,7 +124,7 @@ class CoulombFriction(BodyFriction, Force):
         return self.force, self.torque, v0, w0, static_force, static_torque
 
     @property
-    def slides(self):
+    def slides(self) -> tuple[Any, ...]:
         """Where it sticks or slides by the exact law: at the point, and in rotation."""
         point = (POINT_OF_BODY,) if self._acts("force", self.slip_velocity) else ()
         return point + ((ORIENTATION,) if self._acts("torque", self.slip_rate) else ())

@@ -271,7 +271,7 @@ class Phases:
         }
 
     def restore(self, numbers, arrays, scene_of=None):
-        """As they were when they were saved; scene_of(modes): the scene of a phase and its gaps, None where there is none.
+        """As they were when they were saved; scene_of(modes): its scene and gaps, None where there are none.
 
         Raises
         ------

@@ -357,6 +357,21 @@ def test_a_block_slides_on_through_an_action(action, mu, slip, tmp_path):
         np.testing.assert_allclose(np.ptp(solution.energy - solution.work), 0.0, atol=FINE)
 
 
+def test_a_friction_of_a_joint_goes_within_a_run():
+    """The block is braked by mu m g up to 0.2 s, and then by nothing."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    block = scene.add_body(2.0, (1, 1, 1), velocity=(3, 0, 0), name="block")
+    way = C.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, 0), name="way")
+    scene.add(F.TranslationalFriction(scene.add(way), kinetic=0.2, static=0.3, name="rub"))
+    release = at(0.2, lambda change: change.deactivate("rub"))
+    solution = ts.simulate(scene, (0, 1), t_eval=[0.1, 0.7], events=release, dense_output=True)
+    v = solution.velocity("block")[:, 0]
+    np.testing.assert_allclose(v, [3 - 0.2 * G * 0.1, 3 - 0.2 * G * 0.2], rtol=FINE)
+    np.testing.assert_allclose(solution.dissipation, [0.2 * 2.0 * G * v[0], 0.0], rtol=FINE)
+    np.testing.assert_allclose(solution.reaction("way")[0][:, 2], 2.0 * G, rtol=FINE)
+    np.testing.assert_allclose(np.ptp(solution.energy - solution.work), 0.0, atol=FINE)
+
+
 def test_a_ball_rolls_when_it_would_after_an_action():
     """The ball slides up to 2 v / 7 mu g, and then at 5 v / 7, whatever happens to another body."""
     scene = ts.Scene(gravity=(0, 0, -G))

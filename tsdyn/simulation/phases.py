@@ -148,11 +148,13 @@ class Phases:
         out = np.zeros((len(numbers), m))
         for kind, mine, some in self._gathered(numbers, arrays):
             rows, columns = self._columns[kind]
-            lam, own = reactions.multipliers(self.packed[kind], *some), np.zeros((mine.size, m))
+            *motion, memory = some
+            lam = reactions.multipliers(self.packed[kind], *motion, self._own_memory(kind, memory))
+            own = np.zeros((mine.size, m))
             own[:, rows] = lam[:, columns]
             modes = self._modes(kind)
             if modes.grips:
-                add_friction(self._gaps[kind], modes, self.packed[kind], *some[:3], lam, own)
+                add_friction(self._gaps[kind], modes, self.packed[kind], *motion[:3], lam, own)
             out[mine] = own
         return out
 
@@ -186,17 +188,28 @@ class Phases:
 
     def with_normal_loads(self, numbers, t, q, qd, qdd, memory):
         """As `reactions.with_normal_loads`: the rows that hold frictions in a phase take their part of the loads."""
-        out = [None] * len(numbers)
+        slots, columns = memory.shape[1], {load.force.name: load.normal for load in self.whole.loads}
+        out = np.zeros((len(numbers), slots + self.whole.system.normals.size))
+        out[:, :slots] = memory
         for kind, mine, some in self._gathered(numbers, (t, q, qd, qdd, memory)):
-            for i, row in zip(mine, reactions.with_normal_loads(self.packed[kind], *some), strict=True):
-                out[i] = row
-        return np.array(out).reshape(len(numbers), -1)
+            found = reactions.with_normal_loads(self.packed[kind], *some)
+            for load in self.packed[kind].loads:  # without those that are inactive
+                if load.normal >= 0:
+                    out[mine, slots + columns[load.force.name]] = found[:, slots + load.normal]
+        return out
+
+    def _own_memory(self, kind, memory):
+        """Memory of forces in a phase, without normal loads where it has not those of the scene."""
+        system = self.whole.system
+        same = self.packed[kind].system.normals.size == system.normals.size
+        return memory if same or memory is None else memory[:, : system.memory.size]
 
     def constraint_error(self, numbers, *arrays):
         """The `ConstraintError` of the rows that hold."""
         out = np.zeros((3, len(numbers)))
         for kind, mine, some in self._gathered(numbers, arrays):
-            out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
+            *motion, memory = some
+            out[:, mine] = diagnostics.constraint_error(self.packed[kind], *motion, self._own_memory(kind, memory))
         return diagnostics.ConstraintError(*out)
 
     def packed_at(self, t):

@@ -133,12 +133,12 @@ class CoulombFriction(BodyFriction, Force):
         return slip == 0.0 and bool(getattr(self, name) or getattr(self, f"static_{name}"))
 
     @property
-    def taken(self):
+    def taken(self) -> int:
         """Numbers of par that a run sets: those of its slides."""
         return sum(each.count for each in self.slides)
 
     @property
-    def slips(self):
+    def slips(self) -> bool:
         """Whether a law is regularised."""
         return (self.force > 0.0 and self.slip_velocity > 0.0) or (self.torque > 0.0 and self.slip_rate > 0.0)
 

@@ -145,8 +145,7 @@ class Coupler(SumRow):
             joint, kind, _ = coordinate
             if joint.scene is not self.scene:
                 raise self.error(f"{self.name}: {joint.name!r} belongs to another scene.")
-            if not joint.added:
-                raise self.error(f"{self.name}: add its joint {joint.name!r} to the scene first.")
+            self._demand_added(joint)
             before = self._all[:i]
             if coordinate == self.dependent and before:
                 raise self.error(f"{self.name}: the {kind} of {joint.name!r} would depend on itself.")

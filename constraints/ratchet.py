@@ -24,7 +24,7 @@ class Ratchet(Unilateral, Joint):
     Raises
     ------
     InvalidConstraint
-        If the joint has no coordinate, or direction is neither.
+        If the joint has no coordinate or isn't in the scene, or direction is neither.
 
     Notes
     -----
@@ -66,7 +66,8 @@ class Ratchet(Unilateral, Joint):
         return f"{self._kind()}({self.joint.name})"
 
     def check(self):
-        """Refuse another direction than 1 and -1."""
+        """Refuse a joint that isn't in the scene, and another direction than 1 and -1."""
+        self._demand_added(self.joint)
         self._check_law()
         if isinstance(self.direction, bool) or self.direction not in (1, -1):
             raise InvalidConstraint(f"{self.name}: direction must be 1 or -1, got {shown(self.direction)}.")

@@ -172,6 +172,8 @@ class Rolls:
 class RollsOnPlane(Unilateral, Rolls):
     """Mixed into those on a plane: with `kinetic` they roll, slip and lift off."""
 
+    _opens_by = "kinetic, 0 without friction"
+
     def _set_rolling(self, slip: bool, restitution: float, kinetic: float | None, static: float | None) -> None:
         """Take slip and the coefficients, at the end of `__init__`."""
         self.slip = slip

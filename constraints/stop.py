@@ -34,7 +34,8 @@ class Stop(Unilateral, Joint):
     Raises
     ------
     InvalidConstraint
-        If the joint has no coordinate, the bounds are missing or cross, or restitution is inadmissible.
+        If the joint has no coordinate or isn't in the scene, the bounds are missing or cross, or restitution is
+        inadmissible.
 
     Notes
     -----
@@ -80,7 +81,8 @@ class Stop(Unilateral, Joint):
         return f"{self._kind()}({self.joint.name})"
 
     def check(self):
-        """Refuse bounds that are missing, or that cross."""
+        """Refuse a joint that isn't in the scene, and bounds that are missing, or that cross."""
+        self._demand_added(self.joint)
         self._check_law()
         bounds = [(name, getattr(self, name)) for name in ("lower", "upper") if getattr(self, name) is not None]
         if not bounds:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.contact_scenes import bouncing, box, pendulum
-from tests.helpers.stopped_runs import Stop, same
+from tests.helpers.contacts import bouncing, box, pendulum
+from tests.helpers.resuming import Stop, same
 from tsdyn.runs import driver
 
 C, G = ts.constraints, 9.81

@@ -9,8 +9,8 @@ import tsdyn as ts
 from benchmarks.stiff import jointed
 from examples import driven_pivot, four_bar, geared_pair, top
 from tests.helpers.refusals import refuse
+from tests.helpers.resuming import Stop, same
 from tests.helpers.skates import sleigh
-from tests.helpers.stopped_runs import Stop, same
 from tsdyn.files import checkpoint
 from tsdyn.runs import driver
 from tsdyn.simulation import segments

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
-from tests.helpers.stopped_runs import Stop
+from tests.helpers.resuming import Stop
 from tsdyn.runs import driver
 
 C = ts.constraints

@@ -433,6 +433,12 @@ def test_a_store_and_a_file_hold_them(tmp_path):
         assert other.phases == plain.phases
 
 
+def test_a_method_that_serves_the_first_phase_alone_is_refused():
+    """The ball slides without rows on velocities at first, and rolls with them then."""
+    with pytest.raises(ts.InvalidArgument, match="rows on velocities: use formulation='tangent'"):
+        ts.prepare(ball("rolling", (3, 0, 0)), integrator="sdirk54", formulation="null-space")
+
+
 def test_bad_coefficients():
     scene = slope(0.3, 0.0)
     block, ground = scene.body("block"), scene.ground
@@ -454,5 +460,8 @@ def test_bad_coefficients():
     body = scene.add_body(1.0, (1, 1, 1), position=(0, 0, 3))
     with pytest.raises(ts.InvalidConstraint, match="leave out slip=True"):
         C.RollingBall(body, ground, radius=0.5, normal_b=(0, 0, 1), slip=True, kinetic=0.3)
+    for name in ("static", "restitution"):
+        with pytest.raises(ts.InvalidConstraint, match=f"{name} is of a constraint that opens; set kinetic, 0 without"):
+            C.RollingBall(body, ground, radius=0.5, normal_b=(0, 0, 1), **{name: 0.3})
     with pytest.raises(ts.InvalidForce, match="no friction of the exact law"):
         ts.simulate(scene, (0, 0.1)).sticking(scene.add(ts.forces.PointForce(block, force=(0, 0, 0.1))))

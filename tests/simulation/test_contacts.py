@@ -7,11 +7,10 @@ import pytest
 from scipy.special import ellipk
 
 import tsdyn as ts
-from tests.helpers.contact_scenes import bouncing, box, pendulum
+from tests.helpers.contacts import G, bouncing, box, pendulum
 from tests.helpers.tolerances import EPS
 
 C = ts.constraints
-G = 9.81
 
 
 def penetration(scene, solution):
@@ -346,6 +345,11 @@ def test_coefficients_and_bounds():
             C.Stop(scene["hinge"], *bounds)
     with pytest.raises(ts.InvalidConstraint, match="angle or a displacement"):
         C.Stop(scene.body("bar"), 0.0)
+    place = {"point": (0, 0, 0), "axis": (0, 1, 0), "name": "loose"}
+    loose = C.Revolute.at(scene.ground, scene.body("bar"), **place)
+    for item in (C.Stop, C.Ratchet):
+        with pytest.raises(ts.InvalidConstraint, match="add its joint 'loose' to the scene first"):
+            item(loose, 1)
 
 
 def test_radii():
@@ -383,6 +387,17 @@ def test_what_impacts_refuse():
         ts.impact(scene, ts.State(0.0, *scene.start), law="stronge")
     with pytest.raises(ts.InvalidConstraint, match="wall"):
         ts.impact(scene, ts.State(0.0, *scene.start), contacts=["wall"])
+    with pytest.raises(ts.InvalidConstraint, match="'wall'"):
+        ts.impact(scene, ts.State(0.0, *scene.start), contacts="wall")
+
+
+def test_an_impact_of_one_contact_by_its_name_or_itself():
+    scene, _ = bouncing(0.5)
+    state = ts.State(0.0, scene.start[0], np.array([1.0, 0.0, -2.0]))
+    for contacts in ("floor", scene["floor"], ["floor"]):
+        after, impulses = ts.impact(scene, state, contacts)
+        np.testing.assert_allclose(after.qd, [1.0, 0.0, 1.0], rtol=4 * EPS)
+        np.testing.assert_allclose(impulses["floor"], 0.5 * 3.0, rtol=4 * EPS)
 
 
 def test_a_scene_of_a_file(tmp_path):

@@ -325,6 +325,68 @@ def test_contacts_and_actions():
     assert abs(solution.t[-1] - 1.0) < FINE
 
 
+@pytest.mark.parametrize(
+    ("action", "mu", "slip"),
+    [
+        (lambda change: change.set("floor.kinetic", 0.1), 0.1, 2.6),
+        (lambda change: change.set("floor.restitution", 0.5), 0.2, 2.6),
+        (lambda change: change.deactivate("wind"), 0.2, 2.6),
+        (lambda change: change.impulse("block", (-1.2, 0, 0)), 0.2, 2.0),
+    ],
+)
+def test_a_block_slides_on_through_an_action(action, mu, slip, tmp_path):
+    """Of friction mu m g, 0.2 at first: velocities, reactions, losses and the balance of energy."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    block = scene.add_point_mass(mass=2.0, velocity=(3, 0, 0), name="block")
+    floor = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": 0.2, "name": "floor"}
+    scene.add(C.PlaneContact(block, scene.ground, **floor))
+    kite = scene.add_point_mass(mass=1.0, position=(0, 0, 9), name="kite")
+    scene.add(F.PointForce(kite, force=(0, 1, 0), name="wind"))
+    found = ts.simulate(scene, (0, 1), t_eval=[0.1, 0.7], events=at(0.2, action), dense_output=True)
+    found.save(tmp_path / "run.h5")
+    for solution in (found, ts.load(tmp_path / "run.h5")):
+        v = np.array([3 - 0.2 * G * 0.1, slip - mu * G * 0.5])
+        np.testing.assert_allclose(solution.velocity("block")[:, 0], v, rtol=FINE)
+        friction = np.array([-0.2, -mu]) * 2.0 * G
+        force, _ = solution.reaction("floor")
+        np.testing.assert_allclose(force, np.transpose([friction, [0, 0], [2.0 * G] * 2]), rtol=FINE, atol=FINE)
+        np.testing.assert_allclose(solution.at(0.7).reaction("floor")[0], force[1], rtol=FINE, atol=FINE)
+        np.testing.assert_allclose(solution.friction_demand("floor"), [0.2, mu], rtol=FINE)
+        np.testing.assert_allclose(solution.dissipation, -friction * v, rtol=FINE)
+        np.testing.assert_allclose(solution.power_of("floor"), friction * v, rtol=FINE)
+        np.testing.assert_allclose(np.ptp(solution.energy - solution.work), 0.0, atol=FINE)
+
+
+def test_a_friction_of_a_joint_goes_within_a_run():
+    """The block is braked by mu m g up to 0.2 s, and then by nothing."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    block = scene.add_body(2.0, (1, 1, 1), velocity=(3, 0, 0), name="block")
+    way = C.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, 0), name="way")
+    scene.add(F.TranslationalFriction(scene.add(way), kinetic=0.2, static=0.3, name="rub"))
+    release = at(0.2, lambda change: change.deactivate("rub"))
+    solution = ts.simulate(scene, (0, 1), t_eval=[0.1, 0.7], events=release, dense_output=True)
+    v = solution.velocity("block")[:, 0]
+    np.testing.assert_allclose(v, [3 - 0.2 * G * 0.1, 3 - 0.2 * G * 0.2], rtol=FINE)
+    np.testing.assert_allclose(solution.dissipation, [0.2 * 2.0 * G * v[0], 0.0], rtol=FINE)
+    np.testing.assert_allclose(solution.reaction("way")[0][:, 2], 2.0 * G, rtol=FINE)
+    np.testing.assert_allclose(np.ptp(solution.energy - solution.work), 0.0, atol=FINE)
+
+
+def test_a_ball_rolls_when_it_would_after_an_action():
+    """The ball slides up to 2 v / 7 mu g, and then at 5 v / 7, whatever happens to another body."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    ball = scene.add_body(**ts.shapes.sphere(0.1, mass=2.0), position=(0, 0, 0.1), velocity=(3, 0, 0), name="ball")
+    scene.add(C.RollingBall(ball, scene.ground, radius=0.1, normal_b=(0, 0, 1), kinetic=0.2, name="lane"))
+    bob = scene.add_point_mass(mass=1.0, position=(0, 5, -1), velocity=(1, 0, 0), name="bob")
+    scene.add(C.Rope([(scene.ground, (0, 5, 0)), (bob, (0, 0, 0))], name="rope"))
+    solution = ts.simulate(scene, (0, 1), events=at(0.2, lambda change: change.impulse("bob", (0.5, 0, 0))))
+    begins = [begin for begin, _, names in solution.phases if "lane sticks" in names]
+    np.testing.assert_allclose(begins, 2 * 3 / (7 * 0.2 * G), rtol=FINE)
+    np.testing.assert_allclose(solution.velocity("ball")[-1], [15 / 7, 0, 0], rtol=FINE, atol=FINE)
+    assert all("rope" in names for _, _, names in solution.phases)
+    np.testing.assert_allclose(solution.multipliers[-1, solution.rows("lane")][0], -2.0 * G, rtol=FINE)
+
+
 def test_a_contact_of_the_start_that_is_inactive_is_passed():
     scene = ts.Scene(gravity=(0, 0, -G))
     ball = scene.add_point_mass(mass=1.0, position=(0, 0, 0.5), name="ball")

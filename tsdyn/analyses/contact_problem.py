@@ -84,6 +84,10 @@ class Gaps:
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
 
+    def all_rows(self, which=slice(None)):
+        """Rows of Phi of gaps and of their slips, by default of all."""
+        return np.concatenate((self.rows[which], self.slip_rows[which][self.rubs[which]].ravel()))
+
     def _stop(self, handles, side):
         """A function of q (..., n) and counted angles (..., angles) that returns the gap (...) of a joint's angle."""
         place = handles.row(side.joint, "angle")

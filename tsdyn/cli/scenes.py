@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ..drawing import aligned
 from ..errors import InvalidArgument, TsdynError
+from ..validation import counted
 from .parser import load_document, load_run, load_scene, print_json, robot_options
 from .run import (
     SOLUTIONS,
@@ -107,7 +108,7 @@ def _info(parsed):
         return 0
     print(f"{parsed.scene}: {scene!r}")
     _print_table("bodies", [(body.name, type(body).__name__, f"{body.mass:g} kg") for body in scene.bodies])
-    items = [(item.name, type(item).__name__, f"{item.all_rows} rows") for item in scene._added]
+    items = [(item.name, type(item).__name__, counted(item.all_rows, "row")) for item in scene._added]
     _print_table("constraints", items)
     _print_table("forces", [(force.name, force._kind(), "") for force in scene.forces])
     if parsed.parameters:

@@ -499,6 +499,11 @@ class Attachment:
     def check(self) -> None:
         """Raise an error where an attribute has an impossible value; asked when one is made, and when one is set."""
 
+    def _demand_added(self, joint: Any) -> None:
+        """Refuse a joint that the scene lacks; of `check`."""
+        if not joint.added:
+            raise self.error(f"{self.name}: add its joint {joint.name!r} to the scene first.")
+
     @property
     def referred(self) -> tuple[Any, ...]:
         """What it refers to, among other things: its bodies, a joint."""

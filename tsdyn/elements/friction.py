@@ -443,8 +443,7 @@ class JointFriction:
 
     def check(self) -> None:
         """A joint that the scene has, and friction no smaller at rest than sliding."""
-        if not self.joint.added:
-            raise self.error(f"{self.name}: add its joint {self.joint.name!r} to the scene first.")
+        self._demand_added(self.joint)
         if self.__dict__.get("static") is not None and self.static < self.kinetic:
             raise self.error(
                 f"{self.name}: static must be at least kinetic = {self.kinetic:g}, got {self.static:g}; leave it out "

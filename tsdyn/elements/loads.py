@@ -491,17 +491,13 @@ class JointLoad:
 
     def check(self) -> None:
         """A joint that the scene has; of a continuous load a plain function of three arguments."""
-        self._demand_joint()
+        self._demand_added(self.joint)
         if self.__dict__.get("period") is None and arguments_of(self.function) != 3:
             raise self.error(
                 f"{self.name}: function must be a plain Python function of three arguments (t, {self.coordinate}, "
                 f"rate), got {self.function!r}{starred(self.function)}. With period= it may be any object to be called "
                 "so."
             )
-
-    def _demand_joint(self):
-        if not self.joint.added:
-            raise self.error(f"{self.name}: add its joint {self.joint.name!r} to the scene first.")
 
     def parameters(self) -> tuple[Any, ...]:
         """None but what it remembers."""

@@ -79,7 +79,8 @@ class Unilateral:
                 f"{self.name}: static must be at least kinetic = {kinetic:g}, got {shown(static)}; leave it out where "
                 "they are the same."
             )
-        for what, given in (("restitution", self.restitution != 0.0), ("kinetic", self.rubs)):
+        friction = "kinetic" if kinetic else "static"
+        for what, given in (("restitution", self.restitution != 0.0), (friction, self.rubs)):
             if given and not self.unilateral:
                 raise InvalidConstraint(f"{self.name}: {what} is of a constraint that opens; set {self._opens_by}.")
 

@@ -104,7 +104,7 @@ class Armature(JointLoad, Force):
 
     def check(self):
         """A joint that the scene has, and a ratio."""
-        self._demand_joint()
+        self._demand_added(self.joint)
         if self.ratio == 0.0:
             raise InvalidForce(f"{self.name}: ratio must not be zero; leave the armature out, or set inertia=0.")
 

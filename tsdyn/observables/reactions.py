@@ -609,26 +609,26 @@ class Exerting:
         As `Solution.reaction` has them: on a, or b if a is the ground; in the ground frame, the torque about the item's
         first point on that body. A state at k times gives (k, 3).
         """
-        force, torque = exerted(self._motion(), item, on)
+        force, torque = exerted(self._motion(item), item, on)
         return (force, torque) if np.ndim(self.t) else (force[0], torque[0])
 
     def contact_point(self, constraint: ItemLike) -> Floats:
         """Where a rolling or sliding surface touches, as `Solution.contact_point` has it: (3,), of k times (k, 3)."""
-        point = contact_point(self._motion(), constraint)
+        point = contact_point(self._motion(constraint), constraint)
         return point if np.ndim(self.t) else point[0]
 
     def friction_demand(self, constraint: ItemLike) -> Floats:
         """Tangential over normal force, as `Solution.friction_demand` has it: a number, of k times (k,)."""
-        demand = friction_demand(self._motion(), constraint)
+        demand = friction_demand(self._motion(constraint), constraint)
         return demand if np.ndim(self.t) else demand[0]
 
-    def _acting(self):
-        """The packed scene whose parts act, and multipliers of its rows."""
+    def _acting(self, item):
+        """The packed scene that has a constraint or force as it acts, and multipliers of its rows."""
         return self.packed, self.multipliers
 
-    def _motion(self):
+    def _motion(self, item):
         """The states as what `exerted` reads."""
-        packed, lam = self._acting()
+        packed, lam = self._acting(item)
         levels = self.q, self.qd, self.qdd, lam
         t, (q, qd, qdd, lam) = np.atleast_1d(self.t), map(np.atleast_2d, levels)
         memory = with_normal_loads(packed, t, q, qd, qdd, np.atleast_2d(self.memory))

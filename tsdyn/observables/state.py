@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from ..calls import fitting, lacking
+from ..elements.force import Force
 from ..errors import InvalidArgument
 from ..model.kinematics import Kinematics
 from .reactions import Exerting
@@ -94,6 +95,7 @@ class StatePhase(NamedTuple):
     values: dict  # parameters that were set, by name
     packed: Any  # of the phase of the run; None of several states in different ones
     columns: Any  # rows of the scene, and where they are among those of the phase: (2, rows)
+    whole: Any  # the scene with these parameters, packed with all of its constraints
 
 
 class RememberingState(State):
@@ -127,11 +129,13 @@ class RememberingState(State):
         state.phase = self.phase
         return state
 
-    def _acting(self):
+    def _acting(self, item):
         if self.phase is None:
-            return super()._acting()
+            return super()._acting(item)
         if self.phase.packed is None:
             raise InvalidArgument("these states are of several phases of a run: ask for reactions at one time each.")
+        if not isinstance(self.handles.item(item), Force):
+            return self.phase.whole, self.multipliers
         rows, columns = self.phase.columns
         lam = np.zeros((*np.shape(self.multipliers)[:-1], len(self.phase.packed.system.segments)))
         lam[..., columns] = self.multipliers[..., rows]

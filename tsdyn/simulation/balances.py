@@ -118,7 +118,7 @@ def _power(solution, trajectory, item, t):
             )
         power[mine] = _supplied(at, item)
     losses = solution._losses_at(t, *levels, memory)
-    return power - (losses.sum(axis=1) if item is None else solution._losses_of(item, losses))
+    return power - solution._losses_of(item, losses)
 
 
 def _supplied(at, item):
@@ -171,7 +171,7 @@ class Balances:
     @property
     def dissipation(self) -> Floats:
         """Power (k,), W, dissipated by dampers and friction; not negative."""
-        return self._force_powers.dissipation + self._losses().sum(axis=1)
+        return self._force_powers.dissipation + self._losses_of(None, self._losses())
 
     @cached_property
     def work(self) -> Floats:

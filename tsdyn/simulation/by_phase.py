@@ -15,16 +15,19 @@ def in_phases(method):
     return call
 
 
-def by_phase(solution, ask):
-    """What a solution says; where phases differ in forces or numbers, what the outputs of each packed scene say."""
+def by_phase(solution, ask, whole=False):
+    """What a solution says; where phases differ in forces or numbers, what the outputs of each packed scene say.
+
+    whole: as of `Phases.parts`, to ask about a constraint.
+    """
     phases = getattr(solution, "_phases", None)
-    return ask(solution) if phases is None or not phases.varies else gathered(solution, ask)
+    return ask(solution) if phases is None or not phases.varies else gathered(solution, ask, whole)
 
 
-def gathered(solution, ask):
+def gathered(solution, ask, whole=False):
     """What the outputs of each packed scene say, in the order of the outputs."""
     found, order = [], []
-    for part, mine in solution._phases.parts(solution):
+    for part, mine in solution._phases.parts(solution, whole):
         found.append(ask(part))
         order.append(mine)
     back = np.argsort(np.concatenate(order), kind="stable")

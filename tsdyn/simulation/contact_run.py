@@ -295,7 +295,7 @@ class _ContactRun(Transitions):
         return self.run_of(phase, replace(self.options, events=None), call), call
 
     def _end_phase(self, t):
-        kind = self.phases.kind(self.packed, self._record(), self.scene.packed)
+        kind = self.phases.kind(self.packed, self._record(), self.scene.packed, self.gaps)
         self.phases.add(kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
 
     def _record(self):
@@ -303,12 +303,12 @@ class _ContactRun(Transitions):
         return [self.modes.saved(), self.remembered.tolist(), plain((self.inactive, self.values))]
 
     def _recorded_scene(self, record):
-        """The scene that such a record tells."""
+        """The scene that such a record tells, and its gaps."""
         inactive, values = record[2]
         self.change(tuple(inactive), dict(values))
         self.modes, self.remembered = UnitModes.of(record[0]), np.array(record[1], float)
         demand(self.remembered.shape == (self.count + self.scene.system.memory.size,), "what is remembered")
-        return self._scene()
+        return self._scene(), self.gaps
 
     def _resume(self, t, run, numbers):
         """After events of these numbers: whether the run of the phase goes on, with other velocities.

@@ -8,11 +8,11 @@ from ..elements.bodies import rotation_matrix
 from ..elements.force import Force
 from ..elements.sliding import WAY, heading, slip_velocity
 from ..jit.kernels import twin
-from ..model.packed import Derived, begins_of, first_rows, index_of
+from ..model.packed import Derived, begins_of, index_of
 from ..observables import reactions
 from ..observables.diagnostics import marker_states
 from .parameters import KEPT
-from .phase_scenes import phase_of
+from .phase_scenes import first_row_of, phase_of
 from .scene_cache import prepared_numbers
 from .tolerances import SAME_WAY, SLOW
 
@@ -113,7 +113,7 @@ class Reactions:
     def __init__(self, gaps, modes, packed):
         self.gaps, self.packed, self.closed = gaps, packed, modes.closed
         self.sticks = [i for i in modes.closed if modes.grips.get(i, ()) is None]
-        first = _first(packed)
+        first = first_row_of(packed)
         self.normal = [first[id(_gap_row(gaps, modes, i))] for i in self.closed]
         self.slip = np.array([_slip_columns(gaps.list[i].contact, first) for i in self.sticks], int).reshape(-1, 2)
         self.which = [self.closed.index(i) for i in self.sticks]
@@ -140,11 +140,6 @@ def _slip_columns(contact, first):
     if len(contact.parts) == 1:
         return slip_rows(contact, first)
     return [first.get(id(part), -1) for part in contact.parts[1:]]
-
-
-def _first(packed):
-    """The first row of each primitive, by its id."""
-    return {id(part): first for part, first in first_rows(packed.constraints)}
 
 
 def carried(gaps, which, t, q, N, T):
@@ -200,7 +195,7 @@ def add_friction(gaps, modes, packed, t, q, qd, lam, out):
     rubbing = [i for i in modes.closed if gaps.rubs[i]]
     if not rubbing:
         return
-    first = _first(packed)
+    first = first_row_of(packed)
     N = np.array([-gaps.sign[i] * lam[:, first[id(_gap_row(gaps, modes, i))]] for i in rubbing]).T
     tangents = np.array([gaps.slopes(*pair, rubbing) for pair in zip(t, q, strict=True)])  # (k, c, 2, n)
     rows = gaps.slip_rows[rubbing]

@@ -251,7 +251,7 @@ class JumpRows:
         self.M = mass_matrix(system, run.q)
         off = {id(item) for item in run.without}
         idle = [np.arange(self.Phi.size)[member.rows] for member in self.packed.members if id(member.constraint) in off]
-        self.bilateral = np.setdiff1d(np.arange(self.Phi.size), np.concatenate((run.gaps.rows, *idle)))
+        self.bilateral = np.setdiff1d(np.arange(self.Phi.size), np.concatenate((run.gaps.all_rows(), *idle)))
 
     def violated(self, tol):
         """The constraints whose rows don't hold, each with its residual."""
@@ -304,7 +304,7 @@ class JumpRows:
 
     def impulses(self, load, closed):
         """Impulses P (m,) of the bilateral rows and those of closed gaps, with Phi_q^T P = load; of least size."""
-        rows, P = np.concatenate((self.bilateral, self.gaps.rows[closed])), np.zeros(self.Phi.size)
+        rows, P = np.concatenate((self.bilateral, self.gaps.all_rows(closed))), np.zeros(self.Phi.size)
         P[rows] = np.linalg.lstsq(self.Phi_q[rows].T, load, rcond=RANK_TOL)[0]
         return P
 

@@ -10,6 +10,7 @@ from ..analyses.contact_friction import strike
 from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, impulses
 from ..calls import fitting
 from ..configuration.tolerances import INITIAL_TOL
+from ..elements.element import Attachment
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint
 from ..observables.state import RememberingState, remembered
 from ..runs.arguments import state_arrays
@@ -55,7 +56,7 @@ def held(inertia, qd, which, rates):
 def impact(
     scene: Scene,
     state: Any,
-    contacts: Sequence[ItemLike] | None = None,
+    contacts: ItemLike | Sequence[ItemLike] | None = None,
     restitution: float | Mapping[Any, float] | None = None,
     law: str = "newton",
 ) -> tuple[RememberingState, dict[str, float]]:
@@ -67,7 +68,7 @@ def impact(
         With unilateral constraints.
     state : State
         At the impact, such as `solution.state`; its positions are kept.
-    contacts : sequence of unilateral constraints or names, optional
+    contacts : unilateral constraint, or name of one, or a sequence of these, optional
         Those that are closed; by default those whose gap is zero at the state, to 1e-9.
     restitution : float, or mapping of contacts or names to floats, optional
         Coefficients in place of those of the contacts.
@@ -152,7 +153,7 @@ def impact(
 def _chosen(gaps, items, near):
     """Numbers of the gaps of some contacts; of a stop with two bounds the one that is near."""
     found = []
-    for item in items:
+    for item in [items] if isinstance(items, (str, Attachment)) else items:
         mine = [i for i, gap in enumerate(gaps.list) if item is gap.contact or item == gap.contact.name]
         if not mine:
             raise InvalidConstraint(f"impact: {item!r} is no unilateral constraint of the scene.")

@@ -70,6 +70,7 @@ class Phases:
     packed : Packed
         Of the scene with the rows of all units.
     gaps : Gaps
+        Of this scene. Phases with other parameters have their own.
 
     Attributes
     ----------
@@ -90,7 +91,7 @@ class Phases:
     def __init__(self, packed, gaps):
         self.whole, self.gaps, self.list, self.impulses = packed, gaps, [], []
         self.starts, self.of, self.gains, self.changes = [], [], {}, []
-        self.packed, self.modes, self._columns, self._known = [], [], [], {}  # of each kind of phase
+        self.packed, self.modes, self._gaps, self._columns, self._known = [], [], [], [], {}  # of each kind of phase
         self.scenes = []  # of each kind, of phases that were restored
 
     @property
@@ -99,15 +100,16 @@ class Phases:
         forces = {load.force.name for load in self.whole.loads}
         return any(values or not forces.isdisjoint(inactive) for inactive, values in self.changes)
 
-    def kind(self, packed, modes, whole):
+    def kind(self, packed, modes, whole, gaps):
         """The number of the kind of phases that are packed so.
 
-        modes: what makes its scene again, for files. whole: the scene with its parameters, packed.
+        modes: what makes its scene again, for files. whole, gaps: of the scene with its parameters, packed.
         """
         kind = self._known.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
             self.packed.append(packed)
             self.modes.append(modes)
+            self._gaps.append(gaps)
             self._columns.append(shared_rows(whole, packed))
         return kind
 
@@ -146,11 +148,13 @@ class Phases:
         out = np.zeros((len(numbers), m))
         for kind, mine, some in self._gathered(numbers, arrays):
             rows, columns = self._columns[kind]
-            lam, own = reactions.multipliers(self.packed[kind], *some), np.zeros((mine.size, m))
+            *motion, memory = some
+            lam = reactions.multipliers(self.packed[kind], *motion, self._own_memory(kind, memory))
+            own = np.zeros((mine.size, m))
             own[:, rows] = lam[:, columns]
             modes = self._modes(kind)
             if modes.grips:
-                add_friction(self.gaps, modes, self.packed[kind], *some[:3], lam, own)
+                add_friction(self._gaps[kind], modes, self.packed[kind], *motion[:3], lam, own)
             out[mine] = own
         return out
 
@@ -179,22 +183,33 @@ class Phases:
         for kind, mine, (own, *some) in self._gathered(numbers, (lam, t, q, qd)):
             which = [i for i, d in self._modes(kind).grips.items() if d is not None]
             if which:
-                out[np.ix_(mine, which)] = losses(self.gaps, which, own, *some)
+                out[np.ix_(mine, which)] = losses(self._gaps[kind], which, own, *some)
         return out
 
     def with_normal_loads(self, numbers, t, q, qd, qdd, memory):
         """As `reactions.with_normal_loads`: the rows that hold frictions in a phase take their part of the loads."""
-        out = [None] * len(numbers)
+        slots, columns = memory.shape[1], {load.force.name: load.normal for load in self.whole.loads}
+        out = np.zeros((len(numbers), slots + self.whole.system.normals.size))
+        out[:, :slots] = memory
         for kind, mine, some in self._gathered(numbers, (t, q, qd, qdd, memory)):
-            for i, row in zip(mine, reactions.with_normal_loads(self.packed[kind], *some), strict=True):
-                out[i] = row
-        return np.array(out).reshape(len(numbers), -1)
+            found = reactions.with_normal_loads(self.packed[kind], *some)
+            for load in self.packed[kind].loads:  # without those that are inactive
+                if load.normal >= 0:
+                    out[mine, slots + columns[load.force.name]] = found[:, slots + load.normal]
+        return out
+
+    def _own_memory(self, kind, memory):
+        """Memory of forces in a phase, without normal loads where it has not those of the scene."""
+        system = self.whole.system
+        same = self.packed[kind].system.normals.size == system.normals.size
+        return memory if same or memory is None else memory[:, : system.memory.size]
 
     def constraint_error(self, numbers, *arrays):
         """The `ConstraintError` of the rows that hold."""
         out = np.zeros((3, len(numbers)))
         for kind, mine, some in self._gathered(numbers, arrays):
-            out[:, mine] = diagnostics.constraint_error(self.packed[kind], *some)
+            *motion, memory = some
+            out[:, mine] = diagnostics.constraint_error(self.packed[kind], *motion, self._own_memory(kind, memory))
         return diagnostics.ConstraintError(*out)
 
     def packed_at(self, t):
@@ -209,17 +224,22 @@ class Phases:
         numbers = np.unique(self.at(np.atleast_1d(t))).tolist() or [0]
         kinds = {self.of[number] for number in numbers}
         one = kinds.pop() if len(kinds) == 1 else None
-        found = (None, None) if one is None else (self.packed[one], self._columns[one])
+        found = 3 * (None,) if one is None else (self.packed[one], self._columns[one], self._gaps[one].packed)
         return StatePhase(*self.changes[numbers[-1]], *found)
 
-    def parts(self, solution):
-        """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are."""
+    def parts(self, solution, whole):
+        """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are.
+
+        whole: with all constraints of the scene, not with the rows and forces of the phase.
+        """
         if not self.packed:
             raise StorageError("phases differ in forces or parameters, and the file has no scene: pass scene=.")
         for kind, mine, _ in self._gathered(solution._phase_of_rows, ()):
             part = solution._picked(mine)
-            packed = self.packed[kind]
+            packed = self._gaps[kind].packed if whole else self.packed[kind]
             part.packed, part.system, part.handles, part._phases = packed, packed.system, handles_of(packed), None
+            if whole:
+                part.multipliers = solution.multipliers[mine]
             yield part, mine
 
     def active(self, item, numbers):
@@ -264,7 +284,7 @@ class Phases:
         }
 
     def restore(self, numbers, arrays, scene_of=None):
-        """As they were when they were saved; scene_of(modes): the scene of a phase, None where there is none.
+        """As they were when they were saved; scene_of(modes): its scene and gaps, None where there are none.
 
         Raises
         ------
@@ -295,11 +315,11 @@ class Phases:
             self.modes = numbers["modes"]
             return
         for modes, derived in zip(numbers["modes"], numbers["derived"], strict=True):
-            scene = scene_of(modes)
+            scene, gaps = scene_of(modes)
             packed = scene.packed
             if derived != derived_record(packed):
                 take_derived(packed, derived)
-            self.kind(packed, modes, packed if scene._whole is None else scene._whole.packed)
+            self.kind(packed, modes, packed if scene._whole is None else scene._whole.packed, gaps)
             self.scenes.append(scene)
 
 

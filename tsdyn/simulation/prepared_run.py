@@ -49,19 +49,19 @@ if TYPE_CHECKING:
 # segments.py.
 
 
-def first_method(options, prepared):
-    """Return the method that a run of these `RunOptions` begins with."""
+def first_method(options, prepared, scene=None):
+    """Return the method that a run of these `RunOptions` begins with; scene: with the rows of all of its phases."""
     method = options.method
     if method is None:
         series = options.may_use_series and not prepared.refusal and prepared.pays
         method = adaptive(Taylor if series else DOP853, options.rtol, options.atol)
-    _demand_served(method, options.form, prepared)
+    _demand_served(method, options.form, prepared, scene or prepared.packed)
     return method if options.max_step is None else frozen(method.bounded(options.max_step))
 
 
-def _demand_served(method, form, prepared):
-    """Refuse a method that doesn't solve for the stages of such a scene."""
-    if method.implicit and form.is_mixed(has_rates(prepared.packed)):
+def _demand_served(method, form, prepared, scene):
+    """Refuse a method that doesn't solve for the stages of such a scene, in whichever phase."""
+    if method.implicit and form.is_mixed(has_rates(scene)):
         raise InvalidArgument(
             f"{type(method).__name__} doesn't solve for its stages in the null-space form where there are rows on "
             "velocities: use formulation='tangent', which does, or an explicit method."
@@ -182,7 +182,7 @@ class Run:
         self._prepare_kernels(options.dense_output or options.events is not None)
         self._prepared = kept = prepared(self._first)
         self._packed, self._start = scene.packed, scene._initial()
-        self.method = method = first_method(options, kept)
+        self.method = method = first_method(options, kept, scene)
         self._driver = DRIVERS.get(method.driver, method.driver)
 
     @fitting

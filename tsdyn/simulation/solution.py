@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from ..calls import fitting, fitting_methods
+from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
 from ..formulations.chart_validity import REASONS
 from ..methods.integrator import is_plain
@@ -455,7 +456,9 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         return self._phases.losses(numbers, lam, t, q, qd)
 
     def _losses_of(self, part, losses):
-        """The part (k,) of losses (k, contacts) that is of a constraint or force."""
+        """The part (k,) of losses (k, contacts) that is of a constraint or force, or of no force of packed scenes."""
+        if part is None:  # where packed scenes of phases are asked, friction of contacts is among their forces
+            return 0.0 if self._phases is not None and self._phases.varies else losses.sum(axis=1)
         mine = [] if self._phases is None else self._phases.gaps.of_contact(part)
         return losses[:, mine].sum(axis=1)
 
@@ -513,10 +516,9 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> print(force[-1].round(6) + 0.0, torque[-1].round(6) + 0.0)
         [ 0.  0. 20.] [  0. -20.   0.]
         """
-        phases = self._phases
-        if phases is None or not (phases.varies or getattr(self.handles.item(item), "slides", ())):
-            return exerted(self, item, on)
-        return gathered(self, lambda part: exerted(part, item, on))
+        kind = self.handles.item(item)
+        ask = gathered if self._phases is not None and getattr(kind, "slides", ()) else by_phase
+        return ask(self, lambda part: exerted(part, item, on), not isinstance(kind, Force))
 
     def sticking(self, friction: ItemLike) -> Bools:
         """Whether a friction of the exact law sticks: (k,).
@@ -580,7 +582,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> print(ts.simulate(scene, (0, 1)).contact_point(contact)[-1].round(9) + 0.0)
         [1. 2. 0.]
         """
-        return reactions.contact_point(self, constraint)
+        return by_phase(self, lambda part: reactions.contact_point(part, constraint), True)
 
     def friction_demand(self, constraint: ItemLike) -> Floats:
         """Tangential over normal force at a contact, (k,): the coefficient of friction that rolling needs at least.
@@ -599,7 +601,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         >>> print(f"{ts.simulate(scene, (0, 1)).friction_demand(contact)[-1]:.6f}")
         0.285714
         """
-        return by_phase(self, lambda part: reactions.friction_demand(part, constraint))
+        return by_phase(self, lambda part: reactions.friction_demand(part, constraint), True)
 
     def reaction_unique(self, item: ItemLike, on: BodyLike | None = None) -> Bools:
         """Return True where `reaction` is unique, at each output: bool (k,).

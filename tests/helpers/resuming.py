@@ -1,4 +1,4 @@
-"""Runs that are stopped, and whether what goes on from there is the same to the bit."""
+"""Runs that are stopped and gone on with."""
 
 import numpy as np
 

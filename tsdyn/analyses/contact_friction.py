@@ -17,7 +17,7 @@ import numpy as np
 from ..elements.tolerances import LEAST_SLIP
 from ..maths.coulomb_cone import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
-from .contact_problem import NoSolution, Settled, depends, energy_gain
+from .contact_problem import NoSolution, Settled, depends, energy_gain, slack_of
 from .tolerances import AT_BOUND, DEPENDENT, LEVEL, WITHIN_BOUND
 
 
@@ -124,7 +124,8 @@ def settle_grips(inertia, resting, qd, fired=()):
             else:
                 grips[i] = inertia.along(i, -T[j] / length)
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
-    return Settled(closed, idle, gdd, grips, _independent(inertia, closed, grips))
+    slack = slack_of(inertia, closed, dict(zip(resting, N, strict=True)), small)
+    return Settled(closed, idle, gdd, grips, _independent(inertia, closed, grips), slack)
 
 
 def _independent(inertia, closed, grips):
@@ -159,9 +160,11 @@ def _demand_unique(G, d, mu, mode):
         if known[j]:
             load[j, 1:, 0] = -mu[j] * d[j]
     held = [3 * j + i for j in np.flatnonzero(mode != OPEN) for i in range(1 if mode[j] != STICKS else 3)]
+    size = np.diag(G)
+    held = [r for r in held if size[r] > DEPENDENT**2 * size.max()]  # bilateral rows hold the others
     own = G.reshape(G.shape[0], -1, 3)
     A = np.einsum("rji,jik->rjk", own, load).reshape(G.shape)[np.ix_(held, held)]
-    scale = np.sqrt(np.diag(G)[held])
+    scale = np.sqrt(size[held])
     A = A / scale[:, None] / scale
     values = np.linalg.eigvals(A)
     if (values.real < -RANK_TOL).any():

@@ -295,6 +295,7 @@ class Settled(NamedTuple):
     accelerations: np.ndarray  # (count,) of all gaps
     grips: dict = MappingProxyType({})  # of those with friction, see contact_friction.py
     rows: dict = MappingProxyType({})  # of closed ones that stick: which of the two rows of the slip are independent
+    slack: dict = MappingProxyType({})  # of closed ones whose reactions are rounding: what these may fall below zero
 
 
 def settle(inertia, resting, qd, fired=()):
@@ -336,7 +337,13 @@ def settle(inertia, resting, qd, fired=()):
             idle.append(i)
         else:
             closed.append(i)
-    return Settled(sorted(closed), idle, gdd)
+    pushes = dict(zip(resting, lam, strict=True))
+    return Settled(sorted(closed), idle, gdd, slack=slack_of(inertia, closed, pushes, small))
+
+
+def slack_of(inertia, closed, pushes, small):
+    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations."""
+    return {i: small[i] / inertia.G[i, i] for i in closed if pushes[i] * inertia.G[i, i] <= small[i]}
 
 
 def depends(inertia, closed, i):

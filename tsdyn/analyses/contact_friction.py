@@ -135,6 +135,7 @@ def _independent(inertia, closed, grips):
         return {}
     rows = np.concatenate([inertia.J[closed], inertia.tangents[sticks].reshape(2 * len(sticks), -1)])
     loads, kept = inertia.free(rows.T).T, np.ones(len(rows), bool)
+    held = DEPENDENT**2 * (rows * loads).sum(axis=1).max()  # by bilateral rows
     for k in range(len(rows)):  # Gram-Schmidt in the metric of kinetic energy
         size = rows[k] @ loads[k]
         for j in np.flatnonzero(kept[:k]):
@@ -142,7 +143,7 @@ def _independent(inertia, closed, grips):
             rows[k] -= share * rows[j]
             loads[k] -= share * loads[j]
         left = rows[k] @ loads[k]
-        kept[k] = k < len(closed) or left > DEPENDENT * size
+        kept[k] = k < len(closed) or left > max(DEPENDENT * size, held)
         if kept[k]:
             rows[k] /= np.sqrt(max(left, TINY))
             loads[k] /= np.sqrt(max(left, TINY))

@@ -342,13 +342,19 @@ def settle(inertia, resting, qd, fired=()):
 
 
 def slack_of(inertia, closed, pushes, small):
-    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations."""
-    return {i: small[i] / inertia.G[i, i] for i in closed if pushes[i] * inertia.G[i, i] <= small[i]}
+    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations.
+
+    Accelerations may be zero as bilateral reactions carry the weight: its rounding is in them.
+    """
+    small = small + LEVEL * np.abs(inertia.J).sum(axis=1) * np.abs(inertia.gaps.packed.system.gravity).max()
+    return {i: float(small[i] / inertia.G[i, i]) for i in closed if pushes[i] * inertia.G[i, i] <= small[i]}
 
 
 def depends(inertia, closed, i):
     """Whether the row of a gap depends on those of closed ones and on the bilateral rows."""
-    own, alone = inertia.response[i], inertia.J[i]
+    own, alone, mobile = inertia.response[i], inertia.J[i], np.diag(inertia.G)
+    if mobile[i] <= DEPENDENT**2 * mobile.max():  # bilateral rows hold it
+        return True
     if not closed:
         return not inertia.G[i, i] > DEPENDENT**2 * np.linalg.norm(alone) * np.linalg.norm(own)
     share = np.linalg.lstsq(inertia.among(closed), inertia.G[closed, i], rcond=None)[0]

@@ -114,7 +114,7 @@ def settle_grips(inertia, resting, qd, fired=()):
         pushes = N[j] * G[3 * j, 3 * j] > small[i]
         if not pushes and (gdd[i] > small[i] or i in fired):
             continue
-        (idle if depends(inertia, closed, i) else closed).append(i)
+        (idle if _is_idle(inertia, closed, i, grips, pushes) else closed).append(i)
         if gaps.rubs[i]:
             length = np.hypot(*T[j])
             if slides[j]:
@@ -126,6 +126,12 @@ def settle_grips(inertia, resting, qd, fired=()):
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
     slack = slack_of(inertia, closed, dict(zip(resting, N, strict=True)), small)
     return Settled(closed, idle, gdd, grips, _independent(inertia, closed, grips), slack)
+
+
+def _is_idle(inertia, closed, i, grips, pushes):
+    """Whether closed contacts hold a gap; where it doesn't push, with their friction."""
+    sticks = () if pushes else [k for k in closed if grips.get(k, ()) is None]
+    return depends(inertia, closed, i, sticks)
 
 
 def _independent(inertia, closed, grips):
@@ -189,7 +195,7 @@ def _carried(inertia, closed, idle, grips, N, resting):
     shares, _ = nnls(columns / size, columns @ given)
     closed, idle = [], []
     for j in np.argsort(-shares):
-        (idle if depends(inertia, closed, which[j]) else closed).append(which[j])
+        (idle if _is_idle(inertia, closed, which[j], grips, shares[j] > 0.0) else closed).append(which[j])
     return sorted(closed), sorted(idle)
 
 

@@ -108,13 +108,17 @@ def settle_grips(inertia, resting, qd, fired=()):
     _demand_unique(G, d, mu, mode)
     gdd = c + inertia.J @ (response @ p)
     small = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p))
-    closed, idle, grips = [], [], {}
+    closed, idle, spare, grips = [], [], [], {}
     for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
         i = resting[j]
         pushes = N[j] * G[3 * j, 3 * j] > small[i]
         if not pushes and (gdd[i] > small[i] or i in fired):
             continue
-        (idle if _is_idle(inertia, closed, i, grips, pushes) else closed).append(i)
+        sticks = [k for k in closed if grips.get(k, ()) is None]
+        if not pushes and depends(inertia, closed, i, sticks):  # the friction of others holds it
+            spare.append(i)
+        else:
+            (idle if depends(inertia, closed, i) else closed).append(i)
         if gaps.rubs[i]:
             length = np.hypot(*T[j])
             if slides[j]:
@@ -125,13 +129,7 @@ def settle_grips(inertia, resting, qd, fired=()):
                 grips[i] = inertia.along(i, -T[j] / length)
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
     slack = slack_of(inertia, closed, dict(zip(resting, N, strict=True)), small)
-    return Settled(closed, idle, gdd, grips, _independent(inertia, closed, grips), slack)
-
-
-def _is_idle(inertia, closed, i, grips, pushes):
-    """Whether closed contacts hold a gap; where it doesn't push, with their friction."""
-    sticks = () if pushes else [k for k in closed if grips.get(k, ()) is None]
-    return depends(inertia, closed, i, sticks)
+    return Settled(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack)
 
 
 def _independent(inertia, closed, grips):
@@ -195,7 +193,7 @@ def _carried(inertia, closed, idle, grips, N, resting):
     shares, _ = nnls(columns / size, columns @ given)
     closed, idle = [], []
     for j in np.argsort(-shares):
-        (idle if _is_idle(inertia, closed, which[j], grips, shares[j] > 0.0) else closed).append(which[j])
+        (idle if depends(inertia, closed, which[j]) else closed).append(which[j])
     return sorted(closed), sorted(idle)
 
 

@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from .tolerances import CONE_FACTORS, CONE_LEFT, CONE_ROUNDING, CONE_SLIP, CONE_STALLED, CONE_STEPS, CONE_SWEEPS, RANK_TOL
+from .tolerances import (
+    CONE_FACTORS,
+    CONE_LEFT,
+    CONE_ROUNDING,
+    CONE_SLIP,
+    CONE_STALLED,
+    CONE_STEPS,
+    CONE_SWEEPS,
+    RANK_TOL,
+)
 
 # u = G p + b, p = (N, T) of each contact, T in two directions. Contacts with slip of a known direction d have
 # T = -mu N d. With y = p - r u, r > 0, all in units in which the diagonal of G is about one, p solves the problem where

@@ -217,9 +217,12 @@ class Transitions:
                 more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
                 p = p + more
             a = self._lowering(inertia, touching, qd, after)
+        # Impulses that change rates by less than rounding are none
+        small, named = AT_REST * inertia.sizes(self.qd), zip(touching, p, strict=True)
+        self.phases.impulses += [
+            (self.t, self.gaps.names[i], float(x)) for i, x in named if x * inertia.G[i, i] > small[i]
+        ]
         self.qd = qd
-        named = zip(touching, p, strict=True)
-        self.phases.impulses += [(self.t, self.gaps.names[i], float(x)) for i, x in named if x > 0.0]
         return after
 
     def _jump(self, inertia, touching, before, e, qd=None):

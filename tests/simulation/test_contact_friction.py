@@ -465,3 +465,24 @@ def test_bad_coefficients():
             C.RollingBall(body, ground, radius=0.5, normal_b=(0, 0, 1), **{name: 0.3})
     with pytest.raises(ts.InvalidForce, match="no friction of the exact law"):
         ts.simulate(scene, (0, 0.1)).sticking(scene.add(ts.forces.PointForce(block, force=(0, 0, 0.1))))
+
+
+def test_links_that_lie_on_a_floor_hold_each_other():
+    """A link of 1 kg leans from a hinge to the floor, another one lies beyond: all is held, across the plane by joints.
+
+    Weights are shared in halves; slips that bilateral constraints hold have no friction.
+    """
+    scene, height = ts.Scene(gravity=(0, 0, -G)), 0.3
+    reach, law = np.sqrt(1.0 - height**2), FLOOR | {"point_a": (0.5, 0, 0), "kinetic": 0.6}
+    leaning = Rotation.from_euler("y", np.arcsin(height))
+    one = scene.add_body(1.0, (0.01, 0.1, 0.1), (reach / 2, 0, height / 2), leaning)
+    two = scene.add_body(1.0, (0.01, 0.1, 0.1), (reach + 0.5, 0, 0))
+    scene.add(C.Revolute.at(scene.ground, one, point=(0, 0, height), axis=(0, 1, 0)))
+    scene.add(C.Revolute.at(one, two, point=(reach, 0, 0), axis=(0, 1, 0)))
+    for body, name in ((one, "first"), (two, "second")):
+        scene.add(C.PlaneContact(body, scene.ground, **law, name=name))
+    solution = ts.simulate(scene, (0, 1))
+    assert motion(solution) == 0.0
+    assert np.isfinite(solution.multipliers).all()
+    for name, load in (("first", G), ("second", G / 2)):
+        np.testing.assert_allclose(solution.reaction(name)[0], np.tile([0, 0, load], (len(solution.t), 1)), atol=1e-9)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
+from scipy.special import ellipk
 
 import tsdyn as ts
 
@@ -380,3 +381,25 @@ def test_a_contact_that_is_pulled_from_the_start_opens_there(method):
     assert solution.phases[-1][0] < 1e-30
     np.testing.assert_allclose(solution.position(ahead)[-1, 0], 1.5, atol=1e-14)
     np.testing.assert_allclose(solution.position(behind)[-1], 0.0, atol=1e-30)
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_balls_of_a_cradle_that_hang_at_rest_touch_without_a_reaction(count):
+    """Rounding of a reaction that is zero opens no contact before the first ball comes, after a quarter of a period."""
+    scene, last = ts.Scene(gravity=(0, 0, -9.81)), None
+    for i in range(count):
+        tilt = 0.5 * (i == 0)
+        ball = scene.add_point_mass(1.0, (0.2 * i - np.sin(tilt), 0, -np.cos(tilt)))
+        scene.add(C.Distance(ball, scene.ground, point_b=(0.2 * i, 0, 0)))
+        if last is not None:
+            scene.add(C.SphereContact(last, ball, radius_a=0.1, radius_b=0.1, name=f"{i}"))
+        last = ball
+    solution = ts.simulate(scene, (0, 0.55))
+    start, end, touching = solution.phases[0]
+    assert (start, touching) == (0.0, tuple(str(i) for i in range(2, count)))
+    np.testing.assert_allclose(end, ellipk(np.sin(0.25) ** 2) / np.sqrt(9.81), rtol=1e-8)
+    # Plastic: all go on together
+    speed = np.sqrt(19.62 * (1 - np.cos(0.5)))
+    np.testing.assert_allclose(
+        [p for _, _, p in solution.impulses], speed * (1 - np.arange(1, count) / count), rtol=1e-8
+    )

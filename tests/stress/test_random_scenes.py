@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.helpers.drawn_numbers import DrawnNumbers
 from tsdyn.stress.judgement import comparison, judge_case, judge_scene
-from tsdyn.stress.random_scenes import KINDS, Draw, drawn, generate
+from tsdyn.stress.random_scenes import CONTACTS, KINDS, Draw, drawn, generate
 
 
 def test_every_kind_is_drawn():
@@ -33,6 +33,19 @@ def test_a_kind_is_drawn_of_one_body(kind):
 def test_a_random_scene(seed):
     found = judge_scene(seed, 2, 12)
     assert not found.fault, f"{found.name}: {found.word}: {found.said}"
+
+
+CONTACT_SCENES = (
+    *(("ropes", seed) for seed in (107, 110, 118)),  # a rope that comes back, after others have run
+    ("cradle", 115), ("balls", 138),  # reactions that are rounding
+    ("chain_over_floor", 9), ("chain_over_floor", 118),  # slips and links that bilateral constraints hold
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "seed"), CONTACT_SCENES)
+def test_a_scene_with_contacts_runs_to_its_end(kind, seed):
+    found = judge_case(drawn(np.random.default_rng(seed), 2, 8, {kind: CONTACTS[kind]}), ())
+    assert found.word == "success", f"{found.word}: {found.said}"
 
 
 @pytest.mark.slow

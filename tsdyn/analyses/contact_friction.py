@@ -17,7 +17,7 @@ import numpy as np
 from ..elements.tolerances import LEAST_SLIP
 from ..maths.coulomb_cone import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
-from .contact_problem import NoSolution, Settled, depends, energy_gain
+from .contact_problem import NoSolution, Settled, depends, energy_gain, slack_of
 from .tolerances import AT_BOUND, DEPENDENT, LEVEL, WITHIN_BOUND
 
 
@@ -108,13 +108,17 @@ def settle_grips(inertia, resting, qd, fired=()):
     _demand_unique(G, d, mu, mode)
     gdd = c + inertia.J @ (response @ p)
     small = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p))
-    closed, idle, grips = [], [], {}
+    closed, idle, spare, grips = [], [], [], {}
     for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
         i = resting[j]
         pushes = N[j] * G[3 * j, 3 * j] > small[i]
         if not pushes and (gdd[i] > small[i] or i in fired):
             continue
-        (idle if depends(inertia, closed, i) else closed).append(i)
+        sticks = [k for k in closed if grips.get(k, ()) is None]
+        if not pushes and depends(inertia, closed, i, sticks):  # the friction of others holds it
+            spare.append(i)
+        else:
+            (idle if depends(inertia, closed, i) else closed).append(i)
         if gaps.rubs[i]:
             length = np.hypot(*T[j])
             if slides[j]:
@@ -124,7 +128,8 @@ def settle_grips(inertia, resting, qd, fired=()):
             else:
                 grips[i] = inertia.along(i, -T[j] / length)
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
-    return Settled(closed, idle, gdd, grips, _independent(inertia, closed, grips))
+    slack = slack_of(inertia, closed, dict(zip(resting, N, strict=True)), small)
+    return Settled(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack)
 
 
 def _independent(inertia, closed, grips):
@@ -134,6 +139,7 @@ def _independent(inertia, closed, grips):
         return {}
     rows = np.concatenate([inertia.J[closed], inertia.tangents[sticks].reshape(2 * len(sticks), -1)])
     loads, kept = inertia.free(rows.T).T, np.ones(len(rows), bool)
+    held = DEPENDENT**2 * (rows * loads).sum(axis=1).max()  # by bilateral rows
     for k in range(len(rows)):  # Gram-Schmidt in the metric of kinetic energy
         size = rows[k] @ loads[k]
         for j in np.flatnonzero(kept[:k]):
@@ -141,7 +147,7 @@ def _independent(inertia, closed, grips):
             rows[k] -= share * rows[j]
             loads[k] -= share * loads[j]
         left = rows[k] @ loads[k]
-        kept[k] = k < len(closed) or left > DEPENDENT * size
+        kept[k] = k < len(closed) or left > max(DEPENDENT * size, held)
         if kept[k]:
             rows[k] /= np.sqrt(max(left, TINY))
             loads[k] /= np.sqrt(max(left, TINY))
@@ -159,9 +165,11 @@ def _demand_unique(G, d, mu, mode):
         if known[j]:
             load[j, 1:, 0] = -mu[j] * d[j]
     held = [3 * j + i for j in np.flatnonzero(mode != OPEN) for i in range(1 if mode[j] != STICKS else 3)]
+    size = np.diag(G)
+    held = [r for r in held if size[r] > DEPENDENT**2 * size.max()]  # bilateral rows hold the others
     own = G.reshape(G.shape[0], -1, 3)
     A = np.einsum("rji,jik->rjk", own, load).reshape(G.shape)[np.ix_(held, held)]
-    scale = np.sqrt(np.diag(G)[held])
+    scale = np.sqrt(size[held])
     A = A / scale[:, None] / scale
     values = np.linalg.eigvals(A)
     if (values.real < -RANK_TOL).any():

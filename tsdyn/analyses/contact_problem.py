@@ -299,6 +299,7 @@ class Settled(NamedTuple):
     accelerations: np.ndarray  # (count,) of all gaps
     grips: dict = MappingProxyType({})  # of those with friction, see contact_friction.py
     rows: dict = MappingProxyType({})  # of closed ones that stick: which of the two rows of the slip are independent
+    slack: dict = MappingProxyType({})  # of closed ones whose reactions are rounding: what these may fall below zero
 
 
 def settle(inertia, resting, qd, fired=()):
@@ -340,14 +341,30 @@ def settle(inertia, resting, qd, fired=()):
             idle.append(i)
         else:
             closed.append(i)
-    return Settled(sorted(closed), idle, gdd)
+    pushes = dict(zip(resting, lam, strict=True))
+    return Settled(sorted(closed), idle, gdd, slack=slack_of(inertia, closed, pushes, small))
 
 
-def depends(inertia, closed, i):
-    """Whether the row of a gap depends on those of closed ones and on the bilateral rows."""
-    own, alone = inertia.response[i], inertia.J[i]
+def slack_of(inertia, closed, pushes, small):
+    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations.
+
+    Accelerations may be zero as bilateral reactions carry the weight: its rounding is in them.
+    """
+    small = small + LEVEL * np.abs(inertia.J).sum(axis=1) * np.abs(inertia.gaps.packed.system.gravity).max()
+    return {i: float(small[i] / inertia.G[i, i]) for i in closed if pushes[i] * inertia.G[i, i] <= small[i]}
+
+
+def depends(inertia, closed, i, sticks=()):
+    """Whether the row of a gap depends on those of closed ones, on slips of those that stick, and on bilateral rows."""
+    own, alone, mobile = inertia.response[i], inertia.J[i], np.diag(inertia.G)
+    if mobile[i] <= DEPENDENT**2 * mobile.max():  # bilateral rows hold it
+        return True
     if not closed:
         return not inertia.G[i, i] > DEPENDENT**2 * np.linalg.norm(alone) * np.linalg.norm(own)
-    share = np.linalg.lstsq(inertia.among(closed), inertia.G[closed, i], rcond=None)[0]
-    left = own - share @ inertia.response[closed]
+    rows, loads = inertia.J[closed], inertia.response[closed]
+    if len(sticks):
+        slips = inertia.tangents[sticks].reshape(2 * len(sticks), -1)
+        rows, loads = np.concatenate([rows, slips]), np.concatenate([loads, inertia.free(slips.T).T])
+    share = np.linalg.lstsq(rows @ loads.T, rows @ own, rcond=RANK_TOL**2 if len(sticks) else None)[0]
+    left = own - share @ loads
     return bool(np.linalg.norm(left) <= DEPENDENT * np.linalg.norm(own))

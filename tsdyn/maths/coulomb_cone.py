@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from .tolerances import CONE_FACTORS, CONE_LEFT, CONE_ROUNDING, CONE_STALLED, CONE_STEPS, CONE_SWEEPS, RANK_TOL
+from .tolerances import (
+    CONE_FACTORS,
+    CONE_LEFT,
+    CONE_ROUNDING,
+    CONE_SLIP,
+    CONE_STALLED,
+    CONE_STEPS,
+    CONE_SWEEPS,
+    RANK_TOL,
+)
 
 # u = G p + b, p = (N, T) of each contact, T in two directions. Contacts with slip of a known direction d have
 # T = -mu N d. With y = p - r u, r > 0, all in units in which the diagonal of G is about one, p solves the problem where
@@ -50,7 +59,7 @@ def solve_cone(G, b, mu, slip=None, given=None):
     problem = _Problem(G * scale[:, None] * scale, b * scale / size, mu, slip, given)
     p = np.zeros(3 * k)
     with np.errstate(over="ignore", invalid="ignore"):  # where there is no solution
-        for left, counts in ((0.0, CONE_SWEEPS), (CONE_LEFT, CONE_SWEEPS[:1])):
+        for left, counts in ((0.0, CONE_SWEEPS), (CONE_LEFT, CONE_SWEEPS[:1]), (CONE_SLIP, CONE_SWEEPS[:1])):
             for sweeps in counts:
                 p = problem.swept(p, sweeps)
                 for factor in CONE_FACTORS if np.isfinite(p).all() else ():
@@ -103,7 +112,10 @@ class _Problem:
         return D
 
     def newton(self, p, factor, left):
-        """A solution from a start; None where the method stalls with more than `left` of its terms."""
+        """A solution from a start; None where the method stalls with more than `left` of its terms.
+
+        In normal directions CONE_LEFT is left at most.
+        """
         F, y = self.residual(p, factor)
         eye, best, stalled = np.eye(p.size), np.inf, 0
         for _ in range(CONE_STEPS):
@@ -115,9 +127,9 @@ class _Problem:
                 return self.image(y).ravel()  # without the rounding of zeros
             stalled = 0 if size < 0.5 * best else stalled + 1
             if size <= best:
-                best, nearest = size, self.image(y).ravel()
+                best, normal, nearest = size, np.abs(F[::3]).max(), self.image(y).ravel()
             if stalled > CONE_STALLED:  # b of rows that depend on each other may disagree by rounding
-                return nearest if best <= left * terms else None
+                return nearest if best <= left * terms and normal <= CONE_LEFT * terms else None
             step = np.linalg.lstsq(eye - self.slope(y) @ (eye - factor * self.G), -F, rcond=RANK_TOL**2)[0]
             share = 1.0
             while True:

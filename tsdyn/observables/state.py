@@ -183,5 +183,7 @@ def begin_memory(packed, handles, angles, memory, items=None):
                 memory[load.slot] = angles[row.first + load.force.which]
     for part, slot in zip(packed.constraints, packed.slots, strict=True) if memory.size else ():
         if slot >= 0 and (chosen is None or not chosen.isdisjoint((id(part), id(part.owner)))):
+            if chosen and not part.counted:
+                memory[slot : slot + part.memory] = part.first_memory
             for i, (joint, which) in enumerate(part.counted):
                 memory[slot + i] = angles[handles.row(joint, "angle").first + which]

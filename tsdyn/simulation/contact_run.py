@@ -383,7 +383,8 @@ class _ContactRun(Transitions):
         else:
             first = first_row_of(packed)
             sides = [gaps.list[i].side for i in modes.closed]
-            leaving = Leaving(packed, [first[id(side.row)] for side in sides], [side.sign for side in sides]).over
+            rows, slack = [first[id(side.row)] for side in sides], [modes.slack.get(i, 0.0) for i in modes.closed]
+            leaving = Leaving(packed, rows, [side.sign for side in sides], slack).over
         self.closing = Closing(gaps, modes.opened, TOUCHING * self.length)
         for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):

@@ -117,6 +117,7 @@ class Reactions:
         self.normal = [first[id(_gap_row(gaps, modes, i))] for i in self.closed]
         self.slip = np.array([_slip_columns(gaps.list[i].contact, first) for i in self.sticks], int).reshape(-1, 2)
         self.which = [self.closed.index(i) for i in self.sticks]
+        self.slack = np.array([modes.slack.get(i, 0.0) for i in modes.closed])
 
     def over(self, states):
         """Values (k, closed and sticking) of states at k times."""
@@ -126,7 +127,8 @@ class Reactions:
         held = N[:, self.which]
         T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
         T = carried(self.gaps, self.sticks, states.t, states.q, held, T)
-        return np.hstack([N, self.gaps.static[self.sticks] * held - np.hypot(*np.moveaxis(T, 2, 0))])
+        N = N + self.slack
+        return np.hstack([N, self.gaps.static[self.sticks] * N[:, self.which] - np.hypot(*np.moveaxis(T, 2, 0))])
 
 
 def _gap_row(gaps, modes, i):

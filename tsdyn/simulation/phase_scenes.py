@@ -85,8 +85,9 @@ def _pack_phase(phase, scene, holds, held):
 
 
 def _remembering(packed, whole):
-    """Packed with the memory of a whole scene; what is missing is kept in a number that nothing reads."""
-    own, memory = _slots(packed), np.full(whole.system.memory.size, packed.system.reals.size)
+    """Packed with the memory of a whole scene; what is missing is kept in numbers that nothing reads."""
+    own, size = _slots(packed), whole.system.memory.size
+    memory = packed.system.reals.size + np.arange(size)
     found = _slots(whole)
     for item, slots in own.items():
         memory[found[item]] = packed.system.memory[slots]
@@ -95,7 +96,7 @@ def _remembering(packed, whole):
     first = {item: slots.start for item, slots in found.items()}
     pairs = zip(packed.constraints, packed.slots, strict=True)
     return packed._replace(
-        system=packed.system._replace(memory=memory, reals=np.append(packed.system.reals, 0.0)),
+        system=packed.system._replace(memory=memory, reals=np.append(packed.system.reals, np.zeros(size))),
         loads=tuple(load if load.slot < 0 else load._replace(slot=first[id(load.force)]) for load in packed.loads),
         slots=tuple(slot if slot < 0 else first[id(part)] for part, slot in pairs),
     )

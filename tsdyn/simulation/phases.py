@@ -30,6 +30,7 @@ class UnitModes:
 
     grips: dict = field(default_factory=dict)  # of closed contacts with friction: see grips.py
     held: dict = field(default_factory=dict)
+    slack: dict = field(default_factory=dict)  # closed with a reaction of rounding: how far below zero it leaves, N
 
     def same(self, other):
         """Whether the units are in the same modes, whatever has just opened."""

@@ -13,6 +13,8 @@ from ..errors import (
     Status,
 )
 from ..maths.tolerances import EPS
+from ..model.handles import handles_of
+from ..observables.state import begin_memory
 from ..validation import listed
 from .grips import renewed
 from .impacts import held, impact_of, jumped
@@ -92,12 +94,15 @@ class Transitions:
                 self.qd = halted(inertia, self.qd, resting)
                 settled = settle_grips(inertia, resting, self.qd, leaving)
                 grips, places = renewed(self.gaps, before, settled, self.q)
-                self.modes = UnitModes(settled.closed, settled.idle, opened, grips=grips, held=places)
+                self.modes = UnitModes(
+                    settled.closed, settled.idle, opened, grips=grips, held=places, slack=settled.slack
+                )
             elif resting:
-                self.modes = UnitModes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
-            self._begin_anew([i for i in self.modes.closed if i not in before.closed])
+                settled = settle(inertia, resting, self.qd, leaving)
+                self.modes = UnitModes(settled.closed, settled.idle, opened, slack=settled.slack)
             kept = {*self.modes.closed, *self.modes.idle}
             opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
+            self._begin_memory([i for i in self.modes.closed if i not in before.closed])
         except SingularConfiguration as error:
             self.reason = str(error)
             return Status.SINGULAR
@@ -112,17 +117,13 @@ class Transitions:
             return Status.CONTACT_FAILED
         return None
 
-    def _begin_anew(self, closed):
-        """Let rows of gaps that have just closed forget what they remembered of an earlier phase."""
-        parts = {
-            id(part) for i in closed for part in getattr(self.gaps.list[i].side.row, "parts", ()) if part.begins_anew
-        }
-        if not parts:
-            return
-        self.remembered = self.remembered.copy()
-        for part, slot in zip(self.scene.packed.constraints, self.scene.packed.slots, strict=True):
-            if id(part) in parts:
-                self.remembered[self.count + slot : self.count + slot + part.memory] = 0.0
+    def _begin_memory(self, closed):
+        """Rows that come remember nothing of a time when they held: a rope may have turned over since."""
+        items = [item for i in closed for item in (self.gaps.list[i].contact, self.gaps.list[i].side.row)]
+        if items and self.scene.system.memory.size:
+            self.remembered, packed = self.remembered.copy(), self.scene.packed
+            angles, memory = self.remembered[: self.count], self.remembered[self.count :]
+            begin_memory(packed, handles_of(packed), angles, memory, items)
 
     def _settle_frictions(self, before, fired):
         """Which frictions stick; the Status if there is no way on, else None."""
@@ -216,9 +217,12 @@ class Transitions:
                 more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
                 p = p + more
             a = self._lowering(inertia, touching, qd, after)
+        # Impulses that change rates by less than rounding are none
+        small, named = AT_REST * inertia.sizes(self.qd), zip(touching, p, strict=True)
+        self.phases.impulses += [
+            (self.t, self.gaps.names[i], float(x)) for i, x in named if x * inertia.G[i, i] > small[i]
+        ]
         self.qd = qd
-        named = zip(touching, p, strict=True)
-        self.phases.impulses += [(self.t, self.gaps.names[i], float(x)) for i, x in named if x > 0.0]
         return after
 
     def _jump(self, inertia, touching, before, e, qd=None):

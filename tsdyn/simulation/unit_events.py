@@ -66,7 +66,7 @@ class _Loads:
 
 
 class Leaving:
-    """The reactions of closed contacts, positive where they push, as event functions.
+    """The reactions of closed contacts, positive where they push, and their slack, as event functions.
 
     Parameters
     ----------
@@ -75,10 +75,12 @@ class Leaving:
     rows : list of int
     signs : list of float
         Of the gaps over Phi.
+    slack : list of float
+        What a reaction may fall below zero.
     """
 
-    def __init__(self, packed, rows, signs):
-        self.packed, self.rows, self.signs = packed, rows, np.array(signs)
+    def __init__(self, packed, rows, signs, slack):
+        self.packed, self.rows, self.signs, self.slack = packed, rows, np.array(signs), np.array(slack)
 
     @cached_property
     def workspace(self):
@@ -92,7 +94,7 @@ class Leaving:
         else:
             memory = np.tile(states.memory, (states.t.size, 1))
             lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
-        return -self.signs * lam[:, self.rows]
+        return self.slack - self.signs * lam[:, self.rows]
 
 
 class Breaking:

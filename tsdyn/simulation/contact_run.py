@@ -335,6 +335,11 @@ class _ContactRun(Transitions):
             return phase_with_friction(self.scene, self.gaps, self.modes, holds, self.without)
         return self._scene_of(self._closed_rows(), holds)
 
+    def holds(self):
+        """Whether each friction sticks, or is held by what sticks."""
+        held = {*self.modes.sticking, *self.modes.blocked}
+        return len(held) == self.frictions.count and all(d is None for d in self.modes.grips.values())
+
     def filled(self):
         """The same, with what the run remembers among its packed numbers."""
         phase = self._scene()

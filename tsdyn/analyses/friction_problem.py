@@ -352,6 +352,10 @@ class RestProblem:
         places = np.cumsum([0, *(len(each) for each in rows.values())])
         self.at = {i: np.arange(*places[k : k + 2]) for k, i in enumerate(rows)}
 
+    def is_dead(self, i):
+        """Whether no motion that the other rows leave moves a unit."""
+        return bool(self.dead[self.at[i]].all())
+
     def solve(self, ways):
         """Multipliers x of the rows, and normal loads, where units slide in these directions and the others stick."""
         stick = self._held(i for i in self.rows if i not in ways and i not in self.idle)
@@ -424,7 +428,7 @@ class RestProblem:
                 bound += share * N[self.units[i].load.normal] if share else 0.0
                 if force > bound * (BROKEN if i in fired else 1.0 + LEVEL):
                     found[i] = x[at] @ basis / force
-                elif self.dead[at].all() and size > small[at].max():  # nothing holds it
+                elif self.is_dead(i) and size > small[at].max():  # nothing holds it
                     found[i] = a[at] @ basis / size
                 continue
             along = a[at] @ basis @ ways[i]

@@ -154,6 +154,7 @@ class _ContactRun(Transitions):
                 raise InvalidArgument(f"the state is of a scene with {name!r}, which this one lacks.")
         self.without = dependent(self.scene, [parts[name] for name in inactive])
         self.gaps, self.frictions = gaps_of(self.scene, self.without), Frictions(self.scene)
+        self.held_gaps = {}  # the same where frictions stick, by the rows that hold these
         off = {id(item) for item in self.without}
         self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]
         self.off = [i for i, unit in enumerate(self.frictions.units) if id(unit.force) in off]
@@ -214,7 +215,7 @@ class _ContactRun(Transitions):
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         touching = [i for i in touching if i in self.able]
-        return self._settle(touching, ()) or self._settle_frictions(UnitModes(), ())
+        return self._settle(touching, (), ())
 
     def check(self):
         """Raise what a run raises before its first step; its `Task`, of the whole scene."""

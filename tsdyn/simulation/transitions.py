@@ -72,7 +72,7 @@ class Transitions:
 
         fired, broken: gaps and frictions whose events have come.
         """
-        slots, values = self.remembered[self.count :], self.gap
+        slots, values, qd = self.remembered[self.count :], self.gap, self.qd
         before, self.modes, self.rest = self.modes, UnitModes(), self.t
         if not touching:
             return self._settle_frictions(before, broken)
@@ -101,6 +101,7 @@ class Transitions:
                 self.modes = UnitModes(settled.closed, settled.idle, opened, grips=grips, held=places)
             elif resting:
                 self.modes = UnitModes(*settle(inertia, resting, self.qd, leaving)[:2], opened)
+            broken = broken if self.qd is qd else ()  # an impact has given them other velocities
             status = self._alternate(before, inertia, touching, resting, leaving, broken)
             kept = {*self.modes.closed, *self.modes.idle}
             opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}

@@ -206,6 +206,12 @@ def test_what_friction_holds_is_an_equilibrium_where_it_stands():
     assert (found.moved, found.stable) == (0.0, True)
     np.testing.assert_allclose(found.reaction("brake")[0], [1.0, 0, 0], rtol=1e-13)
     np.testing.assert_allclose(found.state.reaction("brake")[0], [1.0, 0, 0], rtol=1e-13)
+    q = found.state.q + 0.05 * np.eye(7)[0]
+    found = braked(0.1).equilibrium(q)  # 1.5 N
+    assert (found.moved, found.stable) == (0.0, True)
+    np.testing.assert_allclose(found.reaction("brake")[0], [1.5, 0, 0], rtol=1e-13)
+    with pytest.raises(ts.InvalidArgument, match="t must be a finite time"):
+        braked(0.1).equilibrium(t=np.nan)
     scene = braked(0.3)
     found = scene.equilibrium()
     np.testing.assert_allclose([found.moved, found.smallest_stiffness], [0.3, 10.0], rtol=1e-12)

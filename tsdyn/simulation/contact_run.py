@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -346,8 +347,11 @@ class _ContactRun(Transitions):
         phase = self._scene()
         system = phase.packed.system._replace(reals=phase.packed.system.reals.copy())
         system.reals[system.memory] = self.remembered[self.count :]
+        derived = copy(phase.packed.derived)  # without what is of the system
+        derived.holds, derived.places = phase.packed.derived.holds, phase.packed.derived.places
+        packed = phase.packed._replace(system=system, derived=derived)
         filled = object.__new__(type(phase))
-        vars(filled).update(vars(phase), _packed=phase.packed._replace(system=system), _prepared=None)
+        vars(filled).update(vars(phase), _packed=packed, _prepared=None)
         return filled
 
     def _closed_rows(self):

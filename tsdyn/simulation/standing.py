@@ -152,15 +152,17 @@ def _demand_still(frictions, gaps, spin=None, about=None, rotors=None, **_):
 
 def _held(scene, own, guess, t, *arguments, **keywords):
     """The `Equilibrium` in which every friction holds what it acts on at the guess; None where one doesn't."""
-    kept, n = prepared(phase_of(scene, [])), scene.start[0].size
+    kept, n, t = prepared(phase_of(scene, [])), scene.start[0].size, number(t)
+    if not np.isfinite(t):
+        return None
     q = scene.start[0] if guess is None else finite_vector(getattr(guess, "q", guess), n, "guess")
-    known = remembered(guess if hasattr(guess, "memory") else None, kept, float(t), q)
+    known = remembered(guess if hasattr(guess, "memory") else None, kept, t, q)
     anchor, slots = Anchor(known[: kept.handles.count]), known[kept.handles.count :]
-    state = RememberingState.of(scene.packed, slots, anchor, float(t), q, *np.zeros((2, n)), np.zeros(0))
+    state = RememberingState.of(scene.packed, slots, anchor, t, q, *np.zeros((2, n)), np.zeros(0))
     for _ in range(2):  # where it stands; where what isn't held comes to rest
         try:
-            run = begun(scene, float(t), state)
-            phase = run._scene()
+            run = begun(scene, t, state)
+            phase = run.filled()
             state.packed, state.memory = phase.packed, run.remembered[run.count :]
             found = own(phase, state, t, *arguments, **keywords) if run.holds() else None
         except (InconsistentState, NoEquilibrium):

@@ -268,9 +268,13 @@ def test_what_sticks_has_no_modes():
     np.testing.assert_allclose(on_a_slope(1.1).linearise().eigenvalues(), [0.0, 0.0], atol=TIGHT)
 
 
-def test_an_equilibrium_asks_for_a_slip_velocity():
-    with pytest.raises(ts.InvalidArgument, match=r"friction.*slip_velocity"):
-        on_a_slope(0.5).equilibrium()
+def test_what_sticks_is_in_equilibrium():
+    found = on_a_slope(0.5).equilibrium()
+    assert found.moved < 1e-15
+    force = 3.0 * G * np.sin(SLOPE) * np.array([-np.cos(SLOPE), 0.0, np.sin(SLOPE)])
+    np.testing.assert_allclose(found.reaction("friction")[0], force, atol=TIGHT)
+    with pytest.raises(ts.NoEquilibrium):
+        on_a_slope(1.1).equilibrium()
 
 
 def test_the_same_bits_in_another_process():

@@ -195,12 +195,111 @@ def test_a_brake_that_holds_leaves_no_freedom():
     assert scene.linearise().coordinates == ("guide.displacement",)
 
 
-def test_friction_at_rest_is_refused_by_name():
-    scene = braked(0.1)
-    with pytest.raises(ts.InvalidArgument, match=r"inverse_dynamics .* brake\. Give slip_velocity"):
-        scene.inverse_dynamics({"guide": ts.motions.time}, ["guide"], t=[0.0, 1.0])
+def test_a_profile_of_exact_friction_is_refused_by_name():
     with pytest.raises(ts.InvalidArgument, match=r"profile .* brake\. Give slip_velocity"):
-        ts.profile(scene, (0, 1))
+        ts.profile(braked(0.1), (0, 1))
+
+
+def test_what_friction_holds_is_an_equilibrium_where_it_stands():
+    """The spring pulls with 1 N, the brake holds 2 N; where it pulls with 3 N, it is slack in the equilibrium."""
+    found = braked(0.1).equilibrium()
+    assert (found.moved, found.stable) == (0.0, True)
+    np.testing.assert_allclose(found.reaction("brake")[0], [1.0, 0, 0], rtol=1e-13)
+    np.testing.assert_allclose(found.state.reaction("brake")[0], [1.0, 0, 0], rtol=1e-13)
+    q = found.state.q + 0.05 * np.eye(7)[0]
+    found = braked(0.1).equilibrium(q)  # 1.5 N
+    assert (found.moved, found.stable) == (0.0, True)
+    np.testing.assert_allclose(found.reaction("brake")[0], [1.5, 0, 0], rtol=1e-13)
+    with pytest.raises(ts.InvalidArgument, match="t must be a finite time"):
+        braked(0.1).equilibrium(t=np.nan)
+    scene = braked(0.3)
+    found = scene.equilibrium()
+    np.testing.assert_allclose([found.moved, found.smallest_stiffness], [0.3, 10.0], rtol=1e-12)
+    np.testing.assert_array_equal(found.reaction("brake")[0], 0.0)
+    solution = ts.simulate(scene, (0, 10), state=found.state)
+    assert solution.sticking("brake").all()
+    with pytest.raises(ts.InvalidArgument, match=r"a spin doesn't go with friction of the exact law \(brake\)"):
+        scene.equilibrium(spin=(0, 0, 1.0))
+
+
+def test_a_contact_with_friction_holds_on_a_slope_or_there_is_no_equilibrium():
+    scene = ts.Scene(gravity=(G * np.sin(0.4), 0, -G * np.cos(0.4)))
+    block = scene.add_point_mass(mass=2.0, name="block")
+    contact = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": 0.4, "static": 0.45, "name": "floor"}
+    scene.add(C.PlaneContact(block, scene.ground, **contact))
+    found = scene.equilibrium()
+    expected = [-2 * G * np.sin(0.4), 0, 2 * G * np.cos(0.4)]
+    assert found.moved == 0.0
+    np.testing.assert_allclose(found.reaction("floor")[0], expected, rtol=1e-13)
+    assert ts.simulate(scene, (0, 5), state=found.state).sticking("floor").all()
+    scene["floor"].kinetic = scene["floor"].static = 0.42  # tan(0.4) = 0.4228
+    with pytest.raises(ts.NoEquilibrium):
+        scene.equilibrium()
+    spring = {"point_b": (-1, 0, 0), "stiffness": 50.0, "free_length": 1.0}
+    scene.add(ts.forces.Spring(block, scene.ground, **spring))
+    scene["floor"].kinetic = scene["floor"].static = 0.1
+    found = scene.equilibrium()  # without friction: the spring takes the weight along the slope
+    np.testing.assert_allclose(found.state.position("block"), [2 * G * np.sin(0.4) / 50, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(found.reaction("floor")[0], [0, 0, 2 * G * np.cos(0.4)], atol=1e-12)
+    np.testing.assert_allclose(found.state.friction_demand("floor"), 0.0, atol=1e-13)
+
+
+def test_what_friction_does_not_hold_comes_to_rest_elsewhere():
+    """A rough shoulder holds an arm of 2 kg; the elbow is free, and its bar, 1 kg, hangs down."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    arm = scene.add_body(2.0, (0.2, 0.3, 0.25), position=(0.8, 0, 0), name="arm")
+    shoulder = scene.add(C.Revolute.at(scene.ground, arm, point=(0, 0, 0), axis=(0, 1, 0), name="shoulder"))
+    scene.add(ts.forces.RevoluteFriction(shoulder, radius=0.05, kinetic=30.0, name="rough"))
+    bar = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(1.6, 0, 0.5), name="bar")
+    scene.add(C.Revolute.at(arm, bar, point=(1.6, 0, 0), axis=(0, 1, 0), name="elbow"))
+    scene.set("elbow", angle=1.0)
+    found = scene.equilibrium()
+    assert found.stable
+    np.testing.assert_allclose(found.state.position("arm"), [0.8, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(found.state.position("bar"), [1.6, 0, -0.5], atol=1e-12)
+    np.testing.assert_allclose(found.reaction("rough", on="arm")[1][1], -G * (2 * 0.8 + 1.6), rtol=1e-12)
+    assert found.moved > 0.1
+
+
+@pytest.mark.parametrize("slip", [0.0, 1e-9])
+def test_inverse_dynamics_with_kinetic_friction(slip):
+    """x = sin t: the spring, the mass, and 2 N against the motion; none where it turns, at t = pi / 2."""
+    scene, t = braked(0.1), np.linspace(0.0, np.pi, 5)
+    scene["brake"].slip_velocity = slip
+    found = scene.inverse_dynamics({"guide": ts.motions.Sine(1.0, 1.0)}, ["guide"], t=t)
+    expected = 9.0 * np.sin(t) + 1.0 + 2.0 * np.array([1, 1, 0, -1, -1])
+    np.testing.assert_allclose(found.load("guide"), expected, rtol=1e-6)
+    np.testing.assert_allclose(found.reaction("brake")[0][:, 0], [-2, -2, 0, 2, 2], atol=1e-6)
+    scene.add(C.TranslationMotor.of(scene["guide"], displacement=ts.motions.Sine(1.0, 1.0), name="motor"))
+    driven = scene.kinematics(t)
+    np.testing.assert_allclose(driven.reaction("motor", on="block")[0][:, 0], expected, rtol=1e-6)
+
+
+def test_inverse_dynamics_with_friction_by_reactions():
+    """A load of 2 kg on a plane, 0.2 of its weight against the motion, in a plane and in a pin."""
+    scene, t = ts.Scene(gravity=(0, 0, -G)), np.array([0.0, 0.5, 1.0])
+    block = scene.add_point_mass(mass=2.0, name="block")
+    plane = scene.add(C.PlaneContact(block, scene.ground, normal_b=(0, 0, 1)))
+    scene.add(ts.forces.ContactFriction(plane, kinetic=0.2, name="rub"))
+    scene.add(ts.forces.PointForce(block, force=(1, 0, 0), name="push"))
+    found = scene.inverse_dynamics({"block.x": ts.motions.Sine(1.0, 1.0), "block.y": ts.motions.time}, ["push"], t=t)
+    v = np.array([np.cos(t), 1.0 + 0.0 * t]).T
+    friction = -0.4 * G * v / np.linalg.norm(v, axis=1)[:, None]
+    np.testing.assert_allclose(found.reaction("rub")[0][:, :2], friction, rtol=1e-12)
+    inertia = np.array([-2.0 * np.sin(t), 0.0 * t]).T
+    np.testing.assert_allclose(found.load("push")[:, :2], inertia - friction, rtol=1e-12)
+
+
+def test_a_state_knows_what_holds_a_friction():
+    solution = ts.simulate(braked(0.1), (0, 1), dense_output=True)
+    np.testing.assert_allclose(solution.state.reaction("brake")[0], [1.0, 0, 0], rtol=1e-13)
+    np.testing.assert_allclose(solution.at([0.2, 0.7]).reaction("brake")[0], [[1.0, 0, 0]] * 2, rtol=1e-13)
+    scene = braked(0.25)
+    stops = ts.simulate(scene, (0, 5), dense_output=True)
+    assert stops.sticking("brake")[-1]
+    assert not stops.sticking("brake")[0]
+    with pytest.raises(ts.InvalidArgument, match="several phases"):
+        stops.at([0.0, 5.0]).reaction("brake")
 
 
 # sampled controllers across events

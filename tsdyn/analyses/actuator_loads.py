@@ -357,7 +357,7 @@ def find_loads(packed, t, q, qd, qdd, memory, actuators):
         instant = Instant(packed.system, (t[i], q[i]), Phi_q, np.flatnonzero(kept[i]), B)
         load = d[i] - inertia[i]
         if frictions:
-            friction, found.normals[i] = _friction(packed, t[i], q[i], qd[i], instant, load)
+            friction, found.normals[i] = _friction(packed, t[i], q[i], qd[i], memory[i], instant, load)
             load = load + friction
         found.multipliers[i] = instant.solve(load)[q.shape[1] :]
         found.u[i], found.missing[i] = instant.u, instant.missing(load)
@@ -385,9 +385,9 @@ def _demand_effective(instant, actuators, used):
             )
 
 
-def _friction(packed, t, q, qd, instant, load):
+def _friction(packed, t, q, qd, memory, instant, load):
     """Friction that depends on reactions (n,), in balance with them, and its normal loads."""
-    friction, x = balance(packed, float(t), q, qd, instant.Phi_q, lambda more: instant.solve(load + more))
+    friction, x = balance(packed, float(t), q, qd, instant.Phi_q, lambda more: instant.solve(load + more), memory)
     return friction, normal_loads(packed, float(t), q, qd, instant.Phi_q, np.nan_to_num(x[q.size :]))[0]
 
 

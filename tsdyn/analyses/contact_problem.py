@@ -176,6 +176,8 @@ class Inertia:
         Gaps that are looked at; all else is zero of others.
     held : sequence of int
         Those that may be held closed, independent: a guess.
+    loads : ndarray (n,), optional
+        Beside those of the scene.
 
     Attributes
     ----------
@@ -185,7 +187,7 @@ class Inertia:
         Rows of the slips; zero without friction.
     """
 
-    def __init__(self, gaps, t, q, slots, which, held=()):
+    def __init__(self, gaps, t, q, slots, which, held=(), loads=None):
         self.gaps, self.t, self.q, self.slots, self.which, self.held = gaps, t, q, slots, np.array(which, int), held
         rows, drift = gaps.workspace.rows(t, q, self.which)
         self._rows, self._drift = gaps.sign[self.which, None] * rows, (gaps.sign * drift[: gaps.count])[self.which]
@@ -194,6 +196,7 @@ class Inertia:
         self.J[self.which], self.response[self.which] = self._rows, response  # M~ J^T, transposed
         self.G[self.which[:, None], self.which] = self._rows @ response.T
         self._sizes, self.tangents = np.abs(self._rows), np.zeros((gaps.count, 2, q.size))
+        self._more = 0.0 if loads is None else self.free(loads)
         rubbing = self.which[gaps.rubs[self.which]]
         if rubbing.size:
             self.tangents[rubbing] = gaps.slopes(t, q, rubbing)
@@ -238,8 +241,13 @@ class Inertia:
 
     def slip_accelerations(self, qd):
         """Accelerations (count, 2) of the slips where all gaps are open."""
-        qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
+        qdd, gamma = self._open(qd)
         return self.tangents @ qdd + self.gaps.biases(gamma)
+
+    def _open(self, qd):
+        """Accelerations (n,) where all gaps are open, and gamma of the rows of all contacts."""
+        qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
+        return qdd + self._more, gamma
 
     def across(self, i, d):
         """Components (2,) of a direction d (3,), ground frame, along the slips of a gap."""
@@ -251,7 +259,7 @@ class Inertia:
 
     def accelerations(self, qd):
         """Accelerations of the gaps (count,) where all are open, at velocities qd (n,); and their terms (count,)."""
-        qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
+        qdd, gamma = self._open(qd)
         bias = (self.gaps.sign * gamma[: self.gaps.count])[self.which]
         return self._of_all(self._rows @ qdd + bias), self._of_all(self._sizes @ np.abs(qdd) + np.abs(bias))
 

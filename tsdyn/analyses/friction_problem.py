@@ -20,12 +20,12 @@ from ..elements.bodies import rotation_matrix
 from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
 from ..errors import SingularConfiguration
-from ..maths.tolerances import RANK_TOL, ROUNDING
+from ..maths.tolerances import EPS, RANK_TOL, ROUNDING
 from ..model.packed import coupled_loads, first_rows
 from ..observables.evaluate import ITERATIONS, constraint_arrays, mass_matrix, normal_reaction, unit_force
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from .slip_velocities import ACROSS, ALONG, WHOLE, slip_velocities
-from .tolerances import ASIDE, BROKEN, LEVEL, PIVOTS
+from .tolerances import ASIDE, AT_REST, BROKEN, LEVEL, PIVOTS, RESTS
 
 if TYPE_CHECKING:
     from ..elements.friction import Sliding
@@ -151,6 +151,21 @@ class Frictions:
         v, _, axes = self.motions(q, qd)
         ways = memory[self.ways] * np.where(self.signed[:, None], axes, 1.0)
         return (v * ways).sum(axis=2) - np.where(self.signed, 0.0, 0.5) * np.linalg.norm(v, axis=2)
+
+    def turn(self, t, levels, memory):
+        """Write the directions of slip into memory (k, slots), zero where a slip rate is zero to rounding.
+
+        levels (k, 3, n); rates that change within rounding of the time t (k,) are zero, too.
+        """
+        q, qd, qdd = levels.swapaxes(0, 1).copy()
+        v, sizes, axes = self.motions(q, qd)
+        speeds = np.linalg.norm(v, axis=2)
+        gained = RESTS * EPS * np.abs(t)[:, None] * self.motions(q, qdd)[1]
+        moves = speeds > np.maximum(AT_REST * sizes, gained)
+        ways = np.where(moves[..., None], v / np.where(moves, speeds, 1.0)[..., None], 0.0)
+        for i, unit in enumerate(self.units):
+            along = np.sign((ways[:, i] * axes[:, i]).sum(axis=1))[:, None]
+            memory[:, unit.way] = along if self.signed[i] else ways[:, i]
 
     def at(self, q):
         """The `FrictionFrames` at q (n,)."""
@@ -337,6 +352,10 @@ class RestProblem:
         places = np.cumsum([0, *(len(each) for each in rows.values())])
         self.at = {i: np.arange(*places[k : k + 2]) for k, i in enumerate(rows)}
 
+    def is_dead(self, i):
+        """Whether no motion that the other rows leave moves a unit."""
+        return bool(self.dead[self.at[i]].all())
+
     def solve(self, ways):
         """Multipliers x of the rows, and normal loads, where units slide in these directions and the others stick."""
         stick = self._held(i for i in self.rows if i not in ways and i not in self.idle)
@@ -409,7 +428,7 @@ class RestProblem:
                 bound += share * N[self.units[i].load.normal] if share else 0.0
                 if force > bound * (BROKEN if i in fired else 1.0 + LEVEL):
                     found[i] = x[at] @ basis / force
-                elif self.dead[at].all() and size > small[at].max():  # nothing holds it
+                elif self.is_dead(i) and size > small[at].max():  # nothing holds it
                     found[i] = a[at] @ basis / size
                 continue
             along = a[at] @ basis @ ways[i]

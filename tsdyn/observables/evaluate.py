@@ -35,14 +35,14 @@ JAMMED = (
 )
 
 
-def balance(packed, t, q, qd, Phi_q, solve):
+def balance(packed, t, q, qd, Phi_q, solve, remembered=None):
     """Return friction forces (n,) and the solution of the equations of motion; solve(load) is affine in the load.
 
     Newton's method for the normal loads N = N(lam_0 + sum_i lam_i N_i).
     """
     system, n = packed.system, q.size
     frictions = coupled_loads(packed)
-    units = [unit_force(system, load, t, q, qd) for load in frictions]
+    units = [unit_force(system, load, t, q, qd, remembered) for load in frictions]
     first = solve(np.zeros(n))
     parts = np.array([solve(unit) - first for unit in units])
     reactions = [normal_reaction(packed, load, q, qd, Phi_q) for load in frictions]

@@ -156,7 +156,7 @@ def equilibrium(
     InvalidForce
         If a load is sampled, or the equilibrium is on a jump of a force.
     InvalidArgument
-        If the guess is not n finite numbers or a state.
+        If the guess is not n finite numbers or a state, or a scene with exact friction is given a spin.
 
     Notes
     -----
@@ -164,9 +164,14 @@ def equilibrium(
     motions that the constraints admit; elsewhere steps that lead down all the same. They lower the potential energy on
     the constraint manifold down to rounding, and their number hardly grows with that of bodies. Saddles are left along
     their direction of most negative stiffness. Work along a step takes the place of energy, so loads need no potential.
-    Redundant rows are allowed. Dampers and friction exert nothing at rest. With a spin, Newton steps lead to the
+    Redundant rows are allowed. Dampers and smooth friction exert nothing at rest. With a spin, Newton steps lead to the
     nearest relative equilibrium, a top's steady precession for one; where it is unstable, gyroscopic terms included, it
     is left along the mode that grows, down to a minimum of the amended potential V - Omega . J Omega / 2.
+
+    Exact friction, of joints and of contacts: where it holds all that it acts on at the start, within its static
+    bounds, it does so in the equilibrium, too. A scene at rest is reported as it stands, `moved` = 0, and what is free
+    beside comes to rest. Elsewhere the equilibrium is that without friction, which is one with friction as well.
+    Neither is for a spin.
 
     Examples
     --------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -154,6 +155,7 @@ class _ContactRun(Transitions):
                 raise InvalidArgument(f"the state is of a scene with {name!r}, which this one lacks.")
         self.without = dependent(self.scene, [parts[name] for name in inactive])
         self.gaps, self.frictions = gaps_of(self.scene, self.without), Frictions(self.scene)
+        self.held_gaps = {}  # the same where frictions stick, by the rows that hold these
         off = {id(item) for item in self.without}
         self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]
         self.off = [i for i, unit in enumerate(self.frictions.units) if id(unit.force) in off]
@@ -214,7 +216,7 @@ class _ContactRun(Transitions):
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         touching = [i for i in touching if i in self.able]
-        return self._settle(touching, ()) or self._settle_frictions(UnitModes(), ())
+        return self._settle(touching, (), ())
 
     def check(self):
         """Raise what a run raises before its first step; its `Task`, of the whole scene."""
@@ -335,13 +337,21 @@ class _ContactRun(Transitions):
             return phase_with_friction(self.scene, self.gaps, self.modes, holds, self.without)
         return self._scene_of(self._closed_rows(), holds)
 
+    def holds(self):
+        """Whether each friction sticks, or is held by what sticks."""
+        held = {*self.modes.sticking, *self.modes.blocked}
+        return len(held) == self.frictions.count and all(d is None for d in self.modes.grips.values())
+
     def filled(self):
         """The same, with what the run remembers among its packed numbers."""
         phase = self._scene()
         system = phase.packed.system._replace(reals=phase.packed.system.reals.copy())
         system.reals[system.memory] = self.remembered[self.count :]
+        derived = copy(phase.packed.derived)  # without what is of the system
+        derived.holds, derived.places = phase.packed.derived.holds, phase.packed.derived.places
+        packed = phase.packed._replace(system=system, derived=derived)
         filled = object.__new__(type(phase))
-        vars(filled).update(vars(phase), _packed=phase.packed._replace(system=system), _prepared=None)
+        vars(filled).update(vars(phase), _packed=packed, _prepared=None)
         return filled
 
     def _closed_rows(self):

@@ -27,6 +27,7 @@ from ..runs.run_log import NAMES, RunEnd
 from ..runs.step_engine import StepEngine
 from ..runs.task import Outcome, Task
 from ..validation import counted, finite_times, floats, unknown_name
+from .phase_scenes import has_contacts, phase_of
 from .progress import silent
 from .scene_cache import prepared
 from .segments import run_segments
@@ -44,6 +45,7 @@ class GivenMotion(Solution):
     _method = ""  # what it is the result of
 
     def __init__(self, scene: Scene, wanted: int, kept: Any, followed: Any, message: str = "") -> None:
+        _turn_frictions(scene, kept, followed)
         span = (float(followed.rows[0, 0]), followed.reached) if len(followed.rows) else (followed.reached,) * 2
         form = SimpleNamespace(name="constraints alone")
         task = SimpleNamespace(prepared=kept, method=None, form=form, span=span, q=followed.last[0])
@@ -87,6 +89,17 @@ class GivenMotion(Solution):
         return ""
 
 
+def _turn_frictions(scene, kept, followed):
+    """Write the directions in which frictions of the exact law slide into what a motion remembers."""
+    if any(getattr(force, "slides", ()) for force in scene._forces):
+        from ..analyses.friction_problem import Frictions
+
+        frictions, rows, count = Frictions(scene), followed.rows, kept.handles.count
+        levels = rows[:, 1 : 1 + 3 * kept.n].reshape(-1, 3, kept.n)
+        frictions.turn(rows[:, 0], levels, rows[:, 1 + 3 * kept.n + count :])
+        frictions.turn(np.array([followed.reached]), followed.last[None], followed.remembered[None, count:])
+
+
 def follow(scene, times, state, who, remedy):
     """Follow the branch of a scene without freedom to times (k,); its `Prepared`, and how far it came, a `Followed`."""
     from ..analyses.kinematic_analysis import (  # imported here: a run needs none of it
@@ -95,6 +108,7 @@ def follow(scene, times, state, who, remedy):
         driven_rates,
     )
 
+    scene = phase_of(scene, []) if has_contacts(scene) else scene  # a copy, with friction of the exact law
     kept = prepared(scene)
     given = scene._initial() if state is None else state_arrays(state, kept.n)
     t0 = _start_time(kept, given[0], times) if state is None else float(state.t)
@@ -430,7 +444,8 @@ def inverse_dynamics(
     The motion of coordinates is made a motion of the scene by `scene.kinematics`: the branch is that of the bodies'
     poses, which are moved to the start of the motion first. Loads solve M qdd + Phi_q^T lam = Q_A + Q_v + B u; where
     they aren't unique, the sum of their squares is the least, in SI units. The cost of an instant is O(N) for chains
-    and trees.
+    and trees. Exact friction is kinetic, against the given motion, by the reactions of this motion; zero where the slip
+    rate is zero, as static friction doesn't follow from a motion.
 
     Examples
     --------

@@ -111,8 +111,8 @@ def _slots(packed):
     return {item: slice(slot, end) for (slot, item), end in zip(owners, ends, strict=False)}
 
 
-def gaps_of(scene, without=None):
-    """The `Gaps` of a scene, of its inactive contacts too; `without` as of `phase_of`."""
+def gaps_of(scene, without=None, holds=()):
+    """The `Gaps` of a scene, of its inactive contacts too; the others as of `phase_of`."""
     from ..analyses.contact_problem import Gaps
 
     sides = [(contact, side) for contact in contacts_of(scene._added) for side in contact.sides]
@@ -120,7 +120,7 @@ def gaps_of(scene, without=None):
     rubbing = [part for contact, side in sides if side.grip for part in contact.parts]
     rows += [part for part in rubbing if not any(part is row for row in rows)]
     alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
-    return Gaps(scene.packed, alone.packed, phase_of(scene, [], without=without).packed)
+    return Gaps(scene.packed, alone.packed, phase_of(scene, [], holds, without).packed)
 
 
 def _holding(packed, holds, held):

@@ -228,6 +228,13 @@ class Phases:
         found = 3 * (None,) if one is None else (self.packed[one], self._columns[one], self._gaps[one].packed)
         return StatePhase(*self.changes[numbers[-1]], *found)
 
+    def held_at(self, t):
+        """`RememberingState.held` of a state at t, s, or of several times."""
+        kinds = {self.of[number] for number in self.at(np.atleast_1d(t)).tolist()} if self.packed else ()
+        if not any(self.packed[kind].derived.holds for kind in kinds):
+            return None
+        return self.packed[kinds.pop()] if len(kinds) == 1 else False
+
     def parts(self, solution, whole):
         """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are.
 

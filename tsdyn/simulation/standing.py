@@ -10,13 +10,15 @@ from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
 from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InconsistentState, InvalidArgument, NoEquilibrium
 from ..model.kinematics import Anchor
+from ..model.packed import first_rows
 from ..observables import reactions
 from ..observables.state import RememberingState, State, remembered
 from ..runs.arguments import state_arrays
 from ..validation import finite_vector, listed, number
 from .contact_run import begun, demand_apart
-from .phase_scenes import NAMED, at_start, demand_regular, gaps_of, named, phase_of
-from .phases import shared_rows
+from .grips import add_friction
+from .phase_scenes import NAMED, at_start, dependent, gaps_of, inactive_of, named, phase_of
+from .phases import UnitModes, shared_rows
 from .scene_cache import prepared
 
 # What happens at a state is decided as a run from it does: contacts that are closed, at rest and push hold, the others
@@ -58,10 +60,7 @@ def linearise(scene, own, state=None, *arguments, **keywords):
 
 def along(scene, own, *arguments, **keywords):
     """`kinematics` or `inverse_dynamics` of the scene with open contacts; refuses a motion along which one is met."""
-    who = own.__name__
-    if who != "kinematics":
-        demand_regular(scene, who)
-    motion, gaps = own(phase_of(scene, []), *arguments, **keywords), gaps_of(scene)
+    who, motion, gaps = own.__name__, own(phase_of(scene, []), *arguments, **keywords), gaps_of(scene)
     for k, q in enumerate(motion.q):
         met = closed_gaps(gaps, q, motion.anchor.angles[k])
         if met:
@@ -85,22 +84,23 @@ def set_start(scene, own, state=None, **keywords):
 def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
     """The `Equilibrium` with closed contacts that push and open ones that don't penetrate.
 
-    From the contacts that are closed at the guess on: of those that the way to the equilibrium meets the first one is
-    closed, and those that would have to pull are opened.
+    Where frictions hold all that they act on, that which they hold; else without friction, from the contacts that are
+    closed at the guess on: of those that the way to the equilibrium meets the first one is closed, and those that would
+    have to pull are opened.
     """
-    demand_regular(scene, "equilibrium")
     gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
-    if gaps.rubs.any():
-        names = listed(list(dict.fromkeys(gaps.names[i] for i in np.flatnonzero(gaps.rubs))), NAMED)
-        raise InvalidArgument(
-            f"equilibrium: contacts with friction ({names}) rest at more than one place. Run the scene from where it "
-            "stands: solution.sticking tells whether it rests; or set kinetic=0 and static=None."
-        )
+    frictions = [force for force in scene._forces if getattr(force, "slides", ())]
+    if frictions or gaps.rubs.any():
+        _demand_still(frictions, gaps, *arguments, **keywords)
+        found = _held(scene, own, guess, t, *arguments, **keywords)
+        if found is not None:
+            return found
+    without = dependent(scene, (*inactive_of(scene), *frictions))
     q = scene.start[0] if guess is None else np.asarray(getattr(guess, "q", guess), float)
     closed, seen = closed_gaps(gaps, q, _angles(kept, guess, t, q)), set()
     while frozenset(closed) not in seen:
         seen.add(frozenset(closed))
-        phase = phase_of(scene, [gaps.list[i].side.row for i in closed])
+        phase = phase_of(scene, [_gap_row(gaps, i) for i in closed], without=without)
         try:
             found = own(phase, guess, t, *arguments, **keywords)
         except NoEquilibrium as error:
@@ -125,7 +125,8 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
             break
         pushing = sorted([*settled.closed, *settled.idle])
         if pushing == closed:
-            return _of_all(scene, found, gaps, settled.closed)
+            phase = phase_of(scene, [_gap_row(gaps, i) for i in settled.closed], without=without)
+            return _of_all(scene, found, gaps, phase, UnitModes(settled.closed))
         guess, q, closed = state, state.q, pushing
     raise NoEquilibrium(
         "no set of closed contacts was found that push while the others stay open. Start nearer to the equilibrium, "
@@ -133,16 +134,64 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
     )
 
 
-def _of_all(scene, found, gaps, closed):
-    """The same `Equilibrium` with multipliers of all rows of the scene, those of these closed contacts among them."""
-    state, phase = found.state, phase_of(scene, [gaps.list[i].side.row for i in closed])
+def _gap_row(gaps, i):
+    """The row of a gap, without those of its slip."""
+    side = gaps.list[i].side
+    return side.grip.gap if side.grip else side.row
+
+
+def _demand_still(frictions, gaps, spin=None, about=None, rotors=None, **_):
+    """Refuse friction of the exact law in steady motion."""
+    if spin is not None or rotors is not None:
+        items = [*frictions, *(gaps.list[i].contact for i in np.flatnonzero(gaps.rubs))]
+        raise InvalidArgument(
+            f"equilibrium: a spin doesn't go with friction of the exact law ({named(items)}). "
+            "Leave the friction out, or give slip_velocity (slip_rate of a torque), such as 1e-3 m/s."
+        )
+
+
+def _held(scene, own, guess, t, *arguments, **keywords):
+    """The `Equilibrium` in which every friction holds what it acts on at the guess; None where one doesn't."""
+    kept, n, t = prepared(phase_of(scene, [])), scene.start[0].size, number(t)
+    if not np.isfinite(t):
+        return None
+    q = scene.start[0] if guess is None else finite_vector(getattr(guess, "q", guess), n, "guess")
+    known = remembered(guess if hasattr(guess, "memory") else None, kept, t, q)
+    anchor, slots = Anchor(known[: kept.handles.count]), known[kept.handles.count :]
+    state = RememberingState.of(scene.packed, slots, anchor, t, q, *np.zeros((2, n)), np.zeros(0))
+    for _ in range(2):  # where it stands; where what isn't held comes to rest
+        try:
+            run = begun(scene, t, state)
+            phase = run.filled()
+            state.packed, state.memory = phase.packed, run.remembered[run.count :]
+            found = own(phase, state, t, *arguments, **keywords) if run.holds() else None
+        except (InconsistentState, NoEquilibrium):
+            return None
+        if found is None:
+            return None
+        if not found.steps:
+            found.moved = float(np.abs(found.state.q - q).max())
+            return _of_all(scene, found, run.gaps, phase, run.modes)
+        state = found.state
+    return None
+
+
+def _of_all(scene, found, gaps, phase, modes):
+    """The same `Equilibrium` of a phase with multipliers of all rows of the scene."""
+    state, t = found.state, np.array([found.state.t])
     levels = state.q[None], state.qd[None], state.qdd[None]
-    own = reactions.multipliers(phase.packed, np.array([state.t]), *levels, state.memory[None])
+    lam = reactions.multipliers(phase.packed, t, *levels, state.memory[None])
+    found.multipliers = np.zeros((1, len(scene.system.segments)))
     rows, columns = shared_rows(scene.packed, phase.packed)
-    found.multipliers = np.zeros((1, len(scene.packed.system.segments)))
-    found.multipliers[:, rows] = own[:, columns]
-    parts = *state[:4], found.multipliers[0]
-    found.state = RememberingState.of(scene.packed, state.memory, state.anchor, *parts)
+    found.multipliers[:, rows] = lam[:, columns]
+    if modes.grips:
+        add_friction(gaps, modes, phase.packed, t, *levels[:2], lam, found.multipliers)
+    else:
+        first = {id(part): row for part, row in first_rows(phase.packed.constraints)}
+        for i in modes.closed:
+            found.multipliers[:, gaps.rows[i]] = lam[:, first[id(_gap_row(gaps, i))]]
+    found.state = RememberingState.of(scene.packed, state.memory, state.anchor, *state[:4], found.multipliers[0])
+    found.state.held = phase.packed if phase.packed.derived.holds else None
     return found
 
 

@@ -77,6 +77,8 @@ ENDLESS = 1e-12
 MOST_AT_AN_INSTANT = 100
 # Events after which progress is judged: a run that would need CREEPING times as many more is ended.
 EVENTS_JUDGED, CREEPING = 1000, 1e3
+# Rounds in which contacts and frictions of joints are decided in turn: each changes the modes of some.
+ROUNDS = 30
 # Cosine of the turn of a slip since its phase began, above which the next one keeps its direction; m/s: V, the velocity
 # from which on a slip that slows down may turn less and less.
 SAME_WAY, SLOW = 1.0 - 1e-12, 1e-2

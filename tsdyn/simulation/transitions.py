@@ -7,25 +7,28 @@ import numpy as np
 from ..analyses.contact_friction import halted, settle_grips
 from ..analyses.contact_problem import Inertia, NoSolution, settle
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
-from ..analyses.tolerances import AT_REST, RESTS, STOPPED
+from ..analyses.tolerances import AT_REST, LEVEL, RESTS, STOPPED
 from ..errors import (
     SingularConfiguration,
     Status,
 )
-from ..maths.tolerances import EPS
+from ..maths.tolerances import EPS, RANK_TOL
 from ..model.handles import handles_of
+from ..observables.generalised_forces import force_loads
 from ..observables.state import begin_memory
 from ..validation import listed
 from .grips import renewed
 from .impacts import held, impact_of, jumped
-from .phase_scenes import NAMED
+from .phase_scenes import NAMED, gaps_of
 from .phases import UnitModes
+from .scene_cache import prepared
 from .tolerances import (
     CREEPING,
     ENDLESS,
     EVENTS_JUDGED,
     MOST_AT_AN_INSTANT,
     ROUNDED,
+    ROUNDS,
     TOUCHING,
 )
 
@@ -45,10 +48,10 @@ class Transitions:
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         hit = [i for i in fired if i < count]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
-        status = self._settle(sorted(touching), hit)
+        status = self._settle(sorted(touching), hit, [i - count for i in fired if count <= i < count + own])
         if measured and self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
-        return status or self._settle_frictions(before, [i - count for i in fired if count <= i < count + own])
+        return status
 
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
@@ -66,12 +69,15 @@ class Transitions:
             self.judged = self.t, 0
         return False
 
-    def _settle(self, touching, fired):
-        """Impact, then which gaps stay closed; the Status if there is no way on, else None."""
-        slots, values = self.remembered[self.count :], self.gap
+    def _settle(self, touching, fired, broken):
+        """Impact, then which gaps stay closed, which frictions stick; the Status if there is no way on, else None.
+
+        fired, broken: gaps and frictions whose events have come.
+        """
+        slots, values, qd = self.remembered[self.count :], self.gap, self.qd
         before, self.modes, self.rest = self.modes, UnitModes(), self.t
         if not touching:
-            return None
+            return self._settle_frictions(before, broken)
         try:
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
@@ -100,9 +106,12 @@ class Transitions:
             elif resting:
                 settled = settle(inertia, resting, self.qd, leaving)
                 self.modes = UnitModes(settled.closed, settled.idle, opened, slack=settled.slack)
+            broken = broken if self.qd is qd else ()  # an impact has given them other velocities
+            status = self._alternate(before, inertia, touching, resting, leaving, broken)
             kept = {*self.modes.closed, *self.modes.idle}
             opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
             self._begin_memory([i for i in self.modes.closed if i not in before.closed])
+            return status
         except SingularConfiguration as error:
             self.reason = str(error)
             return Status.SINGULAR
@@ -115,7 +124,6 @@ class Transitions:
                     "kinetic, or use a compliant contact."
                 )
             return Status.CONTACT_FAILED
-        return None
 
     def _begin_memory(self, closed):
         """Rows that come remember nothing of a time when they held: a rope may have turned over since."""
@@ -125,8 +133,46 @@ class Transitions:
             angles, memory = self.remembered[: self.count], self.remembered[self.count :]
             begin_memory(packed, handles_of(packed), angles, memory, items)
 
-    def _settle_frictions(self, before, fired):
-        """Which frictions stick; the Status if there is no way on, else None."""
+    def _alternate(self, before, unheld, touching, resting, leaving, broken):
+        """Frictions by the closed contacts, and contacts by the frictions, until both agree; as of `_settle`.
+
+        unheld: the `Inertia` without frictions.
+        """
+        for _ in range(ROUNDS):
+            status = self._settle_frictions(before, broken, bool(resting))
+            if status is not None or not (self.frictions.count and resting):
+                return status
+            holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
+            slots, gaps = self.remembered[self.count :].copy(), self._gaps_with(holds)
+            for unit in self.frictions.units:
+                slots[unit.way] = 0.0  # their loads are known
+            inertia = Inertia(gaps, self.t, self.q, slots, touching, self.modes.closed, self.friction)
+            dead = [i for i in resting if inertia.G[i, i] <= RANK_TOL * unheld.G[i, i]]  # frictions hold these
+            settled = settle(inertia, [i for i in resting if i not in dead], self.qd, leaving)
+            closed, idle, a = settled[:3]
+            small = LEVEL * np.maximum(*(each.accelerations(self.qd)[1] for each in (inertia, unheld)))
+            if (a[dead] < -small[dead]).any():
+                raise NoSolution
+            idle = sorted([*idle, *(i for i in dead if a[i] <= small[i])])
+            if (closed, idle) == (self.modes.closed, sorted(self.modes.idle)):
+                return None
+            self.modes = UnitModes(closed, idle, self.modes.opened, slack=settled.slack)
+        names = listed([*(self.gaps.names[i] for i in resting), *self.frictions.names], NAMED)
+        self.reason = f"No closed contacts and sticking frictions agree at t = {self.t:.9g} s: {names}."
+        return Status.CONTACT_FAILED
+
+    def _gaps_with(self, holds):
+        """The `Gaps` of the scene in which these rows hold frictions."""
+        key = frozenset(hold.key for hold in holds)
+        if key not in self.held_gaps:
+            free = self._scene_of([], holds)
+            start = (self.q.copy(), self.qd.copy()), self.t, self.options.initial_tol, self.remembered
+            prepared(free).start(free, *start, True)  # finds redundant rows
+            self.held_gaps[key] = gaps_of(self.scene, self.without, holds)
+        return self.held_gaps[key]
+
+    def _settle_frictions(self, before, fired, loads=False):
+        """Which frictions stick, and what the others exert if `loads`; the Status if there is no way on, else None."""
         frictions, count = self.frictions, self.count
         if not frictions.count:
             return None
@@ -147,23 +193,37 @@ class Transitions:
                 memory[unit.way] = 0.0
             else:
                 memory[unit.way] = place.written(i, v[0, i] / speed)
-        if not resting:
+        if not (resting or loads):
             return None
         try:
-            rest, ranks = self._rest(place, before, resting, guess, fired)
+            rest, ranks, dead, packed = self._rest(place, before, resting, guess, fired)
         except NoRest as error:
             names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
             self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         for i, way in rest.ways.items():
             memory[frictions.units[i].way] = place.written(i, way)
-        self.modes.sticking = {i: ranks[i] for i in rest.sticking}
-        self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
+        # What closed contacts hold needs no rows of its own
+        idle = [i for i in rest.sticking if i in dead and self.modes.closed]
+        self.modes.sticking = {i: ranks[i] for i in rest.sticking if i not in idle}
+        self.modes.blocked = sorted([*self.off, *rest.blocked, *idle, *(i for i in resting if not ranks[i])])
         self.modes.begun = {i: (self.t, rate) for i, rate in rest.rates.items()}
+        if loads:
+            self.friction = self._load(packed, rest.loads)
         return None
 
+    def _load(self, packed, N):
+        """What frictions exert (n,) that slide, by their normal loads (frictions,)."""
+        known = {id(unit.force) for unit in self.frictions.units}
+        forces = [load.alone for load in packed.loads if id(load.force) in known]
+        system, motion = packed.system._replace(forces=np.concatenate(forces)), (self.q[None], self.qd[None])
+        memory = np.concatenate([self.remembered[self.count :], N])[None]
+        found = force_loads(system, np.array([self.t]), *motion, memory)
+        memory[0, [slot for unit in self.frictions.units for slot in range(unit.way.start, unit.way.stop)]] = 0.0
+        return (found - force_loads(system, np.array([self.t]), *motion, memory))[0]
+
     def _rest(self, place, before, resting, guess, fired):
-        """The `FrictionAtRest` that are at rest, and how many rows hold each."""
+        """The `FrictionAtRest`, how many rows hold each at rest, those that nothing moves, and the packed phase."""
         units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
         for i in resting:
             ranks[i] = before.sticking.get(i, -1)
@@ -183,7 +243,8 @@ class Transitions:
                     memory[units[i].held(k)[-1]] = Phi[row]
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
         problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
-        return problem.settle({i: way for i, way in guess.items() if i in free}, fired), ranks
+        rest = problem.settle({i: way for i, way in guess.items() if i in free}, fired)
+        return rest, ranks, [i for i in free if problem.is_dead(i)], phase.packed
 
     def _motions_of(self, place, i):
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""

@@ -43,6 +43,7 @@ from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
 from .tolerances import (
+    LOADED,
     MOST_PINNED,
     PENETRATION,
     TOUCHING,
@@ -392,12 +393,14 @@ class _ContactRun(Transitions):
             function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
-        breaking = Breaking(packed, [frictions.units[i] for i in sticking]).over
+        light = [(frictions.units[i], LOADED * limit) for i, limit in modes.light.items()]
+        breaking = Breaking(packed, [frictions.units[i] for i in sticking], light).over
+        loaded = [*sticking, *modes.light]
         slowing = Slowing(frictions, modes.begun).over
         for i in range(frictions.count):
             if i in modes.blocked:
                 continue
-            function = GroupMember(breaking, sticking.index(i)) if i in modes.sticking else GroupMember(slowing, i)
+            function = GroupMember(breaking, loaded.index(i)) if i in loaded else GroupMember(slowing, i)
             yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
 
     def _still(self, phase):

@@ -81,5 +81,7 @@ EVENTS_JUDGED, CREEPING = 1000, 1e3
 # from which on a slip that slows down may turn less and less.
 SAME_WAY, SLOW = 1.0 - 1e-12, 1e-2
 
+# Load of a friction over that up to which it counts as none, from which on it counts.
+LOADED = 4.0
 # Coordinates of a scene up to which bodies that rest, where frictions stick, are found, by dense matrices.
 MOST_PINNED = 1000

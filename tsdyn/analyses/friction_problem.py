@@ -388,7 +388,7 @@ class RestProblem:
 
         fired: units whose reactions have just reached their bounds. Raises `NoRest`.
         """
-        fired, seen, judged = set(fired), set(), set()
+        fired, seen, judged, guessed = set(fired), set(), set(), False
         self.light, self.idle = set(self.rows), []
         self.light &= self._unloaded(*self.solve({})).keys()  # without friction
         ways = {i: way for i, way in ways.items() if i not in self.light}
@@ -408,6 +408,9 @@ class RestProblem:
                 ways = {i: way for i, way in ways.items() if i not in self.light}
                 continue
             known = tuple((i, *np.sign(np.round(d, 3))) for i, d in sorted(ways.items()))
+            if known in seen and (guess := self._bounded(N)) and not guessed:
+                ways, guessed = guess, True
+                continue
             one_by_one = known in seen or count >= PIVOTS
             seen.add(known)
             for i in sorted(wrong)[: 1 if one_by_one else None]:
@@ -426,6 +429,30 @@ class RestProblem:
             along = a[self.at[i]] if a[self.at[i]].any() else np.eye(len(self.at[i]))[0]
             ways[i], light[i] = along @ self.bases[i] / np.linalg.norm(along), unloaded.get(i, 0.0)
         return FrictionAtRest(sticking, ways, blocked, N, rates, light)
+
+    def _bounded(self, N):
+        """Directions of those that slide, by the bounds of these normal loads; None where units have several rows.
+
+        x minimises x.H x / 2 - c.x within |x| <= mu N, H = -G: where pivoting goes round, as along a chain.
+        """
+        from scipy.linalg import LinAlgError, cholesky, solve_triangular
+        from scipy.optimize import lsq_linear
+
+        units = [i for i in self.rows if i not in self.idle and i not in self.light]
+        at = self._held(units)
+        if len(at) > len(units):
+            return None
+        try:
+            R = cholesky(-self.G[np.ix_(at, at)])
+        except LinAlgError:
+            return None
+        pairs = [self.units[i].bound for i in units]
+        bounds = np.array([x + N[self.units[i].load.normal] * share for i, (share, x) in zip(units, pairs, strict=True)])
+        bounds = np.maximum(bounds, TINY)
+        c = solve_triangular(R, (self.c + self.D @ N)[at], trans="T")
+        x = lsq_linear(R, c, (-bounds, bounds), method="bvls", tol=TINY).x
+        slides = zip(units, x, np.abs(x) >= bounds * (1.0 - LEVEL), strict=True)
+        return {i: np.sign(one) * self.bases[i][0] for i, one, beyond in slides if beyond}
 
     def _unloaded(self, x, N):
         """Units whose normal loads are zero within rounding of what acts on their bodies, and up to which load."""
@@ -478,6 +505,13 @@ class RestProblem:
     def _idle(self, ways):
         """Units that stick by what others hold: with rows of their own the reactions wouldn't be unique."""
         sticking, idle = [], []
+        own = self._held(i for i in self.rows if i not in ways and i not in self.light)
+        try:  # by the pivots: what is left of each row beside those before
+            left = np.diag(np.linalg.cholesky(-self.G[np.ix_(own, own)])) ** 2
+            if (left > RANK_TOL * np.abs(np.diag(self.G)).max()).all():
+                return idle
+        except np.linalg.LinAlgError:
+            pass
         for i in self.rows:
             if i not in ways and i not in self.light:
                 (idle if sticking and self._is_blocked(i, sticking) else sticking).append(i)

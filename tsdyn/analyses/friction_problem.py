@@ -280,7 +280,7 @@ class FrictionAtRest(NamedTuple):
     blocked: list  # of these, those that others hold
     loads: Any  # normal loads (frictions,)
     rates: dict  # what the event of each that slides begins with: its acceleration, zero within rounding
-    light: dict  # of each unit of the scene that carries no load: the load, N, up to which it has none
+    limits: dict  # loads, N, up to which a unit has none: of those that stick, and of those that have none
 
 
 class NoRest(Exception):
@@ -390,7 +390,7 @@ class RestProblem:
         """
         fired, seen, judged, guessed = set(fired), set(), set(), False
         self.light, self.idle = set(self.rows), []
-        self.light &= self._unloaded(*self.solve({})).keys()  # without friction
+        self.light &= self._unloaded(*self.solve({}))[0]  # without friction
         ways = {i: way for i, way in ways.items() if i not in self.light}
         for count in range(PIVOTS * (1 + len(self.rows))):
             self.idle = self._idle(ways)
@@ -399,10 +399,10 @@ class RestProblem:
             small = self._rounding(x, N)
             wrong = self._wrong(ways, x, N, a, small, fired)
             if not wrong:
-                unloaded = self._unloaded(x, N)
-                others = (self.light ^ unloaded.keys()) & self.rows.keys() - judged
+                unloaded, limits = self._unloaded(x, N)
+                others = (self.light ^ unloaded) & self.rows.keys() - judged
                 if not others:
-                    return self._found(ways, N, a, small, unloaded)
+                    return self._found(ways, N, a, small, (unloaded, limits))
                 self.light ^= others
                 judged |= others
                 ways = {i: way for i, way in ways.items() if i not in self.light}
@@ -424,11 +424,12 @@ class RestProblem:
     def _found(self, ways, N, a, small, unloaded):
         sticking = [i for i in self.rows if i not in (*ways, *self.idle, *self.light)]
         blocked = [i for i in ways if self._is_blocked(i, sticking)] + self.idle
-        rates, light = self._rates(ways, a, small), {i: unloaded[i] for i in unloaded if i not in self.rows}
+        rates, (unloaded, limits) = self._rates(ways, a, small), unloaded
         for i in self.light:
             along = a[self.at[i]] if a[self.at[i]].any() else np.eye(len(self.at[i]))[0]
-            ways[i], light[i] = along @ self.bases[i] / np.linalg.norm(along), unloaded.get(i, 0.0)
-        return FrictionAtRest(sticking, ways, blocked, N, rates, light)
+            ways[i] = along @ self.bases[i] / np.linalg.norm(along)
+        known = {*sticking, *self.light, *(unloaded - self.rows.keys())}
+        return FrictionAtRest(sticking, ways, blocked, N, rates, {i: limits[i] for i in sorted(known)})
 
     def _bounded(self, N):
         """Directions of those that slide, by the bounds of these normal loads; None where units have several rows.
@@ -447,19 +448,20 @@ class RestProblem:
         except LinAlgError:
             return None
         pairs = [self.units[i].bound for i in units]
-        bounds = np.array([x + N[self.units[i].load.normal] * share for i, (share, x) in zip(units, pairs, strict=True)])
-        bounds = np.maximum(bounds, TINY)
+        loads = [N[self.units[i].load.normal] if share else 0.0 for i, (share, _) in zip(units, pairs, strict=True)]
+        bounds = np.maximum([share * load + own for load, (share, own) in zip(loads, pairs, strict=True)], TINY)
         c = solve_triangular(R, (self.c + self.D @ N)[at], trans="T")
         x = lsq_linear(R, c, (-bounds, bounds), method="bvls", tol=TINY).x
         slides = zip(units, x, np.abs(x) >= bounds * (1.0 - LEVEL), strict=True)
         return {i: np.sign(one) * self.bases[i][0] for i, one, beyond in slides if beyond}
 
     def _unloaded(self, x, N):
-        """Units whose normal loads are zero within rounding of what acts on their bodies, and up to which load."""
+        """Units whose normal loads are small beside what acts on their bodies; up to which loads (units,)."""
         acting = self.applied + self.mass * np.linalg.norm((self.qdd @ np.concatenate(([1.0], x, N)))[self.r], axis=1)
         limits = self.place.frictions.unloaded * np.append(acting, 0.0)[self.place.frictions.ends].max(axis=1)
         loads = [unit.load.normal for unit in self.units]
-        return {i: limits[i] for i, normal in enumerate(loads) if normal >= 0 and N[normal] < limits[i]}
+        limits = np.where(np.array(loads) < 0, 0.0, limits).tolist()
+        return {i for i, normal in enumerate(loads) if normal >= 0 and N[normal] < limits[i]}, limits
 
     def _rounding(self, x, N):
         """Accelerations of the rows that are zero to rounding."""

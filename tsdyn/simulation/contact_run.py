@@ -43,7 +43,6 @@ from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
 from .tolerances import (
-    LOADED,
     MOST_PINNED,
     PENETRATION,
     TOUCHING,
@@ -393,9 +392,10 @@ class _ContactRun(Transitions):
             function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
-        light = [(frictions.units[i], LOADED * limit) for i, limit in modes.light.items()]
-        breaking = Breaking(packed, [frictions.units[i] for i in sticking], light).over
-        loaded = [*sticking, *modes.light]
+        light = [i for i in modes.limits if i not in modes.sticking]
+        units = [[frictions.units[i] for i in some] for some in (sticking, light)]
+        breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in (*sticking, *light)])).over
+        loaded = [*sticking, *light]
         slowing = Slowing(frictions, modes.begun).over
         for i in range(frictions.count):
             if i in modes.blocked:

@@ -124,7 +124,8 @@ class Transitions:
         least = np.maximum(least, AT_ONCE * np.minimum(sizes, (self.t - self.span[0]) * rates))
         self.remembered, resting, guess = self.remembered.copy(), [], {}
         memory = self.remembered[count:]  # a part of it
-        self.modes.blocked, self.modes.light = self.off, {i: x for i, x in before.light.items() if i not in fired}
+        self.modes.blocked = self.off
+        self.modes.limits = {i: x for i, x in before.limits.items() if i not in (*fired, *before.sticking)}
         for i, unit in enumerate(frictions.units):
             if i in self.off:
                 continue
@@ -148,7 +149,7 @@ class Transitions:
             memory[frictions.units[i].way] = place.written(i, way)
         self.modes.sticking = {i: ranks[i] for i in rest.sticking}
         self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
-        self.modes.begun, self.modes.light = {i: (self.t, rate) for i, rate in rest.rates.items()}, rest.light
+        self.modes.begun, self.modes.limits = {i: (self.t, rate) for i, rate in rest.rates.items()}, rest.limits
         return None
 
     def _rest(self, place, before, resting, guess, fired):

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..analyses.contact_rows import ReactionWorkspace
 from ..observables import reactions
+from .tolerances import LOADED, REACTION_NOISE
 
 
 class Closing:
@@ -87,13 +88,20 @@ class Breaking:
     packed : Packed
         Of the phase.
     sticking : list of friction_problem.FrictionUnit
-    light : list of (friction_problem.FrictionUnit, float)
-        With the load, N.
+    light : list of friction_problem.FrictionUnit
+    limits : ndarray (sticking and light units,), N
+        Loads that count as none.
+
+    Attributes
+    ----------
+    noise : ndarray (sticking and light units,)
+        Rounding of the values.
     """
 
-    def __init__(self, packed, sticking, light):
-        self.packed, self.sticking = packed, sticking
-        self.normals, self.limits = [unit.load.normal for unit, _ in light], np.array([limit for _, limit in light])
+    def __init__(self, packed, sticking, light, limits):
+        self.packed, self.sticking, self.normals = packed, sticking, [unit.load.normal for unit in light]
+        self.limits = LOADED * limits[len(sticking) :]
+        self.noise = REACTION_NOISE * limits * ([unit.bound[0] for unit in sticking] + [1.0] * len(light))
 
     def over(self, states):
         """Values (k, sticking and light units) of states at k times."""

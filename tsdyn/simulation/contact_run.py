@@ -396,7 +396,7 @@ class _ContactRun(Transitions):
         units = [[frictions.units[i] for i in some] for some in (sticking, light)]
         breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in (*sticking, *light)])).over
         loaded = [*sticking, *light]
-        slowing = Slowing(frictions, modes.begun).over
+        slowing = Slowing(frictions, modes.begun, frictions.sizes(self.q, self.qdd)).over
         for i in range(frictions.count):
             if i in modes.blocked:
                 continue

@@ -5,6 +5,7 @@ from functools import cached_property
 import numpy as np
 
 from ..analyses.contact_rows import ReactionWorkspace
+from ..analyses.tolerances import LEVEL
 from ..observables import reactions
 from .tolerances import LOADED, REACTION_NOISE
 
@@ -131,10 +132,19 @@ class Slowing:
     frictions : Frictions
     begun : dict
         Of those that have just begun to slide: time and acceleration there, by their numbers.
+    rates : ndarray (frictions,)
+        Sizes of the terms of accelerations.
+
+    Attributes
+    ----------
+    noise : ndarray (frictions,)
+        Rounding of the values, of slides that begin with an acceleration that is hardly more.
     """
 
-    def __init__(self, frictions, begun):
-        self.frictions, self.begun = frictions, begun
+    def __init__(self, frictions, begun, rates):
+        self.frictions, self.begun, self.noise = frictions, begun, np.zeros(frictions.count)
+        for i, (_, first) in begun.items():
+            self.noise[i] = LEVEL * rates[i] if first < LEVEL / REACTION_NOISE * rates[i] else 0.0
 
     def over(self, states):
         """Values (k, frictions) of states at k times."""

@@ -34,9 +34,6 @@ def find_loads(context, q, reactions, out):
         normal_load(c.system, c.tangent, c.graph.frictions[i], q, DERIVE | HERE, reactions[i], out[i])
 
 
-KERNELS = find_units, find_loads
-
-
 class NormalLoads:
     """Frictions of a packed scene that depend on reactions, at one state.
 

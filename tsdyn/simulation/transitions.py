@@ -117,8 +117,8 @@ class Transitions:
         if not frictions.count:
             return None
         place, (v, _, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
-        # Velocities that change within rounding of the time are at rest, too, and those that come to rest at once, too:
-        # where loads vanish along a chain events would follow each other ever faster
+        # Velocities that change within rounding of the time are at rest, too, and those that come to rest at
+        # once: where loads vanish along a chain events would follow each other ever faster
         sizes, rates = frictions.sizes(self.q, self.qd), frictions.sizes(self.q, self.qdd)
         least = np.maximum(AT_REST * sizes, RESTS * EPS * abs(self.t) * rates)
         least = np.maximum(least, AT_ONCE * np.minimum(sizes, (self.t - self.span[0]) * rates))

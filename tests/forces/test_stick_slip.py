@@ -239,6 +239,20 @@ def test_twenty_joints_stick_and_slip_with_static_above_kinetic():
         assert (torque <= 0.4 * 0.02 * np.linalg.norm(force[:, [0, 2]], axis=1) + HELD).all()
 
 
+def test_joints_without_a_load_make_no_events():
+    """A level chain, released: of each joint's load the next one has 0.2 or so, and the tip falls freely."""
+    scene, last, end = ts.Scene(gravity=(0, 0, -G)), None, 5e-6
+    for k in range(30):
+        link = scene.add_body(0.1, (1e-4, 1e-4, 1e-4), (0.1 * k + 0.05, 0, 0), name=f"link {k}")
+        pin = scene.add(C.Revolute.at(last or scene.ground, link, point=(0.1 * k, 0, 0), axis=(0, 1, 0)))
+        scene.add(F.RevoluteFriction(pin, kinetic=0.1, radius=0.01))
+        last = link
+    solution = ts.simulate(scene, (0.0, end))
+    assert solution.phases == [(0.0, end, ())]
+    np.testing.assert_allclose(solution.position(last)[-1], (2.95, 0.0, -0.5 * G * end**2), rtol=0, atol=TIGHT)
+    np.testing.assert_allclose(solution.velocity(last)[-1, 2], -G * end, rtol=1e-9)
+
+
 def test_an_impact_releases_what_sticks():
     """An elastic ball stops at the block and leaves it 2 m/s, which friction stops after v^2 / (2 mu g)."""
     scene = ts.Scene()

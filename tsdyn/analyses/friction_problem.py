@@ -20,12 +20,13 @@ from ..elements.bodies import rotation_matrix
 from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
 from ..errors import SingularConfiguration
-from ..maths.tolerances import EPS, RANK_TOL, ROUNDING
-from ..model.packed import coupled_loads, first_rows
-from ..observables.evaluate import ITERATIONS, constraint_arrays, mass_matrix, normal_reaction, unit_force
+from ..maths.tolerances import EPS, RANK_TOL, ROUNDING, TINY
+from ..model.packed import first_rows
+from ..observables.evaluate import ITERATIONS, constraint_arrays, mass_matrix
 from ..observables.generalised_forces import applied_loads, velocity_forces
+from .friction_units import NormalLoads
 from .slip_velocities import ACROSS, ALONG, WHOLE, slip_velocities
-from .tolerances import ASIDE, AT_REST, BROKEN, LEVEL, PIVOTS, RESTS
+from .tolerances import ASIDE, AT_REST, BROKEN, LEVEL, PIVOTS, RESTS, UNLOADED
 
 if TYPE_CHECKING:
     from ..elements.friction import Sliding
@@ -126,7 +127,10 @@ class Frictions:
         places = np.vstack([spans, (0, 0)])[self.ends].reshape(-1, 4)
         self.table = np.column_stack([places, self.turns, np.array(part, int)]).astype(np.int64).ravel()
         # The point of a; the axis of a, or the normal of b
-        self.points = np.array([unit.load.coordinates[0] for unit in self.units], float).ravel()
+        points = np.array([unit.load.coordinates[0] for unit in self.units], float).reshape(-1, 3)
+        self.points, arms = points.ravel(), np.where(self.turns, np.linalg.norm(points, axis=1), 1.0)
+        shares = np.array([max(unit.bound[0], unit.sliding[0]) for unit in self.units])
+        self.unloaded = UNLOADED * np.maximum(arms / np.maximum(shares, TINY), 1.0)  # loads over the forces on bodies
         axes = [unit.load.coordinates[4] if one else np.zeros(3) for unit, one in zip(self.units, part, strict=True)]
         self.axes = np.array(axes, float).ravel()
         self.ways = np.array([range(unit.slot, unit.slot + 3) for unit in self.units], int).reshape(-1, 3)
@@ -145,6 +149,15 @@ class Frictions:
         sizes = np.zeros((len(q), self.count))
         slip_velocities(q, qd, self.table, self.points, self.axes, v, sizes, axes)
         return v.reshape(-1, self.count, 3), sizes, axes.reshape(-1, self.count, 3)
+
+    def sizes(self, q, qd):
+        """What rounding of velocities at q, qd (n,) is a share of (units,): sizes of their terms.
+
+        Joints couple rates of turning to the velocities of their bodies: these count, over the scene's size.
+        """
+        sizes, r = self.motions(q[None], qd[None])[1][0], self.packed.system.bodies[:, :1] + np.arange(3)
+        passing = np.append(np.linalg.norm(qd[r], axis=1), 0.0)[self.ends].sum(axis=1) / self.packed.size
+        return sizes + np.where(self.turns, passing, 0.0)
 
     def speeds(self, q, qd, memory):
         """Of those that slide (k, units): velocities along their directions, in a plane less half of the speed."""
@@ -282,6 +295,7 @@ class FrictionAtRest(NamedTuple):
     blocked: list  # of these, those that others hold
     loads: Any  # normal loads (frictions,)
     rates: dict  # what the event of each that slides begins with: its acceleration, zero within rounding
+    limits: dict  # loads, N, up to which a unit has none: of those that stick, and of those that have none
 
 
 class NoRest(Exception):
@@ -331,11 +345,13 @@ class RestProblem:
             raise SingularConfiguration("a direction that the constraints leave free carries no inertia.") from error
         fixed = own @ solve_triangular(R, -gamma[order], trans="T") if rank else np.zeros(q.size)
         known = applied_loads(system, np.array([t]), q[None], qd[None], memory[None])[0]
+        self.r, self.mass = system.bodies[:, :1] + np.arange(3), system.mass
+        self.applied = np.linalg.norm(known[self.r], axis=1)
         known += velocity_forces(system, q[None], qd[None])[0] - M @ fixed
         self.normals = packed.system.normals.size
-        frictions = coupled_loads(packed)
-        sliding = [unit_force(packed.system, load, t, q, qd, memory) for load in frictions]
-        loads = np.column_stack([known, -Phi_q[mine].T, *sliding])
+        self.coupled = NormalLoads(packed, t, q, qd, memory, Phi_q) if self.normals else None
+        sliding = self.coupled.units if self.normals else np.zeros((q.size, 0))
+        loads = np.column_stack([known, -Phi_q[mine].T, sliding])
         free = Z @ cho_solve(factor, Z.T @ loads) if Z.size else np.zeros_like(loads)
         lam = np.zeros((len(gamma), loads.shape[1]))
         if rank:
@@ -348,7 +364,6 @@ class RestProblem:
         self.dead = dead = np.linalg.norm(self.J @ Z, axis=1) <= RANK_TOL * np.linalg.norm(self.J, axis=1)
         self.G[dead], self.G[:, dead], self.D[dead] = 0.0, 0.0, 0.0  # rates that no motion changes, as at a dead centre
         self.l, self.L, self.K = lam[:, 0], lam[:, 1:count], lam[:, count:]
-        self.reactions = [normal_reaction(packed, load, q, qd, Phi_q) for load in frictions]
         places = np.cumsum([0, *(len(each) for each in rows.values())])
         self.at = {i: np.arange(*places[k : k + 2]) for k, i in enumerate(rows)}
 
@@ -358,7 +373,7 @@ class RestProblem:
 
     def solve(self, ways):
         """Multipliers x of the rows, and normal loads, where units slide in these directions and the others stick."""
-        stick = self._held(i for i in self.rows if i not in ways and i not in self.idle)
+        stick = self._held(i for i in self.rows if i not in (*ways, *self.idle, *self.light))
         x, P = np.zeros(len(self.c)), np.zeros((len(self.c), self.normals))
         for i, way in ways.items():
             share, force = self.units[i].sliding
@@ -369,20 +384,22 @@ class RestProblem:
             right = np.column_stack([self.c + self.G @ x, self.D + self.G @ P])[stick]
             held = -np.linalg.lstsq(self.G[np.ix_(stick, stick)], right, rcond=RANK_TOL**2)[0]
             x[stick], P[stick] = held[:, 0], held[:, 1:]
+        if not self.normals:
+            return x, np.zeros(0)
         # N = N(l + L x + K N), by Newton's method
-        lam, slopes, N = self.l + self.L @ x, self.L @ P + self.K, np.zeros(self.normals)
-        for _ in range(ITERATIONS if N.size else 0):
-            values, changes = zip(*(reaction(lam + slopes @ N) for reaction in self.reactions), strict=True)
+        first = self.coupled.reactions(self.l + self.L @ x)
+        slopes, N = self.coupled.reactions(self.L @ P + self.K), np.zeros(self.normals)
+        for _ in range(ITERATIONS):
+            values, changes = self.coupled.loads(first + slopes @ N)
             try:
-                step = np.linalg.solve(np.eye(N.size) - np.array(changes) @ slopes, np.array(values) - N)
+                step = np.linalg.solve(np.eye(N.size) - (changes[:, None] @ slopes)[:, 0], values - N)
             except np.linalg.LinAlgError:
                 raise NoRest(list(self.rows)) from None
             N = N + step
             if not np.abs(step).max() > ROUNDING * np.abs(N).max():
                 break
         else:
-            if N.size:
-                raise NoRest(list(self.rows))
+            raise NoRest(list(self.rows))
         return x + P @ N, N
 
     def settle(self, ways, fired):
@@ -390,7 +407,10 @@ class RestProblem:
 
         fired: units whose reactions have just reached their bounds. Raises `NoRest`.
         """
-        ways, fired, seen = dict(ways), set(fired), set()
+        fired, seen, judged, guessed = set(fired), set(), set(), False
+        self.light, self.idle = set(self.rows), []
+        self.light &= self._unloaded(*self.solve({}))[0]  # without friction
+        ways = {i: way for i, way in ways.items() if i not in self.light}
         for count in range(PIVOTS * (1 + len(self.rows))):
             self.idle = self._idle(ways)
             x, N = self.solve(ways)
@@ -398,10 +418,18 @@ class RestProblem:
             small = self._rounding(x, N)
             wrong = self._wrong(ways, x, N, a, small, fired)
             if not wrong:
-                sticking = [i for i in self.rows if i not in ways and i not in self.idle]
-                blocked = [i for i in ways if self._is_blocked(i, sticking)]
-                return FrictionAtRest(sticking, ways, blocked + self.idle, N, self._rates(ways, a, small))
+                unloaded, limits = self._unloaded(x, N)
+                others = (self.light ^ unloaded) & self.rows.keys() - judged
+                if not others:
+                    return self._found(ways, N, a, small, (unloaded, limits))
+                self.light ^= others
+                judged |= others
+                ways = {i: way for i, way in ways.items() if i not in self.light}
+                continue
             known = tuple((i, *np.sign(np.round(d, 3))) for i, d in sorted(ways.items()))
+            if known in seen and (guess := self._bounded(N)) and not guessed:
+                ways, guessed = guess, True
+                continue
             one_by_one = known in seen or count >= PIVOTS
             seen.add(known)
             for i in sorted(wrong)[: 1 if one_by_one else None]:
@@ -411,6 +439,48 @@ class RestProblem:
                 else:
                     ways[i] = wrong[i]
         raise NoRest(sorted(wrong))
+
+    def _found(self, ways, N, a, small, unloaded):
+        sticking = [i for i in self.rows if i not in (*ways, *self.idle, *self.light)]
+        blocked = [i for i in ways if self._is_blocked(i, sticking)] + self.idle
+        rates, (unloaded, limits) = self._rates(ways, a, small), unloaded
+        for i in self.light:
+            along = a[self.at[i]] if a[self.at[i]].any() else np.eye(len(self.at[i]))[0]
+            ways[i] = along @ self.bases[i] / np.linalg.norm(along)
+        known = {*sticking, *self.light, *(unloaded - self.rows.keys())}
+        return FrictionAtRest(sticking, ways, blocked, N, rates, {i: limits[i] for i in sorted(known)})
+
+    def _bounded(self, N):
+        """Directions of those that slide, by the bounds of these normal loads; None where units have several rows.
+
+        x minimises x.H x / 2 - c.x within |x| <= mu N, H = -G: where pivoting goes round, as along a chain.
+        """
+        from scipy.linalg import LinAlgError, cholesky, solve_triangular
+        from scipy.optimize import lsq_linear
+
+        units = [i for i in self.rows if i not in self.idle and i not in self.light]
+        at = self._held(units)
+        if len(at) > len(units):
+            return None
+        try:
+            R = cholesky(-self.G[np.ix_(at, at)])
+        except LinAlgError:
+            return None
+        pairs = [self.units[i].bound for i in units]
+        loads = [N[self.units[i].load.normal] if share else 0.0 for i, (share, _) in zip(units, pairs, strict=True)]
+        bounds = np.maximum([share * load + own for load, (share, own) in zip(loads, pairs, strict=True)], TINY)
+        c = solve_triangular(R, (self.c + self.D @ N)[at], trans="T")
+        x = lsq_linear(R, c, (-bounds, bounds), method="bvls", tol=TINY).x
+        slides = zip(units, x, np.abs(x) >= bounds * (1.0 - LEVEL), strict=True)
+        return {i: np.sign(one) * self.bases[i][0] for i, one, beyond in slides if beyond}
+
+    def _unloaded(self, x, N):
+        """Units whose normal loads are small beside what acts on their bodies; up to which loads (units,)."""
+        acting = self.applied + self.mass * np.linalg.norm((self.qdd @ np.concatenate(([1.0], x, N)))[self.r], axis=1)
+        limits = self.place.frictions.unloaded * np.append(acting, 0.0)[self.place.frictions.ends].max(axis=1)
+        loads = [unit.load.normal for unit in self.units]
+        limits = np.where(np.array(loads) < 0, 0.0, limits).tolist()
+        return {i for i, normal in enumerate(loads) if normal >= 0 and N[normal] < limits[i]}, limits
 
     def _rounding(self, x, N):
         """Accelerations of the rows that are zero to rounding."""
@@ -423,6 +493,8 @@ class RestProblem:
         found = {}
         for i, at in self.at.items():
             basis, size = self.bases[i], np.linalg.norm(a[at])
+            if i in self.light:
+                continue
             if i not in ways:
                 (share, bound), force = self.units[i].bound, np.linalg.norm(x[at])
                 bound += share * N[self.units[i].load.normal] if share else 0.0
@@ -454,8 +526,15 @@ class RestProblem:
     def _idle(self, ways):
         """Units that stick by what others hold: with rows of their own the reactions wouldn't be unique."""
         sticking, idle = [], []
+        own = self._held(i for i in self.rows if i not in ways and i not in self.light)
+        try:  # by the pivots: what is left of each row beside those before
+            left = np.diag(np.linalg.cholesky(-self.G[np.ix_(own, own)])) ** 2
+            if (left > RANK_TOL * np.abs(np.diag(self.G)).max()).all():
+                return idle
+        except np.linalg.LinAlgError:
+            pass
         for i in self.rows:
-            if i not in ways:
+            if i not in ways and i not in self.light:
                 (idle if sticking and self._is_blocked(i, sticking) else sticking).append(i)
         return idle
 

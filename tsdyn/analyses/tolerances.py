@@ -131,10 +131,16 @@ AT_BOUND, WITHIN_BOUND = 1e-9, 1.0 - 1e-10
 STOPPED = 1e-8
 # Roundings of the time within which an acceleration changes velocities by none: an event's time is right to some ten.
 RESTS = 100.0
+# Slip over the velocities of the two bodies, and over what their accelerations have made since the start, up to which a
+# friction takes part in the event of another, as if it rested: less than ten digits of a run.
+AT_ONCE = 1e-9
 # Rounds of pivoting over those for all units at once; after as many, or where modes come back, one unit at a time.
 PIVOTS = 30
 # Reaction over the bound from which on a unit whose event has come slides.
 BROKEN = 1.0 - 1e-7
+# Friction, of the forces and inertial forces on the two bodies, or of their moments, below which the load counts as
+# none and the friction isn't followed: reactions are right to ten digits at an event.
+UNLOADED = 1e-9
 # What the cosine of the angle between the direction and the acceleration of a beginning slide may lack of one.
 ASIDE = 1e-12
 

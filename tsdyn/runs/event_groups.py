@@ -66,6 +66,8 @@ class Group:
         self.over, self.numbers, self.degree = over, numbers, 0
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
+        known = getattr(getattr(over, "__self__", None), "noise", None)
+        self._least = np.zeros(len(own)) if known is None else known[self.which]
         # Those that survey and Newton's method serve: changes in one direction end the run
         self._exact = [event.exact for event in own]
         self._may_fall = np.array([event.falls for event in own])
@@ -73,7 +75,7 @@ class Group:
 
     def begin(self, values):
         """Take the values (members,) at the start of a run."""
-        self.value, self.noise, self._is_new = values, np.zeros(len(values)), True
+        self.value, self.noise, self._is_new = values, self._least.copy(), True
         self._odd = np.zeros(len(values), bool)  # whether the `Track` knows more than the value
 
     def lend(self, track, i, t):

@@ -403,12 +403,17 @@ class _ContactRun(Transitions):
             function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
         sticking = list(modes.sticking)
-        breaking = Breaking(packed, [frictions.units[i] for i in sticking]).over
-        slowing = Slowing(frictions, modes.begun).over
+        light = [i for i in modes.limits if i not in modes.sticking]
+        units = [[frictions.units[i] for i in some] for some in (sticking, light)]
+        breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in (*sticking, *light)])).over
+        loaded = [*sticking, *light]
+        if not frictions.count:
+            return
+        slowing = Slowing(frictions, modes.begun, frictions.sizes(self.q, self.qdd)).over
         for i in range(frictions.count):
             if i in modes.blocked:
                 continue
-            function = GroupMember(breaking, sticking.index(i)) if i in modes.sticking else GroupMember(slowing, i)
+            function = GroupMember(breaking, loaded.index(i)) if i in loaded else GroupMember(slowing, i)
             yield gaps.count + i, Event(function, frictions.names[i], 1.0, -1.0)
 
     def _still(self, phase):

@@ -27,7 +27,7 @@ class UnitModes:
     sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
-
+    limits: dict = field(default_factory=dict)  # loads that count as none: of frictions that stick, and that have none
     grips: dict = field(default_factory=dict)  # of closed contacts with friction: see grips.py
     held: dict = field(default_factory=dict)
     slack: dict = field(default_factory=dict)  # closed with a reaction of rounding: how far below zero it leaves, N

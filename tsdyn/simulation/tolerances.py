@@ -83,5 +83,9 @@ ROUNDS = 30
 # from which on a slip that slows down may turn less and less.
 SAME_WAY, SLOW = 1.0 - 1e-12, 1e-2
 
+# Load of a friction over that up to which it counts as none, from which on it counts.
+LOADED = 4.0
+# Of the load that counts as none: rounding of reactions, along chains too.
+REACTION_NOISE = 1e-3
 # Coordinates of a scene up to which bodies that rest, where frictions stick, are found, by dense matrices.
 MOST_PINNED = 1000

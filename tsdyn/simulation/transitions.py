@@ -7,7 +7,7 @@ import numpy as np
 from ..analyses.contact_friction import halted, settle_grips
 from ..analyses.contact_problem import Inertia, NoSolution, settle
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
-from ..analyses.tolerances import AT_REST, LEVEL, RESTS, STOPPED
+from ..analyses.tolerances import AT_ONCE, AT_REST, LEVEL, RESTS, STOPPED
 from ..errors import (
     SingularConfiguration,
     Status,
@@ -176,19 +176,23 @@ class Transitions:
         frictions, count = self.frictions, self.count
         if not frictions.count:
             return None
-        place, (v, sizes, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
-        # Velocities that change within rounding of the time are at rest, too
-        gained = RESTS * EPS * abs(self.t) * frictions.motions(self.q[None], self.qdd[None])[1][0]
+        place, (v, _, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
+        # Velocities that change within rounding of the time are at rest, too, and those that come to rest at
+        # once: where loads vanish along a chain events would follow each other ever faster
+        sizes, rates = frictions.sizes(self.q, self.qd), frictions.sizes(self.q, self.qdd)
+        least = np.maximum(AT_REST * sizes, RESTS * EPS * abs(self.t) * rates)
+        least = np.maximum(least, AT_ONCE * np.minimum(sizes, (self.t - self.span[0]) * rates))
         self.remembered, resting, guess = self.remembered.copy(), [], {}
         memory = self.remembered[count:]  # a part of it
         self.modes.blocked = self.off
+        self.modes.limits = {i: x for i, x in before.limits.items() if i not in (*fired, *before.sticking)}
         for i, unit in enumerate(frictions.units):
             if i in self.off:
                 continue
             speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
             if i in before.blocked and memory[unit.way].any():
                 guess[i] = place.read(i, memory)
-            if speed <= max(AT_REST * sizes[0, i], gained[i], 0.0 if signed else STOPPED) or (signed and i in fired):
+            if speed <= max(least[i], 0.0 if signed else STOPPED) or (signed and i in fired):
                 resting.append(i)
                 memory[unit.way] = 0.0
             else:
@@ -207,7 +211,7 @@ class Transitions:
         idle = [i for i in rest.sticking if i in dead and self.modes.closed]
         self.modes.sticking = {i: ranks[i] for i in rest.sticking if i not in idle}
         self.modes.blocked = sorted([*self.off, *rest.blocked, *idle, *(i for i in resting if not ranks[i])])
-        self.modes.begun = {i: (self.t, rate) for i, rate in rest.rates.items()}
+        self.modes.begun, self.modes.limits = {i: (self.t, rate) for i, rate in rest.rates.items()}, rest.limits
         if loads:
             self.friction = self._load(packed, rest.loads)
         return None

@@ -5,7 +5,9 @@ from functools import cached_property
 import numpy as np
 
 from ..analyses.contact_rows import ReactionWorkspace
+from ..analyses.tolerances import LEVEL
 from ..observables import reactions
+from .tolerances import LOADED, REACTION_NOISE
 
 
 class Closing:
@@ -47,24 +49,6 @@ class Closing:
         return values
 
 
-class _Loads:
-    """Multipliers and normal loads of a phase, shared by its events."""
-
-    def __init__(self, packed):
-        self.packed, self._last = packed, (None, None)
-
-    def at(self, states):
-        """Multipliers (k, m), NaN of redundant rows, and normal loads (k, frictions) of one state or of several."""
-        t, q, qd, qdd = np.atleast_1d(states.t), *map(np.atleast_2d, (states.q, states.qd, states.qdd))
-        key, (last, found) = (t.tobytes(), q.tobytes()), self._last
-        if key != last:
-            memory = np.tile(states.memory, (t.size, 1))
-            wide = reactions.with_normal_loads(self.packed, t, q, qd, qdd, memory)
-            found = reactions.multipliers(self.packed, t, q, qd, qdd, wide), wide[:, memory.shape[1] :]
-            self._last = key, found
-        return found
-
-
 class Leaving:
     """The reactions of closed contacts, positive where they push, and their slack, as event functions.
 
@@ -98,31 +82,45 @@ class Leaving:
 
 
 class Breaking:
-    """What the reactions of frictions that stick are below their bounds, as event functions.
+    """What reactions lack of their limits, as event functions.
+
+    Of frictions that stick: what holds them, and its bound. Of those without a load: the load, and one that counts.
 
     Parameters
     ----------
     packed : Packed
         Of the phase.
-    units : list of friction_problem.FrictionUnit
+    sticking : list of friction_problem.FrictionUnit
+    light : list of friction_problem.FrictionUnit
+    limits : ndarray (sticking and light units,), N
+        Loads that count as none.
+
+    Attributes
+    ----------
+    noise : ndarray (sticking and light units,)
+        Rounding of the values.
     """
 
-    def __init__(self, packed, units):
-        self.packed, self.units = packed, units
+    def __init__(self, packed, sticking, light, limits):
+        self.packed, self.sticking, self.normals = packed, sticking, [unit.load.normal for unit in light]
+        self.limits = LOADED * limits[len(sticking) :]
+        self.noise = REACTION_NOISE * limits * ([unit.bound[0] for unit in sticking] + [1.0] * len(light))
 
     def over(self, states):
-        """Values (k, units) of states at k times."""
+        """Values (k, sticking and light units) of states at k times."""
         memory = np.tile(states.memory, (states.t.size, 1))
         motion = states.t, states.q, states.qd, states.qdd
         wide = reactions.with_normal_loads(self.packed, *motion, memory)
-        lam = reactions.particular(reactions.multipliers(self.packed, *motion, wide))
-        values = np.zeros((states.t.size, len(self.units)))
-        for unit, value in zip(self.units, values.T, strict=True):
+        loads = wide[:, memory.shape[1] :]
+        values = np.zeros((states.t.size, len(self.sticking)))
+        if self.sticking:
+            lam = reactions.particular(reactions.multipliers(self.packed, *motion, wide))
+        for unit, value in zip(self.sticking, values.T, strict=True):
             share, bound = unit.bound
             value += bound - np.linalg.norm(lam[:, self.packed.derived.holds[unit.slot]], axis=1)
             if share:
-                value += share * wide[:, memory.shape[1] + unit.load.normal]
-        return values
+                value += share * loads[:, unit.load.normal]
+        return np.hstack((values, self.limits - loads[:, self.normals])) if self.normals else values
 
 
 class Slowing:
@@ -136,10 +134,19 @@ class Slowing:
     frictions : Frictions
     begun : dict
         Of those that have just begun to slide: time and acceleration there, by their numbers.
+    rates : ndarray (frictions,)
+        Sizes of the terms of accelerations.
+
+    Attributes
+    ----------
+    noise : ndarray (frictions,)
+        Rounding of the values, of slides that begin with an acceleration that is hardly more.
     """
 
-    def __init__(self, frictions, begun):
-        self.frictions, self.begun = frictions, begun
+    def __init__(self, frictions, begun, rates):
+        self.frictions, self.begun, self.noise = frictions, begun, np.zeros(frictions.count)
+        for i, (_, first) in begun.items():
+            self.noise[i] = LEVEL * rates[i] if first < LEVEL / REACTION_NOISE * rates[i] else 0.0
 
     def over(self, states):
         """Values (k, frictions) of states at k times."""

@@ -49,6 +49,15 @@ def test_a_ball_on_an_arm_that_slips(torque):
     np.testing.assert_allclose(lost, torque * abs(solution.angle("pin")[-1]), rtol=1e-9)
 
 
+def test_an_inactive_brake_holds_nothing():
+    """The tip would fall with 1 / 0.7 g, faster than the ball: the seat opens."""
+    scene = seat(20.0)
+    scene.deactivate("brake")
+    solution = ts.simulate(scene, (0, 0.1))
+    np.testing.assert_allclose(solution.acceleration("ball")[0], [0, 0, -G], rtol=1e-13)
+    np.testing.assert_allclose(solution.reaction("seat")[0], 0.0, atol=1e-13)
+
+
 @pytest.mark.parametrize("kinetic", [0.01, 1.0, 20.0])
 def test_an_arm_with_a_rough_pin_on_a_stop(kinetic):
     """At its tip: the floor carries what the load leaves of 9.81 N, the pin nothing; a pin that holds it stays."""

@@ -220,7 +220,8 @@ class Transitions:
         """What frictions exert (n,) that slide, by their normal loads (frictions,)."""
         known = {id(unit.force) for unit in self.frictions.units}
         forces = [load.alone for load in packed.loads if id(load.force) in known]
-        system, motion = packed.system._replace(forces=np.concatenate(forces)), (self.q[None], self.qd[None])
+        forces = np.concatenate([packed.system.forces[:0], *forces])
+        system, motion = packed.system._replace(forces=forces), (self.q[None], self.qd[None])
         memory = np.concatenate([self.remembered[self.count :], N])[None]
         found = force_loads(system, np.array([self.t]), *motion, memory)
         memory[0, [slot for unit in self.frictions.units for slot in range(unit.way.start, unit.way.stop)]] = 0.0

@@ -10,7 +10,7 @@ from ..calls import fitting, lacking
 from ..elements.force import Force
 from ..errors import InvalidArgument
 from ..model.kinematics import Kinematics
-from .reactions import Exerting
+from .reactions import Exerting, multipliers
 
 if TYPE_CHECKING:
     from ..hints import Floats
@@ -94,8 +94,7 @@ class StatePhase(NamedTuple):
     inactive: tuple  # names of the constraints and forces that take no part
     values: dict  # parameters that were set, by name
     packed: Any  # of the phase of the run; None of several states in different ones
-    columns: Any  # rows of the scene, and where they are among those of the phase: (2, rows)
-    whole: Any  # the scene with these parameters, packed with all of its constraints
+    whole: Any  # the scene with these parameters, packed with all of its constraints; None of several ones
 
 
 class RememberingState(State):
@@ -109,7 +108,7 @@ class RememberingState(State):
     anchor : Anchor
         Reference of turn counts.
     phase : StatePhase or None
-        None where no action has changed the scene.
+        None where no action has changed the scene, and no friction is exact.
     """
 
     packed: Any = None
@@ -130,16 +129,17 @@ class RememberingState(State):
         return state
 
     def _acting(self, item):
-        if self.phase is None:
+        phase, item = self.phase, self.handles.item(item)
+        if phase is None:
             return super()._acting(item)
-        if self.phase.packed is None:
+        of_phase = isinstance(item, Force) and (phase.inactive or phase.values or getattr(item, "slides", ()))
+        packed = phase.packed if of_phase else phase.whole
+        if packed is None:
             raise InvalidArgument("these states are of several phases of a run: ask for reactions at one time each.")
-        if not isinstance(self.handles.item(item), Force):
-            return self.phase.whole, self.multipliers
-        rows, columns = self.phase.columns
-        lam = np.zeros((*np.shape(self.multipliers)[:-1], len(self.phase.packed.system.segments)))
-        lam[..., columns] = self.multipliers[..., rows]
-        return self.phase.packed, lam
+        if not of_phase:
+            return packed, self.multipliers
+        t, (*motion, memory) = np.atleast_1d(self.t), map(np.atleast_2d, (self.q, self.qd, self.qdd, self.memory))
+        return packed, multipliers(packed, t, *motion, memory)
 
 
 def remembered(state, prepared, t, q):

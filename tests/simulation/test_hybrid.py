@@ -357,6 +357,21 @@ def test_a_block_slides_on_through_an_action(action, mu, slip, tmp_path):
         np.testing.assert_allclose(np.ptp(solution.energy - solution.work), 0.0, atol=FINE)
 
 
+def test_states_know_the_friction_that_holds():
+    """A block at rest is held against 5 N, then against 4 N."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    block = scene.add_body(2.0, (1, 1, 1), name="block")
+    way = C.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, 0), name="way")
+    scene.add(F.TranslationalFriction(scene.add(way), kinetic=0.2, static=0.3, name="rub"))
+    scene.add(F.PointForce(block, force=(5, 0, 0), name="push"))
+    ease = at(0.2, lambda change: change.set("push.force", (4, 0, 0)))
+    for events, pushes in ((None, (5, 5)), (ease, (5, 4))):
+        solution = ts.simulate(scene, (0, 1), events=events, dense_output=True)
+        for t, push in zip((0.1, 0.7), pushes, strict=True):
+            np.testing.assert_allclose(solution.at(t).reaction("rub")[0], [-push, 0, 0], rtol=FINE, atol=FINE)
+            np.testing.assert_allclose(solution.at(t).reaction("push")[0], [push, 0, 0], rtol=FINE, atol=FINE)
+
+
 def test_a_friction_of_a_joint_goes_within_a_run():
     """The block is braked by mu m g up to 0.2 s, and then by nothing."""
     scene = ts.Scene(gravity=(0, 0, -G))

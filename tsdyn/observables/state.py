@@ -95,8 +95,7 @@ class StatePhase(NamedTuple):
     inactive: tuple  # names of the constraints and forces that take no part
     values: dict  # parameters that were set, by name
     packed: Any  # of the phase of the run; None of several states in different ones
-    columns: Any  # rows of the scene, and where they are among those of the phase: (2, rows)
-    whole: Any  # the scene with these parameters, packed with all of its constraints
+    whole: Any  # the scene with these parameters, packed with all of its constraints; None of several ones
 
 
 class RememberingState(State):
@@ -110,7 +109,7 @@ class RememberingState(State):
     anchor : Anchor
         Reference of turn counts.
     phase : StatePhase or None
-        None where no action has changed the scene.
+        None where no action has changed the scene, and no friction is exact.
     held : Packed or None
         Of the phase of the run, where its rows hold frictions; False of several states in different phases.
     """
@@ -145,16 +144,17 @@ class RememberingState(State):
         return self.of(self.held, self.memory, self.anchor, *self[:4], lam).reaction(item, on)
 
     def _acting(self, item):
-        if self.phase is None:
+        phase, item = self.phase, self.handles.item(item)
+        if phase is None:
             return super()._acting(item)
-        if self.phase.packed is None:
+        of_phase = isinstance(item, Force) and (phase.inactive or phase.values or getattr(item, "slides", ()))
+        packed = phase.packed if of_phase else phase.whole
+        if packed is None:
             raise InvalidArgument(SEVERAL)
-        if not isinstance(self.handles.item(item), Force):
-            return self.phase.whole, self.multipliers
-        rows, columns = self.phase.columns
-        lam = np.zeros((*np.shape(self.multipliers)[:-1], len(self.phase.packed.system.segments)))
-        lam[..., columns] = self.multipliers[..., rows]
-        return self.phase.packed, lam
+        if not of_phase:
+            return packed, self.multipliers
+        t, (*motion, memory) = np.atleast_1d(self.t), map(np.atleast_2d, (self.q, self.qd, self.qdd, self.memory))
+        return packed, multipliers(packed, t, *motion, memory)
 
 
 def remembered(state, prepared, t, q):

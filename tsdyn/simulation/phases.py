@@ -219,14 +219,16 @@ class Phases:
             yield self.packed[kind], mine
 
     def phase_at(self, t):
-        """The `StatePhase` at t, s, or of several times; None where actions have changed nothing."""
-        if not any(inactive or values for inactive, values in self.changes):
+        """The `StatePhase` at t, s, or of several times; None where phases differ in rows of constraints alone."""
+        changed = any(inactive or values for inactive, values in self.changes)
+        if not (changed or any(packed.derived.holds for packed in self.packed)):
             return None
         numbers = np.unique(self.at(np.atleast_1d(t))).tolist() or [0]
         kinds = {self.of[number] for number in numbers}
-        one = kinds.pop() if len(kinds) == 1 else None
-        found = 3 * (None,) if one is None else (self.packed[one], self._columns[one], self._gaps[one].packed)
-        return StatePhase(*self.changes[numbers[-1]], *found)
+        scenes = [self.packed[kind] for kind in kinds], [self._gaps[kind].packed for kind in kinds]
+        same = all(self.changes[number] == self.changes[numbers[0]] for number in numbers)
+        alike = [found[0] if same and all(each is found[0] for each in found) else None for found in scenes]
+        return StatePhase(*self.changes[numbers[-1]], *alike)
 
     def held_at(self, t):
         """`RememberingState.held` of a state at t, s, or of several times."""

@@ -155,9 +155,11 @@ class Frictions:
 
         Joints couple rates of turning to the velocities of their bodies: these count, over the scene's size.
         """
+        if not self.count:
+            return np.zeros(0)
         sizes, r = self.motions(q[None], qd[None])[1][0], self.packed.system.bodies[:, :1] + np.arange(3)
-        passing = np.append(np.linalg.norm(qd[r], axis=1), 0.0)[self.ends].sum(axis=1) / self.packed.size
-        return sizes + np.where(self.turns, passing, 0.0)
+        passing = np.append(np.linalg.norm(qd[r], axis=1), 0.0)[self.ends].sum(axis=1)
+        return sizes + np.where(self.turns, passing, 0.0) / (self.packed.size or np.inf)
 
     def speeds(self, q, qd, memory):
         """Of those that slide (k, units): velocities along their directions, in a plane less half of the speed."""

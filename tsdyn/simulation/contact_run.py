@@ -402,13 +402,13 @@ class _ContactRun(Transitions):
             is_open = i not in modes.closed
             function = GroupMember(self.closing.over, i) if is_open else GroupMember(leaving, modes.closed.index(i))
             yield i, Event(function, gaps.names[i], 1.0, -1.0, is_open, not is_open)
+        if not frictions.count:
+            return
         sticking = list(modes.sticking)
         light = [i for i in modes.limits if i not in modes.sticking]
         units = [[frictions.units[i] for i in some] for some in (sticking, light)]
         breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in (*sticking, *light)])).over
         loaded = [*sticking, *light]
-        if not frictions.count:
-            return
         slowing = Slowing(frictions, modes.begun, frictions.sizes(self.q, self.qdd)).over
         for i in range(frictions.count):
             if i in modes.blocked:

@@ -71,7 +71,7 @@ def check(solution, tol=1e-9):
     jump = np.flatnonzero(np.diff(solution.t) == 0.0)[0]
     lost = DRIVER * LOAD * RATE**2 / 2.0 / (DRIVER + LOAD)
     assert abs(solution.energy[jump] - solution.energy[jump + 1] - lost) < tol * lost
-    rest = solution.phases[-1][0]
+    rest = solution.t[solution.sticking("brake")][0]
     assert abs(rest - (BRAKED + LOAD * COMMON / BRAKE)) < tol
     assert solution.sticking("brake")[-1]
 

@@ -22,6 +22,7 @@ from tsdyn.testing.force_checks import evaluate_force_jacobian
 # Constraints that are no polynomials of the positions, and the step of their differences
 TRANSCENDENTAL = (
     "Thread", "Gear", "AngleTerm", "Span", "SmoothContact", "RollingContact", "CylinderContact", "CylinderRolling",
+    "SphereRolling",
 )  # fmt: skip
 SMOOTH = 2e-3
 POLYNOMIAL = 0.05  # of differences of polynomials of degree six and less, which they are exact for

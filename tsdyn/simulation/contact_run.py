@@ -367,7 +367,8 @@ class _ContactRun(Transitions):
         """Names of the units whose rows hold."""
         held = sorted([*self.modes.closed, *self.modes.idle])
         memory, units = self.remembered[self.count :], self.frictions.units
-        idle = [i for i in self.modes.blocked if not memory[units[i].way].any()]
+        off = {*self.off}
+        idle = [i for i in self.modes.blocked if i not in off and not memory[units[i].way].any()]
         names = [self.gaps.names[i] for i in held]
         names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
         names += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]

@@ -531,7 +531,7 @@ class RestProblem:
         own = self._held(i for i in self.rows if i not in ways and i not in self.light)
         try:  # by the pivots: what is left of each row beside those before
             left = np.diag(np.linalg.cholesky(-self.G[np.ix_(own, own)])) ** 2
-            if (left > RANK_TOL * np.abs(np.diag(self.G)).max()).all():
+            if (left > RANK_TOL * np.abs(np.diag(self.G)).max(initial=0.0)).all():
                 return idle
         except np.linalg.LinAlgError:
             pass

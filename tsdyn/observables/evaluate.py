@@ -68,10 +68,10 @@ def normal_loads(packed, t, q, qd, Phi_q, lam):
     return loads, np.array([unit_force(packed.system, load, t, q, qd) for load in frictions])
 
 
-def unit_force(system, load, t, q, qd):
+def unit_force(system, load, t, q, qd, remembered=None):
     """Return the generalised forces g (n,) of one friction for unit normal load."""
     memory = np.zeros((1, system.memory.size + system.normals.size))
-    memory[0, : system.memory.size] = system.reals[system.memory]
+    memory[0, : system.memory.size] = system.reals[system.memory] if remembered is None else remembered
     memory[0, system.memory.size + load.normal] = 1.0
     return force_loads(system._replace(forces=load.alone), np.array([t]), q[None], qd[None], memory)[0]
 

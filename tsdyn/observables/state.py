@@ -15,9 +15,6 @@ from .reactions import Exerting, multipliers
 if TYPE_CHECKING:
     from ..hints import BodyLike, Floats, ItemLike
 
-
-# A state: the type of `solution.state` and `solution.at(t)`, and a possible start of a run.
-
 NOTHING = np.empty(0)
 SEVERAL = "these states are of several phases of a run: ask for reactions at one time each."
 
@@ -132,6 +129,7 @@ class RememberingState(State):
         state.phase, state.held = self.phase, self.held
         return state
 
+    @fitting
     def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
         """As of all states; of a friction that sticks by the rows that hold it."""
         if self.held is None or not getattr(self.handles.item(item), "slides", ()):

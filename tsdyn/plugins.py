@@ -57,7 +57,7 @@ from .elements.loads import (
 )
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
-from .elements.tolerances import FLAT, PARALLEL, RIGHT_ANGLED
+from .elements.tolerances import FLAT, PARALLEL, RIGHT_ANGLED, SLIP
 from .elements.unilateral import Side, Unilateral
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
@@ -137,6 +137,7 @@ __all__ = [
     "PLANE",
     "POINT_OF_BODY",
     "RIGHT_ANGLED",
+    "SLIP",
     "STATE",
     "Action",
     "Adaptive",

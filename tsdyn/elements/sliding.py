@@ -21,9 +21,9 @@ import numpy as np
 
 from ..jit.kernels import kernel
 from ..jit.predicates import some
-from ..maths.recurrences import cross, dot, inverse_root, product, quotient, scaled, square
-from ..maths.tolerances import TINY
+from ..maths.recurrences import cross, dot, inverse_root, product, scaled
 from .force import Force
+from .friction import heading, heading_series
 from .markers import Point, Turn, Vector
 from .tolerances import AHEAD
 
@@ -79,7 +79,7 @@ class _Sliding(Force):
         k0, k1, k2 = arm(x, par, n0, n1, n2)
         l0, l1, l2 = x[0] - x[6] + k0, x[1] - x[7] + k1, x[2] - x[8] + k2
         v0, v1, v2 = slip_velocity(x, xd, par)
-        e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3])
+        e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3], AHEAD)
         f = -par[-1] * par[MU]
         F0, F1, F2 = f * e0, f * e1, f * e2
         out[0], out[1], out[2] = F0, F1, F2
@@ -113,7 +113,7 @@ class _Sliding(Force):
         off = scaled(s, 3, 21, k)
         for i in range(3):
             s[22 + i, k] = s[18 + i, k] - off[i]
-        e0, e1, e2 = heading_series(s, 22, 52, par[WAY : WAY + 3], k)
+        e0, e1, e2 = heading_series(s, 22, 52, par[WAY : WAY + 3], AHEAD, k)
         s[27, k], s[28, k], s[29, k] = -par[MU] * e0, -par[MU] * e1, -par[MU] * e2
         n0, n1, n2 = cross(s, 12, 27, k)
         m0, m1, m2 = cross(s, 15, 27, k)
@@ -134,7 +134,7 @@ class _Sliding(Force):
     def dissipation(x, xd, par, t):
         """Eq. (4)."""
         v0, v1, v2 = slip_velocity(x, xd, par)
-        e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3])
+        e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3], AHEAD)
         return par[-1] * par[MU] * (e0 * v0 + e1 * v1 + e2 * v2)
 
 
@@ -216,28 +216,3 @@ def arm_rows(x, par, k, s):
             s[12, k] += c0
             s[13, k] += c1
             s[14, k] += c2
-
-
-@kernel
-def heading(v0, v1, v2, d):
-    """e of Eq. (3), a tuple of three."""
-    a = v0 * d[0] + v1 * d[1] + v2 * d[2]
-    c = a / (a * a + AHEAD * AHEAD)
-    u0, u1, u2 = d[0] + c * (v0 - a * d[0]), d[1] + c * (v1 - a * d[1]), d[2] + c * (v2 - a * d[2])
-    size = np.sqrt(u0 * u0 + u1 * u1 + u2 * u2 + TINY)
-    return u0 / size, u1 / size, u2 / size
-
-
-@kernel
-def heading_series(s, v, first, d, k):
-    """Coefficient k, a tuple of three, of `heading`; v in rows v to v + 2 of s, eleven rows are its own."""
-    a, u, zero = first, first + 3, 1.0 if k == 0 else 0.0
-    s[a, k] = s[v, k] * d[0] + s[v + 1, k] * d[1] + s[v + 2, k] * d[2]
-    s[a + 1, k] = square(s[a], k) + AHEAD * AHEAD * zero
-    s[a + 2, k] = quotient(s[a], s[a + 1], s[a + 2], k)
-    for i in range(3):
-        s[first + 6 + i, k] = s[v + i, k] - s[a, k] * d[i]
-        s[u + i, k] = d[i] * zero + product(s[first + 6 + i], s[a + 2], k)
-    s[first + 9, k] = dot(s, u, u, k) + TINY * zero
-    s[first + 10, k] = inverse_root(s[first + 9], s[first + 10], k)
-    return scaled(s, u, first + 10, k)

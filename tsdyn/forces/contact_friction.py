@@ -15,6 +15,7 @@ from ..constraints.plane_contact import PlaneContact
 from ..plugins import (
     HEADING_ROWS,
     PLANE,
+    SLIP,
     Force,
     JointFriction,
     Point,
@@ -74,7 +75,7 @@ class ContactFriction(JointFriction, Force):
         v0, v1, v2 = v0 - off * x[12], v1 - off * x[13], v2 - off * x[14]
         if par[3] == 0.0:
             f = -par[-1] * sliding(v0 * v0 + v1 * v1 + v2 * v2, par)
-            v0, v1, v2 = heading(v0, v1, v2, par[WAY : WAY + 3])
+            v0, v1, v2 = heading(v0, v1, v2, par[WAY : WAY + 3], SLIP)
         else:
             f = -par[-1] * coefficient(v0 * v0 + v1 * v1 + v2 * v2, par)
         act(x, f * v0, f * v1, f * v2, 0.0, 0.0, 0.0, out)
@@ -99,7 +100,7 @@ class ContactFriction(JointFriction, Force):
         way = 13
         if par[3] == 0.0:
             s[22, k], way = -sliding_series(s, 16, 17, par, k), 19
-            s[19, k], s[20, k], s[21, k] = heading_series(s, 13, 30, par[WAY : WAY + 3], k)
+            s[19, k], s[20, k], s[21, k] = heading_series(s, 13, 30, par[WAY : WAY + 3], SLIP, k)
         else:
             s[22, k] = -coefficient_series(s, 16, 17, par, k)
         s[23, k], s[24, k], s[25, k] = scaled(s, way, 22, k)
@@ -121,6 +122,6 @@ class ContactFriction(JointFriction, Force):
         v0, v1, v2 = v0 - off * x[12], v1 - off * x[13], v2 - off * x[14]
         vv = v0 * v0 + v1 * v1 + v2 * v2
         if par[3] == 0.0:
-            e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3])
+            e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3], SLIP)
             return par[-1] * sliding(vv, par) * (e0 * v0 + e1 * v1 + e2 * v2)
         return par[-1] * coefficient(vv, par) * vv

@@ -20,6 +20,7 @@ from ..plugins import (
     HEADING_ROWS,
     ORIENTATION,
     POINT_OF_BODY,
+    SLIP,
     BodyFriction,
     Force,
     act,
@@ -148,12 +149,12 @@ class CoulombFriction(BodyFriction, Force):
         v0, v1, v2 = slip(x, xd)
         w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
         if par[2] == 0.0:
-            v0, v1, v2 = heading(v0, v1, v2, par[WAY : WAY + 3])
+            v0, v1, v2 = heading(v0, v1, v2, par[WAY : WAY + 3], SLIP)
             f = -par[0] + 0.0 * v0
         else:
             f = -par[0] / np.sqrt(v0 * v0 + v1 * v1 + v2 * v2 + par[2] * par[2])
         if par[3] == 0.0:
-            w0, w1, w2 = heading(w0, w1, w2, par[TURN : TURN + 3])
+            w0, w1, w2 = heading(w0, w1, w2, par[TURN : TURN + 3], SLIP)
             n = -par[1] + 0.0 * w0
         else:
             n = -par[1] / np.sqrt(w0 * w0 + w1 * w1 + w2 * w2 + par[3] * par[3])
@@ -166,7 +167,7 @@ class CoulombFriction(BodyFriction, Force):
             for i in range(3):
                 s[12 + i, k] = xd[3 + i] - xd[9 + i]
             if par[3] == 0.0:
-                n0, n1, n2 = heading_series(s, 12, 19, par[TURN : TURN + 3], k)
+                n0, n1, n2 = heading_series(s, 12, 19, par[TURN : TURN + 3], SLIP, k)
             else:
                 n0, n1, n2 = direction_series(s, 12, 15, par[3], k)
             out[3], out[4], out[5] = -par[1] * n0, -par[1] * n1, -par[1] * n2
@@ -174,7 +175,7 @@ class CoulombFriction(BodyFriction, Force):
         if par[0] != 0.0:
             slip_series(x, xd, k, s)
             if par[2] == 0.0:
-                f0, f1, f2 = heading_series(s, 6, 19 + HEADING_ROWS, par[WAY : WAY + 3], k)
+                f0, f1, f2 = heading_series(s, 6, 19 + HEADING_ROWS, par[WAY : WAY + 3], SLIP, k)
             else:
                 f0, f1, f2 = direction_series(s, 6, 17, par[2], k)
             s[9, k], s[10, k], s[11, k] = -par[0] * f0, -par[0] * f1, -par[0] * f2
@@ -187,12 +188,12 @@ class CoulombFriction(BodyFriction, Force):
         w0, w1, w2 = xd[3] - xd[9], xd[4] - xd[10], xd[5] - xd[11]
         vv, ww = v0 * v0 + v1 * v1 + v2 * v2, w0 * w0 + w1 * w1 + w2 * w2
         if par[2] == 0.0:
-            e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3])
+            e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3], SLIP)
             lost = par[0] * (e0 * v0 + e1 * v1 + e2 * v2)
         else:
             lost = par[0] * vv / np.sqrt(vv + par[2] * par[2])
         if par[3] == 0.0:
-            e0, e1, e2 = heading(w0, w1, w2, par[TURN : TURN + 3])
+            e0, e1, e2 = heading(w0, w1, w2, par[TURN : TURN + 3], SLIP)
             return lost + par[1] * (e0 * w0 + e1 * w1 + e2 * w2)
         return lost + par[1] * ww / np.sqrt(ww + par[3] * par[3])
 

@@ -6,7 +6,9 @@ from ..analyses.contact_friction import spread
 from ..analyses.contact_problem import slip_rows
 from ..elements.bodies import rotation_matrix
 from ..elements.force import Force
-from ..elements.sliding import WAY, heading, slip_velocity
+from ..elements.friction import heading
+from ..elements.sliding import WAY, slip_velocity
+from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
 from ..model.packed import Derived, begins_of, index_of
 from ..observables import reactions
@@ -213,5 +215,5 @@ def add_friction(gaps, modes, packed, t, q, qd, lam, out):
         if modes.grips[i] is not None:
             out[:, gaps.rows[i]] = -gaps.sign[i] * N[:, j]
             d = gaps.across(i, tangents[:, j], modes.grips[i])  # (k, 2)
-            e = np.array([twin(heading)(*v, 0.0, (*way, 0.0))[:2] for v, way in zip(slip[:, j], d, strict=True)])
+            e = np.array([twin(heading)(*v, 0.0, (*way, 0.0), AHEAD)[:2] for v, way in zip(slip[:, j], d, strict=True)])
             out[:, rows[j]] = (gaps.kinetic[i] * N[:, j])[:, None] * e

@@ -13,7 +13,7 @@ from ..model.kinematics import Kinematics
 from .reactions import Exerting, multipliers
 
 if TYPE_CHECKING:
-    from ..hints import BodyLike, Floats, ItemLike
+    from ..hints import Floats
 
 NOTHING = np.empty(0)
 SEVERAL = "these states are of several phases of a run: ask for reactions at one time each."
@@ -107,15 +107,12 @@ class RememberingState(State):
         Reference of turn counts.
     phase : StatePhase or None
         None where no action has changed the scene, and no friction is exact.
-    held : Packed or None
-        Of the phase of the run, where its rows hold frictions; False of several states in different phases.
     """
 
     packed: Any = None
     memory: Any = None
     anchor: Any = None
     phase: StatePhase | None = None
-    held: Any = None
 
     @classmethod
     def of(cls, packed, memory, anchor, *parts):
@@ -126,20 +123,8 @@ class RememberingState(State):
 
     def _replace(self, **changes: Any) -> RememberingState:
         state = self.of(self.packed, self.memory, self.anchor, *super()._replace(**changes))
-        state.phase, state.held = self.phase, self.held
+        state.phase = self.phase
         return state
-
-    @fitting
-    def reaction(self, item: ItemLike, on: BodyLike | None = None) -> tuple[Floats, Floats]:
-        """As of all states; of a friction that sticks by the rows that hold it."""
-        if self.held is None or not getattr(self.handles.item(item), "slides", ()):
-            return super().reaction(item, on)
-        if self.held is False:
-            raise InvalidArgument(SEVERAL)
-        t, levels = np.atleast_1d(self.t), map(np.atleast_2d, self[1:4])
-        lam = multipliers(self.held, t, *levels, np.atleast_2d(self.memory))
-        lam = lam.reshape(*np.shape(self.q)[:-1], -1)
-        return self.of(self.held, self.memory, self.anchor, *self[:4], lam).reaction(item, on)
 
     def _acting(self, item):
         phase, item = self.phase, self.handles.item(item)

@@ -1,10 +1,9 @@
-"""Runs of scenes with unilateral constraints: phases between events, impacts, openings; `ts.impact`."""
+"""Runs of scenes with unilateral constraints: phases between events, impacts, openings."""
 
 from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -50,9 +49,6 @@ from .tolerances import (
 )
 from .transitions import Transitions
 from .unit_events import Breaking, Closing, Leaving, Slowing
-
-if TYPE_CHECKING:
-    pass
 
 # A run with contacts is a sequence of phases. A scene has units: gaps, each open or closed. A phase is a run of the
 # scene with the units in their modes, the closed gaps as bilateral rows, and ends at the first zero of what a unit
@@ -170,7 +166,6 @@ class _ContactRun(Transitions):
                 f"regularised friction that depends on reactions ({', '.join(rough)}) doesn't serve scenes with "
                 "contacts: leave out slip_velocity, for the exact law."
             )
-
         if self.frictions.count and self.gaps.rubs.any():
             names = listed(list(dict.fromkeys(self.frictions.names)), NAMED)
             raise InvalidArgument(

@@ -230,13 +230,6 @@ class Phases:
         alike = [found[0] if same and all(each is found[0] for each in found) else None for found in scenes]
         return StatePhase(*self.changes[numbers[-1]], *alike)
 
-    def held_at(self, t):
-        """`RememberingState.held` of a state at t, s, or of several times."""
-        kinds = {self.of[number] for number in self.at(np.atleast_1d(t)).tolist()} if self.packed else ()
-        if not any(self.packed[kind].derived.holds for kind in kinds):
-            return None
-        return self.packed[kinds.pop()] if len(kinds) == 1 else False
-
     def parts(self, solution, whole):
         """Yield the outputs of a solution by packed scenes, each as a solution of that scene, and which they are.
 

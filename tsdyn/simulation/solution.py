@@ -372,7 +372,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def _in_phase(self, state):
         """A state, or several, with what actions have changed before."""
         if self._phases is not None:
-            state.phase, state.held = self._phases.phase_at(state.t), self._phases.held_at(state.t)
+            state.phase = self._phases.phase_at(state.t)
         return state
 
     def _anchor_of(self, t):

@@ -12,7 +12,7 @@ from ..errors import InconsistentState, InvalidArgument, NoEquilibrium
 from ..model.kinematics import Anchor
 from ..model.packed import first_rows
 from ..observables import reactions
-from ..observables.state import RememberingState, State, remembered
+from ..observables.state import RememberingState, State, StatePhase, remembered
 from ..runs.arguments import state_arrays
 from ..validation import finite_vector, listed, number
 from .contact_run import begun, demand_apart
@@ -191,7 +191,9 @@ def _of_all(scene, found, gaps, phase, modes):
         for i in modes.closed:
             found.multipliers[:, gaps.rows[i]] = lam[:, first[id(_gap_row(gaps, i))]]
     found.state = RememberingState.of(scene.packed, state.memory, state.anchor, *state[:4], found.multipliers[0])
-    found.state.held = phase.packed if phase.packed.derived.holds else None
+    if phase.packed.derived.holds:
+        inactive = tuple(item.name for item in inactive_of(scene))
+        found.state.phase = StatePhase(inactive, {}, phase.packed, scene.packed)
     return found
 
 

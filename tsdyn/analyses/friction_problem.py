@@ -20,6 +20,7 @@ from ..elements.bodies import rotation_matrix
 from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
 from ..errors import SingularConfiguration
+from ..maths.matrix_rank import range_and_null_space
 from ..maths.tolerances import EPS, RANK_TOL, ROUNDING, TINY
 from ..model.packed import first_rows
 from ..observables.evaluate import ITERATIONS, constraint_arrays, mass_matrix
@@ -280,13 +281,7 @@ def immobile(packed, t, q, memory):
 
 
 def _null_space(rows):
-    from scipy.linalg import qr
-
-    if not len(rows):
-        return np.eye(rows.shape[1])
-    Q, R, _ = qr(rows.T, pivoting=True)
-    size = np.abs(np.diag(R))
-    return Q[:, int((size > RANK_TOL * size.max(initial=0.0)).sum()) :]
+    return range_and_null_space(rows)[1] if len(rows) else np.eye(rows.shape[1])
 
 
 class FrictionAtRest(NamedTuple):
@@ -329,7 +324,7 @@ class RestProblem:
     """
 
     def __init__(self, place, packed, rows, bases, t, q, qd, memory):
-        from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
+        from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
         self.place, self.units, self.rows, self.bases = place, place.frictions.units, rows, bases
         system = _remembering(packed.system, memory)
@@ -337,10 +332,8 @@ class RestProblem:
         M = mass_matrix(system, q)
         mine = np.concatenate([*rows.values(), np.zeros(0, int)])
         others = np.setdiff1d(np.arange(len(gamma)), mine)
-        Q, R, order = qr(Phi_q[others].T, pivoting=True)
-        size = np.abs(np.diag(R))
-        rank = int((size > RANK_TOL * size.max(initial=0.0)).sum())
-        Z, own, R, order = Q[:, rank:], Q[:, :rank], R[:rank, :rank], others[order[:rank]]
+        own, Z, R, order = range_and_null_space(Phi_q[others])
+        rank, order = len(order), others[order]
         try:
             factor = cho_factor(Z.T @ M @ Z) if Z.size else None
         except np.linalg.LinAlgError as error:

@@ -9,6 +9,7 @@ import numpy as np
 from ..calls import fitting_methods
 from ..elements.bodies import START, PointMass, named, rotation_matrix, transform_g
 from ..errors import InvalidArgument, InvalidBody, SingularConfiguration
+from ..maths.matrix_rank import range_and_null_space
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import handles_of
 from ..observables.evaluate import constraint_arrays, mass_matrix
@@ -284,16 +285,14 @@ class JumpRows:
 
     def jumped(self, qd, load):
         """Velocities (n,) with M (v - qd) + B^T P = load, B v + Phi_t = 0."""
-        from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
+        from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
         B = self.Phi_q[self.bilateral]
-        Q, R, order = qr(B.T, pivoting=True)
-        size = np.abs(np.diag(R))
-        rank = int((size > RANK_TOL * size.max(initial=0.0)).sum())
-        change, Z = np.zeros(qd.size), Q[:, rank:]
-        if rank:
-            rates = -(B @ qd + self.Phi_t[self.bilateral])[order[:rank]]
-            change = Q[:, :rank] @ solve_triangular(R[:rank, :rank], rates, trans="T")
+        own, Z, R, order = range_and_null_space(B)
+        change = np.zeros(qd.size)
+        if order.size:
+            rates = -(B @ qd + self.Phi_t[self.bilateral])[order]
+            change = own @ solve_triangular(R, rates, trans="T")
         if Z.size:
             try:
                 factor = cho_factor(Z.T @ self.M @ Z)

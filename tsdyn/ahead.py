@@ -39,6 +39,7 @@ from .motions.signals import Signal
 from .rows.interface import ELIMINATION
 from .runs.arguments import adaptive
 from .runs.path_loads import watch
+from .runs.step_engine import second_derivative
 from .runs.stepper import advance
 from .taylor import step_parts
 from .taylor.layout import FAR, no_series, pays, room
@@ -147,7 +148,7 @@ def of_method(method, form, within, far=False, rough=False):
     if within:
         interpolant = method.interpolant(form.first_order)
         yield from (interpolant.fill, interpolant.value)
-        yield from (method.second,) if method.implicit else ()
+        yield from filter(None, (second_derivative(method, form),))
 
 
 def _is_checked(force):

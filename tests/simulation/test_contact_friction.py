@@ -432,10 +432,12 @@ def test_a_store_and_a_file_hold_them(tmp_path):
         assert other.phases == plain.phases
 
 
-def test_a_method_that_serves_the_first_phase_alone_is_refused():
-    """The ball slides without rows on velocities at first, and rolls with them then."""
-    with pytest.raises(ts.InvalidArgument, match="rows on velocities: use formulation='tangent'"):
-        ts.prepare(ball("rolling", (3, 0, 0)), integrator="sdirk54", formulation="null-space")
+@pytest.mark.slow
+def test_a_ball_slides_then_rolls_by_an_implicit_method_in_the_null_space_form():
+    """Rows on velocities come in the second phase: it rolls at 5/7 of its first speed."""
+    solution = ts.simulate(ball("rolling", (3, 0, 0)), (0, 2), integrator="sdirk54", formulation="null-space")
+    assert solution.raise_if_failed().phases[-1][2] == ("floor", "floor sticks")
+    np.testing.assert_allclose(solution.velocity("ball")[-1], (15 / 7, 0, 0), rtol=0, atol=1e-6)
 
 
 def test_bad_coefficients():

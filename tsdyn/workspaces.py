@@ -354,9 +354,7 @@ class RunState(NamedTuple):
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
     normal: np.ndarray  # (2 m,)  normal coordinates u and ud at the last accepted point; of no size without a basis
-    block: (
-        np.ndarray
-    )  # the present step's: start, h, end, chart; the interpolant's data; u, ud of its ends; ...
+    block: np.ndarray  # the present step's: start, h, end, chart; the interpolant's data; u, ud of its ends; ...
     clock: Clock
     numbers: RunNumbers
     kernels: RunKernels

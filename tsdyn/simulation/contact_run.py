@@ -435,7 +435,7 @@ class _ContactRun(Transitions):
         return left if left.size or self.per_step else np.array([np.inf])  # an empty array would ask for every step
 
     def _steps_left(self):
-        most = self.options.max_steps
+        most = self.options.max_steps if self.archive is None else self.archive.most_steps
         return None if most is None else max(most - self.steps, 0)
 
     def _reporting(self):

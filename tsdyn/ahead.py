@@ -147,6 +147,7 @@ def of_method(method, form, within, far=False, rough=False):
     if within:
         interpolant = method.interpolant(form.first_order)
         yield from (interpolant.fill, interpolant.value)
+        yield from (kernels.normal,) if form.has_normals else ()
         yield from (method.second,) if method.implicit else ()
 
 

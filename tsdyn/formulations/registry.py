@@ -79,6 +79,11 @@ class Formulation:
         return int(unheld.sum())
 
     @property
+    def has_normals(self):
+        """Whether positions have normal coordinates u that dense output starts from."""
+        return hasattr(self.kernels, "normal")
+
+    @property
     def frees_stages(self):
         """Whether stages of explicit methods may stay where their sums put them, off the manifold."""
         return hasattr(self.kernels, "stage_place")

@@ -76,9 +76,9 @@ def demand_apart(gaps, q, angles, tol, able=None):
 # Numbers of a run that a checkpoint holds as they are, and the names of its arrays
 KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", "replaced", "written", "totals"
 START, PREFIX = ("q", "qd", "remembered"), "phase "
-# What a phase raises that can't begin, after others: whose fault it is
+# What a phase raises that can't begin, after others
 FAILURES = {
-    InvalidArgument: Status.EVENT_FAILED, InvalidForce: Status.SAMPLING_FAILED, SingularConfiguration: Status.SINGULAR,
+    InvalidArgument: Status.METHOD_REFUSED, InvalidForce: Status.SAMPLING_FAILED, SingularConfiguration: Status.SINGULAR,
 }  # fmt: skip
 
 
@@ -435,7 +435,7 @@ class _ContactRun(Transitions):
         return left if left.size or self.per_step else np.array([np.inf])  # an empty array would ask for every step
 
     def _steps_left(self):
-        most = self.options.max_steps
+        most = self.options.max_steps if self.archive is None else self.archive.most_steps
         return None if most is None else max(most - self.steps, 0)
 
     def _reporting(self):

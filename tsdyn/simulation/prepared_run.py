@@ -395,7 +395,8 @@ class Run:
             outcome = self._ended(task, numbers, arrays, archive)
             return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
         try:
-            outcome = run_task(task._replace(archive=archive), scene, self.options.initial_tol)
+            task = task._replace(archive=archive, max_steps=archive.most_steps)
+            outcome = run_task(task, scene, self.options.initial_tol)
             seconds = clock() - started
             other = instead(task, outcome.status)
             if other is not None:

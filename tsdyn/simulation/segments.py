@@ -392,9 +392,6 @@ class _Segments:
                 if self.link.interrupted:
                     raise KeyboardInterrupt
                 rest = self._rest()
-                if rest.max_steps == 0:
-                    parts[-1] = parts[-1]._replace(status=Status.MAX_STEPS)
-                    break
                 try:
                     parts.append(self._run(rest, role))
                 except TsdynError as error:

@@ -17,7 +17,7 @@ from ..model.handles import handles_of
 from ..observables.generalised_forces import force_loads
 from ..observables.state import begin_memory
 from ..validation import listed
-from .grips import renewed
+from .grips import gripped
 from .impacts import held, impact_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import UnitModes
@@ -99,10 +99,9 @@ class Transitions:
             if self.gaps.rubs[resting].any():
                 self.qd = halted(inertia, self.qd, resting)
                 settled = settle_grips(inertia, resting, self.qd, leaving)
-                grips, places = renewed(self.gaps, before, settled, self.q)
-                self.modes = UnitModes(
-                    settled.closed, settled.idle, opened, grips=grips, held=places, slack=settled.slack
-                )
+                self.remembered = self.remembered.copy()
+                grips = gripped(self.gaps, before, settled, self.q, self.remembered[self.count :])
+                self.modes = UnitModes(settled.closed, settled.idle, opened, grips=grips, slack=settled.slack)
             elif resting:
                 settled = settle(inertia, resting, self.qd, leaving)
                 self.modes = UnitModes(settled.closed, settled.idle, opened, slack=settled.slack)
@@ -238,7 +237,7 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        phase = self._scene_of(self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
+        phase = self._scene_of(self._items(), [self._hold(i, ranks[i]) for i in free])
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
@@ -255,7 +254,7 @@ class Transitions:
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
         unit = self.frictions.units[i]
         hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
-        phase = self._scene_of(self._closed_rows(), [hold])
+        phase = self._scene_of(self._items(), [hold])
         memory = self.remembered[self.count :].copy()
         for k in range(3):
             memory[np.array(unit.held(k))] = hold.numbers[k]

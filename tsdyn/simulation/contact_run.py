@@ -166,12 +166,6 @@ class _ContactRun(Transitions):
                 f"regularised friction that depends on reactions ({', '.join(rough)}) doesn't serve scenes with "
                 "contacts: leave out slip_velocity, for the exact law."
             )
-        if self.frictions.count and self.gaps.rubs.any():
-            names = listed(list(dict.fromkeys(self.frictions.names)), NAMED)
-            raise InvalidArgument(
-                f"exact friction of joints ({names}) doesn't serve scenes in which contacts have friction, too: use "
-                "ViscousFriction, or CoulombFriction with a slip_velocity, or leave out kinetic of the contacts."
-            )
 
     def run(self):
         """Run to the end; the `Task` of the last phase, of the whole scene, and the `Outcome` of all."""

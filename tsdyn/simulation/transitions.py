@@ -291,12 +291,15 @@ class Transitions:
         return after
 
     def _note_impulses(self, inertia, which, p, qd):
-        """Note the impulses (k,) of the gaps `which`, but those that change the rates at qd by less than rounding."""
-        small = AT_REST * inertia.sizes(qd)
+        """Note the impulses (k,) of the gaps `which`, but those that change the rates at qd by less than rounding.
+
+        Pulls, of contacts that stay closed though they are lifted, are noted without friction, whose part isn't told.
+        """
+        small, rubs = AT_REST * inertia.sizes(qd), self.gaps.rubs
         self.phases.impulses += [
             (self.t, self.gaps.names[i], float(x))
             for i, x in zip(which, p, strict=True)
-            if abs(x) * inertia.G[i, i] > small[i]
+            if (x if rubs[i] else abs(x)) * inertia.G[i, i] > small[i]
         ]
 
     def _jump(self, inertia, touching, before, e, qd=None):

@@ -234,9 +234,8 @@ class Inertia:
         return self._of_all(rates)
 
     def hold(self, which, rates):
-        """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
-        own = np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
-        return self.pushed(which, -own)
+        """Impulses (k,) that take these rates from these gaps; negative ones pull."""
+        return -np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
 
     def slips(self, qd):
         """Velocities (count, 2) of the slips, zero where they are rounding."""

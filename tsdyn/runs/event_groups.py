@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..maths.root_isolation import survey
+from ..maths.root_isolation import Crossing, survey
 from .tolerances import FALLEN, FROM_REST, ROOT, ROOT_STEPS, ROUGH_ROOT
 
 # A group is surveyed on a step at once (root_isolation.survey). Of the members that cross zero the earliest is located,
@@ -71,6 +71,7 @@ class Group:
         # Those that survey and Newton's method serve: changes in one direction end the run
         self._exact = [event.exact for event in own]
         self._may_fall = np.array([event.falls for event in own])
+        self._some_may_fall = self._may_fall.any()
         self._falls = np.array([event.direction if event.limit == 1.0 else 0.0 for event in own])
 
     def begin(self, values):
@@ -125,16 +126,21 @@ class Group:
         found, end, last = None, step.t1, self.value.copy()
         alone, left = {}, np.arange(len(last))
         while left.size:
+            whole = left.size == len(last)
             values, noise, degree = self.value[left], self.noise[left], max(step.degree, self.degree // 2)
-            seen = survey(lambda times, left=left: sample(times)[:, left], step.t0, values, end, degree, noise)
+            own = sample if whole else lambda times, left=left: sample(times)[:, left]
+            seen = survey(own, step.t0, values, end, degree, noise)
             self.degree, last[left] = seen.degree, seen.samples[-1]
-            if self._was_new and (fallen := self._fallen(seen.samples, left)) is not None:
+            if self._was_new and self._some_may_fall and (fallen := self._fallen(seen.samples, left)) is not None:
                 return (self.numbers[fallen], step.t0), []
             unclear = self._unclear(seen, left, noise)
+            if not unclear:
+                alone = {}
+                break
             falls = (self._falls[left] * values < 0.0) & ~self._odd[left]
-            roots = {j: seen.root(j) for j, since in unclear.items() if seen.until[j] > since and falls[j]}
-            first = roots and _earliest(lambda t, left=left: sample(np.array([t]))[0, left], seen, roots)
-            alone = {int(left[j]): since for j, since in unclear.items() if j not in roots or first is None}
+            roots = {j: each for j, each in unclear.items() if each.until > each.since and falls[j]}
+            first = roots and _earliest(own, seen, roots)
+            alone = {int(left[j]): each.since for j, each in unclear.items() if j not in roots or first is None}
             if not first:
                 break
             # What was unclear may be clear up to there
@@ -145,32 +151,32 @@ class Group:
         return found, [i for i, since in alone.items() if since < end]
 
     def _unclear(self, seen, left, noise):
-        """Of the members `left` those that may have a zero, and up to which time they have none."""
-        unclear = {j: since for j, since in enumerate(seen.since) if since < math.inf}
+        """Of the members `left` those that may have a zero, with their `Crossing`."""
+        unclear = seen.unclear
         # What a `Track` knows of zeros is of no interest where the member is clear, on the side that it falls from
         for j in self._odd[left].nonzero()[0].tolist():
             if j in unclear or not self._falls[left[j]] * seen.samples[-1, j] < 0.0:
-                unclear.setdefault(j, seen.a)
+                unclear.setdefault(j, Crossing(seen.a))
             else:
                 self._odd[left[j]] = False
         # Values of rounding alone have no zero
         if unclear and noise.any():
             quiet = (np.abs(seen.samples).max(axis=0) <= noise).tolist()
-            unclear = {j: since for j, since in unclear.items() if not quiet[j]}
+            unclear = {j: each for j, each in unclear.items() if not quiet[j]}
         return unclear
 
 
-def _earliest(values, seen, roots):
-    """Which function of a `Survey` crosses zero first, and when; None if unsure.
+def _earliest(sample, seen, roots):
+    """Which function of a `Survey` crosses zero first, and when; None if unsure. roots: their `Crossing`s.
 
-    By Newton's method from the earliest of the roots (t, slope) of interpolants. Where that leaves another function
-    beyond zero, it goes on with that one.
+    By Newton's method from the earliest of the roots of interpolants. Where that leaves another function beyond zero,
+    it goes on with that one.
     """
-    j, before = min(roots, key=roots.__getitem__), math.inf
-    t = roots[j][0]
+    j, before = min(roots, key=lambda k: roots[k].root), math.inf
+    t = roots[j].root
     for _ in range(ROOT_STEPS):
-        found = values(t)
-        moves = {k: float(found[k]) / slope for k, (root, slope) in roots.items()}
+        found = sample(np.array([t]))[0].tolist()
+        moves = {k: found[k] / each.slope for k, each in roots.items()}
         k = max(moves, key=moves.__getitem__)  # the furthest back
         if k != j:
             j, before = k, math.inf
@@ -178,7 +184,7 @@ def _earliest(values, seen, roots):
         # The last digit, or rounding of the values: no step is shorter
         done = abs(move) <= ROOT * abs(t) or (abs(move) >= 0.5 * before and abs(move) < ROUGH_ROOT * (seen.b - seen.a))
         before, t = abs(move), t - move
-        if not seen.since[j] <= t <= seen.until[j]:
+        if not roots[j].since <= t <= roots[j].until:
             return None
         if done:
             return j, t

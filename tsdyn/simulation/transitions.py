@@ -93,7 +93,8 @@ class Transitions:
             opening = [i for i in fired if i not in before.closed]
             noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
             if noise:  # a gap that closes with a rate of rounding, or a ratchet that takes hold
-                self.qd, rates = held(inertia, self.qd, noise, rates)
+                p, self.qd, rates = held(inertia, self.qd, noise, rates)
+                self._note_impulses(inertia, noise, p, qd)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
@@ -284,18 +285,28 @@ class Transitions:
         for _ in touching:
             if not a.any():
                 break
-            qd, after = held(inertia, qd, [i for i in touching if a[i] > 0.0 or after[i] == 0.0], after)
+            stays = [k for k, i in enumerate(touching) if a[i] > 0.0 or after[i] == 0.0]
+            more, qd, after = held(inertia, qd, [touching[k] for k in stays], after)
+            p[stays] += more
             if (after[touching] < 0.0).any():
                 more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
                 p = p + more
             a = self._lowering(inertia, touching, qd, after)
-        # Impulses that change rates by less than rounding are none
-        small, named = AT_REST * inertia.sizes(self.qd), zip(touching, p, strict=True)
-        self.phases.impulses += [
-            (self.t, self.gaps.names[i], float(x)) for i, x in named if x * inertia.G[i, i] > small[i]
-        ]
+        self._note_impulses(inertia, touching, p, self.qd)
         self.qd = qd
         return after
+
+    def _note_impulses(self, inertia, which, p, qd):
+        """Note the impulses (k,) of the gaps `which`, but those that change the rates at qd by less than rounding.
+
+        Pulls, of contacts that stay closed though they are lifted, are noted without friction, whose part isn't told.
+        """
+        small, rubs = AT_REST * inertia.sizes(qd), self.gaps.rubs
+        self.phases.impulses += [
+            (self.t, self.gaps.names[i], float(x))
+            for i, x in zip(which, p, strict=True)
+            if (x if rubs[i] else abs(x)) * inertia.G[i, i] > small[i]
+        ]
 
     def _jump(self, inertia, touching, before, e, qd=None):
         """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""

@@ -83,6 +83,11 @@ class Gaps:
         self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
+        self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
+
+    def lengths(self, length):
+        """What rounding of gaps is a part of (count,): the length of the scene, m; of angles a radian, or their bound."""
+        return np.where(self._angles > 0.0, self._angles, length)
 
     def all_rows(self, which=slice(None)):
         """Rows of Phi of gaps and of their slips, by default of all."""

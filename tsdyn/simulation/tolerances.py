@@ -71,7 +71,8 @@ PASSES, GOT_ON = 16, 1e-9
 TOUCHING, PENETRATION = 64.0 * EPS, 1e-9
 # Roundings in a gap, of the sizes of its terms: lower flights than these are none.
 ROUNDED = 16.0
-# Height of flights, of the scene's length or in rad, below which elastic impacts (e = 1) end: others come lower by themselves.
+# Height of flights, of the scene's length or in rad, below which elastic impacts (e = 1) end: others come lower by
+# themselves.
 ENDLESS = 1e-12
 # Events in a row without progress in time, beside one for each gap: a chain of openings that follow from each other.
 MOST_AT_AN_INSTANT = 100

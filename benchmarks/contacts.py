@@ -3,9 +3,11 @@
 - ball: it falls from 1 m and bounces with e = 0.8; the error is that of its height after 1.5 s, in the third flight.
 - rocking: a slender block rocks on smooth ground, by plastic impacts of its edges; the error is that of its tilt after
   0.2 s, between the first and the second impact. The reference: the closed form of the impact, DOP853 before and after.
+- chain: five links fall on a smooth floor, and their ends bounce one after the other with e = 0.8; the error is that of
+  the first end's height after 0.3 s. The reference: minimal coordinates, DOP853 between the impacts.
 - slope: a block rests on a slope below the angle of friction; the error is how far it has moved after 10 s.
 
-Contacts of MuJoCo and Drake are compliant, here as stiff as the step allows; Drake has no coefficient of restitution.
+Contacts of the other programs are compliant, here as stiff as the step allows; Drake has no coefficient of restitution.
 Engines that aren't installed are left out.
 
 Run it: python -m benchmarks.contacts
@@ -23,6 +25,9 @@ STEPS, TOLERANCES, ROUNDS = (1e-3, 1e-4), (1e-4, 1e-8, 1e-12), 2
 G, E, BALL_END = 9.81, 0.8, 1.5
 HALF_WIDTH, HALF_HEIGHT, TILT, ROCKING_END = 0.2, 0.5, 0.1, 0.2  # m, m, rad, s
 ANGLE, FRICTION, SLOPE_END = 0.3, 0.5, 10.0  # rad, -, s
+LINKS, LINK, LINK_MASS, BEND, DROP, CHAIN_END = 5, 0.2, 0.1, 0.25, 0.05, 0.3  # -, m, kg, rad, m, s
+LINK_INERTIA = LINK_MASS * LINK**2 / 12
+ANGLES = [BEND * (1 + i / 7) * (-1) ** i for i in range(LINKS)]  # from x to z
 MASS = 2.0
 INERTIA = MASS * (HALF_WIDTH**2 + HALF_HEIGHT**2) / 3
 HEIGHT = HALF_HEIGHT * np.cos(TILT) + HALF_WIDTH * np.sin(TILT)
@@ -66,6 +71,52 @@ def rocking():
     return -solve_ivp(rates, (first.t[-1], ROCKING_END), (0.0, rate), **options).y[0, -1]
 
 
+def chain():
+    """Height of the first end: coordinates are its place x, z, and the angles of the links."""
+    n = LINKS + 2
+    arms = [LINK * (np.arange(LINKS) < i) for i in range(LINKS + 1)]  # of the ends
+    arms += [LINK * ((np.arange(LINKS) < i) + 0.5 * (np.arange(LINKS) == i)) for i in range(LINKS)]  # of the centroids
+    arms = np.array(arms)
+
+    def points(x):
+        """Jacobians (points, 2, n) of all points, and their centripetal directions (points, 2, LINKS)."""
+        c, s = np.cos(x[2:]), np.sin(x[2:])
+        moved = np.zeros((len(arms), 2, n))
+        moved[:, 0, 0] = moved[:, 1, 1] = 1.0
+        moved[:, :, 2:] = np.stack([-arms * s, arms * c], axis=1)
+        return moved, np.stack([-arms * c, -arms * s], axis=1)
+
+    def mass(x):
+        moved, bent = points(x)
+        M = LINK_MASS * np.einsum("pin,pim->nm", moved[LINKS + 1 :], moved[LINKS + 1 :])
+        M[2:, 2:] += LINK_INERTIA * np.eye(LINKS)
+        return M, moved, bent
+
+    def rates(_, y):
+        M, moved, bent = mass(y[:n])
+        a = bent[LINKS + 1 :] @ y[n + 2 :] ** 2 + [0, G]
+        return np.append(y[n:], np.linalg.solve(M, -LINK_MASS * np.einsum("pin,pi->n", moved[LINKS + 1 :], a)))
+
+    def height(i, begun):
+        def value(t, y):
+            return y[1] + arms[i] @ np.sin(y[2:n]) if t > begun[i] + 1e-6 else 1.0
+
+        value.terminal, value.direction = True, -1
+        return value
+
+    t, y, begun = 0.0, np.array([0, DROP, *ANGLES, *np.zeros(n)], float), np.full(LINKS + 1, -1.0)
+    while True:
+        heights = [height(i, begun) for i in range(LINKS + 1)]
+        run = solve_ivp(rates, (t, CHAIN_END), y, "DOP853", events=heights, rtol=1e-13, atol=1e-15, max_step=2e-3)
+        t, y = run.t[-1], run.y[:, -1]
+        if run.status != 1:
+            return y[1]
+        i = next(i for i, times in enumerate(run.t_events) if times.size)
+        M, moved, _ = mass(y[:n])
+        J, begun[i] = moved[i, 1], t
+        y[n:] -= np.linalg.solve(M, J) * (1 + E) * (J @ y[n:]) / (J @ np.linalg.solve(M, J))
+
+
 # The same in tsdyn
 
 
@@ -104,6 +155,43 @@ def ours_rocking(tol):
 
     seconds, solution = ours(build, ROCKING_END, tol)
     return seconds, 2 * np.arctan2(*solution.orientation("block")[-1, [2, 0]])
+
+
+def links():
+    """The links on hinges, above the floor, without contacts."""
+    scene, tip, last = ts.Scene(gravity=(0, 0, -G)), np.array([0, 0, DROP]), None
+    for i, angle in enumerate(ANGLES):
+        along, turned = (
+            LINK * np.array([np.cos(angle), 0, np.sin(angle)]),
+            (np.cos(angle / 2), 0, -np.sin(angle / 2), 0),
+        )
+        body = scene.add_body(LINK_MASS, (LINK_INERTIA,) * 3, tip + along / 2, turned, name=f"link {i}")
+        if last is None:
+            scene.add(ts.constraints.Parallel(body, scene.ground, axis_a=(0, 1, 0), axis_b=(0, 1, 0)))
+        else:
+            scene.add(ts.constraints.Revolute.at(last, body, point=tip, axis=(0, -1, 0)))
+        last, tip = body, tip + along
+    return scene
+
+
+def ends(scene):
+    """Bodies and points of a chain that touch the floor."""
+    bodies = scene.bodies
+    return [(bodies[0], (-LINK / 2, 0, 0)), *((body, (LINK / 2, 0, 0)) for body in bodies)]
+
+
+def ours_chain(tol):
+    """With contacts of the ends."""
+
+    def build():
+        scene = links()
+        for body, point in ends(scene):
+            contact = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": E}
+            scene.add(ts.constraints.PlaneContact(body, scene.ground, point_a=point, **contact))
+        return scene
+
+    seconds, solution = ours(build, CHAIN_END, tol)
+    return seconds, solution.position("link 0", point=(-LINK / 2, 0, 0))[-1, 2]
 
 
 def ours_slope(tol):

@@ -4,6 +4,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import tsdyn as ts
@@ -225,6 +226,34 @@ def test_a_stop_counts_turns(bound):
     assert abs(t - abs(bound) / 2) < 1e-13 * abs(bound)
     assert abs(impulse - 2.0 * 2.0) < 1e-13
     assert abs(solution.angle(hinge)[-1] - bound) < 1e-13 * abs(bound)
+
+
+@pytest.mark.parametrize(
+    ("size", "share", "gravity"), [(1.0, 1.0, 0.0), (1e6, 1.0, 0.0), (1e-6, 1.0, 0.0), (1.0, 1e-3, 10.0)]
+)
+def test_a_wheel_leaves_its_stop_and_comes_back(size, share, gravity):
+    """A torque -cos(t) - 0.3, about a hinge and times the inertia and a share, turns a wheel.
+
+    It leaves at cos(t) = -0.3, without a rate. The wheel's place, 1e6 m away, has a rounding that the angle hasn't;
+    the hinge carries the weight, whose rounding doesn't delay the wheel.
+    """
+    scene, inertia = ts.Scene(gravity=(0, 0, -gravity)), 2.0 * size**2
+    wheel = scene.add_body(mass=1.0, inertia=(inertia,) * 3, position=(size, 0, 0), name="wheel")
+    hinge = scene.add(C.Revolute.at(scene.ground, wheel, point=wheel.position, axis=(0, 0, 1), name="hinge"))
+    scene.add(C.Stop(hinge, lower=0.0, restitution=0.5, name="stop"))
+    torque = share * inertia * (ts.motions.Sine(-1.0, 1.0, np.pi / 2) - 0.3)
+    scene.add(ts.forces.Torque(wheel, torque=(0, 0, torque)))
+    solution = ts.simulate(scene, (0, 10.0), rtol=1e-12, atol=1e-12)
+    begun = np.arccos(-0.3)
+
+    def angle(t):
+        return np.cos(t) - np.cos(begun) + np.sin(begun) * (t - begun) - 0.15 * (t - begun) ** 2
+
+    landed = brentq(angle, begun + 1.0, 10.0, xtol=1e-15)
+    rate = -np.sin(landed) + np.sin(begun) - 0.3 * (landed - begun)
+    assert abs(solution.phases[0][1] - begun) < 1e-9
+    assert abs(solution.impulses[0][0] - landed) < 1e-10
+    np.testing.assert_allclose(solution.impulses[0][2], -1.5 * share * inertia * rate, rtol=1e-9)
 
 
 def test_a_stop_of_a_slide():

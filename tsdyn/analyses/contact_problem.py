@@ -87,6 +87,11 @@ class Gaps:
         self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
+        self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
+
+    def lengths(self, length):
+        """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound."""
+        return np.where(self._angles > 0.0, self._angles, length)
 
     def all_rows(self, which=slice(None)):
         """Rows of Phi of gaps and of their slips, by default of all."""
@@ -266,6 +271,10 @@ class Inertia:
         bias = (self.gaps.sign * gamma[: self.gaps.count])[self.which]
         return self._of_all(self._rows @ qdd + bias), self._of_all(self._sizes @ np.abs(qdd) + np.abs(bias))
 
+    def carried(self):
+        """Rounding (count,) of accelerations of the gaps, of weight that bilateral reactions carry."""
+        return LEVEL * np.abs(self.J).sum(axis=1) * np.abs(self.gaps.packed.system.gravity).max()
+
 
 class NoSolution(Exception):
     """A complementarity problem without a solution."""
@@ -332,13 +341,14 @@ def settle(inertia, resting, qd, fired=()):
     c, terms = inertia.accelerations(qd)
     if not resting:
         return Settled([], [], c)
-    resting, fired = list(resting), [i for i in fired if i in resting]
+    resting, fired, carried = list(resting), [i for i in fired if i in resting], inertia.carried()
     while True:
         lam, basic = _solved(inertia, resting, c[resting])
         gdd = c + inertia.G[:, resting] @ lam
         small = LEVEL * (terms + np.abs(inertia.G[:, resting]) @ lam)
         # A reaction that has just vanished doesn't come back by rounding
-        gone = [i for i, x in zip(resting, lam, strict=True) if i in fired and x * inertia.G[i, i] <= small[i]]
+        least = small + carried
+        gone = [i for i, x in zip(resting, lam, strict=True) if i in fired and x * inertia.G[i, i] <= least[i]]
         if not gone:
             break
         resting = [i for i in resting if i not in gone]
@@ -357,11 +367,8 @@ def settle(inertia, resting, qd, fired=()):
 
 
 def slack_of(inertia, closed, pushes, small):
-    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations.
-
-    Accelerations may be zero as bilateral reactions carry the weight: its rounding is in them.
-    """
-    small = small + LEVEL * np.abs(inertia.J).sum(axis=1) * np.abs(inertia.gaps.packed.system.gravity).max()
+    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations."""
+    small = small + inertia.carried()
     return {i: float(small[i] / inertia.G[i, i]) for i in closed if pushes[i] * inertia.G[i, i] <= small[i]}
 
 

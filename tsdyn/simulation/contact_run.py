@@ -382,7 +382,7 @@ class _ContactRun(Transitions):
             sides = [gaps.list[i].side for i in modes.closed]
             rows, slack = [first[id(side.row)] for side in sides], [modes.slack.get(i, 0.0) for i in modes.closed]
             leaving = Leaving(packed, rows, [side.sign for side in sides], slack).over
-        self.closing = Closing(gaps, modes.opened, TOUCHING * self.length)
+        self.closing = Closing(gaps, modes.opened, TOUCHING * gaps.lengths(self.length))
         for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
@@ -483,7 +483,11 @@ class _ContactRun(Transitions):
     def _is_deep(self):
         """Whether contacts penetrate; says so."""
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        deep = [i for i in (self.gap < -PENETRATION * self.length).nonzero()[0].tolist() if i in self.able]
+        deep = [
+            i
+            for i in (self.gap < -PENETRATION * self.gaps.lengths(self.length)).nonzero()[0].tolist()
+            if i in self.able
+        ]
         if deep:
             found = listed([self.gaps.names[i] for i in deep], NAMED)
             self.reason = f"Penetration was not noticed: {found}. Give a max_step."

@@ -49,7 +49,7 @@ class Transitions:
         self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        (near,) = (self.gap <= TOUCHING * self.length).nonzero()
+        (near,) = (self.gap <= TOUCHING * self.gaps.lengths(self.length)).nonzero()
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         hit = [i for i in fired if i < count]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
@@ -324,6 +324,7 @@ class Transitions:
             return np.zeros(self.gaps.count)
         resting = [i for i in touching if rates[i] == 0.0]
         a = -settled_by(inertia, resting, qd).accelerations
-        rounding = EPS * np.maximum(self.length, ROUNDED * inertia.sizes(self.q))
-        rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
+        lengths, elastic = self.gaps.lengths(self.length), self.gaps.restitution == 1.0
+        rounding = EPS * np.maximum(lengths, ROUNDED * inertia.sizes(self.q))
+        rounding[elastic] = ENDLESS * lengths[elastic]  # flights that would never get lower
         return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)

@@ -21,8 +21,8 @@ class Closing:
     gaps : Gaps
     opened : dict
         Of contacts that have opened: time, gap and rate there, by their numbers.
-    rounding : float, m or rad
-        Of a gap.
+    rounding : ndarray (count,), m or rad
+        Of the gaps.
     """
 
     def __init__(self, gaps, opened, rounding):
@@ -45,7 +45,7 @@ class Closing:
             later = since > 0.0
             grown = values[:, self.which] - first
             divided = np.where(later, grown / np.where(later, since, 1.0), rate)
-            values[:, self.which] = np.where(rate > 0.0, divided, grown + self.rounding)
+            values[:, self.which] = np.where(rate > 0.0, divided, grown + self.rounding[self.which])
         return values
 
 

@@ -107,7 +107,6 @@ class Gear(Primitive):
             one, other = (np.arctan2(u @ np.cross(l, w), l @ w) for w in (f, h))
             offset = float(other - number(ratio) * one)
         self.offset = offset
-        self.check()
 
     def _places(self, given):
         """Fill in missing references: along the line of centres, far from the branch cut of the angle."""

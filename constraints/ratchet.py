@@ -60,7 +60,6 @@ class Ratchet(Unilateral, Joint):
         super().__init__(*found[0][:2], name=name)
         self.direction = direction
         self._set_law(0.0)
-        self.check()
 
     def _untitled(self, bodies):
         return f"{self._kind()}({self.joint.name})"

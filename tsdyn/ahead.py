@@ -40,6 +40,7 @@ from .rows.interface import ELIMINATION
 from .runs import dense_output
 from .runs.arguments import adaptive
 from .runs.path_loads import watch
+from .runs.step_engine import second_derivative
 from .runs.stepper import advance
 from .taylor import step_parts
 from .taylor.layout import FAR, no_series, pays, room
@@ -149,7 +150,7 @@ def of_method(method, form, within, far=False, rough=False):
         interpolant = method.interpolant(form.first_order)
         yield from (interpolant.fill, interpolant.value)
         yield from (kernels.normal,) if form.has_normals else ()
-        yield from (method.second,) if method.implicit else ()
+        yield from filter(None, (second_derivative(method, form),))
 
 
 def of_phases():

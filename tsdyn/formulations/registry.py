@@ -106,7 +106,7 @@ class Formulation:
 
     def stages(self, coupled=False):
         """The kernels that implicit methods need, by their names in `StageKernels`; coupled: all stages at once."""
-        module = self.kernels if self.basis_free else linearisation
+        module = self.kernels if self.basis_free or self.mixed else linearisation
         if coupled:
             own = {name: getattr(implicit_tangent, name) for name in implicit_tangent.KERNELS}
             shared = ("linearise", "reduce", "soften", "recall", "residual", "distance")

@@ -172,7 +172,7 @@ def begin_chart(context, c, r, log, reason):
         note_selection(c.tangent, log.points[r.numbers.chart_rows, w.q.size :])
     note_normal(context, r, r.clock.t)
     # Distance to a singular configuration
-    if r.numbers.first_order == 0:
+    if r.numbers.first_order != 1:
         note_indicator(c.graph, c.tangent, c.chart.rows0)
         if r.numbers.may_pass == 1 and status == 0 and reason != AT_START and is_next_to_singular(c.tangent):
             return PASSAGE

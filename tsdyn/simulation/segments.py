@@ -13,7 +13,6 @@ from ..formulations.registry import formulation
 from ..integrators import SDIRK54, Radau, Taylor
 from ..jit.compiled import clock
 from ..methods.integrator import frozen
-from ..model.packed import has_rates
 from ..rows.tolerances import NEAR
 from ..runs.dense_output import StepPieces
 from ..runs.driver import SegmentLink, begin, run
@@ -343,8 +342,7 @@ def came_to_rest(task, status):
 
 def may_pass(task):
     """Whether there is a way past singular configurations."""
-    prepared = task.prepared
-    return not (task.form.first_order or task.form.is_mixed(has_rates(prepared.packed)) or prepared.refusal)
+    return not (task.form.first_order or task.prepared.refusal)
 
 
 def _until_its_end(report):

@@ -78,8 +78,10 @@ KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", 
 START, PREFIX = ("q", "qd", "remembered"), "phase "
 # What a phase raises that can't begin, after others
 FAILURES = {
-    InvalidArgument: Status.METHOD_REFUSED, InvalidForce: Status.SAMPLING_FAILED, SingularConfiguration: Status.SINGULAR,
-}  # fmt: skip
+    InvalidArgument: Status.METHOD_REFUSED,
+    InvalidForce: Status.SAMPLING_FAILED,
+    SingularConfiguration: Status.SINGULAR,
+}
 
 
 class _ContactRun(Transitions):
@@ -350,15 +352,15 @@ class _ContactRun(Transitions):
         return Hold(unit, rank, self.remembered[np.array(places, int)])
 
     def _names(self):
-        """Names of the units whose rows hold."""
+        """Names of the units whose rows hold; those of contacts that stick stand there twice."""
         held = sorted([*self.modes.closed, *self.modes.idle])
         memory, units = self.remembered[self.count :], self.frictions.units
         off = {*self.off}
         idle = [i for i in self.modes.blocked if i not in off and not memory[units[i].way].any()]
-        names = [self.gaps.names[i] for i in held]
-        names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.sticks(i)]
-        names += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
-        return tuple(dict.fromkeys(names))
+        closed = [self.gaps.names[i] for i in held]
+        sticking = [self.gaps.names[i] for i in held if self.modes.sticks(i)]
+        sticking += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
+        return *dict.fromkeys(closed), *dict.fromkeys(sticking)
 
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""

@@ -121,7 +121,7 @@ class Gaps:
         levels (k, ...) begin with q (n,); counted is a function that returns the counted angles (k, angles) of joints.
         """
         rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
-        found = self.sign * self.workspace.gaps(t, rows)[:, : self.count]
+        found = np.ascontiguousarray(self.workspace.gaps(t, rows, self.sign)[:, : self.count])
         if self._stops:
             q, angles = rows[:, : self.workspace.n], counted()
             for i, value in self._stops:

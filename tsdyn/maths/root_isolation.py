@@ -159,8 +159,7 @@ def _look_at(values, errors, samples, j, noise, fine):
 
 @entry("mmmvmvmm")
 def _look(values, errors, series, grid, samples, noise, scratch, out):  # eight: a table, and what is looked at
-    """out (m, 4): where functions are clear of zero up to, inf of those that are so all along; by where they have
-    crossed it once, NaN if unclear; where the interpolant crosses it, and its slope there. All in [-1, 1].
+    """out (m, 4): since, until, roots and slopes of a `Survey`, on [-1, 1].
 
     Return 1 if all are resolved, 0 if not, -1 where one is no number.
     """
@@ -222,15 +221,6 @@ def _cross(c, x0, x1):
 SURVEYING = (_look,)
 
 
-class Crossing(NamedTuple):
-    """What is known of a function that may be zero in an interval."""
-
-    since: float  # up to when it is clear of zero
-    until: float = math.nan  # by when it has crossed it, once; NaN where that is unclear
-    root: float = math.nan  # when the interpolant does
-    slope: float = math.nan  # then
-
-
 class Survey(NamedTuple):
     """Several functions on one interval."""
 
@@ -238,7 +228,14 @@ class Survey(NamedTuple):
     b: float
     degree: int  # of interpolants that resolve them
     samples: np.ndarray  # (N + 2, m)
-    unclear: dict  # `Crossing`s of those that aren't clear of zero all along, by their numbers
+    since: list  # times up to which functions are clear of zero; inf of those that are so all along
+    until: list  # by when functions have crossed zero, once; NaN where that is unclear
+    roots: list  # where their interpolants do
+    slopes: list  # of the interpolants there
+
+    def root(self, j):
+        """Where the interpolant of function j crosses zero, between its `since` and `until`; its slope there."""
+        return self.roots[j], self.slopes[j]
 
 
 def survey(sample, a, first, b, degree, noise):
@@ -262,19 +259,17 @@ def survey(sample, a, first, b, degree, noise):
     """
     samples = np.concatenate((first[None], sample(_points(degree, a, b)[1:])))
     while True:
-        grid, out = table(degree), np.empty((first.size, 4))
+        grid, out = table(degree), np.zeros((first.size, 4))
         scratch = np.empty((2, grid.fine.size))
         known = grid.values, grid.errors, grid.widened, grid.fine
         if _look(*known, samples, noise, scratch, out) != 0 or degree == LARGEST:
             break
         degree *= 2
         _, samples = _refined(degree, a, b, samples, sample)
-    half, unclear = 0.5 * (b - a), {}
-    for j, (since, until, root, slope) in enumerate(out.tolist()):
-        if since < math.inf:
-            times = (a + half * (x + 1.0) for x in (since, until, root))
-            unclear[j] = Crossing(*times, slope / half)
-    return Survey(a, b, degree, samples, unclear)
+    half = 0.5 * (b - a)
+    out[:, :3] = a + half * (out[:, :3] + 1.0)
+    out[:, 3] /= half
+    return Survey(a, b, degree, samples, *out.T.tolist())
 
 
 class Search:

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..maths.root_isolation import Crossing, survey
-from .tolerances import FALLEN, FROM_REST, ROOT, ROOT_STEPS, ROUGH_ROOT
+from ..maths.root_isolation import survey
+from .tolerances import FALLEN, FROM_REST, LIKE_THE_LAST, PART, ROOT, ROOT_STEPS, ROUGH_ROOT
 
 # A group is surveyed on a step at once (root_isolation.survey). Of the members that cross zero the earliest is located,
 # by the interpolant and Newton's method; the others are surveyed again up to there. Only members whose zeros are
@@ -64,6 +64,7 @@ class Group:
 
     def __init__(self, over, events, numbers):
         self.over, self.numbers, self.degree = over, numbers, 0
+        self._length, self._begun = math.inf, math.nan  # of the last phase that ended so, s; when the present one began
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
         known = getattr(getattr(over, "__self__", None), "noise", None)
@@ -123,11 +124,24 @@ class Group:
             Values (k, members) at times (k,) within the step.
         """
         self._first, self._was_new, self._is_new = self.value, self._is_new, False
-        found, end, last = None, step.t1, self.value.copy()
+        self._begun = step.t0 if self._was_new else self._begun
+        # Where phases are much shorter than steps, such as flights of a ball that bounces, the step's begin comes first
+        part = step.t0 + LIKE_THE_LAST * self._length
+        found = None
+        if part - step.t0 < PART * (step.t1 - step.t0):
+            found, alone = self._search_to(part, step, sample)
+        if found is None:
+            found, alone = self._search_to(step.t1, step, sample)
+        self._length = found[1] - self._begun if found else math.inf
+        return found, alone
+
+    def _search_to(self, end, step, sample):
+        """As of `search`, up to a time."""
+        found, last, least = None, self.value.copy(), step.degree_of(end - step.t0)
         alone, left = {}, np.arange(len(last))
         while left.size:
             whole = left.size == len(last)
-            values, noise, degree = self.value[left], self.noise[left], max(step.degree, self.degree // 2)
+            values, noise, degree = self.value[left], self.noise[left], max(least, self.degree // 2)
             own = sample if whole else lambda times, left=left: sample(times)[:, left]
             seen = survey(own, step.t0, values, end, degree, noise)
             self.degree, last[left] = seen.degree, seen.samples[-1]
@@ -138,45 +152,46 @@ class Group:
                 alone = {}
                 break
             falls = (self._falls[left] * values < 0.0) & ~self._odd[left]
-            roots = {j: each for j, each in unclear.items() if each.until > each.since and falls[j]}
+            roots = {j: seen.root(j) for j, since in unclear.items() if seen.until[j] > since and falls[j]}
             first = roots and _earliest(own, seen, roots)
-            alone = {int(left[j]): each.since for j, each in unclear.items() if j not in roots or first is None}
+            alone = {int(left[j]): since for j, since in unclear.items() if j not in roots or first is None}
             if not first:
                 break
             # What was unclear may be clear up to there
             j, end = first
             found = self.numbers[left[j]], end
             left = np.array([i for i, since in alone.items() if since < end], int)
-        self.value = last
+        if found or end == step.t1:
+            self.value = last
         return found, [i for i, since in alone.items() if since < end]
 
     def _unclear(self, seen, left, noise):
-        """Of the members `left` those that may have a zero, with their `Crossing`."""
-        unclear = seen.unclear
+        """Of the members `left` those that may have a zero, and up to which time they have none."""
+        unclear = {j: since for j, since in enumerate(seen.since) if since < math.inf}
         # What a `Track` knows of zeros is of no interest where the member is clear, on the side that it falls from
         for j in self._odd[left].nonzero()[0].tolist():
             if j in unclear or not self._falls[left[j]] * seen.samples[-1, j] < 0.0:
-                unclear.setdefault(j, Crossing(seen.a))
+                unclear.setdefault(j, seen.a)
             else:
                 self._odd[left[j]] = False
         # Values of rounding alone have no zero
         if unclear and noise.any():
             quiet = (np.abs(seen.samples).max(axis=0) <= noise).tolist()
-            unclear = {j: each for j, each in unclear.items() if not quiet[j]}
+            unclear = {j: since for j, since in unclear.items() if not quiet[j]}
         return unclear
 
 
 def _earliest(sample, seen, roots):
-    """Which function of a `Survey` crosses zero first, and when; None if unsure. roots: their `Crossing`s.
+    """Which function of a `Survey` crosses zero first, and when; None if unsure.
 
-    By Newton's method from the earliest of the roots of interpolants. Where that leaves another function beyond zero,
-    it goes on with that one.
+    By Newton's method from the earliest of the roots (t, slope) of interpolants. Where that leaves another function
+    beyond zero, it goes on with that one.
     """
-    j, before = min(roots, key=lambda k: roots[k].root), math.inf
-    t = roots[j].root
+    j, before = min(roots, key=roots.__getitem__), math.inf
+    t = roots[j][0]
     for _ in range(ROOT_STEPS):
         found = sample(np.array([t]))[0].tolist()
-        moves = {k: found[k] / each.slope for k, each in roots.items()}
+        moves = {k: found[k] / slope for k, (_, slope) in roots.items()}
         k = max(moves, key=moves.__getitem__)  # the furthest back
         if k != j:
             j, before = k, math.inf
@@ -184,7 +199,7 @@ def _earliest(sample, seen, roots):
         # The last digit, or rounding of the values: no step is shorter
         done = abs(move) <= ROOT * abs(t) or (abs(move) >= 0.5 * before and abs(move) < ROUGH_ROOT * (seen.b - seen.a))
         before, t = abs(move), t - move
-        if not roots[j].since <= t <= roots[j].until:
+        if not seen.since[j] <= t <= seen.until[j]:
             return None
         if done:
             return j, t

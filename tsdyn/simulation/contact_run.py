@@ -288,7 +288,7 @@ class _ContactRun(Transitions):
         return self.run_of(phase, replace(self.options, events=None), call), call
 
     def _end_phase(self, t):
-        kind = self.phases.kind(self.packed, self._record(), self.scene.packed, self.gaps)
+        kind = self.phases.kind(self.packed, self._record, self.scene.packed, self.gaps)
         self.phases.add(kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
 
     def _record(self):
@@ -485,11 +485,10 @@ class _ContactRun(Transitions):
     def _is_deep(self):
         """Whether contacts penetrate; says so."""
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        deep = [
-            i
-            for i in (self.gap < -PENETRATION * self.gaps.lengths(self.length)).nonzero()[0].tolist()
-            if i in self.able
-        ]
+        allowed = -PENETRATION * self.gaps.lengths(self.length)
+        if not (self.gap < allowed).any():
+            return False
+        deep = [i for i in (self.gap < allowed).nonzero()[0].tolist() if i in self.able]
         if deep:
             found = listed([self.gaps.names[i] for i in deep], NAMED)
             self.reason = f"Penetration was not noticed: {found}. Give a max_step."

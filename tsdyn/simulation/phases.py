@@ -117,12 +117,13 @@ class Phases:
     def kind(self, packed, modes, whole, gaps):
         """The number of the kind of phases that are packed so.
 
-        modes: what makes its scene again, for files. whole, gaps: of the scene with its parameters, packed.
+        modes: a function that returns what makes its scene again, for files. whole, gaps: of the scene with its
+        parameters, packed.
         """
         kind = self._known.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
             self.packed.append(packed)
-            self.modes.append(modes)
+            self.modes.append(modes())
             self._gaps.append(gaps)
             self._columns.append(shared_rows(whole, packed))
         return kind
@@ -336,7 +337,7 @@ class Phases:
             packed = scene.packed
             if derived != derived_record(packed):
                 take_derived(packed, derived)
-            self.kind(packed, modes, packed if scene._whole is None else scene._whole.packed, gaps)
+            self.kind(packed, lambda modes=modes: modes, packed if scene._whole is None else scene._whole.packed, gaps)
             self.scenes.append(scene)
 
 

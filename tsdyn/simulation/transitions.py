@@ -84,6 +84,8 @@ class Transitions:
         if not touching:
             return self._settle_frictions(before, broken)
         try:
+            if len(touching) == 1 and self._bounces(touching[0], before, slots):
+                return None
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
@@ -267,6 +269,25 @@ class Transitions:
         for k in range(3):
             memory[np.array(unit.held(k))] = hold.numbers[k]
         return free_motions(phase.packed, self.t, self.q, memory, phase.packed.derived.holds[unit.slot])
+
+    def _bounces(self, i, before, slots):
+        """Whether gap i, the only one that touches, is hit without friction and opens: then that has happened.
+
+        As `_hit` has it, of several gaps: here by one kernel, since balls bounce often.
+        """
+        gaps, e = self.gaps, float(self.gaps.restitution[i])
+        if self.frictions.count or gaps.rubs[i] or i in gaps.following or before.closed or before.idle or e == 0.0:
+            return False
+        found = gaps.workspace.bounce(self.t, self.q, self.qd, slots, i, float(gaps.sign[i]), e)
+        (rate, size, G, p, acceleration, length), qd = found
+        if not (G > 0.0 and rate < -AT_REST * size):
+            return False
+        height = ENDLESS * self.length if e == 1.0 else EPS * max(self.length, ROUNDED * length)
+        if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * height:
+            return False
+        self.phases.impulses.append((self.t, gaps.names[i], p))
+        self.qd, self.modes = qd, UnitModes(opened={i: (self.t, self.gap[i], -e * rate)})
+        return True
 
     def _hit(self, inertia, touching, rates):
         """Jump of velocities at an impact; the rates (count,) afterwards."""

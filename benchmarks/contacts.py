@@ -15,6 +15,7 @@ Run it: python -m benchmarks.contacts
 
 import importlib.util
 import time
+from importlib import metadata
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -167,7 +168,7 @@ def links():
         )
         body = scene.add_body(LINK_MASS, (LINK_INERTIA,) * 3, tip + along / 2, turned, name=f"link {i}")
         if last is None:
-            scene.add(ts.constraints.Parallel(body, scene.ground, axis_a=(0, 1, 0), axis_b=(0, 1, 0)))
+            scene.add(ts.constraints.Planar.at(scene.ground, body, point=tip, axis=(0, 1, 0)))
         else:
             scene.add(ts.constraints.Revolute.at(last, body, point=tip, axis=(0, -1, 0)))
         last, tip = body, tip + along
@@ -217,13 +218,19 @@ BOX = f'<geom type="box" size="{HALF_WIDTH} 0.3 {HALF_HEIGHT}"/>'
 
 def mujoco(step, end, contact, body, gravity=(0, 0, -G), start=(0, 0, 0)):
     """Coordinates x, z (from where the body is put) and tilt of a body in a plane, at the end."""
+    inertia = f'<inertial pos="0 0 0" mass="{MASS}" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/>'
+    bodies = f'<body pos="0 0 {body[0]}">{PLANAR}{inertia}{body[1]}</body>'
+    return mujoco_run(step, end, contact, bodies, gravity, start)
+
+
+def mujoco_run(step, end, contact, bodies, gravity, start):
+    """Coordinates of bodies over a plane at the end. They collide with the plane alone."""
     import mujoco
 
     text = (
         f'<mujoco><option timestep="{step}" gravity="{" ".join(map(str, gravity))}" cone="elliptic" impratio="100"/>'
-        f'<default><geom solimp="0.9999 0.9999 1e-3" {contact}/></default><worldbody><geom type="plane" size="9 9 1"/>'
-        f'<body pos="0 0 {body[0]}">{PLANAR}<inertial pos="0 0 0" mass="{MASS}" diaginertia="{INERTIA} {INERTIA} '
-        f'{INERTIA}"/>{body[1]}</body></worldbody></mujoco>'
+        f'<default><geom solimp="0.9999 0.9999 1e-3" contype="0" {contact}/></default><worldbody>'
+        f'<geom type="plane" size="9 9 1" contype="1"/>{bodies}</worldbody></mujoco>'
     )
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
@@ -243,6 +250,18 @@ def mujoco_ball(step):
     contact = f'solref="{5 * step / ratio} {ratio}" condim="1"'
     seconds, x = mujoco(step, BALL_END, contact, (1.1, '<geom type="sphere" size="0.1"/>'))
     return seconds, x[1] + 1.0
+
+
+def mujoco_chain(step):
+    """Spheres at the ends of the links; contacts as those of the ball."""
+    ratio, sphere = -np.log(E) / np.hypot(np.pi, np.log(E)), '<geom type="sphere" size="0.02" pos="{} 0 0"/>'
+    numbers = f'mass="{LINK_MASS}" diaginertia="{LINK_INERTIA} {LINK_INERTIA} {LINK_INERTIA}"'
+    link = f'<joint type="hinge" axis="0 -1 0"/><inertial pos="{LINK / 2} 0 0" {numbers}/>{sphere.format(LINK)}'
+    first = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>' + link + sphere.format(0)
+    bodies = f'<body pos="0 0 {DROP + 0.02}">{first}' + f'<body pos="{LINK} 0 0">{link}' * (LINKS - 1)
+    contact, start = f'solref="{5 * step / ratio} {ratio}" condim="1"', (0, 0, ANGLES[0], *np.diff(ANGLES))
+    seconds, x = mujoco_run(step, CHAIN_END, contact, bodies + "</body>" * LINKS, (0, 0, -G), start)
+    return seconds, x[1] + DROP
 
 
 def mujoco_rocking(step):
@@ -306,25 +325,117 @@ def drake_slope(step):
     return seconds, found[0]
 
 
+# In Exudyn: generalised-alpha; spheres at the points that touch, and a large triangle
+
+
+def exudyn(scene, points, step, end, mass, e=0.0, friction=0.0):
+    """Seconds, and places and rotations of the bodies at the end; twenty steps to a period of `mass` on a contact."""
+    import exudyn as exu
+    from exudyn import utilities
+
+    from tsdyn.measuring.engines import Exudyn
+
+    made, radius, size = Exudyn(scene), 0.09, 100.0
+    stiffness = mass * (2 * np.pi / (20 * step)) ** 2
+    law = {"restitutionCoefficient": e, "impactModel": 2, "minimumImpactVelocity": 1e-3}
+    law = law if e else {"contactDamping": 2 * np.sqrt(stiffness * mass)}
+    corners = exu.Vector3DList([[-size, -size, -radius], [size, -size, -radius], [0, size, -radius]])
+    ground = made._marker(scene.ground, (0, 0, 0))
+    for body, point in points:
+        node = made.mbs.AddNode(utilities.NodeGenericData(initialCoordinates=[0] * 4, numberOfDataCoordinates=4))
+        contact = utilities.ObjectContactSphereTriangle(
+            markerNumbers=[made._marker(body, point), ground], nodeNumber=node, sphereRadius=radius,
+            trianglePoints=corners, contactStiffness=stiffness, dynamicFriction=friction, **law,
+        )  # fmt: skip
+        made.mbs.AddObject(contact)
+    made.mbs.Assemble()
+    found = made.run(end, step, outputs=1)
+    return found.seconds, found.r[-1], found.A[-1]
+
+
+def exudyn_ball(step):
+    """A body without rotation."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    body = scene.add_body(MASS, (INERTIA,) * 3, (0, 0, 1.0))
+    seconds, r, _ = exudyn(scene, [(body, (0, 0, 0))], step, BALL_END, MASS, E)
+    return seconds, r[0, 2]
+
+
+def exudyn_chain(step):
+    """All ends, as in tsdyn."""
+    scene = links()
+    seconds, r, A = exudyn(scene, ends(scene), step, CHAIN_END, LINK_MASS, E)
+    return seconds, (r[0] - A[0] @ (LINK / 2, 0, 0))[2]
+
+
+def exudyn_block(step, end, half_height, height, tilt, friction, gravity):
+    """Place and tilt of a block in a plane, on the two edges of its section."""
+    scene, turned = ts.Scene(gravity=gravity), (np.cos(tilt / 2), 0, np.sin(tilt / 2), 0)
+    block = scene.add_body(MASS, (INERTIA,) * 3, (0, 0, height), turned)
+    scene.add(ts.constraints.Planar.at(scene.ground, block, point=(0, 0, 0), axis=(0, 1, 0)))
+    edges = [(block, (x, 0, -half_height)) for x in (-HALF_WIDTH, HALF_WIDTH)]
+    seconds, r, A = exudyn(scene, edges, step, end, MASS / 2, friction=friction)
+    return seconds, r[0, 0], np.arctan2(A[0, 0, 2], A[0, 0, 0])
+
+
+def exudyn_rocking(step):
+    """Without friction."""
+    seconds, _, tilt = exudyn_block(step, ROCKING_END, HALF_HEIGHT, HEIGHT, TILT, 0.0, (0, 0, -G))
+    return seconds, tilt
+
+
+def exudyn_slope(step):
+    """A low block, gravity turned."""
+    gravity = G * np.sin(ANGLE), 0, -G * np.cos(ANGLE)
+    return exudyn_block(step, SLOPE_END, HALF_WIDTH, HALF_WIDTH, 0.0, FRICTION, gravity)[:2]
+
+
 RUNS = {
-    "ball": (ball, {"tsdyn": ours_ball, "mujoco": mujoco_ball}),
-    "rocking": (rocking, {"tsdyn": ours_rocking, "mujoco": mujoco_rocking, "pydrake": drake_rocking}),
-    "slope": (lambda: 0.0, {"tsdyn": ours_slope, "mujoco": mujoco_slope, "pydrake": drake_slope}),
+    "ball": (ball, {"tsdyn": ours_ball, "mujoco": mujoco_ball, "exudyn": exudyn_ball}),
+    "chain": (chain, {"tsdyn": ours_chain, "mujoco": mujoco_chain, "exudyn": exudyn_chain}),
+    "rocking": (
+        rocking,
+        {"tsdyn": ours_rocking, "mujoco": mujoco_rocking, "exudyn": exudyn_rocking, "pydrake": drake_rocking},
+    ),
+    "slope": (
+        lambda: 0.0,
+        {"tsdyn": ours_slope, "mujoco": mujoco_slope, "exudyn": exudyn_slope, "pydrake": drake_slope},
+    ),
 }
 
 
+PROGRAMS = {"tsdyn": "tsdyn", "mujoco": "MuJoCo", "exudyn": "Exudyn", "pydrake": "Drake, discrete"}
+PACKAGES = {"pydrake": "drake"}
+
+
+def cells(program, value, motion):
+    """Error at the end and milliseconds, the least of some rounds; empty where a program hasn't the motion."""
+    reference, runs = RUNS[motion]
+    if program not in runs:
+        return ["", ""]
+    found = [runs[program](value) for _ in range(ROUNDS)]
+    return [f"{abs(found[-1][1] - reference()):.1e}", f"{1e3 * min(seconds for seconds, _ in found):.2g}"]
+
+
+def table(motions=tuple(RUNS)):
+    """Yield the lines of a table in Markdown, of the programs that are installed."""
+    yield f"| program | setting | {' | '.join(f'{motion} | ms' for motion in motions)} |"
+    yield "|---|---|" + "---:|---:|" * len(motions)
+    for program, title in PROGRAMS.items():
+        if not importlib.util.find_spec(program):
+            continue
+        version = "" if program == "tsdyn" else f" {metadata.version(PACKAGES.get(program, program))}"
+        for value in TOLERANCES if program == "tsdyn" else STEPS:
+            setting = f"tolerance {value:.0e}" if program == "tsdyn" else f"step {value:g} s"
+            row = [cell for motion in motions for cell in cells(program, value, motion)]
+            yield f"| {title}{version} | {setting} | {' | '.join(row)} |"
+            title = version = ""
+
+
 def main():
-    """Print the error at the end, and milliseconds, the least of some rounds."""
-    print("motion   program  setting        error   time (ms)")
-    for motion, (reference, runs) in RUNS.items():
-        exact = reference()
-        for program, run in runs.items():
-            if not importlib.util.find_spec(program):
-                continue
-            for value in TOLERANCES if program == "tsdyn" else STEPS:
-                found = [run(value) for _ in range(ROUNDS)]
-                error, seconds = abs(found[-1][1] - exact), min(s for s, _ in found)
-                print(f"{motion:8} {program:8} {value:7.0e} {error:12.1e} {1e3 * seconds:11.2f}", flush=True)
+    """Print the table as it grows."""
+    for line in table():
+        print(line, flush=True)
 
 
 if __name__ == "__main__":

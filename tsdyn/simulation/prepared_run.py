@@ -55,21 +55,16 @@ def first_method(options, prepared, scene=None):
     if method is None:
         series = options.may_use_series and not prepared.refusal and prepared.pays
         method = adaptive(Taylor if series else DOP853, options.rtol, options.atol)
-    _demand_served(method, options.form, prepared, scene or prepared.packed)
+    _demand_served(method, options.form, scene or prepared.packed)
     return method if options.max_step is None else frozen(method.bounded(options.max_step))
 
 
-def _demand_served(method, form, prepared, scene):
+def _demand_served(method, form, scene):
     """Refuse a method that doesn't solve for the stages of such a scene, in whichever phase."""
     if method.implicit and form.is_mixed(has_rates(scene)):
         raise InvalidArgument(
             f"{type(method).__name__} doesn't solve for its stages in the null-space form where there are rows on "
             "velocities: use formulation='tangent', which does, or an explicit method."
-        )
-    if method.coupled and prepared.rough:
-        raise InvalidArgument(
-            f"{type(method).__name__} doesn't solve for reactions that friction depends on "
-            f"({', '.join(prepared.rough)}): SDIRK54 does, as do all explicit methods."
         )
 
 

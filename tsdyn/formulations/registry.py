@@ -111,8 +111,8 @@ class Formulation:
             own = {name: getattr(implicit_tangent, name) for name in implicit_tangent.KERNELS}
             shared = ("linearise", "reduce", "soften", "recall", "residual", "distance")
             return own | {name: getattr(module, name) for name in shared} | {"error_norm": self.kernels.error_norm}
-        names = ("linearise", "reduce", "factorise", "solve", "soften", "recall")
-        names += ("residual", "correct", "distance") if self.basis_free else ()
+        names = ("linearise", "reduce", "factorise", "soften", "recall")
+        names += ("residual", "correct", "distance") if self.basis_free else ("solve",)
         return {name: getattr(module, name) for name in names} | {"error_norm": self.kernels.error_norm}
 
 

@@ -54,11 +54,6 @@ def first_method(options, prepared):
     if method is None:
         series = options.may_use_series and not prepared.refusal and prepared.pays
         method = adaptive(Taylor if series else DOP853, options.rtol, options.atol)
-    if method.coupled and prepared.rough:
-        raise InvalidArgument(
-            f"{type(method).__name__} doesn't solve for reactions that friction depends on "
-            f"({', '.join(prepared.rough)}): SDIRK54 does, as do all explicit methods."
-        )
     return method if options.max_step is None else frozen(method.bounded(options.max_step))
 
 

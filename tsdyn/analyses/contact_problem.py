@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
-from ..elements.element import angles
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
@@ -111,8 +110,9 @@ class Gaps:
     @staticmethod
     def _rate(handles, side):
         """A function of q, qd (..., n) that returns the rate (...) of a joint, in the direction of its ratchet."""
-        kind, rate = ("angle", angle_of) if angles(side.follows) else ("displacement", displacement)
-        (geometry, *_) = getattr(handles.row(side.follows, kind), f"{kind}s")
+        joint, kind, index = side.follows
+        geometry = getattr(handles.row(joint, kind), f"{kind}s")[index]
+        rate = angle_of if kind == "angle" else displacement
         return lambda q, qd: side.sign * rate(geometry, *handles.motions(geometry, (q, qd)), 1)
 
     def values(self, t, levels, counted):

@@ -136,6 +136,11 @@ class Gaps:
         """Rows (k, 2, n) of the slips of the gaps `which`, which have friction."""
         return self.workspace.rows(t, q, self._slips[which].ravel())[0].reshape(len(which), 2, -1)
 
+    def responses(self, t, q, memory, which):
+        """Accelerations (k, 2, n) by unit friction of these gaps, with all gaps open."""
+        rows = self.slopes(t, q, which).reshape(2 * len(which), -1)
+        return self.workspace.respond(t, q, memory, rows).reshape(len(which), 2, -1)
+
     def biases(self, gamma):
         """Of the accelerations of slips (count, 2), from those of all rows; zero without friction."""
         return np.where(self.rubs[:, None], gamma[self._slips], 0.0)
@@ -251,6 +256,11 @@ class Inertia:
         """Accelerations (count, 2) of the slips where all gaps are open."""
         qdd, gamma = self._open(qd)
         return self.tangents @ qdd + self.gaps.biases(gamma)
+
+    def biases(self, qd):
+        """Accelerations (count, 3) of gaps and slips where the bodies have none."""
+        _, gamma = self._open(qd)
+        return np.column_stack([self.gaps.sign * gamma[: self.gaps.count], self.gaps.biases(gamma)])
 
     def _open(self, qd):
         """Accelerations (n,) where all gaps are open, and gamma of the rows of all contacts."""

@@ -36,6 +36,11 @@ class Side(NamedTuple):
     grip: Grip | None = None
     follows: Any = None  # (joint, kind, index) whose rate, times sign, is not negative: closed wherever that is zero
 
+    @property
+    def gap(self) -> Primitive | SumRow:
+        """The row of the gap, without those of the slip."""
+        return self.grip.gap if self.grip else self.row
+
 
 class Unilateral:
     """Mixed into a constraint that only pushes, or only pulls.

@@ -45,10 +45,6 @@ class UnitModes:
         """Whether the units are in the same modes, whatever has just opened."""
         return {**vars(self), "opened": 0} == {**vars(other), "opened": 0}
 
-    def agrees(self, other):
-        """Whether the contacts are in the same modes."""
-        return all(getattr(self, name) == getattr(other, name) for name in ("closed", "idle", "grips"))
-
     def saved(self):
         """Lists of numbers, for JSON: one for each field, of a dict its items."""
         return [plain(value) for value in vars(self).values()]

@@ -57,6 +57,8 @@ class Gaps:
     restitution, kinetic, static : ndarray (count,)
     rubs : ndarray (count,), bool
         Whether there is friction.
+    slots : ndarray (count,)
+        Where the numbers of those with friction begin in what the run remembers.
     slip_rows : ndarray (count, 2)
         Rows of Phi of the slips, where there is friction.
     following : dict
@@ -76,6 +78,8 @@ class Gaps:
         self.rubs = np.array([grip is not None for grip in grips], bool)
         self.kinetic = np.array([grip.kinetic if grip else 0.0 for grip in grips], float)
         self.static = np.array([grip.static if grip else 0.0 for grip in grips], float)
+        slots = {id(contact): slot for contact, slot in packed.contacts}
+        self.slots = np.array([slots.get(id(gap.contact), 0) for gap in self.list], int)
         self.slip_rows = np.where(self.rubs, self.rows, 0)[:, None] + [1, 2]
         own = {id(part): first for part, first in first_rows(contacts.constraints)}
         self._slips = np.zeros((self.count, 2), int)  # among the rows of `contacts`
@@ -146,8 +150,8 @@ class Gaps:
         return np.where(self.rubs[:, None], gamma[self._slips], 0.0)
 
     def across(self, i, tangents, d):
-        """Components (..., 2) of a direction d (3,), ground frame, along the slips of a gap; tangents (..., 2, n)."""
-        return self._along(i, tangents) @ np.asarray(d)
+        """Components (..., 2) of directions d (..., 3), ground frame, along slips of a gap; tangents (..., 2, n)."""
+        return np.einsum("...ij,...j->...i", self._along(i, tangents), d)
 
     def along(self, i, tangents, d):
         """The direction (3,), ground frame, of components d (2,)."""

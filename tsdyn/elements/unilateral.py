@@ -89,6 +89,11 @@ class Unilateral:
         """Whether it has friction."""
         return bool(self.kinetic or self.static)
 
+    @property
+    def taken(self) -> int:
+        """Numbers that a run sets, with friction: the direction in which it slides, points of b where it sticks."""
+        return 3 * len(self.parts) if self.rubs else 0
+
     def _grip(self, gap: Primitive, **geometry: Any) -> Grip:
         """Its friction, on the row of its gap; geometry: arguments of the law of sliding, see sliding.py."""
         stop_waiting(gap)

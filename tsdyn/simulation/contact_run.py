@@ -36,7 +36,7 @@ from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome
 from ..validation import counted, damaged, demand, listed
 from . import hybrid
-from .grips import Halting, Reactions, phase_with_friction
+from .grips import Halting, Reactions, items_of
 from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
 from .phases import PhasePieces, Phases, Pinned, UnitModes, plain
 from .progress import reporter, silent
@@ -172,12 +172,6 @@ class _ContactRun(Transitions):
             raise InvalidArgument(
                 f"regularised friction that depends on reactions ({', '.join(rough)}) doesn't serve scenes with "
                 "contacts: leave out slip_velocity, for the exact law."
-            )
-        if self.frictions.count and self.gaps.rubs.any():
-            names = listed(list(dict.fromkeys(self.frictions.names)), NAMED)
-            raise InvalidArgument(
-                f"exact friction of joints ({names}) doesn't serve scenes in which contacts have friction, too: use "
-                "ViscousFriction, or CoulombFriction with a slip_velocity, or leave out kinetic of the contacts."
             )
 
     def run(self):
@@ -334,15 +328,12 @@ class _ContactRun(Transitions):
 
     def _scene(self):
         """The scene of the present modes."""
-        holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
-        if self.modes.grips:
-            return phase_with_friction(self.scene, self.gaps, self.modes, holds, self.without)
-        return self._scene_of(self._closed_rows(), holds)
+        return self._scene_of(self._items(), [self._hold(i, rank) for i, rank in self.modes.sticking.items()])
 
     def holds(self):
         """Whether each friction sticks, or is held by what sticks."""
         held = {*self.modes.sticking, *self.modes.blocked}
-        return len(held) == self.frictions.count and all(d is None for d in self.modes.grips.values())
+        return len(held) == self.frictions.count and all(map(self.modes.sticks, self.modes.grips))
 
     def filled(self):
         """The same, with what the run remembers among its packed numbers."""
@@ -356,8 +347,8 @@ class _ContactRun(Transitions):
         vars(filled).update(vars(phase), _packed=packed, _prepared=None)
         return filled
 
-    def _closed_rows(self):
-        return [self.gaps.list[i].side.row for i in self.modes.closed]
+    def _items(self):
+        return items_of(self.gaps, self.modes)
 
     def _hold(self, i, rank):
         """The rows that hold a friction, with the numbers that the run remembers."""
@@ -372,7 +363,7 @@ class _ContactRun(Transitions):
         off = {*self.off}
         idle = [i for i in self.modes.blocked if i not in off and not memory[units[i].way].any()]
         names = [self.gaps.names[i] for i in held]
-        names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
+        names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.sticks(i)]
         names += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
         return tuple(dict.fromkeys(names))
 
@@ -421,8 +412,8 @@ class _ContactRun(Transitions):
 
     def _still(self, phase):
         """Coordinates of the bodies that rest where frictions stick."""
-        grip = any(d is None for d in self.modes.grips.values())
-        if not (self.modes.sticking or grip) or self.q.size > MOST_PINNED:
+        sticks = self.modes.sticking or any(map(self.modes.sticks, self.modes.grips))
+        if not sticks or self.q.size > MOST_PINNED:
             return np.zeros(0, int)
         return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
 
@@ -432,7 +423,7 @@ class _ContactRun(Transitions):
         pushing, grips = Reactions(gaps, modes, packed), gaps.count + self.frictions.count
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
-        slides = [i for i in modes.closed if modes.grips.get(i) is not None]
+        slides = [i for i in modes.closed if modes.slides(i)]
         halting = Halting(packed, [gaps.list[i].side.grip.sliding for i in slides])
         for k, i in enumerate(slides):
             yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)

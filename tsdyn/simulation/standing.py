@@ -185,7 +185,7 @@ def _of_all(scene, found, gaps, phase, modes):
     rows, columns = shared_rows(scene.packed, phase.packed)
     found.multipliers[:, rows] = lam[:, columns]
     if modes.grips:
-        add_friction(gaps, modes, phase.packed, t, *levels[:2], lam, found.multipliers)
+        add_friction(gaps, modes, phase.packed, t, *levels[:2], state.memory[None], lam, found.multipliers)
     else:
         first = {id(part): row for part, row in first_rows(phase.packed.constraints)}
         for i in modes.closed:

@@ -17,7 +17,7 @@ from ..model.handles import handles_of
 from ..observables.generalised_forces import force_loads
 from ..observables.state import begin_memory
 from ..validation import listed
-from .grips import renewed
+from .grips import gripped
 from .impacts import held, impact_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import UnitModes
@@ -31,6 +31,11 @@ from .tolerances import (
     ROUNDS,
     TOUCHING,
 )
+
+
+def settled_by(inertia, resting, qd, fired=()):
+    """The `Settled` contacts, with friction and without; arguments as of `settle`."""
+    return (settle_grips if inertia.gaps.rubs[resting].any() else settle)(inertia, resting, qd, fired)
 
 
 class Transitions:
@@ -98,17 +103,9 @@ class Transitions:
             opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
             # What grazes without a reaction has left: its gap was rounding
             leaving = [i for i in fired if i in before.closed or i in grazing]
+            self.qd = halted(inertia, self.qd, resting)
             self.modes = UnitModes(opened=opened)
-            if self.gaps.rubs[resting].any():
-                self.qd = halted(inertia, self.qd, resting)
-                settled = settle_grips(inertia, resting, self.qd, leaving)
-                grips, places = renewed(self.gaps, before, settled, self.q)
-                self.modes = UnitModes(
-                    settled.closed, settled.idle, opened, grips=grips, held=places, slack=settled.slack
-                )
-            elif resting:
-                settled = settle(inertia, resting, self.qd, leaving)
-                self.modes = UnitModes(settled.closed, settled.idle, opened, slack=settled.slack)
+            self._settle_contacts(settled_by(inertia, resting, self.qd, leaving), before)
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
             status = self._alternate(before, inertia, touching, resting, leaving, broken)
             kept = {*self.modes.closed, *self.modes.idle}
@@ -127,6 +124,13 @@ class Transitions:
                     "kinetic, or use a compliant contact."
                 )
             return Status.CONTACT_FAILED
+
+    def _settle_contacts(self, settled, before):
+        """Take what contacts do."""
+        self.remembered = self.remembered.copy()
+        grips = gripped(self.gaps, before, settled, self.q, self.remembered[self.count :])
+        opened = self.modes.opened
+        self.modes = UnitModes(settled.closed, settled.idle, opened, grips=grips, slack=settled.slack)
 
     def _begin_memory(self, closed):
         """Rows that come remember nothing of a time when they held: a rope may have turned over since."""
@@ -151,15 +155,17 @@ class Transitions:
                 slots[unit.way] = 0.0  # their loads are known
             inertia = Inertia(gaps, self.t, self.q, slots, touching, self.modes.closed, self.friction)
             dead = [i for i in resting if inertia.G[i, i] <= RANK_TOL * unheld.G[i, i]]  # frictions hold these
-            settled = settle(inertia, [i for i in resting if i not in dead], self.qd, leaving)
-            closed, idle, a = settled[:3]
+            settled = settled_by(inertia, [i for i in resting if i not in dead], self.qd, leaving)
+            a = settled.accelerations
             small = LEVEL * np.maximum(*(each.accelerations(self.qd)[1] for each in (inertia, unheld)))
             if (a[dead] < -small[dead]).any():
                 raise NoSolution
-            idle = sorted([*idle, *(i for i in dead if a[i] <= small[i])])
-            if (closed, idle) == (self.modes.closed, sorted(self.modes.idle)):
+            idle, modes, known = [i for i in dead if a[i] <= small[i]], self.modes, self.remembered
+            grips = {**settled.grips, **{i: None for i in idle if self.gaps.rubs[i]}}
+            self._settle_contacts(settled._replace(idle=sorted([*settled.idle, *idle]), grips=grips), modes)
+            if modes.agrees(self.modes) and np.array_equal(known, self.remembered):
+                self.modes = modes
                 return None
-            self.modes = UnitModes(closed, idle, self.modes.opened, slack=settled.slack)
         names = listed([*(self.gaps.names[i] for i in resting), *self.frictions.names], NAMED)
         self.reason = f"No closed contacts and sticking frictions agree at t = {self.t:.9g} s: {names}."
         return Status.CONTACT_FAILED
@@ -241,7 +247,7 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        phase = self._scene_of(self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
+        phase = self._scene_of(self._items(), [self._hold(i, ranks[i]) for i in free])
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
@@ -258,7 +264,7 @@ class Transitions:
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
         unit = self.frictions.units[i]
         hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
-        phase = self._scene_of(self._closed_rows(), [hold])
+        phase = self._scene_of(self._items(), [hold])
         memory = self.remembered[self.count :].copy()
         for k in range(3):
             memory[np.array(unit.held(k))] = hold.numbers[k]
@@ -338,7 +344,7 @@ class Transitions:
         if not opening.any():
             return np.zeros(self.gaps.count)
         resting = [i for i in touching if rates[i] == 0.0]
-        a = -(settle_grips if self.gaps.rubs[resting].any() else settle)(inertia, resting, qd).accelerations
+        a = -settled_by(inertia, resting, qd).accelerations
         rounding = EPS * np.maximum(self.length, ROUNDED * inertia.sizes(self.q))
         rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
         return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)

@@ -10,6 +10,7 @@ M~ f are the accelerations that loads f make where the bilateral rows hold. lam 
 from __future__ import annotations
 
 import math
+import threading
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -35,7 +36,7 @@ class Gap(NamedTuple):
 
 
 class Gaps:
-    """The inequalities of a scene; one evaluation at a time.
+    """The inequalities of a scene.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ class Gaps:
     """
 
     def __init__(self, packed, contacts, free):
-        self.packed, self.list = packed, []
+        self.packed, self.list, self._made_of, self._own = packed, [], (packed, contacts, free), threading.local()
         first = {id(member.constraint): member.rows.start for member in packed.members}
         for contact in contacts_of(member.constraint for member in packed.members):
             self.list += [Gap(contact, side, first[id(contact)] + i) for i, side in enumerate(contact.sides)]
@@ -83,7 +84,7 @@ class Gaps:
         self._slips = np.zeros((self.count, 2), int)  # among the rows of `contacts`
         for i in np.flatnonzero(self.rubs):
             self._slips[i] = slip_rows(self.list[i].contact, own)
-        self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
+        handles = handles_of(packed)
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
         self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
@@ -91,6 +92,19 @@ class Gaps:
     def lengths(self, length):
         """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound."""
         return np.where(self._angles > 0.0, self._angles, length)
+
+    def __reduce__(self):
+        """Made anew in another process: kernels' memory is of this one."""
+        return Gaps, self._made_of
+
+    @property
+    def workspace(self):
+        """The `ContactWorkspace` of this thread."""
+        try:
+            return self._own.workspace
+        except AttributeError:
+            self._own.workspace = ContactWorkspace(*self._made_of[1:])
+            return self._own.workspace
 
     def all_rows(self, which=slice(None)):
         """Rows of Phi of gaps and of their slips, by default of all."""

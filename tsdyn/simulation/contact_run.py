@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from ..ahead import compile_ahead
+from ..analyses import contact_rows, friction_units
 from ..analyses.contact_problem import closed_gaps
-from ..analyses.contact_rows import KERNELS
 from ..analyses.friction_problem import Frictions, Hold, immobile
 from ..elements.unilateral import contacts_of
 from ..errors import (
@@ -84,6 +85,12 @@ FAILURES = {
 }
 
 
+@cache
+def _compile_once(slides):
+    """Have compiled what events need; slides: whether there is exact friction of joints."""
+    compile_ahead((*contact_rows.KERNELS, *(friction_units.KERNELS if slides else ())))
+
+
 class _ContactRun(Transitions):
     """One run in the making.
 
@@ -135,7 +142,7 @@ class _ContactRun(Transitions):
 
         inactive, values: names and parameters of what actions have changed, by default nothing.
         """
-        compile_ahead(KERNELS)
+        _compile_once(any(getattr(force, "slides", ()) for force in scene._forces))
         with_own_parts(scene)
         self.base, self.count, self.modes, self.acted = scene, handles_of(scene.packed).count, UnitModes(), False
         at_first = tuple(item.name for item in inactive_of(scene))

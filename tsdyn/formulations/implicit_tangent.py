@@ -48,9 +48,9 @@ from .tangent import (
     COLUMNS,
     accelerate,
     check_chart,
+    error_norm,
     place,
     start_chart,
-    tangent_size,
     weighted_square,
     whole_size,
     write_state,
@@ -417,12 +417,6 @@ def _correct_normal_part(c, g, k):
     clear_rates(c.graph, f.b)  # u takes off what rows on positions forbid
     for e in range(f.b.size):
         w.u[e] -= g * g * f.b[e]
-
-
-@callback(NORM, "d")
-def error_norm(context, ex, ey, old, rtol, atol):
-    """The error of an implicit step: its part tangent to the constraints."""
-    return tangent_size(load(context), ex, ey, old, rtol, atol)
 
 
 @callback(NORM, "d")

@@ -138,7 +138,7 @@ def of_method(method, form, within, far=False, rough=False):
         return
     kernels = form.kernels
     yield from (kernels.place, kernels.accelerate, kernels.complete)
-    yield from (kernels.check, kernels.start_chart, kernels.error_norm, advance)
+    yield from (kernels.check, kernels.start_chart, advance)
     if method.driver == "steps":
         yield from filter(None, called_for(method.kernel(form.first_order)[0]))
         yield from form.stage_kernels(form.frees_stages)

@@ -55,8 +55,17 @@ from .saddle_point import (
     turned_back,
     write_rows,
 )
-from .tangent import COLUMNS, accelerate, check_chart, normal_part, place, start_chart, weighted_square, write_state
-from .tangent import error_norm as distance  # of changes that are tangent to the constraints already
+from .tangent import (
+    COLUMNS,
+    accelerate,
+    check_chart,
+    error_norm,
+    place,
+    start_chart,
+    weighted_square,
+    whole_size,
+    write_state,
+)
 
 # Right-hand side of a Newton correction of a stage: the normal part of accelerations, and the unbalanced loads.
 
@@ -476,33 +485,10 @@ def _correct_normal_part(c, g, k):
         w.u[e] -= g * g * f.b[e]
 
 
-# Error norm of an implicit step: errors of chart coordinates without their normal part, in terms of q and qd.
-
-
-@kernel
-def _tangent_part(graph, f, l, e, of_positions):
-    """f.Z = P0 e; of positions what their solve leaves of it."""
-    copy(e, f.Z)
-    for i in range(e.size, f.Z.size):
-        f.Z[i] = 0.0
-    if f.b.size > 0:
-        normal_part(graph, l, f.Z, f.b, of_positions)
-        apply_multipliers(graph, l.rows0, f.b, f.Z)
-
-
 @callback(NORM, "d")
-def error_norm(context, ex, ey, old, rtol, atol):
-    """Root mean square of the errors P0 ex of q and P0 ey of qd, over atol + rtol times the larger end of the step."""
-    c = load(context)
-    w, f, l, graph = c.work, c.tangent, c.chart, c.graph
-    n, k = w.q.size, l.x.size - 8
-    old = vector(old, 3 * n)
-    # The normal component of the error is removed by the position solve
-    _tangent_part(graph, f, l, vector(ex, k), True)
-    total = weighted_square(graph, l, f.Z, w.q, old, 0, rtol, atol)
-    _tangent_part(graph, f, l, vector(ey, k), False)
-    total += weighted_square(graph, l, f.Z, w.qd, old, n, rtol, atol)
-    return math.sqrt(total / (2 * n))
+def distance(context, ex, ey, old, rtol, atol):
+    """As `error_norm`, of changes that are tangent to the constraints already."""
+    return whole_size(load(context), ex, ey, old, rtol, atol)
 
 
 # Newton's method for all stages of a collocation method at once, in the tangent form.

@@ -16,7 +16,10 @@ from .locked_orientations import moving_graph
 
 @dataclass(frozen=True)
 class Formulation:
-    """A module of kernels: place, accelerate, complete, check, start_chart; for some stage_place, stage_accelerate."""
+    """A module of kernels: place, accelerate, complete, check, start_chart, error_norm.
+
+    Some have others for steps whose stages aren't placed: stage_place, stage_accelerate, stage_error_norm.
+    """
 
     name: str
     kernels: ModuleType
@@ -89,9 +92,11 @@ class Formulation:
         return hasattr(self.kernels, "stage_place")
 
     def stage_kernels(self, free):
-        """The kernels place and accelerate of an explicit method's stages."""
+        """The kernels place and accelerate of an explicit method's stages, and the error norm of its steps."""
         k = self.kernels
-        return (k.stage_place, k.stage_accelerate) if free else (k.place, k.accelerate)
+        if free:
+            return k.stage_place, k.stage_accelerate, k.stage_error_norm
+        return k.place, k.accelerate, k.error_norm
 
     def addresses(self):
         """Addresses of the kernels that a driver calls, by their names in `RunKernels`; loads or compiles them."""

@@ -150,10 +150,11 @@ class StepEngine:
         memory.context.chart.state.turn_limit = TURN_FREE if free else TURN_LIMIT
         share = LOADS_LEFT * method.step_tolerances()[0] if method.step is None else 0.0
         memory.context.chart.state.loads_left = max(share, LAST_PLACE)
-        place, accelerate = form.stage_kernels(free)
+        place, accelerate, norm = form.stage_kernels(free)
         run.kernels.stage_place, run.kernels.stage_accelerate = place.address, accelerate.address
         run.numbers.first_order = MIXED if form.mixed else form.first_order
         if method.step is None:
+            run.kernels.error_norm = norm.address
             run.clock.turn_share = run.clock.error_before = 1.0
             run.clock.exponent = 1.0 / (method.embedded_order + 1)
             if method.stability_limit and (form.mixed or not form.first_order):
@@ -220,7 +221,6 @@ def kernels_of(method, form, step, interpolant, adaptive, within):
     kernels = {"step": called, "plug_in": plug_in}
     if adaptive:
         kernels |= dict(zip(("error", "second_error"), method.errors, strict=False))
-        kernels["error_norm"] = form.kernels.error_norm
     if within:
         kernels |= {"fill": interpolant.fill, "value": interpolant.value}
         kernels["normal"] = form.kernels.normal if form.has_normals else None

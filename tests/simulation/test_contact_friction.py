@@ -399,7 +399,7 @@ def test_random_scenes_keep_the_laws(build, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["dop853", "rk45", "sdirk54", "taylor"])
+@pytest.mark.parametrize("method", ["dop853", "rk45", "radau", "sdirk54", "taylor"])
 def test_every_method(method):
     scene = ball("rolling", (2, 0, 0), (0, -6, 0))
     solution = ts.simulate(scene, (0, 2), integrator=method, rtol=1e-10, atol=1e-10)

@@ -438,12 +438,6 @@ def test_a_store_and_a_file_hold_them(tmp_path):
         assert other.phases == plain.phases
 
 
-def test_a_method_that_serves_the_first_phase_alone_is_refused():
-    """The ball slides without rows on velocities at first, and rolls with them then."""
-    with pytest.raises(ts.InvalidArgument, match="rows on velocities: use formulation='tangent'"):
-        ts.prepare(ball("rolling", (3, 0, 0)), integrator="sdirk54", formulation="null-space")
-
-
 def test_bad_coefficients():
     scene = slope(0.3, 0.0)
     block, ground = scene.body("block"), scene.ground

@@ -14,6 +14,8 @@ from tsdyn.workspaces import Context, allocate, allocate_linear, basis_free_part
 
 WEIGHTS = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}  # central differences of sixth order
 
+NAMES = "place", "accelerate", "complete", "check", "start_chart", "linearise", "reduce", "factorise", "solve", "soften"
+
 _call_vector, _call_number, _call_chart, _call_soften = caller("pp"), caller("pd"), caller("pdpppp"), caller("ppdp")
 
 
@@ -57,16 +59,16 @@ def _start_mixed(context, at, t, v, w, wd, vd):
 
 @entry
 def solve(context, at, g, rho):
-    """P^-1 A rho; at: addresses of factorise, solve and soften."""
+    """P^-1 A rho; at: addresses of factorise and solve."""
     status = _call_number(at[0], context, g)
     return _call_vector(at[1], context, rho) if status == 0 else status
 
 
 @entry
 def soften(context, at, ex, g, ey):
-    """(I - g J)^-1 (ex, ey)."""
+    """(I - g J)^-1 (ex, ey); at: addresses from that of factorise to that of soften."""
     status = _call_number(at[0], context, g)
-    return _call_soften(at[2], context, ex, g, ey) if status == 0 else status
+    return _call_soften(at[-1], context, ex, g, ey) if status == 0 else status
 
 
 @entry
@@ -96,7 +98,8 @@ class Tangent:
         parts = basis_free_parts(form.graph(packed), n, True)
         self.context = Context(system, work, allocate_linear(system, n, m, True, kept), *parts)
         self.address, *self._keep = resident(self.context)
-        self.at = np.array([*form.addresses().values(), *form.implicit().values()][:10], np.int64)
+        found = form.addresses() | form.implicit()
+        self.at = np.array([found[name] for name in NAMES], np.int64)
         self.k, self.t = n - m, t
         v, self.vd, vdd = np.zeros((3, self.k))
         assert _start(self.address, self.at, t, v, self.vd, vdd) == 0

@@ -34,7 +34,7 @@ from ..maths.dense_linalg import (
     multiply,
     transposed_times,
 )
-from ..methods.explicit import ACCELERATE, NORM, PLACE
+from ..methods.explicit import ACCELERATE, NORM, NORMAL, PLACE
 from ..model.equations import set_time
 from ..model.packed import System
 from ..rows.constraint_graph import ConstraintGraph
@@ -58,6 +58,7 @@ from .null_space import (
     find_accelerations,
     frictional_acceleration,
     project,
+    put_normal,
     reduced_mass,
     refine_velocities,
     set_positions,
@@ -160,6 +161,14 @@ def place(context, t, v):
     c = load_mixed(context)
     status = set_positions(c, t, v)  # B and T are those with which the next solve starts
     return _map_velocities(c, t) if status == OK else status
+
+
+@callback(NORMAL)
+def normal(context, t, vd, out):
+    """As of the null-space form."""
+    c = load_mixed(context)
+    put_normal(c, t, vector(vd, c.work.v.size), vector(out, 2 * c.work.u.size))
+    return OK
 
 
 @callback(ACCELERATE)

@@ -193,7 +193,7 @@ def _set_stage(g, known, xd, k, xs, ys):
 @kernel
 def _is_direct(c):
     """Whether the form solves a stage's equations for positions, velocities and reactions at the same time."""
-    return c.linear.kernels.residual != 0 and c.graph.frictions.shape[0] == 0
+    return c.linear.kernels.residual != 0
 
 
 @kernel

@@ -54,7 +54,7 @@ def quintic(s, h, n, d, out, outd):
 
 
 @kernel
-def _cubic(s, h, d, out):
+def cubic(s, h, d, out):
     """Cubic Hermite interpolation; d holds values and derivatives of the start, then those of the end."""
     n = out.size
     # Weights of the difference of values and of both derivatives
@@ -114,7 +114,7 @@ def hermite_first_order(s, h, n, nx, ny, data, x, y):
     """Quintic for x, cubic for y, whose second derivative nothing gives."""
     d = vector(data, 6 * nx + 4 * ny)
     quintic(s, h, nx, d, vector(x, nx), vector(y, 0))
-    _cubic(s, h, d[6 * nx :], vector(y, ny))
+    cubic(s, h, d[6 * nx :], vector(y, ny))
     return 0
 
 

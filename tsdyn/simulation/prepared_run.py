@@ -54,11 +54,6 @@ def first_method(options, prepared):
     if method is None:
         series = options.may_use_series and not prepared.refusal and prepared.pays
         method = adaptive(Taylor if series else DOP853, options.rtol, options.atol)
-    if method.coupled and prepared.rough:
-        raise InvalidArgument(
-            f"{type(method).__name__} doesn't solve for reactions that friction depends on "
-            f"({', '.join(prepared.rough)}): SDIRK54 does, as do all explicit methods."
-        )
     return method if options.max_step is None else frozen(method.bounded(options.max_step))
 
 
@@ -383,7 +378,8 @@ class Run:
             outcome = self._ended(task, numbers, arrays, archive)
             return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
         try:
-            outcome = run_task(task._replace(archive=archive), scene, self.options.initial_tol)
+            task = task._replace(archive=archive, max_steps=archive.most_steps)
+            outcome = run_task(task, scene, self.options.initial_tol)
             seconds = clock() - started
             other = instead(task, outcome.status)
             if other is not None:

@@ -106,8 +106,7 @@ class RunOptions:
     integrator : Integrator or str, optional
         A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor; DOP853 if a part of the
         scene has no series, or series fail where a law is not analytic. Where the motion is found stiff Radau (SDIRK54
-        with friction by reactions, and in the null-space form) goes on from there, as long as it needs less work;
-        `solution.message` says so.
+        in the null-space form) goes on from there, as long as it needs less work; `solution.message` says so.
     rtol, atol : float, optional
         Tolerances of the default method, or of an adaptive method given by name; default 1e-8. An instance has its own
         tolerances; rtol or atol beside an instance is refused.

@@ -13,7 +13,7 @@ from numba.extending import intrinsic
 import tsdyn as ts
 from tests.helpers.processes import REPORT, ROOT, SMALL, TINY, command, edit, run
 from tsdyn.jit import backend, cache, compilers, stock, target
-from tsdyn.jit.arrays import stack, zeros
+from tsdyn.jit.resident import stack, zeros
 
 VERSIONS = f"Numba {numba.__version__}; it was seen in {' to '.join(backend.SEEN)}"
 

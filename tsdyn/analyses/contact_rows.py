@@ -32,8 +32,7 @@ from ..model.equations import (
 )
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, no_system
-from ..rows.constraint_graph import BIAS, REDUCED
-from ..rows.graph_builder import graph_of
+from ..rows.constraint_graph import BIAS, REDUCED, graph_of
 from ..rows.interface import (
     DYNAMICS,
     constrain_accelerations,

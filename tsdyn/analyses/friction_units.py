@@ -8,8 +8,7 @@ from ..formulations.accelerations import normal_load, unit_friction
 from ..jit.kernels import entry, resident
 from ..model.equations import recall, set_time
 from ..model.packed import coupled_loads, index_of
-from ..rows.constraint_graph import REDUCED
-from ..rows.graph_builder import graph_of
+from ..rows.constraint_graph import REDUCED, graph_of
 from ..workspaces import load_parts, parts
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..configuration.kinetic_metric import Metric, least_step
+from ..configuration.continuation import Metric, least_step
 from ..configuration.tolerances import MOST_ROTATION
 from ..constraints.angle_driver import AngleDriver
 from ..constraints.dot2 import Dot2
@@ -39,8 +39,7 @@ from ..model.packed import System
 from ..motions.elementary import Polynomial, Smooth
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import constraint_rows
-from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, ConstraintGraph, no_graph
-from ..rows.graph_builder import graph_of, redundant_rows
+from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, ConstraintGraph, graph_of, no_graph, redundant_rows
 from ..rows.interface import TangentWorkspace, allocate_tangent, constrain, evaluate_bias, note_indicator
 from ..validation import listed, nearest, vector3
 from ..workspaces import Work, parts, plain_context

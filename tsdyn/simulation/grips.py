@@ -10,7 +10,8 @@ from ..elements.friction import heading
 from ..elements.sliding import WAY, slip_velocity
 from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
-from ..model.packed import Derived, begins_of, index_of
+from ..model.handles import begins_of
+from ..model.packed import Derived, index_of
 from ..observables import reactions
 from ..observables.diagnostics import marker_states
 from .parameters import KEPT

@@ -174,6 +174,7 @@ def follow(branch, times, out, first, most):
     """
     c = load_branch(branch)
     n, way = c.work.q.size, c.way
+    # The first call: velocities and accelerations at the start
     if way.begun == 0:
         place_bodies(c.graph.bodies, c.now[0], c.tangent.poses)
         way.failed = _solve(c, way.t)
@@ -183,12 +184,14 @@ def follow(branch, times, out, first, most):
         way.begun = 1
     width, end = 1 + 3 * n + c.remembered.size, way.steps + way.rejected + most
     for i in range(first, times.size):
+        # Steps of the continuation up to times[i]; a slice ends after `most` of them
         while way.t != times[i]:
             if way.steps + way.rejected >= end:
                 way.failed = SLICE_DONE
                 return i
             if not _step(c, times[i]):
                 return i
+        # Row i of the output
         at = i * width
         out[at] = way.t
         for level in range(3):

@@ -198,16 +198,19 @@ def take_start(context, q, qd, velocity, at, count, t, tol):  # eight: addresses
     x, xd, at = vector(q, n), vector(qd, n), integers(at, count)
     rates = vector(velocity, c.graph.row.shape[0])
     _set_floor(w.control, x, at)
+    # Rows at the start, and S = H W H^T in the metric of lengths: regular, or it is for Python to judge
     if _evaluate(parts.lengths, x, xd, t, rates, 1) != NONE:
         return 0
     if (c.graph.axes.rows.shape[0] > 0 or parts.unequal[0] != 0) and _failing_row(c, x, t) >= 0:
         return 0
+    # |Phi| and |Phi_q qd + Phi_t|: at rounding, within the tolerance, or beyond it
     if _hold(f.b, rates, f.rows.H, x, xd, at, min(LAST_PLACE, tol)) == 1:
         return PLAIN
     far, fast = _residuals(c, rates, x, xd, at)
     whole, rate = 1.0 + largest(x), 1.0 + largest(xd)
     if not (far <= tol * whole and fast <= tol * rate and is_finite(f.rows.H)):
         return 0
+    # Project: p to unit length, positions, then velocities
     if far > LAST_PLACE * whole:
         for i in at:
             length = math.sqrt(x[i] * x[i] + x[i + 1] * x[i + 1] + x[i + 2] * x[i + 2] + x[i + 3] * x[i + 3])

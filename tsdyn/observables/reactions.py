@@ -164,10 +164,12 @@ def solve_multipliers(context, t, q, r, memory, rows, out):
     bodies = graph.bodies
     for k in range(t.size):
         recall(s, memory[k])
+        # S = H W H^T, and Phi_q by short rows
         regular = factorise_at(graph, s, f, t[k], q[k])
         constraint_jacobian(s, q[k], t[k], rows)
         copy(r[k], f.Q)
         take_loads(bodies, q[k], r[k], f.Z)
+        # S lam = H W r, refined once: balance_loads leaves in Z what lam doesn't balance
         for i in range(out.shape[1]):
             out[k, i] = 0.0
         for _ in range(2):
@@ -181,6 +183,7 @@ def solve_multipliers(context, t, q, r, memory, rows, out):
                 at = s.segments[i, 2 * half]
                 for c in range(s.segments[i, 2 * half + 1]):
                     f.Q[at + c] -= rows[i, 7 * half + c] * out[k, row]
+        # Multiplier of a normalisation: the remainder of r along p
         for b in range(bodies.shape[0]):
             i = graph.normals[b]
             if i >= 0:

@@ -216,6 +216,7 @@ def _sample(s, r, h, t0, places, d, weights, f):
     x, xd = r.path[7 * k : 8 * k], r.path[8 * k : 9 * k]
     Q, q, qd = r.path[9 * k : 9 * k + n], r.path[9 * k + n : 9 * k + 2 * n], r.path[9 * k + 2 * n :]
     for place in range(places + 1):
+        # Quintic Hermite polynomial of the coordinates of loaded bodies, at t0 + share h
         share = place / places
         quintic(share, h, k, d, x, xd)
         j = 0
@@ -225,10 +226,12 @@ def _sample(s, r, h, t0, places, d, weights, f):
                 q[c], qd[c] = x[j], xd[j]
                 j += 1
         set_time(s, t0 + share * h)
+        # Q: generalised forces of the watched loads
         for i in range(r.watched.size):
             kind = s.forces[r.watched[i]]
             table, reals = s.table[kind.table :], s.reals[kind.reals :]
             call_kind(kind.force, kind.count, kind.stride, table, reals, q, qd, t0 + share * h, Q)
+        # f = sum_c weights_c Q_c
         total, j = 0.0, 0
         for i in range(r.loaded.size):
             at, size = s.bodies[r.loaded[i], 0], s.bodies[r.loaded[i], 1]

@@ -9,7 +9,7 @@ import numpy as np
 from ..configuration.mobility import divide
 from ..elements.bodies import rotation_matrix, transform_g
 from ..elements.loops.coordinate_rows import INTS, STRIDE
-from ..elements.loops.forces import FORCE_INTS as FORCE_INTS
+from ..elements.loops.forces import FORCE_INTS
 from ..elements.loops.template import AT
 from ..errors import InvalidForce, SingularConfiguration
 from ..formulations.tolerances import REFINEMENTS

@@ -379,3 +379,11 @@ def first_rows(primitives):
     for primitive in primitives:
         yield primitive, row if primitive.all_rows else row - 1
         row += primitive.all_rows
+
+
+def index_of(packed, body):
+    """Where a body stood among the others when the scene was packed; None where it was not there."""
+    known = packed.derived
+    if known.body_indices is None:
+        known.body_indices = {id(one): i for i, one in enumerate(packed.bodies)}
+    return known.body_indices.get(id(body))

@@ -659,14 +659,6 @@ def _members(constraints):
         part, row = parts.stop, rows.stop
 
 
-def index_of(packed, body):
-    """Where a body stood among the others when the scene was packed; None where it was not there."""
-    known = packed.derived
-    if known.body_indices is None:
-        known.body_indices = {id(one): i for i, one in enumerate(packed.bodies)}
-    return known.body_indices.get(id(body))
-
-
 def member_of(packed, constraint):
     """The `Member` that a constraint, or a joint's part, is; None where it is not of that scene."""
     known = packed.derived

@@ -23,8 +23,8 @@ from ..jit.kernels import entry, kernel, long_kernel, resident, stack, twin
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import LAST_PLACE, RANK_TOL, TINY
 from ..model.equations import WIDTH, added_inertia, constraint_jacobian, recall, set_time, with_short_rows
-from ..model.handles import classes, first_rows, handles_of
-from ..model.packed import index_of, member_of, no_system
+from ..model.handles import classes, first_rows, handles_of, index_of
+from ..model.packed import member_of, no_system
 from ..rows.constraint_graph import REDUCED, graph_of
 from ..rows.interface import (
     METRIC,

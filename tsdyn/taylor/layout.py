@@ -18,7 +18,8 @@ from ..formulations.locked_orientations import instances
 from ..jit.kernels import Record, loader, records, twin
 from ..jit.resident import zeros
 from ..model.equations import changes_with_state
-from ..model.packed import System, coupled_loads, index_of, members_of
+from ..model.handles import index_of
+from ..model.packed import System, coupled_loads, members_of
 from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.program import run_program

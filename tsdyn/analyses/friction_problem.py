@@ -315,7 +315,7 @@ class RestProblem:
     ----------
     place : FrictionFrames
     packed : Packed
-        Of a phase with the rows of these units.
+        Of a phase with the rows of these units; other units may have rows, which don't hold.
     rows : dict of int to ndarray
         Unit -> its rows of Phi.
     bases : dict of int to ndarray (r, 3)
@@ -334,7 +334,7 @@ class RestProblem:
         _, Phi_q, _, gamma = constraint_arrays(system, q, qd, t)
         M = mass_matrix(system, q)
         mine = np.concatenate([*rows.values(), np.zeros(0, int)])
-        others = np.setdiff1d(np.arange(len(gamma)), mine)
+        others = np.setdiff1d(np.arange(len(gamma)), np.concatenate([*packed.derived.holds.values(), mine]))
         own, Z, R, order = range_and_null_space(Phi_q[others])
         rank, order = len(order), others[order]
         try:

@@ -244,7 +244,11 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        phase = self._scene_of([], [self._hold(i, ranks[i]) for i in free])
+        # With rows of those that slide, too, which don't count: it is packed once
+        holds = {i: self._hold(i, ranks[i]) for i in free}
+        for i in set(range(len(units))) - {*free, *self.off}:
+            holds[i] = Hold(units[i], n := units[i].slide.freedom, place.numbers(i, np.eye(3)[:n]))
+        phase = self._scene_of([], holds.values())
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are

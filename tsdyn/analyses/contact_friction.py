@@ -131,11 +131,11 @@ def settle_grips(inertia, resting, qd, fired=()):
     N, T, d, slides = p[::3], p.reshape(-1, 3)[:, 1:], cones.d, cones.slides
     _demand_unique(G, d, mu, mode)
     gdd = c + inertia.J @ (response @ p)
-    small = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p))
+    small, carried = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p)), inertia.carried()
     closed, idle, spare, grips = [], [], [], {}
     for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
         i = resting[j]
-        pushes = N[j] * G[3 * j, 3 * j] > small[i]
+        pushes = N[j] * G[3 * j, 3 * j] > small[i] + carried[i] * (i in fired)
         if not pushes and (gdd[i] > small[i] or i in fired):
             continue
         sticks = [k for k in closed if grips.get(k, ()) is None]

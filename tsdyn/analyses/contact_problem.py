@@ -10,13 +10,13 @@ M~ f are the accelerations that loads f make where the bilateral rows hold. lam 
 from __future__ import annotations
 
 import math
+import threading
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
-from ..elements.element import angles
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
@@ -36,7 +36,7 @@ class Gap(NamedTuple):
 
 
 class Gaps:
-    """The inequalities of a scene; one evaluation at a time.
+    """The inequalities of a scene.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Gaps:
     """
 
     def __init__(self, packed, contacts, free):
-        self.packed, self.list = packed, []
+        self.packed, self.list, self._made_of, self._own = packed, [], (packed, contacts, free), threading.local()
         first = {id(member.constraint): member.rows.start for member in packed.members}
         for contact in contacts_of(member.constraint for member in packed.members):
             self.list += [Gap(contact, side, first[id(contact)] + i) for i, side in enumerate(contact.sides)]
@@ -84,9 +84,27 @@ class Gaps:
         self._slips = np.zeros((self.count, 2), int)  # among the rows of `contacts`
         for i in np.flatnonzero(self.rubs):
             self._slips[i] = slip_rows(self.list[i].contact, own)
-        self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
+        handles = handles_of(packed)
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
+        self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
+
+    def lengths(self, length):
+        """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound."""
+        return np.where(self._angles > 0.0, self._angles, length)
+
+    def __reduce__(self):
+        """Made anew in another process: kernels' memory is of this one."""
+        return Gaps, self._made_of
+
+    @property
+    def workspace(self):
+        """The `ContactWorkspace` of this thread."""
+        try:
+            return self._own.workspace
+        except AttributeError:
+            self._own.workspace = ContactWorkspace(*self._made_of[1:])
+            return self._own.workspace
 
     def all_rows(self, which=slice(None)):
         """Rows of Phi of gaps and of their slips, by default of all."""
@@ -106,8 +124,9 @@ class Gaps:
     @staticmethod
     def _rate(handles, side):
         """A function of q, qd (..., n) that returns the rate (...) of a joint, in the direction of its ratchet."""
-        kind, rate = ("angle", angle_of) if angles(side.follows) else ("displacement", displacement)
-        (geometry, *_) = getattr(handles.row(side.follows, kind), f"{kind}s")
+        joint, kind, index = side.follows
+        geometry = getattr(handles.row(joint, kind), f"{kind}s")[index]
+        rate = angle_of if kind == "angle" else displacement
         return lambda q, qd: side.sign * rate(geometry, *handles.motions(geometry, (q, qd)), 1)
 
     def values(self, t, levels, counted):
@@ -116,7 +135,7 @@ class Gaps:
         levels (k, ...) begin with q (n,); counted is a function that returns the counted angles (k, angles) of joints.
         """
         rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
-        found = self.sign * self.workspace.gaps(t, rows)[:, : self.count]
+        found = np.ascontiguousarray(self.workspace.gaps(t, rows, self.sign)[:, : self.count])
         if self._stops:
             q, angles = rows[:, : self.workspace.n], counted()
             for i, value in self._stops:
@@ -239,9 +258,8 @@ class Inertia:
         return self._of_all(rates)
 
     def hold(self, which, rates):
-        """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
-        own = np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
-        return self.pushed(which, -own)
+        """Impulses (k,) that take these rates from these gaps; negative ones pull."""
+        return -np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
 
     def slips(self, qd):
         """Velocities (count, 2) of the slips, zero where they are rounding."""
@@ -276,6 +294,10 @@ class Inertia:
         qdd, gamma = self._open(qd)
         bias = (self.gaps.sign * gamma[: self.gaps.count])[self.which]
         return self._of_all(self._rows @ qdd + bias), self._of_all(self._sizes @ np.abs(qdd) + np.abs(bias))
+
+    def carried(self):
+        """Rounding (count,) of accelerations of the gaps, of weight that bilateral reactions carry."""
+        return LEVEL * np.abs(self.J).sum(axis=1) * np.abs(self.gaps.packed.system.gravity).max()
 
 
 class NoSolution(Exception):
@@ -343,13 +365,14 @@ def settle(inertia, resting, qd, fired=()):
     c, terms = inertia.accelerations(qd)
     if not resting:
         return Settled([], [], c)
-    resting, fired = list(resting), [i for i in fired if i in resting]
+    resting, fired, carried = list(resting), [i for i in fired if i in resting], inertia.carried()
     while True:
         lam, basic = _solved(inertia, resting, c[resting])
         gdd = c + inertia.G[:, resting] @ lam
         small = LEVEL * (terms + np.abs(inertia.G[:, resting]) @ lam)
         # A reaction that has just vanished doesn't come back by rounding
-        gone = [i for i, x in zip(resting, lam, strict=True) if i in fired and x * inertia.G[i, i] <= small[i]]
+        least = small + carried
+        gone = [i for i, x in zip(resting, lam, strict=True) if i in fired and x * inertia.G[i, i] <= least[i]]
         if not gone:
             break
         resting = [i for i in resting if i not in gone]
@@ -368,11 +391,8 @@ def settle(inertia, resting, qd, fired=()):
 
 
 def slack_of(inertia, closed, pushes, small):
-    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations.
-
-    Accelerations may be zero as bilateral reactions carry the weight: its rounding is in them.
-    """
-    small = small + LEVEL * np.abs(inertia.J).sum(axis=1) * np.abs(inertia.gaps.packed.system.gravity).max()
+    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations."""
+    small = small + inertia.carried()
     return {i: float(small[i] / inertia.G[i, i]) for i in closed if pushes[i] * inertia.G[i, i] <= small[i]}
 
 

@@ -69,7 +69,7 @@ def phase_of(scene, rows, holds=(), without=None):
         vars(phase).update(
             _added=[each for each in scene._added if id(each) not in gone] + [*constraints, *chain(*held)],
             _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None, _start=None,
-            _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
+            _prepared=None, _phases=None, _gaps=None, _spare={}, _waiting={}, _opens=False,
             _pack=partial(_pack_phase, phase, scene, holds, held), _whole=scene,
         )  # fmt: skip
     return known[key]
@@ -116,7 +116,14 @@ def _slots(packed):
 
 
 def gaps_of(scene, without=None, holds=()):
-    """The `Gaps` of a scene, of its inactive contacts too; the others as of `phase_of`."""
+    """The `Gaps` of a scene, of its inactive contacts too, kept until it changes; the others as of `phase_of`."""
+    free = phase_of(scene, [], holds, without)
+    if free._gaps is None:
+        free._gaps = _new_gaps(scene, free)
+    return free._gaps
+
+
+def _new_gaps(scene, free):
     from ..analyses.contact_problem import Gaps
 
     sides = [(contact, side) for contact in contacts_of(scene._added) for side in contact.sides]
@@ -124,7 +131,7 @@ def gaps_of(scene, without=None, holds=()):
     rubbing = [part for contact, side in sides if side.grip for part in contact.parts]
     rows += [part for part in rubbing if not any(part is row for row in rows)]
     alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
-    return Gaps(scene.packed, alone.packed, phase_of(scene, [], holds, without).packed)
+    return Gaps(scene.packed, alone.packed, free.packed)
 
 
 def _holding(packed, holds, held):

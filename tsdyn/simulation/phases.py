@@ -85,7 +85,7 @@ class Phases:
     Attributes
     ----------
     list : list of (float, float, tuple of str)
-        Start, end (s) and names of the closed contacts.
+        Start, end (s) and names of the closed contacts, then of what sticks.
     impulses : list of (float, str, float)
         Time (s), name, impulse (N s, or N m s of an angle).
     starts : list of float
@@ -113,12 +113,13 @@ class Phases:
     def kind(self, packed, modes, whole, gaps):
         """The number of the kind of phases that are packed so.
 
-        modes: what makes its scene again, for files. whole, gaps: of the scene with its parameters, packed.
+        modes: a function that returns what makes its scene again, for files. whole, gaps: of the scene with its
+        parameters, packed.
         """
         kind = self._known.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
             self.packed.append(packed)
-            self.modes.append(modes)
+            self.modes.append(modes())
             self._gaps.append(gaps)
             self._columns.append(shared_rows(whole, packed))
         return kind
@@ -172,7 +173,7 @@ class Phases:
         return UnitModes.of(self.modes[kind][0])
 
     def told(self):
-        """The `list`, in which phases are one where the same hold as before, and no impact or action is between."""
+        """The `list`, each name once; phases are one where the same rows hold, and no impact or action is between."""
         found, before, hit = [], None, {t for t, *_ in self.impulses}
         for (start, end, names), begun, changes in zip(self.list, self.starts, self.changes, strict=True):
             if found and names == found[-1][2] and changes == before and begun not in hit:
@@ -180,7 +181,7 @@ class Phases:
             else:
                 found.append((start, end, names))
             before = changes
-        return found
+        return [(start, end, tuple(dict.fromkeys(names))) for start, end, names in found]
 
     def sticking(self, numbers, i):
         """Whether a contact with friction sticks (k,); i: the number of its gap."""
@@ -264,7 +265,7 @@ class Phases:
         for k, (inactive, _) in enumerate(self.changes):
             active = [item.name for item in parts if item.name not in inactive]
             begin, end, names = self.list[k]
-            self.list[k] = begin, end, tuple(dict.fromkeys((*names, *active)))
+            self.list[k] = begin, end, (*names, *(name for name in active if name not in names))
 
     def _gathered(self, numbers, arrays):
         """Yield each kind of phases, the entries (j,) of arrays in its phases, and these parts of the arrays."""
@@ -332,7 +333,7 @@ class Phases:
             packed = scene.packed
             if derived != derived_record(packed):
                 take_derived(packed, derived)
-            self.kind(packed, modes, packed if scene._whole is None else scene._whole.packed, gaps)
+            self.kind(packed, lambda modes=modes: modes, packed if scene._whole is None else scene._whole.packed, gaps)
             self.scenes.append(scene)
 
 

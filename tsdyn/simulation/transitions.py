@@ -49,7 +49,7 @@ class Transitions:
         self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        (near,) = (self.gap <= TOUCHING * self.length).nonzero()
+        (near,) = (self.gap <= TOUCHING * self.gaps.lengths(self.length)).nonzero()
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         hit = [i for i in fired if i < count]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
@@ -84,6 +84,8 @@ class Transitions:
         if not touching:
             return self._settle_frictions(before, broken)
         try:
+            if len(touching) == 1 and self._bounces(touching[0], before, slots):
+                return None
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
@@ -93,7 +95,8 @@ class Transitions:
             opening = [i for i in fired if i not in before.closed]
             noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
             if noise:  # a gap that closes with a rate of rounding, or a ratchet that takes hold
-                self.qd, rates = held(inertia, self.qd, noise, rates)
+                p, self.qd, rates = held(inertia, self.qd, noise, rates)
+                self._note_impulses(inertia, noise, p, qd)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
@@ -271,6 +274,25 @@ class Transitions:
             memory[np.array(unit.held(k))] = hold.numbers[k]
         return free_motions(phase.packed, self.t, self.q, memory, phase.packed.derived.holds[unit.slot])
 
+    def _bounces(self, i, before, slots):
+        """Whether gap i, the only one that touches, is hit without friction and opens: then that has happened.
+
+        As `_hit` has it, of several gaps: here by one kernel, since balls bounce often.
+        """
+        gaps, e = self.gaps, float(self.gaps.restitution[i])
+        if self.frictions.count or gaps.rubs[i] or i in gaps.following or before.closed or before.idle or e == 0.0:
+            return False
+        found = gaps.workspace.bounce(self.t, self.q, self.qd, slots, i, float(gaps.sign[i]), e)
+        (rate, size, G, p, acceleration, length), qd = found
+        if not (G > 0.0 and rate < -AT_REST * size):
+            return False
+        height = ENDLESS * self.length if e == 1.0 else EPS * max(self.length, ROUNDED * length)
+        if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * height:
+            return False
+        self.phases.impulses.append((self.t, gaps.names[i], p))
+        self.qd, self.modes = qd, UnitModes(opened={i: (self.t, self.gap[i], -e * rate)})
+        return True
+
     def _hit(self, inertia, touching, rates):
         """Jump of velocities at an impact; the rates (count,) afterwards."""
         e, before = self.gaps.restitution[touching].copy(), rates[touching]
@@ -288,18 +310,28 @@ class Transitions:
         for _ in touching:
             if not a.any():
                 break
-            qd, after = held(inertia, qd, [i for i in touching if a[i] > 0.0 or after[i] == 0.0], after)
+            stays = [k for k, i in enumerate(touching) if a[i] > 0.0 or after[i] == 0.0]
+            more, qd, after = held(inertia, qd, [touching[k] for k in stays], after)
+            p[stays] += more
             if (after[touching] < 0.0).any():
                 more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
                 p = p + more
             a = self._lowering(inertia, touching, qd, after)
-        # Impulses that change rates by less than rounding are none
-        small, named = AT_REST * inertia.sizes(self.qd), zip(touching, p, strict=True)
-        self.phases.impulses += [
-            (self.t, self.gaps.names[i], float(x)) for i, x in named if x * inertia.G[i, i] > small[i]
-        ]
+        self._note_impulses(inertia, touching, p, self.qd)
         self.qd = qd
         return after
+
+    def _note_impulses(self, inertia, which, p, qd):
+        """Note the impulses (k,) of the gaps `which`, but those that change the rates at qd by less than rounding.
+
+        Pulls, of contacts that stay closed though they are lifted, are noted without friction, whose part isn't told.
+        """
+        small, rubs = AT_REST * inertia.sizes(qd), self.gaps.rubs
+        self.phases.impulses += [
+            (self.t, self.gaps.names[i], float(x))
+            for i, x in zip(which, p, strict=True)
+            if (x if rubs[i] else abs(x)) * inertia.G[i, i] > small[i]
+        ]
 
     def _jump(self, inertia, touching, before, e, qd=None):
         """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
@@ -317,6 +349,7 @@ class Transitions:
             return np.zeros(self.gaps.count)
         resting = [i for i in touching if rates[i] == 0.0]
         a = -settled_by(inertia, resting, qd).accelerations
-        rounding = EPS * np.maximum(self.length, ROUNDED * inertia.sizes(self.q))
-        rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
+        lengths, elastic = self.gaps.lengths(self.length), self.gaps.restitution == 1.0
+        rounding = EPS * np.maximum(lengths, ROUNDED * inertia.sizes(self.q))
+        rounding[elastic] = ENDLESS * lengths[elastic]  # flights that would never get lower
         return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)

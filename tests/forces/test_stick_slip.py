@@ -253,6 +253,16 @@ def test_joints_without_a_load_make_no_events():
     np.testing.assert_allclose(solution.velocity(last)[-1, 2], -G * end, rtol=1e-9)
 
 
+@pytest.mark.parametrize("inactive", [0, 1])
+def test_an_inactive_friction_is_none(inactive):
+    without, scene = chain(2), chain(2)
+    without.remove(f"friction {inactive}")
+    scene.deactivate(f"friction {inactive}")
+    one, other = (ts.simulate(each, (0.0, 0.5), rtol=1e-12, atol=1e-12) for each in (without, scene))
+    np.testing.assert_allclose(other.q[-1], one.q[-1], rtol=0, atol=TIGHT)
+    assert other.phases == one.phases
+
+
 def test_an_impact_releases_what_sticks():
     """An elastic ball stops at the block and leaves it 2 m/s, which friction stops after v^2 / (2 mu g)."""
     scene = ts.Scene()

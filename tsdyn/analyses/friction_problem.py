@@ -103,16 +103,23 @@ class Hold(NamedTuple):
 class Frictions:
     """The frictions of a scene that follow the exact law.
 
+    Parameters
+    ----------
+    scene : Scene
+    acting : sequence of packed.Load, optional
+        Of its phases, with numbers of normal loads; without those of inactive forces. By default those of the scene.
+
     Attributes
     ----------
     units : list of FrictionUnit
     names : list of str
     """
 
-    def __init__(self, scene):
+    def __init__(self, scene, acting=None):
         self.packed, self.units = scene.packed, []
+        known = {id(load.force): load for load in (self.packed.loads if acting is None else acting)}
         for force, load in zip(scene._forces, self.packed.loads, strict=True):
-            slot = load.slot + force.memory
+            load, slot = known.get(id(force), load._replace(normal=-1)), load.slot + force.memory
             for slide in getattr(force, "slides", ()):
                 self.units.append(FrictionUnit(load, force, slide, slot))
                 slot += slide.count

@@ -251,7 +251,7 @@ class Transitions:
         holds = {i: self._hold(i, ranks[i]) for i in free}
         for i in set(range(len(units))) - {*free, *self.off}:
             holds[i] = Hold(units[i], n := units[i].slide.freedom, place.numbers(i, np.eye(3)[:n]))
-        phase = self._scene_of([], holds.values())
+        phase = self._scene_of([], list(holds.values()))
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are

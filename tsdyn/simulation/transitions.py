@@ -250,7 +250,8 @@ class Transitions:
         # With rows of those that slide, too, which don't count: it is packed once
         holds = {i: self._hold(i, ranks[i]) for i in free}
         for i in set(range(len(units))) - {*free, *self.off}:
-            holds[i] = Hold(units[i], n := units[i].slide.freedom, place.numbers(i, np.eye(3)[:n]))
+            slide = units[i].slide
+            holds[i] = Hold(units[i], slide.freedom, np.ones((slide.freedom, slide.row_numbers)))
         phase = self._scene_of([], list(holds.values()))
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]

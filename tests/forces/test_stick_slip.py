@@ -253,6 +253,13 @@ def test_joints_without_a_load_make_no_events():
     np.testing.assert_allclose(solution.velocity(last)[-1, 2], -G * end, rtol=1e-9)
 
 
+def test_a_start_as_slow_as_rest_sticks():
+    """In a plane 1e-8 m/s is rest: the slip is ended."""
+    solution = ts.simulate(on_a_plane((6e-9, 0, 0), 0.3), (0.0, 1.0))
+    assert solution.success
+    assert not solution.qd.any()
+
+
 @pytest.mark.parametrize("inactive", [0, 1])
 def test_an_inactive_friction_is_none(inactive):
     without, scene = chain(2), chain(2)

@@ -585,6 +585,15 @@ class RestProblem:
             found[i] = float(rate) if rate > small[at].max() else 0.0
         return found
 
+    def stopped(self, units, qd):
+        """Velocities (n,) with the slips ended of units that stick, by the least change of kinetic energy."""
+        rows = self._held(units)
+        left = self.J[rows] @ qd
+        if not left.any():
+            return qd
+        rows, left = np.append(rows, self.pressed), np.append(left, np.zeros(len(self.pressed)))
+        return qd - self.qdd[:, 1 + rows] @ np.linalg.lstsq(self.G[np.ix_(rows, rows)], left, rcond=RANK_TOL**2)[0]
+
     def _held(self, units):
         """The rows of some units."""
         return np.concatenate([*(self.at[i] for i in units), np.zeros(0, int)]).astype(int)

@@ -263,6 +263,8 @@ class Transitions:
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
         problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
         rest = problem.settle({i: way for i, way in guess.items() if i in free}, fired)
+        # In a plane slips end where they are slow
+        self.qd = problem.stopped([i for i in rest.sticking if i in fresh and not self.frictions.signed[i]], self.qd)
         return rest, ranks, phase.packed
 
     def _motions_of(self, place, i):

@@ -250,8 +250,9 @@ class Transitions:
         # With rows of those that slide, too, which don't count: it is packed once
         holds = {i: self._hold(i, ranks[i]) for i in free}
         for i in set(range(len(units))) - {*free, *self.off}:
-            slide = units[i].slide
-            holds[i] = Hold(units[i], slide.freedom, np.ones((slide.freedom, slide.row_numbers)))
+            numbers = np.ones((units[i].slide.freedom, units[i].slide.row_numbers))
+            numbers[:, -1] = 0.0
+            holds[i] = Hold(units[i], len(numbers), numbers)
         phase = self._scene_of([], list(holds.values()))
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]

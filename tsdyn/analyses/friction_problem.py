@@ -5,7 +5,8 @@
 
 The normal loads N follow from reactions and these from the friction (`observables.evaluate.balance`). Of those that are
 at rest, which stick is found by pivoting: those beyond their bounds slide against what held them, those that would
-slide backwards stick.
+slide backwards stick. Reactions of contacts at rest are found with each choice, as a problem with cones
+(contact_friction.py); what contacts hold by themselves needs no friction.
 """
 
 from __future__ import annotations

@@ -158,7 +158,8 @@ class _ContactRun(Transitions):
             if name not in parts:
                 raise InvalidArgument(f"the state is of a scene with {name!r}, which this one lacks.")
         self.without = dependent(self.scene, [parts[name] for name in inactive])
-        self.gaps, self.frictions = gaps_of(self.scene, self.without), Frictions(self.scene)
+        self.gaps = gaps_of(self.scene, self.without)
+        self.frictions = Frictions(self.scene, self._scene_of([], []).packed.loads)
         self.held_gaps = {}  # the same where frictions stick, by the rows that hold these
         off = {id(item) for item in self.without}
         self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]

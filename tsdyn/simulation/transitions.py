@@ -247,7 +247,13 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        phase = self._scene_of([], [self._hold(i, ranks[i]) for i in free])
+        # With rows of those that slide, too, which don't count: it is packed once
+        holds = {i: self._hold(i, ranks[i]) for i in free}
+        for i in set(range(len(units))) - {*free, *self.off}:
+            numbers = np.ones((units[i].slide.freedom, units[i].slide.row_numbers))
+            numbers[:, -1] = 0.0
+            holds[i] = Hold(units[i], len(numbers), numbers)
+        phase = self._scene_of([], list(holds.values()))
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
@@ -258,6 +264,8 @@ class Transitions:
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
         problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
         rest = problem.settle({i: way for i, way in guess.items() if i in free}, fired)
+        # In a plane slips end where they are slow
+        self.qd = problem.stopped([i for i in rest.sticking if i in fresh and not self.frictions.signed[i]], self.qd)
         return rest, ranks, phase.packed
 
     def _motions_of(self, place, i):

@@ -82,6 +82,18 @@ def settle_grips(inertia, resting, qd, fired=()):
     NoSolution
         Where no reactions keep the contacts from penetrating, or several do: with much friction (Painleve).
     """
+    found = _settled(inertia, resting, qd, fired)
+    if not found.idle:
+        return found
+    # Idle contacts carry nothing in the phase: what the others do follows from their own normal loads
+    again = _settled(inertia, found.closed, qd, fired)
+    if again.closed != found.closed or again.idle:
+        return found
+    return again._replace(idle=found.idle, grips={**found.grips, **again.grips})
+
+
+def _settled(inertia, resting, qd, fired):
+    """As `settle_grips`, with the normal loads shared among all contacts."""
     gaps, resting = inertia.gaps, list(resting)
     rows = rows_of(inertia, resting)
     response = inertia.free(rows.T)

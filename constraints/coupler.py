@@ -109,7 +109,6 @@ class Coupler(SumRow):
         joint = chosen[0][0]
         super().__init__(joint.a, joint.b, (), name)
         self.ratio, self.offset, self.polynomial, self.function = ratio, offset, polynomial, function
-        self.check()
 
     def _untitled(self, bodies):
         return f"Coupler({', '.join(joint.name for joint, *_ in self._all)})"

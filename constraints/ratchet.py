@@ -62,7 +62,6 @@ class Ratchet(Unilateral, Joint):
         super().__init__(*geometry_of(self.joint, *coordinate)[:2], name=name)
         self.direction = direction
         self._set_law(0.0)
-        self.check()
 
     def _untitled(self, bodies):
         return f"{self._kind()}({self.joint.name})"

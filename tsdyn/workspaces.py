@@ -114,7 +114,7 @@ class SaddleWorkspace(NamedTuple):
     B: np.ndarray  # (nb * 9,)  omega' by pi' at constant rates of chart coordinates; saddle_point.py
     lower: np.ndarray  # factors; saddle_point.factorise
     upper: np.ndarray
-    multipliers: np.ndarray  # (m,)  what the last Newton correction led to; saddle_point.solve
+    multipliers: np.ndarray  # (m,)  what the last Newton correction led to; implicit_tangent.correct
     before: np.ndarray  # (m,)  those of the stage before; implicit_tangent.py
     a: np.ndarray  # ((nb + 1) * 8,)  accelerations of bodies, the same
     x: np.ndarray  # (s,)  right-hand side and solution, in order of elimination

@@ -1,9 +1,10 @@
 """Unilateral contacts and stops against closed forms: impact times, rest, openings, energies, refusals."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import tsdyn as ts
@@ -245,6 +246,34 @@ def test_a_stop_counts_turns(bound):
     assert abs(solution.angle(hinge)[-1] - bound) < 1e-13 * abs(bound)
 
 
+@pytest.mark.parametrize(
+    ("size", "share", "gravity"), [(1.0, 1.0, 0.0), (1e6, 1.0, 0.0), (1e-6, 1.0, 0.0), (1.0, 1e-3, 10.0)]
+)
+def test_a_wheel_leaves_its_stop_and_comes_back(size, share, gravity):
+    """A torque -cos(t) - 0.3, about a hinge and times the inertia and a share, turns a wheel.
+
+    It leaves at cos(t) = -0.3, without a rate. The wheel's place, 1e6 m away, has a rounding that the angle hasn't;
+    the hinge carries the weight, whose rounding doesn't delay the wheel.
+    """
+    scene, inertia = ts.Scene(gravity=(0, 0, -gravity)), 2.0 * size**2
+    wheel = scene.add_body(mass=1.0, inertia=(inertia,) * 3, position=(size, 0, 0), name="wheel")
+    hinge = scene.add(C.Revolute.at(scene.ground, wheel, point=wheel.position, axis=(0, 0, 1), name="hinge"))
+    scene.add(C.Stop(hinge, lower=0.0, restitution=0.5, name="stop"))
+    torque = share * inertia * (ts.motions.Sine(-1.0, 1.0, np.pi / 2) - 0.3)
+    scene.add(ts.forces.Torque(wheel, torque=(0, 0, torque)))
+    solution = ts.simulate(scene, (0, 10.0), rtol=1e-12, atol=1e-12)
+    begun = np.arccos(-0.3)
+
+    def angle(t):
+        return np.cos(t) - np.cos(begun) + np.sin(begun) * (t - begun) - 0.15 * (t - begun) ** 2
+
+    landed = brentq(angle, begun + 1.0, 10.0, xtol=1e-15)
+    rate = -np.sin(landed) + np.sin(begun) - 0.3 * (landed - begun)
+    assert abs(solution.phases[0][1] - begun) < 1e-9
+    assert abs(solution.impulses[0][0] - landed) < 1e-10
+    np.testing.assert_allclose(solution.impulses[0][2], -1.5 * share * inertia * rate, rtol=1e-9)
+
+
 def test_a_stop_of_a_slide():
     scene = ts.Scene(gravity=(0, 0, 0))
     block = scene.add_body(mass=2.0, inertia=(1, 1, 1), velocity=(0.5, 0, 0))
@@ -302,6 +331,29 @@ def test_a_box_falls_and_comes_to_rest_on_four_corners(tilt, e, spin):
     assert np.diff(solution.energy).max() < 1e-10 * G
     assert penetration(scene, solution) > -1e-14
     assert solution.constraint_error.position.max() < 1e-14
+
+
+def test_impulses_account_for_the_momentum_of_a_stack():
+    """Also those that keep corners closed which another impact lifts by less than rounding."""
+    scene, below, floor = ts.Scene(gravity=(0, 0, -G)), None, []
+    for i, half in enumerate((0.0012, -0.0013)):
+        given = {"position": (0, 0, 0.28 + 0.53 * i), "orientation": (np.cos(half), np.sin(half), 0, 0)}
+        block = scene.add_body(**ts.shapes.box((1, 1, 0.5), mass=1.0), **given)
+        for x, y in product((-0.5, 0.5), repeat=2):
+            law = {"unilateral": True, "restitution": 0.5, "normal_b": (0, 0, 1), "point_b": (0, 0, 0.25 * i)}
+            corner = scene.add(C.PlaneContact(block, below or scene.ground, point_a=(x, y, -0.25), **law))
+            floor += [corner.name] * (below is None)
+        below = block
+    solution = ts.simulate(scene, (0, 0.6))
+    times, first, count = np.unique(solution.t, return_index=True, return_counts=True)
+    left = [
+        (solution.qd[i + k - 1] - solution.qd[i])[[2, 9]].sum()
+        - sum(p for at, name, p in solution.impulses if at == t and name in floor)
+        for t, i, k in zip(times, first, count, strict=True)
+        if k > 1
+    ]
+    assert len(left) > 80
+    assert np.abs(left).max() < 1e-14
 
 
 def test_the_instant_of_a_flat_box():

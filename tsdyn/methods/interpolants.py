@@ -119,6 +119,16 @@ def hermite_first_order(s, h, n, nx, ny, data, x, y):
 
 
 @callback(VALUE)
+def cubic_rate(s, h, n, nx, ny, data, x, y):
+    """The derivative of the cubic for y of `hermite_first_order`, as y; x is left alone."""
+    d, y = vector(data, 6 * nx + 4 * ny)[6 * nx :], vector(y, ny)
+    f, g0, g1 = 6.0 * s * (1.0 - s) / h, 1.0 + s * (3.0 * s - 4.0), s * (3.0 * s - 2.0)
+    for i in range(ny):
+        y[i] = f * (d[2 * ny + i] - d[i]) + g0 * d[ny + i] + g1 * d[3 * ny + i]
+    return 0
+
+
+@callback(VALUE)
 def hermite_second(s, h, n, nx, ny, data, x, y):
     """The second derivative of the quintic for x, as y; x is left alone."""
     d, k, y = vector(data, 6 * nx), nx, vector(y, nx)

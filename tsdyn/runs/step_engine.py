@@ -7,6 +7,7 @@ from ..formulations.tolerances import LOADS_LEFT, TURN_FREE, TURN_LIMIT
 from ..maths.tolerances import LAST_PLACE
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.explicit import called_for
+from ..methods.interpolants import cubic_rate
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, has_rates
 from ..rows.interface import redundancy
@@ -68,7 +69,7 @@ class StepMemory(Memory):
         if saddle is not None:
             self._scratch.append(context.saddle.K.base)
         if form.mixed:
-            self._scratch.append(context.rates.D.base)
+            self._scratch += [context.rates.D.base, context.mixed.P.base]
         rest = *self._laid_out, context.tangent.rows.S, context.tangent.poses
         self.nbytes = sum(array.nbytes for array in (*self._scratch, *rest))
 
@@ -149,19 +150,20 @@ class StepEngine:
         memory.context.chart.state.turn_limit = TURN_FREE if free else TURN_LIMIT
         share = LOADS_LEFT * method.step_tolerances()[0] if method.step is None else 0.0
         memory.context.chart.state.loads_left = max(share, LAST_PLACE)
-        place, accelerate = form.stage_kernels(free)
+        place, accelerate, norm = form.stage_kernels(free)
         run.kernels.stage_place, run.kernels.stage_accelerate = place.address, accelerate.address
         run.numbers.first_order = MIXED if form.mixed else form.first_order
         if method.step is None:
+            run.kernels.error_norm = norm.address
             run.clock.turn_share = run.clock.error_before = 1.0
             run.clock.exponent = 1.0 / (method.embedded_order + 1)
-            if method.stability_limit and not form.first_order:
+            if method.stability_limit and (form.mixed or not form.first_order):
                 run.clock.stability_limit = method.stability_limit
-                run.numbers.last_stage = 2 * len(method.tableau.c) * nx
+                run.numbers.last_stage = len(method.tableau.c) * sum(self.sizes)
         if method.implicit:
             addresses = form.implicit(method.coupled > 0)
             prepare_implicit(memory.context.linear, method, addresses, form.basis_free, self.slips)
-            run.numbers.stage_at = (2 * len(method.tableau.c) + 1) * nx
+            run.numbers.stage_at = len(method.tableau.c) * sum(self.sizes) + nx
 
     def reading(self, memory, prepared, constraint_tol):
         """A `Reading` of the steps; a function and its arguments that make it in another process."""
@@ -203,6 +205,13 @@ def _reading(packed, form, interpolant, constraint_tol, kernels):
     return TrajectoryReading(kernel, workspace, system, shift=1, degree=8)
 
 
+def second_derivative(method, form):
+    """The kernel of accelerations between the ends of steps; None where they follow from the equations."""
+    if not method.implicit:
+        return None
+    return cubic_rate if form.first_order else method.second
+
+
 def kernels_of(method, form, step, interpolant, adaptive, within):
     """Addresses that the driver and the reader call, by their names in `RunKernels`.
 
@@ -212,11 +221,10 @@ def kernels_of(method, form, step, interpolant, adaptive, within):
     kernels = {"step": called, "plug_in": plug_in}
     if adaptive:
         kernels |= dict(zip(("error", "second_error"), method.errors, strict=False))
-        kernels["error_norm"] = form.kernels.error_norm
     if within:
         kernels |= {"fill": interpolant.fill, "value": interpolant.value}
         kernels["normal"] = form.kernels.normal if form.has_normals else None
-        kernels["second"] = method.second if method.implicit else None
+        kernels["second"] = second_derivative(method, form)
     return form.addresses() | {name: kernel.address for name, kernel in kernels.items() if kernel is not None}
 
 

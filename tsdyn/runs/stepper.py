@@ -172,7 +172,7 @@ def begin_chart(context, c, r, log, reason):
         note_selection(c.tangent, log.points[r.numbers.chart_rows, w.q.size :])
     note_normal(context, r, r.clock.t)
     # Distance to a singular configuration
-    if r.numbers.first_order == 0:
+    if r.numbers.first_order != 1:
         note_indicator(c.graph, c.tangent, c.chart.rows0)
         if r.numbers.may_pass == 1 and status == 0 and reason != AT_START and is_next_to_singular(c.tangent):
             return PASSAGE
@@ -185,7 +185,8 @@ def has_hardly_turned(c):
     return 0.0 < turned_most(c.chart) < limits.HARDLY_TURNED
 
 
-# Where friction brings a joint to rest: there its force changes at once, and an implicit step is to end just before.
+# Where friction of the regularised law brings a joint to rest: there its force changes at once, and an implicit step is
+# to end just before.
 #
 # With Q the generalised forces of a friction for unit normal load, -Q . qd = mu |v|. From velocity and deceleration,
 #
@@ -225,6 +226,9 @@ def until_rest(c, r, h):
         friction = c.graph.frictions[i]
         # mu |v| now
         now = _friction_power(c, friction, r, 1.0, 0.0)
+        # The exact law doesn't change with the sign of v: an event is where it does
+        if _friction_power(c, friction, r, -1.0, 0.0) < 0.0:
+            continue
         # At rest, friction grows faster than in proportion to velocity
         if not _friction_power(c, friction, r, 2.0, 0.0) < limits.SLIDES * now:
             r.numbers.still += 1

@@ -85,6 +85,9 @@ TURN_GAIN = 1.05
 # --- events ----------------------------------------------------------------------------------------------------------
 # rad, rotation of a body in a step: below the first, half the samples suffice; above the second, the most are taken.
 SLOW_TURN, FAST_TURN = 0.1, 2.0
+# Lengths of the last phase of a run that are searched for the next event first, where they are at most this part of a
+# step.
+LIKE_THE_LAST, PART = 2.0, 0.25
 
 # A value or time below this fraction of the others counts as zero at the start of a run: rounding of some dozen
 # operations of an event function.

@@ -398,7 +398,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """Time (s), name and impulse of contacts at impacts, of parts that become active, of impulses on bodies.
 
         N s, or N m s of an angle; of a constraint of several rows an array (rows,) as of `multipliers`, of a body an
-        array (3,) in the ground frame.
+        array (3,) in the ground frame. Negative, about the square root of rounding, of a contact without friction
+        that an impact elsewhere lifts by less than rounding: it stays closed.
         """
         return [] if self._phases is None else list(self._phases.impulses)
 

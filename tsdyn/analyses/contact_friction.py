@@ -29,7 +29,7 @@ def rows_of(inertia, which):
 class Struck(NamedTuple):
     """What an impact with friction does."""
 
-    p: np.ndarray  # (k,) normal impulses
+    p: np.ndarray  # (k, 3) impulses, normal and along both slips
     change: np.ndarray  # (n,) of velocities
     share: float  # of the coefficients of restitution that act
 
@@ -62,7 +62,7 @@ def strike(inertia, which, qd, rates, restitution, law="newton"):
             released[normal] = e * compressed[normal]
             p = compressed + released + solved(released[normal], before + G @ (compressed + released))
         if energy_gain(G, before, p) <= LEVEL * (np.abs(before) @ np.abs(p)) or share == 0.0:
-            return Struck(p[normal], response @ p, share)
+            return Struck(p.reshape(-1, 3), response @ p, share)
         share = share / 2.0 if share > LEVEL else 0.0
 
 

@@ -78,7 +78,6 @@ KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", 
 START, PREFIX = ("q", "qd", "remembered"), "phase "
 # What a phase raises that can't begin, after others
 FAILURES = {
-    InvalidArgument: Status.METHOD_REFUSED,
     InvalidForce: Status.SAMPLING_FAILED,
     SingularConfiguration: Status.SINGULAR,
 }

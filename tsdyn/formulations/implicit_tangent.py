@@ -41,8 +41,15 @@ from ..rows.interface import (
 from ..workspaces import load
 from . import tolerances as limits
 from .accelerations import body_forces, body_of, factorise_loads, find_loads, forget_loads, keep_loads, weigh_units
-from .chart_coordinates import add_rate_residuals, displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
-from .chart_validity import measure_turns
+from .charts import (
+    add_rate_residuals,
+    displace,
+    factorise_normal,
+    measure_turns,
+    to_bodies,
+    turn_accelerations,
+    turn_rates,
+)
 from .projection import largest_residual, velocity_floor
 from .saddle_point import (
     add_blocks,
@@ -55,7 +62,17 @@ from .saddle_point import (
     turned_back,
     write_rows,
 )
-from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, weighted_square, write_state
+from .tangent import (
+    COLUMNS,
+    accelerate,
+    check_chart,
+    error_norm,
+    place,
+    start_chart,
+    weighted_square,
+    whole_size,
+    write_state,
+)
 
 # Right-hand side of a Newton correction of a stage: the normal part of accelerations, and the unbalanced loads.
 
@@ -478,12 +495,7 @@ def _correct_normal_part(c, g, k):
 @callback(NORM, "d")
 def distance(context, ex, ey, old, rtol, atol):
     """As `error_norm`, of changes that are tangent to the constraints already."""
-    c = load(context)
-    w, l, graph, n = c.work, c.chart, c.graph, c.work.q.size
-    old = vector(old, 3 * n)
-    total = weighted_square(graph, l, vector(ex, l.x.size - 8), w.q, old, 0, rtol, atol)
-    total += weighted_square(graph, l, vector(ey, l.x.size - 8), w.qd, old, n, rtol, atol)
-    return math.sqrt(total / (2 * n))
+    return whole_size(load(context), ex, ey, old, rtol, atol)
 
 
 # Newton's method for all stages of a collocation method at once, in the tangent form.

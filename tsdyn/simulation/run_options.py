@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calls import fitting_constructor
-from ..docstrings import entries_of
+from ..calls import entries_of, fitting_constructor
 from ..errors import InvalidArgument
 from ..formulations.registry import formulation as find_formulation
 from ..methods.integrator import registered
-from ..runs.arguments import interval, method_of, output_times
 from ..runs.events import prepare
+from ..runs.task import interval, method_of, output_times
 from ..validation import one_of, positive, whole
 
 if TYPE_CHECKING:
@@ -298,7 +297,9 @@ def _demand_served(method, form):
     """Refuse a method that runs scenes in another form only."""
     if not _serves(method, form):
         others = ", ".join(repr(name) for name, kind in registered().items() if _serves(kind, form))
-        why = f"{type(method).__name__} solves its stages in the tangent-space form only"
+        why = f"{type(method).__name__} solves its stages in the tangent and the null-space form only"
+        if method.coupled:
+            why = f"{type(method).__name__} solves all stages at once, by sparse matrices of the tangent form only"
         if method.driver == "series":
             why = "Taylor series are of the motion itself and need no other form than 'tangent'"
         raise InvalidArgument(f"{why}; formulation={form.name!r} is served by {others}.")

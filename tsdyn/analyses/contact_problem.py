@@ -10,13 +10,13 @@ M~ f are the accelerations that loads f make where the bilateral rows hold. lam 
 from __future__ import annotations
 
 import math
+import threading
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
-from ..elements.element import angles
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
@@ -36,7 +36,7 @@ class Gap(NamedTuple):
 
 
 class Gaps:
-    """The inequalities of a scene; one evaluation at a time.
+    """The inequalities of a scene.
 
     Parameters
     ----------
@@ -56,6 +56,8 @@ class Gaps:
     restitution, kinetic, static : ndarray (count,)
     rubs : ndarray (count,), bool
         Whether there is friction.
+    slots : ndarray (count,)
+        Where the numbers of those with friction begin in what the run remembers.
     slip_rows : ndarray (count, 2)
         Rows of Phi of the slips, where there is friction.
     following : dict
@@ -63,7 +65,7 @@ class Gaps:
     """
 
     def __init__(self, packed, contacts, free):
-        self.packed, self.list = packed, []
+        self.packed, self.list, self._made_of, self._own = packed, [], (packed, contacts, free), threading.local()
         first = {id(member.constraint): member.rows.start for member in packed.members}
         for contact in contacts_of(member.constraint for member in packed.members):
             self.list += [Gap(contact, side, first[id(contact)] + i) for i, side in enumerate(contact.sides)]
@@ -75,14 +77,34 @@ class Gaps:
         self.rubs = np.array([grip is not None for grip in grips], bool)
         self.kinetic = np.array([grip.kinetic if grip else 0.0 for grip in grips], float)
         self.static = np.array([grip.static if grip else 0.0 for grip in grips], float)
+        slots = {id(contact): slot for contact, slot in packed.contacts}
+        self.slots = np.array([slots.get(id(gap.contact), 0) for gap in self.list], int)
         self.slip_rows = np.where(self.rubs, self.rows, 0)[:, None] + [1, 2]
         own = {id(part): first for part, first in first_rows(contacts.constraints)}
         self._slips = np.zeros((self.count, 2), int)  # among the rows of `contacts`
         for i in np.flatnonzero(self.rubs):
             self._slips[i] = slip_rows(self.list[i].contact, own)
-        self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
+        handles = handles_of(packed)
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
+        self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
+
+    def lengths(self, length):
+        """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound."""
+        return np.where(self._angles > 0.0, self._angles, length)
+
+    def __reduce__(self):
+        """Made anew in another process: kernels' memory is of this one."""
+        return Gaps, self._made_of
+
+    @property
+    def workspace(self):
+        """The `ContactWorkspace` of this thread."""
+        try:
+            return self._own.workspace
+        except AttributeError:
+            self._own.workspace = ContactWorkspace(*self._made_of[1:])
+            return self._own.workspace
 
     def all_rows(self, which=slice(None)):
         """Rows of Phi of gaps and of their slips, by default of all."""
@@ -102,8 +124,9 @@ class Gaps:
     @staticmethod
     def _rate(handles, side):
         """A function of q, qd (..., n) that returns the rate (...) of a joint, in the direction of its ratchet."""
-        kind, rate = ("angle", angle_of) if angles(side.follows) else ("displacement", displacement)
-        (geometry, *_) = getattr(handles.row(side.follows, kind), f"{kind}s")
+        joint, kind, index = side.follows
+        geometry = getattr(handles.row(joint, kind), f"{kind}s")[index]
+        rate = angle_of if kind == "angle" else displacement
         return lambda q, qd: side.sign * rate(geometry, *handles.motions(geometry, (q, qd)), 1)
 
     def values(self, t, levels, counted):
@@ -112,7 +135,7 @@ class Gaps:
         levels (k, ...) begin with q (n,); counted is a function that returns the counted angles (k, angles) of joints.
         """
         rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
-        found = self.sign * self.workspace.gaps(t, rows)[:, : self.count]
+        found = np.ascontiguousarray(self.workspace.gaps(t, rows, self.sign)[:, : self.count])
         if self._stops:
             q, angles = rows[:, : self.workspace.n], counted()
             for i, value in self._stops:
@@ -127,13 +150,18 @@ class Gaps:
         """Rows (k, 2, n) of the slips of the gaps `which`, which have friction."""
         return self.workspace.rows(t, q, self._slips[which].ravel())[0].reshape(len(which), 2, -1)
 
+    def responses(self, t, q, memory, which):
+        """Accelerations (k, 2, n) by unit friction of these gaps, with all gaps open."""
+        rows = self.slopes(t, q, which).reshape(2 * len(which), -1)
+        return self.workspace.respond(t, q, memory, rows).reshape(len(which), 2, -1)
+
     def biases(self, gamma):
         """Of the accelerations of slips (count, 2), from those of all rows; zero without friction."""
         return np.where(self.rubs[:, None], gamma[self._slips], 0.0)
 
     def across(self, i, tangents, d):
-        """Components (..., 2) of a direction d (3,), ground frame, along the slips of a gap; tangents (..., 2, n)."""
-        return self._along(i, tangents) @ np.asarray(d)
+        """Components (..., 2) of directions d (..., 3), ground frame, along slips of a gap; tangents (..., 2, n)."""
+        return np.einsum("...ij,...j->...i", self._along(i, tangents), d)
 
     def along(self, i, tangents, d):
         """The direction (3,), ground frame, of components d (2,)."""
@@ -230,9 +258,8 @@ class Inertia:
         return self._of_all(rates)
 
     def hold(self, which, rates):
-        """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
-        own = np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
-        return self.pushed(which, -own)
+        """Impulses (k,) that take these rates from these gaps; negative ones pull."""
+        return -np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
 
     def slips(self, qd):
         """Velocities (count, 2) of the slips, zero where they are rounding."""
@@ -243,6 +270,11 @@ class Inertia:
         """Accelerations (count, 2) of the slips where all gaps are open."""
         qdd, gamma = self._open(qd)
         return self.tangents @ qdd + self.gaps.biases(gamma)
+
+    def biases(self, qd):
+        """Accelerations (count, 3) of gaps and slips where the bodies have none."""
+        _, gamma = self._open(qd)
+        return np.column_stack([self.gaps.sign * gamma[: self.gaps.count], self.gaps.biases(gamma)])
 
     def _open(self, qd):
         """Accelerations (n,) where all gaps are open, and gamma of the rows of all contacts."""
@@ -262,6 +294,10 @@ class Inertia:
         qdd, gamma = self._open(qd)
         bias = (self.gaps.sign * gamma[: self.gaps.count])[self.which]
         return self._of_all(self._rows @ qdd + bias), self._of_all(self._sizes @ np.abs(qdd) + np.abs(bias))
+
+    def carried(self):
+        """Rounding (count,) of accelerations of the gaps, of weight that bilateral reactions carry."""
+        return LEVEL * np.abs(self.J).sum(axis=1) * np.abs(self.gaps.packed.system.gravity).max()
 
 
 class NoSolution(Exception):
@@ -329,13 +365,14 @@ def settle(inertia, resting, qd, fired=()):
     c, terms = inertia.accelerations(qd)
     if not resting:
         return Settled([], [], c)
-    resting, fired = list(resting), [i for i in fired if i in resting]
+    resting, fired, carried = list(resting), [i for i in fired if i in resting], inertia.carried()
     while True:
         lam, basic = _solved(inertia, resting, c[resting])
         gdd = c + inertia.G[:, resting] @ lam
         small = LEVEL * (terms + np.abs(inertia.G[:, resting]) @ lam)
         # A reaction that has just vanished doesn't come back by rounding
-        gone = [i for i, x in zip(resting, lam, strict=True) if i in fired and x * inertia.G[i, i] <= small[i]]
+        least = small + carried
+        gone = [i for i, x in zip(resting, lam, strict=True) if i in fired and x * inertia.G[i, i] <= least[i]]
         if not gone:
             break
         resting = [i for i in resting if i not in gone]
@@ -354,11 +391,8 @@ def settle(inertia, resting, qd, fired=()):
 
 
 def slack_of(inertia, closed, pushes, small):
-    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations.
-
-    Accelerations may be zero as bilateral reactions carry the weight: its rounding is in them.
-    """
-    small = small + LEVEL * np.abs(inertia.J).sum(axis=1) * np.abs(inertia.gaps.packed.system.gravity).max()
+    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations."""
+    small = small + inertia.carried()
     return {i: float(small[i] / inertia.G[i, i]) for i in closed if pushes[i] * inertia.G[i, i] <= small[i]}
 
 

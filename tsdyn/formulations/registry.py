@@ -82,6 +82,11 @@ class Formulation:
         return int(unheld.sum())
 
     @property
+    def has_normals(self):
+        """Whether positions have normal coordinates u that dense output starts from."""
+        return hasattr(self.kernels, "normal")
+
+    @property
     def frees_stages(self):
         """Whether stages of explicit methods may stay where their sums put them, off the manifold."""
         return hasattr(self.kernels, "stage_place")
@@ -106,13 +111,13 @@ class Formulation:
 
     def stages(self, coupled=False):
         """The kernels that implicit methods need, by their names in `StageKernels`; coupled: all stages at once."""
-        module = self.kernels if self.basis_free else linearisation
+        module = self.kernels if self.basis_free or self.mixed else linearisation
         if coupled:
             own = {name: getattr(implicit_tangent, name) for name in implicit_tangent.KERNELS}
             shared = ("linearise", "reduce", "soften", "recall", "residual", "distance")
             return own | {name: getattr(module, name) for name in shared} | {"error_norm": self.kernels.error_norm}
-        names = ("linearise", "reduce", "factorise", "solve", "soften", "recall")
-        names += ("residual", "correct", "distance") if self.basis_free else ()
+        names = ("linearise", "reduce", "factorise", "soften", "recall")
+        names += ("residual", "correct", "distance") if self.basis_free else ("solve",)
         return {name: getattr(module, name) for name in names} | {"error_norm": self.kernels.error_norm}
 
 

@@ -16,11 +16,12 @@ from ..workspaces import load_run
 # start of the step from the `RunState`, and writes the increments dx, dy there, which the driver adds by compensated
 # summation. The memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then (x', y') of each stage.
 
-PLACE, ACCELERATE, STEP = "pdp", "pdppp", "ppdd"
+PLACE, ACCELERATE, NORMAL, STEP = "pdp", "pdppp", "pdpp", "ppdd"
 ERROR, NORM = "diipppppp", "ppppdd"
 call_norm = caller(NORM, "d")
 call_error = caller(ERROR)
 call_place = caller(PLACE)
+call_normal = caller(NORMAL)
 call_accelerate = caller(ACCELERATE)
 call_step = caller(STEP)
 

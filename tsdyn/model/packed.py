@@ -455,6 +455,7 @@ class Packed(NamedTuple):
     loads: tuple  # a packed_forces.Load for each force, in the order added
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
     slots: tuple  # of System.memory, the first of each constraint; -1 for none
+    contacts: tuple  # of contacts with friction, each with the first slot of its numbers
     inertias: tuple  # primitives whose rows add inertia to a joint coordinate, in the order of their forces
     derived: Derived  # what has been worked out from it
 
@@ -525,6 +526,10 @@ def pack(scene, handles=None):
     for function, begin, at in functions:
         reals[at : at + PLACES] = function.addresses(begin, len(reals))
         reals += function.numbers()
+    contacts = [each for each in scene.constraints if getattr(each, "taken", 0)]
+    for contact in contacts:
+        kept[contact] = range(len(reals), len(reals) + contact.taken)
+        reals += [0.0] * contact.taken
     moments = [body.values.get("inertia", np.zeros((3, 3))).ravel() for body in scene.bodies]
     system = System(
         bodies=np.array(list(where.values()), np.int64).reshape(-1, 2),
@@ -551,9 +556,11 @@ def pack(scene, handles=None):
     firsts = accumulate(map(len, kept.values()), initial=len(memory))
     order = dict(zip(kept, firsts, strict=False))
     slots = tuple(order.get(constraint, -1) for constraint in primitives)
-    given = tuple(parameters.values())
-    whole = system, scene.bodies, primitives, given, coordinates, size, loads, members, slots, tuple(added), derived
-    return Packed(*whole)
+    own = tuple((contact, order[contact]) for contact in contacts)
+    return Packed(
+        system, scene.bodies, primitives, tuple(parameters.values()), coordinates, size, loads, members, slots, own,
+        tuple(added), derived,
+    )  # fmt: skip
 
 
 def _shorten(table, kind):

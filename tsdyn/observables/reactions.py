@@ -117,7 +117,7 @@ def factorise_at(graph, s, f, t, q):
 
 
 @entry("pvmmmmm")
-def _solve(context, t, q, qd, r, memory, out):
+def solve_normal_loads(context, t, q, qd, r, memory, out):
     """out (k, frictions): normal loads with Phi_q^T lam - sum_i g_i N_i = r (k, n); NaN if there are none.
 
     H W (H^T lam - sum_i g_i N_i(lam)) = H W r: the acceleration equation for the residual forces.
@@ -150,7 +150,7 @@ def with_normal_loads(packed, t, q, qd, qdd, memory):
     own = system._replace(reals=system.reals.copy())
     context, *_keep = resident(parts(own, graph_of(packed, REDUCED), q.shape[1]))
     loads = np.zeros((t.size, system.normals.size))
-    _solve(context, t, q, qd, r, memory, loads)
+    solve_normal_loads(context, t, q, qd, r, memory, loads)
     return np.hstack((memory, loads))
 
 

@@ -122,6 +122,10 @@ class Slices:
                 rows = self._rows()
                 if rows <= 0:
                     self.status = Status.MAX_STEPS
+                    if self.task.archive is not None:
+                        with deferred_interrupts():
+                            self.recorder.collect()
+                            self.task.archive.stop(self.saved)
 
     def _rows(self):
         """Steps of the next slice, which ends where another method is considered: that mustn't depend on the clock."""

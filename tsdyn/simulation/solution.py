@@ -388,7 +388,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def phases(self) -> list[tuple[float, float, tuple[str, ...]]]:
         """Start and end (s) of each phase, and the names of what holds only in some.
 
-        These are closed contacts, frictions that stick, and those active of the parts that come and go by actions.
+        These are closed contacts, frictions that stick, and those active of the parts that come and go by actions. A
+        phase ends, too, where a closed contact begins or ends to stick: see `sticking`.
         """
         return [(self.span[0], self.reached, ())] if self._phases is None else self._phases.told()
 
@@ -397,7 +398,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """Time (s), name and impulse of contacts at impacts, of parts that become active, of impulses on bodies.
 
         N s, or N m s of an angle; of a constraint of several rows an array (rows,) as of `multipliers`, of a body an
-        array (3,) in the ground frame.
+        array (3,) in the ground frame. Negative, about the square root of rounding, of a contact without friction
+        that an impact elsewhere lifts by less than rounding: it stays closed.
         """
         return [] if self._phases is None else list(self._phases.impulses)
 

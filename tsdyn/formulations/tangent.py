@@ -6,7 +6,7 @@ from ..elements.loops.constraint_rows import largest_coordinate, write_accelerat
 from ..errors import Status
 from ..jit.kernels import callback, kernel, long_kernel, vector
 from ..maths.dense_linalg import copy, is_finite
-from ..maths.tolerances import EPS, ROUNDING, ROUNDING_AT_MOST
+from ..maths.tolerances import ROUNDING, ROUNDING_AT_MOST
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
@@ -41,7 +41,7 @@ from .chart_coordinates import (
 )
 from .chart_validity import every_level_holds, reason_to_leave, set_base_point
 from .projection import largest_residual, velocity_floor
-from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, SLOW, SLOW_FACTORS, STALLED, SWEEPS
+from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, ROUNDED, SLOW, SLOW_FACTORS, STALLED, SWEEPS
 
 # Error norms of the tangent form: errors ex, ey of chart coordinates as errors of q and qd, their root mean square over
 # atol + rtol times the larger end of the step.
@@ -139,8 +139,8 @@ def stage_error_norm(context, ex, ey, old, rtol, atol):
     old, size = vector(old, 3 * n), w.control.floor / ROUNDING
     speed, spin = largest_rates(graph, c.tangent.poses)
     ex, ey = vector(ex, l.x.size - 8), vector(ey, l.x.size - 8)
-    total = _square(graph, l, ex, w.q, old, 0, rtol, atol + EPS * size, atol + EPS)
-    total += _square(graph, l, ey, w.qd, old, n, rtol, atol + EPS * speed, atol + EPS * spin)
+    total = _square(graph, l, ex, w.q, old, 0, rtol, atol + ROUNDED * size, atol + ROUNDED)
+    total += _square(graph, l, ey, w.qd, old, n, rtol, atol + ROUNDED * speed, atol + ROUNDED * spin)
     return math.sqrt(total / (2 * n))
 
 

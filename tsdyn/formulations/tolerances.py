@@ -17,7 +17,7 @@ WALK = 0.5
 EXACT, REFINEMENTS = 1e-11, 3
 
 # Of the scene's size, of one, and of the largest speed and spin: rounding in the error estimate of a step, which is all
-# there is of it in coordinates that constraints keep at zero. With four times as much a fast top loses a digit at 1e-15.
+# there is of it in coordinates that constraints keep at zero. With four times as much fast tops lose a digit at 1e-15.
 ROUNDED = 0.25 * EPS
 
 # --- convergence of Newton's method, ratios of successive residuals or corrections

@@ -9,7 +9,7 @@ from ..elements.friction import heading
 from ..elements.sliding import slip_velocity
 from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
-from ..model.packed import index_of
+from ..model.handles import index_of
 from ..observables import reactions
 from ..observables.diagnostics import marker_states
 from .phase_scenes import first_row_of

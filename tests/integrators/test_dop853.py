@@ -121,7 +121,7 @@ def test_a_new_chart_does_not_make_the_control_forget(method):
     """
     scene, _ = load("two_body_pendulum")
     often, seldom = (
-        ts.simulate(scene, (0.0, 5.0), integrator=method(1e-9, 1e-9), chart_interval=interval) for interval in (1, None)
+        ts.simulate(scene, (0.0, 5.0), integrator=method(1e-9, 1e-9), chart_interval=interval) for interval in (1, 1000)
     )
     assert often.stats.charts > 3 * seldom.stats.charts
     assert 0.93 < often.stats.steps / seldom.stats.steps < 1.03

@@ -62,17 +62,7 @@ from .saddle_point import (
     turned_back,
     write_rows,
 )
-from .tangent import (
-    COLUMNS,
-    accelerate,
-    check_chart,
-    error_norm,
-    place,
-    start_chart,
-    weighted_square,
-    whole_size,
-    write_state,
-)
+from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, weighted_square, write_state
 
 # Right-hand side of a Newton correction of a stage: the normal part of accelerations, and the unbalanced loads.
 
@@ -495,7 +485,12 @@ def _correct_normal_part(c, g, k):
 @callback(NORM, "d")
 def distance(context, ex, ey, old, rtol, atol):
     """As `error_norm`, of changes that are tangent to the constraints already."""
-    return whole_size(load(context), ex, ey, old, rtol, atol)
+    c = load(context)
+    w, l, graph, n = c.work, c.chart, c.graph, c.work.q.size
+    old = vector(old, 3 * n)
+    total = weighted_square(graph, l, vector(ex, l.x.size - 8), w.q, old, 0, rtol, atol)
+    total += weighted_square(graph, l, vector(ey, l.x.size - 8), w.qd, old, n, rtol, atol)
+    return math.sqrt(total / (2 * n))
 
 
 # Newton's method for all stages of a collocation method at once, in the tangent form.

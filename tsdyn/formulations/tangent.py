@@ -6,7 +6,7 @@ from ..elements.loops.constraint_rows import largest_coordinate, write_accelerat
 from ..errors import Status
 from ..jit.kernels import callback, kernel, long_kernel, vector
 from ..maths.dense_linalg import copy, is_finite
-from ..maths.tolerances import ROUNDING_AT_MOST
+from ..maths.tolerances import ROUNDING, ROUNDING_AT_MOST
 from ..methods.explicit import ACCELERATE, NORM, PLACE
 from ..model.equations import is_rheonomic, set_time
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES
@@ -36,13 +36,14 @@ from .charts import (
     displace,
     every_level_holds,
     factorise_normal,
+    largest_rates,
     reason_to_leave,
     set_base_point,
     turn_rates,
     write_back,
 )
 from .projection import largest_residual, velocity_floor
-from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, SLOW, SLOW_FACTORS, STALLED, SWEEPS
+from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, ROUNDED, SLOW, SLOW_FACTORS, STALLED, SWEEPS
 
 # Error norms of the tangent form: errors ex, ey of chart coordinates as errors of q and qd, their root mean square over
 # atol + rtol times the larger end of the step.
@@ -74,6 +75,12 @@ def weighted_square(graph, l, Z, values, old, at, rtol, atol):
 
     Eight arguments: the graph, the chart, the change Z, values at both ends of the step, and tolerances.
     """
+    return _square(graph, l, Z, values, old, at, rtol, atol, atol)
+
+
+@kernel
+def _square(graph, l, Z, values, old, at, rtol, atol, turn_atol):
+    """The same with another absolute tolerance of Euler parameters."""
     total = 0.0
     for b in range(graph.bodies.shape[0]):
         i, o = graph.bodies[b, 0], 8 * b
@@ -95,7 +102,7 @@ def weighted_square(graph, l, Z, values, old, at, rtol, atol):
                     part = e3 * x + e0 * y - e1 * z
                 else:
                     part = -e2 * x + e1 * y + e0 * z
-                part /= atol + rtol * max(abs(values[i + c]), abs(old[at + i + c]))
+                part /= turn_atol + rtol * max(abs(values[i + c]), abs(old[at + i + c]))
                 total += part * part
     return total
 
@@ -113,16 +120,6 @@ def _tangent_size(c, ex, ey, old, rtol, atol):
     return math.sqrt(total / (2 * n))
 
 
-@kernel
-def whole_size(c, ex, ey, old, rtol, atol):
-    """The norm of ex and ey as they are."""
-    w, l, graph, n = c.work, c.chart, c.graph, c.work.q.size
-    old = vector(old, 3 * n)
-    total = weighted_square(graph, l, vector(ex, l.x.size - 8), w.q, old, 0, rtol, atol)
-    total += weighted_square(graph, l, vector(ey, l.x.size - 8), w.qd, old, n, rtol, atol)
-    return math.sqrt(total / (2 * n))
-
-
 @callback(NORM, "d")
 def error_norm(context, ex, ey, old, rtol, atol):
     """The norm of what placement leaves of the errors, which is their tangent part."""
@@ -134,12 +131,19 @@ def stage_error_norm(context, ex, ey, old, rtol, atol):
     """The norm of the errors of a step whose stages aren't placed.
 
     The part that its placement takes off counts, too: of a mechanism with few degrees of freedom the tangent part
-    vanishes now and then, where the step errs all the same. What motions prescribe is exact, however long the step.
+    vanishes now and then, where the step errs all the same. Rounding of the largest numbers, which is all there is of
+    some constrained coordinates, doesn't count. What motions prescribe is exact, however long the step.
     """
     c = load(context)
     if is_rheonomic(c.system):
         return _tangent_size(c, ex, ey, old, rtol, atol)
-    return whole_size(c, ex, ey, old, rtol, atol)
+    w, l, graph, n = c.work, c.chart, c.graph, c.work.q.size
+    old, size = vector(old, 3 * n), w.control.floor / ROUNDING
+    speed, spin = largest_rates(graph, c.tangent.poses)
+    ex, ey = vector(ex, l.x.size - 8), vector(ey, l.x.size - 8)
+    total = _square(graph, l, ex, w.q, old, 0, rtol, atol + ROUNDED * size, atol + ROUNDED)
+    total += _square(graph, l, ey, w.qd, old, n, rtol, atol + ROUNDED * speed, atol + ROUNDED * spin)
+    return math.sqrt(total / (2 * n))
 
 
 # The tangent form: the tangent-space ODE without a basis of the tangent space, equivalent to Eq. 26, in O(N).

@@ -1,5 +1,7 @@
 """Thresholds of the formulations: quantity, unit, and where each number comes from."""
 
+from ..maths.tolerances import EPS
+
 # --- rounding: |Phi| below ROUNDING of the numbers that enter it, |Phi_q qd + Phi_t| below LAST_PLACE of |rd| + size
 # |omega'|, corrections of multipliers below LAST_PLACE of the largest (maths/tolerances.py).
 
@@ -13,6 +15,10 @@ WALK = 0.5
 # Residual of the rows over the largest acceleration, up to which one correction of accelerations leaves rounding; and
 # corrections at most. Masses that are unequal by 1e10 need two.
 EXACT, REFINEMENTS = 1e-11, 3
+
+# Of the scene's size, of one, and of the largest speed and spin: rounding in the error estimate of a step, which is all
+# there is of it in coordinates that constraints keep at zero. With four times as much fast tops lose a digit at 1e-15.
+ROUNDED = 0.25 * EPS
 
 # --- convergence of Newton's method, ratios of successive residuals or corrections
 SLOW = 0.25  # positions: above it the matrix of an older configuration is replaced; two sweeps gain a digit at it

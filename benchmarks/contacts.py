@@ -35,10 +35,10 @@ HEIGHT = HALF_HEIGHT * np.cos(TILT) + HALF_WIDTH * np.sin(TILT)
 
 
 def timed(run):
-    """Seconds of a call, and what it returns."""
-    began = time.perf_counter()
+    """Seconds of processor time of a call, and what it returns."""
+    began = time.process_time()
     found = run()
-    return time.perf_counter() - began, found
+    return time.process_time() - began, found
 
 
 # The references
@@ -349,7 +349,7 @@ def exudyn(scene, points, step, end, mass, e=0.0, friction=0.0):
         )  # fmt: skip
         made.mbs.AddObject(contact)
     made.mbs.Assemble()
-    found = made.run(end, step, outputs=1)
+    found = made.run(end, step, outputs=1, clock=time.process_time)
     return found.seconds, found.r[-1], found.A[-1]
 
 

@@ -20,7 +20,7 @@ import threading
 from importlib import import_module
 from pathlib import Path
 
-from .configuration import start_kernels
+from .configuration import initial_conditions
 from .elements import force, primitive
 from .elements.laws import SceneLaw
 from .errors import TsdynError
@@ -32,17 +32,19 @@ from .jit.compiled import DEBUG, is_declared, is_loaded, is_stored, load, signat
 from .jit.interrupts import Waiting
 from .jit.target import available, portable
 from .methods.explicit import called_for
-from .model.equations import is_of_user
-from .model.packed import has_rates, second_derivatives
+from .model.equations import is_of_user, second_derivatives
+from .model.handles import has_rates
 from .motions import program, tracing
 from .motions.signals import Signal
 from .rows.interface import ELIMINATION
-from .runs.arguments import adaptive
-from .runs.path_loads import watch
+from .runs import dense_output
+from .runs.step_control import watch
+from .runs.step_engine import second_derivative
 from .runs.stepper import advance
+from .runs.task import adaptive
 from .taylor import step_parts
 from .taylor.layout import FAR, no_series, pays, room
-from .taylor.series_engine import accelerating, expanding
+from .taylor.series_engine import accelerating, expanding, read_series
 from .taylor.stepper import advance_series
 
 # Which kernels a run needs, so that a first one can have them compiled at the same time.
@@ -129,14 +131,14 @@ def of_method(method, form, within, far=False, rough=False):
 
     far: of series that are too long for caches near by; rough: of a scene with joint friction.
     """
-    yield start_kernels.evaluate_start
+    yield initial_conditions.evaluate_start
     if isinstance(method, Taylor):
         yield from (expanding(rough, far), step_parts.reach, advance_series)
         yield from (accelerating(rough), step_parts.pass_singular) if within else ()
         return
     kernels = form.kernels
     yield from (kernels.place, kernels.accelerate, kernels.complete)
-    yield from (kernels.check, kernels.start_chart, kernels.error_norm, advance)
+    yield from (kernels.check, kernels.start_chart, advance)
     if method.driver == "steps":
         yield from filter(None, called_for(method.kernel(form.first_order)[0]))
         yield from form.stage_kernels(form.frees_stages)
@@ -147,7 +149,16 @@ def of_method(method, form, within, far=False, rough=False):
     if within:
         interpolant = method.interpolant(form.first_order)
         yield from (interpolant.fill, interpolant.value)
-        yield from (method.second,) if method.implicit else ()
+        yield from (kernels.normal,) if form.has_normals else ()
+        yield from filter(None, (second_derivative(method, form),))
+
+
+def of_phases():
+    """The kernels that runs with contacts or exact friction need beside: of impacts, events and changes of modes."""
+    from .analyses import contact_rows, friction_units
+
+    yield from (initial_conditions.land_start, read_series, dense_output.read)
+    yield from (*contact_rows.KERNELS, *friction_units.KERNELS)
 
 
 def _is_checked(force):
@@ -344,13 +355,7 @@ def find(module, name):
 @functools.cache
 def _loops():
     """{(module, name): kernel} of constraints and forces."""
-    kinds = {**primitive.registered(), **force.registered()}.values()
-    kernels = [
-        kernel
-        for kind in kinds
-        if is_ours(kind.__module__)
-        for kernel in getattr(kind, "own_kernels", kind.kernels).values()
-    ]
+    kernels = [kernel for kind in _built_in() for kernel in _loops_of(kind).values()]
     return {(kernel.py_func.__module__, kernel.py_func.__qualname__): kernel for kernel in kernels}
 
 
@@ -392,15 +397,20 @@ def named(everything):
 
 
 def _default():
-    yield from ELIMINATION["symmetric"]
     form = FORMULATIONS["tangent"]
+    yield from (*ELIMINATION["symmetric"], *ELIMINATION["unsymmetric"], form.friction_solver)
+    yield from (step_parts.check_laws, tracing.run_order, program.run_program, watch)
     for rough in (False, True):
         yield from of_method(Taylor(1e-8), form, True, rough=rough)
-    for kind in _built_in(primitive.registered()):
-        for moving in (False, *[True] * ("phi_t" in kind.kernels)):
-            yield from of_constraint(kind, moving)
-    for kind in _built_in(force.registered()):
-        yield from of_force(kind.own_kernels)
+    yield from of_method(DOP853(1e-8, 1e-8), form, True)
+    yield from of_phases()
+    for kind in _built_in():
+        if issubclass(kind, primitive.Primitive):
+            for moving in (False, *[True] * ("phi_t" in kind.kernels)):
+                yield from of_constraint(kind, moving)
+        else:
+            for driven in ("", "driven_"):
+                yield from of_force(kind.own_kernels, driven=driven)
 
 
 def _all():
@@ -409,14 +419,24 @@ def _all():
         if not file.stem.startswith("__"):
             with contextlib.suppress(ModuleNotFoundError):  # an optional package's
                 import_module(".".join((home.name, *file.relative_to(home).with_suffix("").parts)))
-    for kind in _built_in({**primitive.registered(), **force.registered()}):
-        yield from getattr(kind, "own_kernels", kind.kernels).values()
+    for kind in _built_in():
+        yield from _loops_of(kind).values()
     for module in [value for name, value in sys.modules.items() if is_ours(name)]:
         yield from filter(is_declared, vars(module).values())
 
 
-def _built_in(registered):
-    return [kind for name, kind in registered.items() if is_ours(name)]
+def _built_in():
+    """The package's own classes of constraints and forces, those that others choose for themselves among them."""
+    further, found = [primitive.Primitive, force.Force], []
+    while further:
+        kinds = further.pop().__subclasses__()
+        further += kinds
+        found += [kind for kind in kinds if is_ours(kind.__module__)]
+    return dict.fromkeys(found)
+
+
+def _loops_of(kind):
+    return getattr(kind, "own_kernels", kind.kernels)
 
 
 # Kernels for a platform wheel, which setup.py builds.

@@ -10,19 +10,18 @@ M~ f are the accelerations that loads f make where the bilateral rows hold. lam 
 from __future__ import annotations
 
 import math
+import threading
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
-from ..elements.element import angles
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import angle as angle_of
-from ..model.handles import counted, displacement, handles_of
-from ..model.packed import first_rows, index_of
+from ..model.handles import counted, displacement, first_rows, handles_of, index_of
 from .contact_rows import ContactWorkspace
 from .tolerances import AT_REST, DEPENDENT, LEVEL
 
@@ -36,7 +35,7 @@ class Gap(NamedTuple):
 
 
 class Gaps:
-    """The inequalities of a scene; one evaluation at a time.
+    """The inequalities of a scene.
 
     Parameters
     ----------
@@ -56,6 +55,8 @@ class Gaps:
     restitution, kinetic, static : ndarray (count,)
     rubs : ndarray (count,), bool
         Whether there is friction.
+    slots : ndarray (count,)
+        Where the numbers of those with friction begin in what the run remembers.
     slip_rows : ndarray (count, 2)
         Rows of Phi of the slips, where there is friction.
     following : dict
@@ -63,7 +64,7 @@ class Gaps:
     """
 
     def __init__(self, packed, contacts, free):
-        self.packed, self.list = packed, []
+        self.packed, self.list, self._made_of, self._own = packed, [], (packed, contacts, free), threading.local()
         first = {id(member.constraint): member.rows.start for member in packed.members}
         for contact in contacts_of(member.constraint for member in packed.members):
             self.list += [Gap(contact, side, first[id(contact)] + i) for i, side in enumerate(contact.sides)]
@@ -75,12 +76,14 @@ class Gaps:
         self.rubs = np.array([grip is not None for grip in grips], bool)
         self.kinetic = np.array([grip.kinetic if grip else 0.0 for grip in grips], float)
         self.static = np.array([grip.static if grip else 0.0 for grip in grips], float)
+        slots = {id(contact): slot for contact, slot in packed.contacts}
+        self.slots = np.array([slots.get(id(gap.contact), 0) for gap in self.list], int)
         self.slip_rows = np.where(self.rubs, self.rows, 0)[:, None] + [1, 2]
         own = {id(part): first for part, first in first_rows(contacts.constraints)}
         self._slips = np.zeros((self.count, 2), int)  # among the rows of `contacts`
         for i in np.flatnonzero(self.rubs):
             self._slips[i] = slip_rows(self.list[i].contact, own)
-        self.workspace, handles = ContactWorkspace(contacts, free), handles_of(packed)
+        handles = handles_of(packed)
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
         self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
@@ -88,6 +91,19 @@ class Gaps:
     def lengths(self, length):
         """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound."""
         return np.where(self._angles > 0.0, self._angles, length)
+
+    def __reduce__(self):
+        """Made anew in another process: kernels' memory is of this one."""
+        return Gaps, self._made_of
+
+    @property
+    def workspace(self):
+        """The `ContactWorkspace` of this thread."""
+        try:
+            return self._own.workspace
+        except AttributeError:
+            self._own.workspace = ContactWorkspace(*self._made_of[1:])
+            return self._own.workspace
 
     def all_rows(self, which=slice(None)):
         """Rows of Phi of gaps and of their slips, by default of all."""
@@ -107,8 +123,9 @@ class Gaps:
     @staticmethod
     def _rate(handles, side):
         """A function of q, qd (..., n) that returns the rate (...) of a joint, in the direction of its ratchet."""
-        kind, rate = ("angle", angle_of) if angles(side.follows) else ("displacement", displacement)
-        (geometry, *_) = getattr(handles.row(side.follows, kind), f"{kind}s")
+        joint, kind, index = side.follows
+        geometry = getattr(handles.row(joint, kind), f"{kind}s")[index]
+        rate = angle_of if kind == "angle" else displacement
         return lambda q, qd: side.sign * rate(geometry, *handles.motions(geometry, (q, qd)), 1)
 
     def values(self, t, levels, counted):
@@ -117,7 +134,7 @@ class Gaps:
         levels (k, ...) begin with q (n,); counted is a function that returns the counted angles (k, angles) of joints.
         """
         rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
-        found = self.sign * self.workspace.gaps(t, rows)[:, : self.count]
+        found = np.ascontiguousarray(self.workspace.gaps(t, rows, self.sign)[:, : self.count])
         if self._stops:
             q, angles = rows[:, : self.workspace.n], counted()
             for i, value in self._stops:
@@ -132,13 +149,18 @@ class Gaps:
         """Rows (k, 2, n) of the slips of the gaps `which`, which have friction."""
         return self.workspace.rows(t, q, self._slips[which].ravel())[0].reshape(len(which), 2, -1)
 
+    def responses(self, t, q, memory, which):
+        """Accelerations (k, 2, n) by unit friction of these gaps, with all gaps open."""
+        rows = self.slopes(t, q, which).reshape(2 * len(which), -1)
+        return self.workspace.respond(t, q, memory, rows).reshape(len(which), 2, -1)
+
     def biases(self, gamma):
         """Of the accelerations of slips (count, 2), from those of all rows; zero without friction."""
         return np.where(self.rubs[:, None], gamma[self._slips], 0.0)
 
     def across(self, i, tangents, d):
-        """Components (..., 2) of a direction d (3,), ground frame, along the slips of a gap; tangents (..., 2, n)."""
-        return self._along(i, tangents) @ np.asarray(d)
+        """Components (..., 2) of directions d (..., 3), ground frame, along slips of a gap; tangents (..., 2, n)."""
+        return np.einsum("...ij,...j->...i", self._along(i, tangents), d)
 
     def along(self, i, tangents, d):
         """The direction (3,), ground frame, of components d (2,)."""
@@ -235,9 +257,8 @@ class Inertia:
         return self._of_all(rates)
 
     def hold(self, which, rates):
-        """The least change of velocities (n,), by kinetic energy, that takes these rates from these gaps."""
-        own = np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
-        return self.pushed(which, -own)
+        """Impulses (k,) that take these rates from these gaps; negative ones pull."""
+        return -np.linalg.lstsq(self.among(which), rates, rcond=RANK_TOL**2)[0]
 
     def slips(self, qd):
         """Velocities (count, 2) of the slips, zero where they are rounding."""
@@ -248,6 +269,11 @@ class Inertia:
         """Accelerations (count, 2) of the slips where all gaps are open."""
         qdd, gamma = self._open(qd)
         return self.tangents @ qdd + self.gaps.biases(gamma)
+
+    def biases(self, qd):
+        """Accelerations (count, 3) of gaps and slips where the bodies have none."""
+        _, gamma = self._open(qd)
+        return np.column_stack([self.gaps.sign * gamma[: self.gaps.count], self.gaps.biases(gamma)])
 
     def _open(self, qd):
         """Accelerations (n,) where all gaps are open, and gamma of the rows of all contacts."""

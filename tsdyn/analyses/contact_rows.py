@@ -14,7 +14,7 @@ import numpy as np
 from ..elements.loops.constraint_rows import move_bodies, place_bodies, take_loads, write_accelerations
 from ..errors import SingularConfiguration
 from ..formulations.accelerations import refine_accelerations, solve_accelerations
-from ..jit.kernels import entry, loader, resident
+from ..jit.kernels import entry, kernel, loader, resident
 from ..maths.dense_linalg import copy
 from ..maths.root_isolation import SURVEYING
 from ..maths.vectors import add, spin, subtract
@@ -32,8 +32,7 @@ from ..model.equations import (
 )
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, no_system
-from ..rows.constraint_graph import BIAS, REDUCED
-from ..rows.graph_builder import graph_of
+from ..rows.constraint_graph import BIAS, REDUCED, graph_of
 from ..rows.interface import (
     DYNAMICS,
     constrain_accelerations,
@@ -55,22 +54,38 @@ class ContactParts(NamedTuple):
 load_contacts = loader(ContactParts(no_parts(), no_system()))
 
 
-@entry("pvmm")
-def find_gaps(context, t, q, out):
-    """out (k, m) = Phi of the rows of contacts at times t (k,), positions q (k, n), rows of which may go on."""
+@entry("pvmvm")
+def find_gaps(context, t, q, sign, out):
+    """out (k, m) = Phi of contacts, of the first rows times their sign, at times t (k,) and positions q (k, n).
+
+    Rows of q may go on.
+    """
     s = load_contacts(context).rows
     for k in range(t.size):
         set_time(s, t[k])
         constraints(s, q[k], t[k], out[k])
+        for i in range(sign.size):
+            out[k, i] *= sign[i]
 
 
-@entry("pdvwmmv")
-def find_rows(context, t, q, place, short, J, drift):
-    """Rows J (k, n) of contacts, and Phi_t (m,) of all; zero on entry.
+@entry("vwmvm")
+def measure_opened(t, which, start, rounding, values):
+    """Divide gaps by the time since they have opened, in values (k, gaps) at times t (k,), or add the rounding to them.
 
-    place (m,): which row of J is that of a contact, -1 for none; short (lines, 14): scratch, zero on entry.
+    start (3, opened): time, gap and rate where those of the numbers `which` have opened, without a rate the second.
     """
-    s = load_contacts(context).rows
+    for j in range(which.size):
+        begun, first, rate = start[0, j], start[1, j], start[2, j]
+        for k in range(t.size):
+            grown, since = values[k, which[j]] - first, t[k] - begun
+            if not rate > 0.0:
+                values[k, which[j]] = grown + rounding[which[j]]
+            else:
+                values[k, which[j]] = grown / since if since > 0.0 else rate
+
+
+@kernel
+def _find_rows(s, t, q, place, short, J, drift):
     set_time(s, t)
     constraint_jacobian(s, q, t, short)
     time_derivative(s, q, t, drift)
@@ -82,10 +97,17 @@ def find_rows(context, t, q, place, short, J, drift):
                 J[k, at + c] += short[i, 7 * half + c]
 
 
-@entry("pdvvmm")
-def respond(context, t, q, memory, loads, out):
-    """out (k, n): accelerations by loads (k, n), Eq. (1). The factors stay; 0 where there are none, else 1."""
-    c = load_contacts(context).free
+@entry("pdvwmmv")
+def find_rows(context, t, q, place, short, J, drift):
+    """Rows J (k, n) of contacts, and Phi_t (m,) of all; zero on entry.
+
+    place (m,): which row of J is that of a contact, -1 for none; short (lines, 14): scratch, zero on entry.
+    """
+    _find_rows(load_contacts(context).rows, t, q, place, short, J, drift)
+
+
+@kernel
+def _respond(c, t, q, memory, loads, out):
     graph, s, w, f = c.graph, c.system, c.work, c.tangent
     recall(s, memory)
     set_time(s, t)
@@ -111,10 +133,14 @@ def respond(context, t, q, memory, loads, out):
     return 1
 
 
-@entry("pdvvvv")
-def accelerate(context, t, q, qd, out, gamma):
-    """Accelerations out (n,) with all contacts open, and gamma (m,) of their rows, where `respond` has been called."""
-    c = load_contacts(context)
+@entry("pdvvmm")
+def respond(context, t, q, memory, loads, out):
+    """out (k, n): accelerations by loads (k, n), Eq. (1). The factors stay; 0 where there are none, else 1."""
+    return _respond(load_contacts(context).free, t, q, memory, loads, out)
+
+
+@kernel
+def _accelerate(c, t, q, qd, out, gamma):
     graph, s, w, f = c.free.graph, c.free.system, c.free.work, c.free.tangent
     copy(qd, w.qd)
     move_bodies(graph.bodies, q, qd, f.poses)
@@ -122,6 +148,44 @@ def accelerate(context, t, q, qd, out, gamma):
     refine_accelerations(graph, f)
     write_accelerations(graph.bodies, f.poses, f.Z, out)
     acceleration_bias(c.rows, q, qd, t, gamma)
+
+
+@entry("pdvvvv")
+def accelerate(context, t, q, qd, out, gamma):
+    """Accelerations out (n,) with all contacts open, and gamma (m,) of their rows, where `respond` has been called."""
+    _accelerate(load_contacts(context), t, q, qd, out, gamma)
+
+
+@entry("pdvvvwmmmv")
+def bounce(context, t, q, qd, memory, place, short, rows, gamma, numbers):
+    """Impact of one gap, sign Phi_i, with restitution e: p = -(1 + e) gd / G. 0 where there are no factors, else 1.
+
+    rows (4, n): J and M~ J^T of the gap, velocities and accelerations afterwards; gamma (2, m). rows and gamma are zero
+    on entry. numbers (9,): i, sign and e; to be written: gd before, the sizes of its terms, G, p, gdd afterwards, the
+    sizes of terms of the gap.
+    """
+    c, i, sign, e = load_contacts(context), int(numbers[0]), numbers[1], numbers[2]
+    _find_rows(c.rows, t, q, place, short, rows[:1], gamma[0])
+    J, response, after, qdd = rows[0], rows[1], rows[2], rows[3]
+    for j in range(J.size):
+        J[j] *= sign
+    if not _respond(c.free, t, q, memory, rows[:1], rows[1:2]):
+        return 0
+    rate, size, G, length = sign * gamma[0, i], abs(gamma[0, i]), 0.0, 0.0
+    for j in range(J.size):
+        rate += J[j] * qd[j]
+        size += abs(J[j] * qd[j])
+        length += abs(J[j] * q[j])
+        G += J[j] * response[j]
+    p = -(rate + e * rate) / G
+    for j in range(J.size):
+        after[j] = qd[j] + p * response[j]
+    _accelerate(c, t, q, after, qdd, gamma[1])
+    gdd = sign * gamma[1, i]
+    for j in range(J.size):
+        gdd += J[j] * qdd[j]
+    numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8] = rate, size, G, p, gdd, length
+    return 1
 
 
 @entry("pvvvm")
@@ -174,7 +238,10 @@ def find_multipliers(context, t, levels, memory, out):
                 out[k, graph.row[e]] = f.b[e] if regular else math.nan
 
 
-KERNELS = find_gaps, find_rows, respond, accelerate, gain, find_multipliers, *SURVEYING
+KERNELS = find_gaps, measure_opened, find_rows, respond, accelerate, bounce, gain, find_multipliers, *SURVEYING
+
+
+NO_INERTIA = "a direction that the constraints leave free carries no inertia."
 
 
 class ReactionWorkspace:
@@ -211,7 +278,8 @@ class ContactWorkspace:
         self._rows, self._all = rows._replace(reals=rows.reals.copy()), np.arange(self.m)
         spans = rows.segments, free.system.inertia_segments
         self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in spans)
-        self._accelerate = interrupts_answered()(accelerate) if calls_laws(free) else accelerate
+        answered = interrupts_answered() if calls_laws(free) else lambda kernel: kernel
+        self._accelerate, self._bounce = answered(accelerate), answered(bounce)
         self._enter()
 
     def _enter(self):
@@ -222,10 +290,10 @@ class ContactWorkspace:
             free = parts(system._replace(reals=system.reals.copy()), graph, self.n)
             self._graph, (self.address, *self._keep) = graph, resident(ContactParts(free, self._rows))
 
-    def gaps(self, t, q):
-        """Phi (k, m) of the rows at times t (k,), positions q (k, n), rows of which may go on."""
+    def gaps(self, t, q, sign):
+        """Phi (k, m), of the first rows times their sign, at times t (k,), positions q (k, n); rows of q may go on."""
         out = np.zeros((t.size, self.m))
-        find_gaps(self.address, t, q, out)
+        find_gaps(self.address, t, q, sign, out)
         return out
 
     def rows(self, t, q, which=None):
@@ -243,7 +311,7 @@ class ContactWorkspace:
         out = np.empty_like(loads)
         self._enter()
         if not respond(self.address, t, q, memory, loads, out):
-            raise SingularConfiguration("a direction that the constraints leave free carries no inertia.")
+            raise SingularConfiguration(NO_INERTIA)
         return out
 
     def accelerations(self, t, q, qd):
@@ -251,6 +319,16 @@ class ContactWorkspace:
         qdd, gamma = np.empty(self.n), np.zeros(self.m)
         self._accelerate(self.address, t, q, qd, qdd, gamma)
         return qdd, gamma
+
+    def bounce(self, t, q, qd, memory, i, sign, e):
+        """Numbers (6,) of an impact of the gap in row i alone, as of the kernel, and velocities (n,) afterwards."""
+        place, rows, gamma = np.full(self.m, -1), np.zeros((4, self.n)), np.zeros((2, self.m))
+        numbers = np.array([i, sign, e, *[0.0] * 6])
+        place[i] = 0
+        self._enter()
+        if not self._bounce(self.address, t, q, qd, memory, place, self._short, rows, gamma, numbers):
+            raise SingularConfiguration(NO_INERTIA)
+        return numbers[3:].tolist(), rows[2]
 
     def gain(self, q, before, after):
         """Kinetic energy that velocities (n,) have more afterwards, J."""

@@ -6,11 +6,14 @@ from ..elements.bodies import transform_g
 from ..elements.loops.friction import DERIVE, HERE
 from ..formulations.accelerations import normal_load, unit_friction
 from ..jit.kernels import entry, resident
-from ..model.equations import recall, set_time
-from ..model.packed import coupled_loads, index_of
-from ..rows.constraint_graph import REDUCED
-from ..rows.graph_builder import graph_of
+from ..model.equations import evaluate_constraints, recall, set_time
+from ..model.handles import index_of
+from ..model.packed import coupled_loads
+from ..observables.generalised_forces import sum_forces
+from ..observables.reactions import solve_multipliers, solve_normal_loads
+from ..rows.constraint_graph import REDUCED, graph_of
 from ..workspaces import load_parts, parts
+from .slip_velocities import slip_velocities
 
 
 @entry("pdvvvm")
@@ -32,6 +35,11 @@ def find_loads(context, q, reactions, out):
     c = load_parts(context)
     for i in range(out.shape[0]):
         normal_load(c.system, c.tangent, c.graph.frictions[i], q, DERIVE | HERE, reactions[i], out[i])
+
+
+KERNELS = (
+    find_units, find_loads, slip_velocities, sum_forces, evaluate_constraints, solve_normal_loads, solve_multipliers,
+)  # fmt: skip
 
 
 class NormalLoads:

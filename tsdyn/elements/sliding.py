@@ -27,7 +27,7 @@ from .friction import heading, heading_series
 from .markers import Point, Turn, Vector
 from .tolerances import AHEAD
 
-MU, SIDE, AXES, TYRE, BALLS, WAY = 0, 1, 2, 5, 6, 7  # where these begin in par; d is the last
+MU, SIDE, AXES, TYRE, BALLS, WAY = 0, 1, 2, 5, 6, 7  # where these begin in par; then N
 A, B, Z, E = 0, 6, 12, 15  # where x_a, x_b, z and e_1 begin in x; a Turn follows each point
 
 
@@ -56,6 +56,7 @@ class _Sliding(Force):
         Vector("b", "normal_b"),
     )
     particles = True
+    taken = 3
     slots = 63
     positive = (53,)
     sharp = True
@@ -67,10 +68,10 @@ class _Sliding(Force):
         self.kinetic, self.semi_axes, self.tyre_radius, self.balls = kinetic, semi_axes, tyre_radius, balls
 
     def parameters(self):
-        """(mu, side of the reaction, a_j^2, R, s, d): d is set in a run."""
+        """(mu, side of the reaction, a_j^2, R, s); a run sets d."""
         side = 1.0 if self.on is self.a else -1.0
         squares = (np.asarray(self.semi_axes, float) ** 2).tolist()
-        return self.kinetic, side, *squares, self.tyre_radius, self.balls, 0.0, 0.0, 0.0
+        return self.kinetic, side, *squares, self.tyre_radius, self.balls
 
     @staticmethod
     def law(x, xd, par, t, out):

@@ -34,7 +34,12 @@ class Side(NamedTuple):
     which: int = 0  # angle of the joint
     bound: float = 0.0  # rad
     grip: Grip | None = None
-    follows: Any = None  # joint whose rate, times sign, is not negative: the gap is closed wherever that is zero
+    follows: Any = None  # (joint, kind, index) whose rate, times sign, is not negative: closed wherever that is zero
+
+    @property
+    def gap(self) -> Primitive | SumRow:
+        """The row of the gap, without those of the slip."""
+        return self.grip.gap if self.grip else self.row
 
 
 class Unilateral:
@@ -88,6 +93,11 @@ class Unilateral:
     def rubs(self) -> bool:
         """Whether it has friction."""
         return bool(self.kinetic or self.static)
+
+    @property
+    def taken(self) -> int:
+        """Numbers that a run sets, with friction: the direction in which it slides, points of b where it sticks."""
+        return 3 * len(self.parts) if self.rubs else 0
 
     def _grip(self, gap: Primitive, **geometry: Any) -> Grip:
         """Its friction, on the row of its gap; geometry: arguments of the law of sliding, see sliding.py."""

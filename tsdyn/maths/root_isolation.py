@@ -29,6 +29,7 @@ class ChebyshevTable(NamedTuple):
     middle: int  # which is 0
     fine: np.ndarray  # (FINE N + 1,)  grid of which the nodes are every FINE-th point
     coefficients: np.ndarray  # (N + 1, N + 1)  samples at nodes -> Chebyshev coefficients
+    widened: np.ndarray  # (N + 1, N + 2)  the same of samples at points
     values: np.ndarray  # (FINE N + 1, N + 2)  samples at points -> values on the fine grid
     errors: np.ndarray  # (N / 2 + 1, N + 2)  samples at points -> error at CHECK, and the higher coefficients
 
@@ -56,6 +57,7 @@ def table(N):
         int(np.searchsorted(points, 0.0)),
         fine,
         coefficients,
+        widened,
         chebyshev.chebvander(fine, N) @ widened,
         np.concatenate((missed[None], widened[N // 2 + 1 :])),
     )
@@ -155,36 +157,45 @@ def _look_at(values, errors, samples, j, noise, fine):
     return max(CLEAR * off, noise) if resolved and scale >= UNDERFLOWING else math.inf
 
 
-@entry("mmmvvm")
-def _look(values, errors, samples, noise, fine, out):
-    """out (m, 2): fine points up to which functions are clear of zero; by which they have crossed it once, or -1.
+@entry("mmmvmvmm")
+def _look(values, errors, series, grid, samples, noise, scratch, out):  # eight: a table, and what is looked at
+    """out (m, 4): since, until, roots and slopes of a `Survey`, on [-1, 1].
 
     Return 1 if all are resolved, 0 if not, -1 where one is no number.
     """
-    found = 1
+    found, fine, c = 1, scratch[0], scratch[1, : series.shape[0]]
     for j in range(samples.shape[1]):
         margin = _look_at(values, errors, samples, j, noise[j], fine)
-        out[j, 0], out[j, 1] = 0.0, -1.0
+        out[j, 0], out[j, 1] = -1.0, math.nan
         if not margin < math.inf:
             found = min(found, 0 if margin == math.inf else -1)
             continue
         sign, k = math.copysign(1.0, samples[0, j]), 0
         while k < fine.size and sign * fine[k] > _bend(fine, k) + margin:
             k += 1
-        out[j, 0] = k
+        if k == fine.size:
+            out[j, 0] = math.inf
+            continue
+        out[j, 0] = grid[max(k - 1, 0)]
         # It falls from point to point by more than it bends
         while 0 < k < fine.size and sign * (fine[k - 1] - fine[k]) > max(_bend(fine, k - 1), _bend(fine, k)):
             if sign * fine[k] < -_bend(fine, k) - margin:
-                out[j, 1] = k
+                out[j, 1] = grid[k]
                 break
             k += 1
+        if out[j, 1] > out[j, 0]:
+            for n in range(c.size):
+                c[n] = 0.0
+                for i in range(samples.shape[0]):
+                    c[n] += series[n, i] * samples[i, j]
+            out[j, 2], out[j, 3] = _cross(c, out[j, 0], out[j, 1])
     return found
 
 
-@entry("vddv")
-def _cross(c, x0, x1, out):
-    """out: where a Chebyshev series, of other signs at x0 and x1, is zero; its slope there."""
-    rises, x = 0.0, 0.5 * (x0 + x1)
+@kernel
+def _cross(c, x0, x1):
+    """Where a Chebyshev series, of other signs at x0 and x1, is zero; its slope there."""
+    rises, x, slope = 0.0, 0.5 * (x0 + x1), 0.0
     for sweep in range(MOST_BISECTIONS):
         # The series by T, its derivative by U
         value, slope, T, before, U, under = c[0], 0.0, x, 1.0, 1.0, 0.0
@@ -204,10 +215,10 @@ def _cross(c, x0, x1, out):
         if abs(to - x) <= 2.0 * EPS:
             break
         x = to if x0 < to < x1 else 0.5 * (x0 + x1)
-    out[0], out[1] = x, slope
+    return x, slope
 
 
-SURVEYING = _look, _cross
+SURVEYING = (_look,)
 
 
 class Survey(NamedTuple):
@@ -219,14 +230,12 @@ class Survey(NamedTuple):
     samples: np.ndarray  # (N + 2, m)
     since: list  # times up to which functions are clear of zero; inf of those that are so all along
     until: list  # by when functions have crossed zero, once; NaN where that is unclear
+    roots: list  # where their interpolants do
+    slopes: list  # of the interpolants there
 
     def root(self, j):
         """Where the interpolant of function j crosses zero, between its `since` and `until`; its slope there."""
-        grid, half, out = table(self.degree), 0.5 * (self.b - self.a), np.empty(2)
-        x0, x1 = ((t - self.a) / half - 1.0 for t in (self.since[j], self.until[j]))
-        _cross(grid.coefficients @ self.samples[grid.at_nodes, j], x0, x1, out)
-        x, slope = out.tolist()
-        return self.a + half * (x + 1.0), slope / half
+        return self.roots[j], self.slopes[j]
 
 
 def survey(sample, a, first, b, degree, noise):
@@ -250,17 +259,17 @@ def survey(sample, a, first, b, degree, noise):
     """
     samples = np.concatenate((first[None], sample(_points(degree, a, b)[1:])))
     while True:
-        grid, out = table(degree), np.empty((first.size, 2))
-        if _look(grid.values, grid.errors, samples, noise, np.empty(grid.fine.size), out) != 0 or degree == LARGEST:
+        grid, out = table(degree), np.zeros((first.size, 4))
+        scratch = np.empty((2, grid.fine.size))
+        known = grid.values, grid.errors, grid.widened, grid.fine
+        if _look(*known, samples, noise, scratch, out) != 0 or degree == LARGEST:
             break
         degree *= 2
         _, samples = _refined(degree, a, b, samples, sample)
-    half, fine, (clear, crossed) = 0.5 * (b - a), grid.fine, out.astype(int).T.tolist()
-    return Survey(
-        a, b, degree, samples,
-        [a + half * (float(fine[max(k - 1, 0)]) + 1.0) if k < fine.size else math.inf for k in clear],
-        [a + half * (float(fine[k]) + 1.0) if k >= 0 else math.nan for k in crossed],
-    )  # fmt: skip
+    half = 0.5 * (b - a)
+    out[:, :3] = a + half * (out[:, :3] + 1.0)
+    out[:, 3] /= half
+    return Survey(a, b, degree, samples, *out.T.tolist())
 
 
 class Search:

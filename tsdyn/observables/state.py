@@ -146,8 +146,10 @@ def remembered(state, prepared, t, q):
     if not prepared.remembers and (memory is None or np.shape(memory) == (0,)):
         return NOTHING
     slots = prepared.packed.system.memory.size
-    taken = sum(load.force.taken for load in prepared.packed.loads)  # a run sets these
-    anew = taken + sum(part.memory for part in prepared.packed.constraints if part.begins_anew)
+    packed = prepared.packed
+    owners = *(load.force for load in packed.loads), *(contact for contact, _ in packed.contacts)
+    taken = sum(owner.taken for owner in owners)  # a run sets these
+    anew = taken + sum(part.memory for part in packed.constraints if part.begins_anew)
     if memory is None and state is not None and slots > anew:
         raise InvalidArgument(
             "parts of the scene count turns or hold a load, and this state doesn't say how many: give solution.state, "

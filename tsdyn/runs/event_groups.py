@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..maths.root_isolation import survey
-from .tolerances import FALLEN, FROM_REST, ROOT, ROOT_STEPS, ROUGH_ROOT
+from .tolerances import FALLEN, FROM_REST, LIKE_THE_LAST, PART, ROOT, ROOT_STEPS, ROUGH_ROOT
 
 # A group is surveyed on a step at once (root_isolation.survey). Of the members that cross zero the earliest is located,
 # by the interpolant and Newton's method; the others are surveyed again up to there. Only members whose zeros are
@@ -64,6 +64,7 @@ class Group:
 
     def __init__(self, over, events, numbers):
         self.over, self.numbers, self.degree = over, numbers, 0
+        self._length, self._begun = math.inf, math.nan  # of the last phase that ended so, s; when the present one began
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
         known = getattr(getattr(over, "__self__", None), "noise", None)
@@ -71,6 +72,7 @@ class Group:
         # Those that survey and Newton's method serve: changes in one direction end the run
         self._exact = [event.exact for event in own]
         self._may_fall = np.array([event.falls for event in own])
+        self._some_may_fall = self._may_fall.any()
         self._falls = np.array([event.direction if event.limit == 1.0 else 0.0 for event in own])
 
     def begin(self, values):
@@ -122,18 +124,36 @@ class Group:
             Values (k, members) at times (k,) within the step.
         """
         self._first, self._was_new, self._is_new = self.value, self._is_new, False
-        found, end, last = None, step.t1, self.value.copy()
+        self._begun = step.t0 if self._was_new else self._begun
+        # Where phases are much shorter than steps, such as flights of a ball that bounces, the step's begin comes first
+        part = step.t0 + LIKE_THE_LAST * self._length
+        found = None
+        if part - step.t0 < PART * (step.t1 - step.t0):
+            found, alone = self._search_to(part, step, sample)
+        if found is None:
+            found, alone = self._search_to(step.t1, step, sample)
+        self._length = found[1] - self._begun if found else math.inf
+        return found, alone
+
+    def _search_to(self, end, step, sample):
+        """As of `search`, up to a time."""
+        found, last, least = None, self.value.copy(), step.degree_of(end - step.t0)
         alone, left = {}, np.arange(len(last))
         while left.size:
-            values, noise, degree = self.value[left], self.noise[left], max(step.degree, self.degree // 2)
-            seen = survey(lambda times, left=left: sample(times)[:, left], step.t0, values, end, degree, noise)
+            whole = left.size == len(last)
+            values, noise, degree = self.value[left], self.noise[left], max(least, self.degree // 2)
+            own = sample if whole else lambda times, left=left: sample(times)[:, left]
+            seen = survey(own, step.t0, values, end, degree, noise)
             self.degree, last[left] = seen.degree, seen.samples[-1]
-            if self._was_new and (fallen := self._fallen(seen.samples, left)) is not None:
+            if self._was_new and self._some_may_fall and (fallen := self._fallen(seen.samples, left)) is not None:
                 return (self.numbers[fallen], step.t0), []
             unclear = self._unclear(seen, left, noise)
+            if not unclear:
+                alone = {}
+                break
             falls = (self._falls[left] * values < 0.0) & ~self._odd[left]
             roots = {j: seen.root(j) for j, since in unclear.items() if seen.until[j] > since and falls[j]}
-            first = roots and _earliest(lambda t, left=left: sample(np.array([t]))[0, left], seen, roots)
+            first = roots and _earliest(own, seen, roots)
             alone = {int(left[j]): since for j, since in unclear.items() if j not in roots or first is None}
             if not first:
                 break
@@ -141,7 +161,8 @@ class Group:
             j, end = first
             found = self.numbers[left[j]], end
             left = np.array([i for i, since in alone.items() if since < end], int)
-        self.value = last
+        if found or end == step.t1:
+            self.value = last
         return found, [i for i, since in alone.items() if since < end]
 
     def _unclear(self, seen, left, noise):
@@ -160,7 +181,7 @@ class Group:
         return unclear
 
 
-def _earliest(values, seen, roots):
+def _earliest(sample, seen, roots):
     """Which function of a `Survey` crosses zero first, and when; None if unsure.
 
     By Newton's method from the earliest of the roots (t, slope) of interpolants. Where that leaves another function
@@ -169,8 +190,8 @@ def _earliest(values, seen, roots):
     j, before = min(roots, key=roots.__getitem__), math.inf
     t = roots[j][0]
     for _ in range(ROOT_STEPS):
-        found = values(t)
-        moves = {k: float(found[k]) / slope for k, (root, slope) in roots.items()}
+        found = sample(np.array([t]))[0].tolist()
+        moves = {k: found[k] / slope for k, (_, slope) in roots.items()}
         k = max(moves, key=moves.__getitem__)  # the furthest back
         if k != j:
             j, before = k, math.inf

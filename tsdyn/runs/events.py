@@ -32,7 +32,7 @@ class Event(NamedTuple):
     exact: bool = False  # whether a value at the start that is positive is no rounding of zero
     falls: bool = False  # of a `GroupMember`: whether it may begin at zero within rounding, and fall at once
     action: object = None  # a function of a `Change` that each occurrence calls, or None
-    goes_on: bool = False  # whether a zero at the start has been counted before
+    goes_on: bool = False  # whether the run has begun before, and a zero at the start has been counted
 
     def value(self, t, instant):
         """The function's value; raises `EventFailed`."""
@@ -135,7 +135,7 @@ class Inside:
     """States within the step that a run has just made."""
 
     def __init__(self, reader, run, log, t0, before):
-        self.t0, self.t1, self.degree = t0, float(run.clock.t), 0
+        self.t0, self.t1 = t0, float(run.clock.t)
         self._reader, self._log, self._block = reader, log, run.block[None]
         self._known = {t0: before, self.t1: run.now.copy()}
 
@@ -153,15 +153,14 @@ class Inside:
 
     def levels(self, times):
         """The same as an array (k, 3, n), NaN where there is none; not kept."""
-        ends = times.size > 0 and times[-1] == self.t1
-        inside = times[:-1] if ends else times
-        found, status = self._reader(
-            inside, np.zeros(inside.size, int), self._block, self._log.charts, self._log.points
-        )
+        rows = np.zeros(times.size, int)
+        found, status = self._reader(times, rows, self._block, self._log.charts, self._log.points)
         if status != Status.SUCCESS:
             none = np.full_like(self._known[self.t0], np.nan)
             return np.reshape([none if state is None else state for state in self.states(times)], (-1, *none.shape))
-        return np.concatenate((found, self._known[self.t1][None])) if ends else found
+        if times.size and times[-1] == self.t1:
+            found[-1] = self._known[self.t1]
+        return found
 
     def _read(self, times):
         rows = np.zeros(times.size, int)
@@ -268,6 +267,8 @@ class Watch:
             try:
                 self._begin(run, self.tracks is None)
             except EventFailed as failure:
+                if any(event.goes_on for event in self.events):
+                    return Status.EVENT_FAILED, str(failure)
                 raise InvalidArgument(f"events: {failure}") from failure.__cause__
         stiff, answer = run.numbers.stiff, getattr(memory, "answer", None)  # of sampled loads
         # One step at a time, searched before the next one
@@ -319,7 +320,7 @@ class Watch:
         run, is_member = memory.run, isinstance(self.events[last.index].function, GroupMember)
         if self.resume is None or not is_member or not memory.begins_again or last.t >= run.clock.t_end:
             return False
-        if any(found and event.action for event, found in zip(self.events, self.list, strict=True)):
+        if any(self.list[i] and self.events[i].action for i in self._single):
             return False
         self.begins_again = self.resume(last.t, run, [i for i in self._members if self.list[i]])
         return self.begins_again
@@ -430,7 +431,8 @@ class Watch:
 
     def _locate(self, run, log, step):
         found, failure, end = [], None, step.t1
-        step.degree = self._degree(step)
+        step.degree_of = self._degree_of(self._turn_rate(step.at(step.t0), step.at(step.t1)))
+        step.degree = step.degree_of(step.t1 - step.t0)
         members = {}
         for group in self._groups:
             first, alone = group.search(step, lambda times, group=group: self._sample(group, times, step.levels(times)))
@@ -522,11 +524,20 @@ class Watch:
                 )
         return [(step.t0, track.value)], failure
 
-    def _degree(self, step):
-        """The degree that the interpolant and the fastest turn of a body ask for."""
-        squares = [(step.at(t)[1][self._p] ** 2).sum(axis=1).max(initial=0.0) for t in (step.t0, step.t1)]
-        turn = 2.0 * math.sqrt(max(squares)) * (step.t1 - step.t0)
-        return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
+    def _degree_of(self, rate):
+        """A function of a time, s: the degree that the interpolant and turns of bodies at this rate ask for."""
+
+        def degree(time):
+            turn = rate * time
+            return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
+
+        return degree
+
+    def _turn_rate(self, *states):
+        """The fastest turn of a body, rad/s, at some states (3, n)."""
+        rates = np.array([state[1] for state in states]).take(self._p, axis=1)
+        rates *= rates
+        return 2.0 * math.sqrt(rates.sum(axis=2).max(initial=0.0))
 
     def _walk(self, i, step, points):
         """The occurrences of event i among these points."""

@@ -28,7 +28,7 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 # Exponents of the PI control, times 1 / (order of the estimate + 1): Gustafsson's, as in Solving ODEs II, IV.2.
 PI_ERROR, PI_BEFORE = 0.7, 0.4
 
-# Loads along a step (path_loads.py). DISTINCT: a difference over the time between samples, as a velocity over the
+# Loads along a step (step_control.py). DISTINCT: a difference over the time between samples, as a velocity over the
 # tolerance: a bump at one sample makes 70 times its impulse. LEAST_PLACES: intervals of a step; differences of a
 # cosine in a step of one radian are 1e-9 then, and with IMPLICIT_PLACES in one of three radians, as at order 13, 1e-8.
 DISTINCT, LEAST_PLACES, IMPLICIT_PLACES = 100.0, 8, 16
@@ -85,6 +85,9 @@ TURN_GAIN = 1.05
 # --- events ----------------------------------------------------------------------------------------------------------
 # rad, rotation of a body in a step: below the first, half the samples suffice; above the second, the most are taken.
 SLOW_TURN, FAST_TURN = 0.1, 2.0
+# Lengths of the last phase of a run that are searched for the next event first, where they are at most this part of a
+# step.
+LIKE_THE_LAST, PART = 2.0, 0.25
 
 # A value or time below this fraction of the others counts as zero at the start of a run: rounding of some dozen
 # operations of an event function.
@@ -125,8 +128,3 @@ GETTING_ON = 2.0
 
 # Rejected Taylor steps for which the history of a slice has room, beyond one row for each of its steps.
 TRIES = 32
-
-# --- dense output ----------------------------------------------------------------------------------------------------
-# A state inside a step is reached from the base point of its chart in so many legs. More are taken if a leg needs more
-# than FEW factorisations; a short leg needs one of N, and one of S or of the masses.
-LEGS, FEW = (1, 4, 16), 2

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from ..ahead import compile_ahead
+from ..analyses import contact_rows, friction_units
 from ..analyses.contact_problem import closed_gaps
-from ..analyses.contact_rows import KERNELS
 from ..analyses.friction_problem import Frictions, Hold, immobile
 from ..elements.unilateral import contacts_of
 from ..errors import (
@@ -26,22 +27,21 @@ from ..jit.interrupts import deferred_interrupts
 from ..model.handles import handles_of
 from ..observables import diagnostics
 from ..observables.state import remembered
-from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
 from ..runs.event_groups import GroupMember
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
-from ..runs.task import Outcome
+from ..runs.task import Outcome, interval, output_times, state_arrays
 from ..validation import counted, damaged, demand, listed
 from . import hybrid
-from .grips import Halting, Reactions, phase_with_friction
+from .grips import Halting, Reactions, items_of
 from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
 from .phases import PhasePieces, Phases, Pinned, UnitModes, plain
-from .progress import reporter, silent
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
+from .termination import reporter, silent
 from .tolerances import (
     MOST_PINNED,
     PENETRATION,
@@ -76,10 +76,18 @@ def demand_apart(gaps, q, angles, tol, able=None):
 # Numbers of a run that a checkpoint holds as they are, and the names of its arrays
 KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", "replaced", "written", "totals"
 START, PREFIX = ("q", "qd", "remembered"), "phase "
-# What a phase raises that can't begin, after others: whose fault it is
+# What a phase raises that can't begin, after others
 FAILURES = {
-    InvalidArgument: Status.EVENT_FAILED, InvalidForce: Status.SAMPLING_FAILED, SingularConfiguration: Status.SINGULAR,
-}  # fmt: skip
+    InvalidArgument: Status.METHOD_REFUSED,
+    InvalidForce: Status.SAMPLING_FAILED,
+    SingularConfiguration: Status.SINGULAR,
+}
+
+
+@cache
+def _compile_once(slides):
+    """Have compiled what events need; slides: whether there is exact friction of joints."""
+    compile_ahead((*contact_rows.KERNELS, *(friction_units.KERNELS if slides else ())))
 
 
 class _ContactRun(Transitions):
@@ -133,7 +141,7 @@ class _ContactRun(Transitions):
 
         inactive, values: names and parameters of what actions have changed, by default nothing.
         """
-        compile_ahead(KERNELS)
+        _compile_once(any(getattr(force, "slides", ()) for force in scene._forces))
         with_own_parts(scene)
         self.base, self.count, self.modes, self.acted = scene, handles_of(scene.packed).count, UnitModes(), False
         at_first = tuple(item.name for item in inactive_of(scene))
@@ -165,12 +173,6 @@ class _ContactRun(Transitions):
             raise InvalidArgument(
                 f"regularised friction that depends on reactions ({', '.join(rough)}) doesn't serve scenes with "
                 "contacts: leave out slip_velocity, for the exact law."
-            )
-        if self.frictions.count and self.gaps.rubs.any():
-            names = listed(list(dict.fromkeys(self.frictions.names)), NAMED)
-            raise InvalidArgument(
-                f"exact friction of joints ({names}) doesn't serve scenes in which contacts have friction, too: use "
-                "ViscousFriction, or CoulombFriction with a slip_velocity, or leave out kinetic of the contacts."
             )
 
     def run(self):
@@ -292,7 +294,7 @@ class _ContactRun(Transitions):
         return self.run_of(phase, replace(self.options, events=None), call), call
 
     def _end_phase(self, t):
-        kind = self.phases.kind(self.packed, self._record(), self.scene.packed, self.gaps)
+        kind = self.phases.kind(self.packed, self._record, self.scene.packed, self.gaps)
         self.phases.add(kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
 
     def _record(self):
@@ -327,15 +329,12 @@ class _ContactRun(Transitions):
 
     def _scene(self):
         """The scene of the present modes."""
-        holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
-        if self.modes.grips:
-            return phase_with_friction(self.scene, self.gaps, self.modes, holds, self.without)
-        return self._scene_of(self._closed_rows(), holds)
+        return self._scene_of(self._items(), [self._hold(i, rank) for i, rank in self.modes.sticking.items()])
 
     def holds(self):
         """Whether each friction sticks, or is held by what sticks."""
         held = {*self.modes.sticking, *self.modes.blocked}
-        return len(held) == self.frictions.count and all(d is None for d in self.modes.grips.values())
+        return len(held) == self.frictions.count and all(map(self.modes.sticks, self.modes.grips))
 
     def filled(self):
         """The same, with what the run remembers among its packed numbers."""
@@ -349,8 +348,8 @@ class _ContactRun(Transitions):
         vars(filled).update(vars(phase), _packed=packed, _prepared=None)
         return filled
 
-    def _closed_rows(self):
-        return [self.gaps.list[i].side.row for i in self.modes.closed]
+    def _items(self):
+        return items_of(self.gaps, self.modes)
 
     def _hold(self, i, rank):
         """The rows that hold a friction, with the numbers that the run remembers."""
@@ -359,15 +358,15 @@ class _ContactRun(Transitions):
         return Hold(unit, rank, self.remembered[np.array(places, int)])
 
     def _names(self):
-        """Names of the units whose rows hold."""
+        """Names of the units whose rows hold; those of contacts that stick stand there twice."""
         held = sorted([*self.modes.closed, *self.modes.idle])
         memory, units = self.remembered[self.count :], self.frictions.units
         off = {*self.off}
         idle = [i for i in self.modes.blocked if i not in off and not memory[units[i].way].any()]
-        names = [self.gaps.names[i] for i in held]
-        names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.grips.get(i, ()) is None]
-        names += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
-        return tuple(dict.fromkeys(names))
+        closed = [self.gaps.names[i] for i in held]
+        sticking = [self.gaps.names[i] for i in held if self.modes.sticks(i)]
+        sticking += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
+        return *dict.fromkeys(closed), *dict.fromkeys(sticking)
 
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""
@@ -414,8 +413,8 @@ class _ContactRun(Transitions):
 
     def _still(self, phase):
         """Coordinates of the bodies that rest where frictions stick."""
-        grip = any(d is None for d in self.modes.grips.values())
-        if not (self.modes.sticking or grip) or self.q.size > MOST_PINNED:
+        sticks = self.modes.sticking or any(map(self.modes.sticks, self.modes.grips))
+        if not sticks or self.q.size > MOST_PINNED:
             return np.zeros(0, int)
         return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
 
@@ -425,7 +424,7 @@ class _ContactRun(Transitions):
         pushing, grips = Reactions(gaps, modes, packed), gaps.count + self.frictions.count
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
-        slides = [i for i in modes.closed if modes.grips.get(i) is not None]
+        slides = [i for i in modes.closed if modes.slides(i)]
         halting = Halting(packed, [gaps.list[i].side.grip.sliding for i in slides])
         for k, i in enumerate(slides):
             yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
@@ -435,7 +434,7 @@ class _ContactRun(Transitions):
         return left if left.size or self.per_step else np.array([np.inf])  # an empty array would ask for every step
 
     def _steps_left(self):
-        most = self.options.max_steps
+        most = self.options.max_steps if self.archive is None else self.archive.most_steps
         return None if most is None else max(most - self.steps, 0)
 
     def _reporting(self):
@@ -492,11 +491,10 @@ class _ContactRun(Transitions):
     def _is_deep(self):
         """Whether contacts penetrate; says so."""
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        deep = [
-            i
-            for i in (self.gap < -PENETRATION * self.gaps.lengths(self.length)).nonzero()[0].tolist()
-            if i in self.able
-        ]
+        allowed = -PENETRATION * self.gaps.lengths(self.length)
+        if not (self.gap < allowed).any():
+            return False
+        deep = [i for i in (self.gap < allowed).nonzero()[0].tolist() if i in self.able]
         if deep:
             found = listed([self.gaps.names[i] for i in deep], NAMED)
             self.reason = f"Penetration was not noticed: {found}. Give a max_step."

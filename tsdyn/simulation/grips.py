@@ -5,73 +5,36 @@ import numpy as np
 from ..analyses.contact_friction import spread
 from ..analyses.contact_problem import slip_rows
 from ..elements.bodies import rotation_matrix
-from ..elements.force import Force
 from ..elements.friction import heading
-from ..elements.sliding import WAY, slip_velocity
+from ..elements.sliding import slip_velocity
 from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
-from ..model.packed import Derived, begins_of, index_of
+from ..model.handles import index_of
 from ..observables import reactions
 from ..observables.diagnostics import marker_states
-from .parameters import KEPT
-from .phase_scenes import first_row_of, phase_of
-from .scene_cache import prepared_numbers
+from .phase_scenes import first_row_of
 from .tolerances import SAME_WAY, SLOW
 
 # A closed contact with friction sticks or slides. Where it sticks, all its rows hold; those of the slip of a point are
 # rows on positions, which hold it where it came to rest. Where it slides, the row of the gap holds, and a force in
 # proportion to its reaction acts (elements/sliding.py), with a direction d near the slip; the next phase takes another
-# one where the slip has turned too far. `grips` has for each such contact, by the number of its gap, None where it
-# sticks, else d (3,), ground frame; `held` where in b, m, the point of a is that sticks, and which of the two rows of
-# its slip are independent of others.
+# one where the slip has turned too far. Both are among what the run remembers: d (3,), ground frame, and for each of
+# the two rows where in b, m, the point of a is.
 
 
-def phase_with_friction(scene, gaps, modes, holds, without=None):
-    """The scene of a phase: as `phase_of`, with the directions of sliding contacts and the places of sticking ones."""
-    items, numbers = [], {}
+def items_of(gaps, modes):
+    """The rows that hold closed contacts, and the forces of those that slide."""
+    items = []
     for i in modes.closed:
         gap = gaps.list[i]
-        if not gaps.rubs[i]:
-            items.append(gap.side.row)
-        elif modes.grips[i] is None:
-            first, *others = gap.contact.parts
-            kept = [part for part, held in zip(others, modes.held.get(i, ())[3:], strict=True) if held]
-            items += [first, *kept]
-            numbers |= {part: modes.held[i][:3] for part in kept}
-        else:
+        if modes.slides(i):
             items += gap.side.grip[:2]
-            numbers[gap.side.grip.sliding] = modes.grips[i]
-    phase = phase_of(scene, items, holds, without)
-    return _with_numbers(phase, numbers) if numbers else phase
-
-
-def _with_numbers(scene, numbers):
-    """The scene with other numbers (3,): of the law of sliding its direction, of a row the point of b."""
-    kept = prepared_numbers(scene)
-    _ = kept.refusal, kept.pays, kept.sharp, kept.slips, kept.sampled  # for `Prepared.like`
-    packed, begins = scene.packed, begins_of(scene.packed)
-    reals, coordinates, loads = packed.system.reals.copy(), list(packed.coordinates), list(packed.loads)
-    order = {id(each): i for i, each in enumerate(packed.constraints)}
-    acting = {id(load.force): i for i, load in enumerate(loads)}
-    for item, value in numbers.items():
-        if isinstance(item, Force):
-            load, k = loads[acting[id(item)]], acting[id(item)]
-            at = int(load.alone[0].reals) + 3 * len(item.markers) + WAY
-            loads[k] = load._replace(parameters=(*load.parameters[:WAY], *value))
+        elif modes.sticks(i):
+            first, *others = gap.contact.parts
+            items += [first, *(part for part, held in zip(others, modes.grips[i], strict=False) if held)]
         else:
-            at, k = begins[id(item)] + 3, order[id(item)]
-            coordinates[k] = (coordinates[k][0], np.array(value), *coordinates[k][2:])
-        reals[at : at + 3] = value
-    derived = Derived()
-    for name in KEPT:
-        setattr(derived, name, getattr(packed.derived, name))
-    found = packed._replace(
-        system=packed.system._replace(reals=reals), coordinates=tuple(coordinates), loads=tuple(loads), derived=derived
-    )
-    other = object.__new__(type(scene))
-    vars(other).update(vars(scene))
-    vars(other).update(_packed=found, _prepared=kept.like(found), _start=None, _phases=None, _spare={})
-    return other
+            items.append(gap.side.row)
+    return items
 
 
 def held_point(packed, part, q):
@@ -82,23 +45,25 @@ def held_point(packed, part, q):
             at = packed.system.bodies[index_of(packed, body), 0]
             A = rotation_matrix(q[at + 3 : at + 7]) if body.dimension == 7 else np.eye(3)
             x = turn(A, q[at : at + 3], x)
-    return tuple(x.tolist())
+    return x
 
 
-def renewed(gaps, before, settled, q):
-    """`grips` and `held` of the next phase: as before where a contact goes on as it was."""
-    grips, held = {}, {}
+def gripped(gaps, before, settled, q, memory):
+    """`grips` of the next phase; writes directions, and places of those that come to rest, into memory (slots,)."""
+    grips = {}
     for i, d in settled.grips.items():
-        old = before.grips.get(i, ())
-        parts = gaps.list[i].contact.parts
-        if d is None:
-            if len(parts) > 1 and i in settled.rows:
-                known = before.held[i][:3] if old is None and i in before.held else held_point(gaps.packed, parts[1], q)
-                held[i] = (*known, *map(int, settled.rows[i]))
+        way, others = memory[gaps.slots[i] :][:3], gaps.list[i].contact.parts[1:]
+        if d is not None:
             grips[i] = None
-        else:
-            grips[i] = old if old and np.dot(old, d) > SAME_WAY else tuple(d.tolist())
-    return grips, held
+            if not (before.slides(i) and np.dot(way, d) > SAME_WAY):
+                way[:] = d
+            continue
+        way[:] = 0.0
+        grips[i] = tuple(map(int, settled.rows.get(i, ()))) if others else (1, 1)
+        if grips[i] and not before.grips.get(i):
+            for k, part in enumerate(others, 1):
+                memory[gaps.slots[i] + 3 * k :][:3] = held_point(gaps.packed, part, q)
+    return grips
 
 
 class Reactions:
@@ -114,7 +79,7 @@ class Reactions:
 
     def __init__(self, gaps, modes, packed):
         self.gaps, self.packed, self.closed = gaps, packed, modes.closed
-        self.sticks = [i for i in modes.closed if modes.grips.get(i, ()) is None]
+        self.sticks = [i for i in modes.closed if modes.sticks(i)]
         first = first_row_of(packed)
         self.normal = [first[id(_gap_row(gaps, modes, i))] for i in self.closed]
         self.slip = np.array([_slip_columns(gaps.list[i].contact, first) for i in self.sticks], int).reshape(-1, 2)
@@ -128,7 +93,7 @@ class Reactions:
         N = -self.gaps.sign[self.closed] * lam[:, self.normal]
         held = N[:, self.which]
         T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
-        T = carried(self.gaps, self.sticks, states.t, states.q, held, T)
+        T = carried(self.gaps, self.sticks, states.t, states.q, memory, held, T)
         N = N + self.slack
         return np.hstack([N, self.gaps.static[self.sticks] * N[:, self.which] - np.hypot(*np.moveaxis(T, 2, 0))])
 
@@ -136,7 +101,7 @@ class Reactions:
 def _gap_row(gaps, modes, i):
     """The primitive whose first row is the gap of a closed contact in a phase."""
     gap = gaps.list[i]
-    return gap.side.grip.gap if modes.grips.get(i) is not None else gap.side.row
+    return gap.side.grip.gap if modes.slides(i) else gap.side.row
 
 
 def _slip_columns(contact, first):
@@ -146,13 +111,13 @@ def _slip_columns(contact, first):
     return [first.get(id(part), -1) for part in contact.parts[1:]]
 
 
-def carried(gaps, which, t, q, N, T):
+def carried(gaps, which, t, q, memory, N, T):
     """Friction (k, c, 2) of contacts that stick, where rows depend on others shared in proportion to N (k, c)."""
     rows = np.isnan(T).any(axis=(1, 2))
     if rows.any():
         T = np.nan_to_num(T)
-        tangents = np.array([gaps.slopes(t[k], q[k], which) for k in np.flatnonzero(rows)])
-        T[rows] = spread(N[rows], tangents, T[rows])
+        responses = np.array([gaps.responses(t[k], q[k], memory[k], which) for k in np.flatnonzero(rows)])
+        T[rows] = spread(N[rows], responses, T[rows])
     return T
 
 
@@ -165,7 +130,7 @@ class Halting:
     ----------
     packed : Packed
         Of the phase.
-    slides : list of Sliding
+    slides : list of _Sliding
     """
 
     def __init__(self, packed, slides):
@@ -178,7 +143,7 @@ class Halting:
         for load in self.loads:
             x, xd = marker_states(self.packed, load, states.q, states.qd)
             v = twin(slip_velocity)([jet.x for jet in x], xd, load.parameters)
-            d = load.parameters[WAY:]
+            d = states.memory[load.slot : load.slot + 3]
             speed = np.sqrt(sum(a * a for a in v))
             along = sum(a * b for a, b in zip(v, d, strict=True))
             found.append(along - 0.5 * (speed + 1.98 * SLOW) / (speed + SLOW) * speed)
@@ -191,10 +156,10 @@ def losses(gaps, which, lam, t, q, qd):
     return (lam[:, gaps.slip_rows[which]] * slips).sum(axis=2)
 
 
-def add_friction(gaps, modes, packed, t, q, qd, lam, out):
+def add_friction(gaps, modes, packed, t, q, qd, memory, lam, out):
     """Write the multipliers of the slips in a phase into out (k, m): those of contacts that slide, and redundant ones.
 
-    lam (k, rows) are the multipliers of the phase.
+    memory (k, slots) has the directions; lam (k, rows) are the multipliers of the phase.
     """
     rubbing = [i for i in modes.closed if gaps.rubs[i]]
     if not rubbing:
@@ -203,17 +168,17 @@ def add_friction(gaps, modes, packed, t, q, qd, lam, out):
     N = np.array([-gaps.sign[i] * lam[:, first[id(_gap_row(gaps, modes, i))]] for i in rubbing]).T
     tangents = np.array([gaps.slopes(*pair, rubbing) for pair in zip(t, q, strict=True)])  # (k, c, 2, n)
     rows = gaps.slip_rows[rubbing]
-    sticks = [j for j, i in enumerate(rubbing) if modes.grips[i] is None]
+    sticks = [j for j, i in enumerate(rubbing) if modes.sticks(i)]
     if sticks:
         T = -out[:, rows[sticks]]
         for j, i in enumerate(sticks):
-            T[:, j, [k for k, held in enumerate(modes.held.get(rubbing[i], ())[3:]) if not held]] = np.nan
+            T[:, j, [k for k, held in enumerate(modes.grips[rubbing[i]]) if not held]] = np.nan
         which = [rubbing[j] for j in sticks]
-        out[:, rows[sticks]] = -carried(gaps, which, t, q, N[:, sticks], T)
+        out[:, rows[sticks]] = -carried(gaps, which, t, q, memory, N[:, sticks], T)
     slip = np.einsum("kcin,kn->kci", tangents, qd)
     for j, i in enumerate(rubbing):
-        if modes.grips[i] is not None:
+        if modes.slides(i):
             out[:, gaps.rows[i]] = -gaps.sign[i] * N[:, j]
-            d = gaps.across(i, tangents[:, j], modes.grips[i])  # (k, 2)
+            d = gaps.across(i, tangents[:, j], memory[:, gaps.slots[i] :][:, :3])  # (k, 2)
             e = np.array([twin(heading)(*v, 0.0, (*way, 0.0), AHEAD)[:2] for v, way in zip(slip[:, j], d, strict=True)])
             out[:, rows[j]] = (gaps.kinetic[i] * N[:, j])[:, None] * e

@@ -13,7 +13,7 @@ from ..configuration.tolerances import INITIAL_TOL
 from ..elements.element import Attachment
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint
 from ..observables.state import RememberingState, remembered
-from ..runs.arguments import state_arrays
+from ..runs.task import state_arrays
 from ..validation import floats, listed
 from .phase_scenes import NAMED, gaps_of, has_contacts, phase_of
 from .run_options import LAWS
@@ -45,11 +45,12 @@ def jumped(inertia, qd, change, which, before, e, p, law="newton"):
 
 
 def held(inertia, qd, which, rates):
-    """Velocities (n,) and rates (count,) after the least change, by kinetic energy, that ends some rates."""
-    change = inertia.hold(which, rates[which])
+    """Impulses (k,), velocities (n,) and rates (count,) after the least change, by kinetic energy, that ends some."""
+    p = inertia.hold(which, rates[which])
+    change = inertia.pushed(which, p)
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = 0.0
-    return qd + change, after
+    return p, qd + change, after
 
 
 @fitting

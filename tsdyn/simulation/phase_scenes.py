@@ -9,8 +9,8 @@ from ..calls import fitting
 from ..elements.force import Force
 from ..elements.unilateral import contacts_of
 from ..errors import InconsistentState, InvalidArgument
-from ..model.handles import handles_of
-from ..model.packed import begins_of, pack
+from ..model.handles import begins_of, handles_of
+from ..model.packed import pack
 from ..validation import listed
 
 # A phase is a scene of its own, packed once for each combination of modes: the bodies, joints and forces of the scene,
@@ -69,7 +69,7 @@ def phase_of(scene, rows, holds=(), without=None):
         vars(phase).update(
             _added=[each for each in scene._added if id(each) not in gone] + [*constraints, *chain(*held)],
             _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None, _start=None,
-            _prepared=None, _phases=None, _spare={}, _waiting={}, _opens=False,
+            _prepared=None, _phases=None, _gaps=None, _spare={}, _waiting={}, _opens=False,
             _pack=partial(_pack_phase, phase, scene, holds, held), _whole=scene,
         )  # fmt: skip
     return known[key]
@@ -81,7 +81,7 @@ def _pack_phase(phase, scene, holds, held):
     packed = pack(phase, handles_of(whole).where_some_act((*phase._added, *phase._forces)))
     if whole.system.memory.size:
         packed = _remembering(packed, whole)
-    return _holding(packed, holds, held) if holds else packed
+    return _holding(packed, holds, held) if holds or packed.contacts else packed
 
 
 def _remembering(packed, whole):
@@ -92,13 +92,14 @@ def _remembering(packed, whole):
     for item, slots in own.items():
         memory[found[item]] = packed.system.memory[slots]
     if np.array_equal(memory, packed.system.memory):
-        return packed
+        return packed._replace(contacts=whole.contacts)
     first = {item: slots.start for item, slots in found.items()}
     pairs = zip(packed.constraints, packed.slots, strict=True)
     return packed._replace(
         system=packed.system._replace(memory=memory, reals=np.append(packed.system.reals, np.zeros(size))),
         loads=tuple(load if load.slot < 0 else load._replace(slot=first[id(load.force)]) for load in packed.loads),
         slots=tuple(slot if slot < 0 else first[id(part)] for part, slot in pairs),
+        contacts=whole.contacts,
     )
 
 
@@ -106,33 +107,47 @@ def _slots(packed):
     """The slots of System.memory of each force and primitive that has any, a slice, by its id."""
     owners = [(load.slot, id(load.force)) for load in packed.loads]
     owners += zip(packed.slots, map(id, packed.constraints), strict=True)
+    owners += ((slot, id(contact)) for contact, slot in packed.contacts)
     owners = sorted(owner for owner in owners if owner[0] >= 0)
     ends = [*(slot for slot, _ in owners[1:]), packed.system.memory.size]
-    return {item: slice(slot, end) for (slot, item), end in zip(owners, ends, strict=False)}
+    found = {item: slice(slot, end) for (slot, item), end in zip(owners, ends, strict=False)}
+    laws = [(slot, contact.sides[0].grip.sliding) for contact, slot in packed.contacts]
+    return found | {id(law): slice(slot, slot + law.taken) for slot, law in laws}
 
 
 def gaps_of(scene, without=None, holds=()):
-    """The `Gaps` of a scene, of its inactive contacts too; the others as of `phase_of`."""
+    """The `Gaps` of a scene, of its inactive contacts too, kept until it changes; the others as of `phase_of`."""
+    free = phase_of(scene, [], holds, without)
+    if free._gaps is None:
+        free._gaps = _new_gaps(scene, free)
+    return free._gaps
+
+
+def _new_gaps(scene, free):
     from ..analyses.contact_problem import Gaps
 
     sides = [(contact, side) for contact in contacts_of(scene._added) for side in contact.sides]
-    rows = [side.grip.gap if side.grip else side.row for _, side in sides]
+    rows = [side.gap for _, side in sides]
     rubbing = [part for contact, side in sides if side.grip for part in contact.parts]
     rows += [part for part in rubbing if not any(part is row for row in rows)]
     alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
-    return Gaps(scene.packed, alone.packed, phase_of(scene, [], holds, without).packed)
+    return Gaps(scene.packed, alone.packed, free.packed)
 
 
 def _holding(packed, holds, held):
-    """Packed with the numbers of the rows of holds among what the run remembers."""
+    """Packed with the numbers of the rows that hold frictions and contacts among what the run remembers."""
     system, begins, first = packed.system, begins_of(packed), first_row_of(packed)
-    memory = system.memory.copy()
+    memory, places = system.memory.copy(), packed.derived.places
     for hold, rows in zip(holds, held, strict=True):
         packed.derived.holds[hold.unit.slot] = np.array([first[id(row)] for row in rows], int)
-        for row, places in zip(rows, hold.places(), strict=True):
-            packed.derived.places[id(row)] = places
-            for slot, at in places:
-                memory[slot] = begins[id(row)] + at
+        places.update(zip(map(id, rows), hold.places(), strict=True))
+    for contact, slot in packed.contacts:
+        for k, part in enumerate(contact.parts[1:], 1):
+            if id(part) in begins:
+                places[id(part)] = [(slot + 3 * k + i, 3 + i) for i in range(3)]  # the point of b
+    for row, numbers in places.items():
+        for slot, at in numbers:
+            memory[slot] = begins[row] + at
     return packed._replace(system=system._replace(memory=memory))
 
 
@@ -151,7 +166,7 @@ def at_start(scene):
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
     closed = [gaps.list[i] for i in closed_gaps(gaps, q, angles) if i not in gaps.following]
     sides = [gap.side for gap in closed if gap.contact.active]
-    return phase_of(scene, [side.grip.gap if side.grip else side.row for side in sides])
+    return phase_of(scene, [side.gap for side in sides])
 
 
 def demand_bilateral(scene, who="this analysis"):

@@ -7,11 +7,10 @@ import numpy as np
 
 from ..errors import StorageError
 from ..formulations.locked_orientations import keep_turning
-from ..model.handles import handles_of
-from ..model.packed import first_rows
+from ..model.handles import first_rows, handles_of
 from ..observables import diagnostics, reactions
 from ..observables.state import StatePhase
-from ..rows.graph_builder import graph_of, set_redundant
+from ..rows.constraint_graph import graph_of, set_redundant
 from ..runs.dense_output import StepPieces
 from ..validation import demand, demand_record
 from .grips import add_friction, losses
@@ -28,9 +27,18 @@ class UnitModes:
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
     limits: dict = field(default_factory=dict)  # loads that count as none: of frictions that stick, and that have none
-    grips: dict = field(default_factory=dict)  # of closed contacts with friction: see grips.py
-    held: dict = field(default_factory=dict)
+    grips: dict = field(
+        default_factory=dict
+    )  # of closed contacts with friction: rows of the slip that hold; None: slides
     slack: dict = field(default_factory=dict)  # closed with a reaction of rounding: how far below zero it leaves, N
+
+    def sticks(self, i):
+        """Whether a contact with friction sticks."""
+        return self.grips.get(i) is not None
+
+    def slides(self, i):
+        """Whether a contact slides with friction."""
+        return self.grips.get(i, ()) is None
 
     def same(self, other):
         """Whether the units are in the same modes, whatever has just opened."""
@@ -76,7 +84,7 @@ class Phases:
     Attributes
     ----------
     list : list of (float, float, tuple of str)
-        Start, end (s) and names of the closed contacts.
+        Start, end (s) and names of the closed contacts, then of what sticks.
     impulses : list of (float, str, float)
         Time (s), name, impulse (N s, or N m s of an angle).
     starts : list of float
@@ -104,12 +112,13 @@ class Phases:
     def kind(self, packed, modes, whole, gaps):
         """The number of the kind of phases that are packed so.
 
-        modes: what makes its scene again, for files. whole, gaps: of the scene with its parameters, packed.
+        modes: a function that returns what makes its scene again, for files. whole, gaps: of the scene with its
+        parameters, packed.
         """
         kind = self._known.setdefault(id(packed), len(self.packed))
         if kind == len(self.packed):
             self.packed.append(packed)
-            self.modes.append(modes)
+            self.modes.append(modes())
             self._gaps.append(gaps)
             self._columns.append(shared_rows(whole, packed))
         return kind
@@ -155,7 +164,7 @@ class Phases:
             own[:, rows] = lam[:, columns]
             modes = self._modes(kind)
             if modes.grips:
-                add_friction(self._gaps[kind], modes, self.packed[kind], *motion[:3], lam, own)
+                add_friction(self._gaps[kind], modes, self.packed[kind], *motion[:3], memory, lam, own)
             out[mine] = own
         return out
 
@@ -163,7 +172,7 @@ class Phases:
         return UnitModes.of(self.modes[kind][0])
 
     def told(self):
-        """The `list`, in which phases are one where the same hold as before, and no impact or action is between."""
+        """The `list`, each name once; phases are one where the same rows hold, and no impact or action is between."""
         found, before, hit = [], None, {t for t, *_ in self.impulses}
         for (start, end, names), begun, changes in zip(self.list, self.starts, self.changes, strict=True):
             if found and names == found[-1][2] and changes == before and begun not in hit:
@@ -171,18 +180,19 @@ class Phases:
             else:
                 found.append((start, end, names))
             before = changes
-        return found
+        return [(start, end, tuple(dict.fromkeys(names))) for start, end, names in found]
 
     def sticking(self, numbers, i):
         """Whether a contact with friction sticks (k,); i: the number of its gap."""
-        sticks = np.array([self._modes(kind).grips.get(i, ()) is None for kind in range(len(self.modes))])
+        sticks = np.array([self._modes(kind).sticks(i) for kind in range(len(self.modes))])
         return sticks[np.array(self.of)[numbers]]
 
     def losses(self, numbers, lam, t, q, qd):
         """Power (k, gaps), W, that contacts with friction dissipate; lam (k, m) of the scene."""
         out = np.zeros((len(numbers), self.gaps.count))
         for kind, mine, (own, *some) in self._gathered(numbers, (lam, t, q, qd)):
-            which = [i for i, d in self._modes(kind).grips.items() if d is not None]
+            modes = self._modes(kind)
+            which = [i for i in modes.grips if modes.slides(i)]
             if which:
                 out[np.ix_(mine, which)] = losses(self._gaps[kind], which, own, *some)
         return out
@@ -195,7 +205,7 @@ class Phases:
         for kind, mine, some in self._gathered(numbers, (t, q, qd, qdd, memory)):
             found = reactions.with_normal_loads(self.packed[kind], *some)
             for load in self.packed[kind].loads:  # without those that are inactive
-                if load.normal >= 0:
+                if load.normal >= 0 and load.force.name in columns:
                     out[mine, slots + columns[load.force.name]] = found[:, slots + load.normal]
         return out
 
@@ -254,7 +264,7 @@ class Phases:
         for k, (inactive, _) in enumerate(self.changes):
             active = [item.name for item in parts if item.name not in inactive]
             begin, end, names = self.list[k]
-            self.list[k] = begin, end, tuple(dict.fromkeys((*names, *active)))
+            self.list[k] = begin, end, (*names, *(name for name in active if name not in names))
 
     def _gathered(self, numbers, arrays):
         """Yield each kind of phases, the entries (j,) of arrays in its phases, and these parts of the arrays."""
@@ -322,7 +332,7 @@ class Phases:
             packed = scene.packed
             if derived != derived_record(packed):
                 take_derived(packed, derived)
-            self.kind(packed, modes, packed if scene._whole is None else scene._whole.packed, gaps)
+            self.kind(packed, lambda modes=modes: modes, packed if scene._whole is None else scene._whole.packed, gaps)
             self.scenes.append(scene)
 
 

@@ -13,8 +13,7 @@ import numpy as np
 from ..errors import InvalidArgument, InvalidFile, MissingDependency, Status, StorageError
 from ..files.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
 from ..formulations.registry import formulation
-from ..model.handles import handles_of
-from ..model.packed import has_rates
+from ..model.handles import handles_of, has_rates
 from ..observables.channels import channels_of, values_of
 from ..observables.diagnostics import ConstraintError
 from ..rows.interface import redundancy
@@ -124,6 +123,7 @@ def trajectory_of(numbers, arrays, scenes):
         form = form.serving(method, has_rates(packed))
         graph = form.graph(packed)
         width = method.interpolant(form.first_order).size(n, *form.sizes(packed, graph))
+        width += 4 * len(packed.system.segments) if form.has_normals else 0
         if method.coupled and len(blocks):
             demand((blocks[:, B_DATA] == method.kernel(form.first_order)[1][0]).all(), "the stages of steps")
     width += B_DATA + handles.count + packed.system.memory.size

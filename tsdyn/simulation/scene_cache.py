@@ -2,6 +2,7 @@
 
 import copy
 from functools import cached_property
+from operator import is_not
 from threading import RLock
 
 import numpy as np
@@ -12,9 +13,15 @@ from ..errors import StorageError
 from ..formulations.locked_orientations import hold, still
 from ..jit.interrupts import CollectionsDeferred
 from ..methods.integrator import is_plain
-from ..model.equations import depends_on_time, sampled_loads, user_kinds, watched_loads
+from ..model.equations import (
+    depends_on_time,
+    sampled_loads,
+    user_kinds,
+    watched_loads,
+    with_curvatures,
+    with_force_jacobians,
+)
 from ..model.handles import handles_of
-from ..model.packed import with_curvatures, with_force_jacobians
 from ..motions.knots import NO_CHANGES, NO_STOPS, changes, is_noise, sample_times, stops_of, within_step
 from ..observables.reactions import demand_unique
 from ..runs.driver import instants_of, sampled
@@ -27,6 +34,7 @@ SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocat
 OF_NUMBERS = {"implicit", "spheres", "series", "sampled"}  # what `Prepared` derives from them
 KINDS = 8  # kinds of memory, and shapes of a scene, at most
 LARGEST = 1 << 24  # bytes of a memory that is kept, at most
+STARTS = 4  # that are kept: a run with contacts has two, with all of them open and as they are
 SMALL = 1 << 20  # the same where engines that take turns have one each
 FEW_LAYOUTS = 2  # of memories that other engines have used
 
@@ -54,7 +62,7 @@ def prepared_numbers(scene):
 
 
 class Prepared:
-    """A packed scene, its last consistent start, and the memory of finished runs.
+    """A packed scene, its last consistent starts, and the memory of finished runs.
 
     The memory belongs to the scene; after a change of numbers alone it is used again.
     """
@@ -63,7 +71,7 @@ class Prepared:
     def __init__(self, scene, packed):
         self.packed, self.motions = packed, scene.motions()
         self.n, self.m = int(packed.system.bodies[:, 1].sum()), packed.system.segments.shape[0]
-        self._start = (None, None), None
+        self._starts = {}  # the last ones that were checked, by what was asked
         self.runs = ()  # the last ones that `simulate` has prepared
         self._changes = None, []  # span, and what `_changes_of` has found of motions in it
         self.remembers = bool(packed.system.memory.size or handles_of(packed).count)
@@ -78,7 +86,7 @@ class Prepared:
         other = copy.copy(self)
         for name in OF_NUMBERS & vars(other).keys():
             del vars(other)[name]
-        other.packed, other._start, other._spare, other.runs = packed, ((None, None), None), {}, ()
+        other.packed, other._starts, other._spare, other.runs = packed, {}, {}, ()
         other._changes = None, []
         other.handles = handles_of(packed)
         return other
@@ -240,11 +248,18 @@ class Prepared:
         The same ones are checked once.
         """
         options = t, tol, remembered.tobytes(), redundant_allowed
-        (checked, with_options), start = self._start
-        if options != with_options or not _same(given, checked):
+        checked, found, start = self._starts.get(options, (None, None, None))
+        if checked is None or any(map(is_not, found, self._found)) or not _same(given, checked):
             start = self._projected(scene, *given, t, tol, remembered, redundant_allowed)
-            self._start = (given, options), start
+            if len(self._starts) >= STARTS:
+                self._starts = {}
+            self._starts[options] = given, self._found, start
         return start
+
+    @property
+    def _found(self):
+        """What a start may find out of the packed scene: redundant rows, and bodies that don't turn."""
+        return self.packed.derived.redundant, still(self.packed)
 
     @CollectionsDeferred()
     def _projected(self, scene, q, qd, t, tol, remembered, redundant_allowed):

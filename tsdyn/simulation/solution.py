@@ -13,7 +13,7 @@ import numpy as np
 from ..calls import fitting, fitting_methods
 from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
-from ..formulations.chart_validity import REASONS
+from ..formulations.charts import REASONS
 from ..methods.integrator import is_plain
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import diagnostics, reactions
@@ -21,8 +21,7 @@ from ..observables.generalised_forces import law_values
 from ..observables.reactions import acted, exerted, member, with_normal_loads
 from ..observables.state import RememberingState
 from ..validation import counted, floats
-from .balances import Balances, energy_error
-from .by_phase import by_phase, gathered
+from .balances import Balances, by_phase, energy_error, gathered
 from .records import Records
 from .stored_runs import RunOutputs
 from .termination import account, cause_of
@@ -388,7 +387,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def phases(self) -> list[tuple[float, float, tuple[str, ...]]]:
         """Start and end (s) of each phase, and the names of what holds only in some.
 
-        These are closed contacts, frictions that stick, and those active of the parts that come and go by actions.
+        These are closed contacts, frictions that stick, and those active of the parts that come and go by actions. A
+        phase ends, too, where a closed contact begins or ends to stick: see `sticking`.
         """
         return [(self.span[0], self.reached, ())] if self._phases is None else self._phases.told()
 
@@ -397,7 +397,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """Time (s), name and impulse of contacts at impacts, of parts that become active, of impulses on bodies.
 
         N s, or N m s of an angle; of a constraint of several rows an array (rows,) as of `multipliers`, of a body an
-        array (3,) in the ground frame.
+        array (3,) in the ground frame. Negative, about the square root of rounding, of a contact without friction
+        that an impact elsewhere lifts by less than rounding: it stays closed.
         """
         return [] if self._phases is None else list(self._phases.impulses)
 

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from ..analyses.contact_friction import halted, settle_grips
+from ..analyses.contact_friction import Cones, halted, settle_grips
 from ..analyses.contact_problem import Inertia, NoSolution, settle
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
 from ..analyses.tolerances import AT_ONCE, AT_REST, LEVEL, RESTS, STOPPED
@@ -17,7 +17,7 @@ from ..model.handles import handles_of
 from ..observables.generalised_forces import force_loads
 from ..observables.state import begin_memory
 from ..validation import listed
-from .grips import renewed
+from .grips import gripped
 from .impacts import held, impact_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import UnitModes
@@ -31,6 +31,11 @@ from .tolerances import (
     ROUNDS,
     TOUCHING,
 )
+
+
+def settled_by(inertia, resting, qd, fired=()):
+    """The `Settled` contacts, with friction and without; arguments as of `settle`."""
+    return (settle_grips if inertia.gaps.rubs[resting].any() else settle)(inertia, resting, qd, fired)
 
 
 class Transitions:
@@ -79,6 +84,8 @@ class Transitions:
         if not touching:
             return self._settle_frictions(before, broken)
         try:
+            if len(touching) == 1 and self._bounces(touching[0], before, slots):
+                return None
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
@@ -88,26 +95,19 @@ class Transitions:
             opening = [i for i in fired if i not in before.closed]
             noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
             if noise:  # a gap that closes with a rate of rounding, or a ratchet that takes hold
-                self.qd, rates = held(inertia, self.qd, noise, rates)
+                p, self.qd, rates = held(inertia, self.qd, noise, rates)
+                self._note_impulses(inertia, noise, p, qd)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
             opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
             # What grazes without a reaction has left: its gap was rounding
             leaving = [i for i in fired if i in before.closed or i in grazing]
+            self.qd = halted(inertia, self.qd, resting)
             self.modes = UnitModes(opened=opened)
-            if self.gaps.rubs[resting].any():
-                self.qd = halted(inertia, self.qd, resting)
-                settled = settle_grips(inertia, resting, self.qd, leaving)
-                grips, places = renewed(self.gaps, before, settled, self.q)
-                self.modes = UnitModes(
-                    settled.closed, settled.idle, opened, grips=grips, held=places, slack=settled.slack
-                )
-            elif resting:
-                settled = settle(inertia, resting, self.qd, leaving)
-                self.modes = UnitModes(settled.closed, settled.idle, opened, slack=settled.slack)
+            self._settle_contacts(settled_by(inertia, resting, self.qd, leaving), before)
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
-            status = self._alternate(before, inertia, touching, resting, leaving, broken)
+            status = self._settle_all(before, inertia, touching, resting, leaving, broken)
             kept = {*self.modes.closed, *self.modes.idle}
             opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
             self._begin_memory([i for i in self.modes.closed if i not in before.closed])
@@ -125,6 +125,12 @@ class Transitions:
                 )
             return Status.CONTACT_FAILED
 
+    def _settle_contacts(self, settled, before):
+        """Take what contacts do."""
+        self.remembered, modes = self.remembered.copy(), self.modes
+        modes.closed, modes.idle, modes.slack = settled.closed, settled.idle, dict(settled.slack)
+        modes.grips = gripped(self.gaps, before, settled, self.q, self.remembered[self.count :])
+
     def _begin_memory(self, closed):
         """Rows that come remember nothing of a time when they held: a rope may have turned over since."""
         items = [item for i in closed for item in (self.gaps.list[i].contact, self.gaps.list[i].side.row)]
@@ -133,13 +139,14 @@ class Transitions:
             angles, memory = self.remembered[: self.count], self.remembered[self.count :]
             begin_memory(packed, handles_of(packed), angles, memory, items)
 
-    def _alternate(self, before, unheld, touching, resting, leaving, broken):
-        """Frictions by the closed contacts, and contacts by the frictions, until both agree; as of `_settle`.
+    def _settle_all(self, before, unheld, touching, resting, leaving, broken):
+        """Frictions beside the contacts at rest, and the rows that hold these then; as of `_settle`.
 
-        unheld: the `Inertia` without frictions.
+        unheld: the `Inertia` without frictions. Again where other gaps close: the ways of frictions end there.
         """
+        cones = Cones(unheld, resting, self.qd) if self.frictions.count and resting else None
         for _ in range(ROUNDS):
-            status = self._settle_frictions(before, broken, bool(resting))
+            status = self._settle_frictions(before, broken, cones)
             if status is not None or not (self.frictions.count and resting):
                 return status
             holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
@@ -148,15 +155,16 @@ class Transitions:
                 slots[unit.way] = 0.0  # their loads are known
             inertia = Inertia(gaps, self.t, self.q, slots, touching, self.modes.closed, self.friction)
             dead = [i for i in resting if inertia.G[i, i] <= RANK_TOL * unheld.G[i, i]]  # frictions hold these
-            settled = settle(inertia, [i for i in resting if i not in dead], self.qd, leaving)
-            closed, idle, a = settled[:3]
+            settled = settled_by(inertia, [i for i in resting if i not in dead], self.qd, leaving)
+            a = settled.accelerations
             small = LEVEL * np.maximum(*(each.accelerations(self.qd)[1] for each in (inertia, unheld)))
             if (a[dead] < -small[dead]).any():
                 raise NoSolution
-            idle = sorted([*idle, *(i for i in dead if a[i] <= small[i])])
-            if (closed, idle) == (self.modes.closed, sorted(self.modes.idle)):
+            idle, known = [i for i in dead if a[i] <= small[i]], {*self.modes.closed, *self.modes.idle}
+            grips = {**settled.grips, **{i: None for i in idle if self.gaps.rubs[i]}}
+            self._settle_contacts(settled._replace(idle=sorted([*settled.idle, *idle]), grips=grips), before)
+            if known == {*self.modes.closed, *self.modes.idle}:
                 return None
-            self.modes = UnitModes(closed, idle, self.modes.opened, slack=settled.slack)
         names = listed([*(self.gaps.names[i] for i in resting), *self.frictions.names], NAMED)
         self.reason = f"No closed contacts and sticking frictions agree at t = {self.t:.9g} s: {names}."
         return Status.CONTACT_FAILED
@@ -171,8 +179,11 @@ class Transitions:
             self.held_gaps[key] = gaps_of(self.scene, self.without, holds)
         return self.held_gaps[key]
 
-    def _settle_frictions(self, before, fired, loads=False):
-        """Which frictions stick, and what the others exert if `loads`; the Status if there is no way on, else None."""
+    def _settle_frictions(self, before, fired, cones=None):
+        """Which frictions stick, and what the others exert on contacts; the Status if there is no way on, else None.
+
+        cones: the `Cones` of contacts at rest.
+        """
         frictions, count = self.frictions, self.count
         if not frictions.count:
             return None
@@ -197,22 +208,20 @@ class Transitions:
                 memory[unit.way] = 0.0
             else:
                 memory[unit.way] = place.written(i, v[0, i] / speed)
-        if not (resting or loads):
+        if not resting and cones is None:
             return None
         try:
-            rest, ranks, dead, packed = self._rest(place, before, resting, guess, fired)
+            rest, ranks, packed = self._rest(place, before, resting, guess, fired, cones)
         except NoRest as error:
             names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
             self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         for i, way in rest.ways.items():
             memory[frictions.units[i].way] = place.written(i, way)
-        # What closed contacts hold needs no rows of its own
-        idle = [i for i in rest.sticking if i in dead and self.modes.closed]
-        self.modes.sticking = {i: ranks[i] for i in rest.sticking if i not in idle}
-        self.modes.blocked = sorted([*self.off, *rest.blocked, *idle, *(i for i in resting if not ranks[i])])
+        self.modes.sticking = {i: ranks[i] for i in rest.sticking}
+        self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
         self.modes.begun, self.modes.limits = {i: (self.t, rate) for i, rate in rest.rates.items()}, rest.limits
-        if loads:
+        if cones is not None:
             self.friction = self._load(packed, rest.loads)
         return None
 
@@ -227,8 +236,8 @@ class Transitions:
         memory[0, [slot for unit in self.frictions.units for slot in range(unit.way.start, unit.way.stop)]] = 0.0
         return (found - force_loads(system, np.array([self.t]), *motion, memory))[0]
 
-    def _rest(self, place, before, resting, guess, fired):
-        """The `FrictionAtRest`, how many rows hold each at rest, those that nothing moves, and the packed phase."""
+    def _rest(self, place, before, resting, guess, fired, cones):
+        """The `FrictionAtRest`, how many rows hold each at rest, and the packed phase with open contacts."""
         units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
         for i in resting:
             ranks[i] = before.sticking.get(i, -1)
@@ -238,7 +247,7 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        phase = self._scene_of(self._closed_rows(), [self._hold(i, ranks[i]) for i in free])
+        phase = self._scene_of([], [self._hold(i, ranks[i]) for i in free])
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
@@ -247,19 +256,38 @@ class Transitions:
                 for k, row in enumerate(rows[i]):
                     memory[units[i].held(k)[-1]] = Phi[row]
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
-        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
+        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
         rest = problem.settle({i: way for i, way in guess.items() if i in free}, fired)
-        return rest, ranks, [i for i in free if problem.is_dead(i)], phase.packed
+        return rest, ranks, phase.packed
 
     def _motions_of(self, place, i):
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
         unit = self.frictions.units[i]
         hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
-        phase = self._scene_of(self._closed_rows(), [hold])
+        phase = self._scene_of([self.gaps.list[k].side.gap for k in self.modes.closed], [hold])
         memory = self.remembered[self.count :].copy()
         for k in range(3):
             memory[np.array(unit.held(k))] = hold.numbers[k]
         return free_motions(phase.packed, self.t, self.q, memory, phase.packed.derived.holds[unit.slot])
+
+    def _bounces(self, i, before, slots):
+        """Whether gap i, the only one that touches, is hit without friction and opens: then that has happened.
+
+        As `_hit` has it, of several gaps: here by one kernel, since balls bounce often.
+        """
+        gaps, e = self.gaps, float(self.gaps.restitution[i])
+        if self.frictions.count or gaps.rubs[i] or i in gaps.following or before.closed or before.idle or e == 0.0:
+            return False
+        found = gaps.workspace.bounce(self.t, self.q, self.qd, slots, i, float(gaps.sign[i]), e)
+        (rate, size, G, p, acceleration, length), qd = found
+        if not (G > 0.0 and rate < -AT_REST * size):
+            return False
+        height = ENDLESS * self.length if e == 1.0 else EPS * max(self.length, ROUNDED * length)
+        if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * height:
+            return False
+        self.phases.impulses.append((self.t, gaps.names[i], p))
+        self.qd, self.modes = qd, UnitModes(opened={i: (self.t, self.gap[i], -e * rate)})
+        return True
 
     def _hit(self, inertia, touching, rates):
         """Jump of velocities at an impact; the rates (count,) afterwards."""
@@ -278,18 +306,28 @@ class Transitions:
         for _ in touching:
             if not a.any():
                 break
-            qd, after = held(inertia, qd, [i for i in touching if a[i] > 0.0 or after[i] == 0.0], after)
+            stays = [k for k, i in enumerate(touching) if a[i] > 0.0 or after[i] == 0.0]
+            more, qd, after = held(inertia, qd, [touching[k] for k in stays], after)
+            p[stays] += more
             if (after[touching] < 0.0).any():
                 more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
                 p = p + more
             a = self._lowering(inertia, touching, qd, after)
-        # Impulses that change rates by less than rounding are none
-        small, named = AT_REST * inertia.sizes(self.qd), zip(touching, p, strict=True)
-        self.phases.impulses += [
-            (self.t, self.gaps.names[i], float(x)) for i, x in named if x * inertia.G[i, i] > small[i]
-        ]
+        self._note_impulses(inertia, touching, p, self.qd)
         self.qd = qd
         return after
+
+    def _note_impulses(self, inertia, which, p, qd):
+        """Note the impulses (k,) of the gaps `which`, but those that change the rates at qd by less than rounding.
+
+        Pulls, of contacts that stay closed though they are lifted, are noted without friction, whose part isn't told.
+        """
+        small, rubs = AT_REST * inertia.sizes(qd), self.gaps.rubs
+        self.phases.impulses += [
+            (self.t, self.gaps.names[i], float(x))
+            for i, x in zip(which, p, strict=True)
+            if (x if rubs[i] else abs(x)) * inertia.G[i, i] > small[i]
+        ]
 
     def _jump(self, inertia, touching, before, e, qd=None):
         """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
@@ -306,7 +344,7 @@ class Transitions:
         if not opening.any():
             return np.zeros(self.gaps.count)
         resting = [i for i in touching if rates[i] == 0.0]
-        a = -(settle_grips if self.gaps.rubs[resting].any() else settle)(inertia, resting, qd).accelerations
+        a = -settled_by(inertia, resting, qd).accelerations
         lengths, elastic = self.gaps.lengths(self.length), self.gaps.restitution == 1.0
         rounding = EPS * np.maximum(lengths, ROUNDED * inertia.sizes(self.q))
         rounding[elastic] = ENDLESS * lengths[elastic]  # flights that would never get lower

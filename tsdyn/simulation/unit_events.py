@@ -4,7 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..analyses.contact_rows import ReactionWorkspace
+from ..analyses.contact_rows import ReactionWorkspace, measure_opened
 from ..analyses.tolerances import LEVEL
 from ..observables import reactions
 from .tolerances import LOADED, REACTION_NOISE
@@ -31,21 +31,17 @@ class Closing:
 
     def open(self, opened):
         """Take other contacts that have just opened."""
-        self.which = [i for i in opened if i not in self.gaps.following]
-        self.start = tuple(zip(*(opened[i] for i in self.which), strict=True))
+        which = [i for i in opened if i not in self.gaps.following]
+        self.which = np.array(which, int)
+        self.start = np.array([opened[i] for i in which]).reshape(-1, 3).T.copy()
 
     def over(self, states):
         """Values (k, count) of `States`."""
         values = self.gaps.values(states.t, states.levels, states.counted)
         for i, rate in self.gaps.following.items():
             values[:, i] = rate(states.q, states.qd)
-        if self.which:
-            begun, first, rate = map(np.array, self.start)
-            since = states.t[:, None] - begun
-            later = since > 0.0
-            grown = values[:, self.which] - first
-            divided = np.where(later, grown / np.where(later, since, 1.0), rate)
-            values[:, self.which] = np.where(rate > 0.0, divided, grown + self.rounding[self.which])
+        if self.which.size:
+            measure_opened(states.t, self.which, self.start, self.rounding, values)
         return values
 
 

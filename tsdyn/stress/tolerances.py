@@ -21,6 +21,6 @@ NEAR_SINGULAR, ILL_CONDITIONED = 1e3, 1e8
 ROUNDED_ROWS, SMALL_SCENE = 10.0, 200
 # Outputs of a run that are judged, and bodies whose balance is: the first, the last, and some between.
 OUTPUTS, BODIES = 25, 12
-# Gaps below zero, of the largest coordinate (m) or in rad; momenta that no impulse explains, of the largest: velocities
-# are dropped that lift a body by less than rounding, the square root of it. Impacts of a run that are judged.
-PENETRATED, IMPACTED, IMPACTS = 1e-11, 1e-6, 12
+# Gaps below zero, of the largest coordinate (m) or in rad; momenta that no impulse explains, of the largest: rounding
+# where units of lengths and angles differ by 1e6. Impacts of a run that are judged.
+PENETRATED, IMPACTED, IMPACTS = 1e-11, 1e-8, 12

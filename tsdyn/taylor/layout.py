@@ -15,10 +15,11 @@ from ..elements.loops.ground_contacts import is_ground_contact
 from ..elements.markers import POINT
 from ..errors import InvalidConstraint, InvalidForce
 from ..formulations.locked_orientations import instances
-from ..jit.arrays import zeros
 from ..jit.kernels import Record, loader, records, twin
+from ..jit.resident import zeros
 from ..model.equations import changes_with_state
-from ..model.packed import System, coupled_loads, index_of, members_of
+from ..model.handles import index_of
+from ..model.packed import System, coupled_loads, members_of
 from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.program import run_program
@@ -114,7 +115,7 @@ class Expansion(NamedTuple):
 
     order: Orders
     bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
-    low: np.ndarray  # (b, 16)  what r, rd, omega' and p lack to rounding at the start of the step; step_end.py
+    low: np.ndarray  # (b, 16)  what r, rd, omega' and p lack to rounding at the start of the step; step_parts.py
     low_end: np.ndarray  # (b, 16)  the same at the end of the step tried
     start: np.ndarray  # (b, 4)  p at the start of the step
     low_r2: np.ndarray  # (b, 4)  what r_2 lacks to rounding; coefficients.py
@@ -127,7 +128,7 @@ class Expansion(NamedTuple):
     drives: np.ndarray  # (numbers of loads,) of tables.MotionSeries
     frictions: np.ndarray  # (frictions,) of tables.FrictionSeries
     sources: np.ndarray  # of tables.ReactionSource
-    kept: np.ndarray  # (m,)  multipliers of the step's start, in scenes with joint friction; joint_friction.py
+    kept: np.ndarray  # (m,)  multipliers of the step's start, in scenes with joint friction; series_engine.py
 
 
 class Trial(Record):
@@ -490,7 +491,7 @@ def allocate_expansion(graph, kinds, packed, highest):
         driven = bool(graph.kinds[i].drift)
         slots = kind.slots + (len(kind.quantities()) if driven else 0)
         width = instance_width(len(kind.markers), kind.all_rows, slots, orders, varies, driven)
-        name = "contact_series" if not driven and is_ground_contact(kind, masks) else loops[driven]
+        name = "contact_series" if touches_ground(graph, i, kind) else loops[driven]
         loop = address(kind.kernels, name, kind.__name__, InvalidConstraint)
         rows.append([count, graph.kinds[i].stride, width, orders, loop, total])
         total += count * width
@@ -572,10 +573,15 @@ def masks_of(graph, i):
     return graph.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
 
 
+def touches_ground(graph, i, kind):
+    """Whether all instances of kind i are contacts with the ground, for which there are quicker loops."""
+    return not graph.kinds[i].drift and is_ground_contact(kind, masks_of(graph, i))
+
+
 def with_ground_contacts(graph, kinds):
     """The graph with the quicker loops of contacts with the ground, where all of a kind are."""
     for i, kind in enumerate(kinds):
-        if not graph.kinds[i].drift and is_ground_contact(kind, masks_of(graph, i)):
+        if touches_ground(graph, i, kind):
             graph.kinds["reduced"][i] = address(kind.kernels, "contact_rows", kind.__name__, InvalidConstraint)
     return graph
 

@@ -130,7 +130,7 @@ class Transitions:
         self.remembered = self.remembered.copy()
         grips = gripped(self.gaps, before, settled, self.q, self.remembered[self.count :])
         opened = self.modes.opened
-        self.modes = UnitModes(settled.closed, settled.idle, opened, grips=grips, slack=settled.slack)
+        self.modes = UnitModes(settled.closed, settled.idle, opened, grips=grips, slack=dict(settled.slack))
 
     def _begin_memory(self, closed):
         """Rows that come remember nothing of a time when they held: a rope may have turned over since."""

@@ -7,6 +7,7 @@ H W H^T lam = H W f,  a = W (f - H^T lam)       H: bilateral rows               
 from __future__ import annotations
 
 import math
+import threading
 from typing import NamedTuple
 
 import numpy as np
@@ -305,9 +306,9 @@ class ReactionWorkspace:
     """
 
     def __init__(self, packed, redundant=0.0):
-        system, self.redundant = with_short_rows(packed), redundant
+        system, self.redundant, self.graph = with_short_rows(packed), redundant, graph_of(packed, REDUCED, BIAS)
         self.n, self.m, self.count = int(system.bodies[:, 1].sum()), len(packed.system.segments), system.normals.size
-        whole = parts(system._replace(reals=system.reals.copy()), graph_of(packed, REDUCED, BIAS), self.n)
+        whole = parts(system._replace(reals=system.reals.copy()), self.graph, self.n)
         self.address, *self._keep = resident(whole)
         find = find_reactions if self.count else find_multipliers
         self._find = interrupts_answered()(find) if calls_laws(packed) else find
@@ -318,6 +319,14 @@ class ReactionWorkspace:
         given = self.address, t, levels.reshape(t.size, 3 * self.n), memory, self.redundant, out
         self._find(*given, *[loads] * (self.count > 0))
         return out, loads
+
+
+def reaction_workspace(packed, redundant=0.0):
+    """The `ReactionWorkspace` of a packed scene in this thread; a start may show that rows are redundant."""
+    known, key = packed.derived.reactions, (threading.get_ident(), redundant == 0.0)
+    if key not in known or known[key].graph is not graph_of(packed, REDUCED, BIAS):
+        known[key] = ReactionWorkspace(packed, redundant)
+    return known[key]
 
 
 class ContactWorkspace:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..analyses.contact_friction import spread
 from ..analyses.contact_problem import slip_rows
-from ..analyses.contact_rows import ReactionWorkspace
+from ..analyses.contact_rows import reaction_workspace
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
 from ..elements.tolerances import AHEAD
@@ -89,7 +89,7 @@ class Reactions:
     @cached_property
     def workspace(self):
         """Made at the first evaluation: the start of the phase may show that rows are redundant."""
-        return ReactionWorkspace(self.packed, np.nan)
+        return reaction_workspace(self.packed, np.nan)
 
     def over(self, states):
         """Values (k, closed and sticking) of states at k times."""

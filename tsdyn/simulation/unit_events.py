@@ -4,7 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..analyses.contact_rows import ReactionWorkspace, measure_opened
+from ..analyses.contact_rows import measure_opened, reaction_workspace
 from ..analyses.tolerances import LEVEL
 from .tolerances import LOADED, REACTION_NOISE
 
@@ -64,7 +64,7 @@ class Leaving:
     @cached_property
     def workspace(self):
         """Made at the first evaluation: the start of the phase may show that rows are redundant."""
-        return ReactionWorkspace(self.packed)
+        return reaction_workspace(self.packed)
 
     def over(self, states):
         """Values (k, closed) of `States`."""
@@ -100,7 +100,7 @@ class Breaking:
     @cached_property
     def workspace(self):
         """Made at the first evaluation, as of `Leaving`."""
-        return ReactionWorkspace(self.packed)
+        return reaction_workspace(self.packed)
 
     def over(self, states):
         """Values (k, sticking and light units) of states at k times."""

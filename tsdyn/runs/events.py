@@ -181,7 +181,9 @@ class Inside:
 
     def at(self, t):
         """The state (3, n) at t."""
-        (state,) = self.states(np.array([t]))
+        state = self._known.get(t)
+        if state is None:
+            (state,) = self.states(np.array([t]))
         if state is None:
             raise EventFailed(f"there is no state at t = {t:.9g} s to evaluate events at.", t)
         return state

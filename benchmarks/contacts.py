@@ -3,9 +3,11 @@
 - ball: it falls from 1 m and bounces with e = 0.8; the error is that of its height after 1.5 s, in the third flight.
 - rocking: a slender block rocks on smooth ground, by plastic impacts of its edges; the error is that of its tilt after
   0.2 s, between the first and the second impact. The reference: the closed form of the impact, DOP853 before and after.
+- chain: five links fall on a smooth floor, and their ends bounce one after the other with e = 0.8; the error is that of
+  the first end's height after 0.3 s. The reference: minimal coordinates, DOP853 between the impacts.
 - slope: a block rests on a slope below the angle of friction; the error is how far it has moved after 10 s.
 
-Contacts of MuJoCo and Drake are compliant, here as stiff as the step allows; Drake has no coefficient of restitution.
+Contacts of the other programs are compliant, here as stiff as the step allows; Drake has no coefficient of restitution.
 Engines that aren't installed are left out.
 
 Run it: python -m benchmarks.contacts
@@ -13,6 +15,7 @@ Run it: python -m benchmarks.contacts
 
 import importlib.util
 import time
+from importlib import metadata
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -23,6 +26,9 @@ STEPS, TOLERANCES, ROUNDS = (1e-3, 1e-4), (1e-4, 1e-8, 1e-12), 2
 G, E, BALL_END = 9.81, 0.8, 1.5
 HALF_WIDTH, HALF_HEIGHT, TILT, ROCKING_END = 0.2, 0.5, 0.1, 0.2  # m, m, rad, s
 ANGLE, FRICTION, SLOPE_END = 0.3, 0.5, 10.0  # rad, -, s
+LINKS, LINK, LINK_MASS, BEND, DROP, CHAIN_END = 5, 0.2, 0.1, 0.25, 0.05, 0.3  # -, m, kg, rad, m, s
+LINK_INERTIA = LINK_MASS * LINK**2 / 12
+ANGLES = [BEND * (1 + i / 7) * (-1) ** i for i in range(LINKS)]  # from x to z
 MASS = 2.0
 INERTIA = MASS * (HALF_WIDTH**2 + HALF_HEIGHT**2) / 3
 HEIGHT = HALF_HEIGHT * np.cos(TILT) + HALF_WIDTH * np.sin(TILT)
@@ -66,6 +72,52 @@ def rocking():
     return -solve_ivp(rates, (first.t[-1], ROCKING_END), (0.0, rate), **options).y[0, -1]
 
 
+def chain():
+    """Height of the first end: coordinates are its place x, z, and the angles of the links."""
+    n = LINKS + 2
+    arms = [LINK * (np.arange(LINKS) < i) for i in range(LINKS + 1)]  # of the ends
+    arms += [LINK * ((np.arange(LINKS) < i) + 0.5 * (np.arange(LINKS) == i)) for i in range(LINKS)]  # of the centroids
+    arms = np.array(arms)
+
+    def points(x):
+        """Jacobians (points, 2, n) of all points, and their centripetal directions (points, 2, LINKS)."""
+        c, s = np.cos(x[2:]), np.sin(x[2:])
+        moved = np.zeros((len(arms), 2, n))
+        moved[:, 0, 0] = moved[:, 1, 1] = 1.0
+        moved[:, :, 2:] = np.stack([-arms * s, arms * c], axis=1)
+        return moved, np.stack([-arms * c, -arms * s], axis=1)
+
+    def mass(x):
+        moved, bent = points(x)
+        M = LINK_MASS * np.einsum("pin,pim->nm", moved[LINKS + 1 :], moved[LINKS + 1 :])
+        M[2:, 2:] += LINK_INERTIA * np.eye(LINKS)
+        return M, moved, bent
+
+    def rates(_, y):
+        M, moved, bent = mass(y[:n])
+        a = bent[LINKS + 1 :] @ y[n + 2 :] ** 2 + [0, G]
+        return np.append(y[n:], np.linalg.solve(M, -LINK_MASS * np.einsum("pin,pi->n", moved[LINKS + 1 :], a)))
+
+    def height(i, begun):
+        def value(t, y):
+            return y[1] + arms[i] @ np.sin(y[2:n]) if t > begun[i] + 1e-6 else 1.0
+
+        value.terminal, value.direction = True, -1
+        return value
+
+    t, y, begun = 0.0, np.array([0, DROP, *ANGLES, *np.zeros(n)], float), np.full(LINKS + 1, -1.0)
+    while True:
+        heights = [height(i, begun) for i in range(LINKS + 1)]
+        run = solve_ivp(rates, (t, CHAIN_END), y, "DOP853", events=heights, rtol=1e-13, atol=1e-15, max_step=2e-3)
+        t, y = run.t[-1], run.y[:, -1]
+        if run.status != 1:
+            return y[1]
+        i = next(i for i, times in enumerate(run.t_events) if times.size)
+        M, moved, _ = mass(y[:n])
+        J, begun[i] = moved[i, 1], t
+        y[n:] -= np.linalg.solve(M, J) * (1 + E) * (J @ y[n:]) / (J @ np.linalg.solve(M, J))
+
+
 # The same in tsdyn
 
 
@@ -106,6 +158,43 @@ def ours_rocking(tol):
     return seconds, 2 * np.arctan2(*solution.orientation("block")[-1, [2, 0]])
 
 
+def links():
+    """The links on hinges, above the floor, without contacts."""
+    scene, tip, last = ts.Scene(gravity=(0, 0, -G)), np.array([0, 0, DROP]), None
+    for i, angle in enumerate(ANGLES):
+        along, turned = (
+            LINK * np.array([np.cos(angle), 0, np.sin(angle)]),
+            (np.cos(angle / 2), 0, -np.sin(angle / 2), 0),
+        )
+        body = scene.add_body(LINK_MASS, (LINK_INERTIA,) * 3, tip + along / 2, turned, name=f"link {i}")
+        if last is None:
+            scene.add(ts.constraints.Planar.at(scene.ground, body, point=tip, axis=(0, 1, 0)))
+        else:
+            scene.add(ts.constraints.Revolute.at(last, body, point=tip, axis=(0, -1, 0)))
+        last, tip = body, tip + along
+    return scene
+
+
+def ends(scene):
+    """Bodies and points of a chain that touch the floor."""
+    bodies = scene.bodies
+    return [(bodies[0], (-LINK / 2, 0, 0)), *((body, (LINK / 2, 0, 0)) for body in bodies)]
+
+
+def ours_chain(tol):
+    """With contacts of the ends."""
+
+    def build():
+        scene = links()
+        for body, point in ends(scene):
+            contact = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": E}
+            scene.add(ts.constraints.PlaneContact(body, scene.ground, point_a=point, **contact))
+        return scene
+
+    seconds, solution = ours(build, CHAIN_END, tol)
+    return seconds, solution.position("link 0", point=(-LINK / 2, 0, 0))[-1, 2]
+
+
 def ours_slope(tol):
     """A block that slides in a plane, with friction by its normal force."""
 
@@ -129,13 +218,19 @@ BOX = f'<geom type="box" size="{HALF_WIDTH} 0.3 {HALF_HEIGHT}"/>'
 
 def mujoco(step, end, contact, body, gravity=(0, 0, -G), start=(0, 0, 0)):
     """Coordinates x, z (from where the body is put) and tilt of a body in a plane, at the end."""
+    inertia = f'<inertial pos="0 0 0" mass="{MASS}" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/>'
+    bodies = f'<body pos="0 0 {body[0]}">{PLANAR}{inertia}{body[1]}</body>'
+    return mujoco_run(step, end, contact, bodies, gravity, start)
+
+
+def mujoco_run(step, end, contact, bodies, gravity, start):
+    """Coordinates of bodies over a plane at the end. They collide with the plane alone."""
     import mujoco
 
     text = (
         f'<mujoco><option timestep="{step}" gravity="{" ".join(map(str, gravity))}" cone="elliptic" impratio="100"/>'
-        f'<default><geom solimp="0.9999 0.9999 1e-3" {contact}/></default><worldbody><geom type="plane" size="9 9 1"/>'
-        f'<body pos="0 0 {body[0]}">{PLANAR}<inertial pos="0 0 0" mass="{MASS}" diaginertia="{INERTIA} {INERTIA} '
-        f'{INERTIA}"/>{body[1]}</body></worldbody></mujoco>'
+        f'<default><geom solimp="0.9999 0.9999 1e-3" contype="0" {contact}/></default><worldbody>'
+        f'<geom type="plane" size="9 9 1" contype="1"/>{bodies}</worldbody></mujoco>'
     )
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
@@ -155,6 +250,18 @@ def mujoco_ball(step):
     contact = f'solref="{5 * step / ratio} {ratio}" condim="1"'
     seconds, x = mujoco(step, BALL_END, contact, (1.1, '<geom type="sphere" size="0.1"/>'))
     return seconds, x[1] + 1.0
+
+
+def mujoco_chain(step):
+    """Spheres at the ends of the links; contacts as those of the ball."""
+    ratio, sphere = -np.log(E) / np.hypot(np.pi, np.log(E)), '<geom type="sphere" size="0.02" pos="{} 0 0"/>'
+    numbers = f'mass="{LINK_MASS}" diaginertia="{LINK_INERTIA} {LINK_INERTIA} {LINK_INERTIA}"'
+    link = f'<joint type="hinge" axis="0 -1 0"/><inertial pos="{LINK / 2} 0 0" {numbers}/>{sphere.format(LINK)}'
+    first = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>' + link + sphere.format(0)
+    bodies = f'<body pos="0 0 {DROP + 0.02}">{first}' + f'<body pos="{LINK} 0 0">{link}' * (LINKS - 1)
+    contact, start = f'solref="{5 * step / ratio} {ratio}" condim="1"', (0, 0, ANGLES[0], *np.diff(ANGLES))
+    seconds, x = mujoco_run(step, CHAIN_END, contact, bodies + "</body>" * LINKS, (0, 0, -G), start)
+    return seconds, x[1] + DROP
 
 
 def mujoco_rocking(step):
@@ -218,25 +325,117 @@ def drake_slope(step):
     return seconds, found[0]
 
 
+# In Exudyn: generalised-alpha; spheres at the points that touch, and a large triangle
+
+
+def exudyn(scene, points, step, end, mass, e=0.0, friction=0.0):
+    """Seconds, and places and rotations of the bodies at the end; twenty steps to a period of `mass` on a contact."""
+    import exudyn as exu
+    from exudyn import utilities
+
+    from tsdyn.measuring.engines import Exudyn
+
+    made, radius, size = Exudyn(scene), 0.09, 100.0
+    stiffness = mass * (2 * np.pi / (20 * step)) ** 2
+    law = {"restitutionCoefficient": e, "impactModel": 2, "minimumImpactVelocity": 1e-3}
+    law = law if e else {"contactDamping": 2 * np.sqrt(stiffness * mass)}
+    corners = exu.Vector3DList([[-size, -size, -radius], [size, -size, -radius], [0, size, -radius]])
+    ground = made._marker(scene.ground, (0, 0, 0))
+    for body, point in points:
+        node = made.mbs.AddNode(utilities.NodeGenericData(initialCoordinates=[0] * 4, numberOfDataCoordinates=4))
+        contact = utilities.ObjectContactSphereTriangle(
+            markerNumbers=[made._marker(body, point), ground], nodeNumber=node, sphereRadius=radius,
+            trianglePoints=corners, contactStiffness=stiffness, dynamicFriction=friction, **law,
+        )  # fmt: skip
+        made.mbs.AddObject(contact)
+    made.mbs.Assemble()
+    found = made.run(end, step, outputs=1)
+    return found.seconds, found.r[-1], found.A[-1]
+
+
+def exudyn_ball(step):
+    """A body without rotation."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    body = scene.add_body(MASS, (INERTIA,) * 3, (0, 0, 1.0))
+    seconds, r, _ = exudyn(scene, [(body, (0, 0, 0))], step, BALL_END, MASS, E)
+    return seconds, r[0, 2]
+
+
+def exudyn_chain(step):
+    """All ends, as in tsdyn."""
+    scene = links()
+    seconds, r, A = exudyn(scene, ends(scene), step, CHAIN_END, LINK_MASS, E)
+    return seconds, (r[0] - A[0] @ (LINK / 2, 0, 0))[2]
+
+
+def exudyn_block(step, end, half_height, height, tilt, friction, gravity):
+    """Place and tilt of a block in a plane, on the two edges of its section."""
+    scene, turned = ts.Scene(gravity=gravity), (np.cos(tilt / 2), 0, np.sin(tilt / 2), 0)
+    block = scene.add_body(MASS, (INERTIA,) * 3, (0, 0, height), turned)
+    scene.add(ts.constraints.Planar.at(scene.ground, block, point=(0, 0, 0), axis=(0, 1, 0)))
+    edges = [(block, (x, 0, -half_height)) for x in (-HALF_WIDTH, HALF_WIDTH)]
+    seconds, r, A = exudyn(scene, edges, step, end, MASS / 2, friction=friction)
+    return seconds, r[0, 0], np.arctan2(A[0, 0, 2], A[0, 0, 0])
+
+
+def exudyn_rocking(step):
+    """Without friction."""
+    seconds, _, tilt = exudyn_block(step, ROCKING_END, HALF_HEIGHT, HEIGHT, TILT, 0.0, (0, 0, -G))
+    return seconds, tilt
+
+
+def exudyn_slope(step):
+    """A low block, gravity turned."""
+    gravity = G * np.sin(ANGLE), 0, -G * np.cos(ANGLE)
+    return exudyn_block(step, SLOPE_END, HALF_WIDTH, HALF_WIDTH, 0.0, FRICTION, gravity)[:2]
+
+
 RUNS = {
-    "ball": (ball, {"tsdyn": ours_ball, "mujoco": mujoco_ball}),
-    "rocking": (rocking, {"tsdyn": ours_rocking, "mujoco": mujoco_rocking, "pydrake": drake_rocking}),
-    "slope": (lambda: 0.0, {"tsdyn": ours_slope, "mujoco": mujoco_slope, "pydrake": drake_slope}),
+    "ball": (ball, {"tsdyn": ours_ball, "mujoco": mujoco_ball, "exudyn": exudyn_ball}),
+    "chain": (chain, {"tsdyn": ours_chain, "mujoco": mujoco_chain, "exudyn": exudyn_chain}),
+    "rocking": (
+        rocking,
+        {"tsdyn": ours_rocking, "mujoco": mujoco_rocking, "exudyn": exudyn_rocking, "pydrake": drake_rocking},
+    ),
+    "slope": (
+        lambda: 0.0,
+        {"tsdyn": ours_slope, "mujoco": mujoco_slope, "exudyn": exudyn_slope, "pydrake": drake_slope},
+    ),
 }
 
 
+PROGRAMS = {"tsdyn": "tsdyn", "mujoco": "MuJoCo", "exudyn": "Exudyn", "pydrake": "Drake, discrete"}
+PACKAGES = {"pydrake": "drake"}
+
+
+def cells(program, value, motion):
+    """Error at the end and milliseconds, the least of some rounds; empty where a program hasn't the motion."""
+    reference, runs = RUNS[motion]
+    if program not in runs:
+        return ["", ""]
+    found = [runs[program](value) for _ in range(ROUNDS)]
+    return [f"{abs(found[-1][1] - reference()):.1e}", f"{1e3 * min(seconds for seconds, _ in found):.2g}"]
+
+
+def table(motions=tuple(RUNS)):
+    """Yield the lines of a table in Markdown, of the programs that are installed."""
+    yield f"| program | setting | {' | '.join(f'{motion} | ms' for motion in motions)} |"
+    yield "|---|---|" + "---:|---:|" * len(motions)
+    for program, title in PROGRAMS.items():
+        if not importlib.util.find_spec(program):
+            continue
+        version = "" if program == "tsdyn" else f" {metadata.version(PACKAGES.get(program, program))}"
+        for value in TOLERANCES if program == "tsdyn" else STEPS:
+            setting = f"tolerance {value:.0e}" if program == "tsdyn" else f"step {value:g} s"
+            row = [cell for motion in motions for cell in cells(program, value, motion)]
+            yield f"| {title}{version} | {setting} | {' | '.join(row)} |"
+            title = version = ""
+
+
 def main():
-    """Print the error at the end, and milliseconds, the least of some rounds."""
-    print("motion   program  setting        error   time (ms)")
-    for motion, (reference, runs) in RUNS.items():
-        exact = reference()
-        for program, run in runs.items():
-            if not importlib.util.find_spec(program):
-                continue
-            for value in TOLERANCES if program == "tsdyn" else STEPS:
-                found = [run(value) for _ in range(ROUNDS)]
-                error, seconds = abs(found[-1][1] - exact), min(s for s, _ in found)
-                print(f"{motion:8} {program:8} {value:7.0e} {error:12.1e} {1e3 * seconds:11.2f}", flush=True)
+    """Print the table as it grows."""
+    for line in table():
+        print(line, flush=True)
 
 
 if __name__ == "__main__":

@@ -17,9 +17,12 @@ import tsdyn as ts
 from benchmarks.call_overhead import Clocked
 from benchmarks.contender import timed
 from benchmarks.scenes import SCENES
+from examples import coin
 from tsdyn.ensembles import case_loop
 
 SPANS = {"sliding top": (1e-4, 1.0, 10.0), "two-body pendulum": (1e-4, 0.5, 5.0), "chain of 4": (1e-4, 0.2, 1.0)}
+SPANS["rolling coin"] = 1e-4, 1.0, 10.0
+NODDING = 0.3, (0.4, 8.0, 1.5)  # lean, rad, and angular velocity, rad/s, of the coin
 CASES, ROUNDS, LOOPED = 1500, 5, 30  # cases of the longest span: a tenth
 
 
@@ -66,7 +69,7 @@ def looped(scene, values, span):
 
 def measure(name, end, count, rounds):
     """Medians of seconds a case: one thread, two threads, a loop over `simulate`, and the overhead."""
-    scene, span = SCENES[name].build(), (0.0, end)
+    scene, span = coin.rolling(*NODDING) if name == "rolling coin" else SCENES[name].build(), (0.0, end)
     values = table(scene, count)
     calls = {threads: lambda threads=threads: ts.ensemble(scene, values, span, threads=threads) for threads in (1, 2)}
     found = {1: [], 2: [], "loop": [], "overhead": [], "lanes": []}

@@ -15,30 +15,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..plugins import (
-    Angle,
     CoordinateFunction,
     InvalidConstraint,
     JointFunction,
     Smooth,
     SumRow,
-    angles,
-    displacements,
+    chosen_coordinate,
     finite,
     fitting,
     floats,
     functions_of,
+    geometry_of,
     label,
     shown,
-    shown_for_handle,
 )
 from .angle_term import AngleTerm, _AngleFunctionTerm
 from .displacement_term import DisplacementTerm, _DisplacementFunctionTerm
 from .joint_function_term import joint_function_term
 
 if TYPE_CHECKING:
-    from ..hints import ArrayLike, Function, Joint, Prescribed
-
-    JointCoordinate = Joint | tuple[Joint, str] | tuple[Joint, str, int]
+    from ..hints import ArrayLike, Function, JointCoordinate, Prescribed
 
 
 class Coupler(SumRow):
@@ -108,12 +104,11 @@ class Coupler(SumRow):
         where = name or "Coupler"
         if not independents:
             raise InvalidConstraint(f"{where}: give one joint or more on which {shown(dependent)} depends.")
-        chosen = [_chosen(where, given) for given in (dependent, *independents)]
+        chosen = [chosen_coordinate(where, given) for given in (dependent, *independents)]
         self.__dict__.update(dependent=chosen[0], independents=tuple(chosen[1:]))
         joint = chosen[0][0]
         super().__init__(joint.a, joint.b, (), name)
         self.ratio, self.offset, self.polynomial, self.function = ratio, offset, polynomial, function
-        self.check()
 
     def _untitled(self, bodies):
         return f"Coupler({', '.join(joint.name for joint, *_ in self._all)})"
@@ -214,12 +209,12 @@ class Coupler(SumRow):
         """The term of one coordinate."""
         given = {"ratio": factor, "offset": offset} | ({} if function is None else {"function": function})
         if kind == "angle":
-            own, other, f, g, h = angles(joint)[index]
+            own, other, f, g, h = geometry_of(joint, kind, index)
             cls = AngleTerm if function is None else _AngleFunctionTerm
             term = cls(own, other, reference_a=f, across_a=g, reference_b=h, **given)
             term.__dict__["counted"] = ((joint, index),)
             return term
-        own, other, e, s_own, s_other = displacements(joint)[index]
+        own, other, e, s_own, s_other = geometry_of(joint, kind, index)
         cls = DisplacementTerm if function is None else _DisplacementFunctionTerm
         return cls(own, other, axis_a=e, point_a=s_own, point_b=s_other, **given)
 
@@ -228,7 +223,7 @@ class Coupler(SumRow):
         chosen = [self.independents[i] for i in function.order]
         bodies, places, counted = [], [], []
         for joint, kind, index in chosen:
-            own, other, *given = (angles if kind == "angle" else displacements)(joint)[index]
+            own, other, *given = geometry_of(joint, kind, index)
             bodies += own, other
             places += given
             counted += [(joint, index)] * (kind == "angle")
@@ -244,25 +239,3 @@ class Coupler(SumRow):
 
         joint = a.scene.add(Cylindrical(a, b, axis_a=rng.normal(size=3), axis_b=rng.normal(size=3)))
         return cls((joint, "angle"), (joint, "displacement"), ratio=rng.uniform(0.5, 2.0), offset=rng.normal())
-
-
-def _chosen(where, given):
-    """(joint, kind, index) of what is given for a coordinate of a joint."""
-    joint, *which = given if isinstance(given, tuple) else (given,)
-    declared = getattr(joint, "joint_coordinates", ())
-    if not declared or getattr(joint, "drives", ""):
-        raise InvalidConstraint(
-            f"{where}: couple joints with an angle or a displacement, such as Revolute or Translational, got "
-            f"{shown_for_handle(joint)}."
-        )
-    kinds = ["angle" if isinstance(each, Angle) else "displacement" for each in declared]
-    choices = [(kind, kinds[:i].count(kind)) for i, kind in enumerate(kinds)]
-    found = [choice for choice in choices if list(choice)[: len(which)] == which]
-    if len(found) != 1:
-        shapes = ", ".join(
-            f"(joint, {kind!r}, {i})" if kinds.count(kind) > 1 else f"(joint, {kind!r})" for kind, i in choices
-        )
-        raise InvalidConstraint(
-            f"{where}: say which coordinate of {joint.name!r} is meant, by {shapes}; got {shown(given)}."
-        )
-    return joint, *found[0]

@@ -103,11 +103,9 @@ class Gear(Primitive):
             if not np.linalg.norm(np.cross(u, v)) > PARALLEL * np.linalg.norm(v):
                 raise self.error(f"{self.name}: {word} is along the axis at the start; it must be perpendicular to it.")
         if offset is None:
-            self.check()
-            one, other = (np.arctan2(u @ np.cross(l, w), l @ w) for w in (f, h))
-            offset = float(other - number(ratio) * one)
+            one, other = (float(np.arctan2(u @ np.cross(l, w), l @ w)) for w in (f, h))
+            offset = other - number(ratio) * one
         self.offset = offset
-        self.check()
 
     def _places(self, given):
         """Fill in missing references: along the line of centres, far from the branch cut of the angle."""
@@ -139,7 +137,7 @@ class Gear(Primitive):
                 f"{self.name}: ratio is the turn of b over that of a and must be a finite number other than zero, got "
                 f"{self.ratio!r}; it is negative if the wheels rotate in opposite directions."
             )
-        if "offset" in self.__dict__ and not np.isfinite(number(self.offset)):
+        if not np.isfinite(number(self.offset)):
             raise self.error(f"{self.name}: offset must be a finite angle in rad, got {shown(self.offset)}.")
 
     def parameters(self):

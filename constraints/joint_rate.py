@@ -1,22 +1,20 @@
 """Rows of rates: an angle or a displacement between two bodies doesn't change.
 
-    E = f.h,  F = g.h                       f, g of body a, unit vectors across each other; h of body b
-    A xd  = E (gd.h + g.hd) - F (fd.h + f.hd)            (1)  [rad/s]: the rate of atan2(F, E), where E^2 + F^2 = 1
-    A     = [ -F h^T, E h^T, E g^T - F f^T ]             (2)  for (f, g, h)
-    gamma = 2 E gd.hd - 2 F fd.hd                        (3)
+    A xd  = ratio thetad = ratio (E Fd - F Ed) / S         (1)  [rad/s]  theta, E, F and S of AngleTerm
+    A xd  = ratio (e.(xd_b - xd_a) + ed.(x_b - x_a))       (2)  [m/s]    the rate of DisplacementTerm
 
-    A xd  = e.(xd_b - xd_a) + ed.d,  d = x_b - x_a       (4)  [m/s]: the rate of e.d
-    A     = [ -e^T, e^T, d^T ]                           (5)  for (x_a, x_b, e)
-    gamma = 2 ed.dd                                      (6)
-
-(1) is singular where h is along the axis, which a joint keeps it from.
+A and gamma are Phi_x and gamma of these terms, at a ratio of 1. (1) is singular where b's direction is along the axis,
+which a joint keeps it from.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import Point, Primitive, Vector, dot, scaled
+from ..plugins import Point, Primitive, Vector
+from .angle_driver import sine_cosine_rates
+from .angle_term import AngleTerm
+from .displacement_term import DisplacementTerm
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
@@ -49,55 +47,24 @@ class AngleRate(Primitive):
 
     rate_rows, anywhere = 1, True
     markers = (Vector("a", "zero_a"), Vector("a", "quarter_a"), Vector("b", "hand_b"))
-    slots = 11
+    slots = AngleTerm.slots
 
     def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
         super().__init__(a, b, **places)
 
+    def parameters(self):
+        """The ratio."""
+        return (1.0,)
+
     @staticmethod
     def rate(x, xd, par, t, out):
         """Eq. (1)."""
-        E, F, Ed, Fd = 0.0, 0.0, 0.0, 0.0
-        for i in range(3):
-            E += x[i] * x[6 + i]
-            F += x[3 + i] * x[6 + i]
-            Ed += xd[i] * x[6 + i] + x[i] * xd[6 + i]
-            Fd += xd[3 + i] * x[6 + i] + x[3 + i] * xd[6 + i]
-        out[0] = E * Fd - F * Ed
+        E, F, Ed, Fd, _Edd, _Fdd = sine_cosine_rates(x, xd, 6)
+        out[0] = par[0] * (E * Fd - F * Ed) / (E * E + F * F)
 
-    @staticmethod
-    def rate_jacobian(x, par, t, out):
-        """Eq. (2)."""
-        E, F = 0.0, 0.0
-        for i in range(3):
-            E += x[i] * x[6 + i]
-            F += x[3 + i] * x[6 + i]
-        for i in range(3):
-            out[0, i], out[0, 3 + i] = -F * x[6 + i], E * x[6 + i]
-            out[0, 6 + i] = E * x[3 + i] - F * x[i]
-
-    @staticmethod
-    def rate_gamma(x, xd, par, t, out):
-        """Eq. (3)."""
-        E, F, fast, slow = 0.0, 0.0, 0.0, 0.0
-        for i in range(3):
-            E += x[i] * x[6 + i]
-            F += x[3 + i] * x[6 + i]
-            fast += xd[3 + i] * xd[6 + i]
-            slow += xd[i] * xd[6 + i]
-        out[0] = 2.0 * (E * fast - F * slow)
-
-    @staticmethod
-    def series(x, par, k, s, out):
-        """Of Eq. (2); rows of f, g, h, E, F."""
-        for i in range(3):
-            s[i, k], s[3 + i, k], s[6 + i, k] = x[i], x[3 + i], x[6 + i]
-        s[9, k], s[10, k] = dot(s, 0, 6, k), dot(s, 3, 6, k)
-        first, second = scaled(s, 6, 10, k), scaled(s, 6, 9, k)
-        across, along = scaled(s, 3, 9, k), scaled(s, 0, 10, k)
-        for i in range(3):
-            out[0, i], out[0, 3 + i] = -first[i], second[i]
-            out[0, 6 + i] = across[i] - along[i]
+    rate_jacobian = staticmethod(AngleTerm.jacobian)
+    rate_gamma = staticmethod(AngleTerm.gamma)
+    series = staticmethod(AngleTerm.series)
 
 
 class DisplacementRate(Primitive):
@@ -117,33 +84,22 @@ class DisplacementRate(Primitive):
     """
 
     rate_rows, anywhere = 1, True
-    markers = (Point("a"), Point("b"), Vector("a"))
+    markers = (Vector("a"), Point("a"), Point("b"))
 
     def __init__(self, a: BodyLike, b: BodyLike, **places: Any) -> None:
         super().__init__(a, b, **places)
 
+    def parameters(self):
+        """The ratio."""
+        return (1.0,)
+
     @staticmethod
     def rate(x, xd, par, t, out):
-        """Eq. (4)."""
+        """Eq. (2)."""
         out[0] = 0.0
         for i in range(3):
-            out[0] += x[6 + i] * (xd[3 + i] - xd[i]) + xd[6 + i] * (x[3 + i] - x[i])
+            out[0] += par[0] * (x[i] * (xd[6 + i] - xd[3 + i]) + xd[i] * (x[6 + i] - x[3 + i]))
 
-    @staticmethod
-    def rate_jacobian(x, par, t, out):
-        """Eq. (5)."""
-        for i in range(3):
-            out[0, i], out[0, 3 + i], out[0, 6 + i] = -x[6 + i], x[6 + i], x[3 + i] - x[i]
-
-    @staticmethod
-    def rate_gamma(x, xd, par, t, out):
-        """Eq. (6)."""
-        out[0] = 0.0
-        for i in range(3):
-            out[0] += 2.0 * xd[6 + i] * (xd[3 + i] - xd[i])
-
-    @staticmethod
-    def series(x, par, k, s, out):
-        """Of Eq. (5)."""
-        for i in range(3):
-            out[0, i], out[0, 3 + i], out[0, 6 + i] = -x[6 + i], x[6 + i], x[3 + i] - x[i]
+    rate_jacobian = staticmethod(DisplacementTerm.jacobian)
+    rate_gamma = staticmethod(DisplacementTerm.gamma)
+    series = staticmethod(DisplacementTerm.series)

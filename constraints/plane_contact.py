@@ -85,7 +85,6 @@ class PlaneContact(Unilateral, Primitive):
             raise InvalidConstraint(f"{self.name}: unilateral must be True or False, got {unilateral!r}.")
         self.unilateral = unilateral
         self._set_law(restitution, kinetic, static)
-        self.check()
 
     def __setattr__(self, name, value):
         """Set an attribute, checked; the rows follow."""

@@ -88,7 +88,6 @@ class RackAndPinion(Joint):
             turn = travel(a, b, self.direction_a, self.point_a, self.point_b) / self.radius
             now = carried(a, self.axis_a, self.direction_a, b, self.axis_b)
             self.reference_b = turned_about(self.axis_b, now, turn)
-        self.check()
 
     def check(self):
         """Refuse a radius of zero, a rack not perpendicular to the axis, and a reference along the axis."""

@@ -7,8 +7,13 @@ A stop that follows: it takes hold wherever the rate vanishes. Never singular by
 
 from __future__ import annotations
 
-from ..plugins import InvalidConstraint, Joint, Side, Unilateral, angles, displacements, shown
+from typing import TYPE_CHECKING
+
+from ..plugins import InvalidConstraint, Joint, Side, Unilateral, chosen_coordinate, geometry_of, shown
 from .joint_rate import AngleRate, DisplacementRate
+
+if TYPE_CHECKING:
+    from ..hints import JointCoordinate
 
 
 class Ratchet(Unilateral, Joint):
@@ -16,8 +21,8 @@ class Ratchet(Unilateral, Joint):
 
     Parameters
     ----------
-    joint : Joint
-        With an angle or a displacement, in the scene; of a joint with both the angle, of several angles the first.
+    joint : Joint, or (Joint, "angle" or "displacement"), or (Joint, "angle", index)
+        In the scene; of a joint alone that has both the angle counts, of several angles the first.
     direction : {1, -1}
         -1: the coordinate only falls.
 
@@ -48,19 +53,15 @@ class Ratchet(Unilateral, Joint):
     ('ratchet',) at 0.400000 m
     """
 
+    permanent = ("joint", "coordinate")
     markers = ()
 
-    def __init__(self, joint: Joint, direction: int = 1, name: str = "") -> None:
-        found = (angles(joint) or displacements(joint)) if getattr(joint, "joint_coordinates", ()) else []
-        if not found:
-            raise InvalidConstraint(
-                f"{name or 'Ratchet'}: joint must be one with an angle or a displacement, got {joint!r}."
-            )
-        self.__dict__["joint"] = joint
-        super().__init__(*found[0][:2], name=name)
+    def __init__(self, joint: JointCoordinate, direction: int = 1, name: str = "") -> None:
+        self.__dict__["joint"], *coordinate = chosen_coordinate(name or "Ratchet", joint, default=True)
+        self.__dict__["coordinate"] = tuple(coordinate)
+        super().__init__(*geometry_of(self.joint, *coordinate)[:2], name=name)
         self.direction = direction
         self._set_law(0.0)
-        self.check()
 
     def _untitled(self, bodies):
         return f"{self._kind()}({self.joint.name})"
@@ -74,17 +75,18 @@ class Ratchet(Unilateral, Joint):
 
     def compose(self):
         """Eq. (1)."""
-        if angles(self.joint):
-            own, other, f, g, h = angles(self.joint)[0]
+        own, other, *place = geometry_of(self.joint, *self.coordinate)
+        if self.coordinate[0] == "angle":
+            f, g, h = place
             yield "rate", AngleRate(own, other, zero_a=f, quarter_a=g, hand_b=h)
         else:
-            own, other, e, s_own, s_other = displacements(self.joint)[0]
+            e, s_own, s_other = place
             yield "rate", DisplacementRate(own, other, axis_a=e, point_a=s_own, point_b=s_other)
 
     @property
     def sides(self):
         """Eq. (1)."""
-        return (Side(self.parts[0], float(self.direction), follows=self.joint),)
+        return (Side(self.parts[0], float(self.direction), follows=(self.joint, *self.coordinate)),)
 
     @classmethod
     def example(cls, rng, a, b):

@@ -178,7 +178,6 @@ class RollsOnPlane(Unilateral, Rolls):
         """Take slip and the coefficients, at the end of `__init__`."""
         self.slip = slip
         self._set_law(restitution, kinetic, static)
-        self.check()
 
     @property
     def unilateral(self) -> bool:

@@ -110,7 +110,6 @@ class Rope(Unilateral, SumRow):
         super().__init__(a, b, (), name)
         self.length = self._present_length if length is None else length
         self._set_law(restitution)
-        self.check()
 
     def _untitled(self, bodies):
         return f"Rope({', '.join(body.name for body, _ in self.points)})"

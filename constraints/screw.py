@@ -66,7 +66,6 @@ class Screw(FramedJoint):
         self.lead = demand_lead(self, "lead", lead)
         turn = travel(a, b, self.axis_a, self.point_a, self.point_b) / self.lead
         set_apart(self, places, turn)
-        self.check()
 
     def check(self):
         """Refuse a lead of zero, and references along the axes."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import InvalidConstraint, Joint, Point, Side, Unilateral, Vector, across, positive
+from ..plugins import InvalidConstraint, Joint, Point, Side, Unilateral, Vector, across, not_negative
 from .distance import Distance
 from .plane_contact import PlaneContact
 from .rolling_contact import RollingContact
@@ -30,9 +30,9 @@ class SphereContact(Unilateral, Joint):
     Parameters
     ----------
     radius_a : float, m
-        Of the ball of a.
+        Of the ball of a; 0 for a point.
     radius_b : float, m; optional
-        Of the ball of b. None for a plane of b, through center_b with the normal normal_b.
+        Of the ball of b, 0 for a point. None for a plane of b, through center_b with the normal normal_b.
     normal_b : array_like (3,), optional
         Of the plane, body frame of b; the ball is on this side.
     inside : bool
@@ -93,14 +93,16 @@ class SphereContact(Unilateral, Joint):
     def check(self):
         """Refuse radii that are none, and two shapes of b at once."""
         self._check_law()
-        positive(self.radius_a, f"{self.name}: radius_a (m)", InvalidConstraint)
+        not_negative(self.radius_a, f"{self.name}: radius_a (m)", InvalidConstraint)
         if (self.radius_b is None) == (self.normal_b is None):
             raise InvalidConstraint(
                 f"{self.name}: give radius_b for a ball of b, or normal_b for a plane of b through center_b; got "
                 f"{'neither' if self.radius_b is None else 'both'}."
             )
         if self.radius_b is not None:
-            positive(self.radius_b, f"{self.name}: radius_b (m)", InvalidConstraint)
+            not_negative(self.radius_b, f"{self.name}: radius_b (m)", InvalidConstraint)
+            if self.radius_a == self.radius_b == 0.0:
+                raise InvalidConstraint(f"{self.name}: two points don't collide; give a radius above 0 m.")
         if self.rubs and self.radius_b is not None and 3 in (self.a.dimension, self.b.dimension):
             body = self.a if self.a.dimension == 3 else self.b
             raise InvalidConstraint(
@@ -131,7 +133,7 @@ class SphereContact(Unilateral, Joint):
             share = (-1.0 if self.inside else 1.0) * self.radius_a / self._distance
             centers = {"center_a": self.center_a, "center_b": self.center_b}
             yield "contact", SphereRolling(self.a, self.b, **centers, distance=self._distance, share=share)
-        elif self.a.dimension == 3:
+        elif self._is_point:
             for normal in (self.normal_b, *across(self.normal_b)):
                 point = self.center_b + self.radius_a * self.normal_b
                 yield "contact", PlaneContact(self.a, self.b, point_a=self.center_a, point_b=point, normal_b=normal)
@@ -143,6 +145,11 @@ class SphereContact(Unilateral, Joint):
             yield "contact", RollingContact(self.a, self.b, **places, **frame, **plane, semi_axes=[self.radius_a] * 3)
 
     @property
+    def _is_point(self):
+        """Whether friction can't turn a: its slip is that of a point."""
+        return self.a.dimension == 3 or self.radius_a == 0.0
+
+    @property
     def _distance(self):
         return self.radius_b - self.radius_a if self.inside else self.radius_a + self.radius_b
 
@@ -150,7 +157,7 @@ class SphereContact(Unilateral, Joint):
     def _friction(self):
         """Its `Grip`."""
         balls = 0.0 if self.radius_b is None else -1.0 if self.inside else 1.0
-        radius = 0.0 if self.a.dimension == 3 else self.radius_a
+        radius = 0.0 if self._is_point else self.radius_a
         normal = (0.0, 0.0, 1.0) if self.normal_b is None else self.normal_b
         point = self.center_b if balls else self.center_b + (self.radius_a - radius) * normal
         places = {"point_a": self.center_a, "point_b": point, "normal_b": normal}

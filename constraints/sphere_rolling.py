@@ -71,7 +71,6 @@ class SphereRolling(Primitive):
         frame = dict(zip(names, np.tile(np.eye(3), (2, 1)), strict=True))
         super().__init__(a, b, **{**frame, **places})
         self.distance, self.share = distance, share
-        self.check()
 
     def check(self):
         """Refuse a distance that is none."""

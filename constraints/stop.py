@@ -10,13 +10,16 @@ gap is measured by the counted angle, over any number of turns. Never singular b
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import InvalidConstraint, Joint, Side, Unilateral, angles, displacements, finite, shown, shown_for_handle
+from ..plugins import InvalidConstraint, Joint, Side, Unilateral, chosen_coordinate, finite, geometry_of, shown
 from .dot1 import Dot1
 from .dot2 import Dot2
+
+if TYPE_CHECKING:
+    from ..hints import JointCoordinate
 
 
 class Stop(Unilateral, Joint):
@@ -24,8 +27,8 @@ class Stop(Unilateral, Joint):
 
     Parameters
     ----------
-    joint : Joint
-        With an angle or a displacement, in the scene; of a joint with both the angle, of several angles the first.
+    joint : Joint, or (Joint, "angle" or "displacement"), or (Joint, "angle", index)
+        In the scene; of a joint alone that has both the angle counts, of several angles the first.
     lower, upper : float, rad or m; optional
         Bounds of `solution.angle(joint)`, or of `solution.displacement(joint)`; one of them at least.
     restitution : float, 0 to 1
@@ -56,24 +59,21 @@ class Stop(Unilateral, Joint):
     1.000 s [ 1.5 -0.6]
     """
 
+    permanent = ("joint", "coordinate")
     markers = ()
     excess = "is passed"
 
     def __init__(
         self,
-        joint: Joint,
+        joint: JointCoordinate,
         lower: float | None = None,
         upper: float | None = None,
         restitution: float = 0.0,
         name: str = "",
     ) -> None:
-        found = (angles(joint) or displacements(joint)) if getattr(joint, "joint_coordinates", ()) else []
-        if not found:
-            raise InvalidConstraint(
-                f"{name or 'Stop'}: joint must be one with an angle or a displacement, got {shown_for_handle(joint)}."
-            )
-        self.__dict__["joint"] = joint
-        super().__init__(*found[0][:2], name=name)
+        self.__dict__["joint"], *coordinate = chosen_coordinate(name or "Stop", joint, default=True)
+        self.__dict__["coordinate"] = tuple(coordinate)
+        super().__init__(*self.geometry[:2], name=name)
         self.lower, self.upper = lower, upper
         self._set_law(restitution)
 
@@ -97,7 +97,7 @@ class Stop(Unilateral, Joint):
     @property
     def geometry(self) -> Any:
         """Where the coordinate is measured: an `AngleGeometry` or a `DisplacementGeometry`."""
-        return (angles(self.joint) or displacements(self.joint))[0]
+        return geometry_of(self.joint, *self.coordinate)
 
     def _bounds(self):
         return [(name, float(value)) for name in ("lower", "upper") if (value := getattr(self, name)) is not None]
@@ -106,7 +106,7 @@ class Stop(Unilateral, Joint):
         """Rows of Eqs. (1), (2)."""
         own, other, *place = self.geometry
         for name, bound in self._bounds():
-            if angles(self.joint):
+            if self.coordinate[0] == "angle":
                 f, g, h = map(np.array, place)
                 axis = math.cos(bound) * g - math.sin(bound) * f
                 yield name, Dot1(own, other, axis_a=axis, axis_b=h)
@@ -117,9 +117,12 @@ class Stop(Unilateral, Joint):
     @property
     def sides(self):
         """One for each bound."""
-        joint = self.joint if angles(self.joint) else None
+        kind, index = self.coordinate
+        joint = self.joint if kind == "angle" else None
         bounds = zip(self.parts, self._bounds(), strict=True)
-        return tuple(Side(part, 1.0 if name == "lower" else -1.0, joint, 0, bound) for part, (name, bound) in bounds)
+        return tuple(
+            Side(part, 1.0 if name == "lower" else -1.0, joint, index, bound) for part, (name, bound) in bounds
+        )
 
     @classmethod
     def example(cls, rng, a, b):

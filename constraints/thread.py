@@ -85,7 +85,6 @@ class Thread(Primitive):
     def __init__(self, a: BodyLike, b: BodyLike, *, lead: float | None = None, **places: Any) -> None:
         super().__init__(a, b, **places)
         self.lead = lead
-        self.check()
 
     def check(self):
         """Refuse a lead of zero."""

@@ -54,6 +54,14 @@ GOVERNOR = {
     "left": S.Sphere(0.05),
     "right": S.Sphere(0.05),
 }
+WOODPECKER = {
+    "sleeve": [S.Box((0.0062, 0.006, 0.0116)), S.Capsule(0.0005, 0.01, axis="x", position=(0.005, 0, 0))],
+    "bird": [
+        S.Sphere(0.004),
+        S.Capsule(0.002, 0.018, axis="z", position=(-0.002, 0, 0.009)),
+        S.Capsule(0.0006, 0.017, axis="x", position=(-0.0115, 0, 0.02)),
+    ],
+}
 
 
 def _rate(name):
@@ -206,6 +214,25 @@ SECTIONS = {
         Entry("cradle", "Newton's cradle", 1.2, "first, last (m)", lambda m, s: m.ends(s), (0.0, 0.5), animated=True),
         Entry(
             "box_stack", "A stack of boxes", 1.0, "heights (m)", lambda m, s: m.heights(s), (0.0, 0.5), animated=True
+        ),
+        Entry(
+            "woodpecker",
+            "Woodpecker toy",
+            0.9,
+            "sleeve (m)",
+            lambda m, s: s.position("sleeve")[:, 2],
+            (0.0, 0.1),
+            shapes=WOODPECKER,
+            animated=True,
+        ),
+        Entry(
+            "clearance",
+            "Slider-crank with clearance",
+            0.1,
+            "slider / play",
+            lambda m, s: m.offset(s),
+            (0.0, 0.1),
+            shapes={"slider": S.Box((0.1, 0.05, 0.05))},
         ),
     ),
     "Control": (

@@ -1,10 +1,10 @@
 """Measure again what the pages have as tables, and write it between their marks.
 
-    python -m docs.measure [methods] [benchmarks] [stiff] [ensembles] [stress] [--quick]
+    python -m docs.measure [methods] [benchmarks] [stiff] [ensembles] [contacts] [stress] [--quick]
 
-methods: choosing-a-method.md; benchmarks, stiff: benchmarks.md; ensembles: ensembles.md; stress: stress.md and
-its figure. All of them take some hours, with --quick some minutes. Milliseconds are those of your machine: compare
-ratios.
+methods: choosing-a-method.md; benchmarks, stiff: benchmarks.md; ensembles: ensembles.md; contacts: how-to/contact.md;
+stress: stress.md and its figure. All of them take some hours, with --quick some minutes. Milliseconds are those of your
+machine: compare ratios.
 """
 
 import argparse
@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import tsdyn as ts
+from benchmarks import contacts as contact_peers
 from benchmarks import ensemble_peers, provenance, stiff, stiff_peers, work_precision
 from examples import drive_train, four_bar, stick_slip, top
 from tsdyn.cli import main as tsdyn
@@ -127,6 +128,12 @@ def stiff_scenes(quick):
     return "\n".join([*lines, f"Milliseconds to an error of positions, m; {provenance.line()}"])
 
 
+def contacts(quick):
+    """The table of how-to/contact.md: errors and milliseconds of contacts, of tsdyn and other programs."""
+    lines = [*contact_peers.table(*([("ball", "chain")] if quick else []))]
+    return "\n".join([*lines, "", provenance.line()])
+
+
 def stress(quick):
     """The table and the figure of stress.md, by its own command."""
     words = ["squeezer", "governor"] if quick else ["--plot", str(DOCS / "images" / "stress.png")]
@@ -149,6 +156,7 @@ TABLES = {
     "benchmarks": (benchmarks, "benchmarks.md"),
     "stiff": (stiff_scenes, "benchmarks.md"),
     "ensembles": (ensembles, "ensembles.md"),
+    "contacts": (contacts, "how-to/contact.md"),
 }
 PARTS = ", ".join([*TABLES, "stress"])
 

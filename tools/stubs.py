@@ -85,6 +85,8 @@ def _attributes(cls: type, known: tuple[str, ...]) -> list[str]:
         if name in ("a", "b", "name", *known) or method or not hasattr(instance, name):
             continue
         given = str(parameter.annotation)
+        if given == "JointCoordinate" and isinstance(getattr(instance, name), ts.Joint):
+            given = "Joint"  # of which another attribute says the coordinate
         if not _may_be_none(cls, name):
             given = given.removesuffix(" | None")
         lines += _attribute(name, READ.get(given, given), given if _may_be_set(instance, name) else None)

@@ -40,6 +40,7 @@ from .rows.interface import ELIMINATION
 from .runs import dense_output
 from .runs.arguments import adaptive
 from .runs.path_loads import watch
+from .runs.step_engine import second_derivative
 from .runs.stepper import advance
 from .taylor import step_parts
 from .taylor.layout import FAR, no_series, pays, room
@@ -137,7 +138,7 @@ def of_method(method, form, within, far=False, rough=False):
         return
     kernels = form.kernels
     yield from (kernels.place, kernels.accelerate, kernels.complete)
-    yield from (kernels.check, kernels.start_chart, kernels.error_norm, advance)
+    yield from (kernels.check, kernels.start_chart, advance)
     if method.driver == "steps":
         yield from filter(None, called_for(method.kernel(form.first_order)[0]))
         yield from form.stage_kernels(form.frees_stages)
@@ -148,7 +149,8 @@ def of_method(method, form, within, far=False, rough=False):
     if within:
         interpolant = method.interpolant(form.first_order)
         yield from (interpolant.fill, interpolant.value)
-        yield from (method.second,) if method.implicit else ()
+        yield from (kernels.normal,) if form.has_normals else ()
+        yield from filter(None, (second_derivative(method, form),))
 
 
 def of_phases():

@@ -63,6 +63,7 @@ AnyBody: TypeAlias = PointMass | Ground
 Place: TypeAlias = str | PathLike[str]  # of a file
 BodyLike: TypeAlias = PointMass | Ground | str  # a handle, or a name
 ItemLike: TypeAlias = Attachment | str
+JointCoordinate: TypeAlias = Joint | tuple[Joint, str] | tuple[Joint, str, int]  # "angle" or "displacement", index
 RopePoints: TypeAlias = Sequence[tuple[BodyLike, ArrayLike]]
 Orientation: TypeAlias = ArrayLike | Rotation
 Span: TypeAlias = Sequence[float] | Floats

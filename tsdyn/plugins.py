@@ -6,7 +6,17 @@ integrators/ import from here, too. docs/plug-ins.md shows how.
 
 from .calls import Placing, fitting
 from .elements.bodies import Ground, PointMass, ground_point, named, rotation_matrix
-from .elements.element import Angle, Displacement, angles, displacements, in_frame, rope_points, stop_waiting
+from .elements.element import (
+    Angle,
+    Displacement,
+    angles,
+    chosen_coordinate,
+    displacements,
+    geometry_of,
+    in_frame,
+    rope_points,
+    stop_waiting,
+)
 from .elements.force import Force, load, vector_load
 from .elements.friction import (
     AXIS,
@@ -198,6 +208,7 @@ __all__ = [
     "call_accelerate",
     "call_place",
     "carried",
+    "chosen_coordinate",
     "coefficient",
     "coefficient_series",
     "coordinate_function",
@@ -215,6 +226,7 @@ __all__ = [
     "floats",
     "functions_of",
     "gate",
+    "geometry_of",
     "given_series",
     "ground_point",
     "heading",

@@ -114,7 +114,7 @@ class SaddleWorkspace(NamedTuple):
     B: np.ndarray  # (nb * 9,)  omega' by pi' at constant rates of chart coordinates; saddle_point.py
     lower: np.ndarray  # factors; saddle_point.factorise
     upper: np.ndarray
-    multipliers: np.ndarray  # (m,)  what the last Newton correction led to; saddle_point.solve
+    multipliers: np.ndarray  # (m,)  what the last Newton correction led to; implicit_tangent.correct
     before: np.ndarray  # (m,)  those of the stage before; implicit_tangent.py
     a: np.ndarray  # ((nb + 1) * 8,)  accelerations of bodies, the same
     x: np.ndarray  # (s,)  right-hand side and solution, in order of elimination
@@ -287,6 +287,7 @@ class RunNumbers(Record):
     blocks: int  # of its blocks
     next_eval: int  # in its t_eval
     next_stop: int  # in its stops
+    normal_at: int  # where in a block the normal coordinates of the step's ends begin; 0: it has none
     last_stage: int  # where in memory an explicit method leaves its last stage; 0: stiffness is not watched
     stage_at: int  # where in memory an implicit method leaves its last stage; 0 for others
     at_limit: int  # steps at the limit of stability, or in which little moves
@@ -298,7 +299,7 @@ class RunNumbers(Record):
 class RunKernels(Record):
     """Addresses of what drivers call; zero for what a run doesn't."""
 
-    place: int  # the formulation's: place to error_norm
+    place: int  # the formulation's: place to normal
     accelerate: int
     stage_place: int  # place and accelerate of an explicit step's stages
     stage_accelerate: int
@@ -306,6 +307,7 @@ class RunKernels(Record):
     check: int
     start_chart: int
     error_norm: int
+    normal: int  # of a form with a basis: u and ud
     step: int  # the method's: step to second
     plug_in: int  # the step kernel of a plug-in; see methods/explicit.py
     error: int
@@ -351,7 +353,8 @@ class RunState(NamedTuple):
     path: np.ndarray  # scratch of path_loads.py
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
-    block: np.ndarray  # the present step's: start, h, end, chart; the interpolant's data; what is remembered
+    normal: np.ndarray  # (2 m,)  normal coordinates u and ud at the last accepted point; of no size without a basis
+    block: np.ndarray  # the present step's: start, h, end, chart; the interpolant's data; u, ud of its ends; ...
     clock: Clock
     numbers: RunNumbers
     kernels: RunKernels
@@ -362,7 +365,7 @@ def enter_joints(run, handles, remembered):
     run.joints[:], run.frames[:], run.remembered[:] = handles.joints, handles.frames, remembered
 
 
-def lay_out(n, nx, ny, angles, slots, *, tableau=0, memory=0, warm=0, block=0, path=0, watched=0, loaded=0):
+def lay_out(n, nx, ny, angles, slots, *, tableau=0, memory=0, warm=0, block=0, normal=0, path=0, watched=0, loaded=0):
     """The `RunState` of a system of sizes nx, ny, whose forces remember so many `slots`.
 
     The other lengths are those of its arrays; a block is longer than its interpolant's data, which is what is given.
@@ -376,7 +379,8 @@ def lay_out(n, nx, ny, angles, slots, *, tableau=0, memory=0, warm=0, block=0, p
         **dict.fromkeys(("y", "yd", "dy", "y_low", "y_low_old", "y_old", "yd_old", "ys", "yds"), (ny,)),
         "warm": (warm,),
         "memory": (memory,),
-        "block": (B_DATA + block + angles + slots,),
+        "normal": (2 * normal,),
+        "block": (B_DATA + block + 4 * normal + angles + slots,),
         "path": (path,),
     }
     whole = {"joints": (angles, 4), "watched": (watched,), "loaded": (loaded,)}

@@ -419,7 +419,7 @@ def test_a_run_resumes_to_the_bit(tmp_path, monkeypatch):
         (lambda j, k, o: ((j, k), {"ratio": np.nan}), "ratio must be a finite number"),
         (lambda j, k, o: ((j, k), {"offset": np.inf}), "offset must be a finite number"),
         (lambda j, k, o: ((j, o), {}), "another scene"),
-        (lambda j, k, o: ((j, 3.0), {}), "joints with an angle or a displacement, .* got 3.0"),
+        (lambda j, k, o: ((j, 3.0), {}), "with an angle or a displacement, .* got 3.0"),
         (lambda j, k, o: (((j, "displacement"), k), {}), "say which coordinate"),
         (lambda j, k, o: ((j, k), {"polynomial": ()}), "polynomial must be finite coefficients"),
         (lambda j, k, o: ((j, k), {"polynomial": (1.0, np.nan)}), "polynomial must be finite coefficients"),

@@ -8,7 +8,7 @@ import pytest
 import tsdyn as ts
 from examples.bead_on_surface import OnEllipsoid
 from examples.driven_pivot import DrivenPivot
-from tests.helpers.built_in import JOINTS, PRIMITIVES
+from tests.helpers.built_in import FORCES, JOINTS, PRIMITIVES
 from tests.helpers.tolerances import ALGEBRA
 from tsdyn.jit.kernels import twin
 from tsdyn.testing.series_checks import check_constraint_series
@@ -44,6 +44,15 @@ GIVEN = {
 
 def test_every_primitive_and_joint_is_public():
     assert {kind.__name__ for kind in PRIMITIVES + JOINTS} <= set(C.__all__)
+
+
+@pytest.mark.parametrize("kind", [*PRIMITIVES, *JOINTS, *FORCES], ids=lambda kind: kind.__name__)
+def test_a_new_one_is_checked_once(kind, monkeypatch, rng):
+    scene, asked, plain = ts.Scene(), [], kind.check
+    a, b = (scene.add_body(1.0, (1, 1, 1), position=(x, 0, 0)) for x in (0, 1))
+    monkeypatch.setattr(kind, "check", lambda self: asked.append(self) or plain(self))
+    one = kind.example(rng, a, b)
+    assert asked == [one]
 
 
 @pytest.mark.slow_but("0-*", "!0-OnEllipsoid", "!0-DrivenPivot")

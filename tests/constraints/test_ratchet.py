@@ -108,3 +108,15 @@ def test_files_analyses_and_what_cant_be(tmp_path):
         C.Ratchet(scene["hinge"], 0)
     with pytest.raises(ts.InvalidConstraint, match="an angle or a displacement"):
         C.Ratchet(scene.add(C.PlaneContact(scene["wheel"], scene.ground, normal_b=(0, 0, 1))))
+
+
+def test_of_a_joint_with_both_coordinates_the_one_that_is_named():
+    """Against the ratchet's direction the body stops at once along one coordinate, and goes on along the other."""
+    for which, (v, w) in ((), (-1.0, 0.0)), (("angle",), (-1.0, 0.0)), (("displacement",), (0.0, -2.0)):
+        scene = ts.Scene(gravity=(0, 0, 0))
+        rod = scene.add_body(1.0, (0.1, 0.1, 0.1), velocity=(0, 0, -1), angular_velocity=(0, 0, -2), name="rod")
+        sleeve = scene.add(C.Cylindrical(scene.ground, rod, axis_a=(0, 0, 1), axis_b=(0, 0, 1), name="sleeve"))
+        scene.add(C.Ratchet((sleeve, *which) if which else sleeve))
+        solution = ts.simulate(scene, (0, 1))
+        np.testing.assert_allclose(solution.displacement("sleeve")[-1], v, atol=1e-14)
+        np.testing.assert_allclose(solution.angle("sleeve")[-1], w, atol=1e-14)

@@ -157,6 +157,29 @@ def test_the_message_says_how_to_go_on(tmp_path):
 
 
 @pytest.mark.usefixtures("short_slices")
+def bouncing():
+    scene = ts.Scene()
+    ball = scene.add_body(1.0, (0.1, 0.1, 0.1), position=(0.0, 0.0, 1.0), velocity=(1.0, 0.0, 0.0))
+    scene.add(ts.constraints.SphereContact(ball, scene.ground, radius_a=0.2, normal_b=(0, 0, 1), restitution=0.7))
+    return scene
+
+
+@pytest.mark.parametrize("build", [top.build, bouncing], ids=["top", "ball"])
+@pytest.mark.parametrize("method", ["dop853", "taylor"])
+def test_a_run_that_max_steps_stops_may_make_as_many_steps_again(build, method, tmp_path):
+    options, path = {"integrator": method, "history": True}, tmp_path / "run.h5"
+    whole = ts.simulate(build(), (0.0, 1.0), **options)
+    most = whole.stats.steps // 3 or 1
+    found = [ts.simulate(build(), (0.0, 1.0), store=path, checkpoint=1e9, max_steps=most, **options)]
+    assert f"Continue with ts.resume({str(path)!r})" in found[0].message
+    while not found[-1].success:
+        assert found[-1].status == ts.Status.MAX_STEPS
+        assert found[-1].stats.steps == len(found) * most
+        found.append(ts.resume(path))
+    assert len(found) == -(-whole.stats.steps // most)
+    same(whole, found[-1])
+
+
 def test_scenes_with_code_are_passed_again(tmp_path):
     path, scene = tmp_path / "run.h5", driven_pivot.build()
     stop_and_go_on(driven_pivot.build, 0.5, path, again=scene, integrator="dop853")

@@ -5,7 +5,8 @@ import pytest
 
 import tsdyn as ts
 from examples import bicycle, coin, turntable
-from tests.helpers import skates
+from tests.helpers import closed_loops, skates
+from tests.helpers.reduced_ode import Mixed, difference
 from tests.helpers.refusals import refuse
 from tests.helpers.tolerances import FINE, HELD, NEAR, TIGHT
 
@@ -35,7 +36,9 @@ WAYS = {  # options, largest error
     "rk45, null-space": ({"integrator": I.RK45(1e-11, 1e-11), "formulation": "null-space"}, FINE),
     "radau": ({"integrator": I.Radau(1e-11, 1e-11)}, FINE),
     "sdirk54": ({"integrator": I.SDIRK54(1e-9, 1e-9)}, NEAR),
+    "sdirk54, null-space": ({"integrator": I.SDIRK54(1e-9, 1e-9), "formulation": "null-space"}, NEAR),
     "trapezoid": ({"integrator": I.ImplicitTrapezoid(1e-7, 1e-7)}, 1e-5),
+    "trapezoid, null-space": ({"integrator": I.ImplicitTrapezoid(1e-7, 1e-7), "formulation": "null-space"}, 1e-5),
 }
 SPAN = 2.0
 
@@ -101,12 +104,14 @@ ORDERS = {  # method, options, steps, least order observed
     "rk45, placed": (I.RK45, {"chart_interval": 4}, (0.04, 0.02, 0.01), 4.6),
     "rk45, null-space": (I.RK45, {"formulation": "null-space"}, (0.04, 0.02, 0.01), 4.6),
     "sdirk54": (I.SDIRK54, {}, (0.04, 0.02, 0.01), 3.8),
+    "sdirk54, null-space": (I.SDIRK54, {"formulation": "null-space"}, (0.1, 0.05, 0.025), 3.8),
     "trapezoid": (I.ImplicitTrapezoid, {}, (0.04, 0.02, 0.01), 1.95),
+    "trapezoid, null-space": (I.ImplicitTrapezoid, {"formulation": "null-space"}, (0.04, 0.02, 0.01), 1.95),
     "radau": (I.Radau, {}, (0.2, 0.1), 4.6),
 }
 
 
-@pytest.mark.slow_but("nystrom4, null-space", "rk45, placed", "radau")
+@pytest.mark.slow_but("nystrom4, null-space", "rk45, placed", "radau", "trapezoid, null-space")
 @pytest.mark.parametrize("case", ORDERS.values(), ids=ORDERS)
 def test_order(case):
     """Errors fall with the order of the method, on a sleigh with rows of both sorts."""
@@ -125,6 +130,7 @@ BETWEEN = {  # options of coarse runs, how far between the steps from the series
     "rk45, null-space": ({"integrator": I.RK45(1e-8, 1e-8), "formulation": "null-space"}, 1e-6),
     "nystrom4, null-space": ({"integrator": I.Nystrom4(step=0.01), "formulation": "null-space"}, 1e-6),
     "radau": ({"integrator": I.Radau(1e-8, 1e-8)}, 1e-6),
+    "sdirk54, null-space": ({"integrator": I.SDIRK54(1e-8, 1e-8), "formulation": "null-space"}, 1e-6),
 }
 
 
@@ -166,15 +172,51 @@ def test_redundant_rows_beside_rows_on_velocities(formulation, doubled):
     assert abs(solution.position("car")[-1, 0] - 1.0) < TIGHT
 
 
-@pytest.mark.parametrize("method", ["SDIRK54", "ImplicitTrapezoid"])
-def test_implicit_methods_are_refused_in_the_null_space_form(method):
-    integrator = getattr(I, method)(1e-6, 1e-6)
-    options = {"integrator": integrator, "formulation": "null-space"}
-    for run in (
-        lambda: ts.simulate(skates.skate(), (0, 1), **options),
-        lambda: ts.ensemble(skates.skate(), {"skate.mass": [1.0, 2.0]}, (0, 1), **options),
-    ):
-        refuse(run, ts.InvalidArgument, (method, "rows on velocities", "null-space", "formulation='tangent'"))
+def stiff():
+    """A skate on a stiff spring with a damper of 1e6 N s/m, at its free length: it turns about the spring's end."""
+    scene, spring = skates.skate(), {"stiffness": 1e8, "damping": 1e6, "free_length": np.hypot(0.8, 1.9)}
+    scene.add(ts.forces.Spring("skate", scene.ground, point_a=(0.2, 0.1, 0), point_b=(1, 2, 0), **spring))
+    return scene
+
+
+def test_stiff_scenes_take_long_steps_in_the_null_space_form():
+    """Steps of a thousand times what an explicit method could take; the motion is that of the tangent form."""
+    runs = [
+        ts.simulate(stiff(), (0, SPAN), integrator=I.SDIRK54(1e-7, 1e-7), formulation=formulation).raise_if_failed()
+        for formulation in ("tangent", "null-space")
+    ]
+    assert off(*runs) < 1e-5
+    assert runs[1].stats.steps < 1000
+    assert runs[1].stats.jacobians < runs[1].stats.steps
+    assert runs[1].constraint_error.velocity.max() < HELD
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["skate", "sleigh", "on a table", "belt of time", "coin", "bicycle"])
+def test_jacobian_of_the_null_space_form(name, rng):
+    """Derivatives of (vd, wd) by (v, w), away from the chart's start and its time, against differences."""
+    scene, t = SCENES[name](), 0.2
+    scene.add(ts.forces.Spring(scene.bodies[0], scene.ground, point_b=(1, 2, 3), stiffness=3.0, damping=2.0))
+    ode = Mixed(scene)
+    z = ode.start + np.concatenate([0.05 * rng.normal(size=ode.nx), rng.normal(size=ode.ny)])
+    rates, J = ode.f(z, t), ode.jacobian(t)
+    expected = difference(lambda x: ode.f(x, t), z, 1e-3)
+    np.testing.assert_allclose(J, expected, rtol=0, atol=1e-8 * (1.0 + np.abs(expected).max() + np.abs(rates).max()))
+
+
+@pytest.mark.parametrize("method", [I.RK45(1e-9, 1e-9), I.SDIRK54(1e-8, 1e-8)], ids=["rk45", "sdirk54"])
+def test_the_null_space_form_crosses_singular_configurations(method):
+    """A parallelogram turns over and over beside a ball that rolls down a wall, at g / (1 + J / m R^2)."""
+    scene = closed_loops.parallelogram(planar=True)
+    moving = {"velocity": (1, 0, 0), "angular_velocity": (0, 2, 0)}
+    ball = scene.add_body(1.0, (0.1, 0.1, 0.1), (0, 0, 5.5), **moving, name="ball")
+    scene.add(ts.constraints.RollingBall(ball, scene.ground, radius=0.5, point_b=(0, 0, 5), normal_b=(0, 0, 1)))
+    solution = ts.simulate(scene, (0, 5), integrator=method, formulation="null-space").raise_if_failed()
+    other = ts.simulate(scene, (0, 5)).raise_if_failed()
+    turned = closed_loops.angles(solution)
+    assert turned[0][-1] - turned[0][0] > 8.0 * np.pi
+    assert off(solution, other) < 1e-5
+    np.testing.assert_allclose(solution.position("ball")[-1], (5.0, -12.5 * 9.81 / 1.4, 5.5), atol=NEAR)
 
 
 def test_series_against_differences():

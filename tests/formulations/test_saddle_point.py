@@ -50,19 +50,11 @@ def test_stiffness_and_damping_of_bodies(name, rng):
 
 
 def demand_corrections(stages, y, g, rng, share):
-    """A Newton correction and a softened error in the middle of the chart, against dense solves; tangent parts."""
+    """A softened error in the middle of the chart, against dense solves; tangent parts."""
     P0, t, x = stages.projection, 0.0, np.zeros(stages.k)
     f_x = difference(lambda x: stages.f(x, y, t), x, 1e-3)
     f_y = difference(lambda y: stages.f(x, y, t), y, 1e-3)
-    r, ex, ey = stages.moving * rng.normal(size=(3, stages.k))
-    ex, ey, one = P0 @ ex, P0 @ ey, np.eye(stages.k)
-    right = P0 @ np.linalg.solve(one - g * f_y - g * g * f_x, r)
-    small = share * g * np.abs(r).max() + CLOSE
-    for factors in (None, 0):  # of N; of S in their place
-        stages.f(x, y, t)
-        if factors is not None:
-            stages.context.chart.state.factored = factors
-        np.testing.assert_allclose(P0 @ stages.solved(g, r), right, rtol=0, atol=small)
+    ex, ey, one = *(stages.moving * rng.normal(size=(2, stages.k))) @ P0.T, np.eye(stages.k)
     whole = np.block([[one, -g * one], [-g * f_x, one - g * f_y]])
     right = np.linalg.solve(whole, np.concatenate((ex, ey))).reshape(2, -1) @ P0.T
     stages.f(x, y, t)

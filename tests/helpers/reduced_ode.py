@@ -2,6 +2,7 @@
 
 import numpy as np
 
+import tsdyn as ts
 from tsdyn.formulations.registry import formulation
 from tsdyn.jit.kernels import caller, entry, resident
 from tsdyn.methods.diagonally_implicit import call_linearise
@@ -12,6 +13,8 @@ from tsdyn.observables.evaluate import mass_matrix
 from tsdyn.workspaces import Context, allocate, allocate_linear, basis_free_parts
 
 WEIGHTS = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}  # central differences of sixth order
+
+NAMES = "place", "accelerate", "complete", "check", "start_chart", "linearise", "reduce", "factorise", "solve", "soften"
 
 _call_vector, _call_number, _call_chart, _call_soften = caller("pp"), caller("pd"), caller("pdpppp"), caller("ppdp")
 
@@ -40,17 +43,32 @@ def _linearise(context, at, t, renew, vdd):
 
 
 @entry
+def _rates(context, at, t, v, w, wd, vd):
+    status = call_place(at[0], context, t, v)
+    if status == 0:
+        status = call_accelerate(at[1], context, t, w, wd, vd)
+    if status == 0:
+        status = _call_vector(at[2], context, wd)
+    return status
+
+
+@entry
+def _start_mixed(context, at, t, v, w, wd, vd):
+    return _call_chart(at[4], context, t, v, w, wd, vd)
+
+
+@entry
 def solve(context, at, g, rho):
-    """P^-1 A rho; at: addresses of factorise, solve and soften."""
+    """P^-1 A rho; at: addresses of factorise and solve."""
     status = _call_number(at[0], context, g)
     return _call_vector(at[1], context, rho) if status == 0 else status
 
 
 @entry
 def soften(context, at, ex, g, ey):
-    """(I - g J)^-1 (ex, ey)."""
+    """(I - g J)^-1 (ex, ey); at: addresses from that of factorise to that of soften."""
     status = _call_number(at[0], context, g)
-    return _call_soften(at[2], context, ex, g, ey) if status == 0 else status
+    return _call_soften(at[-1], context, ex, g, ey) if status == 0 else status
 
 
 @entry
@@ -80,7 +98,8 @@ class Tangent:
         parts = basis_free_parts(form.graph(packed), n, True)
         self.context = Context(system, work, allocate_linear(system, n, m, True, kept), *parts)
         self.address, *self._keep = resident(self.context)
-        self.at = np.array([*form.addresses().values(), *form.implicit().values()][:10], np.int64)
+        found = form.addresses() | form.implicit()
+        self.at = np.array([found[name] for name in NAMES], np.int64)
         self.k, self.t = n - m, t
         v, self.vd, vdd = np.zeros((3, self.k))
         assert _start(self.address, self.at, t, v, self.vd, vdd) == 0
@@ -110,6 +129,42 @@ class Tangent:
         ex, ey = ex.copy(), ey.copy()
         assert soften(self.address, self.at[7:], ex, g, ey) == 0
         return np.concatenate((ex, ey))
+
+
+class Mixed:
+    """The mixed system (v, w)' of a scene with rows on velocities, none redundant, in the chart of its start."""
+
+    def __init__(self, scene):
+        packed, system, kept = with_derivatives(scene)
+        q, qd = scene.start
+        n, m = q.size, system.segments.shape[0]
+        form = formulation("null-space").serving(ts.integrators.SDIRK54(), rates=True)
+        graph = form.graph(packed)
+        work = allocate(n, m, len(scene.bodies), 1e-14, packed.size, redundant=form.redundancy(packed, graph))
+        work.q[:], work.qd[:] = q, qd
+        parts = allocate_linear(system, n, m, True, kept), *basis_free_parts(graph, n, True)
+        self.context = form.context(packed, Context(system, work, *parts), 0)
+        self.address, *self._keep = resident(self.context)
+        self.at = np.array([*form.addresses().values(), *form.implicit().values()][:10], np.int64)
+        self.nx, self.ny = form.sizes(packed, graph)
+        v, w, wd, vd = np.zeros(self.nx), np.zeros(self.ny), np.zeros(self.ny), np.zeros(self.nx)
+        assert _start_mixed(self.address, self.at, 0.0, v, w, wd, vd) == 0
+        self.start = np.concatenate([v, w])
+
+    def f(self, z, t):
+        """(vd, wd); the place is taken."""
+        wd, vd = np.zeros(self.ny), np.zeros(self.nx)
+        assert _rates(self.address, self.at, t, z[: self.nx].copy(), z[self.nx :].copy(), wd, vd) == 0
+        self.wd = wd
+        return np.concatenate([vd, wd])
+
+    def jacobian(self, t, g=1e-3):
+        """J at the place last taken, of the inverse of I - g J."""
+        assert _linearise(self.address, self.at, t, 1, self.wd) == 0
+        columns = np.eye(self.nx + self.ny)
+        for column in columns:
+            assert solve(self.address, self.at[7:], g, column) == 0
+        return (np.eye(len(columns)) - np.linalg.inv(columns.T)) / g
 
 
 def difference(f, x, h):

@@ -3,7 +3,7 @@
 import numpy as np
 
 import tsdyn as ts
-from tests.helpers.reduced_ode import soften, solve, with_derivatives
+from tests.helpers.reduced_ode import soften, with_derivatives
 from tsdyn.formulations.registry import formulation
 from tsdyn.formulations.saddle_point import add_constraints, add_forces
 from tsdyn.formulations.tolerances import TURN_LIMIT
@@ -16,8 +16,8 @@ from tsdyn.workspaces import Context, allocate, allocate_linear, basis_free_part
 from tsdyn.workspaces import load as load_context
 
 _call_chart, call_check = caller("pdpppp"), caller("p")
-NAMES = "place", "accelerate", "start_chart", "check", "linearise", "reduce", "factorise", "solve", "soften"
-PLACE, ACCELERATE, CHART, CHECK, LINEARISE, REDUCE, FACTORISE, SOLVE, SOFTEN = range(9)
+NAMES = "place", "accelerate", "start_chart", "check", "linearise", "reduce", "factorise", "soften"
+PLACE, ACCELERATE, CHART, CHECK, LINEARISE, REDUCE, FACTORISE, SOFTEN = range(8)
 
 
 @entry
@@ -86,12 +86,6 @@ class Stages:
     def check(self):
         """The reason to leave the chart, or zero."""
         return _check(self.address, self.at)
-
-    def solved(self, g, r):
-        """The Newton correction for a residual r."""
-        r = r.copy()
-        assert solve(self.address, self.at[FACTORISE:], g, r) == 0
-        return r
 
     def softened(self, ex, g, ey):
         """(I - g J)^-1 (ex, ey)."""

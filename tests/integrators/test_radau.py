@@ -5,6 +5,8 @@ import re
 import numpy as np
 import pytest
 from numpy.polynomial import legendre
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import tsdyn as ts
 from benchmarks.stiff import hung, jointed
@@ -89,13 +91,59 @@ def test_other_forms_are_refused(form):
         ts.prepare(scene, integrator="taylor", formulation=form)
 
 
-def test_friction_by_reactions_is_refused_by_name():
-    scene = rough_joints.chain(2)[0]
-    friction = next(force for force in scene.forces if isinstance(force, ts.JointFriction))
-    with pytest.raises(
-        ts.InvalidArgument, match=f"reactions that friction depends on .*{re.escape(friction.name)}.* SDIRK54 does"
-    ):
-        ts.simulate(scene, (0.0, 1.0), integrator="radau")
+@compiles
+@pytest.mark.parametrize("tol", [1e-5, 1e-9])
+def test_a_pendulum_on_a_rough_pin(tol):
+    """Friction by the reactions of the pin, against minimal coordinates in SciPy; it turns back many times."""
+    scene, bar, pin, friction = rough_joints.pendulum()
+    found = ts.simulate(scene, (0.0, 3.0), integrator=I.Radau(tol, tol), dense_output=True).raise_if_failed()
+    angle, rate = solve_ivp(rough_joints.pendulum_rates, (0, 3), (0, 0), method="DOP853", rtol=1e-12, atol=1e-12).y[
+        :, -1
+    ]
+    place = 0.8 * np.array([np.cos(angle), 0.0, -np.sin(angle)])
+    np.testing.assert_allclose(found.position(bar)[-1], place, rtol=0, atol=tol)
+    np.testing.assert_allclose(found.angular_velocity(bar)[-1], (0, rate, 0), rtol=0, atol=10 * tol)
+    demand_on_the_manifold(found, found)
+    rough_joints.demand_balance(scene, found, (pin, friction), tol=tol)
+
+
+@compiles
+@pytest.mark.parametrize("make", [
+    lambda: rough_joints.chain(6)[0],
+    lambda: rough_joints.four_bar()[0],  # with redundant rows
+    lambda: rough_joints.slide(0.5, 0.4)[0],
+], ids=["chain", "four-bar", "slide"])  # fmt: skip
+def test_friction_by_reactions_is_that_of_other_methods(make):
+    exact = ts.simulate(make(), (0.0, 0.3), integrator=I.DOP853(1e-12, 1e-12), t_eval=[0.3])
+    for method in (I.Radau, I.SDIRK54):
+        found = ts.simulate(make(), (0.0, 0.3), integrator=method(1e-7, 1e-7), t_eval=[0.3]).raise_if_failed()
+        np.testing.assert_allclose(found.q, exact.q, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(found.qd, exact.qd, rtol=0, atol=1e-6)
+
+
+@compiles
+@pytest.mark.parametrize("kind", ["force", "reaction"])
+@pytest.mark.parametrize("tol", [1e-3, 1e-4])
+def test_friction_within_a_tiny_slip_velocity(kind, tol):
+    """A block of 1 kg, pushed by 3.2 sin(3 t) N, against friction of 2.5 N: the exact law, in closed form.
+
+    With s = 3 t it slides from s = a = arcsin(2.5 / 3.2) on, until 3 v = 3.2 (cos a - cos s) - 2.5 (s - a) is zero, and
+    sticks to s = a + pi, when it slides back.
+    """
+    scene = ts.Scene(gravity=(0.0, 0.0, -10.0))
+    block = scene.add_point_mass(1.0, name="block")
+    plane = scene.add(ts.constraints.PlaneContact(block, scene.ground, normal_b=(0, 0, 1)))
+    if kind == "force":
+        scene.add(ts.forces.CoulombFriction(block, scene.ground, force=2.5, slip_velocity=1e-7))
+    else:
+        scene.add(ts.forces.ContactFriction(plane, kinetic=0.25, slip_velocity=1e-7))
+    scene.add(ts.forces.PointForce(block, force=(ts.motions.Sine(3.2, 3.0), 0.0, 0.0)))
+    a = np.arcsin(2.5 / 3.2)
+    end = brentq(lambda s: 3.2 * (np.cos(a) - np.cos(s)) - 2.5 * (s - a), a + 0.1, a + np.pi)
+    far = (3.2 * (np.cos(a) * (end - a) - np.sin(end) + np.sin(a)) - 1.25 * (end - a) ** 2) / 9.0
+    times = (0.5 * (end - np.pi + a) + np.arange(12) * np.pi) / 3.0  # while it sticks
+    found = ts.simulate(scene, (0.0, 12.0), integrator=I.Radau(tol, tol), t_eval=times).raise_if_failed()
+    np.testing.assert_allclose(found.q[:, 0], [0, far] * 6, rtol=0, atol=tol)
 
 
 @compiles
@@ -192,3 +240,30 @@ def test_the_interpolant_is_exact_for_polynomials(order):
     np.testing.assert_allclose(state.q[:, 0], force.integ(2)(t), rtol=0, atol=1e2 * EPS)
     np.testing.assert_allclose(state.qd[:, 0], force.integ()(t), rtol=0, atol=1e2 * EPS)
     np.testing.assert_allclose(state.qdd[:, 0], force(t), rtol=0, atol=1e3 * EPS)
+
+
+def exact_chain(links=4):
+    """Links on rough pins of the exact law, released from the horizontal: each pin stops and turns back."""
+    scene = ts.Scene()
+    last = scene.ground
+    for i in range(links):
+        link = scene.add_body(1.0, (0.002, 0.02, 0.02), position=(0.25 + 0.5 * i, 0, 0), name=f"link{i}")
+        pin = scene.add(ts.constraints.Revolute.at(link, last, point=(0.5 * i, 0, 0), axis=(0, 1, 0), name=f"pin{i}"))
+        scene.add(ts.forces.RevoluteFriction(pin, radius=0.02, kinetic=0.2, static=0.3))
+        last = link
+    return scene
+
+
+@compiles
+@pytest.mark.parametrize("method", [I.Radau, I.SDIRK54])
+def test_pins_that_stick_and_slide_by_the_exact_law(method):
+    """The phases and the motion of series; no steps towards the events, which end a phase where they are."""
+    exact = ts.simulate(exact_chain(), (0.0, 1.0), rtol=1e-11, atol=1e-11)
+    found = ts.simulate(exact_chain(), (0.0, 1.0), integrator=method(1e-8, 1e-8)).raise_if_failed()
+    assert [names for *_, names in found.phases] == [names for *_, names in exact.phases] == [
+        (), ("RevoluteFriction(pin1)",), ()
+    ]  # fmt: skip
+    starts = [[begin for begin, *_ in solution.phases] for solution in (found, exact)]
+    np.testing.assert_allclose(*starts, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(found.q[-1], exact.q[-1], rtol=0, atol=1e-8)
+    assert np.diff(np.unique(found.t)).min() > 1e-6

@@ -87,16 +87,16 @@ def test_predictions_of_stages_are_exact_for_polynomials(power, part):
     """Of cubics from four stages of the step and of the one before; of those of lower order from the step's own."""
     tableau, c, before = SDIRK54.tableau.numbers, np.array(SDIRK54.tableau.c), 0.7  # h of the step before, over h
     stages, memory, k = len(c), np.zeros(2 * len(c) + 2), np.zeros(1)
-    own = np.zeros(prediction_memory(stages, 1))
+    own = np.zeros(prediction_memory(stages, 2))
     memory[2 + part :: 2] = (before * c) ** power
-    assert begin_prediction(memory, own, stages, 1, 0.0, before, 1.0) == 0.0
-    assert begin_prediction(memory, own, stages, 1, before, 1.0, 1.0) == before
+    assert begin_prediction(memory, own, stages, 2, 0.0, before, 1.0) == 0.0
+    assert begin_prediction(memory, own, stages, 2, before, 1.0, 1.0) == before
     memory[2 + part :: 2] = (before + c) ** power
     for i in range(1, stages):
-        predict(tableau, memory, own, i, before, 4, part, k)
+        predict(tableau, memory, own, i, before, 4, 2, part, k)
         assert k[0] == pytest.approx((before + c[i]) ** power, rel=100 * EPS)
-        predict(tableau, memory, own, i, 0.0, 4, part, k)
+        predict(tableau, memory, own, i, 0.0, 4, 2, part, k)
         if power < min(i, 4):
             assert k[0] == pytest.approx((before + c[i]) ** power, rel=100 * EPS)
-    assert begin_prediction(memory, own, stages, 1, before, 0.5, 1.0) == 2.0 * before  # the step was rejected
-    assert begin_prediction(memory, own, stages, 1, before + 0.5, 1.0, 2.0) == 0.0  # another chart
+    assert begin_prediction(memory, own, stages, 2, before, 0.5, 1.0) == 2.0 * before  # the step was rejected
+    assert begin_prediction(memory, own, stages, 2, before + 0.5, 1.0, 2.0) == 0.0  # another chart

@@ -17,6 +17,7 @@ from examples import (
     cardan_shaft,
     catapult,
     chebyshev_linkage,
+    clearance,
     clutch,
     coin,
     compass_walker,
@@ -35,6 +36,7 @@ from examples import (
     suspension,
     turntable,
     two_wheeled_robot,
+    woodpecker,
 )
 
 SMALL = 60_000  # bytes
@@ -48,9 +50,9 @@ ROUGH = {  # an end that shows what a run at 1e-3 does wrong
     scotch_yoke: 1.0,
 }
 FURTHER = (
-    bicycle, bouncing_balls, box_stack, cardan_shaft, catapult, chebyshev_linkage, clutch, coin, compass_walker, cradle,
-    delta_robot, docking, flyball_governor, leg_with_rods, rattleback, stewart_platform, suspension, turntable,
-    two_wheeled_robot,
+    bicycle, bouncing_balls, box_stack, cardan_shaft, catapult, chebyshev_linkage, clearance, clutch, coin,
+    compass_walker, cradle, delta_robot, docking, flyball_governor, leg_with_rods, rattleback, stewart_platform,
+    suspension, turntable, two_wheeled_robot, woodpecker,
 )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import tsdyn as ts
 from tests.helpers.closed_forms import point_pendulum
@@ -159,6 +160,49 @@ def test_error_within_one_step(method, power, fine):
         assert one.stats.steps == 1
         off.append(np.abs(one.at(times).q - fine.at(times).q).max())
     assert np.polyfit(np.log(steps), np.log(off), 1)[0] > power - 0.5
+
+
+def bar_on_a_short_link(length):
+    """A bar that falls from a pin on a massless link; the curvature of its chart exceeds the link, and two branches of
+    the constraint lie within a step's reach of each other."""
+    scene = ts.Scene()
+    bar = scene.add_body(mass=1.0, inertia=(0.002, 0.09, 0.09), position=(0.5, 0.0, -length), name="bar")
+    scene.add(C.Distance(bar, scene.ground, point_a=(-0.5, 0.0, 0.0), length=length))
+    return scene
+
+
+def bar_in_angles(length, times):
+    """Its centroid (k, 2) along x and z, by Lagrange's equations of both angles."""
+    m, J, l, g = 1.0, 0.09, 0.5, 9.81
+
+    def rates(t, y):
+        a, b, ad, bd = y
+        x, z = -length * np.sin(a) * ad**2 - l * np.cos(b) * bd**2, length * np.cos(a) * ad**2 - l * np.sin(b) * bd**2
+        c = m * length * l * np.sin(a - b)
+        right = -length * m * (x * np.cos(a) + (z + g) * np.sin(a)), m * l * (x * np.sin(b) - (z + g) * np.cos(b))
+        return (ad, bd, *np.linalg.solve([[m * length**2, c], [c, m * l**2 + J]], right))
+
+    found = solve_ivp(rates, (0.0, times[-1]), np.zeros(4), "DOP853", times, rtol=1e-12, atol=1e-12)
+    a, b = found.y[:2]
+    return np.stack([length * np.sin(a) + l * np.cos(b), -length * np.cos(a) + l * np.sin(b)], axis=1)
+
+
+@pytest.mark.parametrize("method", ["rk45", "dop853", pytest.param("sdirk54", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("formulation", ["tangent", "null-space"])
+def test_states_are_on_the_branch_of_the_run(formulation, method, rng):
+    """Between steps that are long for the constraint's curvature: `at`, t_eval and events."""
+    times = np.sort(rng.uniform(0.0, 1.0, 300))
+    low = lambda t, state: state.position("bar")[2] + 0.4  # noqa: E731
+    for length in (5e-3, 1e-3):
+        options = {"integrator": method, "formulation": formulation, "rtol": 1e-8, "atol": 1e-8, "events": low}
+        scene, exact = bar_on_a_short_link(length), bar_in_angles(length, times)
+        solution = ts.simulate(scene, (0.0, 1.0), dense_output=True, **options).raise_if_failed()
+        given = ts.simulate(scene, (0.0, 1.0), t_eval=times, **options).raise_if_failed()
+        for q in (solution.at(times).q, given.q):
+            np.testing.assert_allclose(q[:, [0, 2]], exact, rtol=0, atol=1e-6)
+        crossed = bar_in_angles(length, solution.t_events[0])[:, 1]
+        assert crossed.size == np.count_nonzero(np.diff(np.sign(exact[:, 1] + 0.4)))
+        np.testing.assert_allclose(crossed, -0.4, rtol=0, atol=1e-6)
 
 
 def test_a_failed_run_keeps_what_it_had():

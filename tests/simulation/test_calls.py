@@ -13,7 +13,7 @@ from examples import driven_pivot, top
 from tests.helpers.scenes import build as build_scene
 from tests.helpers.scenes import random_chain
 from tsdyn.configuration.initial_conditions import StartWorkspace
-from tsdyn.runs import run_log
+from tsdyn.runs import driver, run_log
 from tsdyn.runs.run_memory import Memory
 from tsdyn.runs.step_engine import StepEngine
 from tsdyn.simulation import scene_cache as prepare
@@ -259,6 +259,17 @@ def test_a_large_memory_is_not_kept(monkeypatch):
 
 def test_room_for_charts_is_made_as_they_come(monkeypatch):
     expected = {way: run(top.build(), way) for way in ("charts", "dense", "default")}
-    monkeypatch.setattr(run_log, "CHART_ROOM", 4)
+    monkeypatch.setattr(driver, "FIRST_SLICE", 2)
+    for module in (driver, run_log):
+        monkeypatch.setattr(module, "CHART_ROOM", 4)
     for way, each in expected.items():
         same(run(top.build(), way), each)
+
+
+def test_a_run_of_many_charts_ends_in_its_first_slice(monkeypatch):
+    """A chart in each of 300 steps: a second slice and the joining of both took longer than a tenth of the steps."""
+    calls = []
+    monkeypatch.setattr(Memory, "advance", lambda *given, own=Memory.advance: calls.append(given) or own(*given))
+    solution = ts.simulate(top.build(), SPAN, integrator=I.Nystrom4(1e-3), chart_interval=1, t_eval=SPAN)
+    assert solution.charts.t.size == solution.steps.t.size == 300
+    assert len(calls) == 1

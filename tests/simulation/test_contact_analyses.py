@@ -386,6 +386,25 @@ def test_ctrl_c_keeps_all_phases(monkeypatch):
         np.testing.assert_allclose(rest.q[-1], whole.q[-1], atol=1e-14)
 
 
+def test_radau_slides_after_a_drop():
+    """Friction takes mu (sqrt(2 g h) + g t) off the velocity."""
+    scene = ts.Scene()
+    stone = scene.add_point_mass(1.0, position=(0, 0, 1), velocity=(30, 0, 0))
+    floor = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": 0.3}
+    scene.add(ts.constraints.PlaneContact(stone, scene.ground, **floor))
+    slid = ts.simulate(scene, (0.0, 2.0), integrator="radau").raise_if_failed()
+    np.testing.assert_allclose(slid.qd[-1, 0], 30.0 - 0.3 * 9.81 * 2.0, rtol=1e-7)
+
+
+def test_an_event_that_fails_in_a_later_phase_is_named():
+    def upwards(t, state):
+        return float("nan") if state.qd[2] > 0.1 else 1.0
+
+    solution = ts.simulate(ball_on_floor(), (0, 3.0), events=upwards)
+    assert solution.status is ts.Status.EVENT_FAILED
+    assert "finite" in solution.message
+
+
 def test_failures_in_a_later_phase_return_the_ones_before():
     def fails(t, state):
         if t > 1.0:

@@ -4,6 +4,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import tsdyn as ts
@@ -98,13 +99,14 @@ def test_ten_thousand_impacts_leave_the_constraints_as_they_are():
 # openings
 
 
-def test_a_particle_leaves_a_ball_where_the_normal_force_vanishes():
+@pytest.mark.parametrize(("radius_a", "radius_b"), [(0.1, 0.9), (0.0, 1.0), (1.0, 0.0)])
+def test_a_particle_leaves_a_ball_where_the_normal_force_vanishes(radius_a, radius_b):
     """cos(theta) = 2/3 + v0^2 / 3 g R; afterwards it flies freely."""
     scene, v0 = ts.Scene(gravity=(0, 0, -G)), 0.5
     globe = scene.add_body(mass=1.0, inertia=(1, 1, 1), name="globe")
     scene.add(C.Fixed.at(globe, scene.ground, point=(0, 0, 0)))
     bead = scene.add_point_mass(mass=0.3, position=(0, 0, 1.0), velocity=(v0, 0, 0), name="bead")
-    scene.add(C.SphereContact(bead, globe, radius_a=0.1, radius_b=0.9, name="touch"))
+    scene.add(C.SphereContact(bead, globe, radius_a=radius_a, radius_b=radius_b, name="touch"))
     solution = ts.simulate(scene, (0, 1.0), rtol=1e-12, atol=1e-12, dense_output=True)
     (_, t, closed), (_, _, opened) = solution.phases
     assert (closed, opened) == (("touch",), ())
@@ -112,6 +114,23 @@ def test_a_particle_leaves_a_ball_where_the_normal_force_vanishes():
     assert solution.impulses == []
     assert np.ptp(solution.energy) < 1e-12
     np.testing.assert_array_equal(solution.reaction("touch")[0][-1], 0.0)
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+def test_a_point_slides_on_a_plane(rigid):
+    """A ball of no radius: friction doesn't turn it, takes mu p at the impact, and stops it after v^2 / 2 mu g."""
+    scene = ts.Scene(gravity=(0, 0, -10))
+    start = {"position": (0, 0, 0.2), "velocity": (3, 0, 0), "name": "point"}
+    point = scene.add_body(1.0, (0.1, 0.1, 0.1), **start) if rigid else scene.add_point_mass(1.0, **start)
+    scene.add(C.SphereContact(point, scene.ground, radius_a=0, normal_b=(0, 0, 1), kinetic=0.3, name="floor"))
+    solution = ts.simulate(scene, (0, 2))
+    ((t, _, impulse),) = solution.impulses
+    np.testing.assert_allclose((t, impulse), (0.2, 2.0), rtol=1e-13)
+    v = 3 - 0.3 * 2.0  # after the impact
+    np.testing.assert_allclose(solution.position("point")[-1], [0.6 + v**2 / 6, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(solution.phases[-1][0], 0.2 + v / 3, rtol=1e-12)
+    if rigid:
+        assert np.abs(solution.angular_velocity("point")).max() < 1e-14
 
 
 def test_a_ball_within_a_ball():
@@ -227,6 +246,34 @@ def test_a_stop_counts_turns(bound):
     assert abs(solution.angle(hinge)[-1] - bound) < 1e-13 * abs(bound)
 
 
+@pytest.mark.parametrize(
+    ("size", "share", "gravity"), [(1.0, 1.0, 0.0), (1e6, 1.0, 0.0), (1e-6, 1.0, 0.0), (1.0, 1e-3, 10.0)]
+)
+def test_a_wheel_leaves_its_stop_and_comes_back(size, share, gravity):
+    """A torque -cos(t) - 0.3, about a hinge and times the inertia and a share, turns a wheel.
+
+    It leaves at cos(t) = -0.3, without a rate. The wheel's place, 1e6 m away, has a rounding that the angle hasn't;
+    the hinge carries the weight, whose rounding doesn't delay the wheel.
+    """
+    scene, inertia = ts.Scene(gravity=(0, 0, -gravity)), 2.0 * size**2
+    wheel = scene.add_body(mass=1.0, inertia=(inertia,) * 3, position=(size, 0, 0), name="wheel")
+    hinge = scene.add(C.Revolute.at(scene.ground, wheel, point=wheel.position, axis=(0, 0, 1), name="hinge"))
+    scene.add(C.Stop(hinge, lower=0.0, restitution=0.5, name="stop"))
+    torque = share * inertia * (ts.motions.Sine(-1.0, 1.0, np.pi / 2) - 0.3)
+    scene.add(ts.forces.Torque(wheel, torque=(0, 0, torque)))
+    solution = ts.simulate(scene, (0, 10.0), rtol=1e-12, atol=1e-12)
+    begun = np.arccos(-0.3)
+
+    def angle(t):
+        return np.cos(t) - np.cos(begun) + np.sin(begun) * (t - begun) - 0.15 * (t - begun) ** 2
+
+    landed = brentq(angle, begun + 1.0, 10.0, xtol=1e-15)
+    rate = -np.sin(landed) + np.sin(begun) - 0.3 * (landed - begun)
+    assert abs(solution.phases[0][1] - begun) < 1e-9
+    assert abs(solution.impulses[0][0] - landed) < 1e-10
+    np.testing.assert_allclose(solution.impulses[0][2], -1.5 * share * inertia * rate, rtol=1e-9)
+
+
 def test_a_stop_of_a_slide():
     scene = ts.Scene(gravity=(0, 0, 0))
     block = scene.add_body(mass=2.0, inertia=(1, 1, 1), velocity=(0.5, 0, 0))
@@ -237,6 +284,36 @@ def test_a_stop_of_a_slide():
         [t for t, *_ in solution.impulses], [0.6, 1.4, 2.2, 3.0][: len(solution.impulses)], atol=1e-13
     )
     assert -0.1 - 1e-14 < solution.displacement(slide).min() < solution.displacement(slide).max() < 0.3 + 1e-14
+
+
+@pytest.mark.parametrize(
+    ("which", "t", "impulse"),
+    [((), 0.5, 0.4), (("angle",), 0.5, 0.4), (("displacement",), 1.0, 2.0), (("displacement", 0), 1.0, 2.0)],
+)
+def test_a_stop_of_a_joint_with_both_coordinates(which, t, impulse, tmp_path):
+    """The one that is named, elastic: 1 rad at 2 rad/s, or 1 m at 1 m/s. A file keeps it."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    rod = scene.add_body(1.0, (0.1, 0.1, 0.1), velocity=(0, 0, 1), angular_velocity=(0, 0, 2), name="rod")
+    sleeve = scene.add(C.Cylindrical(scene.ground, rod, axis_a=(0, 0, 1), axis_b=(0, 0, 1), name="sleeve"))
+    stop = scene.add(C.Stop((sleeve, *which) if which else sleeve, upper=1.0, restitution=1.0, name="stop"))
+    assert (stop.joint, stop.coordinate[0]) == (sleeve, which[0] if which else "angle")
+    scene.save(tmp_path / "sleeve.toml")
+    for each in (scene, scene.copy(), ts.load(tmp_path / "sleeve.toml")):
+        ((at, name, p),) = ts.simulate(each, (0, 2.5)).impulses
+        assert name == "stop"
+        np.testing.assert_allclose((at, p), (t, impulse), rtol=1e-13)
+
+
+def test_a_stop_of_the_second_angle():
+    scene = ts.Scene(gravity=(0, 0, 0))
+    fork = scene.add_body(1.0, (0.1, 0.1, 0.1), angular_velocity=(0, 2, 0), name="fork")
+    joint = scene.add(C.Universal.at(scene.ground, fork, point=(0, 0, 0), axis=(1, 0, 0), axis_b=(0, 1, 0)))
+    scene.add(C.Stop((joint, "angle", 1), upper=0.5, name="stop"))
+    solution = ts.simulate(scene, (0, 1))
+    ((t, _, impulse),) = solution.impulses
+    np.testing.assert_allclose((t, impulse), (0.25, 0.2), rtol=1e-13)
+    with pytest.raises(ts.InvalidConstraint, match="say which coordinate"):
+        C.Stop((joint, "displacement"), upper=0.5)
 
 
 # boxes: redundant contacts
@@ -382,6 +459,7 @@ def test_radii():
         ({"radius_a": 0.1}, "neither"),
         ({"radius_a": 0.1, "radius_b": 1.0, "normal_b": (0, 0, 1)}, "both"),
         ({"radius_a": -0.1, "normal_b": (0, 0, 1)}, "radius_a"),
+        ({"radius_a": 0.0, "radius_b": 0.0}, "two points"),
         ({"radius_a": 0.1, "radius_b": 0.1, "inside": True}, "larger than"),
     ):
         with pytest.raises(ts.InvalidConstraint, match=match):

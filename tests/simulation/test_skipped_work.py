@@ -174,6 +174,6 @@ def test_accelerations_between_the_steps_are_loaded_where_an_output_asks(alone):
 @pytest.mark.slow
 def test_a_method_loads_its_own_step_and_nothing_between_the_steps(alone):
     new = set(alone["steps"][1]) - set(alone["within"][1])
-    assert {"second_order_step", "place", "accelerate", "complete", "check", "start_chart", "error_norm"} <= new
+    assert {"second_order_step", "place", "accelerate", "complete", "check", "start_chart", "stage_error_norm"} <= new
     assert not {name for name in new if name.startswith(("fill", "dop853", "hermite", "implicit", "linear", "time_"))}
     assert {name.split(".")[0] for name in new if name.endswith("_loop")} <= {"Spherical", "EulerNormalization"}

@@ -6,7 +6,7 @@ import pytest
 from tsdyn.errors import Status
 from tsdyn.stress import judgement
 from tsdyn.stress.judgement import judge_case, run_case
-from tsdyn.stress.random_scenes import generate
+from tsdyn.stress.random_scenes import CONTACTS, drawn, generate
 
 KEPT = {
     2002342: "fixed steps across a spin that diverges",
@@ -65,4 +65,18 @@ def test_light_links_between_heavy_bodies_keep_their_accelerations_on_the_constr
 @pytest.mark.parametrize("seed", KEPT, ids=KEPT.values())
 def test_a_kept_scene(seed):
     found = judge_case(generate(seed), judgement.ALL)
+    assert not found.fault, f"{found.name}: {found.word}: {found.said}"
+
+
+KEPT_CONTACTS = {
+    ("stops", 600093): "a stop leaves where its reaction vanishes, though hinges carry weight of 1e20 N",
+    ("stops", 600011): "the angle of a stop in a scene of kilometres closes to rounding of angles",
+    ("ropes", 500014): "reactions of rounding, in free fall",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "seed"), KEPT_CONTACTS, ids=KEPT_CONTACTS.values())
+def test_a_kept_scene_with_contacts(kind, seed):
+    found = judge_case(drawn(np.random.default_rng(seed), 1, 5, {kind: CONTACTS[kind]}), ())
     assert not found.fault, f"{found.name}: {found.word}: {found.said}"

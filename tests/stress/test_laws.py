@@ -123,6 +123,16 @@ def test_faults_of_contacts_are_found():
     assert laws.energy_left(solution)[0] > 1e-2 * size
 
 
+def test_reactions_of_rounding_do_not_pull():
+    """Two particles touch while they fall: their reaction is rounding of their weights."""
+    scene, apart = ts.Scene(), np.array([0.3, 0.1, 0.2]) / np.sqrt(0.14)
+    falling = [scene.add_point_mass(m, 0.2 * i * apart, (0.1, 0.2, 0.3)) for i, m in enumerate((1.0, 1.7))]
+    scene.add(C.SphereContact(*falling, radius_a=0.1, radius_b=0.1, name="touch"))
+    solution = ts.simulate(scene, (0, 1), dense_output=True)
+    assert np.abs(solution.multipliers).max() > 0.0
+    assert not broken(solution)
+
+
 def test_momenta_of_a_fall():
     assert max(laws.momentum_left(run(held=False))) < 1e-9
     assert max(laws.momentum_left(run())) > 1e-2  # the ground pushes

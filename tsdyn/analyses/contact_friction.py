@@ -66,6 +66,46 @@ def strike(inertia, which, qd, rates, restitution, law="newton"):
         share = share / 2.0 if share > LEVEL else 0.0
 
 
+class Cones:
+    """The gaps `resting`, closed and without a rate, at velocities qd (n,), and the cones of their reactions.
+
+    Attributes
+    ----------
+    rows : ndarray (3 k, n)
+        Of gaps and slips.
+    bias : ndarray (3 k,)
+        Accelerations of these where the bodies have none.
+    """
+
+    def __init__(self, inertia, resting, qd):
+        gaps, slips = inertia.gaps, inertia.slips(qd)[resting]
+        self.rows, self.bias = rows_of(inertia, resting), inertia.biases(qd)[resting].ravel()
+        speeds = np.hypot(*slips.T)
+        self.slides = speeds > LEAST_SLIP
+        self.d = np.full(slips.shape, np.nan)
+        self.d[self.slides] = slips[self.slides] / speeds[self.slides, None]
+        self.rubs, self.kinetic, self.static = (x[resting] for x in (gaps.rubs, gaps.kinetic, gaps.static))
+
+    def solve(self, G, b, bounds=()):
+        """Reactions p (3 k,), modes and coefficients (k,), where accelerations are G p + b; raises NoSolution.
+
+        bounds: of forces (3,) that follow; they have modes, too.
+        """
+        mu = np.where(self.slides, self.kinetic, self.static)
+        # Contacts at rest whose friction reaches the bound slide by the kinetic coefficient
+        for _ in range(mu.size + 1):
+            p, mode = solve_cone(G, b, mu, self.d, bounds=bounds)
+            if p is None:
+                raise NoSolution
+            N, *T = p.reshape(-1, 3)[: mu.size].T
+            bound = np.hypot(*T) >= (1.0 - AT_BOUND) * mu * N
+            leave = bound & ~self.slides & (mode[: mu.size] != OPEN) & self.rubs & (mu > self.kinetic * WITHIN_BOUND)
+            if not leave.any():
+                break
+            mu = np.where(leave, self.kinetic * WITHIN_BOUND, mu)
+        return p, mode, mu
+
+
 def settle_grips(inertia, resting, qd, fired=()):
     """Which of the gaps that are closed and at rest stay so, and which stick or slide; arguments as of `settle`.
 
@@ -83,35 +123,19 @@ def settle_grips(inertia, resting, qd, fired=()):
         Where no reactions keep the contacts from penetrating, or several do: with much friction (Painleve).
     """
     gaps, resting = inertia.gaps, list(resting)
-    rows = rows_of(inertia, resting)
-    response = inertia.free(rows.T)
-    G, k = rows @ response, len(resting)
-    c, terms = inertia.accelerations(qd)
+    cones = Cones(inertia, resting, qd)
+    response = inertia.free(cones.rows.T)
+    G, (c, terms) = cones.rows @ response, inertia.accelerations(qd)
     b = np.column_stack([c[resting], inertia.slip_accelerations(qd)[resting]]).ravel()
-    slips = inertia.slips(qd)[resting]
-    speeds = np.hypot(*slips.T)
-    slides = speeds > LEAST_SLIP
-    d = np.full((k, 2), np.nan)
-    d[slides] = slips[slides] / speeds[slides, None]
-    mu = np.where(slides, gaps.kinetic[resting], gaps.static[resting])
-    # Contacts at rest whose friction reaches the bound slide by the kinetic coefficient
-    for _ in range(k + 1):
-        p, mode = solve_cone(G, b, mu, d)
-        if p is None:
-            raise NoSolution
-        N, T = p[::3], p.reshape(-1, 3)[:, 1:]
-        bound = np.hypot(*T.T) >= (1.0 - AT_BOUND) * mu * N
-        leave = bound & ~slides & (mode != OPEN) & gaps.rubs[resting] & (mu > gaps.kinetic[resting] * WITHIN_BOUND)
-        if not leave.any():
-            break
-        mu = np.where(leave, gaps.kinetic[resting] * WITHIN_BOUND, mu)
+    p, mode, mu = cones.solve(G, b)
+    N, T, d, slides = p[::3], p.reshape(-1, 3)[:, 1:], cones.d, cones.slides
     _demand_unique(G, d, mu, mode)
     gdd = c + inertia.J @ (response @ p)
-    small = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p))
+    small, carried = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p)), inertia.carried()
     closed, idle, spare, grips = [], [], [], {}
     for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
         i = resting[j]
-        pushes = N[j] * G[3 * j, 3 * j] > small[i]
+        pushes = N[j] * G[3 * j, 3 * j] > small[i] + carried[i] * (i in fired)
         if not pushes and (gdd[i] > small[i] or i in fired):
             continue
         sticks = [k for k in closed if grips.get(k, ()) is None]
@@ -208,15 +232,15 @@ def halted(inertia, qd, resting):
     return qd - response @ np.linalg.lstsq(rows @ response, left, rcond=RANK_TOL**2)[0]
 
 
-def spread(N, tangents, T):
+def spread(N, responses, T):
     """The same friction (k, c, 2) of c contacts at k states as N (k, c) would carry it where rows depend.
 
-    tangents (k, c, 2, n): of the least sum of |T|^2 / N with the same loads. A box on a plane that doesn't turn has
-    T / N alike at all corners.
+    responses (k, c, 2, n): accelerations by unit friction. The least sum of |T|^2 / N with the same accelerations: a
+    box on a plane that doesn't turn has T / N alike at all corners.
     """
     k, c = N.shape
     weight = np.repeat(np.sqrt(np.maximum(N, 0.0)), 2, axis=1)
-    rows = tangents.reshape(k, 2 * c, -1)
+    rows = responses.reshape(k, 2 * c, -1)
     loads = np.einsum("kr,krn->kn", T.reshape(k, 2 * c), rows)
     found = [
         w * np.linalg.lstsq((w[:, None] * A).T, load, rcond=RANK_TOL)[0]

@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
-from ..elements.element import angles
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
@@ -88,6 +87,11 @@ class Gaps:
         handles = handles_of(packed)
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
+        self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
+
+    def lengths(self, length):
+        """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound."""
+        return np.where(self._angles > 0.0, self._angles, length)
 
     def __reduce__(self):
         """Made anew in another process: kernels' memory is of this one."""
@@ -120,8 +124,9 @@ class Gaps:
     @staticmethod
     def _rate(handles, side):
         """A function of q, qd (..., n) that returns the rate (...) of a joint, in the direction of its ratchet."""
-        kind, rate = ("angle", angle_of) if angles(side.follows) else ("displacement", displacement)
-        (geometry, *_) = getattr(handles.row(side.follows, kind), f"{kind}s")
+        joint, kind, index = side.follows
+        geometry = getattr(handles.row(joint, kind), f"{kind}s")[index]
+        rate = angle_of if kind == "angle" else displacement
         return lambda q, qd: side.sign * rate(geometry, *handles.motions(geometry, (q, qd)), 1)
 
     def values(self, t, levels, counted):
@@ -144,6 +149,11 @@ class Gaps:
     def slopes(self, t, q, which):
         """Rows (k, 2, n) of the slips of the gaps `which`, which have friction."""
         return self.workspace.rows(t, q, self._slips[which].ravel())[0].reshape(len(which), 2, -1)
+
+    def responses(self, t, q, memory, which):
+        """Accelerations (k, 2, n) by unit friction of these gaps, with all gaps open."""
+        rows = self.slopes(t, q, which).reshape(2 * len(which), -1)
+        return self.workspace.respond(t, q, memory, rows).reshape(len(which), 2, -1)
 
     def biases(self, gamma):
         """Of the accelerations of slips (count, 2), from those of all rows; zero without friction."""
@@ -274,6 +284,11 @@ class Inertia:
         qdd, gamma = self._open(qd)
         return self.tangents @ qdd + self.gaps.biases(gamma)
 
+    def biases(self, qd):
+        """Accelerations (count, 3) of gaps and slips where the bodies have none."""
+        _, gamma = self._open(qd)
+        return np.column_stack([self.gaps.sign * gamma[: self.gaps.count], self.gaps.biases(gamma)])
+
     def _open(self, qd):
         """Accelerations (n,) where all gaps are open, and gamma of the rows of all contacts."""
         qdd, gamma = self.gaps.workspace.accelerations(self.t, self.q, qd)
@@ -292,6 +307,10 @@ class Inertia:
         qdd, gamma = self._open(qd)
         bias = (self.gaps.sign * gamma[: self.gaps.count])[self.which]
         return self._of_all(self._rows @ qdd + bias), self._of_all(self._sizes @ np.abs(qdd) + np.abs(bias))
+
+    def carried(self):
+        """Rounding (count,) of accelerations of the gaps, of weight that bilateral reactions carry."""
+        return LEVEL * np.abs(self.J).sum(axis=1) * np.abs(self.gaps.packed.system.gravity).max()
 
 
 class NoSolution(Exception):
@@ -359,13 +378,14 @@ def settle(inertia, resting, qd, fired=()):
     c, terms = inertia.accelerations(qd)
     if not resting:
         return Settled([], [], c)
-    resting, fired = list(resting), [i for i in fired if i in resting]
+    resting, fired, carried = list(resting), [i for i in fired if i in resting], inertia.carried()
     while True:
         lam, basic = _solved(inertia, resting, c[resting])
         gdd = c + inertia.G[:, resting] @ lam
         small = LEVEL * (terms + np.abs(inertia.G[:, resting]) @ lam)
         # A reaction that has just vanished doesn't come back by rounding
-        gone = [i for i, x in zip(resting, lam, strict=True) if i in fired and x * inertia.G[i, i] <= small[i]]
+        least = small + carried
+        gone = [i for i, x in zip(resting, lam, strict=True) if i in fired and x * inertia.G[i, i] <= least[i]]
         if not gone:
             break
         resting = [i for i in resting if i not in gone]
@@ -384,11 +404,8 @@ def settle(inertia, resting, qd, fired=()):
 
 
 def slack_of(inertia, closed, pushes, small):
-    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations.
-
-    Accelerations may be zero as bilateral reactions carry the weight: its rounding is in them.
-    """
-    small = small + LEVEL * np.abs(inertia.J).sum(axis=1) * np.abs(inertia.gaps.packed.system.gravity).max()
+    """The `slack` of closed gaps; pushes: reactions by gaps, small (count,): rounding of their accelerations."""
+    small = small + inertia.carried()
     return {i: float(small[i] / inertia.G[i, i]) for i in closed if pushes[i] * inertia.G[i, i] <= small[i]}
 
 

@@ -72,7 +72,7 @@ def find_gaps(context, t, q, sign, out):
             out[k, i] *= sign[i]
 
 
-@entry("vwmdm")
+@entry("vwmvm")
 def measure_opened(t, which, start, rounding, values):
     """Divide gaps by the time since they have opened, in values (k, gaps) at times t (k,), or add the rounding to them.
 
@@ -83,7 +83,7 @@ def measure_opened(t, which, start, rounding, values):
         for k in range(t.size):
             grown, since = values[k, which[j]] - first, t[k] - begun
             if not rate > 0.0:
-                values[k, which[j]] = grown + rounding
+                values[k, which[j]] = grown + rounding[which[j]]
             else:
                 values[k, which[j]] = grown / since if since > 0.0 else rate
 

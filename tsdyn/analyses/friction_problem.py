@@ -20,6 +20,7 @@ from ..elements.bodies import rotation_matrix
 from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
 from ..errors import SingularConfiguration
+from ..maths.coulomb_cone import OPEN, STICKS
 from ..maths.matrix_rank import range_and_null_space
 from ..maths.tolerances import EPS, RANK_TOL, ROUNDING, TINY
 from ..model.packed import first_rows
@@ -306,7 +307,7 @@ class NoRest(Exception):
 class RestProblem:
     """Rows, masses and loads at one state, with rows for all units that are at rest.
 
-        x                  multipliers of these rows; N: normal loads
+        x                  multipliers of these rows, then reactions of contacts; N: normal loads
         J qdd + gamma      c + G x + D N       D: of the frictions that slide already
         multipliers        l + L x + K N       of the other rows, of which the normal loads follow
 
@@ -321,9 +322,11 @@ class RestProblem:
         Unit -> the directions of its rows, ground frame.
     t, q, qd, memory
         The state; memory has the directions of the units that slide already.
+    cones : contact_friction.Cones, optional
+        Contacts that are closed and at rest, which the phase has no rows of.
     """
 
-    def __init__(self, place, packed, rows, bases, t, q, qd, memory):
+    def __init__(self, place, packed, rows, bases, t, q, qd, memory, cones=None):
         from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
         self.place, self.units, self.rows, self.bases = place, place.frictions.units, rows, bases
@@ -346,13 +349,18 @@ class RestProblem:
         self.normals = packed.system.normals.size
         self.coupled = NormalLoads(packed, t, q, qd, memory, Phi_q) if self.normals else None
         sliding = self.coupled.units if self.normals else np.zeros((q.size, 0))
-        loads = np.column_stack([known, -Phi_q[mine].T, sliding])
+        self.cones, self.J, self.gamma, own_loads = cones, Phi_q[mine], gamma[mine], -Phi_q[mine].T
+        if cones is not None:
+            self.J, self.gamma = np.vstack([self.J, cones.rows]), np.append(self.gamma, cones.bias)
+            own_loads = np.hstack([own_loads, cones.rows.T])
+        self.pushing, self.normal_loads = np.arange(mine.size, len(self.J)), np.zeros(self.normals)
+        self.pressed = self.pushing[:0]  # rows that contacts hold
+        loads = np.column_stack([known, own_loads, sliding])
         free = Z @ cho_solve(factor, Z.T @ loads) if Z.size else np.zeros_like(loads)
         lam = np.zeros((len(gamma), loads.shape[1]))
         if rank:
             lam[order] = solve_triangular(R, own.T @ (loads - M @ free))
-        count = 1 + mine.size
-        self.J, self.gamma, self.qdd = Phi_q[mine], gamma[mine], free
+        count, self.qdd = 1 + len(self.J), free
         self.qdd[:, 0] += fixed
         G = self.J @ self.qdd
         self.c, self.G, self.D = G[:, 0] + self.gamma, G[:, 1:count], G[:, count:]
@@ -369,12 +377,9 @@ class RestProblem:
     def solve(self, ways):
         """Multipliers x of the rows, and normal loads, where units slide in these directions and the others stick."""
         stick = self._held(i for i in self.rows if i not in (*ways, *self.idle, *self.light))
-        x, P = np.zeros(len(self.c)), np.zeros((len(self.c), self.normals))
-        for i, way in ways.items():
-            share, force = self.units[i].sliding
-            x[self.at[i]] = force * (self.bases[i] @ way)
-            if share:
-                P[self.at[i], self.units[i].load.normal] = share * (self.bases[i] @ way)
+        if self.cones is not None:
+            return self._with_contacts(ways, stick)
+        x, P = self._sliding(ways)
         if stick.size:
             right = np.column_stack([self.c + self.G @ x, self.D + self.G @ P])[stick]
             held = -np.linalg.lstsq(self.G[np.ix_(stick, stick)], right, rcond=RANK_TOL**2)[0]
@@ -397,13 +402,61 @@ class RestProblem:
             raise NoRest(list(self.rows))
         return x + P @ N, N
 
+    def _sliding(self, ways):
+        """Multipliers (rows,) of units that slide in these directions; by unit normal loads (rows, normals)."""
+        x, P = np.zeros(len(self.c)), np.zeros((len(self.c), self.normals))
+        for i, way in ways.items():
+            share, force = self.units[i].sliding
+            x[self.at[i]] = force * (self.bases[i] @ way)
+            if share:
+                P[self.at[i], self.units[i].load.normal] = share * (self.bases[i] @ way)
+        return x, P
+
+    def _with_contacts(self, ways, stick):
+        """As `solve`, beside contacts; `ways` of units that may slide in several directions are written.
+
+        Contacts and these units together are one problem with cones, for given N; N follows by iteration.
+        """
+        (x, P), pushing, N = self._sliding(ways), self.pushing, self.normal_loads
+        balls = [i for i in ways if len(self.at[i]) > 1]
+        # Three rows of each; -1 for one that a unit doesn't have
+        u = np.concatenate([pushing, *(np.append(self.at[i], -np.ones(3 - len(self.at[i]), int)) for i in balls)])
+        acts, count = u >= 0, len(pushing) // 3
+        pushes = np.where(np.isin(u, pushing), 1.0, -1.0) * acts
+        G, across = self.G[np.ix_(u, u)] * acts[:, None] * pushes, self.G[np.ix_(u, stick)] * acts[:, None]
+        by_u = np.linalg.lstsq(self.G[np.ix_(stick, stick)], self.G[np.ix_(stick, u)] * pushes, rcond=RANK_TOL**2)[0]
+        G = G - across @ by_u
+        for _ in range(ITERATIONS):
+            y = x + P @ N
+            bounds, y[self._held(balls)] = [np.linalg.norm(y[self.at[i]]) for i in balls], 0.0
+            own = self.c + self.G @ y + self.D @ N
+            held = np.linalg.lstsq(self.G[np.ix_(stick, stick)], own[stick], rcond=RANK_TOL**2)[0]
+            p, mode, _ = self.cones.solve(G, own[u] * acts - across @ held, bounds)
+            y[u[acts]] = (pushes * p)[acts]
+            y[stick] = -held - by_u @ p
+            before = N
+            if self.normals:
+                N = self.coupled.loads(self.coupled.reactions(self.l + self.L @ y + self.K @ N))[0]
+            if not (np.abs(N - before) > LEVEL * np.abs(N).max(initial=0.0)).any():
+                break
+        else:
+            raise NoRest(list(self.rows))
+        for i in balls:
+            if y[self.at[i]].any():
+                way = y[self.at[i]] @ self.bases[i]
+                ways[i] = way / np.linalg.norm(way)
+        closed = mode[:count] != OPEN
+        rests = closed & (mode[:count] == STICKS) & self.cones.rubs
+        self.normal_loads, self.pressed = N, pushing[np.column_stack([closed, rests, rests]).ravel()]
+        return y, N
+
     def settle(self, ways, fired):
         """The `FrictionAtRest` of the units, by pivoting from a guess: directions of those that slide.
 
         fired: units whose reactions have just reached their bounds. Raises `NoRest`.
         """
         fired, seen, judged, guessed = set(fired), set(), set(), False
-        self.light, self.idle = set(self.rows), []
+        self.light, self.idle, self.engaged = set(self.rows), [], set()
         self.light &= self._unloaded(*self.solve({}))[0]  # without friction
         ways = {i: way for i, way in ways.items() if i not in self.light}
         for count in range(PIVOTS * (1 + len(self.rows))):
@@ -412,6 +465,11 @@ class RestProblem:
             a = self.c + self.G @ x + self.D @ N
             small = self._rounding(x, N)
             wrong = self._wrong(ways, x, N, a, small, fired)
+            # Contacts don't hold what they were to hold alone
+            moved = [i for i in self.idle if i not in self.engaged and (np.abs(a) > small)[self.at[i]].any()]
+            if self.cones is not None and moved:
+                self.engaged.update(moved)
+                continue
             if not wrong:
                 unloaded, limits = self._unloaded(x, N)
                 others = (self.light ^ unloaded) & self.rows.keys() - judged
@@ -437,7 +495,7 @@ class RestProblem:
 
     def _found(self, ways, N, a, small, unloaded):
         sticking = [i for i in self.rows if i not in (*ways, *self.idle, *self.light)]
-        blocked = [i for i in ways if self._is_blocked(i, sticking)] + self.idle
+        blocked = [i for i in ways if self._is_blocked(i, sticking, self.pressed)] + self.idle
         rates, (unloaded, limits) = self._rates(ways, a, small), unloaded
         for i in self.light:
             along = a[self.at[i]] if a[self.at[i]].any() else np.eye(len(self.at[i]))[0]
@@ -455,7 +513,7 @@ class RestProblem:
 
         units = [i for i in self.rows if i not in self.idle and i not in self.light]
         at = self._held(units)
-        if len(at) > len(units):
+        if len(at) > len(units) or self.cones is not None:
             return None
         try:
             R = cholesky(-self.G[np.ix_(at, at)])
@@ -505,6 +563,12 @@ class RestProblem:
                 found[i] = a[at] @ basis / size
         return found
 
+    def _left(self, i, rows):
+        """Accelerations (r, r) of a unit by its own multipliers where rows (k,) hold."""
+        rows, at = rows.astype(int), self.at[i]
+        held = np.linalg.lstsq(self.G[np.ix_(rows, rows)], self.G[np.ix_(rows, at)], rcond=RANK_TOL**2)[0]
+        return self.G[np.ix_(at, at)] - self.G[np.ix_(at, rows)] @ held
+
     def _rates(self, ways, a, small):
         """Accelerations along the directions of sliding, in a plane less half of their size; zero within rounding."""
         found = {}
@@ -520,23 +584,21 @@ class RestProblem:
 
     def _idle(self, ways):
         """Units that stick by what others hold: with rows of their own the reactions wouldn't be unique."""
-        sticking, idle = [], []
-        own = self._held(i for i in self.rows if i not in ways and i not in self.light)
+        free = [i for i in self.rows if i not in ways and i not in self.light]
+        own, sticking, idle = self._held(free), [], []
         try:  # by the pivots: what is left of each row beside those before
             left = np.diag(np.linalg.cholesky(-self.G[np.ix_(own, own)])) ** 2
-            if (left > RANK_TOL * np.abs(np.diag(self.G)).max(initial=0.0)).all():
+            if not self.pressed.size and (left > RANK_TOL * np.abs(np.diag(self.G)).max(initial=0.0)).all():
                 return idle
         except np.linalg.LinAlgError:
             pass
-        for i in self.rows:
-            if i not in ways and i not in self.light:
-                (idle if sticking and self._is_blocked(i, sticking) else sticking).append(i)
+        for i in free:
+            pressed = self.pressed[:0] if i in self.engaged else self.pressed
+            blocked = (sticking or pressed.size) and self._is_blocked(i, sticking, pressed)
+            (idle if blocked else sticking).append(i)
         return idle
 
-    def _is_blocked(self, i, sticking):
-        """Whether a unit can't move where others stick, or at all."""
-        stick = self._held(sticking)
-        own = self.G[np.ix_(self.at[i], self.at[i])]
-        held = np.linalg.lstsq(self.G[np.ix_(stick, stick)], self.G[np.ix_(stick, self.at[i])], rcond=RANK_TOL**2)[0]
-        left = np.diag(own - self.G[np.ix_(self.at[i], stick)] @ held)
-        return bool(np.abs(left).max() <= RANK_TOL * np.abs(np.diag(own)).max())
+    def _is_blocked(self, i, sticking, pressed):
+        """Whether a unit can't move where others stick and contacts hold these rows, or at all."""
+        own, left = self.G[self.at[i], self.at[i]], np.diag(self._left(i, np.append(self._held(sticking), pressed)))
+        return bool(np.abs(left).max() <= RANK_TOL * np.abs(own).max())

@@ -20,7 +20,7 @@ from ..errors import InvalidConstraint
 from ..jit.kernels import NumbaError, kernel, twin
 from ..maths import vectors
 from ..maths.vectors import IDENTITY, unit
-from ..validation import counted, demand_known, floats, label, listed, number, shown
+from ..validation import counted, demand_known, floats, label, listed, number, shown, shown_for_handle
 from .bodies import Ground, PointMass, ground_point, named, new_name, rotation_matrix
 from .markers import PARAMETERS, POINT, TURN, Marker, entries
 from .tolerances import UNDIRECTED
@@ -203,6 +203,38 @@ def angles(item):
 def displacements(item):
     """The `DisplacementGeometry` of each displacement that a constraint or force declares, in order."""
     return [declared.of(item) for declared in item.joint_coordinates if isinstance(declared, Displacement)]
+
+
+def chosen_coordinate(where, given, default=False):
+    """(joint, kind, index) of what is given for a coordinate of a joint: the joint, or (joint, kind) or with an index.
+
+    default: whether of a joint with several the angle is meant, the first one.
+    """
+    joint, *which = given if isinstance(given, tuple) and given else (given,)
+    declared = getattr(joint, "joint_coordinates", ())
+    if not declared or getattr(joint, "drives", ""):
+        raise InvalidConstraint(
+            f"{where}: joint must be one with an angle or a displacement, such as Revolute or Translational, got "
+            f"{shown_for_handle(joint)}."
+        )
+    kinds = ["angle" if isinstance(each, Angle) else "displacement" for each in declared]
+    choices = [(kind, kinds[:i].count(kind)) for i, kind in enumerate(kinds)]
+    if default and not which:
+        return joint, *min(choices)
+    found = [choice for choice in choices if list(choice)[: len(which)] == which]
+    if len(found) != 1:
+        shapes = ", ".join(
+            f"(joint, {kind!r}, {i})" if kinds.count(kind) > 1 else f"(joint, {kind!r})" for kind, i in choices
+        )
+        raise InvalidConstraint(
+            f"{where}: say which coordinate of {joint.name!r} is meant, by {shapes}; got {shown(given)}."
+        )
+    return joint, *found[0]
+
+
+def geometry_of(joint, kind, index):
+    """The `AngleGeometry` or `DisplacementGeometry` of a coordinate of a joint."""
+    return (angles if kind == "angle" else displacements)(joint)[index]
 
 
 def _bodies(item, axis):

@@ -225,7 +225,6 @@ class BodyFriction:
         super().__init__(a, b, point_a=point_a, name=name)
         for key, value in quantities.items():
             setattr(self, key, value)
-        self.check()
 
     def parameters(self) -> tuple[Any, ...]:
         """The quantities, in their order."""
@@ -421,7 +420,6 @@ class JointFriction:
         self.slip_velocity, self.stribeck_velocity = slip_velocity, stribeck_velocity
         for key, value in geometry.items():
             setattr(self, key, value)
-        self.check()
 
     def _untitled(self, bodies):
         return f"{self._kind()}({self.joint.name})"

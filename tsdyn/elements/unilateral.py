@@ -34,7 +34,12 @@ class Side(NamedTuple):
     which: int = 0  # angle of the joint
     bound: float = 0.0  # rad
     grip: Grip | None = None
-    follows: Any = None  # joint whose rate, times sign, is not negative: the gap is closed wherever that is zero
+    follows: Any = None  # (joint, kind, index) whose rate, times sign, is not negative: closed wherever that is zero
+
+    @property
+    def gap(self) -> Primitive | SumRow:
+        """The row of the gap, without those of the slip."""
+        return self.grip.gap if self.grip else self.row
 
 
 class Unilateral:

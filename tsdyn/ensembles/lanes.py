@@ -369,6 +369,6 @@ def _of_scene(arena):
 
 
 def _load(study, kept):
-    constraint_loops(kept.series.kinds, study.lanes)
+    constraint_loops(kept.series.graph, kept.series.kinds, study.lanes)
     force_loops(kept.packed, study.lanes)
     load(lane_runner(study.lanes))

@@ -177,6 +177,18 @@ class Archive:
         elif self._size > self._format.BUFFER:
             self._write()
 
+    @property
+    def most_steps(self):
+        """How many steps the whole run may make, None for any number: max_steps, and as many after each stop there."""
+        most = self.facts["max_steps"]
+        return None if most is None else most + self.facts["granted"]
+
+    def stop(self, state):
+        """Write a checkpoint where max_steps stops the run: a run that goes on from it may make as many steps again."""
+        if self.has_checkpoints and self.facts["max_steps"] is not None:
+            self.facts["granted"] = self.most_steps
+            self.checkpoint(*state())
+
     def checkpoint(self, numbers, arrays):
         """Write a checkpoint of this state."""
         self._write()

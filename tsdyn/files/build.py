@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from ..elements.bodies import IDENTITY, Body
-from ..elements.element import Angle, idle_forces
+from ..elements.element import Angle, chosen_coordinate, idle_forces
 from ..elements.joint import Joint
 from ..errors import InvalidArgument
 from ..jit.code_hash import is_ours
@@ -125,7 +125,7 @@ def _item(item, refused):
             refused.append(f"{item.name} keeps no {name}")
     for name, argument in arguments.items():
         if argument.kind == types.COORDINATE:
-            found[name] = _coordinate_names(vars(item)[name])
+            found[name] = _coordinate_names(item, vars(item)[name])
         if argument.kind == types.POINTS:
             found[name] = [[body.name, list(s)] for body, s in vars(item)[name]]
         if argument.kind in types.NAMED:
@@ -142,10 +142,14 @@ def _item(item, refused):
     return found | _history(item) | ({} if item.active else {"active": False})
 
 
-def _coordinate_names(given):
-    """[joint, kind, index] of a coordinate of a joint, or of several."""
+def _coordinate_names(item, given):
+    """[joint, kind, index] of a coordinate of a joint, or of several; a joint alone where that says as much."""
+    if not isinstance(given, tuple):
+        is_default = chosen_coordinate(item.name, given, default=True)[1:] == item.coordinate
+        return given.name if is_default else [given.name, *item.coordinate]
     joint, *which = given
-    return [joint.name, *which] if which and isinstance(which[0], str) else [_coordinate_names(each) for each in given]
+    is_one = which and isinstance(which[0], str)
+    return [joint.name, *which] if is_one else [_coordinate_names(item, each) for each in given]
 
 
 def _value_of(item, argument):
@@ -320,7 +324,7 @@ def _coordinates(reading, path, table, what, key):
     """The joint coordinates that a key names: "hinge", ["hinge", "angle", 0], or a list of these."""
     given = table.get(key)
     alone = isinstance(given, list) and given[1:2] in [[kind] for kind in KINDS]
-    found, several = [], isinstance(given, list) and bool(given) and key != "dependent"  # of which there is one
+    found, several = [], isinstance(given, list) and bool(given) and key == "independents"
     for one in given if several and not alone else [given]:
         joint, *which = one if isinstance(one, list) and one else [one]
         own = table if key not in table else {**table, key: joint}

@@ -168,6 +168,13 @@ def forget_loads(system):
 
 
 @kernel
+def keep_loads(system, f):
+    """Set joint friction in the sum of forces to the present normal loads, such as for its derivatives."""
+    for i in range(system.normals.size):
+        system.reals[system.normals[i]] = f.friction.load[7 * i]
+
+
+@kernel
 def step_share(sweep):
     """Return the share of a Newton correction of the loads that is applied."""
     return 1.0 if sweep < DAMPED else DAMPED_SHARE
@@ -196,7 +203,7 @@ OK, JAMMED, SINGULAR = int(Status.SUCCESS), int(Status.JAMMED), int(Status.SINGU
 
 
 @kernel
-def _weigh_units(graph, system, f, q, qd, t):
+def weigh_units(graph, system, f, q, qd, t):
     """r.g = W g."""
     r, Q = f.friction, stack(14)
     for i in range(graph.frictions.shape[0]):
@@ -229,12 +236,12 @@ def body_reaction(graph, f, friction, lam, out):
 
 
 @kernel
-def _find_loads(graph, system, f, q, what):
-    """Normal loads at the multipliers r.lam, as `normal_load`."""
+def find_loads(graph, system, f, q, lam, what):  # six: where the loads are, and what to do
+    """Normal loads at the multipliers lam, as `normal_load`."""
     r, reaction = f.friction, stack(6)
     for i in range(graph.frictions.shape[0]):
         friction = graph.frictions[i]
-        body_reaction(graph, f, friction, r.lam, reaction)
+        body_reaction(graph, f, friction, lam, reaction)
         normal_load(system, f, friction, q, what, reaction, r.load[7 * i :])
 
 
@@ -287,7 +294,7 @@ def find_reactions(graph, system, f, q, qd, t, least):  # seven: what the loads 
     reactions were found.
     """
     r = f.friction
-    _weigh_units(graph, system, f, q, qd, t)
+    weigh_units(graph, system, f, q, qd, t)
     copy(f.Z, r.Z)
     # Start: the multipliers of the last evaluation, or none. Without any the first matrix is S, free of friction
     clear_redundant(f, r.lam)
@@ -300,7 +307,7 @@ def find_reactions(graph, system, f, q, qd, t, least):  # seven: what the loads 
     for sweep in range(LOAD_SWEEPS):
         # Loads at the present lam, with derivatives where N~ is factorised
         derived = renew and size > 0.0 and not done
-        _find_loads(graph, system, f, q, (DERIVE if derived else 0) | (HERE if sweep == 0 else 0))
+        find_loads(graph, system, f, q, r.lam, (DERIVE if derived else 0) | (HERE if sweep == 0 else 0))
         # Z = W (F + sum_i g_i F_n,i - H^T lam)
         _apply_loads(graph, f)
         if done:
@@ -325,7 +332,7 @@ def find_reactions(graph, system, f, q, qd, t, least):  # seven: what the loads 
     # Where all reactions vanish, what is left of them is rounding of the accelerations
     if not left <= SUM_ROUNDING * largest(f.Z):
         return False
-    _find_loads(graph, system, f, q, 0)
+    find_loads(graph, system, f, q, r.lam, 0)
     _apply_loads(graph, f)
     return True
 
@@ -344,8 +351,7 @@ def solve_friction(context, t, unused):
     c = load(context)
     system, f, graph, stage = c.system, c.tangent, c.graph, c.chart.state
     found = accelerate_with_friction(graph, system, c.work, f, t, stage.loads_left if stage.free == 1 else LAST_PLACE)
-    for i in range(system.normals.size):
-        system.reals[system.normals[i]] = f.friction.load[7 * i]
+    keep_loads(system, f)
     copy(f.friction.lam, f.b)
     if found:
         return OK

@@ -3,8 +3,9 @@
 import math
 
 from ..elements.loops.constraint_rows import write_positions, write_velocities
+from ..elements.loops.friction import DERIVE, HERE
 from ..errors import Status
-from ..jit.kernels import ANY, callback, complex_vector, data_of, kernel, vector
+from ..jit.kernels import ANY, callback, complex_vector, data_of, kernel, stack, vector
 from ..jit.simd import add, cross, fma, four, lanes, put, splat, times, total
 from ..maths.dense_linalg import copy, largest
 from ..maths.tolerances import ROUNDING_AT_MOST
@@ -35,16 +36,36 @@ from ..rows.interface import (
     unbalance_inertia_rows,
     weigh,
     weigh_bodies,
-    write_saddle_rows,
+    weigh_selected_rows,
 )
 from ..workspaces import load
 from . import tolerances as limits
-from .accelerations import body_forces
+from .accelerations import body_forces, body_of, factorise_loads, find_loads, forget_loads, keep_loads, weigh_units
 from .chart_coordinates import add_rate_residuals, displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
 from .chart_validity import measure_turns
 from .projection import largest_residual, velocity_floor
-from .saddle_point import add_blocks, degrees, factorise, linearise, reduce, soften, solve, take_solution, turned_back
-from .tangent import COLUMNS, accelerate, check_chart, error_norm, place, start_chart, weighted_square, write_state
+from .saddle_point import (
+    add_blocks,
+    degrees,
+    factorise,
+    linearise,
+    reduce,
+    soften,
+    take_solution,
+    turned_back,
+    write_rows,
+)
+from .tangent import (
+    COLUMNS,
+    accelerate,
+    check_chart,
+    error_norm,
+    place,
+    start_chart,
+    weighted_square,
+    whole_size,
+    write_state,
+)
 
 # Right-hand side of a Newton correction of a stage: the normal part of accelerations, and the unbalanced loads.
 
@@ -123,10 +144,12 @@ def find_imbalance(c, left):
     unbalance_inertia_rows(graph, f.rows, s.graph.row_at, s.multipliers, s.x)
     for b in range(graph.bodies.shape[0]):
         weigh(graph.mass, b, f.Z, 8 * b, f.Z, 8 * b)
-    # e = F - M (a + C n) - H^T lam
+    # e = F - M (a + C n) - H^T lam, F with the friction of the joints
     for i in range(s.e.size):
         s.e[i] = s.loads[i] - f.Z[i]
     take_reactions(graph, f.rows, s.multipliers, s.e)
+    for i in range(graph.frictions.shape[0]):
+        _add_friction(graph, f, i, f.friction.load[7 * i], s.e)
     if f.b.size > 0 and not _correct_multipliers(c, left):
         return False
     for b in range(graph.bodies.shape[0]):
@@ -137,8 +160,56 @@ def find_imbalance(c, left):
 
 
 @kernel
+def _add_friction(graph, f, i, N, out):
+    """Add g_i N, the friction i for a normal load N, to the loads on its two bodies."""
+    g, scale = stack(8), splat(N)
+    for k in range(2):
+        # M times W g_i
+        b = body_of(graph.frictions[i], k)
+        if b < graph.bodies.shape[0]:
+            weigh(graph.mass, b, f.friction.g, 16 * i + 8 * k, g, 0)
+            put(out, 8 * b, fma(four(g, 0), scale, four(out, 8 * b)))
+            put(out, 8 * b + 4, fma(four(g, 4), scale, four(out, 8 * b + 4)))
+
+
+@kernel
+def _change_friction(c):
+    """Find the normal loads of the multipliers, and what they change of s.e."""
+    f, s, graph = c.tangent, c.saddle, c.graph
+    for i in range(graph.frictions.shape[0]):
+        _add_friction(graph, f, i, -f.friction.load[7 * i], s.e)
+    find_loads(graph, c.system, f, c.work.q, s.multipliers, 0)
+    for i in range(graph.frictions.shape[0]):
+        _add_friction(graph, f, i, f.friction.load[7 * i], s.e)
+
+
+@kernel
+def _renew_reactions(c):
+    """Factors of S, or with friction of N~, at the present H. False if singular."""
+    f, graph = c.tangent, c.graph
+    c.work.counters.factorizations += 1
+    if graph.frictions.shape[0] == 0:
+        return factorise_selected_rows(graph, f, f.rows, DYNAMICS) < 0
+    find_loads(graph, c.system, f, c.work.q, c.saddle.multipliers, DERIVE)
+    weigh_selected_rows(graph, f.rows)
+    return factorise_loads(graph, f, False)
+
+
+@kernel
+def _solve_reactions(c):
+    """f.b <- S^-1 f.b, or with friction N~^-1 f.b, by factors that may be of an older configuration."""
+    f, graph = c.tangent, c.graph
+    if graph.frictions.shape[0] == 0:
+        solve_rows(graph, f.rows, f.b)
+    else:
+        solve_product(graph, f.friction.lower, f.friction.upper, f.b)
+
+
+@kernel
 def _correct_multipliers(c, left):
     """Correct lam by S^-1 H W e until `left` of H W e is left, e = F - M (a + C n) - H^T lam = s.e. False: S singular.
+
+    Where friction depends on lam, N~ of accelerations.py takes the place of S.
 
     The saddle-point matrix was formed with an older H, so the residual normal to the constraints is eliminated with the
     present one. S may be older, too, as long as corrections contract: at first it is that of the step's start.
@@ -163,15 +234,15 @@ def _correct_multipliers(c, left):
         else:
             # S of an older configuration contracts no more
             if worst > limits.SLOW * before and not renewed:
-                w.counters.factorizations += 1
-                if factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0:
+                if not _renew_reactions(c):
                     return False
                 renewed = True
-            solve_rows(graph, f.rows, f.b)
+            _solve_reactions(c)
             clear_redundant(f, f.b)  # which others may have been when S was made
         # lam <- lam + dlam,  e <- e - H^T dlam
         add_to(f.b, s.multipliers)
         take_reactions(graph, f.rows, f.b, s.e)
+        _change_friction(c)
         before = worst
     return True
 
@@ -225,9 +296,14 @@ def residual(context, t, g, x, y, k):
         write_velocities(graph.bodies, f.poses, w.qd)
     if f.b.size > 0:
         evaluate_bias(graph, system, f, t)
-    # F at the stage, and a of k
+    # F at the stage, but for friction by reactions; that of unit loads, and loads at the predicted reactions; a of k
+    forget_loads(system)
     body_forces(graph, system, w, f, t)
     copy(f.Z, s.loads)
+    if graph.frictions.shape[0] > 0:
+        weigh_units(graph, system, f, w.q, w.qd, t)
+        find_loads(graph, system, f, w.q, s.multipliers, HERE)
+        keep_loads(system, f)
     turn_accelerations(graph, l, f.poses, vector(k, n), s.a)
     return OK if largest(s.loads) < math.inf else NOT_FINITE
 
@@ -412,12 +488,7 @@ def _correct_normal_part(c, g, k):
 @callback(NORM, "d")
 def distance(context, ex, ey, old, rtol, atol):
     """As `error_norm`, of changes that are tangent to the constraints already."""
-    c = load(context)
-    w, l, graph, n = c.work, c.chart, c.graph, c.work.q.size
-    old = vector(old, 3 * n)
-    total = weighted_square(graph, l, vector(ex, l.x.size - 8), w.q, old, 0, rtol, atol)
-    total += weighted_square(graph, l, vector(ey, l.x.size - 8), w.qd, old, n, rtol, atol)
-    return math.sqrt(total / (2 * n))
+    return whole_size(load(context), ex, ey, old, rtol, atol)
 
 
 # Newton's method for all stages of a collocation method at once, in the tangent form.
@@ -478,7 +549,7 @@ def factorise_stages(context, h, tableau, i):
     # M, H and H^T are common to all eigenvalues
     if i == 0:
         c.work.counters.iteration_matrices += 1
-        write_saddle_rows(graph, f, s)
+        write_rows(c)
         add_blocks(graph, s, s.upper, s.lower, 0.0, True)
     # The real eigenvalue comes last, since its factors take the place of the common part
     if i == s.complex_upper.shape[0]:

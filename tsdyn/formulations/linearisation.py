@@ -12,6 +12,10 @@ derivatives of the force laws in corotated frames (forces.py). At the current co
 `factorise` form P = A - g C_hat + g^2 K_hat, the iteration matrix of a stage with g = h a_ii.
 """
 
+from typing import NamedTuple
+
+import numpy as np
+
 from ..jit.kernels import callback, kernel, stack, stack2, vector
 from ..maths.dense_linalg import (
     add_product,
@@ -35,6 +39,16 @@ from ..model.equations import (
 from ..workspaces import load
 from .null_space import find_accelerations
 from .null_space_chart import NOT_FINITE, OK, SINGULAR
+
+
+class Displacements(NamedTuple):
+    """Displacements D dv, and what `project_derivatives` makes of them."""
+
+    D: np.ndarray  # (n, k)
+    F: np.ndarray  # (l, k)  in body frames
+    X: np.ndarray  # (n, k)  scratch
+    X2: np.ndarray  # (n, k)  scratch
+    K_hat: np.ndarray  # (velocities, k)
 
 
 @kernel
@@ -115,7 +129,7 @@ def _inertia_rows(system, w, linear):
 
 
 @kernel
-def _add_mass_times(system, w, scale, X, out):
+def add_mass_times(system, w, scale, X, out):
     """out += scale M X; X and out (n, n)."""
     G, a = stack2(3, 4), stack(3)
     n = w.q.size
@@ -195,12 +209,10 @@ def _to_body_frames(system, q, X, scratch, out):
             to += 3
 
 
-@callback("pdp")
-def linearise(context, t, vdd):
-    """Set K_body and C_body at the last accelerations vdd. Status."""
-    c = load(context)
-    system, w, linear = c.system, c.work, c.linear
-    find_accelerations(system, w, vector(vdd, w.v.size))
+@kernel
+def curvatures(system, w, linear, t, vdd):
+    """K and C of forces, inertia and reactions at the last accelerations vdd; G1, G2, Y and Z."""
+    find_accelerations(system, w, vdd)
     n = w.q.size
     clear_matrix(linear.K)
     clear_matrix(linear.C)
@@ -220,19 +232,32 @@ def linearise(context, t, vdd):
     constraint_curvature(system, w.q, w.qd, w.qdd, t, linear.lam, linear.K, linear.G1, linear.G2)
     multiply(linear.UB, linear.G1, linear.Y)
     multiply(linear.UB, linear.G2, linear.Z)
+
+
+@kernel
+def keep_in_body_frames(system, w, linear):
+    """K_body and C_body. Status."""
     # C* += 2 M Y,    K* += C* Y - M Z
-    _add_mass_times(system, w, 2.0, linear.Y, linear.C)
-    _add_mass_times(system, w, -1.0, linear.Z, linear.K)
+    add_mass_times(system, w, 2.0, linear.Y, linear.C)
+    add_mass_times(system, w, -1.0, linear.Z, linear.K)
     add_product(1.0, linear.C, linear.Y, linear.K)
     # An overflow shows in the sum of all entries
     total = 0.0
-    for i in range(n):
-        for j in range(n):
+    for i in range(w.q.size):
+        for j in range(w.q.size):
             total += abs(linear.K[i, j]) + abs(linear.C[i, j])
     _to_body_frames(system, w.q, linear.K, linear.Z, linear.K_body)
     _to_body_frames(system, w.q, linear.C, linear.Z, linear.C_body)
     w.counters.jacobians += 1
     return OK if total < 1.0 / TINY else NOT_FINITE
+
+
+@callback("pdp")
+def linearise(context, t, vdd):
+    """Set K_body and C_body at the last accelerations vdd. Status."""
+    c = load(context)
+    curvatures(c.system, c.work, c.linear, t, vector(vdd, c.work.v.size))
+    return keep_in_body_frames(c.system, c.work, c.linear)
 
 
 @kernel
@@ -243,45 +268,74 @@ def _forces(system, w, linear, t, renew):
     force_jacobian(system, w.q, w.qd, t, linear.Q_q, linear.Q_qd, renew, linear.kept)
 
 
-@callback("pd")
-def reduce(context, t):
-    """Set K_hat and C_hat at the current state."""
-    c = load(context)
-    system, w, linear = c.system, c.work, c.linear
-    k, to, A = w.v.size, 0, stack2(3, 3)
-    # F = [A^T D_r; 2 G D_p]: tangent velocities as velocities in body frames
+@kernel
+def in_body_frames(system, q, D, out):
+    """out = [A^T D_r; 2 G D_p]: tangent velocities as velocities in body frames."""
+    to, A = 0, stack2(3, 3)
     for b in range(system.mass.size):
         at = system.bodies[b, 0]
         if system.bodies[b, 1] == 7:
-            matrix_a(w.q[at + 3 : at + 7], A)
-            for i in range(3):
-                for j in range(k):
-                    linear.F[to + i, j] = A[0, i] * w.D[at, j] + A[1, i] * w.D[at + 1, j] + A[2, i] * w.D[at + 2, j]
-                    linear.F[to + 3 + i, j] = w.E[3 * b + i, j]
+            matrix_a(q[at + 3 : at + 7], A)
+            e0, e1, e2, e3 = 2.0 * q[at + 3], 2.0 * q[at + 4], 2.0 * q[at + 5], 2.0 * q[at + 6]
+            d0, d1, d2, d3 = D[at + 3], D[at + 4], D[at + 5], D[at + 6]
+            for j in range(D.shape[1]):
+                for i in range(3):
+                    out[to + i, j] = A[0, i] * D[at, j] + A[1, i] * D[at + 1, j] + A[2, i] * D[at + 2, j]
+                out[to + 3, j] = -e1 * d0[j] + e0 * d1[j] + e3 * d2[j] - e2 * d3[j]
+                out[to + 4, j] = -e2 * d0[j] - e3 * d1[j] + e0 * d2[j] + e1 * d3[j]
+                out[to + 5, j] = -e3 * d0[j] + e2 * d1[j] - e1 * d2[j] + e0 * d3[j]
             to += 6
         else:
             for i in range(3):
-                for j in range(k):
-                    linear.F[to + i, j] = w.D[at + i, j]
+                for j in range(D.shape[1]):
+                    out[to + i, j] = D[at + i, j]
             to += 3
-    clear_matrix(linear.K_hat)
+
+
+@kernel
+def project_derivatives(system, w, linear, t, moved):
+    """C_hat, and moved.K_hat by displacements moved.D dv, moved.F in body frames; w.D are the velocities."""
+    clear_matrix(moved.K_hat)
     clear_matrix(linear.C_hat)
     # K_hat = F^T K_body F,    C_hat = F^T C_body F
-    multiply(linear.K_body, linear.F, linear.X)
-    add_transposed_product(1.0, linear.F, linear.X, linear.K_hat)
+    multiply(linear.K_body, moved.F, moved.X)
+    add_transposed_product(1.0, linear.F, moved.X, moved.K_hat)
     multiply(linear.C_body, linear.F, linear.X)
     add_transposed_product(1.0, linear.F, linear.X, linear.C_hat)
     if system.forces.shape[0] > 0:
         # K_hat += D^T (Q_qd Y - Q_q) D,    C_hat += D^T Q_qd D
         _forces(system, w, linear, t, 0)
-        multiply(linear.Q_q, w.D, linear.X)
-        add_transposed_product(-1.0, w.D, linear.X, linear.K_hat)
+        multiply(linear.Q_q, moved.D, moved.X)
+        add_transposed_product(-1.0, w.D, moved.X, moved.K_hat)
         multiply(linear.Q_qd, w.D, linear.X)
         add_transposed_product(1.0, w.D, linear.X, linear.C_hat)
-        multiply(linear.Y, w.D, linear.X)  # Q_qd Y with the Q_qd of now: what a stale one points to may be soft by now
-        multiply(linear.Q_qd, linear.X, linear.X2)
-        add_transposed_product(1.0, w.D, linear.X2, linear.K_hat)
+        # Q_qd Y with the Q_qd of now: what a stale one points to may be soft by now
+        multiply(linear.Y, moved.D, moved.X)
+        multiply(linear.Q_qd, moved.X, moved.X2)
+        add_transposed_product(1.0, w.D, moved.X2, moved.K_hat)
+
+
+@callback("pd")
+def reduce(context, t):
+    """Set K_hat and C_hat at the current state."""
+    c = load(context)
+    w, linear = c.work, c.linear
+    in_body_frames(c.system, w.q, w.D, linear.F)
+    project_derivatives(c.system, w, linear, t, Displacements(w.D, linear.F, linear.X, linear.X2, linear.K_hat))
     return OK
+
+
+@kernel
+def mass_matrix(w, P):
+    """P = D^T M D, formed again from its Cholesky factor."""
+    for i in range(w.v.size):
+        for j in range(i + 1):
+            x = 0.0  # A = L L^T, the diagonal holding reciprocals
+            for d in range(j):
+                x += w.A[i, d] * w.A[j, d]
+            x += (w.A[i, j] if i != j else 1.0 / w.A[i, i]) / w.A[j, j]
+            P[i, j] = x
+            P[j, i] = x
 
 
 @callback("pd")
@@ -290,15 +344,7 @@ def factorise(context, g):
     c = load(context)
     w, linear = c.work, c.linear
     k = w.v.size
-    # A = D^T M D, formed again from its Cholesky factor
-    for i in range(k):
-        for j in range(i + 1):
-            x = 0.0  # A = L L^T, the diagonal holding reciprocals
-            for d in range(j):
-                x += w.A[i, d] * w.A[j, d]
-            x += (w.A[i, j] if i != j else 1.0 / w.A[i, i]) / w.A[j, j]
-            linear.P[i, j] = x
-            linear.P[j, i] = x
+    mass_matrix(w, linear.P)
     # P = A - g C_hat + g^2 K_hat
     for i in range(k):
         for j in range(k):
@@ -308,7 +354,7 @@ def factorise(context, g):
 
 
 @kernel
-def _times_mass(w, linear, rho):
+def times_mass(w, linear, rho):
     """rho <- A rho, by the Cholesky factor of A, whose diagonal holds reciprocals."""
     k = rho.size
     # b = L^T rho
@@ -341,7 +387,7 @@ def solve(context, rho):
     c = load(context)
     w, linear = c.work, c.linear
     rho = vector(rho, w.v.size)
-    _times_mass(w, linear, rho)
+    times_mass(w, linear, rho)
     lu_solve(linear.P, linear.pivots, rho, rho.size)
     return OK
 
@@ -357,7 +403,7 @@ def soften(context, ex, g, ey):
     k = w.v.size
     ex, ey = vector(ex, k), vector(ey, k)
     # P y = A ey - g K_hat ex,  x = ex + g y
-    _times_mass(w, linear, ey)
+    times_mass(w, linear, ey)
     for i in range(k):
         for j in range(k):
             ey[i] -= g * linear.K_hat[i, j] * ex[j]

@@ -18,7 +18,7 @@ from ..maths.dense_linalg import (
 )
 from ..maths.tolerances import LAST_PLACE, SUM_ROUNDING
 from ..maths.vectors import multiply_g
-from ..methods.explicit import ACCELERATE, NORM, PLACE
+from ..methods.explicit import ACCELERATE, NORM, NORMAL, PLACE
 from ..model.equations import (
     add_inertia_row,
     applied_forces,
@@ -445,6 +445,31 @@ def set_positions(c, t, v):
     status = solve_positions(system, w, t, vector(v, w.v.size))
     # Eqs. 7, 9 and 28 at the new q
     return tangent_map(system, w, t) if status == OK else status
+
+
+@callback(NORMAL)
+def normal(context, t, vd, out):
+    """out (2 m,) = u and ud at the present q, which dense output starts from."""
+    c = load(context)
+    put_normal(c, t, vector(vd, c.work.v.size), vector(out, 2 * c.work.u.size))
+    return OK
+
+
+@kernel
+def put_normal(c, t, vd, out):
+    """u, then ud = T vd + B Phi_t, from Phi(q0 + V v - U u, t) = 0."""
+    w, m = c.work, c.work.u.size
+    copy(w.u, out)
+    if is_rheonomic(c.system):
+        evaluate_dense_drift(c.system, w, t)
+    for i in range(m):
+        x = 0.0
+        for j in range(vd.size):
+            x += w.T[i, j] * vd[j]
+        if is_rheonomic(c.system):
+            for j in range(m):
+                x += w.B[i, j] * w.Phi_t[j]
+        out[m + i] = x
 
 
 @callback(ACCELERATE)

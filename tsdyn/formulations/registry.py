@@ -16,7 +16,10 @@ from .locked_orientations import moving_graph
 
 @dataclass(frozen=True)
 class Formulation:
-    """A module of kernels: place, accelerate, complete, check, start_chart; for some stage_place, stage_accelerate."""
+    """A module of kernels: place, accelerate, complete, check, start_chart, error_norm.
+
+    Some have others for steps whose stages aren't placed: stage_place, stage_accelerate, stage_error_norm.
+    """
 
     name: str
     kernels: ModuleType
@@ -79,14 +82,21 @@ class Formulation:
         return int(unheld.sum())
 
     @property
+    def has_normals(self):
+        """Whether positions have normal coordinates u that dense output starts from."""
+        return hasattr(self.kernels, "normal")
+
+    @property
     def frees_stages(self):
         """Whether stages of explicit methods may stay where their sums put them, off the manifold."""
         return hasattr(self.kernels, "stage_place")
 
     def stage_kernels(self, free):
-        """The kernels place and accelerate of an explicit method's stages."""
+        """The kernels place and accelerate of an explicit method's stages, and the error norm of its steps."""
         k = self.kernels
-        return (k.stage_place, k.stage_accelerate) if free else (k.place, k.accelerate)
+        if free:
+            return k.stage_place, k.stage_accelerate, k.stage_error_norm
+        return k.place, k.accelerate, k.error_norm
 
     def addresses(self):
         """Addresses of the kernels that a driver calls, by their names in `RunKernels`; loads or compiles them."""
@@ -101,13 +111,13 @@ class Formulation:
 
     def stages(self, coupled=False):
         """The kernels that implicit methods need, by their names in `StageKernels`; coupled: all stages at once."""
-        module = self.kernels if self.basis_free else linearisation
+        module = self.kernels if self.basis_free or self.mixed else linearisation
         if coupled:
             own = {name: getattr(implicit_tangent, name) for name in implicit_tangent.KERNELS}
             shared = ("linearise", "reduce", "soften", "recall", "residual", "distance")
             return own | {name: getattr(module, name) for name in shared} | {"error_norm": self.kernels.error_norm}
-        names = ("linearise", "reduce", "factorise", "solve", "soften", "recall")
-        names += ("residual", "correct", "distance") if self.basis_free else ()
+        names = ("linearise", "reduce", "factorise", "soften", "recall")
+        names += ("residual", "correct", "distance") if self.basis_free else ("solve",)
         return {name: getattr(module, name) for name in names} | {"error_norm": self.kernels.error_norm}
 
 

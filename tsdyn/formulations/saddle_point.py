@@ -2,6 +2,7 @@
 
 from ..elements.loops.constraint_rows import OMEGA, POSE, write_positions, write_velocities
 from ..elements.loops.coordinate_rows import call_kind
+from ..elements.loops.friction import DERIVE
 from ..errors import Status
 from ..jit.kernels import callback, kernel, long_kernel, stack, stack2, vector
 from ..jit.simd import add, cross, fma, four, lanes, put, splat, sub
@@ -20,11 +21,12 @@ from ..rows.interface import (
     solve_product,
     solve_saddle,
     weigh,
+    weigh_selected_rows,
     write_saddle_rows,
 )
 from ..rows.saddle_matrix import BLOCK, LOWER, OWN, UPPER
 from ..workspaces import load
-from .accelerations import body_of, solve_accelerations
+from .accelerations import body_of, call_friction, find_loads, solve_accelerations
 from .chart_coordinates import (
     acceleration_by_turn,
     add_gyroscopic,
@@ -238,19 +240,16 @@ def linearise(context, t, yd):
     system, w, f, graph = c.system, c.work, c.tangent, c.graph
     c.linear.numbers.fresh = 1
     w.counters.jacobians += 1
-    # Multipliers of the present state, for the geometric stiffness
-    if is_direct(graph):
-        w.counters.factorizations += 1
-        if f.b.size > 0 and factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0:
-            return SINGULAR
-        solve_accelerations(graph, system, w, f, t)
+    # Multipliers of the present state, for the geometric stiffness and for friction
+    w.counters.factorizations += 1
+    if graph.frictions.shape[0] > 0:
+        copy(c.saddle.multipliers, f.friction.lam)
+        weigh_selected_rows(graph, f.rows)
+        return call_friction(graph.friction_solver[0], context, t, yd)
+    if f.b.size > 0 and factorise_selected_rows(graph, f, f.rows, DYNAMICS) >= 0:
+        return SINGULAR
+    solve_accelerations(graph, system, w, f, t)
     return OK
-
-
-@kernel
-def is_direct(graph):
-    """Whether implicit_tangent.py solves the stages: reactions on which friction depends are found by `accelerate`."""
-    return graph.frictions.shape[0] == 0
 
 
 @callback("pd")
@@ -348,8 +347,18 @@ def add_blocks(graph, s, upper, lower, g, masses):  # six: the graph, a matrix a
 
 
 @kernel
+def write_rows(c):
+    """Set the matrix to H and H^T at the present configuration; with friction to H^T - g N_lam in place of H^T."""
+    f, s, graph = c.tangent, c.saddle, c.graph
+    write_saddle_rows(graph, f, s)
+    if graph.frictions.shape[0] > 0:
+        find_loads(graph, c.system, f, c.work.q, s.multipliers, DERIVE)
+        _write_frictions(graph, f, s)
+
+
+@kernel
 def _write_frictions(graph, f, s):
-    """H^T - g N_lam in place of H^T: what the reactions of a joint change of its friction."""
+    """Add - g N_lam: what the reactions of a joint change of its friction."""
     change = stack(8)
     for i in range(graph.frictions.shape[0]):
         friction = graph.frictions[i]
@@ -380,33 +389,28 @@ def factorise(context, g):
     c = load(context)
     f, s, graph = c.tangent, c.saddle, c.graph
     # H and H^T, then the blocks of bodies between them
-    write_saddle_rows(graph, f, s)
+    write_rows(c)
     add_blocks(graph, s, s.upper, s.lower, g, True)
-    _write_frictions(graph, f, s)
     c.work.counters.iteration_matrices += 1
-    # Stages that solve for u and z by themselves begin with these factors of N
-    if is_direct(graph) and f.b.size > 0 and not factorise_normal(graph, c.work, f, c.chart):
+    # Stages begin with these factors of N
+    if f.b.size > 0 and not factorise_normal(graph, c.work, f, c.chart):
         return SINGULAR
     return OK if factorise_saddle(s) else SINGULAR
 
 
 @kernel
-def _take_tangent_part(graph, f, l, x, factored, out):
-    """out ((nb + 1) 8,) = x - Y0 n, n = N^-1 H (x as a motion of bodies); Z = out as one.
-
-    Where there are no factors of N, those of S serve, twice: normal parts and those of stiff modes may be large.
-    """
+def _take_tangent_part(graph, f, l, x, out):
+    """out ((nb + 1) 8,) = x - Y0 n, n = N^-1 H (x as a motion of bodies); Z = out as one."""
     # x, the ground at rest
     for i in range(x.size):
         out[i] = x[i]
     for i in range(x.size, out.size):
         out[i] = 0.0
-    lower, upper = l.lower if factored else f.rows.S, l.upper if factored else f.rows.S
-    for _ in range((1 if factored else 2) if f.b.size > 0 else 0):
+    if f.b.size > 0:
         # n = N^-1 H x,  x <- x - Y0 n
         to_bodies(graph, l, out, f.Z)
         multiply_rows(graph, f.rows, f.Z, f.b)
-        solve_product(graph, lower, upper, f.b)
+        solve_product(graph, l.lower, l.upper, f.b)
         apply_multipliers(graph, l.rows0, f.b, out)
     to_bodies(graph, l, out, f.Z)
 
@@ -476,25 +480,6 @@ def take_solution(graph, s):
             s.a[8 * b + i + i // 3] += s.x[s.graph.body_at[b] + i]
 
 
-@callback("pp")
-def solve(context, x):
-    """x (8 b,) <- the Newton correction for the residual x of the accelerations."""
-    c = load(context)
-    f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
-    x = vector(x, l.x.size - 8)
-    # Accelerations and multipliers of the iterate k: those of the state, less the residual x
-    copy(f.b, s.multipliers)
-    to_bodies(graph, l, x, s.e)
-    for i in range(s.a.size):
-        s.a[i] = f.Z[i] - s.e[i]
-    # Right-hand side M r
-    _take_tangent_part(graph, f, l, x, l.state.factored == 1, s.r)
-    _weigh(graph, f, s, f.Z)
-    _correct(graph, l, s, x, s.r)
-    take_solution(graph, s)
-    return OK
-
-
 @callback("ppdp")
 def soften(context, ex, g, ey):
     """(ex, ey) <- (I - g J)^-1 (ex, ey), as linearisation.soften.
@@ -505,10 +490,10 @@ def soften(context, ex, g, ey):
     f, l, s, graph = c.tangent, c.chart, c.saddle, c.graph
     ex, ey = vector(ex, l.x.size - 8), vector(ey, l.x.size - 8)
     # M ey
-    _take_tangent_part(graph, f, l, ey, True, s.r)  # N is that of the chart's check
+    _take_tangent_part(graph, f, l, ey, s.r)  # N is that of the chart's check
     _weigh(graph, f, s, f.Z)
     # + g K ex
-    _take_tangent_part(graph, f, l, ex, True, s.e)
+    _take_tangent_part(graph, f, l, ex, s.e)
     _add_stiffness(graph, s, g, f.Z)
     _correct(graph, l, s, ey, s.r)
     for i in range(ex.size):

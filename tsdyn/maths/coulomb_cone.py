@@ -11,6 +11,7 @@ from .tolerances import (
     CONE_STEPS,
     CONE_SWEEPS,
     RANK_TOL,
+    TINY,
 )
 
 # u = G p + b, p = (N, T) of each contact, T in two directions. Contacts with slip of a known direction d have
@@ -26,7 +27,7 @@ from .tolerances import (
 OPEN, STICKS, SLIDES = 0, 1, 2
 
 
-def solve_cone(G, b, mu, slip=None, given=None):
+def solve_cone(G, b, mu, slip=None, given=None, bounds=()):
     """Solve for contacts with Coulomb friction.
 
     Parameters
@@ -39,6 +40,8 @@ def solve_cone(G, b, mu, slip=None, given=None):
         Directions of slip where they are known; NaN elsewhere.
     given : ndarray (k,), optional
         Normal parts beside N, of which b has the effect already: |T| <= mu (N + given).
+    bounds : sequence of float
+        Of forces (3,) that follow those of the contacts, of friction alone: |p| <= bound.
 
     Returns
     -------
@@ -47,6 +50,7 @@ def solve_cone(G, b, mu, slip=None, given=None):
     mode : ndarray (k,)
         OPEN, STICKS or SLIDES.
     """
+    mu, others = np.append(mu, np.zeros(len(bounds))), len(bounds)
     k = mu.size
     if k == 0:
         return np.zeros(0), np.zeros(0, int)
@@ -55,8 +59,8 @@ def solve_cone(G, b, mu, slip=None, given=None):
     size = np.abs(b * scale).max()
     if size == 0.0:
         return np.zeros(3 * k), np.full(k, OPEN)
-    given = np.zeros(k) if given is None else given / (scale[::3] * size)
-    problem = _Problem(G * scale[:, None] * scale, b * scale / size, mu, slip, given)
+    given = np.append(np.zeros(k - others) if given is None else given, bounds) / (scale[::3] * size)
+    problem = _Problem(G * scale[:, None] * scale, b * scale / size, mu, slip, given, others)
     p = np.zeros(3 * k)
     with np.errstate(over="ignore", invalid="ignore"):  # where there is no solution
         for left, counts in ((0.0, CONE_SWEEPS), (CONE_LEFT, CONE_SWEEPS[:1]), (CONE_SLIP, CONE_SWEEPS[:1])):
@@ -72,13 +76,15 @@ def solve_cone(G, b, mu, slip=None, given=None):
 class _Problem:
     """One problem in scaled units; arguments as of `solve_cone`."""
 
-    def __init__(self, G, b, mu, slip, given):
+    def __init__(self, G, b, mu, slip, given, others):
         self.G, self.b, self.mu, self.given = G, b, mu, given
-        known = np.zeros(mu.size, bool) if slip is None else np.isfinite(slip).all(axis=1)
-        self.known = known | (mu == 0.0)  # T follows from N
+        known, self.balls = np.zeros(mu.size, bool), np.arange(mu.size) >= mu.size - others
+        if slip is not None:
+            known[: len(slip)] = np.isfinite(slip).all(axis=1)
+        self.known = (known | (mu == 0.0)) & ~self.balls  # T follows from N
         self.direction = np.zeros((mu.size, 2))
         if slip is not None:
-            self.direction[known] = slip[known]
+            self.direction[known] = slip[known[: len(slip)]]
 
     def image(self, y, contacts=slice(None)):
         """Right-hand sides of Eqs. (1), (2) (k, 3) for y (k, 3)."""
@@ -87,7 +93,11 @@ class _Problem:
         bound, length = mu * (N + self.given[contacts]), np.hypot(y[:, 1], y[:, 2])
         share = np.where(length > bound, bound / np.where(length > 0.0, length, 1.0), 1.0)
         T = np.where(known[:, None], -bound[:, None] * d, share[:, None] * y[:, 1:])
-        return np.column_stack([N, T])
+        found, balls = np.column_stack([N, T]), self.balls[contacts]
+        if balls.any():
+            size = np.linalg.norm(y[balls], axis=1)
+            found[balls] = y[balls] * np.minimum(1.0, self.given[contacts][balls] / np.maximum(size, TINY))[:, None]
+        return found
 
     def residual(self, p, factor=1.0):
         """p less the right-hand sides of Eqs. (1), (2), and y (k, 3) for r."""
@@ -99,6 +109,12 @@ class _Problem:
         D = np.zeros((y.size, y.size))
         for i, (n, *t) in enumerate(y):
             o, mu, pushes = 3 * i, self.mu[i], float(n > 0.0)
+            if self.balls[i]:
+                size, bound = np.linalg.norm(y[i]), self.given[i]
+                e = y[i] / max(size, TINY)
+                part = np.eye(3) if size <= bound else bound / size * (np.eye(3) - np.outer(e, e))
+                D[o : o + 3, o : o + 3] = part
+                continue
             D[o, o] = pushes
             length, bound = np.hypot(*t), mu * (max(n, 0.0) + self.given[i])
             if self.known[i]:
@@ -157,4 +173,6 @@ class _Problem:
         y = self.residual(p)[1]
         N, length = p[::3], np.hypot(y[:, 1], y[:, 2])
         slides = self.known | (length > self.mu * (N + self.given))
-        return np.where(N > 0.0, np.where(slides, SLIDES, STICKS), OPEN)
+        found = np.where(N > 0.0, np.where(slides, SLIDES, STICKS), OPEN)
+        beyond = np.linalg.norm(y, axis=1) > self.given
+        return np.where(self.balls, np.where(beyond, SLIDES, STICKS), found)

@@ -204,11 +204,7 @@ def _iterate(context, c, r, own, t, h):
     moved, zeros, adaptive = r.memory[_rest(r) :][:n], r.memory[_rest(r) + n :][:n], r.numbers.adaptive == 1
     # Sizes of corrections are error norms: rounding of 1 + |value| is RESIDUAL_FLOOR / tol
     tol = numbers.rtol + numbers.atol
-    floor, stalled, kappa = (
-        limits.RESIDUAL_FLOOR / tol,
-        limits.STALLED_CORRECTION / tol,
-        limits.KAPPA_COUPLED if adaptive else limits.KAPPA,
-    )
+    floor, stalled, kappa = limits.RESIDUAL_FLOOR / tol, limits.STALLED_CORRECTION / tol, numbers.kappa
     for e in range(n):
         moved[e] = zeros[e] = 0.0
     before, theta, rate, renewals, fresh, newest = math.inf, 0.0, 1.0, 0, False, False

@@ -17,7 +17,7 @@ from .explicit import ERROR, STEP, call_accelerate, call_norm, call_place, combi
 # polynomial.
 #
 # The memory of it: t, h and the counter of charts of the last attempt; h of the step before, 0 where there is none; the
-# number of points; then vd_i and k_i of each stage of the step before, n floats each.
+# number of points; then x'_i and y'_i of each stage of the step before.
 #
 # With friction velocities are predicted in place of accelerations: at rest they are smooth to a part of the slip
 # velocity, and friction beyond it doesn't determine them.
@@ -26,23 +26,23 @@ T_LAST, H_LAST, CHART_LAST, STEP_BEFORE, POINTS, BEFORE = range(6)
 LEAST_POINTS, MOST_POINTS = 2, 4
 
 
-def prediction_memory(stages, n):
-    """Floats of memory that predictions need."""
-    return BEFORE + 2 * stages * n
+def prediction_memory(stages, size):
+    """Floats of memory that predictions need, size being nx + ny."""
+    return BEFORE + stages * size
 
 
 @kernel
-def begin_prediction(memory, own, stages, n, t, h, charts):
+def begin_prediction(memory, own, stages, size, t, h, charts):
     """Keep the stages of the last attempt if it led to t; the ratio of their step to h, 0 where there are none.
 
-    memory is that of the stages, of which stage i has vd_i at (2 i + 2) n and k_i behind; own is that of predictions.
+    memory is that of the stages, of which stage i has (x'_i, y'_i) at (i + 1) size; own is that of predictions.
     """
     if own[CHART_LAST] != charts:
         own[STEP_BEFORE] = 0.0
     # The last attempt ended at t: its stages are those of the step before
     elif own[H_LAST] > 0.0 and abs(own[T_LAST] + own[H_LAST] - t) <= limits.SAME_TIME * h:
         own[STEP_BEFORE] = own[H_LAST]
-        copy(memory[2 * n :][: 2 * stages * n], own[BEFORE:])
+        copy(memory[size:][: stages * size], own[BEFORE:])
     # Neither accepted nor repeated
     elif own[T_LAST] != t:
         own[STEP_BEFORE] = 0.0
@@ -51,8 +51,8 @@ def begin_prediction(memory, own, stages, n, t, h, charts):
 
 
 @kernel
-def predict(tableau, memory, own, i, ratio, points, part, k):  # eight: what is known, and what is asked for
-    """k_i (part 1) or vd_i (part 0) on the polynomial through the `points` nearest of the stages known.
+def predict(tableau, memory, own, i, ratio, points, size, part, k):  # nine: what is known, and what is asked for
+    """y'_i (part nx) or x'_i (part 0) on the polynomial through the `points` nearest of the stages known.
 
     Of the step before, too, if ratio > 0.
     """
@@ -84,7 +84,7 @@ def predict(tableau, memory, own, i, ratio, points, part, k):  # eight: what is 
         for l in range(found):
             if l != m:
                 weight *= (target - times[l]) / (times[m] - times[l])
-        known = memory[(2 * source + 2 + part) * n :] if source < i else own[BEFORE + (2 * (source - i) + part) * n :]
+        known = memory[(source + 1) * size + part :] if source < i else own[BEFORE + (source - i) * size + part :]
         for e in range(n):
             k[e] += weight * known[e]
 
@@ -102,13 +102,13 @@ def extrapolated(own, i):
 
 
 @kernel
-def choose_points(tableau, memory, own, ratio, part, scratch):
+def choose_points(tableau, memory, own, ratio, size, part, scratch):  # seven: as `predict`
     """Take the number of points that would have predicted the first implicit stage best; scratch is of n floats."""
     n, least = scratch.size, math.inf
-    k = memory[(4 + part) * n :]
+    k = memory[2 * size + part :]
     # Squared error of the prediction from so many points
     for points in range(LEAST_POINTS, MOST_POINTS + 1):
-        predict(tableau, memory, own, 1, ratio, points, part, scratch)
+        predict(tableau, memory, own, 1, ratio, points, size, part, scratch)
         off = 0.0
         for e in range(n):
             off += (k[e] - scratch[e]) * (k[e] - scratch[e])
@@ -123,16 +123,22 @@ def choose_points(tableau, memory, own, ratio, part, scratch):
 #     vd_i = vd + h sum_{j<i} a_ij k_j + g k_i,    v_i = v + h sum_{j<i} a_ij vd_j + g vd_i,    g = h a_ii
 #     k_i <- k_i + P^-1 A (f(v_i, vd_i) - k_i),    P = A - g C_hat + g^2 K_hat  (linearisation.py)
 #
+# In a mixed system, (v, w)' = (vd(v, w), f(v, w)), vd_i is an unknown, too:
+#
+#     w_i = w + h sum_{j<i} a_ij k_j + g k_i
+#     (vd_i, k_i) <- (vd_i, k_i) + (I - g J)^-1 ((vd, f)(v_i, w_i) - (vd_i, k_i))
+#
 # P is kept over iterations, stages and steps. On poor measured contraction it is rebuilt, first from the same stiffness
 # and damping at the current configuration, then from new ones.
 #
-# The memory of a step, n = k floats each:  known part of v_i, of vd_i;  (vd, k) of each stage;  then scratch, below,
-# and what predictions of stages keep.
+# The memory of a step, n = nx + ny floats each:  known part of (x_i, y_i);  (x', y') = (vd, k) of each stage;  then
+# scratch, below, and what predictions of stages keep.
 
 STAGE_FAILED = int(Status.STAGE_FAILED)
-SCRATCH = 6  # vectors of it, and a number
-# f(v_i, vd_i), the correction of v_i, v_i; v and vd of the step before in this chart, h before, then the predicted k_i
-F, DX, XS, Y_BEFORE, K_BEFORE, H_BEFORE = range(6)
+SCRATCH = 5  # vectors of it, and a number
+# (x', y') at the iterate, then what a correction changes of y_i; what it changes of x_i; x_i, and y_i unless it is x';
+# (x', y') at the step before in this chart; the predicted ones of the stage; h before
+RATES, MOVED, POINT, LAST, GUESS, H_BEFORE = range(6)
 
 call_linearise = caller("pdp")
 call_reduce = caller("pd")
@@ -143,15 +149,15 @@ call_residual = caller("pddppp")
 call_correct = caller("pdp", "d")
 
 
-def memory_of(stages, n):
+def memory_of(stages, nx, ny):
     """Floats of memory that `implicit_step` needs."""
-    return (stages + 1) * 2 * n + SCRATCH * n + 1 + prediction_memory(stages, n)
+    return (stages + 1 + SCRATCH) * (nx + ny) + 1 + prediction_memory(stages, nx + ny)
 
 
 @kernel
 def _scratch_at(r):
     """Where the scratch begins in the memory of a step."""
-    return (int(r.tableau[0]) + 1) * 2 * r.x.size
+    return (int(r.tableau[0]) + 1) * (r.x.size + r.y.size)
 
 
 @kernel
@@ -176,61 +182,65 @@ def _renew_matrix(context, c, t, g, f, renew, here):
 
 
 @kernel
-def _set_stage(g, k, known, xs, ys):
-    """vd_i = y + g k, v_i = x + g vd_i; known is (x, y), the parts from earlier stages."""
-    n = k.size
-    for c in range(n):
-        ys[c] = known[n + c] + g * k[c]
-        xs[c] = known[c] + g * ys[c]
+def _set_stage(g, known, xd, k, xs, ys):
+    """y_i = y + g k, x_i = x + g x'; known is (x, y), the parts from earlier stages. x' may be y_i."""
+    for c in range(ys.size):
+        ys[c] = known[xs.size + c] + g * k[c]
+    for c in range(xs.size):
+        xs[c] = known[c] + g * xd[c]
 
 
 @kernel
 def _is_direct(c):
     """Whether the form solves a stage's equations for positions, velocities and reactions at the same time."""
-    return c.linear.kernels.residual != 0 and c.graph.frictions.shape[0] == 0
+    return c.linear.kernels.residual != 0
 
 
 @kernel
-def _evaluate(context, c, r, t, g, xs, ys, k, f):  # nine: a stage and its equations
-    """Evaluate the equations of a stage at (t, xs, ys) and k; f = the accelerations there, if it needs them. Status."""
+def _evaluate(context, c, r, t, g, xs, ys, k, rates):  # nine: a stage and its equations
+    """Evaluate the equations of a stage at (t, xs, ys) and k; rates = (x', y') there, if it needs them. Status."""
     # Positions, velocities, accelerations and reactions are unknowns together
     if _is_direct(c):
         return call_residual(c.linear.kernels.residual, context, t, g, xs, ys, k)
-    # Otherwise f is the right-hand side of the ODE
+    # Otherwise rates are the right-hand side of the ODE
     status = call_place(r.kernels.place, context, t, xs)
     if status == 0:
-        status = call_accelerate(r.kernels.accelerate, context, t, ys, f, f)
+        status = call_accelerate(r.kernels.accelerate, context, t, ys, rates[xs.size :], rates)
     return status
 
 
 @kernel
-def _correct(context, c, g, k, f, dx):
-    """k += P^-1 A (f - k); the size of g times it, and of g^2 times it, in the error norm."""
-    linear = c.linear
+def _correct(context, c, second, g, stage, rates, moved):
+    """Correct k, and x' unless it is y_i (`second`); the size of what changes of x_i and y_i in the error norm."""
+    linear, nx = c.linear, moved.size
+    begin = nx if second else 0
     # By the saddle-point matrix
     if _is_direct(c):
-        return call_correct(linear.kernels.correct, context, g, k)
+        return call_correct(linear.kernels.correct, context, g, stage[nx:])
     # k += P^-1 A (f - k)
-    for i in range(k.size):
-        f[i] -= k[i]
-    call_solve(linear.kernels.solve, context, f)
-    for i in range(k.size):
-        k[i] += f[i]
-        # vd changes by g times the correction, v by g^2 times it
-        f[i] *= g
-        dx[i] = g * f[i]
-    return call_norm(linear.kernels.error_norm, context, dx, f, linear.now, linear.numbers.rtol, linear.numbers.atol)
+    for i in range(begin, stage.size):
+        rates[i] -= stage[i]
+    call_solve(linear.kernels.solve, context, rates[begin:])
+    for i in range(begin, stage.size):
+        stage[i] += rates[i]
+        rates[i] *= g
+    # y_i changes by g times the correction, x_i by g times that of x'
+    for i in range(nx):
+        moved[i] = g * rates[nx + i] if second else rates[i]
+    rtol, atol = linear.numbers.rtol, linear.numbers.atol
+    return call_norm(linear.kernels.error_norm, context, moved, rates[nx:], linear.now, rtol, atol)
 
 
 @kernel
-def _is_near(context, c, g, k, guess, f, dx):
+def _is_near(context, c, second, g, stage, guess, rates, moved):  # eight: as _correct, and the prediction
     """Return True if the positions of a solution are near to those of its prediction: another one may be far."""
-    linear = c.linear
-    for i in range(k.size):
-        f[i] = 0.0  # of velocities a stiff transient may change any amount
-        dx[i] = g * g * (k[i] - guess[i])
+    linear, nx = c.linear, moved.size
+    for i in range(nx):
+        moved[i] = g * g * (stage[nx + i] - guess[nx + i]) if second else g * (stage[i] - guess[i])
+    for i in range(nx, stage.size):
+        rates[i] = 0.0  # of velocities a stiff transient may change any amount
     norm = linear.kernels.distance if _is_direct(c) else linear.kernels.error_norm
-    return call_norm(norm, context, dx, f, linear.now, 1.0, 1.0) < limits.FAR_STAGE
+    return call_norm(norm, context, moved, rates[nx:], linear.now, 1.0, 1.0) < limits.FAR_STAGE
 
 
 @kernel
@@ -340,42 +350,43 @@ def _is_solved(c, size, adaptive, is_last):
 
 @kernel
 def _solve_stage(context, c, r, i, t, g):
-    """Solve stage i at time t: k_i, predicted on entry, and v_i, vd_i. Status."""
-    w, linear, n, scratch = c.work, c.linear, r.x.size, r.memory[_scratch_at(r) :]
-    known, ys, k = r.memory[: 2 * n], r.memory[(1 + i) * 2 * n :][:n], r.memory[(1 + i) * 2 * n + n :][:n]
-    f, dx, xs = scratch[F * n :][:n], scratch[DX * n :][:n], scratch[XS * n :][:n]
-    guess, adaptive = scratch[H_BEFORE * n + 1 :][:n], r.numbers.adaptive == 1
-    copy(k, guess)
+    """Solve stage i at time t: its (x', y') = (vd_i, k_i), predicted on entry. Status."""
+    w, linear, nx, n, scratch = c.work, c.linear, r.x.size, r.x.size + r.y.size, r.memory[_scratch_at(r) :]
+    known, stage, second = r.memory[:n], r.memory[(1 + i) * n :][:n], r.numbers.first_order == 0
+    rates, moved, guess = scratch[:n], scratch[MOVED * n :][:nx], scratch[GUESS * n :][:n]
+    xd, k, xs = stage[:nx], stage[nx:], scratch[POINT * n :][:nx]
+    ys, adaptive = stage[:nx] if second else scratch[POINT * n + nx :][: n - nx], r.numbers.adaptive == 1
+    copy(stage, guess)
     _begin_iteration(c, r)
     for _ in range(limits.ITERATIONS if adaptive else limits.FIXED_ITERATIONS):
-        # The equations at v_i, vd_i of the iterate
-        _set_stage(g, k, known, xs, ys)
-        status = _evaluate(context, c, r, t, g, xs, ys, k, f)
+        # The equations at x_i, y_i of the iterate
+        _set_stage(g, known, xd, k, xs, ys)
+        status = _evaluate(context, c, r, t, g, xs, ys, k, rates)
         if status != 0:
             return status
         w.counters.stage_iterations += 1
         # k += P^-1 A (f - k)
-        if not _renew_if_needed(context, c, t, g, f):
+        if not _renew_if_needed(context, c, t, g, rates[nx:]):
             return STAGE_FAILED
-        size = _correct(context, c, g, k, f, dx)
+        size = _correct(context, c, second, g, stage, rates, moved)
         if not size < math.inf or not _measure(c, size):
             return STAGE_FAILED
         if _is_solved(c, size, adaptive, i + 1 == int(r.tableau[0])):
             _learn(linear.numbers, linear.iteration.first, linear.iteration.second, linear.iteration.renewed == 1)
-            _set_stage(g, k, known, xs, ys)
-            return 0 if _is_near(context, c, g, k, guess, f, dx) else STAGE_FAILED
+            _set_stage(g, known, xd, k, xs, ys)
+            return 0 if _is_near(context, c, second, g, stage, guess, rates, moved) else STAGE_FAILED
         linear.iteration.before = size
     return STAGE_FAILED
 
 
 @kernel
-def _see_step_before(context, linear, t, n, scratch):
-    """h of the step before, 0 where there is none, and its start in this chart."""
+def _see_step_before(context, linear, t, nx, n, scratch):
+    """h of the step before, 0 where there is none, and (x', y') of its start in this chart."""
     # -inf: there is none
     h_before = t - linear.numbers.t_before if linear.numbers.t_before > -math.inf else 0.0
     scratch[H_BEFORE * n] = h_before
     if h_before > 0.0:
-        call_recall(linear.kernels.recall, context, scratch[Y_BEFORE * n :], scratch[K_BEFORE * n :])
+        call_recall(linear.kernels.recall, context, scratch[LAST * n :], scratch[LAST * n + nx :])
     return h_before
 
 
@@ -383,35 +394,39 @@ def _see_step_before(context, linear, t, n, scratch):
 def implicit_step(context, run, t, h):
     """One step of a method whose first stage is explicit; memory as of `memory_of`."""
     c, r = load(context), load_run(run)
-    n, tableau, memory, scratch = r.x.size, r.tableau, r.memory, r.memory[_scratch_at(r) :]
-    stages = int(tableau[0])
+    nx, ny, tableau, memory, scratch = r.x.size, r.y.size, r.tableau, r.memory, r.memory[_scratch_at(r) :]
+    n, stages, second = nx + ny, int(tableau[0]), r.numbers.first_order == 0
     width = 2 + stages
-    x, y, k_before = memory[:n], memory[n : 2 * n], scratch[K_BEFORE * n :]
+    x, y, start, last = memory[:nx], memory[nx:n], memory[n : 2 * n], scratch[LAST * n :]
     # Predictions: polynomials through known stages, or at first the line through the step before
-    h_before = _see_step_before(context, c.linear, t, n, scratch)
+    h_before = _see_step_before(context, c.linear, t, nx, n, scratch)
     own = scratch[SCRATCH * n + 1 :]
     ratio = begin_prediction(memory, own, stages, n, t, h, float(c.work.counters.charts))
-    part = 0 if c.linear.numbers.slips == 1 and ratio > 0.0 else 1
-    copy(r.y, memory[2 * n : 3 * n])
-    copy(r.yd, memory[3 * n : 4 * n])
+    part = 0 if second and c.linear.numbers.slips == 1 and ratio > 0.0 else nx
+    copy(r.y if second else r.xd, start)
+    copy(r.yd, start[nx:])
     for i in range(1, stages):
         # Stage i at t + c_i h
         row = tableau[1 + i * width :]
-        k = memory[(1 + i) * 2 * n + n :][:n]
-        # the prediction of k_i or vd_i, then the known parts of v_i and vd_i
-        predict(tableau, memory, own, i, ratio, extrapolated(own, i), part, k)
-        combine(row[2:], i, h, 2 * n, memory, memory)
-        # v + h sum_j a_ij vd_j,  vd + h sum_j a_ij k_j, j < i
-        for j in range(n):
+        stage, points = memory[(1 + i) * n :][:n], extrapolated(own, i)
+        k = stage[nx:]
+        # the prediction of k_i or vd_i, then the known parts of x_i and y_i
+        predict(tableau, memory, own, i, ratio, points, n, part, k)
+        if not second:
+            predict(tableau, memory, own, i, ratio, points, n, 0, stage[:nx])
+        combine(row[2:], i, h, n, memory, memory)
+        # x + h sum_j a_ij x'_j,  y + h sum_j a_ij k_j, j < i
+        for j in range(nx):
             x[j] += r.x[j]
+        for j in range(ny):
             y[j] += r.y[j]
         # Predicted is vd_i; k_i follows
         if part == 0:
-            for j in range(n):
+            for j in range(ny):
                 k[j] = (k[j] - y[j]) / (h * row[2 + i])
         elif i == 1 and ratio == 0.0 and h_before > 0.0:  # along the line through the step before
-            for j in range(n):
-                k[j] += row[1] * h / h_before * (r.yd[j] - k_before[j])
+            for j in range(nx if second else 0, n):
+                stage[j] += row[1] * h / h_before * (start[j] - last[j])
         status = _solve_stage(context, c, r, i, t + h * row[1], h * row[2 + i])
         # u, z and lam of a failed stage are of no use
         if status != 0:
@@ -419,9 +434,9 @@ def implicit_step(context, run, t, h):
             return status
         # The first implicit stage says how many points predict best
         if i == 1 and ratio > 0.0:
-            choose_points(tableau, memory, own, ratio, part, scratch[:n])
-    # Increments h sum_i b_i (vd_i, k_i)
-    combine(tableau[1 + stages * width :], stages, h, 2 * n, memory, memory)
+            choose_points(tableau, memory, own, ratio, n, part, scratch[:ny])
+    # Increments h sum_i b_i (x'_i, y'_i)
+    combine(tableau[1 + stages * width :], stages, h, n, memory, memory)
     copy(x, r.dx)
     copy(y, r.dy)
     return 0
@@ -429,20 +444,20 @@ def implicit_step(context, run, t, h):
 
 @callback(ERROR)
 def trapezoid_error(h, nx, ny, y, yd, tableau, memory, ex, ey):  # nine: as plug-ins have it
-    """The trapezoidal rule's -h^3 / 12 times the third derivatives of v and vd, by differences over two steps.
+    """The trapezoidal rule's -h^3 / 12 times the third derivatives of x and y, by differences over two steps.
 
     Where there is no step before, as if one as long had been without slope: more than the error of a short step.
     """
-    n = nx
-    memory, ex, ey = vector(memory, ANY), vector(ex, n), vector(ey, n)
-    before = memory[6 * n :]
+    n = nx + ny
+    memory, ex, ey = vector(memory, ANY), vector(ex, nx), vector(ey, ny)
+    before = memory[3 * n :]
     h_before = before[H_BEFORE * n]
-    for c in range(n):
-        for part, out in ((0, ex), (n, ey)):
+    for part, out in ((0, ex), (nx, ey)):
+        for c in range(out.size):
             # h^3 / 12 y''' from the values of y' at the starts of two steps and at the end of this one
-            now, end, slope = memory[2 * n + part + c], memory[4 * n + part + c], 0.0
+            now, end, slope = memory[n + part + c], memory[2 * n + part + c], 0.0
             if h_before > 0.0:
-                slope = (now - before[Y_BEFORE * n + part + c]) / h_before
+                slope = (now - before[LAST * n + part + c]) / h_before
             out[c] = -h * h * ((end - now) - h * slope) / (6.0 * (h + (h_before if h_before > 0.0 else h)))
     return 0
 

@@ -1,6 +1,7 @@
 """The step kernels of explicit tableau methods and of plug-ins, and how step kernels and error estimates are called."""
 
 from ..jit.kernels import ANY, callback, caller, kernel, vector
+from ..jit.simd import add, four, put, splat, times
 from ..maths.dense_linalg import copy
 from ..workspaces import load_run
 
@@ -15,11 +16,12 @@ from ..workspaces import load_run
 # start of the step from the `RunState`, and writes the increments dx, dy there, which the driver adds by compensated
 # summation. The memory of a Runge-Kutta method holds n = nx + ny floats of scratch, then (x', y') of each stage.
 
-PLACE, ACCELERATE, STEP = "pdp", "pdppp", "ppdd"
+PLACE, ACCELERATE, NORMAL, STEP = "pdp", "pdppp", "pdpp", "ppdd"
 ERROR, NORM = "diipppppp", "ppppdd"
 call_norm = caller(NORM, "d")
 call_error = caller(ERROR)
 call_place = caller(PLACE)
+call_normal = caller(NORMAL)
 call_accelerate = caller(ACCELERATE)
 call_step = caller(STEP)
 
@@ -34,11 +36,31 @@ def error_kernel(function):
 
 
 @kernel
-def _add(out, f, k):
-    """out += f k, where f is not zero."""
-    if f != 0.0:
-        for c in range(out.size):
-            out[c] += f * k[c]
+def _add_stages(weights, count, h, k, stride, out):
+    """out += h sum_j weights_j k_j over the first stages, k_j at k[j stride].
+
+    Sixteen sums at a time stay in registers; coefficients that are zero are skipped.
+    """
+    whole = out.size // 16 * 16
+    for c in range(0, whole, 16):
+        p, q, r, s = four(out, c), four(out, c + 4), four(out, c + 8), four(out, c + 12)
+        for j in range(count):
+            f, at = h * weights[j], j * stride + c
+            if f != 0.0:
+                g = splat(f)
+                p, q = add(p, times(g, four(k, at))), add(q, times(g, four(k, at + 4)))
+                r, s = add(r, times(g, four(k, at + 8))), add(s, times(g, four(k, at + 12)))
+        put(out, c, p)
+        put(out, c + 4, q)
+        put(out, c + 8, r)
+        put(out, c + 12, s)
+    for c in range(whole, out.size):
+        total = out[c]
+        for j in range(count):
+            f = h * weights[j]
+            if f != 0.0:
+                total += f * k[j * stride + c]
+        out[c] = total
 
 
 @callback(STEP)
@@ -47,28 +69,26 @@ def nystrom_step(context, run, t, h):
     r = load_run(run)
     n, x, y, tableau, memory = r.x.size, r.x, r.y, r.tableau, r.memory
     stages = int(tableau[0])
-    xs, ys = memory[:n], memory[n : 2 * n]
+    xs, ys, k = memory[:n], memory[n : 2 * n], memory[2 * n :]
     width = 2 + 2 * stages
-    copy(r.yd, memory[2 * n : 3 * n])
+    copy(r.yd, k)
     for i in range(1, stages):
         row = tableau[1 + i * width :]
         ti = t + h * row[1]
         # y_i = y + h sum_j a_ij k_j
         copy(y, ys)
-        for j in range(i):
-            _add(ys, h * row[2 + stages + j], memory[(2 + j) * n :])
+        _add_stages(row[2 + stages :], i, h, k, n, ys)
         # x_i = x + h c_i y + h^2 sum_j abar_ij k_j, placed unless the stage before was there
         if row[0] == 0.0:
             for c in range(n):
                 xs[c] = h * row[1] * y[c]
-            for j in range(i):
-                _add(xs, h * h * row[2 + j], memory[(2 + j) * n :])
+            _add_stages(row[2:], i, h * h, k, n, xs)
             for c in range(n):
                 xs[c] += x[c]
             status = call_place(r.kernels.stage_place, context, ti, xs)
             if status != 0:
                 return status
-        status = call_accelerate(r.kernels.stage_accelerate, context, ti, ys, memory[(2 + i) * n :], r.xd)
+        status = call_accelerate(r.kernels.stage_accelerate, context, ti, ys, k[i * n :], r.xd)
         if status != 0:
             return status
     # dx = h y + h^2 sum_j bbar_j k_j,  dy = h sum_j b_j k_j
@@ -76,9 +96,8 @@ def nystrom_step(context, run, t, h):
     for c in range(n):
         r.dx[c] = h * y[c]
         r.dy[c] = 0.0
-    for j in range(stages):
-        _add(r.dx, h * h * weights[j], memory[(2 + j) * n :])
-        _add(r.dy, h * weights[stages + j], memory[(2 + j) * n :])
+    _add_stages(weights, stages, h * h, k, n, r.dx)
+    _add_stages(weights[stages:], stages, h, k, n, r.dy)
     return 0
 
 
@@ -88,9 +107,7 @@ def combine(weights, count, h, n, memory, out):
     out = out[:n]
     for c in range(n):
         out[c] = 0.0
-    # Zero coefficients are skipped
-    for j in range(count):
-        _add(out, h * weights[j], memory[(1 + j) * n :])
+    _add_stages(weights, count, h, memory[n:], n, out)
 
 
 @kernel
@@ -156,8 +173,7 @@ def _weigh(weights, stages, h, n, memory, end, out):
     # The derivative at the step's end, then those of the stages
     for c in range(out.size):
         out[c] = h * weights[stages] * end[c]
-    for j in range(stages):
-        _add(out, h * weights[j], memory[(1 + j) * n :])
+    _add_stages(weights, stages, h, memory[n:], n, out)
 
 
 @kernel

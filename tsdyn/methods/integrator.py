@@ -248,7 +248,7 @@ class DiagonallyImplicit(Adaptive):
     def kernel(self, first_order: bool) -> StepKernel:
         """The numbers of the tableau, and the kernel that steps by it."""
         stages = len(self.tableau.c)
-        return implicit_step, self.tableau.numbers, lambda nx, ny: memory_of(stages, nx)
+        return implicit_step, self.tableau.numbers, lambda nx, ny: memory_of(stages, nx, ny)
 
 
 class Collocation(Adaptive):

@@ -54,7 +54,7 @@ def quintic(s, h, n, d, out, outd):
 
 
 @kernel
-def _cubic(s, h, d, out):
+def cubic(s, h, d, out):
     """Cubic Hermite interpolation; d holds values and derivatives of the start, then those of the end."""
     n = out.size
     # Weights of the difference of values and of both derivatives
@@ -114,7 +114,17 @@ def hermite_first_order(s, h, n, nx, ny, data, x, y):
     """Quintic for x, cubic for y, whose second derivative nothing gives."""
     d = vector(data, 6 * nx + 4 * ny)
     quintic(s, h, nx, d, vector(x, nx), vector(y, 0))
-    _cubic(s, h, d[6 * nx :], vector(y, ny))
+    cubic(s, h, d[6 * nx :], vector(y, ny))
+    return 0
+
+
+@callback(VALUE)
+def cubic_rate(s, h, n, nx, ny, data, x, y):
+    """The derivative of the cubic for y of `hermite_first_order`, as y; x is left alone."""
+    d, y = vector(data, 6 * nx + 4 * ny)[6 * nx :], vector(y, ny)
+    f, g0, g1 = 6.0 * s * (1.0 - s) / h, 1.0 + s * (3.0 * s - 4.0), s * (3.0 * s - 2.0)
+    for i in range(ny):
+        y[i] = f * (d[2 * ny + i] - d[i]) + g0 * d[ny + i] + g1 * d[3 * ny + i]
     return 0
 
 

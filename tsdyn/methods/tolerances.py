@@ -68,9 +68,9 @@ RESIDUAL_FLOOR = 4e-15
 FAR_STAGE = 0.1
 
 # --- collocation methods: all stages at once (collocation_step.py) ---
-# Corrections at most; error norm that the iteration may leave; contraction from which the next step has new matrices,
-# and from which stages don't count as solved before matrices have had new derivatives.
-COUPLED_ITERATIONS, KAPPA_COUPLED, SLOW_COUPLED, TRUSTED = 12, 3e-3, 0.1, 0.3
+# Corrections at most; contraction from which the next step has new matrices, and from which stages don't count as
+# solved before matrices have had new derivatives.
+COUPLED_ITERATIONS, SLOW_COUPLED, TRUSTED = 12, 0.1, 0.3
 
 # Corrections that no longer contract, relative to 1 + size: below it they are rounding of large forces.
 STALLED_CORRECTION = 2e-12

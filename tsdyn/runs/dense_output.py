@@ -5,16 +5,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import Status
+from ..formulations.tolerances import CONTRACTION_LOST
 from ..jit.kernels import caller, entry, kernel, long_kernel, resident
 from ..maths.dense_linalg import copy, is_finite
-from ..methods.explicit import call_accelerate, call_place
-from ..methods.interpolants import call_fill, call_value
+from ..methods.explicit import call_accelerate, call_normal, call_place
+from ..methods.interpolants import call_fill, call_value, cubic
 from ..model.joint_turns import angle_after
 from ..observables.tolerances import KEPT_FLOATS
 from ..rows.interface import take_noted_selection
-from ..workspaces import B_CHART, B_DATA, B_END, B_H, B_START, STORED, arrays_of, load, load_run
+from ..workspaces import B_CHART, B_DATA, B_END, B_H, B_START, MIXED, STORED, arrays_of, load, load_run
 from .run_memory import STATUSES, call
-from .tolerances import FEW, LEGS, LONG_STEPS
+from .tolerances import LONG_STEPS
 
 # Outputs of a driver: the records of accepted states.
 
@@ -59,10 +60,11 @@ def restore_now(w, r):
 # workspace of their own (`Reader`), where the chart of a step is rebuilt: q0, the time and the selection of rows
 # determine it.
 
-NOT_FINITE = int(Status.NOT_FINITE)
+CHART_LOST, NOT_FINITE = int(Status.CHART_LOST), int(Status.NOT_FINITE)
 
 call_complete = caller("pp")
 call_chart = caller("pdpppp")
+call_check = caller("p")
 
 
 @long_kernel
@@ -86,32 +88,38 @@ def between(context, w, r, t, block):
     Positions are solved for twice: Newton's method starts further away than in a run, and ends closer to rounding when
     repeated from nearby.
     """
-    status = _place_share(context, w, r, t, t, 1.0, block)
-    return _evaluate_there(context, w, r, t, block) if status == 0 else status
-
-
-@kernel
-def _place_share(context, w, r, t, when, share, block):
-    """Place a share of the coordinates at t, at another time if the share is not all; x and y of the step. Status."""
-    # Coordinates of the chart by the interpolant
-    s = (t - block[B_START]) / block[B_H]
-    call_value(r.kernels.value, s, block[B_H], w.q.size, r.xs.size, r.ys.size, block[B_DATA:], r.xs, r.ys)
-    if share != 1.0:
-        for j in range(r.xs.size):
-            r.xs[j] *= share
-    return call_place(r.kernels.place, context, when, r.xs)
-
-
-@kernel
-def _evaluate_there(context, w, r, t, block):
     h, data = block[B_H], block[B_DATA:]
-    status = evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
+    s = (t - block[B_START]) / h
+    # Coordinates of the chart by the interpolant
+    call_value(r.kernels.value, s, h, w.q.size, r.xs.size, r.ys.size, data, r.xs, r.ys)
+    # Normal coordinates by a cubic: from further away Newton's method may end on another branch of the constraints
+    if r.numbers.normal_at > 0:
+        cubic(s, h, block[r.numbers.normal_at :], w.u)
+        copy(r.xs, w.v)
+    made = w.counters.factorizations
+    status = call_place(r.kernels.place, context, t, r.xs)
+    if status == 0 and w.counters.factorizations > made + (1 if r.numbers.normal_at > 0 else 2):
+        status = _branch_status(context, w, r)
+    if status == 0:
+        status = evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
     # Accelerations by the interpolant: the right-hand side of a stiff scene would amplify its error
     if status == 0 and r.kernels.second != 0:
-        s = (t - block[B_START]) / h
         call_value(r.kernels.second, s, h, w.q.size, r.xs.size, r.ys.size, data, r.xs, r.yds)
         call_complete(r.kernels.complete, context, r.yds)
     return status
+
+
+@long_kernel
+def _branch_status(context, w, r):
+    """CHART_LOST, a Status, where the contraction is that of another branch, else 0: as at the ends of steps.
+
+    A solve that needs no new factors of N, but for those of its start in the tangent form, can't have left the branch.
+    """
+    contraction, condition = w.control.contraction, w.control.condition
+    call_check(r.kernels.check, context)
+    lost = not w.control.contraction < CONTRACTION_LOST
+    w.control.contraction, w.control.condition = contraction, condition
+    return CHART_LOST if lost else 0
 
 
 @kernel
@@ -218,34 +226,11 @@ def read(context, run, t, rows, blocks, charts, points, out):
             keep(c, r.warm)
         # The state at t
         recall(c.system, block)
-        status = _go_to(context, c, r, t[i], charts[chart, 0], block)
+        status = between(context, w, r, t[i], block)
         if status != 0:
             return status
         put_state(w, out[i])
     return 0
-
-
-@kernel
-def _go_to(context, c, r, t, began, block):
-    """`between`, from the base point of the chart, in legs short enough to need no further factorisation. Status.
-
-    Newton's method from far away may end on another branch of the constraints than that of the run.
-    """
-    w, status = c.work, 0
-    # Fewer legs first; more where a leg needed many factorisations, a sign of a step too long
-    for legs in LEGS:
-        if legs > 1:
-            bring_back(c, r.warm)
-        status, most = 0, 0
-        for leg in range(1, legs + 1):
-            if status == 0:
-                # Chart coordinates in proportion, at a time in proportion
-                made, share = w.counters.factorizations, leg / legs
-                status = _place_share(context, w, r, t, began + share * (t - began) if leg < legs else t, share, block)
-                most = max(most, w.counters.factorizations - made)
-        if status == 0 and most <= FEW:
-            break
-    return _evaluate_there(context, w, r, t, block) if status == 0 else status
 
 
 # What a step gives besides its end: the interpolation block, and the states that t_eval asks for.
@@ -269,6 +254,14 @@ def record_end(w, r, log, t):
 
 
 @kernel
+def note_normal(context, r, t):
+    """Keep u and ud of the present state, where the form has them."""
+    if r.numbers.normal_at > 0:
+        rates = r.xd if r.numbers.first_order == MIXED else r.y
+        call_normal(r.kernels.normal, context, t, rates, r.normal)
+
+
+@kernel
 def head_block(r, t0, t1):
     """What every block of a step begins and ends with: the step, its chart, and what is remembered."""
     block = r.block
@@ -287,7 +280,12 @@ def store_block(r, log):
 @kernel
 def record_step(context, run, c, r, log, t0, t1):
     """Record what t_eval asks for in (t0, t1], or the step's end where it asks for nothing. Status."""
-    w = c.work
+    w, first = c.work, r.numbers.normal_at
+    # u and ud of both ends
+    if first > 0:
+        copy(r.normal, r.block[first:])
+        note_normal(context, r, t1)
+        copy(r.normal, r.block[first + r.normal.size :])
     # Most steps record their end only
     within = r.numbers.dense != 0 or is_wanted_before(r, log, t1)
     if not within:

@@ -122,6 +122,10 @@ class Slices:
                 rows = self._rows()
                 if rows <= 0:
                     self.status = Status.MAX_STEPS
+                    if self.task.archive is not None:
+                        with deferred_interrupts():
+                            self.recorder.collect()
+                            self.task.archive.stop(self.saved)
 
     def _rows(self):
         """Steps of the next slice, which ends where another method is considered: that mustn't depend on the clock."""
@@ -622,14 +626,14 @@ def _log_of(memory, task):
     rows, blocks = min(arrays.most, step_limit(memory.run, task)), (NO_ROWS, NO_ROWS)
     if task.dense_output:
         n, redundant = memory.run.now.shape[1], len(redundant_of(memory.context.tangent))
-        blocks = np.zeros((2 * CHART_ROOM, n + redundant)), np.empty((rows, memory.run.block.size))
+        blocks = np.zeros((len(arrays.charts), n + redundant)), np.empty((rows, memory.run.block.size))
     out = np.empty((times.size or rows + 1, arrays.width))
     return RunLog(times, task.stops, out, arrays.history, arrays.charts, *blocks), rows
 
 
 def _arrays_of(memory):
     most, run = first_slice(memory.weight), memory.run
-    history, charts = np.empty((most + 2 * TRIES, 3)), np.empty((2 * CHART_ROOM, 5))
+    history, charts = np.empty((most + 2 * TRIES, 3)), np.empty((most + CHART_ROOM, 5))  # one a step
     return SliceArrays(FIRST_SLICE, most, 1 + run.now.size + run.remembered.size, history, charts)
 
 

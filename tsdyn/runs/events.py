@@ -42,7 +42,7 @@ class Event(NamedTuple):
     exact: bool = False  # whether a value at the start that is positive is no rounding of zero
     falls: bool = False  # of a `GroupMember`: whether it may begin at zero within rounding, and fall at once
     action: object = None  # a function of a `Change` that each occurrence calls, or None
-    goes_on: bool = False  # whether a zero at the start has been counted before
+    goes_on: bool = False  # whether the run has begun before, and a zero at the start has been counted
 
     def value(self, t, instant):
         """The function's value; raises `EventFailed`."""
@@ -279,6 +279,8 @@ class Watch:
             try:
                 self._begin(run, self.tracks is None)
             except EventFailed as failure:
+                if any(event.goes_on for event in self.events):
+                    return Status.EVENT_FAILED, str(failure)
                 raise InvalidArgument(f"events: {failure}") from failure.__cause__
         stiff, answer = run.numbers.stiff, getattr(memory, "answer", None)  # of sampled loads
         # One step at a time, searched before the next one

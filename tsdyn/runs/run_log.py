@@ -84,7 +84,7 @@ def with_end(charts, numbers, condition, contraction):
 #
 # Short histories are stored uncompressed, since a run of 0.1 ms leaves no time for more.
 
-FEW_ROWS, FEW_CHUNKS = 256, 4
+FEW_ROWS, FEW_CHUNKS = 1024, 4
 
 
 class StepLog:

@@ -116,11 +116,13 @@ def watch_stiffness(bodies, w, r, h):
     h |lambda| from the last stage and the step's end, both at the same time (Hairer, Wanner, Solving ODEs II, IV.2).
     """
     n, at, limit = r.x.size, r.numbers.last_stage, r.clock.stability_limit
-    rates, speeds = 0.0, 0.0
+    end, rates, speeds = r.xd if r.numbers.first_order != 0 else r.y, 0.0, 0.0
+    # Differences of the two last evaluations: |dvdd| / |dvd| estimates |lambda|
     for c in range(n):
-        # Differences of the two last evaluations: |dvdd| / |dvd| estimates |lambda|
-        speed, rate = r.memory[at + c] - r.y[c], r.memory[at + n + c] - r.yd[c]
+        speed = r.memory[at + c] - end[c]
         speeds += speed * speed
+    for c in range(r.y.size):
+        rate = r.memory[at + n + c] - r.yd[c]
         rates += rate * rate
     found = False
     # At the limit of stability

@@ -7,11 +7,12 @@ from ..formulations.tolerances import LOADS_LEFT, TURN_FREE, TURN_LIMIT
 from ..maths.tolerances import LAST_PLACE
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.explicit import called_for
+from ..methods.interpolants import cubic_rate
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, has_rates
 from ..rows.interface import redundancy
 from ..rows.saddle_matrix import saddle_of
-from ..workspaces import MIXED, Context, allocate, allocate_linear, basis_free_parts, divided, lay_out, words
+from ..workspaces import B_DATA, MIXED, Context, allocate, allocate_linear, basis_free_parts, divided, lay_out, words
 from .dense_output import TrajectoryReading, read, warm_size
 from .path_loads import watch
 from .run_memory import Memory
@@ -68,7 +69,7 @@ class StepMemory(Memory):
         if saddle is not None:
             self._scratch.append(context.saddle.K.base)
         if form.mixed:
-            self._scratch.append(context.rates.D.base)
+            self._scratch += [context.rates.D.base, context.mixed.P.base]
         rest = *self._laid_out, context.tangent.rows.S, context.tangent.poses
         self.nbytes = sum(array.nbytes for array in (*self._scratch, *rest))
 
@@ -108,9 +109,10 @@ class StepEngine:
         self.interpolant = method.interpolant(form.first_order)
         self.watched, self.loaded = prepared.watched if method.step is None else NOTHING
         path = 9 * int(packed.system.bodies[self.loaded, 1].sum()) + 3 * n if self.watched.size else 0
-        lengths = self.tableau.size, scratch(*self.sizes), self.interpolant.size(n, *self.sizes), path
+        normal = prepared.m if form.has_normals else 0
+        lengths = self.tableau.size, scratch(*self.sizes), self.interpolant.size(n, *self.sizes), normal, path
         lengths += self.watched.size, self.loaded.size
-        names = "tableau", "memory", "block", "path", "watched", "loaded"
+        names = "tableau", "memory", "block", "normal", "path", "watched", "loaded"
         self.lengths = dict(zip(names, lengths, strict=True))
         self.slips = prepared.slips
         self.system, kept = prepared.system(method.implicit, form.basis_free)
@@ -139,6 +141,7 @@ class StepEngine:
             run.kernels.watch = watch.address
         given = method, form, self.step, self.interpolant
         _set(run.kernels, kernels_of(*given, adaptive=method.step is None, within=self.within))
+        run.numbers.normal_at = normal_at(form, self.interpolant, run.now.shape[1], self.sizes) if self.within else 0
         run.numbers.free_stages = free = form.frees_stages and interval == 0
         # Rates of chart coordinates keep what a step leaves of them along rows on velocities, and positions follow it:
         # where it isn't taken off, a chart lasts for one step
@@ -147,24 +150,26 @@ class StepEngine:
         memory.context.chart.state.turn_limit = TURN_FREE if free else TURN_LIMIT
         share = LOADS_LEFT * method.step_tolerances()[0] if method.step is None else 0.0
         memory.context.chart.state.loads_left = max(share, LAST_PLACE)
-        place, accelerate = form.stage_kernels(free)
+        place, accelerate, norm = form.stage_kernels(free)
         run.kernels.stage_place, run.kernels.stage_accelerate = place.address, accelerate.address
         run.numbers.first_order = MIXED if form.mixed else form.first_order
         if method.step is None:
+            run.kernels.error_norm = norm.address
             run.clock.turn_share = run.clock.error_before = 1.0
             run.clock.exponent = 1.0 / (method.embedded_order + 1)
-            if method.stability_limit and not form.first_order:
+            if method.stability_limit and (form.mixed or not form.first_order):
                 run.clock.stability_limit = method.stability_limit
-                run.numbers.last_stage = 2 * len(method.tableau.c) * nx
+                run.numbers.last_stage = len(method.tableau.c) * sum(self.sizes)
         if method.implicit:
             addresses = form.implicit(method.coupled > 0)
             prepare_implicit(memory.context.linear, method, addresses, form.basis_free, self.slips)
-            run.numbers.stage_at = (2 * len(method.tableau.c) + 1) * nx
+            run.numbers.stage_at = len(method.tableau.c) * sum(self.sizes) + nx
 
     def reading(self, memory, prepared, constraint_tol):
         """A `Reading` of the steps; a function and its arguments that make it in another process."""
-        kernels, again = memory.run.kernels.as_dict(), (self.method, self.form.name, constraint_tol)
-        return _reading(prepared.packed, self.form, constraint_tol, kernels), (read_again, prepared.packed, *again)
+        given, again = (self.form, self.interpolant, constraint_tol), (self.method, self.form.name, constraint_tol)
+        reading = _reading(prepared.packed, *given, memory.run.kernels.as_dict())
+        return reading, (read_again, prepared.packed, *again)
 
 
 def read_again(packed, method, name, constraint_tol):
@@ -172,10 +177,15 @@ def read_again(packed, method, name, constraint_tol):
     form = formulation(name).serving(method, has_rates(packed))
     step, interpolant = method.kernel(form.first_order)[0], method.interpolant(form.first_order)
     kernels = kernels_of(method, form, step, interpolant, adaptive=False, within=True)
-    return _reading(packed, form, constraint_tol, kernels)
+    return _reading(packed, form, interpolant, constraint_tol, kernels)
 
 
-def _reading(packed, form, constraint_tol, kernels):
+def normal_at(form, interpolant, n, sizes):
+    """Where in a block u and ud of both ends begin; 0 for a form without them."""
+    return B_DATA + interpolant.size(n, *sizes) if form.has_normals else 0
+
+
+def _reading(packed, form, interpolant, constraint_tol, kernels):
     n, m, system = int(packed.system.bodies[:, 1].sum()), len(packed.system.segments), packed.system
     graph = form.graph(packed)
     sizes = form.sizes(packed, graph)
@@ -187,11 +197,19 @@ def _reading(packed, form, constraint_tol, kernels):
         parts = basis_free_parts(graph, n, not form.basis_free)
         run = lay_out(n, *sizes, 0, 0, warm=warm_size(work, *parts[1:]))
         _set(run.kernels, kernels)
+        run.numbers.normal_at = normal_at(form, interpolant, n, sizes)
         context = Context(own, work, allocate_linear(own, n, m, False), *parts)
         return form.context(packed, context, redundancy(graph)), run
 
     kernel = interrupts_answered()(read) if calls_laws(packed) else read
     return TrajectoryReading(kernel, workspace, system, shift=1, degree=8)
+
+
+def second_derivative(method, form):
+    """The kernel of accelerations between the ends of steps; None where they follow from the equations."""
+    if not method.implicit:
+        return None
+    return cubic_rate if form.first_order else method.second
 
 
 def kernels_of(method, form, step, interpolant, adaptive, within):
@@ -203,10 +221,10 @@ def kernels_of(method, form, step, interpolant, adaptive, within):
     kernels = {"step": called, "plug_in": plug_in}
     if adaptive:
         kernels |= dict(zip(("error", "second_error"), method.errors, strict=False))
-        kernels["error_norm"] = form.kernels.error_norm
     if within:
         kernels |= {"fill": interpolant.fill, "value": interpolant.value}
-        kernels["second"] = method.second if method.implicit else None
+        kernels["normal"] = form.kernels.normal if form.has_normals else None
+        kernels["second"] = second_derivative(method, form)
     return form.addresses() | {name: kernel.address for name, kernel in kernels.items() if kernel is not None}
 
 

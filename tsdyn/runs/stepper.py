@@ -7,7 +7,7 @@ from ..formulations.accelerations import body_of, unit_friction
 from ..formulations.chart_coordinates import turned_most
 from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL
 from ..formulations.tolerances import CONTRACTION_KEPT, CONTRACTION_LOST
-from ..jit.kernels import caller, entry, kernel, long_kernel, stack
+from ..jit.kernels import entry, kernel, long_kernel, stack
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import TINY
 from ..methods.explicit import call_step
@@ -26,9 +26,11 @@ from . import tolerances as limits
 from .dense_output import (
     bring_back,
     call_chart,
+    call_check,
     call_complete,
     evaluate,
     keep,
+    note_normal,
     record,
     record_end,
     record_step,
@@ -168,8 +170,9 @@ def begin_chart(context, c, r, log, reason):
     status = call_chart(r.kernels.start_chart, context, r.clock.t, r.x, r.y, r.yd, r.xd)
     if kept:
         note_selection(c.tangent, log.points[r.numbers.chart_rows, w.q.size :])
+    note_normal(context, r, r.clock.t)
     # Distance to a singular configuration
-    if r.numbers.first_order == 0:
+    if r.numbers.first_order != 1:
         note_indicator(c.graph, c.tangent, c.chart.rows0)
         if r.numbers.may_pass == 1 and status == 0 and reason != AT_START and is_next_to_singular(c.tangent):
             return PASSAGE
@@ -182,7 +185,8 @@ def has_hardly_turned(c):
     return 0.0 < turned_most(c.chart) < limits.HARDLY_TURNED
 
 
-# Where friction brings a joint to rest: there its force changes at once, and an implicit step is to end just before.
+# Where friction of the regularised law brings a joint to rest: there its force changes at once, and an implicit step is
+# to end just before.
 #
 # With Q the generalised forces of a friction for unit normal load, -Q . qd = mu |v|. From velocity and deceleration,
 #
@@ -222,6 +226,9 @@ def until_rest(c, r, h):
         friction = c.graph.frictions[i]
         # mu |v| now
         now = _friction_power(c, friction, r, 1.0, 0.0)
+        # The exact law doesn't change with the sign of v: an event is where it does
+        if _friction_power(c, friction, r, -1.0, 0.0) < 0.0:
+            continue
         # At rest, friction grows faster than in proportion to velocity
         if not _friction_power(c, friction, r, 2.0, 0.0) < limits.SLIDES * now:
             r.numbers.still += 1
@@ -242,8 +249,6 @@ STEP_COLLAPSED, STAGE_FAILED = int(Status.STEP_COLLAPSED), int(Status.STAGE_FAIL
 SLICE_DONE, CHART_LOST, NOT_FINITE = int(Status.SLICE_DONE), int(Status.CHART_LOST), int(Status.NOT_FINITE)
 JAMMED, UNHELD = int(Status.JAMMED), int(Status.UNHELD)
 OFF_CHART = CHART_LOST, int(Status.NEWTON_FAILED), int(Status.SINGULAR)  # what a chart that reaches nowhere ends in
-
-call_check = caller("p")
 
 
 @kernel

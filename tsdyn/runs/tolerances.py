@@ -131,8 +131,3 @@ GETTING_ON = 2.0
 
 # Rejected Taylor steps for which the history of a slice has room, beyond one row for each of its steps.
 TRIES = 32
-
-# --- dense output ----------------------------------------------------------------------------------------------------
-# A state inside a step is reached from the base point of its chart in so many legs. More are taken if a leg needs more
-# than FEW factorisations; a short leg needs one of N, and one of S or of the masses.
-LEGS, FEW = (1, 4, 16), 2

@@ -77,10 +77,12 @@ def demand_apart(gaps, q, angles, tol, able=None):
 # Numbers of a run that a checkpoint holds as they are, and the names of its arrays
 KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", "replaced", "written", "totals"
 START, PREFIX = ("q", "qd", "remembered"), "phase "
-# What a phase raises that can't begin, after others: whose fault it is
+# What a phase raises that can't begin, after others
 FAILURES = {
-    InvalidArgument: Status.EVENT_FAILED, InvalidForce: Status.SAMPLING_FAILED, SingularConfiguration: Status.SINGULAR,
-}  # fmt: skip
+    InvalidArgument: Status.METHOD_REFUSED,
+    InvalidForce: Status.SAMPLING_FAILED,
+    SingularConfiguration: Status.SINGULAR,
+}
 
 
 @cache
@@ -357,15 +359,15 @@ class _ContactRun(Transitions):
         return Hold(unit, rank, self.remembered[np.array(places, int)])
 
     def _names(self):
-        """Names of the units whose rows hold."""
+        """Names of the units whose rows hold; those of contacts that stick stand there twice."""
         held = sorted([*self.modes.closed, *self.modes.idle])
         memory, units = self.remembered[self.count :], self.frictions.units
         off = {*self.off}
         idle = [i for i in self.modes.blocked if i not in off and not memory[units[i].way].any()]
-        names = [self.gaps.names[i] for i in held]
-        names += [f"{self.gaps.names[i]} sticks" for i in held if self.modes.sticks(i)]
-        names += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
-        return tuple(dict.fromkeys(names))
+        closed = [self.gaps.names[i] for i in held]
+        sticking = [self.gaps.names[i] for i in held if self.modes.sticks(i)]
+        sticking += [self.frictions.names[i] for i in sorted([*self.modes.sticking, *idle])]
+        return *dict.fromkeys(closed), *dict.fromkeys(sticking)
 
     def _events(self, phase):
         """Events of a phase: the user's, then one for each of the units `watched`."""
@@ -389,7 +391,7 @@ class _ContactRun(Transitions):
             sides = [gaps.list[i].side for i in modes.closed]
             rows, slack = [first[id(side.row)] for side in sides], [modes.slack.get(i, 0.0) for i in modes.closed]
             leaving = Leaving(packed, rows, [side.sign for side in sides], slack).over
-        self.closing = Closing(gaps, modes.opened, TOUCHING * self.length)
+        self.closing = Closing(gaps, modes.opened, TOUCHING * gaps.lengths(self.length))
         for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
@@ -433,7 +435,7 @@ class _ContactRun(Transitions):
         return left if left.size or self.per_step else np.array([np.inf])  # an empty array would ask for every step
 
     def _steps_left(self):
-        most = self.options.max_steps
+        most = self.options.max_steps if self.archive is None else self.archive.most_steps
         return None if most is None else max(most - self.steps, 0)
 
     def _reporting(self):
@@ -490,9 +492,10 @@ class _ContactRun(Transitions):
     def _is_deep(self):
         """Whether contacts penetrate; says so."""
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        if not self.gap.size or self.gap.min() >= -PENETRATION * self.length:
+        allowed = -PENETRATION * self.gaps.lengths(self.length)
+        if not (self.gap < allowed).any():
             return False
-        deep = [i for i in (self.gap < -PENETRATION * self.length).nonzero()[0].tolist() if i in self.able]
+        deep = [i for i in (self.gap < allowed).nonzero()[0].tolist() if i in self.able]
         if deep:
             found = listed([self.gaps.names[i] for i in deep], NAMED)
             self.reason = f"Penetration was not noticed: {found}. Give a max_step."

@@ -97,7 +97,7 @@ class Reactions:
         N = -self.gaps.sign[self.closed] * lam[:, self.normal]
         held = N[:, self.which]
         T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
-        T = carried(self.gaps, self.sticks, states.t, states.q, held, T)
+        T = carried(self.gaps, self.sticks, states.t, states.q, memory, held, T)
         N = N + self.slack
         return np.hstack([N, self.gaps.static[self.sticks] * N[:, self.which] - np.hypot(*np.moveaxis(T, 2, 0))])
 
@@ -115,13 +115,13 @@ def _slip_columns(contact, first):
     return [first.get(id(part), -1) for part in contact.parts[1:]]
 
 
-def carried(gaps, which, t, q, N, T):
+def carried(gaps, which, t, q, memory, N, T):
     """Friction (k, c, 2) of contacts that stick, where rows depend on others shared in proportion to N (k, c)."""
     rows = np.isnan(T).any(axis=(1, 2))
     if rows.any():
         T = np.nan_to_num(T)
-        tangents = np.array([gaps.slopes(t[k], q[k], which) for k in np.flatnonzero(rows)])
-        T[rows] = spread(N[rows], tangents, T[rows])
+        responses = np.array([gaps.responses(t[k], q[k], memory[k], which) for k in np.flatnonzero(rows)])
+        T[rows] = spread(N[rows], responses, T[rows])
     return T
 
 
@@ -170,7 +170,7 @@ def add_friction(gaps, modes, packed, t, q, qd, memory, lam, out):
         for j, i in enumerate(sticks):
             T[:, j, [k for k, held in enumerate(modes.grips[rubbing[i]]) if not held]] = np.nan
         which = [rubbing[j] for j in sticks]
-        out[:, rows[sticks]] = -carried(gaps, which, t, q, N[:, sticks], T)
+        out[:, rows[sticks]] = -carried(gaps, which, t, q, memory, N[:, sticks], T)
     slip = np.einsum("kcin,kn->kci", tangents, qd)
     for j, i in enumerate(rubbing):
         if modes.slides(i):

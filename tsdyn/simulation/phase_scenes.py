@@ -127,7 +127,7 @@ def _new_gaps(scene, free):
     from ..analyses.contact_problem import Gaps
 
     sides = [(contact, side) for contact in contacts_of(scene._added) for side in contact.sides]
-    rows = [side.grip.gap if side.grip else side.row for _, side in sides]
+    rows = [side.gap for _, side in sides]
     rubbing = [part for contact, side in sides if side.grip for part in contact.parts]
     rows += [part for part in rubbing if not any(part is row for row in rows)]
     alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
@@ -166,7 +166,7 @@ def at_start(scene):
     angles = handles_of(scene.packed).angles_at_start(0.0, q)
     closed = [gaps.list[i] for i in closed_gaps(gaps, q, angles) if i not in gaps.following]
     sides = [gap.side for gap in closed if gap.contact.active]
-    return phase_of(scene, [side.grip.gap if side.grip else side.row for side in sides])
+    return phase_of(scene, [side.gap for side in sides])
 
 
 def demand_bilateral(scene, who="this analysis"):

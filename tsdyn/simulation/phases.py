@@ -45,10 +45,6 @@ class UnitModes:
         """Whether the units are in the same modes, whatever has just opened."""
         return {**vars(self), "opened": 0} == {**vars(other), "opened": 0}
 
-    def agrees(self, other):
-        """Whether the contacts are in the same modes."""
-        return all(getattr(self, name) == getattr(other, name) for name in ("closed", "idle", "grips"))
-
     def saved(self):
         """Lists of numbers, for JSON: one for each field, of a dict its items."""
         return [plain(value) for value in vars(self).values()]
@@ -89,7 +85,7 @@ class Phases:
     Attributes
     ----------
     list : list of (float, float, tuple of str)
-        Start, end (s) and names of the closed contacts.
+        Start, end (s) and names of the closed contacts, then of what sticks.
     impulses : list of (float, str, float)
         Time (s), name, impulse (N s, or N m s of an angle).
     starts : list of float
@@ -177,7 +173,7 @@ class Phases:
         return UnitModes.of(self.modes[kind][0])
 
     def told(self):
-        """The `list`, in which phases are one where the same hold as before, and no impact or action is between."""
+        """The `list`, each name once; phases are one where the same rows hold, and no impact or action is between."""
         found, before, hit = [], None, {t for t, *_ in self.impulses}
         for (start, end, names), begun, changes in zip(self.list, self.starts, self.changes, strict=True):
             if found and names == found[-1][2] and changes == before and begun not in hit:
@@ -185,7 +181,7 @@ class Phases:
             else:
                 found.append((start, end, names))
             before = changes
-        return found
+        return [(start, end, tuple(dict.fromkeys(names))) for start, end, names in found]
 
     def sticking(self, numbers, i):
         """Whether a contact with friction sticks (k,); i: the number of its gap."""
@@ -269,7 +265,7 @@ class Phases:
         for k, (inactive, _) in enumerate(self.changes):
             active = [item.name for item in parts if item.name not in inactive]
             begin, end, names = self.list[k]
-            self.list[k] = begin, end, tuple(dict.fromkeys((*names, *active)))
+            self.list[k] = begin, end, (*names, *(name for name in active if name not in names))
 
     def _gathered(self, numbers, arrays):
         """Yield each kind of phases, the entries (j,) of arrays in its phases, and these parts of the arrays."""

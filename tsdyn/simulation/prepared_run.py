@@ -17,7 +17,6 @@ from ..errors import InvalidArgument, Status
 from ..integrators import DOP853, Taylor
 from ..jit.compiled import clock
 from ..methods.integrator import frozen, is_plain
-from ..model.packed import has_rates
 from ..observables.state import remembered
 from ..runs.arguments import adaptive, demand_steps_seen, interval, output_times, state_arrays
 from ..runs.driver import Sampling
@@ -49,28 +48,13 @@ if TYPE_CHECKING:
 # segments.py.
 
 
-def first_method(options, prepared, scene=None):
-    """Return the method that a run of these `RunOptions` begins with; scene: with the rows of all of its phases."""
+def first_method(options, prepared):
+    """Return the method that a run of these `RunOptions` begins with."""
     method = options.method
     if method is None:
         series = options.may_use_series and not prepared.refusal and prepared.pays
         method = adaptive(Taylor if series else DOP853, options.rtol, options.atol)
-    _demand_served(method, options.form, prepared, scene or prepared.packed)
     return method if options.max_step is None else frozen(method.bounded(options.max_step))
-
-
-def _demand_served(method, form, prepared, scene):
-    """Refuse a method that doesn't solve for the stages of such a scene, in whichever phase."""
-    if method.implicit and form.is_mixed(has_rates(scene)):
-        raise InvalidArgument(
-            f"{type(method).__name__} doesn't solve for its stages in the null-space form where there are rows on "
-            "velocities: use formulation='tangent', which does, or an explicit method."
-        )
-    if method.coupled and prepared.rough:
-        raise InvalidArgument(
-            f"{type(method).__name__} doesn't solve for reactions that friction depends on "
-            f"({', '.join(prepared.rough)}): SDIRK54 does, as do all explicit methods."
-        )
 
 
 def reason(options, prepared):
@@ -88,8 +72,7 @@ def reason(options, prepared):
 
 def turns_of(scene, prepared, method, form, span, within):
     """What makes the `Turns` of a run by the default method; None in a form that no implicit method serves."""
-    served = not (form.first_order or form.is_mixed(has_rates(prepared.packed)))
-    return partial(Turns, scene, prepared, method, form, span, within) if served else None
+    return None if form.first_order else partial(Turns, scene, prepared, method, form, span, within)
 
 
 def instead(task, status):
@@ -182,7 +165,7 @@ class Run:
         self._prepare_kernels(options.dense_output or options.events is not None)
         self._prepared = kept = prepared(self._first)
         self._packed, self._start = scene.packed, scene._initial()
-        self.method = method = first_method(options, kept, scene)
+        self.method = method = first_method(options, kept)
         self._driver = DRIVERS.get(method.driver, method.driver)
 
     @fitting
@@ -395,7 +378,8 @@ class Run:
             outcome = self._ended(task, numbers, arrays, archive)
             return Solution(scene, task, outcome, {"prepare": 0.0, "run": numbers["seconds"]})
         try:
-            outcome = run_task(task._replace(archive=archive), scene, self.options.initial_tol)
+            task = task._replace(archive=archive, max_steps=archive.most_steps)
+            outcome = run_task(task, scene, self.options.initial_tol)
             seconds = clock() - started
             other = instead(task, outcome.status)
             if other is not None:

@@ -50,8 +50,8 @@ def resume(
     Returns
     -------
     Solution
-        Of the whole run. A run that has ended is returned as it is; what was written after the last checkpoint is
-        computed again.
+        Of the whole run. A run that has ended is returned as it is, and one that max_steps has stopped may make as many
+        steps again; what was written after the last checkpoint is computed again.
 
     Raises
     ------

@@ -106,8 +106,7 @@ class RunOptions:
     integrator : Integrator or str, optional
         A method, or its name ("nystrom4", "rk45", "dop853", "taylor", ...). By default Taylor; DOP853 if a part of the
         scene has no series, or series fail where a law is not analytic. Where the motion is found stiff Radau (SDIRK54
-        with friction by reactions, and in the null-space form) goes on from there, as long as it needs less work;
-        `solution.message` says so.
+        in the null-space form) goes on from there, as long as it needs less work; `solution.message` says so.
     rtol, atol : float, optional
         Tolerances of the default method, or of an adaptive method given by name; default 1e-8. An instance has its own
         tolerances; rtol or atol beside an instance is refused.
@@ -299,7 +298,9 @@ def _demand_served(method, form):
     """Refuse a method that runs scenes in another form only."""
     if not _serves(method, form):
         others = ", ".join(repr(name) for name, kind in registered().items() if _serves(kind, form))
-        why = f"{type(method).__name__} solves its stages in the tangent-space form only"
+        why = f"{type(method).__name__} solves its stages in the tangent and the null-space form only"
+        if method.coupled:
+            why = f"{type(method).__name__} solves all stages at once, by sparse matrices of the tangent form only"
         if method.driver == "series":
             why = "Taylor series are of the motion itself and need no other form than 'tangent'"
         raise InvalidArgument(f"{why}; formulation={form.name!r} is served by {others}.")

@@ -124,6 +124,7 @@ def trajectory_of(numbers, arrays, scenes):
         form = form.serving(method, has_rates(packed))
         graph = form.graph(packed)
         width = method.interpolant(form.first_order).size(n, *form.sizes(packed, graph))
+        width += 4 * len(packed.system.segments) if form.has_normals else 0
         if method.coupled and len(blocks):
             demand((blocks[:, B_DATA] == method.kernel(form.first_order)[1][0]).all(), "the stages of steps")
     width += B_DATA + handles.count + packed.system.memory.size

@@ -13,7 +13,6 @@ from ..formulations.registry import formulation
 from ..integrators import SDIRK54, Radau, Taylor
 from ..jit.compiled import clock
 from ..methods.integrator import frozen
-from ..model.packed import has_rates
 from ..rows.tolerances import NEAR
 from ..runs.dense_output import StepPieces
 from ..runs.driver import SegmentLink, begin, run
@@ -42,11 +41,11 @@ KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "beg
 
 
 def implicit(method, prepared, form):
-    """Return the implicit method of the same tolerances: Radau, or SDIRK54 where all stages at once aren't served."""
-    coupled = form.basis_free and not prepared.rough
-    most = SHARP_TOL if coupled and prepared.sharp else math.inf
-    found = (Radau if coupled else SDIRK54)(min(method.rtol, most), min(method.atol, most), max_step=method.max_step)
-    if not coupled:
+    """Return the implicit method of the same tolerances: Radau, or SDIRK54 in the null-space form."""
+    most = SHARP_TOL if form.basis_free and prepared.sharp else math.inf
+    kind = Radau if form.basis_free else SDIRK54
+    found = kind(min(method.rtol, most), min(method.atol, most), max_step=method.max_step)
+    if not form.basis_free:
         found.safety = limits.STIFF_SAFETY
     return frozen(found)
 
@@ -343,8 +342,7 @@ def came_to_rest(task, status):
 
 def may_pass(task):
     """Whether there is a way past singular configurations."""
-    prepared = task.prepared
-    return not (task.form.first_order or task.form.is_mixed(has_rates(prepared.packed)) or prepared.refusal)
+    return not (task.form.first_order or task.prepared.refusal)
 
 
 def _until_its_end(report):
@@ -392,9 +390,6 @@ class _Segments:
                 if self.link.interrupted:
                     raise KeyboardInterrupt
                 rest = self._rest()
-                if rest.max_steps == 0:
-                    parts[-1] = parts[-1]._replace(status=Status.MAX_STEPS)
-                    break
                 try:
                     parts.append(self._run(rest, role))
                 except TsdynError as error:

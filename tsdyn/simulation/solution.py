@@ -388,7 +388,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def phases(self) -> list[tuple[float, float, tuple[str, ...]]]:
         """Start and end (s) of each phase, and the names of what holds only in some.
 
-        These are closed contacts, frictions that stick, and those active of the parts that come and go by actions.
+        These are closed contacts, frictions that stick, and those active of the parts that come and go by actions. A
+        phase ends, too, where a closed contact begins or ends to stick: see `sticking`.
         """
         return [(self.span[0], self.reached, ())] if self._phases is None else self._phases.told()
 

@@ -100,7 +100,7 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
     closed, seen = closed_gaps(gaps, q, _angles(kept, guess, t, q)), set()
     while frozenset(closed) not in seen:
         seen.add(frozenset(closed))
-        phase = phase_of(scene, [_gap_row(gaps, i) for i in closed], without=without)
+        phase = phase_of(scene, [gaps.list[i].side.gap for i in closed], without=without)
         try:
             found = own(phase, guess, t, *arguments, **keywords)
         except NoEquilibrium as error:
@@ -125,19 +125,13 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
             break
         pushing = sorted([*settled.closed, *settled.idle])
         if pushing == closed:
-            phase = phase_of(scene, [_gap_row(gaps, i) for i in settled.closed], without=without)
+            phase = phase_of(scene, [gaps.list[i].side.gap for i in settled.closed], without=without)
             return _of_all(scene, found, gaps, phase, UnitModes(settled.closed))
         guess, q, closed = state, state.q, pushing
     raise NoEquilibrium(
         "no set of closed contacts was found that push while the others stay open. Start nearer to the equilibrium, "
         "with guess=, such as from the state of a run that has come to rest."
     )
-
-
-def _gap_row(gaps, i):
-    """The row of a gap, without those of its slip."""
-    side = gaps.list[i].side
-    return side.grip.gap if side.grip else side.row
 
 
 def _demand_still(frictions, gaps, spin=None, about=None, rotors=None, **_):
@@ -189,7 +183,7 @@ def _of_all(scene, found, gaps, phase, modes):
     else:
         first = {id(part): row for part, row in first_rows(phase.packed.constraints)}
         for i in modes.closed:
-            found.multipliers[:, gaps.rows[i]] = lam[:, first[id(_gap_row(gaps, i))]]
+            found.multipliers[:, gaps.rows[i]] = lam[:, first[id(gaps.list[i].side.gap)]]
     found.state = RememberingState.of(scene.packed, state.memory, state.anchor, *state[:4], found.multipliers[0])
     if phase.packed.derived.holds:
         inactive = tuple(item.name for item in inactive_of(scene))

@@ -280,7 +280,7 @@ def archive_of(given, kept, history, numbers, arrays):
     from ..files.archive import Archive, tables_of
     from ..files.formats import demand_shapes, format_of, writing
 
-    facts = _facts(given, kept)
+    facts = _facts(given, kept) | {"granted": 0}
     if numbers is not None:
         _demand_same_functions(given["store"], facts, numbers)
     remembered = kept.handles.count + kept.packed.system.memory.size
@@ -292,6 +292,8 @@ def archive_of(given, kept, history, numbers, arrays):
         with damaged("the checkpoint"):
             known = numbers["counts"]
             demand(known.keys() == tables.keys() and all(map(is_count, known.values())), "the counts of rows")
+            facts["granted"] = numbers["granted"]
+            demand(is_count(facts["granted"]), "the steps of the run")
     archive = Archive(Path(given["store"]).absolute(), tables, attributes, facts["interval"], _asked(given), facts)
     with writing(archive.path):
         if numbers is None:
@@ -316,13 +318,16 @@ def _asked(given):
     return {"arguments": numbers}, arrays
 
 
+GOES_ON = Status.INTERRUPTED, Status.STORE_FAILED, Status.MAX_STEPS  # of runs that can go on from their last checkpoint
+
+
 def ended(archive, outcome, seconds, task):
     """The `Outcome` of a run whose outputs are in an archive; the checkpoint says that it has ended."""
     if isinstance(outcome.rows, np.ndarray):  # of a driver of a user's
         archive.add("outputs", outcome.rows)
     try:
         archive.flush()
-        if archive.has_checkpoints and outcome.status not in (Status.INTERRUPTED, Status.STORE_FAILED):
+        if archive.has_checkpoints and outcome.status not in GOES_ON:
             method = task.method, outcome.method or repr(task.method)
             told = provenance_of(archive.facts["scene"], *method, task.form.name, task.span, time.time())
             archive.checkpoint(*_ending(outcome, seconds, told))
@@ -459,6 +464,7 @@ def _facts(given, kept):
         "scene": hash_of(kept.packed),
         "functions": sources_of(functions),
         "events": sources_of(events),
+        "max_steps": given["max_steps"],
         "interval": given["checkpoint"] if given["checkpoint"] is None else float(given["checkpoint"]),
     }
 

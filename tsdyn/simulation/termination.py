@@ -137,9 +137,11 @@ def account(solution, scene, reason, goes_on=""):
         return " ".join(part for part in (f"{masses[0].upper()}{masses[1:]}.", reason, where, MASS_REMEDY) if part)
     found, limit = suspect(solution, scene), step_limit(solution)
     remedy = Status.SINGULAR.remedy if found else limit.remedy or solution.status.remedy
+    go_on = f"Continue with {goes_on}." if goes_on else ""
     if solution.status == Status.INTERRUPTED:
-        go_on = f"Continue with {goes_on}." if goes_on else solution.status.remedy
-        remedy = " ".join(part for part in (limit.remedy, go_on) if part)
+        remedy = " ".join(part for part in (limit.remedy, go_on or solution.status.remedy) if part)
+    elif solution.status == Status.MAX_STEPS and go_on:
+        remedy += f" {go_on}"
     lacking = without_series(solution.packed)[:FEW] if found else ()
     if lacking:
         remedy += f" Without a series: {'; '.join(lacking)}."

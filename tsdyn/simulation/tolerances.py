@@ -66,12 +66,13 @@ AGREE, DEEPEST = 1e-11, 8
 PASSES, GOT_ON = 16, 1e-9
 
 # --- contacts --------------------------------------------------------------------------------------------------------
-# Of the scene's length: a gap up to which a contact takes part in an event of another, some roundings of positions; and
-# a depth that no event leaves, which tells that an event was missed.
+# Of the scene's length, of angles in rad: a gap up to which a contact takes part in an event of another, some roundings
+# of positions; and a depth that no event leaves, which tells that an event was missed.
 TOUCHING, PENETRATION = 64.0 * EPS, 1e-9
 # Roundings in a gap, of the sizes of its terms: lower flights than these are none.
 ROUNDED = 16.0
-# Height of flights, of the scene's length, below which elastic impacts (e = 1) end: others come lower by themselves.
+# Height of flights, of the scene's length or in rad, below which elastic impacts (e = 1) end: others come lower by
+# themselves.
 ENDLESS = 1e-12
 # Events in a row without progress in time, beside one for each gap: a chain of openings that follow from each other.
 MOST_AT_AN_INSTANT = 100

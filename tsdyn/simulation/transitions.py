@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from ..analyses.contact_friction import halted, settle_grips
+from ..analyses.contact_friction import Cones, halted, settle_grips
 from ..analyses.contact_problem import Inertia, NoSolution, settle
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
 from ..analyses.tolerances import AT_ONCE, AT_REST, LEVEL, RESTS, STOPPED
@@ -49,7 +49,7 @@ class Transitions:
         self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        (near,) = (self.gap <= TOUCHING * self.length).nonzero()
+        (near,) = (self.gap <= TOUCHING * self.gaps.lengths(self.length)).nonzero()
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         hit = [i for i in fired if i < count]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
@@ -107,7 +107,7 @@ class Transitions:
             self.modes = UnitModes(opened=opened)
             self._settle_contacts(settled_by(inertia, resting, self.qd, leaving), before)
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
-            status = self._alternate(before, inertia, touching, resting, leaving, broken)
+            status = self._settle_all(before, inertia, touching, resting, leaving, broken)
             kept = {*self.modes.closed, *self.modes.idle}
             opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
             self._begin_memory([i for i in self.modes.closed if i not in before.closed])
@@ -127,10 +127,9 @@ class Transitions:
 
     def _settle_contacts(self, settled, before):
         """Take what contacts do."""
-        self.remembered = self.remembered.copy()
-        grips = gripped(self.gaps, before, settled, self.q, self.remembered[self.count :])
-        opened = self.modes.opened
-        self.modes = UnitModes(settled.closed, settled.idle, opened, grips=grips, slack=dict(settled.slack))
+        self.remembered, modes = self.remembered.copy(), self.modes
+        modes.closed, modes.idle, modes.slack = settled.closed, settled.idle, dict(settled.slack)
+        modes.grips = gripped(self.gaps, before, settled, self.q, self.remembered[self.count :])
 
     def _begin_memory(self, closed):
         """Rows that come remember nothing of a time when they held: a rope may have turned over since."""
@@ -140,13 +139,14 @@ class Transitions:
             angles, memory = self.remembered[: self.count], self.remembered[self.count :]
             begin_memory(packed, handles_of(packed), angles, memory, items)
 
-    def _alternate(self, before, unheld, touching, resting, leaving, broken):
-        """Frictions by the closed contacts, and contacts by the frictions, until both agree; as of `_settle`.
+    def _settle_all(self, before, unheld, touching, resting, leaving, broken):
+        """Frictions beside the contacts at rest, and the rows that hold these then; as of `_settle`.
 
-        unheld: the `Inertia` without frictions.
+        unheld: the `Inertia` without frictions. Again where other gaps close: the ways of frictions end there.
         """
+        cones = Cones(unheld, resting, self.qd) if self.frictions.count and resting else None
         for _ in range(ROUNDS):
-            status = self._settle_frictions(before, broken, bool(resting))
+            status = self._settle_frictions(before, broken, cones)
             if status is not None or not (self.frictions.count and resting):
                 return status
             holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
@@ -160,11 +160,10 @@ class Transitions:
             small = LEVEL * np.maximum(*(each.accelerations(self.qd)[1] for each in (inertia, unheld)))
             if (a[dead] < -small[dead]).any():
                 raise NoSolution
-            idle, modes, known = [i for i in dead if a[i] <= small[i]], self.modes, self.remembered
+            idle, known = [i for i in dead if a[i] <= small[i]], {*self.modes.closed, *self.modes.idle}
             grips = {**settled.grips, **{i: None for i in idle if self.gaps.rubs[i]}}
-            self._settle_contacts(settled._replace(idle=sorted([*settled.idle, *idle]), grips=grips), modes)
-            if modes.agrees(self.modes) and np.array_equal(known, self.remembered):
-                self.modes = modes
+            self._settle_contacts(settled._replace(idle=sorted([*settled.idle, *idle]), grips=grips), before)
+            if known == {*self.modes.closed, *self.modes.idle}:
                 return None
         names = listed([*(self.gaps.names[i] for i in resting), *self.frictions.names], NAMED)
         self.reason = f"No closed contacts and sticking frictions agree at t = {self.t:.9g} s: {names}."
@@ -180,8 +179,11 @@ class Transitions:
             self.held_gaps[key] = gaps_of(self.scene, self.without, holds)
         return self.held_gaps[key]
 
-    def _settle_frictions(self, before, fired, loads=False):
-        """Which frictions stick, and what the others exert if `loads`; the Status if there is no way on, else None."""
+    def _settle_frictions(self, before, fired, cones=None):
+        """Which frictions stick, and what the others exert on contacts; the Status if there is no way on, else None.
+
+        cones: the `Cones` of contacts at rest.
+        """
         frictions, count = self.frictions, self.count
         if not frictions.count:
             return None
@@ -206,22 +208,20 @@ class Transitions:
                 memory[unit.way] = 0.0
             else:
                 memory[unit.way] = place.written(i, v[0, i] / speed)
-        if not (resting or loads):
+        if not resting and cones is None:
             return None
         try:
-            rest, ranks, dead, packed = self._rest(place, before, resting, guess, fired)
+            rest, ranks, packed = self._rest(place, before, resting, guess, fired, cones)
         except NoRest as error:
             names = listed(list(dict.fromkeys(frictions.names[i] for i in error.units)), NAMED)
             self.reason = f"No reactions are consistent with the friction at t = {self.t:.9g} s: {names}."
             return Status.CONTACT_FAILED
         for i, way in rest.ways.items():
             memory[frictions.units[i].way] = place.written(i, way)
-        # What closed contacts hold needs no rows of its own
-        idle = [i for i in rest.sticking if i in dead and self.modes.closed]
-        self.modes.sticking = {i: ranks[i] for i in rest.sticking if i not in idle}
-        self.modes.blocked = sorted([*self.off, *rest.blocked, *idle, *(i for i in resting if not ranks[i])])
+        self.modes.sticking = {i: ranks[i] for i in rest.sticking}
+        self.modes.blocked = sorted([*self.off, *rest.blocked, *(i for i in resting if not ranks[i])])
         self.modes.begun, self.modes.limits = {i: (self.t, rate) for i, rate in rest.rates.items()}, rest.limits
-        if loads:
+        if cones is not None:
             self.friction = self._load(packed, rest.loads)
         return None
 
@@ -236,8 +236,8 @@ class Transitions:
         memory[0, [slot for unit in self.frictions.units for slot in range(unit.way.start, unit.way.stop)]] = 0.0
         return (found - force_loads(system, np.array([self.t]), *motion, memory))[0]
 
-    def _rest(self, place, before, resting, guess, fired):
-        """The `FrictionAtRest`, how many rows hold each at rest, those that nothing moves, and the packed phase."""
+    def _rest(self, place, before, resting, guess, fired, cones):
+        """The `FrictionAtRest`, how many rows hold each at rest, and the packed phase with open contacts."""
         units, memory, ranks = self.frictions.units, self.remembered[self.count :], {}
         for i in resting:
             ranks[i] = before.sticking.get(i, -1)
@@ -247,7 +247,7 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        phase = self._scene_of(self._items(), [self._hold(i, ranks[i]) for i in free])
+        phase = self._scene_of([], [self._hold(i, ranks[i]) for i in free])
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
@@ -256,15 +256,15 @@ class Transitions:
                 for k, row in enumerate(rows[i]):
                     memory[units[i].held(k)[-1]] = Phi[row]
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
-        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory)
+        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
         rest = problem.settle({i: way for i, way in guess.items() if i in free}, fired)
-        return rest, ranks, [i for i in free if problem.is_dead(i)], phase.packed
+        return rest, ranks, phase.packed
 
     def _motions_of(self, place, i):
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""
         unit = self.frictions.units[i]
         hold = Hold(unit, 3, place.numbers(i, np.eye(3)))
-        phase = self._scene_of(self._items(), [hold])
+        phase = self._scene_of([self.gaps.list[k].side.gap for k in self.modes.closed], [hold])
         memory = self.remembered[self.count :].copy()
         for k in range(3):
             memory[np.array(unit.held(k))] = hold.numbers[k]
@@ -345,6 +345,7 @@ class Transitions:
             return np.zeros(self.gaps.count)
         resting = [i for i in touching if rates[i] == 0.0]
         a = -settled_by(inertia, resting, qd).accelerations
-        rounding = EPS * np.maximum(self.length, ROUNDED * inertia.sizes(self.q))
-        rounding[self.gaps.restitution == 1.0] = ENDLESS * self.length  # flights that would never get lower
+        lengths, elastic = self.gaps.lengths(self.length), self.gaps.restitution == 1.0
+        rounding = EPS * np.maximum(lengths, ROUNDED * inertia.sizes(self.q))
+        rounding[elastic] = ENDLESS * lengths[elastic]  # flights that would never get lower
         return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)

@@ -20,8 +20,8 @@ class Closing:
     gaps : Gaps
     opened : dict
         Of contacts that have opened: time, gap and rate there, by their numbers.
-    rounding : float, m or rad
-        Of a gap.
+    rounding : ndarray (count,), m or rad
+        Of the gaps.
     """
 
     def __init__(self, gaps, opened, rounding):

@@ -17,7 +17,9 @@ def unilateral(solution):
         return
     lam = solution.multipliers
     times = np.unique(np.append(solution.t[some(solution.t.size, OUTPUTS)], np.linspace(*solution.t[[0, -1]], OUTPUTS)))
-    states, size, largest = solution.at(times), _size(solution), np.abs(lam).max(initial=0.0) or 1.0
+    states, size = solution.at(times), _size(solution)
+    loads = (body.mass * np.linalg.norm(solution.acceleration(body), axis=1) for body in solution.scene.bodies)
+    largest = max(np.abs(lam).max(initial=0.0), *(load.max(initial=0.0) for load in loads)) or 1.0
     for contact, rows in _contacts(solution.packed):
         limit = PENETRATED * (1.0 if _is_angle(contact) else size)
         push = np.stack([-side.sign * lam[:, row] for side, row in zip(contact.sides, rows, strict=True)])

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.element import address
-from ..elements.loops import constraint_rows, constraint_series, force_series, law_check, template
+from ..elements.loops import constraint_rows, constraint_series, force_series, ground_contacts, law_check, template
 from ..elements.loops.constraint_rows import OMEGA, POSE, RD
 from ..elements.loops.constraint_series import BODY_ROW
 from ..elements.loops.law_check import call_margin
@@ -40,7 +40,7 @@ from ..runs.tolerances import FROM_ZERO, HALVED, SHORTEST
 from ..workspaces import plain_context
 from . import tolerances as limits
 from .coefficients import begin, expand
-from .layout import Expansion, SeriesContext, empty_series
+from .layout import Expansion, SeriesContext, empty_series, touches_ground
 from .step_end import Tops, keep_start, project_rates, sum_series
 from .step_length import size_of_order, weights
 
@@ -153,6 +153,11 @@ CONSTRAINT_LOOPS = {
     "values": constraint_rows.values,
     "series": constraint_series.series,
 }
+CONTACT_LOOPS = {
+    "contact_rows": ground_contacts.reduced,
+    "values": constraint_rows.values,
+    "contact_series": ground_contacts.series,
+}
 FORCE_LOOPS = ("series", force_series.series), ("margin", law_check.margin)
 _NAMES = [name for name in vars(template) if name.isupper() or name.startswith("kernel_")]
 _known = {}  # (callback, width): that of lanes
@@ -169,14 +174,15 @@ def _loop(one, loop, markers, width):
     return _known[one, width]
 
 
-def constraint_loops(kinds, width):
+def constraint_loops(graph, kinds, width):
     """Addresses of the loops of constraints for lanes, (kinds, 3): reduced, values, series.
 
     Raises InvalidConstraint where Numba can't compile one.
     """
     found = []
-    for kind in kinds:
-        own = {name: _loop(kind.kernels[name], loop, kind.markers, width) for name, loop in CONSTRAINT_LOOPS.items()}
+    for i, kind in enumerate(kinds):
+        loops = CONTACT_LOOPS if touches_ground(graph, i, kind) else CONSTRAINT_LOOPS
+        own = {name: _loop(kind.kernels[name], loop, kind.markers, width) for name, loop in loops.items()}
         found.append([address(own, name, kind.__name__, InvalidConstraint) for name in own])
     return np.array(found, np.int64).reshape(-1, len(CONSTRAINT_LOOPS))
 
@@ -225,7 +231,7 @@ class LaneMemory:
     def __init__(self, series, packed, memory, width, spinning):
         one = memory.context
         self.context = many = lane_context(one, width)
-        kinds, loops = many.graph.kinds, constraint_loops(series.kinds, width)
+        kinds, loops = many.graph.kinds, constraint_loops(one.graph, series.kinds, width)
         kinds["reduced"], kinds["values"], many.expansion.places["loop"] = loops.T
         kinds["bias"] = kinds["drift"] = 0
         many.expansion.forces["loop"], many.expansion.forces["margin"] = force_loops(packed, width).T

@@ -490,7 +490,7 @@ def allocate_expansion(graph, kinds, packed, highest):
         driven = bool(graph.kinds[i].drift)
         slots = kind.slots + (len(kind.quantities()) if driven else 0)
         width = instance_width(len(kind.markers), kind.all_rows, slots, orders, varies, driven)
-        name = "contact_series" if not driven and is_ground_contact(kind, masks) else loops[driven]
+        name = "contact_series" if touches_ground(graph, i, kind) else loops[driven]
         loop = address(kind.kernels, name, kind.__name__, InvalidConstraint)
         rows.append([count, graph.kinds[i].stride, width, orders, loop, total])
         total += count * width
@@ -572,10 +572,15 @@ def masks_of(graph, i):
     return graph.table[first : first + count * INTS].reshape(count, INTS)[:, MASK]
 
 
+def touches_ground(graph, i, kind):
+    """Whether all instances of kind i are contacts with the ground, for which there are quicker loops."""
+    return not graph.kinds[i].drift and is_ground_contact(kind, masks_of(graph, i))
+
+
 def with_ground_contacts(graph, kinds):
     """The graph with the quicker loops of contacts with the ground, where all of a kind are."""
     for i, kind in enumerate(kinds):
-        if not graph.kinds[i].drift and is_ground_contact(kind, masks_of(graph, i)):
+        if touches_ground(graph, i, kind):
             graph.kinds["reduced"][i] = address(kind.kernels, "contact_rows", kind.__name__, InvalidConstraint)
     return graph
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +44,7 @@ from ..rows.interface import (
     evaluate_rows,
     factorise_rows,
     mark_redundant,
+    reset_selection,
     weigh_bodies,
 )
 from ..workspaces import Parts, load_parts, no_parts, parts
@@ -310,6 +312,7 @@ class ReactionWorkspace:
         self.n, self.m, self.count = int(system.bodies[:, 1].sum()), len(packed.system.segments), system.normals.size
         whole = parts(system._replace(reals=system.reals.copy()), self.graph, self.n)
         self.address, *self._keep = resident(whole)
+        self.begin = partial(reset_selection, self.graph, whole.tangent)  # as if it were new
         find = find_reactions if self.count else find_multipliers
         self._find = interrupts_answered()(find) if calls_laws(packed) else find
 
@@ -322,10 +325,14 @@ class ReactionWorkspace:
 
 
 def reaction_workspace(packed, redundant=0.0):
-    """The `ReactionWorkspace` of a packed scene in this thread; a start may show that rows are redundant."""
+    """The `ReactionWorkspace` of a packed scene in this thread, for a phase that begins.
+
+    A start may have shown that rows are redundant.
+    """
     known, key = packed.derived.reactions, (threading.get_ident(), redundant == 0.0)
     if key not in known or known[key].graph is not graph_of(packed, REDUCED, BIAS):
         known[key] = ReactionWorkspace(packed, redundant)
+    known[key].begin()
     return known[key]
 
 
@@ -357,6 +364,7 @@ class ContactWorkspace:
             system = with_short_rows(self._free)
             free = parts(system._replace(reals=system.reals.copy()), graph, self.n)
             self._graph, (self.address, *self._keep) = graph, resident(ContactParts(free, self._rows))
+            self.begin = partial(reset_selection, graph, free.tangent)  # as if it were new
 
     def gaps(self, t, q, sign):
         """Phi (k, m), of the first rows times their sign, at times t (k,), positions q (k, n); rows of q may go on."""

@@ -17,8 +17,7 @@ import numpy as np
 import tsdyn as ts
 from tests.helpers.sketched_mechanisms import MECHANISMS
 from tests.helpers.sketches import CLEAR
-from tsdyn.configuration.continuation import close
-from tsdyn.configuration.kinetic_metric import Metric
+from tsdyn.configuration.continuation import Metric, close
 
 
 class Tally(NamedTuple):

@@ -1,6 +1,6 @@
 """Constraints, one file each: primitives, and joints composed of them; a new file here is registered automatically."""
 
-from .._discovery import export_all, listing, refusing
+from ..calls import export_all, listing, refusing
 from ..elements import joint as _joint
 from ..elements import primitive as _primitive
 

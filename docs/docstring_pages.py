@@ -3,7 +3,7 @@
 import inspect
 import re
 
-from tsdyn.docstrings import SECTION
+from tsdyn.calls import SECTION
 
 LISTED = ("Parameters", "Returns", "Attributes", "Raises", "Yields")
 PLAIN = re.compile(r"(`[^`]*`)")

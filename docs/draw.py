@@ -23,7 +23,7 @@ STEP = (
     (3, "runs.stepper", "advance"),
     (4, "methods.explicit", "second_order_step"),
     (5, "formulations.tangent", "place"),
-    (6, "formulations.chart_coordinates", "displace"),
+    (6, "formulations.charts", "displace"),
     (6, "rows.evaluation", "evaluate_rows"),
     (6, "rows.schur_complement", "factorise_selected_rows"),
     (5, "formulations.tangent", "accelerate"),

@@ -54,9 +54,8 @@ from .motions.prescribed import Motion  # noqa: E402
 from .motions.tables import Table  # noqa: E402
 from .observables.state import State  # noqa: E402
 from .simulation.load import LOADERS as _LOADERS  # noqa: E402
-from .simulation.load import load  # noqa: E402
+from .simulation.load import load, resume  # noqa: E402
 from .simulation.prepared_run import Run, prepare, simulate  # noqa: E402
-from .simulation.resume import resume  # noqa: E402
 from .simulation.run_options import RunOptions  # noqa: E402
 from .simulation.scene import Scene  # noqa: E402
 from .simulation.solution import Solution  # noqa: E402
@@ -151,7 +150,7 @@ if TYPE_CHECKING:
     from .simulation.hybrid import Change
     from .simulation.impacts import impact
 else:
-    from ._discovery import refusing as _refusing
+    from .calls import refusing as _refusing
 
     _refuse = _refusing("ts", __all__, constraints, forces, integrators, motions)
     _LATER = {

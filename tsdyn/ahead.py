@@ -20,7 +20,7 @@ import threading
 from importlib import import_module
 from pathlib import Path
 
-from .configuration import start_kernels
+from .configuration import initial_conditions
 from .elements import force, primitive
 from .elements.laws import SceneLaw
 from .errors import TsdynError
@@ -32,16 +32,16 @@ from .jit.compiled import DEBUG, is_declared, is_loaded, is_stored, load, signat
 from .jit.interrupts import Waiting
 from .jit.target import available, portable
 from .methods.explicit import called_for
-from .model.equations import is_of_user
-from .model.packed import has_rates, second_derivatives
+from .model.equations import is_of_user, second_derivatives
+from .model.handles import has_rates
 from .motions import program, tracing
 from .motions.signals import Signal
 from .rows.interface import ELIMINATION
 from .runs import dense_output
-from .runs.arguments import adaptive
-from .runs.path_loads import watch
+from .runs.step_control import watch
 from .runs.step_engine import second_derivative
 from .runs.stepper import advance
+from .runs.task import adaptive
 from .taylor import step_parts
 from .taylor.layout import FAR, no_series, pays, room
 from .taylor.series_engine import accelerating, expanding, read_series
@@ -131,7 +131,7 @@ def of_method(method, form, within, far=False, rough=False):
 
     far: of series that are too long for caches near by; rough: of a scene with joint friction.
     """
-    yield start_kernels.evaluate_start
+    yield initial_conditions.evaluate_start
     if isinstance(method, Taylor):
         yield from (expanding(rough, far), step_parts.reach, advance_series)
         yield from (accelerating(rough), step_parts.pass_singular) if within else ()
@@ -157,7 +157,7 @@ def of_phases():
     """The kernels that runs with contacts or exact friction need beside: of impacts, events and changes of modes."""
     from .analyses import contact_rows, friction_units
 
-    yield from (start_kernels.land_start, read_series, dense_output.read)
+    yield from (initial_conditions.land_start, read_series, dense_output.read)
     yield from (*contact_rows.KERNELS, *friction_units.KERNELS)
 
 

@@ -17,13 +17,13 @@ from .graphics.curves import (
     constraint_error,
     contacts,
     energy,
+    mode_shapes,
     phase_portrait,
     poincare_section,
     reaction,
     steps,
 )
 from .graphics.ensembles import final_map, quantile_bands
-from .graphics.modes import mode_shapes
 from .measuring.haug_tables import DURATION, LEVELS
 
 if TYPE_CHECKING:

@@ -114,7 +114,7 @@ from .methods.integrator import (
 from .methods.interpolants import DOP853 as DOP853_INTERPOLANT
 from .methods.interpolants import linear_second
 from .methods.tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
-from .motions.expressions import Smooth
+from .motions.elementary import Smooth
 from .motions.of_coordinates import MOST as MOST_COORDINATES
 from .motions.of_coordinates import ROWS as COORDINATE_SLOPE_ROWS
 from .motions.of_coordinates import (

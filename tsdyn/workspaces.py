@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit.arrays import zeros
 from .jit.kernels import Record, loader
+from .jit.resident import zeros
 from .model.packed import WIDTH, System, no_system
 from .rows.constraint_graph import ConstraintGraph, no_graph
 from .rows.interface import Rows, TangentWorkspace, allocate_rows, allocate_tangent, lu_factors
@@ -348,9 +348,9 @@ class RunState(NamedTuple):
     remembered: np.ndarray  # (angles + slots,)  angles of joints at the last accepted point, and what forces remember
     frames: np.ndarray  # (angles, 9)  f, g and h of each angle; see joint_turns.py
     joints: np.ndarray  # int64 (angles, 4)  where its two bodies' coordinates begin, and how many they are
-    watched: np.ndarray  # int64 (kinds,)  rows of System.forces that are sampled along steps; see path_loads.py
+    watched: np.ndarray  # int64 (kinds,)  rows of System.forces that are sampled along steps; see step_control.py
     loaded: np.ndarray  # int64 (bodies,)  that they act on
-    path: np.ndarray  # scratch of path_loads.py
+    path: np.ndarray  # scratch of step_control.py
     tableau: np.ndarray  # the method's numbers
     memory: np.ndarray  # the method's scratch
     normal: np.ndarray  # (2 m,)  normal coordinates u and ud at the last accepted point; of no size without a basis
@@ -402,7 +402,7 @@ class LevelControl(Record):
     size: float  # of the numbers that enter Phi, m
     floor: float  # |Phi| that rounding leaves
     rate: float  # of Newton's method for positions: of residuals, in the tangent form over the residual
-    contraction: float  # of the chart, dimensionless; chart_validity.py
+    contraction: float  # of the chart, dimensionless; charts.py
     condition: float  # of N as far as the contraction says
 
 

@@ -10,7 +10,7 @@ import tsdyn as ts
 from examples import top
 from tests.helpers.processes import python
 from tsdyn import ahead
-from tsdyn.configuration.start_kernels import evaluate_start
+from tsdyn.configuration.initial_conditions import evaluate_start
 from tsdyn.jit.compiled import _types
 from tsdyn.runs.stepper import advance
 from tsdyn.taylor.stepper import advance_series

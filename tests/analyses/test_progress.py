@@ -9,7 +9,7 @@ import pytest
 import tsdyn as ts
 from tests.helpers.hanging_chains import pendulums
 from tests.helpers.spinning_tops import spinning_top
-from tsdyn.simulation import progress as stage_progress
+from tsdyn.simulation import termination as stage_progress
 
 CALLS = {
     "linearise": lambda progress: pendulums([0.3, 0.2, 1.0]).linearise(progress=progress),

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.helpers.processes import OF_CHECKOUT
-from tsdyn.cli.command import main
+from tsdyn.cli import main
 
 
 @pytest.mark.slow

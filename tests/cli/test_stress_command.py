@@ -7,8 +7,8 @@ import sys
 import pytest
 
 from tests.helpers.processes import ROOT
-from tsdyn.cli.command import main
-from tsdyn.stress import campaign, report
+from tsdyn.cli import main
+from tsdyn.stress import campaign
 from tsdyn.stress.judgement import Judgement
 
 
@@ -91,7 +91,7 @@ def test_jobs_are_seeds_in_turn():
     assert [(job.kind, job.seed, job.count) for job in jobs] == [
         ("scenes", 10, 1), ("calls", 10, 40), ("scenes", 11, 1), ("calls", 11, 10), ("scenes", 12, 1),
     ]  # fmt: skip
-    assert report.tally_text(campaign.Tally(), 0).startswith("0 faults; done")
+    assert campaign.tally_text(campaign.Tally(), 0).startswith("0 faults; done")
 
 
 def test_a_run_loads_nothing_of_it():

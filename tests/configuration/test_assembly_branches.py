@@ -8,7 +8,7 @@ from tests.helpers.sketched_mechanisms import MECHANISMS
 from tests.helpers.sketches import Builder, polar, turned
 from tests.helpers.tolerances import ALGEBRA, COARSE, HELD
 from tsdyn.configuration.assemble import Folds
-from tsdyn.configuration.kinetic_metric import Metric
+from tsdyn.configuration.continuation import Metric
 
 C = ts.constraints
 COUNT = 20

@@ -8,7 +8,7 @@ from benchmarks import mechanisms
 from tests.helpers.sketched_mechanisms import MECHANISMS
 from tests.helpers.sketches import Builder, polar
 from tests.helpers.tolerances import CLOSE
-from tsdyn.configuration import kinetic_metric as kinetic
+from tsdyn.configuration import continuation as kinetic
 from tsdyn.observables.evaluate import constraint_arrays
 
 C = ts.constraints

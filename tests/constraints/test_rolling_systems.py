@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 import tsdyn as ts
 from examples import bicycle, two_wheeled_robot
-from tsdyn.rows.graph_builder import build
+from tsdyn.rows.constraint_graph import build
 from tsdyn.rows.interface import allocate_tangent
 
 C = ts.constraints

@@ -18,7 +18,7 @@ from tests.helpers.rough_joints import (
 )
 from tests.helpers.tolerances import ALGEBRA, CLOSE, HELD, NEAR
 from tsdyn.jit.kernels import twin
-from tsdyn.testing.force_checks import check_friction_series
+from tsdyn.testing.plug_in_checks import check_friction_series
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 PRECISE = {"integrator": "taylor", "rtol": 1e-13, "atol": 1e-13}

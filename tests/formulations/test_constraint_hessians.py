@@ -15,9 +15,9 @@ from tsdyn.elements.loops.forces import turn_block, turn_of_bodies, turn_of_dire
 from tsdyn.elements.markers import PARAMETERS, POINT
 from tsdyn.errors import TsdynError
 from tsdyn.jit.kernels import entry, twin
-from tsdyn.model.packed import with_curvatures, with_force_jacobians
+from tsdyn.model.equations import with_curvatures, with_force_jacobians
 from tsdyn.observables.evaluate import constraint_arrays
-from tsdyn.testing.force_checks import evaluate_force_jacobian
+from tsdyn.testing.plug_in_checks import evaluate_force_jacobian
 
 # Constraints that are no polynomials of the positions, and the step of their differences
 TRANSCENDENTAL = (

@@ -11,7 +11,7 @@ from tests.helpers.locked_scenes import SCENES, C, F, X, Y, Z, block, floating, 
 from tests.helpers.minimal_coordinates import balance
 from tests.helpers.tolerances import ALGEBRA, CLOSE, EXACT, FAIR, FINE, HELD, ROUGH, ROUNDING, TIGHT
 from tsdyn.formulations.locked_orientations import keep_turning, moving_graph, still
-from tsdyn.rows.graph_builder import graph_of
+from tsdyn.rows.constraint_graph import graph_of
 
 I = ts.integrators
 END = 1.0

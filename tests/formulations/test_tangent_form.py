@@ -12,7 +12,7 @@ from tests.helpers.reference import NAMES, load
 from tests.helpers.scenes import BETWEEN, MOTION, PRIMITIVES, build, random_body, random_chain, random_pair
 from tests.helpers.tolerances import CLOSE, COARSE, EPS, FINE, HELD, ROUGH, TIGHT
 from tsdyn.formulations.registry import formulation
-from tsdyn.rows.graph_builder import graph_of
+from tsdyn.rows.constraint_graph import graph_of
 
 C, F, I = ts.constraints, ts.forces, ts.integrators
 FORMS = ("tangent", "null-space")

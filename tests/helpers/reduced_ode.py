@@ -7,8 +7,7 @@ from tsdyn.formulations.registry import formulation
 from tsdyn.jit.kernels import caller, entry, resident
 from tsdyn.methods.diagonally_implicit import call_linearise
 from tsdyn.methods.explicit import call_accelerate, call_place
-from tsdyn.model.equations import constraint_curvature, set_time
-from tsdyn.model.packed import with_curvatures, with_force_jacobians
+from tsdyn.model.equations import constraint_curvature, set_time, with_curvatures, with_force_jacobians
 from tsdyn.observables.evaluate import mass_matrix
 from tsdyn.workspaces import Context, allocate, allocate_linear, basis_free_parts
 

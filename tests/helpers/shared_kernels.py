@@ -7,11 +7,11 @@ joints.
 import tsdyn as ts
 from tests.helpers.built_in import FORCES, PRIMITIVES
 from tsdyn.ahead import of_constraint, of_force, of_method
-from tsdyn.configuration import start_kernels
-from tsdyn.formulations import dependent_rows
+from tsdyn.configuration import initial_conditions
 from tsdyn.formulations.registry import FORMULATIONS
 from tsdyn.jit.compiled import is_declared
 from tsdyn.motions.program import run_program
+from tsdyn.observables import evaluate
 from tsdyn.observables.reactions import solve_multipliers
 from tsdyn.rows.row_selection import reselect_rows
 
@@ -25,8 +25,8 @@ def shared_kernels():
     for form in others:
         for method in explicit:
             yield from of_method(method, form, True)
-    yield from filter(is_declared, vars(start_kernels).values())  # those of assembly
-    yield from (reselect_rows, run_program, solve_multipliers, dependent_rows._choose)
+    yield from filter(is_declared, vars(initial_conditions).values())  # those of assembly
+    yield from (reselect_rows, run_program, solve_multipliers, evaluate._choose)
     for kind in PRIMITIVES:
         for moving in (False, *[True] * ("phi_t" in kind.kernels)):
             yield from of_constraint(kind, moving)

@@ -192,6 +192,25 @@ def test_a_kernel_whose_module_has_moved_is_compiled_without_a_warning(tmp_path)
     assert found == [(2.0, 0, 1, False)] * 2
 
 
+@own
+def test_a_kernel_whose_callee_has_moved_is_compiled_without_a_warning(tmp_path):
+    environment = {"TSDYN_CACHE_DIR": str(tmp_path / "kernels")}
+    home, found = tmp_path / "home", []
+    home.mkdir()
+    for module in ("before", "after"):
+        (home / f"{module}.py").write_text(
+            "from tsdyn.jit.kernels import kernel\n@kernel\ndef level(x):\n    return 3.0 * x\n"
+        )
+        (home / "outer.py").write_text(
+            f"from tsdyn.jit.kernels import entry\nfrom {module} import level\n"
+            "@entry\ndef twice(x):\n    return 2.0 * level(x)\n"
+        )
+        result, errors = run(f"{REPORT}from outer import twice\nreport(value=twice(1.0))\n", environment, home)
+        (home / f"{module}.py").unlink()
+        found.append((result["value"], result.get("damaged", 0), result["misses"], "can't be loaded" in errors))
+    assert found == [(6.0, 0, 1, False)] * 2
+
+
 @posix
 @pytest.mark.parametrize("which", ["kernels", "above"])
 def test_folders_that_others_can_write_to_are_refused(which, tmp_path):

@@ -13,7 +13,7 @@ from numba.extending import intrinsic
 import tsdyn as ts
 from tests.helpers.processes import REPORT, ROOT, SMALL, TINY, command, edit, run
 from tsdyn.jit import backend, cache, compilers, stock, target
-from tsdyn.jit.arrays import stack, zeros
+from tsdyn.jit.resident import stack, zeros
 
 VERSIONS = f"Numba {numba.__version__}; it was seen in {' to '.join(backend.SEEN)}"
 
@@ -212,7 +212,7 @@ def test_both_ways_give_the_same_bits():
     assert "CompilerWarning" not in errors
 
 
-@pytest.mark.parametrize("file", ["lanes", "simd", "resident", "arrays", "backend", "stock"])
+@pytest.mark.parametrize("file", ["lanes", "simd", "resident", "backend", "stock"])
 def test_an_edit_of_code_generation_names_other_kernels(package, file):
     """Types and their lowering are named by no function."""
     code = "from tsdyn.jit.code_hash import platform_hash\n"

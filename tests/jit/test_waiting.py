@@ -28,14 +28,14 @@ def test_one_line_counts_on_a_terminal(monkeypatch):
     monkeypatch.delenv("TSDYN_QUIET", raising=False)
     with interrupts.Waiting(2) as line:
         for name in (
-            "tsdyn.configuration.start_kernels land_start",
+            "tsdyn.configuration.initial_conditions land_start",
             "tsdyn.constraints.distance Distance.phi_loop",
         ):
             line.begin(name)
             line.end(name)
     lines = sys.stderr.text.split("\r")[1:]
     assert {len(line.rstrip("\n")) for line in lines} == {99}
-    assert lines[0].split(":")[-1].strip() == "0 of 2, 0 s (start_kernels.land_start)"
+    assert lines[0].split(":")[-1].strip() == "0 of 2, 0 s (initial_conditions.land_start)"
     assert lines[-1].strip() == "tsdyn: 2 of 2 kernels compiled in 0 s."
     assert sys.stderr.text.count("\n") == 1
 
@@ -43,8 +43,8 @@ def test_one_line_counts_on_a_terminal(monkeypatch):
 def test_quiet(monkeypatch, capsys):
     monkeypatch.setenv("TSDYN_QUIET", "1")
     with interrupts.Waiting(1) as line:
-        line.begin("tsdyn.configuration.start_kernels land_start")
-        line.end("tsdyn.configuration.start_kernels land_start")
+        line.begin("tsdyn.configuration.initial_conditions land_start")
+        line.end("tsdyn.configuration.initial_conditions land_start")
     assert capsys.readouterr() == ("", "")
 
 

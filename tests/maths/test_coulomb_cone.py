@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tsdyn.maths.coulomb_cone import OPEN, SLIDES, STICKS, solve_cone
+from tsdyn.maths.complementarity import OPEN, SLIDES, STICKS, solve_cone
 
 
 def problem(seed):

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import diags_array
 
-from tsdyn.maths import matrix_rank as module
+from tsdyn.maths import dense_linalg as module
 
 
 def test_large_matrices(monkeypatch):

@@ -9,7 +9,7 @@ import pytest
 
 import tsdyn as ts
 from tsdyn import plots
-from tsdyn.cli.command import main
+from tsdyn.cli import main
 from tsdyn.measuring import haug_tables as tables
 
 PNG = b"\x89PNG\r\n\x1a\n"

@@ -18,8 +18,6 @@ ORDER = [
     "_version",
     "validation",
     "calls",
-    "_discovery",
-    "docstrings",
     "drawing",
     "jit",
     "maths",
@@ -55,7 +53,7 @@ ORDER = [
     "__init__",
     "__main__",
 ]
-GRAPHS = {"interface", "constraint_graph", "graph_builder", "massless_axes", "saddle_matrix", "symbolic", "tolerances"}
+GRAPHS = {"interface", "constraint_graph", "inertia_rows", "saddle_matrix", "symbolic", "tolerances"}
 
 
 def _modules():

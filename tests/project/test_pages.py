@@ -75,7 +75,7 @@ def test_there_are_commands_to_run():
 
 def test_commands_of_the_docs_exist():
     """Modules, files and verbs that pages name in commands."""
-    from tsdyn.cli.command import main
+    from tsdyn.cli import main
 
     seen = set()
     for command in commands():

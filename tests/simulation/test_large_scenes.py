@@ -11,12 +11,12 @@ from benchmarks import mechanisms
 from tests.helpers.constraint_levels import check
 from tests.helpers.scenes import random_body, random_primitive
 from tests.helpers.tolerances import CLOSE, COARSE, FAIR, FINE, TIGHT
+from tsdyn.configuration import continuation as kinetic
 from tsdyn.configuration import initial_conditions as start
-from tsdyn.configuration import kinetic_metric as kinetic
 from tsdyn.errors import RedundantConstraints, Status
 from tsdyn.observables.diagnostics import constraint_rows
 from tsdyn.observables.evaluate import constraint_arrays
-from tsdyn.rows import graph_builder as hubs
+from tsdyn.rows import constraint_graph as hubs
 from tsdyn.simulation.scene_cache import prepared
 from tsdyn.taylor import layout as expansion_pack
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 import tsdyn as ts
-from tsdyn.cli.command import main
+from tsdyn.cli import main
 from tsdyn.stress import closed_forms
 from tsdyn.stress.closed_forms import CLOSED_FORMS, ClosedForm, measured
 

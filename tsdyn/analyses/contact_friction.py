@@ -4,7 +4,7 @@
     impact         b = (gd- + e min(gd-, 0), v-): Newton's law along normals, in tangents the cone of kinetic friction
     accelerations  b = (gdd, vd) of open contacts; a contact that slides has T = -mu N v / |v|, one at rest the cone
 
-See maths/coulomb_cone.py for the cone. With friction Newton's law can add energy: coefficients of restitution are
+See maths/complementarity.py for the cone. With friction Newton's law can add energy: coefficients of restitution are
 lowered together until it doesn't; without restitution it never does.
 """
 
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.tolerances import LEAST_SLIP
-from ..maths.coulomb_cone import OPEN, STICKS, solve_cone
+from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
 from .contact_problem import NoSolution, Settled, depends, energy_gain, slack_of
 from .tolerances import AT_BOUND, DEPENDENT, LEVEL, WITHIN_BOUND

@@ -21,8 +21,7 @@ from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import angle as angle_of
-from ..model.handles import counted, displacement, handles_of
-from ..model.packed import first_rows, index_of
+from ..model.handles import counted, displacement, first_rows, handles_of, index_of
 from .contact_rows import ContactWorkspace
 from .tolerances import AT_REST, DEPENDENT, LEVEL
 

@@ -35,8 +35,7 @@ from ..model.equations import (
 )
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, no_system
-from ..rows.constraint_graph import BIAS, REDUCED
-from ..rows.graph_builder import graph_of
+from ..rows.constraint_graph import BIAS, REDUCED, graph_of
 from ..rows.interface import (
     DYNAMICS,
     constrain_accelerations,
@@ -162,14 +161,15 @@ def accelerate(context, t, q, qd, out, gamma):
     _accelerate(load_contacts(context), t, q, qd, out, gamma)
 
 
-@entry("pdvvvwmiddmmv")
-def bounce(context, t, q, qd, memory, place, short, i, sign, e, rows, gamma, out):  # thirteen: all of an impact
-    """Impact of the gap in row i alone, with restitution e: p = -(1 + e) gd / G. 0 where there are no factors, else 1.
+@entry("pdvvvwmmmv")
+def bounce(context, t, q, qd, memory, place, short, rows, gamma, numbers):
+    """Impact of one gap, sign Phi_i, with restitution e: p = -(1 + e) gd / G. 0 where there are no factors, else 1.
 
     rows (4, n): J and M~ J^T of the gap, velocities and accelerations afterwards; gamma (2, m). rows and gamma are zero
-    on entry. out (6,): gd before, the sizes of its terms, G, p, gdd afterwards, the sizes of terms of the gap.
+    on entry. numbers (9,): i, sign and e; to be written: gd before, the sizes of its terms, G, p, gdd afterwards, the
+    sizes of terms of the gap.
     """
-    c = load_contacts(context)
+    c, i, sign, e = load_contacts(context), int(numbers[0]), numbers[1], numbers[2]
     _find_rows(c.rows, t, q, place, short, rows[:1], gamma[0])
     J, response, after, qdd = rows[0], rows[1], rows[2], rows[3]
     for j in range(J.size):
@@ -189,7 +189,7 @@ def bounce(context, t, q, qd, memory, place, short, i, sign, e, rows, gamma, out
     gdd = sign * gamma[1, i]
     for j in range(J.size):
         gdd += J[j] * qdd[j]
-    out[0], out[1], out[2], out[3], out[4], out[5] = rate, size, G, p, gdd, length
+    numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8] = rate, size, G, p, gdd, length
     return 1
 
 
@@ -409,12 +409,13 @@ class ContactWorkspace:
 
     def bounce(self, t, q, qd, memory, i, sign, e):
         """Numbers (6,) of an impact of the gap in row i alone, as of the kernel, and velocities (n,) afterwards."""
-        place, rows, gamma, out = np.full(self.m, -1), np.zeros((4, self.n)), np.zeros((2, self.m)), np.empty(6)
+        place, rows, gamma = np.full(self.m, -1), np.zeros((4, self.n)), np.zeros((2, self.m))
+        numbers = np.array([i, sign, e, *[0.0] * 6])
         place[i] = 0
         self._enter()
-        if not self._bounce(self.address, t, q, qd, memory, place, self._short, i, sign, e, rows, gamma, out):
+        if not self._bounce(self.address, t, q, qd, memory, place, self._short, rows, gamma, numbers):
             raise SingularConfiguration(NO_INERTIA)
-        return out.tolist(), rows[2]
+        return numbers[3:].tolist(), rows[2]
 
     def gain(self, q, before, after):
         """Kinetic energy that velocities (n,) have more afterwards, J."""

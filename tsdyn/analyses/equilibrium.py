@@ -13,8 +13,8 @@ from ..jit.interrupts import interruptible
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, PIVOT_ROUNDING, ROUNDING, SUM_ROUNDING, TINY
 from ..model.kinematics import Anchor
 from ..observables import reactions
-from ..observables.contacts import singular_place
 from ..observables.generalised_forces import force_loads, velocity_forces
+from ..observables.reactions import singular_place
 from ..observables.state import RememberingState
 from . import tolerances as limits
 from .coordinates import Variations, chosen

@@ -20,10 +20,10 @@ from ..elements.bodies import rotation_matrix
 from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
 from ..errors import SingularConfiguration
-from ..maths.coulomb_cone import OPEN, STICKS
-from ..maths.matrix_rank import range_and_null_space
+from ..maths.complementarity import OPEN, STICKS
+from ..maths.dense_linalg import range_and_null_space
 from ..maths.tolerances import EPS, RANK_TOL, ROUNDING, TINY
-from ..model.packed import first_rows
+from ..model.handles import first_rows
 from ..observables.evaluate import ITERATIONS, constraint_arrays, mass_matrix
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from .friction_units import NormalLoads

@@ -7,11 +7,11 @@ from ..elements.loops.friction import DERIVE, HERE
 from ..formulations.accelerations import normal_load, unit_friction
 from ..jit.kernels import entry, resident
 from ..model.equations import evaluate_constraints, recall, set_time
-from ..model.packed import coupled_loads, index_of
+from ..model.handles import index_of
+from ..model.packed import coupled_loads
 from ..observables.generalised_forces import sum_forces
 from ..observables.reactions import solve_multipliers, solve_normal_loads
-from ..rows.constraint_graph import REDUCED
-from ..rows.graph_builder import graph_of
+from ..rows.constraint_graph import REDUCED, graph_of
 from ..workspaces import load_parts, parts
 from .contact_rows import find_reactions
 from .slip_velocities import slip_velocities

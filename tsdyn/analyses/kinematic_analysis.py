@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..configuration.kinetic_metric import Metric, least_step
+from ..configuration.continuation import Metric, least_step
 from ..configuration.tolerances import MOST_ROTATION
 from ..constraints.angle_driver import AngleDriver
 from ..constraints.dot2 import Dot2
@@ -39,8 +39,7 @@ from ..model.packed import System
 from ..motions.elementary import Polynomial, Smooth
 from ..motions.prescribed import Motion
 from ..observables.diagnostics import constraint_rows
-from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, ConstraintGraph, no_graph
-from ..rows.graph_builder import graph_of, redundant_rows
+from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, ConstraintGraph, graph_of, no_graph, redundant_rows
 from ..rows.interface import TangentWorkspace, allocate_tangent, constrain, evaluate_bias, note_indicator
 from ..validation import listed, nearest, vector3
 from ..workspaces import Work, parts, plain_context
@@ -175,6 +174,7 @@ def follow(branch, times, out, first, most):
     """
     c = load_branch(branch)
     n, way = c.work.q.size, c.way
+    # The first call: velocities and accelerations at the start
     if way.begun == 0:
         place_bodies(c.graph.bodies, c.now[0], c.tangent.poses)
         way.failed = _solve(c, way.t)
@@ -184,12 +184,14 @@ def follow(branch, times, out, first, most):
         way.begun = 1
     width, end = 1 + 3 * n + c.remembered.size, way.steps + way.rejected + most
     for i in range(first, times.size):
+        # Steps of the continuation up to times[i]; a slice ends after `most` of them
         while way.t != times[i]:
             if way.steps + way.rejected >= end:
                 way.failed = SLICE_DONE
                 return i
             if not _step(c, times[i]):
                 return i
+        # Row i of the output
         at = i * width
         out[at] = way.t
         for level in range(3):

@@ -2,19 +2,18 @@
 
 import numpy as np
 
-from ..configuration.continuation import close
-from ..configuration.kinetic_metric import Metric
+from ..configuration.continuation import Metric, close
 from ..configuration.tolerances import MOST_ROTATION
 from ..elements.markers import POINT
 from ..errors import SingularConfiguration
-from ..formulations.dependent_rows import dependent_rows
 from ..jit.kernels import entry
-from ..maths.matrix_rank import dependent
+from ..maths.dense_linalg import dependent
 from ..maths.tolerances import PIVOT_ROUNDING, TINY
 from ..model.equations import WIDTH, places, remember, set_time, with_short_rows
 from ..model.handles import all_angles, counted
 from ..model.packed import no_system
-from ..rows.graph_builder import redundant_rows
+from ..observables.evaluate import dependent_rows
+from ..rows.constraint_graph import redundant_rows
 from .nominal_motion import NominalMotion, Pairs
 from .rest import Increments, Rest, SparsePattern
 from .tolerances import ACCEPTED, DENSE, FINAL, GOOD, HALVINGS, REDUNDANT_SHARE, REGULARISED, SHORT, SHORTER, WORTH

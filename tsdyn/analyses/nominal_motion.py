@@ -9,13 +9,12 @@ import numpy as np
 from ..configuration.mobility import divide
 from ..elements.bodies import rotation_matrix, transform_g
 from ..elements.loops.coordinate_rows import INTS, STRIDE
-from ..elements.loops.forces import FORCE_INTS as FORCE_INTS
+from ..elements.loops.forces import FORCE_INTS
 from ..elements.loops.template import AT
 from ..errors import InvalidForce, SingularConfiguration
-from ..formulations.dependent_rows import dependent_rows
 from ..formulations.tolerances import REFINEMENTS
 from ..jit.kernels import entry
-from ..maths.matrix_rank import dependent, sparse_lu
+from ..maths.dense_linalg import dependent, sparse_lu
 from ..maths.tolerances import PIVOT_ROUNDING, ROUNDING, TINY
 from ..model.equations import (
     WIDTH,
@@ -24,14 +23,16 @@ from ..model.equations import (
     call_jacobian,
     constraint_curvature,
     set_time,
+    with_curvatures,
+    with_force_jacobians,
     with_short_rows,
 )
+from ..model.handles import first_rows, instances_of_kinds, of_rates
 from ..model.laws import interrupts_answered
-from ..model.packed import first_rows, instances_of_kinds, no_system, of_rates, with_curvatures, with_force_jacobians
-from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, mass_matrix_sparse
+from ..model.packed import no_system
+from ..observables.evaluate import NOT_UNIQUE, constraint_arrays, dependent_rows, mass_matrix_sparse
 from ..observables.generalised_forces import applied_loads, velocity_forces
-from ..rows.constraint_graph import are_unequal, coordinate_scales
-from ..rows.graph_builder import redundant_rows
+from ..rows.constraint_graph import are_unequal, coordinate_scales, redundant_rows
 from .tolerances import DENSE, REDUNDANT_SHARE
 
 # Derivatives of all constraints and forces, each as a block of the 14 coordinates of its two bodies.

@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..configuration.kinetic_metric import kinetic_rows
+from ..configuration.continuation import kinetic_rows
 from ..elements.bodies import transform_g
 from ..elements.tolerances import FORCE_QUOTIENT
 from ..errors import SingularConfiguration
 from ..jit.interrupts import interruptible
-from ..maths.matrix_rank import interruptible_solver, sparse_lu
+from ..maths.dense_linalg import interruptible_solver, sparse_lu
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, PIVOT_ROUNDING, TINY
 from ..model.equations import added_inertia
 from .coordinates import stacked

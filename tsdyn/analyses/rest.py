@@ -6,7 +6,7 @@ import numpy as np
 
 from ..elements.bodies import transform_g
 from ..errors import SingularConfiguration
-from ..maths.matrix_rank import sparse_lu
+from ..maths.dense_linalg import sparse_lu
 from ..maths.tolerances import HALF_DIGITS, NEGLIGIBLE, ROUNDING, TINY
 from ..model.equations import WIDTH, as_csr
 from ..observables.evaluate import NOT_UNIQUE, constraint_arrays

@@ -44,6 +44,7 @@ def slip_velocities(q, qd, table, points, axes, v, sizes, n):
             one, o, size = table[INTS * u : INTS * (u + 1)], 3 * u, 0.0
             _moved(one[AT_A], one[SIZE_A], q[k], qd[k], ra, va, wa)
             _moved(one[AT_B], one[SIZE_B], q[k], qd[k], rb, vb, wb)
+            # v = w_a - w_b, or v_a + w_a x s - v_b - w_b x d with d = r_a + s - r_b
             if one[TURNS]:
                 for i in range(3):
                     v[k, o + i] = wa[i] - wb[i]
@@ -59,6 +60,7 @@ def slip_velocities(q, qd, table, points, axes, v, sizes, n):
                     size += abs(va[i]) + abs(vb[i]) + abs(wa[j] * s[m]) + abs(wb[j] * d[m])
                 for i in range(3):
                     v[k, o + i] = va[i] - vb[i]
+            # Its part along the axis n of a, (v.n) n, or across the normal n of b, v - (v.n) n
             sizes[k, u] = size
             if one[PART] == WHOLE:
                 continue

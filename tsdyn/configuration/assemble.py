@@ -14,14 +14,26 @@ from ..elements.bodies import named
 from ..elements.force import Force
 from ..errors import InconsistentState, InvalidArgument, InvalidBody
 from ..jit.interrupts import CollectionsDeferred
-from ..maths.matrix_rank import row_lengths
+from ..maths.dense_linalg import row_lengths
 from ..maths.tolerances import LAST_PLACE, NEGLIGIBLE
 from ..model.handles import handles_of
 from ..validation import floats, number, one_of, positive, sequence
-from .conflicts import proved, refuse
-from .continuation import ContinuationEnd, Kept, approach_sketch, approached, close, nearest, relax, stuck
+from .continuation import (
+    ContinuationEnd,
+    Kept,
+    Metric,
+    approach_sketch,
+    approached,
+    close,
+    least_energy,
+    least_step,
+    nearest,
+    relax,
+    rotation_vectors,
+    stuck,
+)
 from .joint_space import Loops, coordinate_from
-from .kinetic_metric import Metric, least_energy, least_step, rotation_vectors
+from .mobility import proved, refuse
 from .motor_starts import approach, are_aligned, demand_aligned, demand_finite, has_motors, refuse_vanished
 from .tolerances import CLEAR_FOLD, FLAT_FOLD, INITIAL_TOL, POINT_LIKE, SHOWN, STAGES, STIFFER
 

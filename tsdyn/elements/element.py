@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Never, Self
 
 import numpy as np
 
-from ..calls import Placing, complete_signature, fitting, fitting_constructor, line_of_user
-from ..docstrings import complete_docstring
+from ..calls import Placing, complete_docstring, complete_signature, fitting, fitting_constructor, line_of_user
 from ..errors import InvalidConstraint
 from ..jit.kernels import NumbaError, kernel, twin
 from ..maths import vectors

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Never, Self
 import numpy as np
 
 from ..errors import InvalidForce
-from ..jit.arrays import spread
 from ..jit.compiled import compiled_once
 from ..jit.kernels import kernel, part, specialised, stack
+from ..jit.resident import spread
 from ..maths.recurrences import rotated, rotation
 from ..maths.vectors import rotate
 from ..motions.signals import Signal, numbers_of, positional, starred

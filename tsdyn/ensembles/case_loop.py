@@ -5,9 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..configuration.initial_conditions import RedundantStarts, RegularStarts, consistent
+from ..configuration.initial_conditions import LANDED, RedundantStarts, RegularStarts, consistent
 from ..configuration.motor_starts import are_aligned, demand_aligned
-from ..configuration.start_kernels import LANDED
 from ..errors import Status
 from ..formulations.locked_orientations import hold, still
 from ..jit.kernels import DEBUG, Record, caller, data_of, entry, integers, kernel, loader, resident, vector
@@ -15,9 +14,9 @@ from ..maths.dense_linalg import copy
 from ..model.packed import Derived
 from ..observables.reactions import demand_unique
 from ..observables.state import remembered
-from ..runs.arguments import state_arrays
 from ..runs.driver import FIRST_SLICE, FIRST_WORK
 from ..runs.run_log import CHART_ROOM, NO_ROWS, RunEnd, RunLog, no_log
+from ..runs.task import state_arrays
 from ..runs.tolerances import LONG_STEPS, TRIES
 from ..simulation.local_origin import are_near, origin_of
 from ..simulation.parameters import KEPT
@@ -168,7 +167,7 @@ class LoopNumbers(Record):
     moves: int  # whether starts differ
     may_land: int  # whether they may be projected
     grid: int  # whether outputs are kept, in place of the last state
-    take_start: int  # address of start_kernels.take_start; 0 where starts need no check
+    take_start: int  # address of `take_start`; 0 where starts need no check
     start_context: int  # its arguments
     start_rates: int
     start_at: int

@@ -15,7 +15,7 @@ from ..maths.tolerances import NEGLIGIBLE, TINY, TYPED
 from ..model.packed import POINT_SIZE, checked_motions, is_small
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
-from ..rows.massless_axes import lean_bodies, levers
+from ..rows.inertia_rows import lean_bodies, levers
 from ..rows.tolerances import MASSLESS, THIN, UNEQUAL_MASSES
 from ..simulation.local_origin import are_within
 from ..simulation.parameters import sketch, with_attributes

@@ -10,7 +10,7 @@ import numpy as np
 from ..elements.bodies import Body, PointMass
 from ..errors import InvalidArgument, TsdynError
 from ..observables.channels import channels_of, values_of
-from ..runs.arguments import state_arrays
+from ..runs.task import state_arrays
 from ..simulation.parameters import fields_of, unknown_field
 from ..simulation.variants import start_names, start_of
 from ..validation import counted, floats, shown, whole

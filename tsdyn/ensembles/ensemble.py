@@ -13,10 +13,10 @@ from ..calls import fitting, unknown_argument
 from ..elements.bodies import named
 from ..errors import InvalidArgument, InvalidFile, Status, StorageError
 from ..files import scene_text
-from ..simulation.progress import bar_class
 from ..simulation.run_options import OPTIONS, demand_arguments_of_file, from_names
 from ..simulation.scene import Scene
 from ..simulation.stored_runs import hash_of
+from ..simulation.termination import bar_class
 from ..validation import damaged, demand, demand_record, sequence, whole
 from .cases import FINAL, TIMES, Cases, cases_of, demand_arguments, demand_whole, started
 from .executors import Collected, run_executor, run_threads

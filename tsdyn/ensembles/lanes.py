@@ -11,7 +11,7 @@ from ..errors import InvalidArgument, Status, TsdynError
 from ..jit.compiled import DEBUG, load
 from ..jit.kernels import Record, entry, kernel, loader, long_kernel, resident, specialised, vector
 from ..motions.signals import Signal
-from ..rows.graph_builder import redundant_rows
+from ..rows.constraint_graph import redundant_rows
 from ..rows.interface import has_redundant_rows, refinements, singularity_indicator
 from ..runs.tolerances import LONG_STEPS
 from ..simulation.run_options import OPTIONS

@@ -12,15 +12,13 @@ from ..errors import Status, TsdynError
 from ..files.scene_text import TableNumbers
 from ..jit.code_hash import is_ours
 from ..model.equations import is_of_user
-from ..model.handles import handles_of
-from ..model.packed import Derived, System, classes, is_small
+from ..model.handles import classes, handles_of
+from ..model.packed import Derived, System, is_small
 from ..motions.signals import Signal
-from ..rows.constraint_graph import are_unequal
-from ..rows.graph_builder import weights
-from ..rows.massless_axes import lean_bodies
-from ..runs.arguments import interval, output_times
+from ..rows.constraint_graph import are_unequal, weights
+from ..rows.inertia_rows import lean_bodies
 from ..runs.events import prepare
-from ..runs.task import Task, between
+from ..runs.task import Task, between, interval, output_times
 from ..simulation import prepared_run
 from ..simulation.parameters import KEPT
 from ..simulation.phase_scenes import at_start

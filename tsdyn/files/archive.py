@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import StorageError
-from ..formulations.chart_validity import REASONS
+from ..formulations.charts import REASONS
 from . import checkpoint
 from .formats import Column, StoredTable, format_of
 

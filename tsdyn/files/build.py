@@ -13,8 +13,20 @@ from ..jit.code_hash import is_ours
 from ..validation import close
 from . import types
 from .expressions import CONSTANTS, NAMES, TIME, Misread
-from .reading import Reading, arguments_in, decoded, keep_bits, known_keys, made, name_of, referred
-from .types import Unwritable, decode_array, decode_number, encode
+from .types import (
+    Reading,
+    Unwritable,
+    arguments_in,
+    decode_array,
+    decode_number,
+    decoded,
+    encode,
+    keep_bits,
+    known_keys,
+    made,
+    name_of,
+    referred,
+)
 
 # A scene as plain data: bodies, constraints and forces with the arguments that make them again.
 

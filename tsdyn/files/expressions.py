@@ -6,8 +6,7 @@ import operator
 
 import numpy as np
 
-from ..motions.elementary import Polynomial, time
-from ..motions.expressions import FUNCTIONS, Smooth, constant, ordered
+from ..motions.elementary import FUNCTIONS, Polynomial, Smooth, constant, ordered, time
 from ..validation import close
 
 LONGEST = 20_000  # characters of an expression that is read

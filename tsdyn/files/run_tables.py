@@ -8,12 +8,11 @@ import numpy as np
 from ..errors import InvalidArgument, TsdynError
 from ..methods.integrator import registered
 from ..observables.channels import channels_of
-from ..runs.arguments import kind_named
+from ..runs.task import kind_named
 from ..validation import close, unknown_parameter
 from . import types
 from .expressions import Misread
-from .reading import known_keys
-from .types import decode_array, decode_number
+from .types import decode_array, decode_number, known_keys
 
 # The table `run` of a scene file: the arguments of a run, by the signature of `simulate`.
 

@@ -1,6 +1,6 @@
 """Forces, one file each; a new file in this folder is registered automatically."""
 
-from .._discovery import export_all, listing, refusing
+from ..calls import export_all, listing, refusing
 from ..elements.force import registered as _known
 
 __all__ = [*export_all(__name__, __path__, globals(), "Force"), "registered"]

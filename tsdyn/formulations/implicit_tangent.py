@@ -41,8 +41,15 @@ from ..rows.interface import (
 from ..workspaces import load
 from . import tolerances as limits
 from .accelerations import body_forces, body_of, factorise_loads, find_loads, forget_loads, keep_loads, weigh_units
-from .chart_coordinates import add_rate_residuals, displace, factorise_normal, to_bodies, turn_accelerations, turn_rates
-from .chart_validity import measure_turns
+from .charts import (
+    add_rate_residuals,
+    displace,
+    factorise_normal,
+    measure_turns,
+    to_bodies,
+    turn_accelerations,
+    turn_rates,
+)
 from .projection import largest_residual, velocity_floor
 from .saddle_point import (
     add_blocks,

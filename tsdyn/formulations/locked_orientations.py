@@ -12,9 +12,9 @@ import numpy as np
 
 from ..elements.markers import PARAMETERS, VECTOR
 from ..maths.tolerances import NEGLIGIBLE, ROUNDING
-from ..model.packed import classes, inertia_classes
+from ..model.handles import classes, inertia_classes
 from ..motions.prescribed import Motion
-from ..rows.graph_builder import build, graph_of, parts_of, redundant_rows, with_loops
+from ..rows.constraint_graph import build, graph_of, parts_of, redundant_rows, with_loops
 from ..rows.interface import MOST_ROWS
 
 

@@ -40,7 +40,7 @@ from .accelerations import (
     step_share,
     unit_friction,
 )
-from .chart_validity import every_level_holds, measure_turns, reason_to_leave
+from .charts import every_level_holds, measure_turns, reason_to_leave
 from .null_space_chart import (
     NOT_FINITE,
     OK,

@@ -16,7 +16,7 @@ from ..maths.dense_linalg import (
 from ..maths.tolerances import ROUNDING_AT_MOST, SUM_ROUNDING, TINY
 from ..model.equations import acceleration_bias, constraint_jacobian, constraints, time_derivative
 from ..rows.interface import list_redundant
-from .chart_validity import set_base_point
+from .charts import set_base_point
 from .tolerances import B_OUTDATED, B_SWEEPS, LAG, SLOW, STALLED, USUAL
 
 # Dense constraint rows of the forms with a basis: evaluate, factorise, solve. Redundant rows are dropped here.
@@ -275,7 +275,7 @@ def update_b(w):
     return SINGULAR
 
 
-# Charts with bases U and V (Eqs. 5-9, 27), made at q0; chart_validity.py decides when a chart is abandoned.
+# Charts with bases U and V (Eqs. 5-9, 27), made at q0; charts.py decides when a chart is abandoned.
 #
 # U spans W0 Phi_q0^T, W0 being the inverse of the mass matrix with p p^T added: the normal space in the metric of
 # kinetic energy, which weights lengths and angles by inertia. (The paper takes U = Phi_q0^T.) Columns are scaled so

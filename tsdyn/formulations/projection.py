@@ -26,7 +26,7 @@ from ..rows.interface import (
     redundant_rows_hold,
     singularity_indicator,
 )
-from .chart_coordinates import largest_rates
+from .charts import largest_rates
 from .tolerances import LAND_SWEEPS, STALLED, WALK
 
 OK, SINGULAR = int(Status.SUCCESS), int(Status.SINGULAR)

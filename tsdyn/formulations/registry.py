@@ -5,9 +5,8 @@ from types import ModuleType
 
 import numpy as np
 
-from ..model.packed import of_rates
-from ..rows.constraint_graph import BIAS, DRIFT, REDUCED
-from ..rows.graph_builder import graph_of, redundant_rows
+from ..model.handles import of_rates
+from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, graph_of, redundant_rows
 from ..rows.interface import redundancy
 from ..validation import unknown_name
 from . import accelerations, implicit_tangent, linearisation, maggi_kane, null_space, null_space_rates, tangent

@@ -27,14 +27,7 @@ from ..rows.interface import (
 from ..rows.saddle_matrix import BLOCK, LOWER, OWN, UPPER
 from ..workspaces import load
 from .accelerations import body_of, call_friction, find_loads, solve_accelerations
-from .chart_coordinates import (
-    acceleration_by_turn,
-    add_gyroscopic,
-    add_inertia,
-    factorise_normal,
-    rate_by_turn,
-    to_bodies,
-)
+from .charts import acceleration_by_turn, add_gyroscopic, add_inertia, factorise_normal, rate_by_turn, to_bodies
 
 # Stiffness and damping blocks of bodies: exact derivatives of their loads by (r, pi') and (rd, omega').
 #
@@ -226,7 +219,7 @@ def add_constraints(system, w, s, t, lam):
 #     [ M - g C_b - g^2 K_b    H^T ] [ a    ]     [ M r ]
 #     [ H                      0   ] [ dlam ]  =  [ 0   ]       r = f(k) - k, its tangent part
 #
-# K_b and C_b are those above, and what chart coordinates add to them (chart_coordinates.py). The normal part of a
+# K_b and C_b are those above, and what chart coordinates add to them (charts.py). The normal part of a
 # correction is that of r: the position solve removes it. Changes of the normal parts of velocities and accelerations
 # with the configuration, of the order of g omega, are neglected.
 

@@ -31,14 +31,16 @@ from ..rows.interface import (
 )
 from ..workspaces import load
 from .accelerations import call_friction, factorise_for_accelerations, refine_accelerations, solve_accelerations
-from .chart_coordinates import (
+from .charts import (
     add_rate_residuals,
     displace,
+    every_level_holds,
     factorise_normal,
+    reason_to_leave,
+    set_base_point,
     turn_rates,
     write_back,
 )
-from .chart_validity import every_level_holds, reason_to_leave, set_base_point
 from .projection import largest_residual, velocity_floor
 from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, SLOW, SLOW_FACTORS, STALLED, SWEEPS
 

@@ -13,8 +13,8 @@ from ..elements.bodies import rotation_matrix
 from ..errors import InvalidArgument, StepFailure
 from ..maths.tolerances import TINY
 from ..model.handles import handles_of
-from ..observables.contacts import touching
 from ..observables.diagnostics import constraint_rows
+from ..observables.reactions import touching
 from ..observables.tolerances import JUMP, OTHERWISE, SMALL_RANGE
 from ..shapes import Mesh
 from ..validation import floats, sequence, vector3

@@ -39,9 +39,9 @@ from ..forces.torsional_spring import TorsionalSpring
 from ..forces.viscous_friction import ViscousFriction
 from ..maths.tolerances import TYPED
 from ..observables.diagnostics import constraint_error
-from . import loops, mjcf, sdf, urdf
+from . import mjcf, sdf, urdf
 from .description import GROUND, FrameOn, ImportReport, fresh
-from .reduction import complete, gather, merge
+from .reduction import add_given, complete, gather, merge
 from .tolerances import HUGE, NO_MASS
 from .xml_file import OutsideFiles, read
 
@@ -99,7 +99,7 @@ def load(
         if not np.abs((joint.start, *(() if joint.point is None else joint.point))).max() < HUGE:
             mistakes.add((1, 1), f"joint {joint.name!r}: its place or its offset is beyond {HUGE:g}.")
     mistakes.demand_none()
-    loops.add_given(description, given)
+    add_given(description, given)
     return _scene(description, make, report, mistakes, limits)
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 
 from ..maths.tolerances import TYPED
-from . import loops
 from .description import (
     GROUND,
     HERE,
@@ -17,6 +16,7 @@ from .description import (
     roll_pitch_yaw,
 )
 from .drawn_shapes import add_sdf_shapes
+from .reduction import read_loops
 
 # Frames of an SDF model: links, joints, frames and inner models, each given in another one.
 
@@ -307,7 +307,7 @@ def _add_model(found, model, outer, prefix, outside, report):
         if owner in names and name not in found.links:
             found.frames[prefix + name] = names[owner], found.links[names[owner]].frame.inverse @ frames.resolve(name)
     add_joints(found, model, frames, names, prefix, report)
-    loops.read(found, model, names)
+    read_loops(found, model, names)
     if static:
         found.joints += [JointItem(f"{name} static", "fixed", GROUND, name) for name in names.values()]
     return names

@@ -6,9 +6,9 @@ https://wiki.ros.org/urdf/XML.
 
 import numpy as np
 
-from . import loops
 from .description import GROUND, HERE, Coupling, Description, JointItem, Link, shifted, turned
 from .drawn_shapes import add_visuals, colours, placed
+from .reduction import read_loops
 
 KINDS = {
     "revolute": "revolute",
@@ -48,7 +48,7 @@ def describe(root, outside, report, free_base):
     base = [name for name in found.links if name not in children]
     if base and (not free_base or base[0] == WORLD):
         found.joints.insert(0, JointItem("base", "fixed", GROUND, base[0]))
-    loops.read(found, root, {name: name for name in found.links})
+    read_loops(found, root, {name: name for name in found.links})
     report.leave_unread(root)
     return found
 

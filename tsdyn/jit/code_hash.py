@@ -83,6 +83,7 @@ def _function_hash(function, above):
     if ours and function in _known:
         return _known[function]
     digest, above = hashlib.sha256(), (*above, function)
+    digest.update(f"{function.__module__}\0".encode())  # a stored kernel imports the modules of its callees
     _add_code(digest, function.__code__, function.__globals__, above, function.__doc__)
     for default in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).items()):
         _add(digest, default, above)

@@ -16,24 +16,31 @@ from numba import NumbaError, types
 from numba.extending import intrinsic
 
 from ..errors import InvalidConstraint
-from .arrays import (
+from .code_hash import is_ours
+from .compiled import DEBUG, OPTIONS, Callback, Callee, callback, entry, letters, table
+from .compilers import current
+from .resident import (
     ANY,
     HAS_CYCLES,
+    Record,
+    Seen,
     complex_stack,
     complex_stack2,
     complex_vector,
     cycles,
     data_of,
+    image_of,
     integers,
+    loader,
     matrix,
+    record_at,
+    records,
+    resident,
+    row_of,
     stack,
     stack2,
     vector,
 )
-from .code_hash import is_ours
-from .compiled import DEBUG, OPTIONS, Callback, Callee, callback, entry, letters, table
-from .compilers import current
-from .resident import Record, Seen, image_of, loader, record_at, records, resident, row_of
 
 __all__ = [  # what is to be found here, too
     "ANY",

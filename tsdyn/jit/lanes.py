@@ -9,11 +9,10 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model, type_callable
 
-from . import arrays
-from .arrays import joined, make_stacker, make_viewer
 from .kernels import kernel
 from .predicates import below, choose, floor, of_register
-from .resident import known_types
+from .resident import joined, known_types, make_stacker, make_viewer
+from .resident import zeros as numbers
 from .simd import FOUR, spread
 
 # Lanes: a number of several cases in one register, and arrays of such numbers, on which kernels run unchanged.
@@ -22,7 +21,7 @@ from .simd import FOUR, spread
 # branches on must be the same in all lanes, so numbers of lanes can't be compared but by masks (predicates.py).
 #
 #     lane_type(width)     of a number of so many cases        zeros(count, width)     an array of them, zero
-#     makers(width)        stack, vector, matrix, ... of them by the names of what they stand for in arrays.py
+#     makers(width)        stack, vector, matrix, ... of them by the names of what they stand for in resident.py
 
 _f64 = ir.DoubleType()
 WIDTHS = 4, 8  # lanes that there are types for
@@ -102,7 +101,7 @@ known_types.update({_dtype(width, threes): lane_type(width, threes) for width in
 
 def zeros(count, width, threes=False):
     """So many numbers of lanes, zero: `values_of` them is (count, width)."""
-    return arrays.zeros(count * width).view(_dtype(width, threes))
+    return numbers(count * width).view(_dtype(width, threes))
 
 
 def is_laned(array):
@@ -117,7 +116,7 @@ def values_of(array):
 
 @cache
 def makers(width, threes=True):
-    """What makes arrays in kernels, for numbers of lanes: by the names of arrays.py."""
+    """What makes arrays in kernels, for numbers of lanes: by the names of resident.py."""
     kind, cell = lane_type(width, threes), ir.VectorType(_f64, width)
     stack, stack2 = make_stacker(kind, cell)
     vector, matrix = (make_viewer(types.Array(kind, n, "C")) for n in (1, 2))

@@ -18,8 +18,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, register_model
 
-from .arrays import joined
 from .compiled import DEBUG
+from .resident import joined
 from .simd import FOUR, number_type
 
 _f64, _i32 = ir.DoubleType(), ir.IntType(32)

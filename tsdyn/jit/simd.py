@@ -19,8 +19,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, register_model
 
-from .arrays import joined
 from .kernels import DEBUG, kernel
+from .resident import joined
 
 _WIDTH = 4
 _f64, _i32 = ir.DoubleType(), ir.IntType(32)

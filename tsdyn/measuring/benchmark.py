@@ -21,7 +21,7 @@ from ..errors import InvalidArgument, Status
 from ..formulations.registry import formulation as find_formulation
 from ..integrators import DOP853, RK45, SDIRK54
 from ..methods.integrator import Integrator, registered
-from ..runs.arguments import interval, kind_named
+from ..runs.task import interval, kind_named
 from ..simulation.prepared_run import simulate
 from ..simulation.scene import Scene
 from ..validation import floats, positive, unknown_name, whole

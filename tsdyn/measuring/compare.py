@@ -15,7 +15,7 @@ from ..drawing import BLUE, VERMILION, ZERO, Tabulated, new_figure
 from ..elements.bodies import transform_g
 from ..errors import InvalidArgument
 from ..observables import diagnostics
-from ..runs.arguments import interval
+from ..runs.task import interval
 from ..simulation.prepared_run import simulate
 from ..validation import nearest, positive, whole
 from .benchmark import poses

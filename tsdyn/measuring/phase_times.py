@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..formulations.chart_coordinates import factorise_normal
+from ..formulations.charts import factorise_normal
 from ..formulations.null_space import reduced_mass, velocities
 from ..formulations.tangent import solve_velocities
 from ..jit.kernels import (

@@ -16,9 +16,9 @@ from ..errors import InvalidArgument, Status, TsdynError
 from ..integrators import SDIRK54, Taylor
 from ..jit.cache import statistics
 from ..jit.kernels import DEBUG
-from ..model.packed import has_rates
+from ..model.handles import has_rates
 from ..observables.state import remembered
-from ..runs.arguments import interval, state_arrays
+from ..runs.task import interval, state_arrays
 from ..simulation import prepared_run
 from ..simulation.phase_scenes import demand_bilateral
 from ..simulation.prepared_run import DRIVERS, simulate

@@ -7,8 +7,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
-from ..calls import fitting
-from ..docstrings import complete_docstring
+from ..calls import complete_docstring, fitting
 from ..jit.code_hash import is_ours
 from ..validation import checked_once, positive
 from .collocation import CollocationTableau, interpolant_of, second_derivative

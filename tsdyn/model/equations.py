@@ -10,9 +10,10 @@ from ..elements.force import Force
 from ..elements.laws import SceneLaw
 from ..elements.loops.constraint_hessians import SLOPES, STIFFNESS
 from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE, call_kind
-from ..elements.loops.forces import FORCE_INTS
+from ..elements.loops.forces import FORCE_INTS, kept_size
 from ..elements.loops.forces import JACOBIAN as FORCE_JACOBIAN_SIGNATURE
 from ..elements.loops.template import AT, DIMENSION
+from ..errors import InvalidConstraint, InvalidForce
 from ..jit.code_hash import is_ours
 from ..jit.kernels import caller, entry, kernel
 from ..maths.dense_linalg import clear_matrix
@@ -20,9 +21,9 @@ from ..motions.prescribed import Motion, call_motion
 from ..motions.program import HOLD, call_smooth
 from ..motions.signals import Signal, call_signal
 from ..motions.tracing import Untraceable, may_change
-from .handles import handles_of
+from .handles import classes, handles_of, inertia_classes, instances_of_kinds
 from .laws import demand_callable, interrupts_answered
-from .packed import WIDTH, checked_motions, instances_of_kinds, no_system
+from .packed import WIDTH, checked_motions, members_of, no_system
 
 call_stiffness, call_slopes = caller(STIFFNESS), caller(SLOPES)
 call_jacobian = caller(FORCE_JACOBIAN_SIGNATURE)
@@ -411,3 +412,32 @@ def demand_compilable(item):
         return
     if item.kernels is not item.own_kernels or not is_ours(type(item).__module__):
         address(item.kernels, "force", item.name, item.error, getattr(item, "hint", ""))
+
+
+def with_force_jacobians(packed, n=0):
+    """The system of a packed scene with the forces' Jacobian loops, which are loaded now; and the floats they keep.
+
+    Their matrices have n columns, by default as many as q.
+    """
+    rows, total, n = packed.system.forces.copy(), 0, n or int(packed.system.bodies[:, 1].sum())
+    for row in rows:
+        force = members_of(row, packed.loads)[0].force
+        row.jacobian, row.kept, row.columns = address(force.kernels, "jacobian", force.name, InvalidForce), total, n
+        total += row.count * kept_size(force.markers)
+    return packed.system._replace(forces=rows), int(total)
+
+
+def second_derivatives(basis_free):
+    """What implicit methods load of constraint_hessians.py, by its names in `ConstraintKind`."""
+    return ("stiffness",) if basis_free else ("stiffness", "slopes")
+
+
+def with_curvatures(packed, basis_free=False):
+    """The system with the kernels of second derivatives, which only implicit methods load."""
+    kinds, inertias = packed.system.kinds.copy(), packed.system.inertias.copy()
+    for name in second_derivatives(basis_free):
+        kinds[name] = [address(kind.kernels, name, kind.__name__, InvalidConstraint) for kind in classes(packed)]
+        inertias[name] = [
+            address(row.kernels, name, row.__name__, InvalidConstraint) for row in inertia_classes(packed)
+        ]
+    return packed.system._replace(kinds=kinds, inertias=inertias)

@@ -1,6 +1,7 @@
-"""Handles of a packed scene: bodies, constraints, forces, coordinates; turns and motion of joint coordinates."""
+"""Handles of a packed scene: bodies, constraints, forces, joint coordinates and their motion; what it consists of."""
 
 import threading
+from collections import Counter
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -13,6 +14,8 @@ from ..errors import InvalidBody, InvalidConstraint
 from ..jit.kernels import twin
 from ..maths import vectors
 from ..maths.tolerances import TYPED
+from ..motions.prescribed import Motion
+from ..motions.signals import Signal
 from . import joint_turns
 
 # Values, rates and accelerations of joint coordinates on a motion (q, qd, qdd), in plain Python.
@@ -308,3 +311,79 @@ def handles_of(packed):
         forces = [load.force for load in packed.loads]
         packed.derived.handles = Handles(packed.bodies, packed.system.bodies.tolist(), packed.members, forces)
     return packed.derived.handles
+
+
+def has_rates(scene):
+    """Whether any constraint of a scene, or of a `Packed`, has rows on velocities."""
+    return any(constraint.rate_rows for constraint in scene.constraints)
+
+
+def of_rates(packed):
+    """Which rows of Phi are rows on velocities, bool (m,)."""
+    counts = [count for constraint in packed.constraints for count in (constraint.rows, constraint.rate_rows)]
+    return np.repeat(np.arange(len(counts)) % 2 == 1, counts)
+
+
+def classes(packed):
+    """The classes of constraints, in the order of System.kinds."""
+    return list(dict.fromkeys(type(constraint) for constraint in packed.constraints))
+
+
+def begins_of(packed):
+    """Where the reals of each primitive begin, by its id, in the order of their rows."""
+    kinds, taken, found = dict(zip(classes(packed), packed.system.kinds, strict=True)), Counter(), {}
+    for primitive in packed.constraints:
+        row = kinds[type(primitive)]
+        found[id(primitive)] = int(row.reals + taken[type(primitive)] * row.stride)
+        taken[type(primitive)] += 1
+    return found
+
+
+def inertia_classes(packed):
+    """The classes of rows that add inertia, in the order of System.inertias."""
+    return list(dict.fromkeys(type(row) for row in packed.inertias))
+
+
+def user_functions(packed):
+    """Yield whatever holds compiled functions of a user's, and those functions."""
+    for given in packed.parameters:
+        for value in given:
+            if isinstance(value, Motion) and value.given:
+                yield value, value.given
+    for load in packed.loads:
+        for value in load.parameters:
+            if isinstance(value, Signal) and value.is_function:
+                yield value, (value.source,)
+        if hasattr(load.force, "function_of_state") and (load.law is None or load.law.traced):
+            yield load.force, (load.force.function_of_state,)
+
+
+def called_functions(packed):
+    """The functions that Python calls during a run: of sampled loads, and laws of the scene that aren't traced."""
+    forces = [load.force for load in packed.loads if load.law is not None and not load.law.traced]
+    sampled = [load.force for load in packed.loads if getattr(load.force, "period", None) is not None]
+    return [getattr(force, force.given) for force in dict.fromkeys((*forces, *sampled))]
+
+
+def instances_of_kinds(packed):
+    """The primitives of each row of System.kinds, in its order."""
+    groups = {kind: [] for kind in classes(packed)}
+    for primitive in packed.constraints:
+        groups[type(primitive)].append(primitive)
+    return list(groups.values())
+
+
+def first_rows(primitives):
+    """Yield each primitive and the first of its rows; the terms of a sum have the same."""
+    row = 0
+    for primitive in primitives:
+        yield primitive, row if primitive.all_rows else row - 1
+        row += primitive.all_rows
+
+
+def index_of(packed, body):
+    """Where a body stood among the others when the scene was packed; None where it was not there."""
+    known = packed.derived
+    if known.body_indices is None:
+        known.body_indices = {id(one): i for i, one in enumerate(packed.bodies)}
+    return known.body_indices.get(id(body))

@@ -1,4 +1,4 @@
-"""Laws that see the whole scene, traced and packed: the state that they get, and what loops/laws.py runs."""
+"""Laws that see the whole scene, traced or called back, and packed: their state, and what loops/laws.py runs."""
 
 import contextlib
 import ctypes
@@ -17,22 +17,12 @@ from ..elements.force import Force
 from ..elements.laws import captured
 from ..elements.loops import laws as loops
 from ..errors import InvalidArgument, TsdynError
-from ..jit.from_kernels import PythonCallback
+from ..jit.compiled import DEBUG, table
 from ..jit.interrupts import raises_here
 from ..jit.kernels import twin
 from ..maths import vectors
-from ..motions.expressions import Smooth, constant, evaluate, ordered
-from ..motions.tracing import (
-    Symbol,
-    Untraceable,
-    Writer,
-    demand_near,
-    may_change,
-    nodes,
-    retold,
-    traced,
-    tried,
-)
+from ..motions.elementary import Smooth, constant, evaluate, ordered
+from ..motions.tracing import Symbol, Untraceable, Writer, demand_near, may_change, nodes, retold, traced, tried
 from ..validation import counted, number
 from .handles import BodyMotion
 from .handles import angle as angle_of
@@ -536,3 +526,22 @@ def demand_callable(force, handles, t, q, qd, angles):
         raise force.error(
             f"{force.name}: its {force.given} raises {type(error).__name__} at the start: {str(error).rstrip('.')}."
         ) from error
+
+
+# Python functions that kernels call by address, as they call a `Callback`.
+
+KINDS = {"i": ctypes.c_int64, "d": ctypes.c_double, "p": ctypes.c_void_p}
+
+
+class PythonCallback:
+    """A Python function with an `address`; it is given addresses of arrays, in debug mode the arrays.
+
+    An exception of it is lost: the function has to answer for its own.
+    """
+
+    def __init__(self, function, signature):
+        self._kept = ctypes.CFUNCTYPE(ctypes.c_int64, *(KINDS[c] for c in signature))(function)
+        self.address = ctypes.cast(self._kept, ctypes.c_void_p).value
+        if DEBUG:
+            table.append(function)
+            self.address = len(table) - 1

@@ -1,7 +1,6 @@
 """The packed system: the arrays that kernels read, in a named tuple whose type is the same for every scene."""
 
 import os
-from collections import Counter
 from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import NamedTuple
@@ -11,7 +10,7 @@ import numpy as np
 from ..elements.element import address, checked_parameters
 from ..elements.laws import SceneLaw
 from ..elements.loops.coordinate_rows import BLOCK, INTS, ROW, STRIDE
-from ..elements.loops.forces import FORCE_INTS, kept_size
+from ..elements.loops.forces import FORCE_INTS
 from ..elements.loops.friction import STAND
 from ..elements.loops.template import AT, DIMENSION
 from ..elements.markers import POINT
@@ -22,7 +21,7 @@ from ..motions.of_coordinates import PLACES, CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..motions.tracing import Untraceable
-from .handles import Handles
+from .handles import Handles, classes, first_rows, inertia_classes, instances_of_kinds
 from .laws import Law
 
 # Rows of the tables of a packed system, each a record: what runs over the instances of a kind, and where they are.
@@ -281,19 +280,6 @@ def _series(value):
         return value.smooth
     except Untraceable:
         return (None,) * value.width
-
-
-def with_force_jacobians(packed, n=0):
-    """The system of a packed scene with the forces' Jacobian loops, which are loaded now; and the floats they keep.
-
-    Their matrices have n columns, by default as many as q.
-    """
-    rows, total, n = packed.system.forces.copy(), 0, n or int(packed.system.bodies[:, 1].sum())
-    for row in rows:
-        force = members_of(row, packed.loads)[0].force
-        row.jacobian, row.kept, row.columns = _force_address(force, "jacobian"), total, n
-        total += row.count * kept_size(force.markers)
-    return packed.system._replace(forces=rows), int(total)
 
 
 def find_forces(system, loads):
@@ -585,22 +571,6 @@ def _segments(primitives, where):
     return found
 
 
-def instances_of_kinds(packed):
-    """The primitives of each row of System.kinds, in its order."""
-    groups = {kind: [] for kind in classes(packed)}
-    for primitive in packed.constraints:
-        groups[type(primitive)].append(primitive)
-    return list(groups.values())
-
-
-def first_rows(primitives):
-    """Yield each primitive and the first of its rows; the terms of a sum have the same."""
-    row = 0
-    for primitive in primitives:
-        yield primitive, row if primitive.all_rows else row - 1
-        row += primitive.all_rows
-
-
 def _pack_constraints(parameters, n, where, table, reals):
     """Append the instances, kind by kind, to `table` and `reals`.
 
@@ -690,14 +660,6 @@ def _members(constraints):
         part, row = parts.stop, rows.stop
 
 
-def index_of(packed, body):
-    """Where a body stood among the others when the scene was packed; None where it was not there."""
-    known = packed.derived
-    if known.body_indices is None:
-        known.body_indices = {id(one): i for i, one in enumerate(packed.bodies)}
-    return known.body_indices.get(id(body))
-
-
 def member_of(packed, constraint):
     """The `Member` that a constraint, or a joint's part, is; None where it is not of that scene."""
     known = packed.derived
@@ -708,72 +670,6 @@ def member_of(packed, constraint):
             found[id(part)] = Member(part, packed.coordinates[i], slice(i, i + 1), rows)
         known.members = found | {id(member.constraint): member for member in packed.members}
     return known.members.get(id(constraint))
-
-
-def has_rates(scene):
-    """Whether any constraint of a scene, or of a `Packed`, has rows on velocities."""
-    return any(constraint.rate_rows for constraint in scene.constraints)
-
-
-def of_rates(packed):
-    """Which rows of Phi are rows on velocities, bool (m,)."""
-    counts = [count for constraint in packed.constraints for count in (constraint.rows, constraint.rate_rows)]
-    return np.repeat(np.arange(len(counts)) % 2 == 1, counts)
-
-
-def classes(packed):
-    """The classes of constraints, in the order of System.kinds."""
-    return list(dict.fromkeys(type(constraint) for constraint in packed.constraints))
-
-
-def begins_of(packed):
-    """Where the reals of each primitive begin, by its id, in the order of their rows."""
-    kinds, taken, found = dict(zip(classes(packed), packed.system.kinds, strict=True)), Counter(), {}
-    for primitive in packed.constraints:
-        row = kinds[type(primitive)]
-        found[id(primitive)] = int(row.reals + taken[type(primitive)] * row.stride)
-        taken[type(primitive)] += 1
-    return found
-
-
-def inertia_classes(packed):
-    """The classes of rows that add inertia, in the order of System.inertias."""
-    return list(dict.fromkeys(type(row) for row in packed.inertias))
-
-
-def user_functions(packed):
-    """Yield whatever holds compiled functions of a user's, and those functions."""
-    for given in packed.parameters:
-        for value in given:
-            if isinstance(value, Motion) and value.given:
-                yield value, value.given
-    for load in packed.loads:
-        for value in load.parameters:
-            if isinstance(value, Signal) and value.is_function:
-                yield value, (value.source,)
-        if hasattr(load.force, "function_of_state") and (load.law is None or load.law.traced):
-            yield load.force, (load.force.function_of_state,)
-
-
-def called_functions(packed):
-    """The functions that Python calls during a run: of sampled loads, and laws of the scene that aren't traced."""
-    forces = [load.force for load in packed.loads if load.law is not None and not load.law.traced]
-    sampled = [load.force for load in packed.loads if getattr(load.force, "period", None) is not None]
-    return [getattr(force, force.given) for force in dict.fromkeys((*forces, *sampled))]
-
-
-def second_derivatives(basis_free):
-    """What implicit methods load of constraint_hessians.py, by its names in `ConstraintKind`."""
-    return ("stiffness",) if basis_free else ("stiffness", "slopes")
-
-
-def with_curvatures(packed, basis_free=False):
-    """The system with the kernels of second derivatives, which only implicit methods load."""
-    kinds, inertias = packed.system.kinds.copy(), packed.system.inertias.copy()
-    for name in second_derivatives(basis_free):
-        kinds[name] = [_address(kind, name) for kind in classes(packed)]
-        inertias[name] = [_address(kind, name) for kind in inertia_classes(packed)]
-    return packed.system._replace(kinds=kinds, inertias=inertias)
 
 
 def checked_motions(constraint):

@@ -170,16 +170,19 @@ def mark_changes(values, strides, d, marks):
         s = strides[row]
         count, first, last = (values.size - 1) // s + 1 - ORDER, -1, -1
         least, until, quiet = 0.0, -1, False
+        # Sixth differences of every s-th sample, |D^6 v|
         for i in range(count):
             v = values[i * s :]
             d[i] = abs(v[0] + v[6 * s] - 6.0 * (v[s] + v[5 * s]) + 15.0 * (v[2 * s] + v[4 * s]) - 20.0 * v[3 * s])
         for i in range(count + ORDER + 1):
+            # A change has ended: mark its intervals
             if first >= 0 and i > last + ORDER:  # differences first to last are large
                 for end in range(min(first + ORDER, last + 1), max(first + ORDER, last + 1) + 1):
                     marks[row, end] = 1
                 first = -1
             if i >= count:
                 continue
+            # Large: far above the differences before it; within REACH of a large one, above `least`
             limit = CLEAR_CHANGE * _before(d, i, s == 1) + NO_CHANGE
             if d[i] > limit:
                 least = least if i <= until else limit

@@ -13,8 +13,7 @@ from ..errors import InvalidConstraint
 from ..jit.kernels import kernel, stack, stack2, twin
 from ..maths.power_series import Jet
 from ..validation import counted, shown
-from .elementary import time
-from .expressions import FUNCTIONS, Smooth, constant, evaluate, ordered
+from .elementary import FUNCTIONS, Smooth, constant, evaluate, ordered, time
 from .prescribed import Motion
 from .program import call_smooth, run_program
 from .tables import is_data

@@ -13,8 +13,7 @@ from ..errors import InvalidArgument, InvalidConstraint
 from ..jit.compiled import compiled_once
 from ..jit.kernels import Callback, NumbaError, caller, entry, kernel, specialised
 from ..validation import number, shown
-from .elementary import Constant, Piecewise, time
-from .expressions import FUNCTIONS, Smooth
+from .elementary import FUNCTIONS, Constant, Piecewise, Smooth, time
 from .knots import demand_covered, demand_followed
 from .program import run_program
 from .signals import demand_time_alone

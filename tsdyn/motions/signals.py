@@ -10,8 +10,7 @@ from ..errors import InvalidArgument
 from ..jit.compiled import compiled_once
 from ..jit.kernels import Callback, NumbaError, caller, entry, kernel, specialised, vector
 from ..validation import floats, number, shown
-from .elementary import Constant, Piecewise, Polynomial
-from .expressions import Smooth
+from .elementary import Constant, Piecewise, Polynomial, Smooth
 from .knots import demand_covered
 from .program import run_program
 from .tables import is_data

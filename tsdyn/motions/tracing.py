@@ -10,8 +10,7 @@ import numpy as np
 
 from ..jit.kernels import ANY, callback, caller, kernel, matrix, vector
 from ..maths.recurrences import square
-from .elementary import time
-from .expressions import FUNCTIONS, OPERATIONS, Smooth, constant, evaluate, ordered
+from .elementary import FUNCTIONS, OPERATIONS, Smooth, constant, evaluate, ordered, time
 from .program import ADD, DIVIDE, MULTIPLY, POLYNOMIAL, SINE, STEP, SUBTRACT, operate
 from .tolerances import PLAIN_DEGREE, SAME_VALUE, TIMES
 

@@ -16,8 +16,8 @@ from ..elements.markers import PARAMETERS, POINT, TURN, Point
 from ..jit.kernels import twin
 from ..maths.power_series import Jet
 from ..model.equations import added_inertia
+from ..model.handles import first_rows
 from ..model.kinematics import angular_velocity
-from ..model.packed import first_rows
 from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal

@@ -1,4 +1,4 @@
-"""`scene.evaluate(q, qd, t)`: the paper's quantities at one state, coupled friction included, in plain NumPy."""
+"""`scene.evaluate(q, qd, t)`: the paper's quantities at one state, in plain NumPy; redundant rows there."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ import numpy as np
 
 from ..calls import fitting
 from ..elements.bodies import rotation_matrix, transform_g
+from ..elements.loops.constraint_rows import place_bodies
 from ..errors import InconsistentState, InvalidArgument, SingularConfiguration
-from ..formulations.dependent_rows import dependent_rows
 from ..jit.interrupts import CollectionsDeferred
-from ..jit.kernels import twin
-from ..maths.matrix_rank import dependent, farthest_first, sparse_lu
+from ..jit.kernels import entry, resident, twin
+from ..maths.dense_linalg import dependent, farthest_first, sparse_lu
 from ..maths.tolerances import COMPLEX_STEP, PIVOT_ROUNDING, RANK_TOL, ROUNDING, SUM_ROUNDING, TINY
-from ..model.equations import WIDTH, added_inertia, as_csr, evaluate_constraints, with_short_rows
-from ..model.packed import coupled_loads
-from ..rows.constraint_graph import coordinate_scales
+from ..model.equations import WIDTH, added_inertia, as_csr, evaluate_constraints, set_time, with_short_rows
+from ..model.packed import Derived, coupled_loads
+from ..rows.constraint_graph import REDUCED, by_lengths, coordinate_scales, graph_of
+from ..rows.interface import allocate_tangent, redundant_of, select_rows
 from ..validation import finite_vector, number
+from ..workspaces import load_parts, parts
 from .diagnostics import marker_states, starts_of
 from .generalised_forces import applied_loads, force_loads, velocity_forces
 from .tolerances import INDEPENDENT, LARGE, REDUNDANT_SHARES
@@ -335,3 +337,32 @@ def mass_matrix_sparse(system, q):
         i, j = np.meshgrid(columns, columns, indexing="ij")
         M += csr_array(((h.T @ h).ravel(), (i.ravel(), j.ravel())), M.shape)
     return M
+
+
+@entry("pvdd")
+def _choose(context, q, t, share):
+    """Select redundant rows at q, those with pivots below a share; return their number, or -1."""
+    c = load_parts(context)
+    graph, f = c.graph, c.tangent
+    set_time(c.system, t)
+    place_bodies(graph.bodies, q, f.poses)
+    return select_rows(graph, c.system, f, t, share)
+
+
+def dependent_rows(packed, q, t, share):
+    """Rows of Phi that are left less than a share of their diagonal entries of H W H^T by elimination, int64 (k,).
+
+    None where no choice among them is independent. Normalisations are not included. See row_selection.py: of many
+    rows the choice is made within blocks, and may have one too many or too few.
+    """
+    own, known = packed, packed.derived
+    if known.redundant is None:
+        if known.examined is None:
+            known.examined = packed._replace(derived=Derived(redundant=np.zeros(0, np.int64)))
+        own = known.examined
+    graph = by_lengths(packed, graph_of(own, REDUCED))
+    whole = parts(packed.system._replace(reals=packed.system.reals.copy()), graph, q.size)
+    tangent = allocate_tangent(graph, q.size, redundant=True)
+    context, *_keep = resident(whole._replace(tangent=tangent))
+    count = _choose(context, q, t, share)
+    return None if count < 0 else np.sort(graph.row[redundant_of(tangent)])

@@ -1,4 +1,4 @@
-"""Multipliers and constraint reactions from positions, velocities and accelerations; their uniqueness."""
+"""Multipliers and constraint reactions from q, qd and qdd; their uniqueness; where surfaces touch."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ from ..elements.loops.friction import HERE
 from ..elements.markers import POINT
 from ..errors import InvalidBody, InvalidConstraint, RedundantConstraints
 from ..formulations.accelerations import find_reactions, normal_load
-from ..jit.kernels import entry, kernel, long_kernel, resident, stack
+from ..jit.kernels import entry, kernel, long_kernel, resident, stack, twin
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import LAST_PLACE, RANK_TOL, TINY
 from ..model.equations import WIDTH, added_inertia, constraint_jacobian, recall, set_time, with_short_rows
-from ..model.handles import handles_of
-from ..model.packed import classes, first_rows, index_of, member_of, no_system
-from ..rows.constraint_graph import REDUCED
-from ..rows.graph_builder import graph_of
+from ..model.handles import classes, first_rows, handles_of, index_of
+from ..model.packed import member_of, no_system
+from ..rows.constraint_graph import REDUCED, graph_of
 from ..rows.interface import (
     METRIC,
     Rows,
@@ -41,7 +40,6 @@ from ..rows.interface import (
     weigh_bodies,
 )
 from ..workspaces import arrays_of, load_parts, parts
-from .contacts import touching
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
 from .tolerances import KEPT_FLOATS
 
@@ -166,10 +164,12 @@ def solve_multipliers(context, t, q, r, memory, rows, out):
     bodies = graph.bodies
     for k in range(t.size):
         recall(s, memory[k])
+        # S = H W H^T, and Phi_q by short rows
         regular = factorise_at(graph, s, f, t[k], q[k])
         constraint_jacobian(s, q[k], t[k], rows)
         copy(r[k], f.Q)
         take_loads(bodies, q[k], r[k], f.Z)
+        # S lam = H W r, refined once: balance_loads leaves in Z what lam doesn't balance
         for i in range(out.shape[1]):
             out[k, i] = 0.0
         for _ in range(2):
@@ -183,6 +183,7 @@ def solve_multipliers(context, t, q, r, memory, rows, out):
                 at = s.segments[i, 2 * half]
                 for c in range(s.segments[i, 2 * half + 1]):
                     f.Q[at + c] -= rows[i, 7 * half + c] * out[k, row]
+        # Multiplier of a normalisation: the remainder of r along p
         for b in range(bodies.shape[0]):
             i = graph.normals[b]
             if i >= 0:
@@ -633,3 +634,42 @@ class Exerting:
         t, (q, qd, qdd, lam) = np.atleast_1d(self.t), map(np.atleast_2d, levels)
         memory = with_normal_loads(packed, t, q, qd, qdd, np.atleast_2d(self.memory))
         return SimpleNamespace(packed=packed, system=packed.system, t=t, q=q, qd=qd, multipliers=lam, _memory=memory)
+
+
+def touching(packed, member, q):
+    """Contact point, m, and unit normal towards a, (k, 3) each in the ground frame; None for what has no contact."""
+    for i in range(member.parts.start, member.parts.stop):
+        find = getattr(type(packed.constraints[i]), "contact", None)
+        if find is not None:
+            return tuple(level.T for level in twin(find)(_markers(packed, i, q), packed.parameters[i]))
+    if getattr(member.constraint, "rubs", False):  # a point on a plane
+        x = _markers(packed, member.parts.start, q)
+        return x[:3].T, x[6:9].T
+    return None
+
+
+def singular_place(packed, q):
+    """Name the first constraint whose own singular place is at q (n,), and say what it is; "" elsewhere."""
+    known = packed.derived.with_singular_places
+    if known is None:
+        parts = enumerate(packed.constraints)
+        known = packed.derived.with_singular_places = [i for i, part in parts if hasattr(type(part), "singular_place")]
+    for i in known:
+        part = packed.constraints[i]
+        said = twin(type(part).singular_place)(_markers(packed, i, q[None])[:, 0], packed.parameters[i])
+        if said:
+            return f"{part.name}: {said}"
+    return ""
+
+
+def _markers(packed, i, q):
+    """Coordinates (len(x), k) of the markers of a primitive, Points and Vectors, along positions q (k, n)."""
+    part, found = packed.constraints[i], []
+    for marker, s in zip(part.markers, packed.coordinates[i], strict=True):
+        body, x = part.body_of(marker), np.broadcast_to(s, (len(q), 3))
+        if body.dimension:
+            at = packed.system.bodies[index_of(packed, body), 0]
+            x = rotation_matrix(q[:, at + 3 : at + 7]) @ s if body.dimension == 7 else x
+            x = x + q[:, at : at + 3] if marker.code == POINT else x
+        found.append(x)
+    return np.concatenate(found, axis=1).T

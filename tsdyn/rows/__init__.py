@@ -5,6 +5,6 @@ constraints/.
 
 Begin with interface.py, which other packages solve by; graphs and orders of elimination are open to all. evaluation.py
 calls the loops, schur_complement.py forms S = H W H^T, N and products with H; row_selection.py selects the redundant
-rows and renews the selection, redundant_rows.py zeroes them. graph_builder.py makes the graph of a scene, symbolic.py
-its order of elimination, factorisation.py eliminates.
+rows and renews the selection, redundant_rows.py zeroes them. constraint_graph.py makes the graph of a scene,
+symbolic.py its order of elimination, factorisation.py eliminates.
 """

@@ -6,8 +6,8 @@ lanes and complex numbers alone, and for a matrix of one row.
 
 import numpy as np
 
-from ..jit.arrays import zeros
 from ..jit.kernels import DEBUG, callback, caller, kernel, loader, long_kernel, vector
+from ..jit.resident import zeros
 from .factorisation import factor_blocks, factor_lu_blocks, factor_lu_row, factor_row, solve_blocks, solve_three
 from .symbolic import analyse
 

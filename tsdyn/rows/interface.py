@@ -3,11 +3,18 @@
 import numpy as np
 
 from ..elements.loops.constraint_rows import POSE
-from ..jit.arrays import zeros
+from ..jit.resident import zeros
 from .constraint_graph import is_raised
 from .elimination import KERNELS as ELIMINATION
 from .elimination import lu_factors
 from .evaluation import (
+    Friction,
+    Indicator,
+    Landing,
+    RedundantRows,
+    Rows,
+    Selection,
+    TangentWorkspace,
     clear_sums,
     evaluate_bias,
     evaluate_drift,
@@ -54,7 +61,6 @@ from .row_selection import (
     singularity_indicator,
     with_reselection,
 )
-from .row_workspace import Friction, Indicator, Landing, RedundantRows, Rows, Selection, TangentWorkspace
 from .saddle_matrix import (
     factorise_complex_saddle,
     factorise_saddle,

@@ -13,10 +13,9 @@ from ..maths.tolerances import PIVOT_ROUNDING
 from . import tolerances as limits
 from .block_operations import eliminate, subtract_products
 from .constraint_graph import ConstraintGraph, no_graph
-from .evaluation import evaluate_all, evaluate_every_row
+from .evaluation import Rows, TangentWorkspace, evaluate_all, evaluate_every_row, no_tangent_workspace
 from .factorisation import keep_diagonal, update_later_blocks
 from .redundant_rows import is_rate, keep_every_row, leave_redundant_rows, length, square
-from .row_workspace import Rows, TangentWorkspace, no_tangent_workspace
 from .schur_complement import (
     factorise_selected_rows,
     form_schur_complement,

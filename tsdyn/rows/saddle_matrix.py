@@ -11,10 +11,10 @@ from ..elements.loops.template import AT, DIMENSION
 from ..jit.kernels import Record, complex_vector, data_of, kernel, records, stack
 from ..jit.simd import let
 from ..maths.tolerances import SUM_ROUNDING
-from ..model.packed import first_rows, members_of
+from ..model.handles import first_rows
+from ..model.packed import members_of
 from .elimination import factor_lu, solve_lu, with_kernels
-from .inertia_rows import clear_rows, put_rows_back
-from .massless_axes import lean_bodies
+from .inertia_rows import clear_rows, lean_bodies, put_rows_back
 from .schur_complement import more
 from .symbolic import Pattern, analyse, fill_reducing_order, lay_out_in_order
 
@@ -29,7 +29,7 @@ from .symbolic import Pattern, analyse, fill_reducing_order, lay_out_in_order
 # system as long as at most one body outside of the set, or the ground, is joined to it: its anchor. Bodies are ordered
 # for least fill; rows between two bodies are eliminated as soon as the set that they make has one anchor at most. In a
 # tree these are the rows of a body's joint to its parent, right behind the body. Rows that close a loop wait for the
-# loop. Axis rows (massless_axes.py) follow the last rows at their body, which hold the axis.
+# loop. Axis rows (inertia_rows.py) follow the last rows at their body, which hold the axis.
 
 GROUND = -1
 
@@ -200,7 +200,7 @@ class SaddleInstance(Record):
 
 
 class LeanAxis(Record):
-    """An axis c e without inertia: what it adds to the block of its body, and its axis row (massless_axes.py)."""
+    """An axis c e without inertia: what it adds to the block of its body, and its axis row (inertia_rows.py)."""
 
     target: int  # where the block begins in the factors, and the length of a row there
     stride: int

@@ -7,6 +7,9 @@ from ..maths.tolerances import HALF_DIGITS, PIVOT_ROUNDING
 from .constraint_graph import ROWS, ROWS_WELD, W_MASS, W_ROTATION, WEIGHTS, WELD_ROWS, WELDS
 from .elimination import factor, factor_and_solve, factor_lu, solve, solve_lu
 from .inertia_rows import (
+    AXIS_H,
+    AXIS_OWN,
+    AXIS_Y,
     clear_rows,
     inner,
     leave_diagonal,
@@ -16,11 +19,10 @@ from .inertia_rows import (
     subtract_multipliers,
 )
 from .inertia_rows import take_reactions as take_inertia_reactions
-from .massless_axes import AXIS_H, AXIS_OWN, AXIS_Y
 from .redundant_rows import set_redundant_diagonal
 from .tolerances import COMPENSATED
 
-# Products of axis rows (massless_axes.py): contributions to S, to matrices of its pattern and right-hand sides.
+# Products of axis rows (inertia_rows.py): contributions to S, to matrices of its pattern and right-hand sides.
 #
 # An axis row is zero in H, since a projection onto the constraint manifold ignores it; in Y = W H^T it is present.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..maths.matrix_rank import sparse_lu
+from ..maths.dense_linalg import sparse_lu
 from .tolerances import LINK_COST, LOOKUP, NUMBER_COST, OWN, PIVOTS_COST, PRODUCT_COST, UPDATE_COST, WIDEST
 
 # Panels: where every number of a factor goes, and the products that elimination subtracts.

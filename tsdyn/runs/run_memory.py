@@ -11,8 +11,8 @@ from ..methods.explicit import ACCELERATE, PLACE
 from ..model.laws import calls_laws, interrupts_answered
 from ..rows.interface import reset_selection, selection_parts
 from ..workspaces import FILLED, STORED, divided, enter_joints, hold, words
-from .arguments import step_count
 from .run_log import no_log, with_end
+from .task import step_count
 from .tolerances import LONG_STEPS, PIECE
 
 # Ctrl-C within a step of a large scene.

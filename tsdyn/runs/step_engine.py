@@ -8,14 +8,15 @@ from ..maths.tolerances import LAST_PLACE
 from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.explicit import called_for
 from ..methods.interpolants import cubic_rate
+from ..model.handles import has_rates
 from ..model.laws import calls_laws, interrupts_answered
-from ..model.packed import System, has_rates
+from ..model.packed import System
 from ..rows.interface import redundancy
 from ..rows.saddle_matrix import saddle_of
 from ..workspaces import B_DATA, MIXED, Context, allocate, allocate_linear, basis_free_parts, divided, lay_out, words
 from .dense_output import TrajectoryReading, read, warm_size
-from .path_loads import watch
 from .run_memory import Memory
+from .step_control import watch
 from .stepper import advance
 
 # Run workspace of the step driver.

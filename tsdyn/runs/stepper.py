@@ -4,8 +4,7 @@ import math
 
 from ..errors import Status
 from ..formulations.accelerations import body_of, unit_friction
-from ..formulations.chart_coordinates import turned_most
-from ..formulations.chart_validity import AT_START, BY_FAILURE, BY_INTERVAL
+from ..formulations.charts import AT_START, BY_FAILURE, BY_INTERVAL, turned_most
 from ..formulations.tolerances import CONTRACTION_KEPT, CONTRACTION_LOST
 from ..jit.kernels import entry, kernel, long_kernel, stack
 from ..maths.dense_linalg import copy
@@ -37,9 +36,8 @@ from .dense_output import (
     restore_now,
     store_now,
 )
-from .path_loads import call_watch
 from .run_log import close_chart, is_full, no_log, note_accepted, note_try, open_chart
-from .step_control import accept, first_step, gets_on, stretch, watch_stiffness
+from .step_control import accept, call_watch, first_step, gets_on, stretch, watch_stiffness
 
 # Rotation limit of a step in driven scenes.
 #

@@ -28,7 +28,7 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 # Exponents of the PI control, times 1 / (order of the estimate + 1): Gustafsson's, as in Solving ODEs II, IV.2.
 PI_ERROR, PI_BEFORE = 0.7, 0.4
 
-# Loads along a step (path_loads.py). DISTINCT: a difference over the time between samples, as a velocity over the
+# Loads along a step (step_control.py). DISTINCT: a difference over the time between samples, as a velocity over the
 # tolerance: a bump at one sample makes 70 times its impulse. LEAST_PLACES: intervals of a step; differences of a
 # cosine in a step of one radian are 1e-9 then, and with IMPLICIT_PLACES in one of three radians, as at order 13, 1e-8.
 DISTINCT, LEAST_PLACES, IMPLICIT_PLACES = 100.0, 8, 16

@@ -13,10 +13,10 @@ from ..elements.bodies import rotation_matrix, transform_g
 from ..errors import InconsistentState, InvalidArgument
 from ..model.handles import counts, handles_of
 from ..observables.state import remembered
-from ..runs.arguments import demand_one_state, state_arrays
+from ..runs.task import demand_one_state, state_arrays
 from ..validation import finite_vector, number, vector3
-from .progress import StageProgress
 from .scene_cache import prepared
+from .termination import StageProgress
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Equilibrium, Linearisation, Progress, Scene, Solution, State
@@ -198,8 +198,7 @@ def _equilibrium(scene, guess, t, spin, about, rotors, report):
         find_equilibrium,
         find_relative,
     )
-    from ..configuration.continuation import nearest
-    from ..configuration.kinetic_metric import Metric
+    from ..configuration.continuation import Metric, nearest
 
     kept = prepared(scene)
     field = _field(kept.packed, spin, about, rotors)

@@ -27,22 +27,21 @@ from ..jit.interrupts import deferred_interrupts
 from ..model.handles import handles_of
 from ..observables import diagnostics
 from ..observables.state import remembered
-from ..runs.arguments import interval, output_times, state_arrays
 from ..runs.driver import Sampling
 from ..runs.event_groups import GroupMember
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
-from ..runs.task import Outcome
+from ..runs.task import Outcome, interval, output_times, state_arrays
 from ..validation import counted, damaged, demand, listed
 from . import hybrid
 from .grips import Halting, Reactions, items_of
 from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
 from .phases import PhasePieces, Phases, Pinned, UnitModes, plain
-from .progress import reporter, silent
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
+from .termination import reporter, silent
 from .tolerances import (
     MOST_PINNED,
     PENETRATION,

@@ -18,21 +18,19 @@ from ..errors import InvalidArgument, Status
 from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853
 from ..jit.compiled import clock
-from ..model.packed import has_rates
+from ..model.handles import has_rates
 from ..observables import diagnostics, reactions
 from ..observables.reactions import acted
 from ..observables.state import remembered
-from ..runs.arguments import state_arrays
 from ..runs.run_log import NAMES, RunEnd
 from ..runs.step_engine import StepEngine
-from ..runs.task import Outcome, Task
+from ..runs.task import Outcome, Task, state_arrays
 from ..validation import counted, finite_times, floats, unknown_name
 from .phase_scenes import has_contacts, phase_of
-from .progress import silent
 from .scene_cache import prepared
 from .segments import run_segments
 from .solution import Solution
-from .termination import suspect
+from .termination import silent, suspect
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike, Floats, GivenMotions, ItemLike, Scene, State
@@ -145,7 +143,7 @@ def _rolled(kept, times, t0, q, qd, memory, who):
 
 def _demand_consistent(scene, kept, q, t):
     """Refuse positions that violate the constraints, before velocities are solved for."""
-    from ..configuration.kinetic_metric import Metric
+    from ..configuration.continuation import Metric
     from ..configuration.motor_starts import demand_small
 
     demand_small(
@@ -160,7 +158,7 @@ def _demand_consistent(scene, kept, q, t):
 
 def _start_time(kept, q, times):
     """t[0] where the poses are consistent then; else 0, or the time nearest to it that data cover."""
-    from ..configuration.kinetic_metric import Metric
+    from ..configuration.continuation import Metric
 
     Phi = Metric(kept.packed, None, float(times[0])).arrays(q)[0]
     if np.abs(Phi).max(initial=0.0) <= INITIAL_TOL * (1.0 + np.abs(q).max()):

@@ -11,7 +11,7 @@ from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
 from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
-from ..model.packed import index_of
+from ..model.handles import index_of
 from .phase_scenes import first_row_of
 from .tolerances import SAME_WAY, SLOW
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..calls import fitting_methods
 from ..elements.bodies import START, PointMass, named, rotation_matrix, transform_g
 from ..errors import InvalidArgument, InvalidBody, SingularConfiguration
-from ..maths.matrix_rank import range_and_null_space
+from ..maths.dense_linalg import range_and_null_space
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import handles_of
 from ..observables.evaluate import constraint_arrays, mass_matrix

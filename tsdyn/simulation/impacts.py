@@ -13,7 +13,7 @@ from ..configuration.tolerances import INITIAL_TOL
 from ..elements.element import Attachment
 from ..errors import InconsistentState, InvalidArgument, InvalidConstraint
 from ..observables.state import RememberingState, remembered
-from ..runs.arguments import state_arrays
+from ..runs.task import state_arrays
 from ..validation import floats, listed
 from .phase_scenes import NAMED, gaps_of, has_contacts, phase_of
 from .run_options import LAWS

@@ -11,8 +11,9 @@ from ..elements.loads import FunctionKernels
 from ..elements.markers import POINT
 from ..jit.code_hash import is_ours
 from ..maths.tolerances import ROUNDING
-from ..model.packed import Derived, classes, size_of
-from ..rows.massless_axes import levers
+from ..model.handles import classes
+from ..model.packed import Derived, size_of
+from ..rows.inertia_rows import levers
 from ..runs.events import EventInstant
 from ..runs.run_log import RunEnd
 from .scene_cache import Prepared

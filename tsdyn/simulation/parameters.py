@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..docstrings import SECTION
+from ..calls import SECTION
 from ..elements.bodies import Attribute, Ground, PointMass
 from ..elements.element import Attachment, checked_parameters
 from ..elements.joint import Joint, SumRow
@@ -23,8 +23,8 @@ from ..errors import InvalidArgument, UnknownParameter
 from ..files.scene_text import TableNumbers
 from ..files.types import Unwritable, encode
 from ..jit.code_hash import is_ours
-from ..model.handles import handles_of
-from ..model.packed import Derived, begins_of, checked_motions, reaches_of, size_of_reaches
+from ..model.handles import begins_of, handles_of
+from ..model.packed import Derived, checked_motions, reaches_of, size_of_reaches
 from ..motions.elementary import Constant
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal, numbers_of, with_number

@@ -9,8 +9,8 @@ from ..calls import fitting
 from ..elements.force import Force
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument
-from ..model.handles import handles_of
-from ..model.packed import begins_of, pack
+from ..model.handles import begins_of, handles_of
+from ..model.packed import pack
 from ..validation import listed
 
 # A phase is a scene of its own, packed once for each combination of modes: the bodies, joints and forces of the scene,

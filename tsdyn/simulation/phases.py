@@ -7,11 +7,10 @@ import numpy as np
 
 from ..errors import StorageError
 from ..formulations.locked_orientations import keep_turning
-from ..model.handles import handles_of
-from ..model.packed import first_rows
+from ..model.handles import first_rows, handles_of
 from ..observables import diagnostics, reactions
 from ..observables.state import StatePhase
-from ..rows.graph_builder import graph_of, set_redundant
+from ..rows.constraint_graph import graph_of, set_redundant
 from ..runs.dense_output import StepPieces
 from ..validation import demand, demand_record
 from .grips import add_friction, losses

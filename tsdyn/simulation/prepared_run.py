@@ -11,29 +11,28 @@ import numpy as np
 
 from ..ahead import kernels_of, prepare_first_run
 from ..calls import ELSEWHERE, fitting
-from ..configuration.holonomic import demand_holonomic
+from ..configuration.motor_starts import demand_holonomic
 from ..elements.element import warn_of_waiting
 from ..errors import InvalidArgument, Status
 from ..integrators import DOP853, Taylor
 from ..jit.compiled import clock
 from ..methods.integrator import frozen, is_plain
 from ..observables.state import remembered
-from ..runs.arguments import adaptive, demand_steps_seen, interval, output_times, state_arrays
 from ..runs.driver import Sampling
 from ..runs.events import prepare as prepared_events
 from ..runs.step_engine import StepEngine
-from ..runs.task import Task, between
+from ..runs.task import Task, adaptive, between, demand_steps_seen, interval, output_times, state_arrays
 from ..taylor.series_engine import SeriesEngine
 from ..validation import damaged
 from . import stored_runs
 from .local_origin import origin_of, run_near, within_rounding
 from .phase_scenes import at_start, with_own_parts
-from .progress import reporter
 from .run_options import OF_CALL, OF_RUN, RunCall, RunOptions, by_name, documented, from_names
 from .scene import Scene
 from .scene_cache import prepared, prepared_numbers
 from .segments import Turns, run_segments
 from .solution import Solution
+from .termination import reporter
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

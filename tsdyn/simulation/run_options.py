@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..calls import fitting_constructor
-from ..docstrings import entries_of
+from ..calls import entries_of, fitting_constructor
 from ..errors import InvalidArgument
 from ..formulations.registry import formulation as find_formulation
 from ..methods.integrator import registered
-from ..runs.arguments import interval, method_of, output_times
 from ..runs.events import prepare
+from ..runs.task import interval, method_of, output_times
 from ..validation import one_of, positive, whole
 
 if TYPE_CHECKING:

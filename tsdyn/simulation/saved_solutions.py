@@ -13,8 +13,7 @@ import numpy as np
 from ..errors import InvalidArgument, InvalidFile, MissingDependency, Status, StorageError
 from ..files.archive import COORDINATES, OUTPUTS, tables_of, units_of_level
 from ..formulations.registry import formulation
-from ..model.handles import handles_of
-from ..model.packed import has_rates
+from ..model.handles import handles_of, has_rates
 from ..observables.channels import channels_of, values_of
 from ..observables.diagnostics import ConstraintError
 from ..rows.interface import redundancy

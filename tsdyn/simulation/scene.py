@@ -28,9 +28,9 @@ from ..elements.primitive import Primitive
 from ..errors import InconsistentState, InvalidArgument, InvalidBody, InvalidConstraint, StorageError
 from ..jit.code_hash import deep_hash
 from ..model.equations import demand_compilable
-from ..model.handles import handles_of
+from ..model.handles import handles_of, user_functions
 from ..model.laws import seen_by
-from ..model.packed import pack, user_functions
+from ..model.packed import pack
 from ..motions.prescribed import Motion
 from ..motions.signals import Signal
 from ..observables.evaluate import evaluate as _evaluate

@@ -13,9 +13,15 @@ from ..errors import StorageError
 from ..formulations.locked_orientations import hold, still
 from ..jit.interrupts import CollectionsDeferred
 from ..methods.integrator import is_plain
-from ..model.equations import depends_on_time, sampled_loads, user_kinds, watched_loads
+from ..model.equations import (
+    depends_on_time,
+    sampled_loads,
+    user_kinds,
+    watched_loads,
+    with_curvatures,
+    with_force_jacobians,
+)
 from ..model.handles import handles_of
-from ..model.packed import with_curvatures, with_force_jacobians
 from ..motions.knots import NO_CHANGES, NO_STOPS, changes, is_noise, sample_times, stops_of, within_step
 from ..observables.reactions import demand_unique
 from ..runs.driver import instants_of, sampled

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..ahead import prepare_first_run
-from ..configuration.holonomic import demand_holonomic
+from ..configuration.motor_starts import demand_holonomic
 from ..errors import Status, TsdynError
 from ..formulations.registry import formulation
 from ..integrators import SDIRK54, Radau, Taylor
@@ -25,7 +25,7 @@ from ..taylor.tolerances import SHARP_TOL
 from ..validation import damaged, demand, demand_numbers, is_count
 from . import tolerances as limits
 from .local_origin import within_rounding
-from .progress import silent
+from .termination import silent
 
 # Turns of the default method: from its explicit method to the implicit one where the motion is stiff, and back.
 #

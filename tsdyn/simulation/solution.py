@@ -13,7 +13,7 @@ import numpy as np
 from ..calls import fitting, fitting_methods
 from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
-from ..formulations.chart_validity import REASONS
+from ..formulations.charts import REASONS
 from ..methods.integrator import is_plain
 from ..model.kinematics import Anchor, Kinematics
 from ..observables import diagnostics, reactions
@@ -21,8 +21,7 @@ from ..observables.generalised_forces import law_values
 from ..observables.reactions import acted, exerted, member, with_normal_loads
 from ..observables.state import RememberingState
 from ..validation import counted, floats
-from .balances import Balances, energy_error
-from .by_phase import by_phase, gathered
+from .balances import Balances, by_phase, energy_error, gathered
 from .records import Records
 from .stored_runs import RunOutputs
 from .termination import account, cause_of

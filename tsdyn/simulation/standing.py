@@ -9,11 +9,11 @@ import numpy as np
 from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
 from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InconsistentState, InvalidArgument, NoEquilibrium
+from ..model.handles import first_rows
 from ..model.kinematics import Anchor
-from ..model.packed import first_rows
 from ..observables import reactions
 from ..observables.state import RememberingState, State, StatePhase, remembered
-from ..runs.arguments import state_arrays
+from ..runs.task import state_arrays
 from ..validation import finite_vector, listed, number
 from .contact_run import begun, demand_apart
 from .grips import add_friction

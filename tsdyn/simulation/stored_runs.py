@@ -22,14 +22,12 @@ from ..errors import InvalidArgument, Status, StorageError
 from ..jit.code_hash import is_ours, platform_hash
 from ..jit.compilers import machine
 from ..methods.integrator import is_own, registered
-from ..model.handles import handles_of
+from ..model.handles import called_functions, handles_of, user_functions
 from ..model.kinematics import Anchor
-from ..model.packed import called_functions, user_functions
 from ..observables.state import RememberingState, State, remembered
 from ..runs import run_log
-from ..runs.arguments import state_arrays
 from ..runs.run_log import RunEnd
-from ..runs.task import Outcome
+from ..runs.task import Outcome, state_arrays
 from ..validation import clipped, damaged, demand, demand_numbers, demand_record, is_count, number, shown
 from .scene_cache import prepared_numbers
 

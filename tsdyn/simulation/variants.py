@@ -14,8 +14,7 @@ from ..calls import fitting
 from ..elements.bodies import START, Ground, PointMass, named
 from ..elements.unilateral import contacts_of
 from ..errors import InvalidArgument, InvalidBody
-from ..model.handles import handles_of
-from ..model.packed import classes
+from ..model.handles import classes, handles_of
 from ..validation import listed
 from .scene_cache import prepared_numbers
 

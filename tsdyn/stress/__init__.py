@@ -1,6 +1,6 @@
 """`tsdyn stress`: the gallery of hard cases, random scenes and calls, and the laws that judge every run.
 
 Imports simulation and below; nothing imports it but the command. Begin with laws.py: what holds of any run, without a
-reference solution. gallery.py, rods.py and squeezer.py build the hard cases, report.py makes their figures;
-random_scenes.py and random_calls.py draw what campaign.py runs.
+reference solution. gallery.py, rods.py and squeezer.py build the hard cases; random_scenes.py and random_calls.py
+draw others; campaign.py runs them and makes the report.
 """

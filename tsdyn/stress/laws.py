@@ -15,11 +15,11 @@ from ..elements.markers import POINT
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, ROUNDING_AT_MOST, SUM_ROUNDING
 from ..model.equations import WIDTH, places, with_short_rows
 from ..model.packed import member_of
-from ..observables.contacts import touching
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
+from ..observables.reactions import touching
+from ..simulation.load import resume
 from ..simulation.prepared_run import Run, simulate
-from ..simulation.resume import resume
 from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
 from .contact_laws import energy_of_phases, impacts, unilateral
 from .findings import Finding, extent, radius_of_gyration, some

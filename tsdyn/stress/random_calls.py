@@ -26,9 +26,8 @@ from ..measuring.profile import profile
 from ..methods.integrator import Integrator
 from ..motions.prescribed import Motion
 from ..motions.tables import Table
-from ..simulation.load import load
+from ..simulation.load import load, resume
 from ..simulation.prepared_run import prepare, simulate
-from ..simulation.resume import resume
 from ..simulation.run_options import RunOptions
 from ..simulation.scene import Scene
 from ..simulation.solution import Solution

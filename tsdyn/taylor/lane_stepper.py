@@ -41,8 +41,8 @@ from ..workspaces import plain_context
 from . import tolerances as limits
 from .coefficients import begin, expand
 from .layout import Expansion, SeriesContext, empty_series, touches_ground
-from .step_end import Tops, keep_start, project_rates, sum_series
 from .step_length import size_of_order, weights
+from .step_parts import Tops, keep_start, project_rates, sum_series
 
 # Memory of a batch of lanes: the context of a run by series, its numbers arrays of lanes, and the state of each.
 

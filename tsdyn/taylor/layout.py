@@ -15,10 +15,11 @@ from ..elements.loops.ground_contacts import is_ground_contact
 from ..elements.markers import POINT
 from ..errors import InvalidConstraint, InvalidForce
 from ..formulations.locked_orientations import instances
-from ..jit.arrays import zeros
 from ..jit.kernels import Record, loader, records, twin
+from ..jit.resident import zeros
 from ..model.equations import changes_with_state
-from ..model.packed import System, coupled_loads, index_of, members_of
+from ..model.handles import index_of
+from ..model.packed import System, coupled_loads, members_of
 from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
 from ..motions.program import run_program
@@ -114,7 +115,7 @@ class Expansion(NamedTuple):
 
     order: Orders
     bodies: np.ndarray  # (b + 1, orders, 24)  see series_loops
-    low: np.ndarray  # (b, 16)  what r, rd, omega' and p lack to rounding at the start of the step; step_end.py
+    low: np.ndarray  # (b, 16)  what r, rd, omega' and p lack to rounding at the start of the step; step_parts.py
     low_end: np.ndarray  # (b, 16)  the same at the end of the step tried
     start: np.ndarray  # (b, 4)  p at the start of the step
     low_r2: np.ndarray  # (b, 4)  what r_2 lacks to rounding; coefficients.py
@@ -127,7 +128,7 @@ class Expansion(NamedTuple):
     drives: np.ndarray  # (numbers of loads,) of tables.MotionSeries
     frictions: np.ndarray  # (frictions,) of tables.FrictionSeries
     sources: np.ndarray  # of tables.ReactionSource
-    kept: np.ndarray  # (m,)  multipliers of the step's start, in scenes with joint friction; joint_friction.py
+    kept: np.ndarray  # (m,)  multipliers of the step's start, in scenes with joint friction; series_engine.py
 
 
 class Trial(Record):

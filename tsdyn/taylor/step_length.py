@@ -3,9 +3,9 @@
 import math
 
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
-from ..formulations.chart_validity import ROUNDING
 from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import first, fma, four, larger, second, splat, third
+from ..maths.tolerances import ROUNDING
 from ..rows.interface import is_near_singular
 from .tolerances import FAINT, FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST, STIFF_RATES, VAST
 

@@ -4,7 +4,7 @@ import math
 
 from ..elements.loops.constraint_rows import OMEGA, POSE, RD, move_bodies, place_bodies
 from ..errors import Status
-from ..formulations.chart_validity import AT_START, BY_SERIES, extent
+from ..formulations.charts import AT_START, BY_SERIES, extent
 from ..jit.kernels import entry, kernel, long_kernel
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.tolerances import ROUNDING_AT_MOST, TINY

@@ -20,7 +20,7 @@ from ..motions.prescribed import Motion
 from ..motions.signals import Signal, numbers_of
 from ..motions.tracing import retold
 from ..observables.diagnostics import starts_of
-from ..rows.graph_builder import build
+from ..rows.constraint_graph import build
 from ..rows.interface import allocate_tangent
 from ..simulation.scene import Scene
 from ..taylor.coefficients import run_forces, run_loops

@@ -99,6 +99,7 @@ def forces(count, stride, table, reals, q, qd, t, out):
     values, nb = int(head[VALUES]), int(head[BODIES])
     # Inputs: t, values that are given, numbers and angles, q and qd of the bodies
     s[0, 0] = t
+    # A function that isn't traced gives the values of the law, at t, q and qd
     if head[FUNCTION] != 0.0:
         given, n = head[int(head[SLOPES]) :], int(head[COORDINATES])
         call_law(int(head[FUNCTION]), q, qd, memory, par, t, given)
@@ -123,6 +124,7 @@ def forces(count, stride, table, reals, q, qd, t, out):
             for c in range(int(body[1])):
                 s[row, 0] = x[int(body[0]) + c]
                 row += 1
+    # The program: forces and torques of each body, rows from RESULTS on
     run_rows(head[int(head[PROGRAM]) :], s, 0)
     # Eq. (1)
     for b in range(nb):

@@ -14,7 +14,7 @@ from ..model.joint_turns import angle_after
 from ..observables.tolerances import KEPT_FLOATS
 from ..rows.interface import take_noted_selection
 from ..workspaces import B_CHART, B_DATA, B_END, B_H, B_START, MIXED, STORED, arrays_of, load, load_run
-from .run_memory import call
+from .run_memory import STATUSES, call
 from .tolerances import LONG_STEPS
 
 # Outputs of a driver: the records of accepted states.
@@ -371,7 +371,7 @@ class Reader:
         out = np.zeros((t.size, 3, self.n))
         arguments = self._context, self._run, t, rows, blocks, charts, points, out
         long = self.n >= LONG_STEPS
-        return out, Status(call(self._read, arguments, (self._kernels,)) if long else self._read(*arguments))
+        return out, STATUSES[call(self._read, arguments, (self._kernels,)) if long else self._read(*arguments)]
 
 
 # What a run with dense output leaves to its solution: the blocks of its steps, read at any time.

@@ -425,7 +425,7 @@ class _ContactRun(Transitions):
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.slides(i)]
-        halting = Halting(packed, [gaps.list[i].side.grip.sliding for i in slides])
+        halting = Halting(gaps, slides)
         for k, i in enumerate(slides):
             yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 

@@ -120,6 +120,7 @@ def gaps_of(scene, without=None, holds=()):
     free = phase_of(scene, [], holds, without)
     if free._gaps is None:
         free._gaps = _new_gaps(scene, free)
+    free._gaps.workspace.begin()
     return free._gaps
 
 

@@ -32,6 +32,7 @@ from ..model.equations import (
 )
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, no_system
+from ..observables.evaluate import NO_INERTIA
 from ..rows.constraint_graph import BIAS, REDUCED, graph_of
 from ..rows.interface import (
     DYNAMICS,
@@ -239,9 +240,6 @@ def find_multipliers(context, t, levels, memory, out):
 
 
 KERNELS = find_gaps, measure_opened, find_rows, respond, accelerate, bounce, gain, find_multipliers, *SURVEYING
-
-
-NO_INERTIA = "a direction that the constraints leave free carries no inertia."
 
 
 class ReactionWorkspace:

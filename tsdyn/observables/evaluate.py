@@ -108,6 +108,7 @@ NOT_UNIQUE = (
     "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
     "leave free carries no inertia."
 )
+NO_INERTIA = "a direction that the constraints leave free carries no inertia: give its bodies mass and inertia."
 ROUNDS, MOST_AT_ONCE = 8, 64  # of restoring rows dropped wrongly; random loads that identify them
 
 

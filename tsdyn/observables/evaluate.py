@@ -340,6 +340,9 @@ def mass_matrix_sparse(system, q):
     return M
 
 
+# Redundant rows of Phi_q at one configuration of a large scene, by sparse factorisation in O(N).
+
+
 @entry("pvdd")
 def _choose(context, q, t, share):
     """Select redundant rows at q, those with pivots below a share; return their number, or -1."""

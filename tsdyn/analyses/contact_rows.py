@@ -35,6 +35,7 @@ from ..model.equations import (
 )
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, no_system
+from ..observables.evaluate import NO_INERTIA
 from ..rows.constraint_graph import BIAS, REDUCED, graph_of
 from ..rows.interface import (
     DYNAMICS,
@@ -296,9 +297,6 @@ def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # te
 KERNELS = (
     find_gaps, measure_opened, find_rows, find_slips, respond, accelerate, bounce, gain, find_multipliers, *SURVEYING,
 )  # fmt: skip
-
-
-NO_INERTIA = "a direction that the constraints leave free carries no inertia."
 
 
 class ReactionWorkspace:

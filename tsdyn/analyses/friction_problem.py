@@ -25,7 +25,7 @@ from ..maths.complementarity import OPEN, STICKS
 from ..maths.dense_linalg import range_and_null_space
 from ..maths.tolerances import EPS, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
-from ..observables.evaluate import ITERATIONS, constraint_arrays, mass_matrix
+from ..observables.evaluate import ITERATIONS, NO_INERTIA, constraint_arrays, mass_matrix
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from .friction_units import NormalLoads
 from .slip_velocities import ACROSS, ALONG, WHOLE, slip_velocities
@@ -348,7 +348,7 @@ class RestProblem:
         try:
             factor = cho_factor(Z.T @ M @ Z) if Z.size else None
         except np.linalg.LinAlgError as error:
-            raise SingularConfiguration("a direction that the constraints leave free carries no inertia.") from error
+            raise SingularConfiguration(NO_INERTIA) from error
         fixed = own @ solve_triangular(R, -gamma[order], trans="T") if rank else np.zeros(q.size)
         known = applied_loads(system, np.array([t]), q[None], qd[None], memory[None])[0]
         self.r, self.mass = system.bodies[:, :1] + np.arange(3), system.mass

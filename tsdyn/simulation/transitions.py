@@ -166,7 +166,7 @@ class Transitions:
             if known == {*self.modes.closed, *self.modes.idle}:
                 return None
         names = listed([*(self.gaps.names[i] for i in resting), *self.frictions.names], NAMED)
-        self.reason = f"No closed contacts and sticking frictions agree at t = {self.t:.9g} s: {names}."
+        self.reason = f"No set of closed contacts and sticking frictions is consistent at t = {self.t:.9g} s: {names}."
         return Status.CONTACT_FAILED
 
     def _gaps_with(self, holds):

@@ -8,6 +8,7 @@
 - slope: a block rests on a slope below the angle of friction; the error is how far it has moved after 10 s.
 
 Contacts of the other programs are compliant, here as stiff as the step allows; Drake has no coefficient of restitution.
+Exudyn is left out on the slope, where a run with a step of 1e-4 s doesn't end within two minutes.
 Engines that aren't installed are left out.
 
 Run it: python -m benchmarks.contacts
@@ -35,10 +36,10 @@ HEIGHT = HALF_HEIGHT * np.cos(TILT) + HALF_WIDTH * np.sin(TILT)
 
 
 def timed(run):
-    """Seconds of a call, and what it returns."""
-    began = time.perf_counter()
+    """Seconds of processor time of a call, and what it returns."""
+    began = time.process_time()
     found = run()
-    return time.perf_counter() - began, found
+    return time.process_time() - began, found
 
 
 # The references
@@ -328,7 +329,7 @@ def drake_slope(step):
 # In Exudyn: generalised-alpha; spheres at the points that touch, and a large triangle
 
 
-def exudyn(scene, points, step, end, mass, e=0.0, friction=0.0):
+def exudyn(scene, points, step, end, mass, e=0.0):
     """Seconds, and places and rotations of the bodies at the end; twenty steps to a period of `mass` on a contact."""
     import exudyn as exu
     from exudyn import utilities
@@ -345,11 +346,11 @@ def exudyn(scene, points, step, end, mass, e=0.0, friction=0.0):
         node = made.mbs.AddNode(utilities.NodeGenericData(initialCoordinates=[0] * 4, numberOfDataCoordinates=4))
         contact = utilities.ObjectContactSphereTriangle(
             markerNumbers=[made._marker(body, point), ground], nodeNumber=node, sphereRadius=radius,
-            trianglePoints=corners, contactStiffness=stiffness, dynamicFriction=friction, **law,
+            trianglePoints=corners, contactStiffness=stiffness, **law,
         )  # fmt: skip
         made.mbs.AddObject(contact)
     made.mbs.Assemble()
-    found = made.run(end, step, outputs=1)
+    found = made.run(end, step, outputs=1, clock=time.process_time)
     return found.seconds, found.r[-1], found.A[-1]
 
 
@@ -368,26 +369,14 @@ def exudyn_chain(step):
     return seconds, (r[0] - A[0] @ (LINK / 2, 0, 0))[2]
 
 
-def exudyn_block(step, end, half_height, height, tilt, friction, gravity):
-    """Place and tilt of a block in a plane, on the two edges of its section."""
-    scene, turned = ts.Scene(gravity=gravity), (np.cos(tilt / 2), 0, np.sin(tilt / 2), 0)
-    block = scene.add_body(MASS, (INERTIA,) * 3, (0, 0, height), turned)
-    scene.add(ts.constraints.Planar.at(scene.ground, block, point=(0, 0, 0), axis=(0, 1, 0)))
-    edges = [(block, (x, 0, -half_height)) for x in (-HALF_WIDTH, HALF_WIDTH)]
-    seconds, r, A = exudyn(scene, edges, step, end, MASS / 2, friction=friction)
-    return seconds, r[0, 0], np.arctan2(A[0, 0, 2], A[0, 0, 0])
-
-
 def exudyn_rocking(step):
-    """Without friction."""
-    seconds, _, tilt = exudyn_block(step, ROCKING_END, HALF_HEIGHT, HEIGHT, TILT, 0.0, (0, 0, -G))
-    return seconds, tilt
-
-
-def exudyn_slope(step):
-    """A low block, gravity turned."""
-    gravity = G * np.sin(ANGLE), 0, -G * np.cos(ANGLE)
-    return exudyn_block(step, SLOPE_END, HALF_WIDTH, HALF_WIDTH, 0.0, FRICTION, gravity)[:2]
+    """A block in a plane, on the two edges of its section."""
+    scene, turned = ts.Scene(gravity=(0, 0, -G)), (np.cos(TILT / 2), 0, np.sin(TILT / 2), 0)
+    block = scene.add_body(MASS, (INERTIA,) * 3, (0, 0, HEIGHT), turned)
+    scene.add(ts.constraints.Planar.at(scene.ground, block, point=(0, 0, 0), axis=(0, 1, 0)))
+    edges = [(block, (x, 0, -HALF_HEIGHT)) for x in (-HALF_WIDTH, HALF_WIDTH)]
+    seconds, _, A = exudyn(scene, edges, step, ROCKING_END, MASS / 2)
+    return seconds, np.arctan2(A[0, 0, 2], A[0, 0, 0])
 
 
 RUNS = {
@@ -397,10 +386,7 @@ RUNS = {
         rocking,
         {"tsdyn": ours_rocking, "mujoco": mujoco_rocking, "exudyn": exudyn_rocking, "pydrake": drake_rocking},
     ),
-    "slope": (
-        lambda: 0.0,
-        {"tsdyn": ours_slope, "mujoco": mujoco_slope, "exudyn": exudyn_slope, "pydrake": drake_slope},
-    ),
+    "slope": (lambda: 0.0, {"tsdyn": ours_slope, "mujoco": mujoco_slope, "pydrake": drake_slope}),
 }
 
 
@@ -413,7 +399,10 @@ def cells(program, value, motion):
     reference, runs = RUNS[motion]
     if program not in runs:
         return ["", ""]
-    found = [runs[program](value) for _ in range(ROUNDS)]
+    try:
+        found = [runs[program](value) for _ in range(ROUNDS)]
+    except ts.StepFailure:
+        return ["gave up", ""]
     return [f"{abs(found[-1][1] - reference()):.1e}", f"{1e3 * min(seconds for seconds, _ in found):.2g}"]
 
 

@@ -27,6 +27,7 @@ from ..plugins import (
     scaled,
     slope_series,
 )
+from .dot2 import write_offset_gradient
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
@@ -83,10 +84,7 @@ class DisplacementTerm(Primitive):
     @staticmethod
     def jacobian(x, par, t, out):
         """Eq. (2)."""
-        for i in range(3):
-            out[0, i] = par[0] * (x[6 + i] - x[3 + i])
-            out[0, 3 + i] = -par[0] * x[i]
-            out[0, 6 + i] = par[0] * x[i]
+        write_offset_gradient(x, par[0], out)
 
     @staticmethod
     def gamma(x, xd, par, t, out):
@@ -95,11 +93,8 @@ class DisplacementTerm(Primitive):
 
     @staticmethod
     def series(x, par, k, s, out):
-        """Of Eq. (2)."""
-        for i in range(3):
-            out[0, i] = par[0] * (x[6 + i] - x[3 + i])
-            out[0, 3 + i] = -par[0] * x[i]
-            out[0, 6 + i] = par[0] * x[i]
+        """Of Eq. (2), which is linear in x."""
+        write_offset_gradient(x, par[0], out)
 
     @classmethod
     def example(cls, rng, a, b):
@@ -132,10 +127,7 @@ class _DisplacementFunctionTerm(DisplacementTerm):
         """Eq. (5)."""
         s = x[0] * (x[6] - x[3]) + x[1] * (x[7] - x[4]) + x[2] * (x[8] - x[5])
         slope = par[0] * coordinate_function(par, 2, s, 1)
-        for i in range(3):
-            out[0, i] = slope * (x[6 + i] - x[3 + i])
-            out[0, 3 + i] = -slope * x[i]
-            out[0, 6 + i] = slope * x[i]
+        write_offset_gradient(x, slope, out)
 
     @staticmethod
     def gamma(x, xd, par, t, out):

@@ -15,10 +15,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import Motion, Point, Primitive, ground_point, square
+from ..plugins import Motion, Point, Primitive, ground_point, kernel, square
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Prescribed
+
+
+@kernel
+def _write_gradient(x, par, out):
+    """out = Phi_x, Eq. (2); of coefficients x its coefficient."""
+    scale = 1.0 / par[3]
+    for i in range(3):
+        d = (x[i] - x[3 + i]) * scale
+        out[0, i] = d
+        out[0, 3 + i] = -d
 
 
 class Distance(Primitive):
@@ -82,11 +92,7 @@ class Distance(Primitive):
     @staticmethod
     def jacobian(x, par, t, out):
         """Eq. (2)."""
-        scale = 1.0 / par[3]
-        for i in range(3):
-            d = (x[i] - x[3 + i]) * scale
-            out[0, i] = d
-            out[0, 3 + i] = -d
+        _write_gradient(x, par, out)
 
     @staticmethod
     def phi_t(x, par, t, out):
@@ -106,9 +112,5 @@ class Distance(Primitive):
 
     @staticmethod
     def series(x, par, k, s, out):
-        """Of Eq. (2)."""
-        scale = 1.0 / par[3]
-        for i in range(3):
-            d = (x[i] - x[3 + i]) * scale
-            out[0, i] = d
-            out[0, 3 + i] = -d
+        """Of Eq. (2), which is linear in x."""
+        _write_gradient(x, par, out)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import Motion, Primitive, Vector
+from ..plugins import Motion, Primitive, Vector, kernel
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Prescribed
@@ -37,6 +37,14 @@ class Prescribed:
     def series_t(x, par, k, s, out):
         """Of Eq. (3); c is in row 0."""
         out[0] = -(k + 1.0) * s[0, k + 1]
+
+
+@kernel
+def _write_gradient(x, out):
+    """out = Phi_x, Eq. (2); of coefficients x its coefficient."""
+    for i in range(3):
+        out[0, i] = x[3 + i]
+        out[0, 3 + i] = x[i]
 
 
 class Dot1(Prescribed, Primitive):
@@ -81,9 +89,7 @@ class Dot1(Prescribed, Primitive):
     @staticmethod
     def jacobian(x, par, t, out):
         """Eq. (2)."""
-        for i in range(3):
-            out[0, i] = x[3 + i]
-            out[0, 3 + i] = x[i]
+        _write_gradient(x, out)
 
     @staticmethod
     def gamma(x, xd, par, t, out):
@@ -92,7 +98,5 @@ class Dot1(Prescribed, Primitive):
 
     @staticmethod
     def series(x, par, k, s, out):
-        """Of Eq. (2)."""
-        for i in range(3):
-            out[0, i] = x[3 + i]
-            out[0, 3 + i] = x[i]
+        """Of Eq. (2), which is linear in x."""
+        _write_gradient(x, out)

@@ -13,11 +13,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import Point, Primitive, Vector
+from ..plugins import Point, Primitive, Vector, kernel
 from .dot1 import Prescribed
 
 if TYPE_CHECKING:
     from ..hints import BodyLike, Prescribed
+
+
+@kernel
+def write_offset_gradient(x, factor, out):
+    """out = factor Phi_x, Eq. (2); of coefficients x its coefficient."""
+    for i in range(3):
+        out[0, i] = factor * (x[6 + i] - x[3 + i])
+        out[0, 3 + i] = -factor * x[i]
+        out[0, 6 + i] = factor * x[i]
 
 
 class Dot2(Prescribed, Primitive):
@@ -56,10 +65,7 @@ class Dot2(Prescribed, Primitive):
     @staticmethod
     def jacobian(x, par, t, out):
         """Eq. (2)."""
-        for i in range(3):
-            out[0, i] = x[6 + i] - x[3 + i]
-            out[0, 3 + i] = -x[i]
-            out[0, 6 + i] = x[i]
+        write_offset_gradient(x, 1.0, out)
 
     @staticmethod
     def gamma(x, xd, par, t, out):
@@ -68,8 +74,5 @@ class Dot2(Prescribed, Primitive):
 
     @staticmethod
     def series(x, par, k, s, out):
-        """Of Eq. (2)."""
-        for i in range(3):
-            out[0, i] = x[6 + i] - x[3 + i]
-            out[0, 3 + i] = -x[i]
-            out[0, 6 + i] = x[i]
+        """Of Eq. (2), which is linear in x."""
+        write_offset_gradient(x, 1.0, out)

@@ -14,10 +14,19 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..plugins import InvalidConstraint, Point, Primitive, Side, Unilateral, Vector, across, stop_waiting
+from ..plugins import InvalidConstraint, Point, Primitive, Side, Unilateral, Vector, across, kernel, stop_waiting
 
 if TYPE_CHECKING:
     from ..hints import BodyLike
+
+
+@kernel
+def _write_gradient(x, out):
+    """out = Phi_x, Eq. (2); of coefficients x its coefficient."""
+    for i in range(3):
+        out[0, i] = x[6 + i]
+        out[0, 3 + i] = -x[6 + i]
+        out[0, 6 + i] = x[i] - x[3 + i]
 
 
 class PlaneContact(Unilateral, Primitive):
@@ -132,10 +141,7 @@ class PlaneContact(Unilateral, Primitive):
     @staticmethod
     def jacobian(x, par, t, out):
         """Eq. (2)."""
-        for i in range(3):
-            out[0, i] = x[6 + i]
-            out[0, 3 + i] = -x[6 + i]
-            out[0, 6 + i] = x[i] - x[3 + i]
+        _write_gradient(x, out)
 
     @staticmethod
     def gamma(x, xd, par, t, out):
@@ -144,8 +150,5 @@ class PlaneContact(Unilateral, Primitive):
 
     @staticmethod
     def series(x, par, k, s, out):
-        """Of Eq. (2)."""
-        for i in range(3):
-            out[0, i] = x[6 + i]
-            out[0, 3 + i] = -x[6 + i]
-            out[0, 6 + i] = x[i] - x[3 + i]
+        """Of Eq. (2), which is linear in x."""
+        _write_gradient(x, out)

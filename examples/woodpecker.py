@@ -66,8 +66,9 @@ def build(small=1.0, start=START):
 
 def pecks(solution):
     """Instants at which the sleeve comes to stick, a period apart (k,), s, and its heights there, m."""
-    t = np.array([begin for begin, _, names in solution.phases if "low corner sticks" in names])
-    return t, solution.at(t).position("sleeve")[:, 2]
+    sticks = solution.sticking("low corner")
+    begins = np.flatnonzero(sticks[1:] & ~sticks[:-1]) + 1
+    return solution.t[begins], solution.position("sleeve")[begins, 2]
 
 
 def check(solution):

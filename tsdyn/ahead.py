@@ -379,6 +379,8 @@ def work():
 def compile_kernels(everything=False):
     """Compile what the default method needs for any built-in constraint and force, or all kernels there are.
 
+    Contacts, impacts and exact friction are among the former.
+
     Returns how many there are, the folder that has them, and {name: problem} of those that it has not.
     """
     if DEBUG:

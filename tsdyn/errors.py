@@ -337,7 +337,6 @@ class Status(IntEnum):
     SERIES_ENDED = 21
     CONTACT_FAILED = 22
     ACTION_FAILED = 23
-    METHOD_REFUSED = 24
 
     def __str__(self) -> str:
         return self.name.lower()
@@ -431,9 +430,5 @@ _SENTENCES = {
     Status.ACTION_FAILED: (
         "What the action of an event asks for can't be carried out.",
         "Correct the action; solution.state is the state at the event.",
-    ),
-    Status.METHOD_REFUSED: (
-        "The method doesn't serve the motion after this event.",
-        "Take a method that does, from the start or from solution.state on.",
     ),
 }

@@ -148,3 +148,35 @@ def test_two_angles_of_a_universal_joint():
 def test_wrong_values_are_refused(wrong, message):
     with pytest.raises(ts.TsdynError, match=message):
         arms().set("hinge0", **wrong)
+
+
+def test_a_joint_leaves_its_stop():
+    """Closed contacts don't hold a joint to which a value is given; a run names one that penetrates."""
+    scene = ts.Scene()
+    bar = scene.add_body(2.0, (0.2, 0.2, 0.01), (0, 0, -1), name="bar")
+    hinge = scene.add(c.Revolute.at(scene.ground, bar, point=(0, 0, 0), axis=(0, 1, 0), name="hinge"))
+    scene.add(c.Stop(hinge, lower=0.0, name="stop"))
+    scene.set(hinge, angle=0.5, rate=-1.0)
+    np.testing.assert_allclose(bar.position, [-np.sin(0.5), 0, -np.cos(0.5)], atol=1e-15)
+    assert ts.simulate(scene, (0, 0.1)).phases == [(0.0, 0.1, ())]
+    scene.set(hinge, angle=0.0)
+    assert scene.set(hinge, rate=0.0).moved == 0.0  # it stands
+    scene.set(hinge, angle=-0.2)
+    with pytest.raises(ts.InconsistentState, match=r"stop is passed by 0\.2"):
+        ts.simulate(scene, (0, 0.1))
+
+
+def test_contacts_that_can_hold_do():
+    """A bar stands on its end, which is closed: its slide is moved, and the end stays on the floor."""
+    scene = ts.Scene()
+    bar = scene.add_body(1.0, (0.1, 0.1, 0.1), (0.3, 0, 0.4), name="bar")
+    scene.add(c.Planar.at(scene.ground, bar, point=bar.position, axis=(0, 1, 0)))
+    cart = scene.add_body(1.0, (0.1, 0.1, 0.1), (0.3, 0, 0.4), name="cart")
+    slide = scene.add(c.Translational.at(scene.ground, cart, point=cart.position, axis=(0, 0, 1), name="slide"))
+    scene.add(c.Revolute.at(cart, bar, point=cart.position, axis=(0, 1, 0)))
+    floor = {"point_a": (-0.3, 0, -0.4), "normal_b": (0, 0, 1), "unilateral": True, "name": "floor"}
+    scene.add(c.PlaneContact(bar, scene.ground, **floor))
+    scene.set(slide, displacement=0.05)
+    solution = ts.simulate(scene, (0, 1e-3))
+    assert abs(solution.position("bar", point=(-0.3, 0, -0.4))[0, 2]) < 1e-12
+    assert solution.phases[0][2] == ("floor",)

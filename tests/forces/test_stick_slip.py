@@ -253,6 +253,23 @@ def test_joints_without_a_load_make_no_events():
     np.testing.assert_allclose(solution.velocity(last)[-1, 2], -G * end, rtol=1e-9)
 
 
+def test_a_start_as_slow_as_rest_sticks():
+    """In a plane 1e-8 m/s is rest: the slip is ended."""
+    solution = ts.simulate(on_a_plane((6e-9, 0, 0), 0.3), (0.0, 1.0))
+    assert solution.success
+    assert not solution.qd.any()
+
+
+@pytest.mark.parametrize("inactive", [0, 1])
+def test_an_inactive_friction_is_none(inactive):
+    without, scene = chain(2), chain(2)
+    without.remove(f"friction {inactive}")
+    scene.deactivate(f"friction {inactive}")
+    one, other = (ts.simulate(each, (0.0, 0.5), rtol=1e-12, atol=1e-12) for each in (without, scene))
+    np.testing.assert_allclose(other.q[-1], one.q[-1], rtol=0, atol=TIGHT)
+    assert other.phases == one.phases
+
+
 def test_an_impact_releases_what_sticks():
     """An elastic ball stops at the block and leaves it 2 m/s, which friction stops after v^2 / (2 mu g)."""
     scene = ts.Scene()

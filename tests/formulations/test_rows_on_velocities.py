@@ -191,6 +191,12 @@ def test_stiff_scenes_take_long_steps_in_the_null_space_form():
     assert runs[1].constraint_error.velocity.max() < HELD
 
 
+def test_the_default_method_turns_to_an_implicit_one_in_the_null_space_form():
+    solution = ts.simulate(stiff(), (0, SPAN), rtol=1e-6, atol=1e-6, formulation="null-space").raise_if_failed()
+    assert "The motion is stiff: SDIRK54 took over" in solution.message
+    assert off(solution, ts.simulate(stiff(), (0, SPAN), integrator=I.SDIRK54(1e-8, 1e-8))) < 1e-5
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["skate", "sleigh", "on a table", "belt of time", "coin", "bicycle"])
 def test_jacobian_of_the_null_space_form(name, rng):

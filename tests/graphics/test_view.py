@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import tsdyn as ts
 from examples import door, four_bar
 from tests.helpers.pages import Tags, array, decoded, place
-from tsdyn.graphics.run_data import FLASH, FRAMES, HIT, HOLDS_BACK, OPEN, PUSHES, run_data
+from tsdyn.graphics.run_data import FLASH, FRAMES, HIT, HOLDS_BACK, OPEN, PUSHES, STICKS, run_data
 from tsdyn.graphics.view import Painter
 
 C, S = ts.constraints, ts.shapes
@@ -610,6 +610,19 @@ def test_contacts_that_open_and_close():
     np.testing.assert_allclose(np.diag(np.reshape(surface["matrix"][:9], (3, 3))), 0.1)
     assert (surface["body"], mark["body"], mark["contact"]) == (0, 1, 0)
     np.testing.assert_allclose(data.positions[:, 1], data.positions[:, 0] - [0, 0, 0.1], atol=SEEN)
+
+
+@pytest.mark.parametrize("every_step", [True, False])
+def test_a_contact_that_sticks_has_a_colour_of_its_own(every_step):
+    """A block slides to rest: its friction of 2 N/kg takes 1 m/s in 0.5 s."""
+    scene = ts.Scene(gravity=(0, 0, -10))
+    block = scene.add_point_mass(mass=1.0, velocity=(1, 0, 0))
+    scene.add(C.PlaneContact(block, scene.ground, normal_b=(0, 0, 1), unilateral=True, kinetic=0.2, name="lane"))
+    times = None if every_step else np.linspace(0, 1, 101)
+    data = decoded(view(ts.simulate(scene, (0.0, 1.0), t_eval=times)))
+    t = np.linspace(0.0, 1.0, data.frames)
+    states = np.frombuffer(base64.b64decode(data.contacts[0]), "u1")
+    assert ({*states[t < 0.49]}, {*states[t > 0.51]}) == ({PUSHES}, {STICKS})
 
 
 def test_rolling_surfaces_are_drawn_with_marks():

@@ -37,6 +37,15 @@ def left_out(scene):
     return {what: [entry.where for entry in entries] for what, entries in scene.imported.groups().items()}
 
 
+def test_a_joint_with_armature_has_the_name_of_its_body(tmp_path):
+    """A rod of 2 kg, level: m g l / (J + m l^2 + armature)."""
+    rod = "<inertial pos='0.5 0 0' mass='2' diaginertia='0.1 0.1 0.1'/>"
+    hinge = "<body name='arm'><joint name='arm' axis='0 1 0' armature='0.4'/>" + rod + "</body>"
+    scene = load(text(tmp_path, f"<mujoco><worldbody>{hinge}</worldbody></mujoco>", "arm.xml"))
+    solution = ts.simulate(scene, (0, 0.1))
+    np.testing.assert_allclose(solution.angular_acceleration(scene.bodies[0])[0, 1], 9.81, rtol=ALGEBRA)
+
+
 def test_urdf():
     with pytest.warns(ts.ImportLosses, match="limits of a joint"):
         scene = ts.load(MODELS / "arm.urdf")

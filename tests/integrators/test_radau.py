@@ -122,6 +122,27 @@ def test_friction_by_reactions_is_that_of_other_methods(make):
 
 
 @compiles
+@pytest.mark.parametrize("method", [I.Radau, I.SDIRK54])
+def test_outputs_change_no_bit_where_there_is_friction_by_reactions(method):
+    """Stages begin with the factors of the step's start, whatever has been asked for inside of the step before."""
+    plain, asked = (
+        ts.simulate(rough_joints.chain(4)[0], (0.0, 0.3), integrator=method(1e-6, 1e-6), t_eval=t_eval)
+        for t_eval in ([0.3], np.linspace(0.0, 0.3, 50))
+    )
+    np.testing.assert_array_equal(plain.q[-1], asked.q[-1])
+
+
+@compiles
+@pytest.mark.parametrize("method", [I.Radau, I.SDIRK54])
+def test_a_mechanism_that_jams_is_named(method):
+    """The place where series find no reactions, and what is said there."""
+    scene = rough_joints.chain(6)[0]
+    exact, found = (ts.simulate(scene, (0.0, 1.0), integrator=each) for each in (I.Taylor(1e-8), method(1e-4, 1e-4)))
+    assert found.status == exact.status == ts.Status.JAMMED
+    assert abs(found.t[-1] - exact.t[-1]) < 1e-5
+
+
+@compiles
 @pytest.mark.parametrize("kind", ["force", "reaction"])
 @pytest.mark.parametrize("tol", [1e-3, 1e-4])
 def test_friction_within_a_tiny_slip_velocity(kind, tol):

@@ -150,6 +150,15 @@ def test_scenes_that_an_engine_cannot_have():
     scene.add(C.RotationMotor.of(scene["hinge"], angle=lambda t: 0.1 * t, name="drive"))
     with pytest.raises(ts.InvalidArgument, match="drive"):
         ts.compare(scene, with_="mujoco")
+    scene = pendulum()
+    stone = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(0, 0, 2), name="stone")
+    scene.add(C.PlaneContact(stone, scene.ground, normal_b=(0, 0, 1), unilateral=True, name="floor"))
+    with pytest.raises(ts.InvalidArgument, match="floor: it opens and closes"):
+        ts.compare(scene, with_="mujoco")
+    scene = pendulum()
+    scene.deactivate("hinge")
+    with pytest.raises(ts.InvalidArgument, match="hinge: it is switched off"):
+        ts.compare(scene, with_="mujoco")
 
 
 def test_wrong_arguments(monkeypatch):

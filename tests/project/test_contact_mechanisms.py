@@ -9,18 +9,23 @@ from examples import clearance, woodpecker
 from tests.helpers.planar_contacts import PlanarContacts, arm
 
 TIGHT, UP = {"rtol": 1e-12, "atol": 1e-12}, np.array([0, 1])
-MODES = {"o": (), "s": ("{0}", "{0} sticks"), "+": ("{0}",), "-": ("{0}",)}
 
 
 def agree(solution, reference, names, tol):
     """The same phases, contacts that stick among them, and the same impulses at the same times."""
     phases, hit = [], {t for t, *_ in reference.impacts}
     for t, mode in reference.phases:
-        held = tuple(word.format(name) for name, m in zip(names, mode, strict=True) for word in MODES[m])
-        if t in hit or not phases or held != phases[-1][1]:  # but for slips that reverse
-            phases.append((t, held))
-    assert [held for *_, held in solution.phases] == [held for _, held in phases]
-    np.testing.assert_allclose([t for t, *_ in solution.phases], [t for t, _ in phases], atol=tol)
+        state = mode.replace("-", "+")
+        if t in hit or not phases or state != phases[-1][1]:  # but for slips that reverse
+            phases.append((t, state))
+    begun = [begin for begin, *_ in solution.phases]
+    np.testing.assert_allclose(begun, [t for t, _ in phases], atol=tol)
+    at = np.searchsorted(solution.t, begun, side="right") - 1  # the later side of an event
+    sticks = np.array([solution.sticking(name)[at] for name in names])
+    for (_, state), (*_, held), stuck in zip(phases, solution.phases, sticks.T, strict=True):
+        assert state == "".join(
+            "s" if s else "+" if name in held else "o" for name, s in zip(names, stuck, strict=True)
+        )
     found = sorted((t, names.index(name), p) for t, name, p in solution.impulses)
     largest = max(p for *_, p in found)
     assert [i for _, i, _ in found] == [i for _, i, _ in reference.impacts]
@@ -106,7 +111,8 @@ def test_a_woodpecker_has_the_published_limit_cycle():
         turned = solution.at(t).orientation("bird")
         return -2 * np.arctan2(turned[2], turned[0]) / small - w.START[1]
 
-    slides = [(a, b) for a, b, names in solution.phases if names == ("low corner",) and b - a > 0.03 and a > 0]
+    ends, _ = w.pecks(solution)  # of the slides after the last landing of each period
+    slides = [next((a, b) for a, b, _ in solution.phases if b == end) for end in ends[1:]]
     states = [solution.at(brentq(angle, a, np.nextafter(b, 0))) for a, b in slides]
     found = np.array([(x.velocity("sleeve")[2], -x.angular_velocity("bird")[1] / small) for x in states[:3]])
     first, last = np.diff(found, axis=0)
@@ -145,7 +151,7 @@ def crank(restitution, friction):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("restitution", "friction", "end"), [(0.4, 0.01, 0.0085), (0.0, 0.0, 0.1), (0.0, 0.1, 0.1)])
+@pytest.mark.parametrize(("restitution", "friction", "end"), [(0.4, 0.01, 0.0085), (0.0, 0.001, 0.05), (0.0, 0.1, 0.1)])
 def test_a_slider_crank_with_clearance(restitution, friction, end):
     """Impacts of Flores, Leine and Glocker (2010) until they accumulate; plastic ones, with slides along the walls."""
     reference, scene = crank(restitution, friction), c.build(friction, restitution)

@@ -1,12 +1,18 @@
 """Contacts with Coulomb friction against closed forms: sticking, sliding, rolling, impacts, openings; refusals."""
 
+import pickle
+import subprocess
+import sys
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 
 import tsdyn as ts
+from tests.helpers.processes import ROOT
 
 C = ts.constraints
 G = 10.0
@@ -242,6 +248,45 @@ def test_random_impacts_keep_the_laws(seed):
         assert again.qd @ M @ again.qd <= after.qd @ M @ after.qd * (1 + 1e-13)
 
 
+@pytest.mark.parametrize("mu", [0.1, 0.9])
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+def test_impulses_of_friction_balance_the_momenta(law, mu, tmp_path):
+    """Of a tumbling box: m dv = P, J dw = sum r x P, at every impact, also of a file; |p_t| <= mu p."""
+    scene, size = ts.Scene(gravity=(0, 0, -G)), np.array([0.5, 0.3, 0.2])
+    start = {"position": (0, 0, 0.7), "orientation": Rotation.from_euler("xyz", (0.3, 0.4, 0.1))}
+    start |= {"velocity": (2.0, -1.0, 0.0), "angular_velocity": (1.0, -3.0, 4.0)}
+    body = scene.add_body(**ts.shapes.box(size, mass=2.0), **start, name="box")
+    corners = size / 2 * np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
+    for i, corner in enumerate(corners):
+        place = {**FLOOR, "point_a": corner, "restitution": 0.4, "kinetic": mu, "name": f"{i}"}
+        scene.add(C.PlaneContact(body, scene.ground, **place))
+    solution = ts.simulate(scene, (0, 0.9), law=law)
+    solution.save(tmp_path / "box.h5")
+    times = np.unique([t for t, *_ in solution.impulses])
+    assert len(times) > 3
+    for impulses in (solution.impulses, ts.load(tmp_path / "box.h5").impulses):
+        for t in times:
+            before, *_, after = np.flatnonzero(solution.t == t)
+            P, L = np.zeros(3), np.zeros(3)
+            for _, name, p in (each for each in impulses if each[0] == t):
+                own = p.tangential + np.array([0, 0, p])
+                assert np.linalg.norm(p.tangential) <= mu * p + 1e-7  # a contact that is lifted within rounding is held
+                P, L = P + own, L + np.cross(solution.rotation(body)[after] @ corners[int(name)], own)
+            change = 2.0 * np.diff(solution.velocity(body)[[before, after]], axis=0)[0]
+            np.testing.assert_allclose(P, change, atol=1e-13)
+            spin = solution.angular_velocity(body)[[before, after]] * np.diagonal(body.inertia)
+            np.testing.assert_allclose(solution.rotation(body)[after].T @ L, np.diff(spin, axis=0)[0], atol=1e-13)
+
+
+def test_the_impulse_of_friction_of_one_impact():
+    """Sphere with v = 3, p = m v_n = 4: it slides through mu p = 0.8, or rolls after 2/7 m v."""
+    for mu, expected in ((0.2, -0.8), (0.9, -6 / 7)):
+        scene = ball("sphere", (3, 0, -4), mu=mu)
+        _, impulses = ts.impact(scene, ts.State(0.0, *scene.start))
+        np.testing.assert_allclose(impulses["floor"], 4.0, rtol=1e-14)
+        np.testing.assert_allclose(impulses["floor"].tangential, [expected, 0, 0], rtol=1e-13, atol=1e-15)
+
+
 def test_a_ball_that_bounces_with_backspin_comes_back():
     """Without slip after the first impact: v = (5 v_0 + 2 R w_0) / 7."""
     solution = ts.simulate(ball("sphere", (1, 0, 0), (0, -9, 0), mu=0.6, e=0.7, height=1.5), (0, 6))
@@ -438,6 +483,29 @@ def test_a_store_and_a_file_hold_them(tmp_path):
         assert other.phases == plain.phases
 
 
+@pytest.mark.slow
+def test_a_ball_slides_then_rolls_by_an_implicit_method_in_the_null_space_form():
+    """Rows on velocities come in the second phase: it rolls at 5/7 of its first speed."""
+    solution = ts.simulate(ball("rolling", (3, 0, 0)), (0, 2), integrator="sdirk54", formulation="null-space")
+    assert solution.raise_if_failed().phases[-1][2] == ("floor",)
+    np.testing.assert_allclose(solution.velocity("ball")[-1], (15 / 7, 0, 0), rtol=0, atol=1e-6)
+
+
+def test_a_solution_in_another_process(tmp_path):
+    """Multipliers of a phase with friction, and of one with a stop: by memory of that process."""
+    scene = boxes(1, velocity=(1, 0, 0))
+    arm = scene.add_body(1.0, (1, 1, 1), position=(5, 0, 0))
+    hinge = scene.add(C.Revolute.at(scene.ground, arm, point=(4, 0, 0), axis=(0, 1, 0)))
+    scene.add(C.Stop(hinge, upper=0.3, restitution=0.5))
+    solution = ts.simulate(scene, (0, 0.5))
+    (tmp_path / "solution").write_bytes(pickle.dumps(solution))
+    code = "import pickle, sys; print(pickle.load(open(sys.argv[1], 'rb')).multipliers.tobytes().hex())"
+    command = [sys.executable, "-c", code, str(tmp_path / "solution")]
+    found = subprocess.run(command, cwd=ROOT, text=True, capture_output=True, timeout=300)
+    assert found.returncode == 0, found.stderr
+    np.testing.assert_array_equal(np.frombuffer(bytes.fromhex(found.stdout)), solution.multipliers.ravel())
+
+
 def test_bad_coefficients():
     scene = slope(0.3, 0.0)
     block, ground = scene.body("block"), scene.ground
@@ -481,3 +549,54 @@ def test_links_that_lie_on_a_floor_hold_each_other():
     assert np.isfinite(solution.multipliers).all()
     for name, load in (("first", G), ("second", G / 2)):
         np.testing.assert_allclose(solution.reaction(name)[0], np.tile([0, 0, load], (len(solution.t), 1)), atol=1e-9)
+
+
+BOXES = [
+    ((0.28, 0.11, 0.4, 0.26), (0.32, 0.53, 0.42), (-0.21, -1.36), 0.0),
+    ((0.21, 0.46, 0.29, 0.17), (0.25, 0.6, 0.23), (0.19, -0.13), 1.76),
+]
+
+
+def corners(size):
+    """Those that stand, body frame (4, 3)."""
+    a, b, h = np.array(size) / 2
+    return np.array([(a, b, -h), (-a, b, -h), (-a, -b, -h), (a, -b, -h)])
+
+
+def slid(mu, size, legs, v, spin, t):
+    """Centroid and angle (3,) of a box that slides on three of its corners, by its equations in x, y and the angle."""
+    m, (r, h) = 2.0, (corners(size)[legs], size[2] / 2)
+    J, mu = m * (size[0] ** 2 + size[1] ** 2) / 12, np.array(mu)[legs]
+
+    def rates(t, y):
+        c, s = np.cos(y[2]), np.sin(y[2])
+        arm = r[:, :2] @ [[c, s], [-s, c]]
+        u = y[3:5] + y[5] * np.column_stack([-arm[:, 1], arm[:, 0]])
+        f = -mu[:, None] * u / np.linalg.norm(u, axis=1)[:, None]  # for N = 1, at h below the centroid
+        N = np.linalg.solve([np.ones(3), arm[:, 1] + h * f[:, 1], -arm[:, 0] - h * f[:, 0]], [m * G, 0, 0])
+        return (*y[3:], *(N @ f / m), N @ (arm[:, 0] * f[:, 1] - arm[:, 1] * f[:, 0]) / J)
+
+    return solve_ivp(rates, (0, t), (0, 0, 0, *v, spin), "DOP853", rtol=1e-12, atol=1e-12).y[:3, -1]
+
+
+@pytest.mark.parametrize(("mu", "size", "v", "spin"), BOXES)
+def test_a_box_on_corners_of_different_friction_slides_and_turns(mu, size, v, spin):
+    """It slides on three corners, one of the distributions that the rigid box leaves open, until all of it rests."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    given = {**ts.shapes.box(size, mass=2.0), "position": (0, 0, size[2] / 2), "velocity": (*v, 0)}
+    body = scene.add_body(**given, angular_velocity=(0, 0, spin), name="box")
+    for i, corner in enumerate(corners(size)):
+        scene.add(C.PlaneContact(body, scene.ground, **FLOOR | {"point_a": corner}, kinetic=mu[i], name=str(i)))
+    solution = ts.simulate(scene, (0, 1.5), rtol=1e-10, atol=1e-10, dense_output=True).raise_if_failed()
+    assert np.abs(solution.qd[-1]).max() == 0.0
+    loads = np.stack([solution.reaction(str(i))[0] for i in range(4)], axis=1)
+    assert loads[:, :, 2].min() > -1e-9
+    slides = ~np.stack([solution.sticking(str(i)) for i in range(4)], axis=1)
+    np.testing.assert_allclose(
+        np.hypot(*np.moveaxis(loads[:, :, :2], 2, 0))[slides], (loads[:, :, 2] * mu)[slides], atol=1e-9
+    )
+    legs = np.flatnonzero(loads[0, :, 2] > 1e-9)
+    state = solution.at(0.1)
+    R = state.rotation("box")
+    found = *state.position("box")[:2], np.arctan2(R[1, 0], R[0, 0])
+    np.testing.assert_allclose(found, slid(mu, size, legs, v, spin, 0.1), atol=1e-8)

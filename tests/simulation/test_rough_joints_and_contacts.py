@@ -42,9 +42,10 @@ def test_a_wheel_with_a_rough_axle_rolls_to_rest(given):
     solution = ts.simulate(cart(), (0, 12), rtol=1e-13, atol=1e-13, **given)
     end = 2.0 / slowing()
     assert [names for _, _, names in solution.phases] == [
-        ("floor", "floor sticks"),
-        ("floor", "floor sticks", "bearing"),
+        ("floor",),
+        ("floor", "bearing"),
     ]
+    assert solution.sticking("floor").all()
     assert abs(solution.phases[1][0] - end) < HELD * end
     assert abs(solution.position("load")[-1, 0] - end) < HELD * 10
     force = solution.reaction("floor")[0]
@@ -81,7 +82,7 @@ def block(slope, mu, hinge, angle, rate=0.0):
 def test_what_sticks_does_not_move_by_a_bit():
     scene = block(0.3, 0.5, 40.0, np.pi / 2)
     solution = ts.simulate(scene, (0, 100))
-    assert solution.phases == [(0.0, 100.0, ("floor", "floor sticks", "rough"))]
+    assert solution.phases == [(0.0, 100.0, ("floor", "rough"))]
     assert np.ptp(solution.q, axis=0).max() == 0.0
     np.testing.assert_allclose(
         solution.reaction("floor")[0][-1], [-5 * G * np.sin(0.3), 0, 5 * G * np.cos(0.3)], rtol=HELD
@@ -148,7 +149,7 @@ def stick_and_slip():
 
 def test_energy_and_bounds_along_sticking_and_sliding():
     solution = ts.simulate(stick_and_slip(), (0, 3), rtol=1e-11, atol=1e-11, dense_output=True)
-    assert [len(names) for _, _, names in solution.phases] == [2, 1, 2, 1, 2]
+    assert len(solution.phases) == 5
     np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=CLOSE)
     errors = solution.constraint_error
     assert max(errors.position.max(), errors.velocity.max()) < ALGEBRA

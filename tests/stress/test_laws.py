@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import tsdyn as ts
 from tsdyn.stress import judgement, laws
@@ -100,6 +101,21 @@ def test_a_sound_run_with_contacts_keeps_all_laws():
         "penetration", "reactions that pull", "reactions of open contacts", "momenta at an impact",
     }  # fmt: skip
     assert not broken(solution)
+
+
+def test_impulses_of_friction_are_judged():
+    """Those of a run are sound; where one is off, it is found."""
+    scene = ts.Scene()
+    box = scene.add_body(**ts.shapes.box((0.4, 0.3, 0.2), mass=2.0), position=(0, 0, 0.5), velocity=(1, 0.5, 0))
+    box.orientation = Rotation.from_euler("xyz", (0.3, 0.2, 0.1))
+    for i, x in enumerate((-0.2, 0.2)):
+        law = {"normal_b": (0, 0, 1), "unilateral": True, "restitution": 0.3, "kinetic": 0.2}
+        scene.add(C.PlaneContact(box, scene.ground, point_a=(x, -0.15, -0.1), **law, name=f"{i}"))
+    solution = ts.simulate(scene, (0.0, 0.4), dense_output=True).raise_if_failed()
+    assert "momenta at an impact" not in broken(solution)
+    t, name, p = solution.impulses[0]
+    solution._phases.impulses[0] = t, name, type(p)(p, 0.9 * p.tangential)
+    assert "momenta at an impact" in broken(solution)
 
 
 def test_faults_of_contacts_are_found():

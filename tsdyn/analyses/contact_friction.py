@@ -29,7 +29,7 @@ def rows_of(inertia, which):
 class Struck(NamedTuple):
     """What an impact with friction does."""
 
-    p: np.ndarray  # (k,) normal impulses
+    p: np.ndarray  # (k, 3) impulses, normal and along both slips
     change: np.ndarray  # (n,) of velocities
     share: float  # of the coefficients of restitution that act
 
@@ -62,7 +62,7 @@ def strike(inertia, which, qd, rates, restitution, law="newton"):
             released[normal] = e * compressed[normal]
             p = compressed + released + solved(released[normal], before + G @ (compressed + released))
         if energy_gain(G, before, p) <= LEVEL * (np.abs(before) @ np.abs(p)) or share == 0.0:
-            return Struck(p[normal], response @ p, share)
+            return Struck(p.reshape(-1, 3), response @ p, share)
         share = share / 2.0 if share > LEVEL else 0.0
 
 
@@ -122,6 +122,18 @@ def settle_grips(inertia, resting, qd, fired=()):
     NoSolution
         Where no reactions keep the contacts from penetrating, or several do: with much friction (Painleve).
     """
+    found = _settled(inertia, resting, qd, fired)
+    if not found.idle:
+        return found
+    # Idle contacts carry nothing in the phase: what the others do follows from their own normal loads
+    again = _settled(inertia, found.closed, qd, fired)
+    if again.closed != found.closed or again.idle:
+        return found
+    return again._replace(idle=found.idle, grips={**found.grips, **again.grips})
+
+
+def _settled(inertia, resting, qd, fired):
+    """As `settle_grips`, with the normal loads shared among all contacts."""
     gaps, resting = inertia.gaps, list(resting)
     cones = Cones(inertia, resting, qd)
     response = inertia.free(cones.rows.T)

@@ -167,11 +167,24 @@ class Gaps:
         return d @ self._along(i, tangents)
 
     def _along(self, i, tangents):
-        """Directions (..., 2, 3) of the slips of a gap: the rows at the point of one of the bodies."""
+        """Directions (..., 2, 3) of the slips of a gap."""
+        at, sign = self._place(i)
+        return sign * tangents[..., at : at + 3]
+
+    def _place(self, i):
+        """Where the directions of slips are in their rows, at the point of one of the bodies; their sign there."""
         part = self.list[i].side.row
         body, sign = (part.a, 1.0) if part.a.dimension else (part.b, -1.0)
-        at = self.packed.system.bodies[index_of(self.packed, body), 0]
-        return sign * tangents[..., at : at + 3]
+        return self.packed.system.bodies[index_of(self.packed, body), 0], sign
+
+    def slips(self, t, levels, which, ways):
+        """Components (k, c) of the slips of gaps along directions (c, 3), ground frame, and their sizes (k, c).
+
+        levels (k, ...) begin with q and qd (n,).
+        """
+        at, sign = zip(*map(self._place, which), strict=True)
+        ways = np.array(sign)[:, None] * ways
+        return self.workspace.slips(t, levels, self._slips[which].ravel(), np.array(at), ways)
 
     def at(self, q, angles, t=0.0):
         """Gaps (count,) at one state."""

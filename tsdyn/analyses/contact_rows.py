@@ -7,16 +7,19 @@ H W H^T lam = H W f,  a = W (f - H^T lam)       H: bilateral rows               
 from __future__ import annotations
 
 import math
+import threading
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ..elements.loops.constraint_rows import move_bodies, place_bodies, take_loads, write_accelerations
 from ..errors import SingularConfiguration
-from ..formulations.accelerations import refine_accelerations, solve_accelerations
+from ..formulations.accelerations import accelerate_with_friction, refine_accelerations, solve_accelerations
 from ..jit.kernels import entry, kernel, loader, resident
 from ..maths.dense_linalg import copy
 from ..maths.root_isolation import SURVEYING
+from ..maths.tolerances import LAST_PLACE
 from ..maths.vectors import add, spin, subtract
 from ..model.equations import (
     WIDTH,
@@ -32,6 +35,7 @@ from ..model.equations import (
 )
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, no_system
+from ..observables.evaluate import NO_INERTIA
 from ..rows.constraint_graph import BIAS, REDUCED, graph_of
 from ..rows.interface import (
     DYNAMICS,
@@ -39,6 +43,8 @@ from ..rows.interface import (
     evaluate_bias,
     evaluate_rows,
     factorise_rows,
+    mark_redundant,
+    reset_selection,
     weigh_bodies,
 )
 from ..workspaces import Parts, load_parts, no_parts, parts
@@ -214,51 +220,118 @@ def gain(context, q, before, after, h):
     return 0.5 * total
 
 
-@entry("pvmvm")
-def find_multipliers(context, t, levels, memory, out):
-    """out (k, m): multipliers at times t (k,) and states on the manifold, levels (k, 3 n), by the equations of motion.
-
-    Zero of dropped rows, NaN where there are none.
-    """
-    c = load_parts(context)
+@kernel
+def _evaluate(c, t, levels):
+    """Rows and factors at t and a state, levels (3 n,); False if there are no factors."""
     graph, s, w, f = c.graph, c.system, c.work, c.tangent
     n = w.q.size
-    recall(s, memory)
+    copy(levels[:n], w.q)
+    copy(levels[n : 2 * n], w.qd)
+    set_time(s, t)
+    place_bodies(graph.bodies, w.q, f.poses)
+    move_bodies(graph.bodies, w.q, w.qd, f.poses)
+    evaluate_rows(graph, s, f, f.rows, t)
+    return factorise_rows(graph, s, f, f.rows, t, DYNAMICS)
+
+
+@entry("pvmvdm")
+def find_multipliers(context, t, levels, memory, redundant, out):
+    """out (k, m): multipliers at times t (k,) and states on the manifold, levels (k, 3 n), by the equations of motion.
+
+    redundant: what is written at redundant rows. NaN where there are none.
+    """
+    c = load_parts(context)
+    recall(c.system, memory)
     for k in range(t.size):
-        copy(levels[k, :n], w.q)
-        copy(levels[k, n : 2 * n], w.qd)
-        set_time(s, t[k])
-        place_bodies(graph.bodies, w.q, f.poses)
-        move_bodies(graph.bodies, w.q, w.qd, f.poses)
-        evaluate_rows(graph, s, f, f.rows, t[k])
-        regular = factorise_rows(graph, s, f, f.rows, t[k], DYNAMICS)
-        solve_accelerations(graph, s, w, f, t[k])
-        for e in range(f.b.size):
-            if graph.row[e] >= 0:
-                out[k, graph.row[e]] = f.b[e] if regular else math.nan
+        regular = _evaluate(c, t[k], levels[k])
+        solve_accelerations(c.graph, c.system, c.work, c.tangent, t[k])
+        for e in range(c.tangent.b.size):
+            if c.graph.row[e] >= 0:
+                out[k, c.graph.row[e]] = c.tangent.b[e] if regular else math.nan
+        mark_redundant(c.graph, c.tangent, redundant, out[k])
 
 
-KERNELS = find_gaps, measure_opened, find_rows, respond, accelerate, bounce, gain, find_multipliers, *SURVEYING
+@entry("pvmvdmm")
+def find_reactions(context, t, levels, memory, redundant, out, loads):
+    """The same with friction in proportion to reactions, and its normal loads (k, frictions)."""
+    c = load_parts(context)
+    recall(c.system, memory)
+    r = c.tangent.friction
+    for e in range(r.lam.size):  # as in a run that goes on from a checkpoint
+        r.lam[e] = 0.0
+    for k in range(t.size):
+        found = _evaluate(c, t[k], levels[k])
+        found = found and accelerate_with_friction(c.graph, c.system, c.work, c.tangent, t[k], LAST_PLACE)
+        for e in range(r.lam.size):
+            if c.graph.row[e] >= 0:
+                out[k, c.graph.row[e]] = r.lam[e] if found else math.nan
+        mark_redundant(c.graph, c.tangent, redundant, out[k])
+        for i in range(loads.shape[1]):
+            loads[k, i] = r.load[7 * i] if found else math.nan
 
 
-NO_INERTIA = "a direction that the constraints leave free carries no inertia."
+@entry("pvmwwmmmvm")
+def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # ten: all of the slips
+    """out (k, 2 c): components of slips along ways d (c, 3), ground frame, and their sizes.
+
+    J (2 c, n): scratch for the rows of slips, of which `place` is as of `find_rows`; at (c,): where the coordinates of
+    the body at whose point the first three of a row are directions of the ground frame begin.
+    """
+    s, n, c = load_contacts(context).rows, J.shape[1], at.size
+    for k in range(t.size):
+        J[:, :] = 0.0
+        _find_rows(s, t[k], levels[k, :n], place, short, J, drift)
+        for i in range(c):
+            along, square = 0.0, 0.0
+            for r in range(2 * i, 2 * i + 2):
+                v, d = 0.0, 0.0
+                for j in range(n):
+                    v += J[r, j] * levels[k, n + j]
+                for j in range(3):
+                    d += J[r, at[i] + j] * ways[i, j]
+                along += v * d
+                square += v * v
+            out[k, i], out[k, c + i] = along, math.sqrt(square)
+
+
+KERNELS = (
+    find_gaps, measure_opened, find_rows, find_slips, respond, accelerate, bounce, gain, find_multipliers, *SURVEYING,
+)  # fmt: skip
 
 
 class ReactionWorkspace:
-    """Multipliers of a packed scene without friction that depends on reactions; one evaluation at a time."""
+    """Multipliers of a packed scene, by its equations of motion; one evaluation at a time.
 
-    def __init__(self, packed):
-        system = with_short_rows(packed)
-        self.n, self.m = int(system.bodies[:, 1].sum()), len(packed.system.segments)
-        whole = parts(system._replace(reals=system.reals.copy()), graph_of(packed, REDUCED, BIAS), self.n)
+    redundant: what stands at redundant rows.
+    """
+
+    def __init__(self, packed, redundant=0.0):
+        system, self.redundant, self.graph = with_short_rows(packed), redundant, graph_of(packed, REDUCED, BIAS)
+        self.n, self.m, self.count = int(system.bodies[:, 1].sum()), len(packed.system.segments), system.normals.size
+        whole = parts(system._replace(reals=system.reals.copy()), self.graph, self.n)
         self.address, *self._keep = resident(whole)
-        self._find = interrupts_answered()(find_multipliers) if calls_laws(packed) else find_multipliers
+        self.begin = partial(reset_selection, self.graph, whole.tangent)  # as if it were new
+        find = find_reactions if self.count else find_multipliers
+        self._find = interrupts_answered()(find) if calls_laws(packed) else find
 
     def multipliers(self, t, levels, memory):
-        """Multipliers (k, m) at times t (k,), levels (k, 3, n); of normalisations zero."""
-        out = np.zeros((t.size, self.m))
-        self._find(self.address, t, levels.reshape(t.size, 3 * self.n), memory, out)
-        return out
+        """Multipliers (k, m) at times t (k,), levels (k, 3, n), of normalisations zero; normal loads (k, frictions)."""
+        out, loads = np.zeros((t.size, self.m)), np.zeros((t.size, self.count))
+        given = self.address, t, levels.reshape(t.size, 3 * self.n), memory, self.redundant, out
+        self._find(*given, *[loads] * (self.count > 0))
+        return out, loads
+
+
+def reaction_workspace(packed, redundant=0.0):
+    """The `ReactionWorkspace` of a packed scene in this thread, for a phase that begins.
+
+    A start may have shown that rows are redundant.
+    """
+    known, key = packed.derived.reactions, (threading.get_ident(), redundant == 0.0)
+    if key not in known or known[key].graph is not graph_of(packed, REDUCED, BIAS):
+        known[key] = ReactionWorkspace(packed, redundant)
+    known[key].begin()
+    return known[key]
 
 
 class ContactWorkspace:
@@ -289,6 +362,7 @@ class ContactWorkspace:
             system = with_short_rows(self._free)
             free = parts(system._replace(reals=system.reals.copy()), graph, self.n)
             self._graph, (self.address, *self._keep) = graph, resident(ContactParts(free, self._rows))
+            self.begin = partial(reset_selection, graph, free.tangent)  # as if it were new
 
     def gaps(self, t, q, sign):
         """Phi (k, m), of the first rows times their sign, at times t (k,), positions q (k, n); rows of q may go on."""
@@ -305,6 +379,17 @@ class ContactWorkspace:
         J, drift = np.zeros((self.m if which is None else len(which), self.n)), np.zeros(self.m)
         find_rows(self.address, t, q, place, self._short, J, drift)
         return J, drift
+
+    def slips(self, t, levels, which, at, ways):
+        """Components (k, c) of slips along directions (c, 3), and their sizes (k, c), as of the kernel.
+
+        which (2 c,): rows of the slips; levels (k, ...) begin with q and qd (n,).
+        """
+        place, J, drift = np.full(self.m, -1), np.zeros((which.size, self.n)), np.zeros(self.m)
+        place[which], out = np.arange(which.size), np.empty((t.size, which.size))
+        rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
+        find_slips(self.address, t, rows, place, at, ways, self._short, J, drift, out)
+        return np.hsplit(out, 2)
 
     def respond(self, t, q, memory, loads):
         """Accelerations (k, n) by loads (k, n), which must be contiguous."""

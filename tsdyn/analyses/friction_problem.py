@@ -5,7 +5,8 @@
 
 The normal loads N follow from reactions and these from the friction (`observables.evaluate.balance`). Of those that are
 at rest, which stick is found by pivoting: those beyond their bounds slide against what held them, those that would
-slide backwards stick.
+slide backwards stick. Reactions of contacts at rest are found with each choice, as a problem with cones
+(contact_friction.py); what contacts hold by themselves needs no friction.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from ..maths.complementarity import OPEN, STICKS
 from ..maths.dense_linalg import range_and_null_space
 from ..maths.tolerances import EPS, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
-from ..observables.evaluate import ITERATIONS, constraint_arrays, mass_matrix
+from ..observables.evaluate import ITERATIONS, NO_INERTIA, constraint_arrays, mass_matrix
 from ..observables.generalised_forces import applied_loads, velocity_forces
 from .friction_units import NormalLoads
 from .slip_velocities import ACROSS, ALONG, WHOLE, slip_velocities
@@ -103,16 +104,23 @@ class Hold(NamedTuple):
 class Frictions:
     """The frictions of a scene that follow the exact law.
 
+    Parameters
+    ----------
+    scene : Scene
+    acting : sequence of packed.Load, optional
+        Of its phases, with numbers of normal loads; without those of inactive forces. By default those of the scene.
+
     Attributes
     ----------
     units : list of FrictionUnit
     names : list of str
     """
 
-    def __init__(self, scene):
+    def __init__(self, scene, acting=None):
         self.packed, self.units = scene.packed, []
+        known = {id(load.force): load for load in (self.packed.loads if acting is None else acting)}
         for force, load in zip(scene._forces, self.packed.loads, strict=True):
-            slot = load.slot + force.memory
+            load, slot = known.get(id(force), load._replace(normal=-1)), load.slot + force.memory
             for slide in getattr(force, "slides", ()):
                 self.units.append(FrictionUnit(load, force, slide, slot))
                 slot += slide.count
@@ -315,7 +323,7 @@ class RestProblem:
     ----------
     place : FrictionFrames
     packed : Packed
-        Of a phase with the rows of these units.
+        Of a phase with the rows of these units; other units may have rows, which don't hold.
     rows : dict of int to ndarray
         Unit -> its rows of Phi.
     bases : dict of int to ndarray (r, 3)
@@ -334,13 +342,13 @@ class RestProblem:
         _, Phi_q, _, gamma = constraint_arrays(system, q, qd, t)
         M = mass_matrix(system, q)
         mine = np.concatenate([*rows.values(), np.zeros(0, int)])
-        others = np.setdiff1d(np.arange(len(gamma)), mine)
+        others = np.setdiff1d(np.arange(len(gamma)), np.concatenate([*packed.derived.holds.values(), mine]))
         own, Z, R, order = range_and_null_space(Phi_q[others])
         rank, order = len(order), others[order]
         try:
             factor = cho_factor(Z.T @ M @ Z) if Z.size else None
         except np.linalg.LinAlgError as error:
-            raise SingularConfiguration("a direction that the constraints leave free carries no inertia.") from error
+            raise SingularConfiguration(NO_INERTIA) from error
         fixed = own @ solve_triangular(R, -gamma[order], trans="T") if rank else np.zeros(q.size)
         known = applied_loads(system, np.array([t]), q[None], qd[None], memory[None])[0]
         self.r, self.mass = system.bodies[:, :1] + np.arange(3), system.mass
@@ -577,6 +585,15 @@ class RestProblem:
             rate = a[at] @ self.bases[i] @ way - part * np.linalg.norm(a[at])
             found[i] = float(rate) if rate > small[at].max() else 0.0
         return found
+
+    def stopped(self, units, qd):
+        """Velocities (n,) with the slips ended of units that stick, by the least change of kinetic energy."""
+        rows = self._held(units)
+        left = self.J[rows] @ qd
+        if not left.any():
+            return qd
+        rows, left = np.append(rows, self.pressed), np.append(left, np.zeros(len(self.pressed)))
+        return qd - self.qdd[:, 1 + rows] @ np.linalg.lstsq(self.G[np.ix_(rows, rows)], left, rcond=RANK_TOL**2)[0]
 
     def _held(self, units):
         """The rows of some units."""

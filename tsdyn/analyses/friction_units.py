@@ -13,6 +13,7 @@ from ..observables.generalised_forces import sum_forces
 from ..observables.reactions import solve_multipliers, solve_normal_loads
 from ..rows.constraint_graph import REDUCED, graph_of
 from ..workspaces import load_parts, parts
+from .contact_rows import find_reactions
 from .slip_velocities import slip_velocities
 
 
@@ -39,6 +40,7 @@ def find_loads(context, q, reactions, out):
 
 KERNELS = (
     find_units, find_loads, slip_velocities, sum_forces, evaluate_constraints, solve_normal_loads, solve_multipliers,
+    find_reactions,
 )  # fmt: skip
 
 

@@ -112,8 +112,9 @@ def _command(commands, run):
 def _compile(parsed):
     """Compile kernels ahead of the first run, on all processors.
 
-    Fill the cache on disk with the kernels of the default method and of every built-in constraint and force, or with
-    all of them. What is there already is left alone. The exit code is 1 where a kernel can't be compiled or stored.
+    Fill the cache on disk with the kernels of the default method and of every built-in constraint and force, those of
+    impacts and of exact friction among them, or with all there are. What is there already is left alone. The exit code
+    is 1 where a kernel can't be compiled or stored.
     """
     from ..ahead import compile_kernels
 

@@ -99,7 +99,8 @@ def set_joint(  # by name: a value and a rate of each coordinate
     -----
     Coordinates that aren't given keep their values. In a tree, the bodies beyond the joint move as one rigid body: no
     other joint changes. In a closed loop the joint is driven to its value in small steps, on the present branch; other
-    freedoms take the nearest values in the metric of kinetic energy.
+    freedoms take the nearest values in the metric of kinetic energy. Closed contacts hold where the values allow it;
+    else all are left out, and a run names those that penetrate.
 
     Examples
     --------

@@ -22,8 +22,6 @@ from .types import Mistakes, Unwritable, encode
 
 # Lines and columns in a TOML text: where each value stands.
 
-# TOML of plain data, to the last bit; lines and columns of values in a TOML text.
-
 _SPACE = re.compile(r"[ \t]*")
 _BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")

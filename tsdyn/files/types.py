@@ -443,8 +443,6 @@ _DECODERS = {
 
 # Mistakes in a file, gathered and reported at once, each with its line, the value and what to write instead.
 
-# What the reading of a document has in common: decoded values, names, and mistakes at their places.
-
 SHOWN = 50
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60

@@ -13,7 +13,7 @@ from ..maths.dense_linalg import (
     multiply,
     null_space,
 )
-from ..maths.tolerances import ROUNDING_AT_MOST, SUM_ROUNDING, TINY
+from ..maths.tolerances import LAST_PLACE, ROUNDING_AT_MOST, SUM_ROUNDING, TINY
 from ..model.equations import acceleration_bias, constraint_jacobian, constraints, time_derivative
 from ..rows.interface import list_redundant
 from .charts import set_base_point
@@ -193,8 +193,9 @@ def solve_positions(system, w, t, v):
                 return NOT_FINITE
             worst = max(worst, size)
         # Slow contraction: B is of a configuration too far away. If a new B did not help, the residual is rounding
-        if worst > tol and worst > SLOW * before:
-            if stuck and worst <= ROUNDING_AT_MOST * floor:
+        rounding = STALLED * before < worst <= ROUNDING_AT_MOST * floor
+        if (worst > tol and worst > SLOW * before) or (worst > STALLED * before and not rounding):
+            if stuck and worst <= max(ROUNDING_AT_MOST * floor, LAST_PLACE * _cancelled(w)):
                 tol, floor = worst, worst  # a fresh B did not help: this is rounding
             elif not factorise_dense_rows(system, w, t):  # B was out of date
                 return SINGULAR
@@ -209,12 +210,23 @@ def solve_positions(system, w, t, v):
         # The last correction leaves worst * rate
         if before < math.inf:
             w.control.rate = worst / before
-        rounding = STALLED * before < worst <= ROUNDING_AT_MOST * floor
         if worst <= floor or (worst <= tol and (rounding or worst * w.control.rate <= left)):
             subtract_normal(w, w.z, w.q)  # q itself, not all of the sum again: a digit less is lost
             return OK
         before = worst
     return NEWTON_FAILED
+
+
+@kernel
+def _cancelled(w):
+    """The largest |U| |u|, m: terms that cancel, and whose rounding Phi has; 1e4 m where masses are unequal by 1e6."""
+    largest = 0.0
+    for i in range(w.q.size):
+        x = 0.0
+        for j in range(w.u.size):
+            x += abs(w.U[i, j] * w.u[j])
+        largest = max(largest, x)
+    return largest
 
 
 @kernel

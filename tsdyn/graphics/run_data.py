@@ -138,11 +138,11 @@ def _nearest(frames, each):
     return centre + each.item.radius_a * towards
 
 
-# States of contacts. Of one that opens: whether it is closed, or has just been hit. Of a plane that holds its point on
-# both sides: whether it pushes, or holds back, where one that opens would do so.
+# States of contacts. Of one that opens: whether it is closed, sticks by its friction, or has just been hit. Of a plane
+# that holds its point on both sides: whether it pushes, or holds back, where one that opens would do so.
 
-OPEN, HOLDS_BACK, PUSHES, HIT = range(4)
-TONES = "#3f464e", "#d33a2c", "#2f9e44", "#f2b705"
+OPEN, HOLDS_BACK, PUSHES, HIT, STICKS = range(5)
+TONES = "#3f464e", "#d33a2c", "#2f9e44", "#f2b705", "#1c7ed6"
 NO_CONTACT = 1e-6  # of the largest force of the contact: below it there is none
 FLASH = 0.02  # of the animation, how long a hit is shown
 NAMED = 4  # closed contacts that are named
@@ -152,7 +152,7 @@ def contact_states(frames: AnimationFrames, constraints: list[Attached]) -> list
     """The states (k,) of each contact at the frames."""
     closed = _closed(frames)
     return [
-        _of_phases(frames, item.name, closed) if getattr(item, "unilateral", False) else _of_plane(frames, item)
+        _of_phases(frames, item, closed) if getattr(item, "unilateral", False) else _of_plane(frames, item)
         for item in (each.item for each in constraints if each.contact is not None)
     ]
 
@@ -171,9 +171,11 @@ def _closed(frames):
     return [phases[max(i, 0)][2] for i in number]
 
 
-def _of_phases(frames, name, closed):
-    states = np.where([name in names for names in closed], PUSHES, OPEN)
-    hits = np.array([-np.inf, *(t for t, hit, _ in frames.run.impulses if hit == name)])
+def _of_phases(frames, item, closed):
+    run, states = frames.run, np.where([item.name in names for names in closed], PUSHES, OPEN)
+    if item.rubs:
+        states[run.sticking(item)[np.searchsorted(run.t, frames.times, side="right") - 1]] = STICKS
+    hits = np.array([-np.inf, *(t for t, hit, _ in run.impulses if hit == item.name)])
     last = hits[np.searchsorted(hits, frames.times, side="right") - 1]
     states[frames.times - last <= FLASH * np.ptp(frames.times)] = HIT
     return states

@@ -198,8 +198,8 @@ def unused(scene, name):
     return fresh(name, scene._titles or ())
 
 
-def add_joint_forces(scene, joint, bodies, report):
-    """Add what acts along a joint; what has no counterpart is listed."""
+def add_joint_forces(scene, joint, bodies, report, added):
+    """Add what acts along a joint, its constraint being `added`; what has no counterpart is listed."""
     if joint.slides:
         _slides(scene, joint, bodies[joint.a], bodies[joint.b], report)
     _add(scene, joint, bodies, report, SUFFIX)
@@ -209,7 +209,7 @@ def add_joint_forces(scene, joint, bodies, report):
         report.leave("negative armature", joint.name, f"{joint.armature:g}")
     elif joint.armature and joint.kind in ONE_AXIS:
         name = unused(scene, joint.name + " armature")
-        scene.add(Armature(scene[joint.name], inertia=joint.armature, name=name))
+        scene.add(Armature(added, inertia=joint.armature, name=name))
 
 
 def _add(scene, joint, bodies, report, suffix):
@@ -292,12 +292,13 @@ def build(description, make, report, limits=False):
         bodies[name] = _add_body(scene, link, report)
     made = {}
     for joint in description.joints:
+        added = None
         if joint.kind != "free":
-            name = joint.name
             _add_joint(scene, joint, bodies)
+            added = scene._added[-1]
             if not (joint.loop and joint.frame_a is not None):
-                made[name] = scene._added[-1], joint.kind
-        add_joint_forces(scene, joint, bodies, report)
+                made[joint.name] = added, joint.kind
+        add_joint_forces(scene, joint, bodies, report, added)
     for tendon in description.tendons:
         if limits or tendon.kind != "limit":
             _add_tendon(scene, tendon, bodies, report)

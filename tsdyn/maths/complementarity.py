@@ -120,6 +120,8 @@ class _Rows:
         return True
 
 
+# Coulomb's cone: 0 <= N, 0 <= u_n, N u_n = 0, |T| <= mu N, and T against u_t where that slips.
+#
 # u = G p + b, p = (N, T) of each contact, T in two directions. Contacts with slip of a known direction d have
 # T = -mu N d. With y = p - r u, r > 0, all in units in which the diagonal of G is about one, p solves the problem where
 #
@@ -129,8 +131,6 @@ class _Rows:
 # Newton's method on Eqs. (1), (2) (Alart and Curnier, 1991) ends in a solution to rounding, or stalls: then sweeps of
 # Eqs. (1), (2) over the contacts in turn, whose fixed points are the solutions, make a better start, or another r
 # another path. A result counts only by its residual.
-
-# Complementarity with Coulomb's cone: 0 <= N, 0 <= u_n, N u_n = 0, |T| <= mu N, and T against u_t where that slips.
 
 OPEN, STICKS, SLIDES = 0, 1, 2
 

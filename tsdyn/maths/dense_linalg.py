@@ -312,9 +312,6 @@ def multiply(A, B, out):
 # Rank of dense rows by singular values; selection of independent rows by pivoted QR.
 
 
-# Rank of dense rows by singular values, independent rows by pivoted QR; sparse factors by SuperLU.
-
-
 def row_lengths(A):
     """Return the lengths of the rows of A, dense or sparse; rounding counts as zero."""
     squares = (A * A).sum(axis=1) if isinstance(A, np.ndarray) else A.multiply(A).sum(axis=1)

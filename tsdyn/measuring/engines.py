@@ -66,7 +66,12 @@ class Engine:
             for item in scene.constraints
             if any(not isinstance(value, (int, float)) for part in item.parts for value in part.parameters())
         ]
-        found = [*cls.refused(scene), *timed]
+        changing = [
+            (item, "it opens and closes" if getattr(item, "unilateral", False) else "it is switched off")
+            for item in (*scene.constraints, *scene.forces)
+            if getattr(item, "unilateral", False) or not item.active
+        ]
+        found = [*cls.refused(scene), *timed, *changing]
         if found:
             lines = "\n".join(f"  {item.name}: {reason}" for item, reason in found[:10])
             more = f"\n  and {len(found) - 10} more" if len(found) > 10 else ""

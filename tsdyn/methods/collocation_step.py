@@ -25,7 +25,7 @@ from .collocation import parts_of
 from .diagonally_implicit import call_linearise, call_reduce, call_residual
 from .explicit import STEP, call_norm, combine
 
-STAGE_FAILED = int(Status.STAGE_FAILED)
+STAGE_FAILED, JAMMED = int(Status.STAGE_FAILED), int(Status.JAMMED)
 # start, step and chart of the last attempt; the step before, 0 if unknown; points of predictions; step of the matrices,
 # 0 if there are none; 1 where stiffness is to be renewed; how many
 T_LAST, H_LAST, CHART_LAST, H_BEFORE, POINTS, MADE_FOR, RENEW, OWN = range(8)
@@ -188,8 +188,10 @@ def _sweep(context, c, r, own, t, h, level):  # seven: as _renew_matrices
             return status
         w.counters.stage_iterations += 1
         # The middle stage stands for the step
-        if level >= 0 and i == stages // 2 and _renew_matrices(context, c, r, own, ti, h, level) != 0:
-            return STAGE_FAILED
+        if level >= 0 and i == stages // 2:
+            status = _renew_matrices(context, c, r, own, ti, h, level)
+            if status != 0:
+                return status if status == JAMMED else STAGE_FAILED
         # Right-hand side of Newton's equations
         status = call_balance(linear.kernels.balance_stage, context, i, k)
         if status != 0:

@@ -134,7 +134,7 @@ def choose_points(tableau, memory, own, ratio, size, part, scratch):  # seven: a
 # The memory of a step, n = nx + ny floats each:  known part of (x_i, y_i);  (x', y') = (vd, k) of each stage;  then
 # scratch, below, and what predictions of stages keep.
 
-STAGE_FAILED = int(Status.STAGE_FAILED)
+STAGE_FAILED, JAMMED = int(Status.STAGE_FAILED), int(Status.JAMMED)
 SCRATCH = 5  # vectors of it, and a number
 # (x', y') at the iterate, then what a correction changes of y_i; what it changes of x_i; x_i, and y_i unless it is x';
 # (x', y') at the step before in this chart; the predicted ones of the stage; h before
@@ -287,7 +287,7 @@ def _restart(one):
 
 @kernel
 def _renew_if_needed(context, c, t, g, f):
-    """Renew the iteration matrix if it is of another g or chart, or contracts poorly; False if it is singular."""
+    """Renew the iteration matrix if it is of another g or chart, or contracts poorly. Status."""
     numbers, one = c.linear.numbers, c.linear.iteration
     sparse, slips, eager = numbers.every_chart == 1, numbers.slips == 1, one.eager == 1
     one.eager = 0
@@ -295,7 +295,7 @@ def _renew_if_needed(context, c, t, g, f):
     poor = one.measured == 1 and one.theta > max(one.limit, numbers.slow)
     stale = eager or off_chart or abs(g - numbers.g) > limits.SAME_STEP * g
     if not (stale or poor):
-        return True
+        return 0
     if not stale:
         # The first poor contraction: the stages to come begin with matrices of their own
         if one.poor == 0 and one.renewed == 0:
@@ -305,13 +305,14 @@ def _renew_if_needed(context, c, t, g, f):
     # The last matrix of a stage has new stiffness and damping
     here = eager or poor or not sparse or numbers.g == 0.0 or numbers.known == 0
     one.renewed = 1
-    if _renew_matrix(context, c, t, g, f, slips or one.poor == limits.MATRICES, here) != 0:
-        return False
+    status = _renew_matrix(context, c, t, g, f, slips or one.poor == limits.MATRICES, here)
+    if status != 0:
+        return status if status == JAMMED else STAGE_FAILED
     if not slips:  # where friction changes within a correction, Newton's own contraction counts
         _restart(one)
     if eager or poor or off_chart:
         one.trusted = 0
-    return True
+    return 0
 
 
 @kernel
@@ -366,8 +367,9 @@ def _solve_stage(context, c, r, i, t, g):
             return status
         w.counters.stage_iterations += 1
         # k += P^-1 A (f - k)
-        if not _renew_if_needed(context, c, t, g, rates[nx:]):
-            return STAGE_FAILED
+        status = _renew_if_needed(context, c, t, g, rates[nx:])
+        if status != 0:
+            return status
         size = _correct(context, c, second, g, stage, rates, moved)
         if not size < math.inf or not _measure(c, size):
             return STAGE_FAILED

@@ -105,6 +105,7 @@ class Derived:
     holds: dict = field(default_factory=dict)  # of a phase, phase_scenes.phase_of: slot of a friction -> rows that hold
     places: dict = field(default_factory=dict)  # it; and id of such a row -> slots, and where its numbers are
     row_parts: list = field(default_factory=list)  # idle: observables.row_parts.taken
+    reactions: dict = field(default_factory=dict)  # of each thread: contact_rows.reaction_workspace
     with_singular_places: list = None  # indices of primitives: contacts.singular_place
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts

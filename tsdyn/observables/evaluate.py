@@ -108,6 +108,7 @@ NOT_UNIQUE = (
     "multipliers and accelerations are not unique here: Phi_q has dependent rows, or a direction that the constraints "
     "leave free carries no inertia."
 )
+NO_INERTIA = "a direction that the constraints leave free carries no inertia: give its bodies mass and inertia."
 ROUNDS, MOST_AT_ONCE = 8, 64  # of restoring rows dropped wrongly; random loads that identify them
 
 
@@ -337,6 +338,9 @@ def mass_matrix_sparse(system, q):
         i, j = np.meshgrid(columns, columns, indexing="ij")
         M += csr_array(((h.T @ h).ravel(), (i.ravel(), j.ravel())), M.shape)
     return M
+
+
+# Redundant rows of Phi_q at one configuration of a large scene, by sparse factorisation in O(N).
 
 
 @entry("pvdd")

@@ -636,6 +636,9 @@ class Exerting:
         return SimpleNamespace(packed=packed, system=packed.system, t=t, q=q, qd=qd, multipliers=lam, _memory=memory)
 
 
+# Where surfaces touch, and where they touch at no single point.
+
+
 def touching(packed, member, q):
     """Contact point, m, and unit normal towards a, (k, 3) each in the ground frame; None for what has no contact."""
     for i in range(member.parts.start, member.parts.stop):

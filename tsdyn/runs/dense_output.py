@@ -14,7 +14,7 @@ from ..model.joint_turns import angle_after
 from ..observables.tolerances import KEPT_FLOATS
 from ..rows.interface import take_noted_selection
 from ..workspaces import B_CHART, B_DATA, B_END, B_H, B_START, MIXED, STORED, arrays_of, load, load_run
-from .run_memory import call
+from .run_memory import STATUSES, call
 from .tolerances import LONG_STEPS
 
 # Outputs of a driver: the records of accepted states.
@@ -151,8 +151,8 @@ def _warm(c, store, out):
     # Starts of Newton's methods: u, v, multipliers and normal loads
     for part in (w.u, w.v, friction.lam, friction.load):
         i = _move(part, store, i, out)
-    if c.saddle.K.size > 0:  # stages begin with the factors of N and S
-        for part in (l.lower, l.upper, f.rows.S):
+    if c.saddle.K.size > 0:  # stages begin with the factors of N, and of S or N~
+        for part in (l.lower, l.upper, f.rows.S, friction.lower, friction.upper):
             i = _move(part, store, i, out)
         if out:
             store[i] = l.state.made
@@ -176,7 +176,8 @@ def _warm(c, store, out):
 
 def warm_size(work, tangent, chart, saddle):
     """Floats that `keep` stores."""
-    friction, factors = tangent.friction, (chart.lower, chart.upper, tangent.rows.S) if saddle.K.size else ()
+    friction, normal = tangent.friction, (chart.lower, chart.upper)
+    factors = (*normal, tangent.rows.S, friction.lower, friction.upper) if saddle.K.size else ()
     kept = work.u, work.v, friction.lam, friction.load, work.B, work.T, *factors
     return sum(part.size for part in kept) + 1 + (1 if factors else 0)
 
@@ -370,7 +371,7 @@ class Reader:
         out = np.zeros((t.size, 3, self.n))
         arguments = self._context, self._run, t, rows, blocks, charts, points, out
         long = self.n >= LONG_STEPS
-        return out, Status(call(self._read, arguments, (self._kernels,)) if long else self._read(*arguments))
+        return out, STATUSES[call(self._read, arguments, (self._kernels,)) if long else self._read(*arguments)]
 
 
 # What a run with dense output leaves to its solution: the blocks of its steps, read at any time.

@@ -114,7 +114,7 @@ class Group:
         falls = zero & (samples.max(axis=0) <= FROM_REST * scale) & (samples[-1] < -FALLEN * scale)
         return int(left[falls.argmax()]) if falls.any() else None
 
-    def search(self, step, sample):
+    def search(self, step, sample, degree):
         """The first event that ends the run, (number, t) or None; members to be searched one by one, up to there.
 
         Parameters
@@ -122,6 +122,8 @@ class Group:
         step : Inside
         sample : function
             Values (k, members) at times (k,) within the step.
+        degree : function
+            The least degree of interpolants on a time, s.
         """
         self._first, self._was_new, self._is_new = self.value, self._is_new, False
         self._begun = step.t0 if self._was_new else self._begun
@@ -129,21 +131,21 @@ class Group:
         part = step.t0 + LIKE_THE_LAST * self._length
         found = None
         if part - step.t0 < PART * (step.t1 - step.t0):
-            found, alone = self._search_to(part, step, sample)
+            found, alone = self._search_to(part, step, sample, degree)
         if found is None:
-            found, alone = self._search_to(step.t1, step, sample)
+            found, alone = self._search_to(step.t1, step, sample, degree)
         self._length = found[1] - self._begun if found else math.inf
         return found, alone
 
-    def _search_to(self, end, step, sample):
+    def _search_to(self, end, step, sample, degree):
         """As of `search`, up to a time."""
-        found, last, least = None, self.value.copy(), step.degree_of(end - step.t0)
+        found, last, least = None, self.value.copy(), degree(end - step.t0)
         alone, left = {}, np.arange(len(last))
         while left.size:
             whole = left.size == len(last)
-            values, noise, degree = self.value[left], self.noise[left], max(least, self.degree // 2)
+            values, noise = self.value[left], self.noise[left]
             own = sample if whole else lambda times, left=left: sample(times)[:, left]
-            seen = survey(own, step.t0, values, end, degree, noise)
+            seen = survey(own, step.t0, values, end, max(least, self.degree // 2), noise)
             self.degree, last[left] = seen.degree, seen.samples[-1]
             if self._was_new and self._some_may_fall and (fallen := self._fallen(seen.samples, left)) is not None:
                 return (self.numbers[fallen], step.t0), []

@@ -1,7 +1,7 @@
 """Events: users' functions of time and state, and their zeros inside every step, on states of the manifold."""
 
 import math
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,17 @@ from ..observables.state import RememberingState
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
 from .event_groups import Group, GroupMember, States
-from .tolerances import FAST_TURN, LEAST_TIME, NOISE, ROOT, SHAKEN, SLOW_TURN, START_ZERO
+from .tolerances import (
+    FAST_SMOOTH_TURN,
+    FAST_TURN,
+    LEAST_TIME,
+    NOISE,
+    ROOT,
+    SHAKEN,
+    SLOW_SMOOTH_TURN,
+    SLOW_TURN,
+    START_ZERO,
+)
 
 # Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp.
 
@@ -171,7 +181,9 @@ class Inside:
 
     def at(self, t):
         """The state (3, n) at t."""
-        (state,) = self.states(np.array([t]))
+        state = self._known.get(t)
+        if state is None:
+            (state,) = self.states(np.array([t]))
         if state is None:
             raise EventFailed(f"there is no state at t = {t:.9g} s to evaluate events at.", t)
         return state
@@ -413,6 +425,13 @@ class Watch:
         """Values (k, members) of a group."""
         return group.over(self._states(times, levels))[:, group.which]
 
+    def _sample_within(self, group, step, times):
+        return self._sample(group, times, step.levels(times))
+
+    def _degree_of_group(self, turning, time):
+        """As of `_degree`, for a group on a time, s, at this rate."""
+        return self._degree(turning * time, SLOW_SMOOTH_TURN, FAST_SMOOTH_TURN)
+
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
         self._note_start()
@@ -431,11 +450,13 @@ class Watch:
 
     def _locate(self, run, log, step):
         found, failure, end = [], None, step.t1
-        step.degree_of = self._degree_of(self._turn_rate(step.at(step.t0), step.at(step.t1)))
-        step.degree = step.degree_of(step.t1 - step.t0)
+        turning = self._turn_rate(step.at(step.t0), step.at(step.t1))
+        step.degree = self._degree(turning * (step.t1 - step.t0))
         members = {}
         for group in self._groups:
-            first, alone = group.search(step, lambda times, group=group: self._sample(group, times, step.levels(times)))
+            sample = partial(self._sample_within, group, step)
+            degree = partial(self._degree_of_group, turning)
+            first, alone = group.search(step, sample, degree)
             if first is not None:
                 i, t = first
                 shift = self._least_time(step, step.t0, end) + ROOT * abs(t)
@@ -524,14 +545,9 @@ class Watch:
                 )
         return [(step.t0, track.value)], failure
 
-    def _degree_of(self, rate):
-        """A function of a time, s: the degree that the interpolant and turns of bodies at this rate ask for."""
-
-        def degree(time):
-            turn = rate * time
-            return LARGEST if turn > FAST_TURN else self.reader.degree if turn > SLOW_TURN else self.reader.degree // 2
-
-        return degree
+    def _degree(self, turn, slow=SLOW_TURN, fast=FAST_TURN):
+        """The degree that the interpolant and the turn of a body, rad, ask for."""
+        return LARGEST if turn > fast else self.reader.degree if turn > slow else self.reader.degree // 2
 
     def _turn_rate(self, *states):
         """The fastest turn of a body, rad/s, at some states (3, n)."""

@@ -4,8 +4,6 @@ import math
 from functools import partial
 from typing import NamedTuple
 
-import numpy as np
-
 from ..errors import Status
 from ..jit.interrupts import interruptible
 from ..jit.kernels import callback, resident
@@ -258,8 +256,8 @@ class Memory:
         # Outputs and stops from here on are still to come
         while numbers.rows > 0 and log.t_eval.size and log.out[numbers.rows - 1, 0] >= t:
             numbers.rows -= 1
-        numbers.next_eval = int(np.searchsorted(log.t_eval, t))
-        numbers.next_stop = int(np.searchsorted(log.stops[:, 0], t, side="right"))
+        numbers.next_eval = int(log.t_eval.searchsorted(t))
+        numbers.next_stop = int(log.stops[:, 0].searchsorted(t, "right"))
         if numbers.in_chart > 0:
             with_end(log.charts[: numbers.chart_rows + 1], numbers, control.condition, control.contraction)
             numbers.chart_rows += 1

@@ -78,7 +78,6 @@ KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", 
 START, PREFIX = ("q", "qd", "remembered"), "phase "
 # What a phase raises that can't begin, after others
 FAILURES = {
-    InvalidArgument: Status.METHOD_REFUSED,
     InvalidForce: Status.SAMPLING_FAILED,
     SingularConfiguration: Status.SINGULAR,
 }
@@ -158,7 +157,8 @@ class _ContactRun(Transitions):
             if name not in parts:
                 raise InvalidArgument(f"the state is of a scene with {name!r}, which this one lacks.")
         self.without = dependent(self.scene, [parts[name] for name in inactive])
-        self.gaps, self.frictions = gaps_of(self.scene, self.without), Frictions(self.scene)
+        self.gaps = gaps_of(self.scene, self.without)
+        self.frictions = Frictions(self.scene, self._scene_of([], []).packed.loads)
         self.held_gaps = {}  # the same where frictions stick, by the rows that hold these
         off = {id(item) for item in self.without}
         self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]
@@ -425,7 +425,7 @@ class _ContactRun(Transitions):
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.slides(i)]
-        halting = Halting(packed, [gaps.list[i].side.grip.sliding for i in slides])
+        halting = Halting(gaps, slides)
         for k, i in enumerate(slides):
             yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 

@@ -1,17 +1,17 @@
 """Contacts with friction in the phases of a run: rows and laws of those that stick and slide, events, multipliers."""
 
+from functools import cached_property
+
 import numpy as np
 
 from ..analyses.contact_friction import spread
 from ..analyses.contact_problem import slip_rows
+from ..analyses.contact_rows import reaction_workspace
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
-from ..elements.sliding import slip_velocity
 from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
 from ..model.handles import index_of
-from ..observables import reactions
-from ..observables.diagnostics import marker_states
 from .phase_scenes import first_row_of
 from .tolerances import SAME_WAY, SLOW
 
@@ -86,13 +86,18 @@ class Reactions:
         self.which = [self.closed.index(i) for i in self.sticks]
         self.slack = np.array([modes.slack.get(i, 0.0) for i in modes.closed])
 
+    @cached_property
+    def workspace(self):
+        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
+        return reaction_workspace(self.packed, np.nan)
+
     def over(self, states):
         """Values (k, closed and sticking) of states at k times."""
-        memory = np.tile(states.memory, (states.t.size, 1))
-        lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
         N = -self.gaps.sign[self.closed] * lam[:, self.normal]
         held = N[:, self.which]
         T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
+        memory = np.tile(states.memory, (states.t.size, 1))
         T = carried(self.gaps, self.sticks, states.t, states.q, memory, held, T)
         N = N + self.slack
         return np.hstack([N, self.gaps.static[self.sticks] * N[:, self.which] - np.hypot(*np.moveaxis(T, 2, 0))])
@@ -128,26 +133,18 @@ class Halting:
 
     Parameters
     ----------
-    packed : Packed
-        Of the phase.
-    slides : list of _Sliding
+    gaps : Gaps
+    slides : list of int
+        Those that slide.
     """
 
-    def __init__(self, packed, slides):
-        self.packed, known = packed, {id(load.force): load for load in packed.loads}
-        self.loads = [known[id(each)] for each in slides]
+    def __init__(self, gaps, slides):
+        self.gaps, self.slides, self.ways = gaps, slides, gaps.slots[slides][:, None] + np.arange(3)
 
     def over(self, states):
         """Values (k, slides) of states at k times."""
-        found = []
-        for load in self.loads:
-            x, xd = marker_states(self.packed, load, states.q, states.qd)
-            v = twin(slip_velocity)([jet.x for jet in x], xd, load.parameters)
-            d = states.memory[load.slot : load.slot + 3]
-            speed = np.sqrt(sum(a * a for a in v))
-            along = sum(a * b for a, b in zip(v, d, strict=True))
-            found.append(along - 0.5 * (speed + 1.98 * SLOW) / (speed + SLOW) * speed)
-        return np.array(found).T
+        along, speed = self.gaps.slips(states.t, states.levels, self.slides, states.memory[self.ways])
+        return along - 0.5 * (speed + 1.98 * SLOW) / (speed + SLOW) * speed
 
 
 def losses(gaps, which, lam, t, q, qd):

@@ -12,7 +12,7 @@ from ..errors import InvalidArgument, InvalidBody, SingularConfiguration
 from ..maths.dense_linalg import range_and_null_space
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import handles_of
-from ..observables.evaluate import constraint_arrays, mass_matrix
+from ..observables.evaluate import NO_INERTIA, constraint_arrays, mass_matrix
 from ..observables.state import begin_memory
 from ..runs.events import EventInstant
 from ..validation import floats, listed, vector3
@@ -112,15 +112,19 @@ class Change:
         Raises
         ------
         InvalidArgument
-            If there is no such parameter, it is of the start, or of the table `parameters` of a file.
+            If there is no such parameter, or it belongs to the start or to the table `parameters` of a file.
         TsdynError
             If the value is inadmissible.
         """
         field = family_of(self._scene)[0].field(parameter)
         if isinstance(field.owner, PointMass) and field.attribute in START:
-            raise InvalidArgument(f"{parameter} is of the start. Change velocities by change.impulse(body, impulse).")
+            raise InvalidArgument(
+                f"{parameter} belongs to the start. Change velocities by change.impulse(body, impulse)."
+            )
         if "." not in parameter and parameter != "gravity":
-            raise InvalidArgument(f"{parameter} is of the file. Set what follows from it, such as the length of a rod.")
+            raise InvalidArgument(
+                f"{parameter} belongs to the file. Set what follows from it, such as the length of a rod."
+            )
         values = self._values | {parameter: value}
         found = with_values(self._scene, values)
         if found.system.memory.size != self._scene.system.memory.size:
@@ -297,7 +301,7 @@ class JumpRows:
             try:
                 factor = cho_factor(Z.T @ self.M @ Z)
             except np.linalg.LinAlgError as error:
-                raise SingularConfiguration("a direction that the constraints leave free has no inertia.") from error
+                raise SingularConfiguration(NO_INERTIA) from error
             change = change + Z @ cho_solve(factor, Z.T @ (load - self.M @ change))
         return qd + change
 

@@ -16,6 +16,7 @@ from ..observables.state import RememberingState, remembered
 from ..runs.task import state_arrays
 from ..validation import floats, listed
 from .phase_scenes import NAMED, gaps_of, has_contacts, phase_of
+from .phases import Impulse
 from .run_options import LAWS
 from .scene_cache import prepared
 
@@ -25,21 +26,31 @@ if TYPE_CHECKING:
     from ..hints import ItemLike, Scene
 
 
+def impulse_of(inertia, i, p):
+    """The `Impulse` of a gap, of its impulses p (3,) along the normal and the slips."""
+    return Impulse(p[0], inertia.along(i, p[1:]).tolist() if inertia.gaps.rubs[i] else (0.0, 0.0, 0.0))
+
+
 def impact_of(inertia, which, qd, before, e, law="newton"):
-    """Normal impulses (k,) of the gaps `which`, the change of velocities (n,), and the share of e that acts."""
+    """Impulses (k, 3) of the gaps `which`, the change of velocities (n,), and the share of e that acts."""
     if inertia.gaps.rubs[which].any():
         return strike(inertia, which, qd, before, e, law)
     p = impulses(inertia, which, before, e, law)
-    return p, inertia.pushed(which, p), 1.0
+    return along_normals(p), inertia.pushed(which, p), 1.0
+
+
+def along_normals(p):
+    """Impulses (k, 3) without friction, of normal ones (k,)."""
+    return np.column_stack((p, np.zeros((len(p), 2))))
 
 
 def jumped(inertia, qd, change, which, before, e, p, law="newton"):
-    """Velocities (n,) after the impulses p (k,) of the gaps `which`, and the rates (count,) of all gaps then."""
+    """Velocities (n,) after the impulses p (k, 3) of the gaps `which`, and the rates (count,) of all gaps then."""
     after = inertia.rates(qd + change, np.abs(qd) + np.abs(change))
     after[which] = np.maximum(after[which], 0.0)  # but for rounding
     if law == "newton":  # without rounding where the impact acts
         for k, i in enumerate(which):
-            if p[k] > 0.0:
+            if p[k, 0] > 0.0:
                 after[i] = -e[k] * min(before[k], 0.0)
     return qd + change, after
 
@@ -60,7 +71,7 @@ def impact(
     contacts: ItemLike | Sequence[ItemLike] | None = None,
     restitution: float | Mapping[Any, float] | None = None,
     law: str = "newton",
-) -> tuple[RememberingState, dict[str, float]]:
+) -> tuple[RememberingState, dict[str, Impulse]]:
     """Return the state after an impact of all closed contacts at once, in the metric of kinetic energy.
 
     Parameters
@@ -80,8 +91,8 @@ def impact(
     Returns
     -------
     state : State
-    impulses : dict of str to float
-        By names of the contacts; N s, or N m s of an angle.
+    impulses : dict of str to Impulse
+        By names of the contacts; as of `solution.impulses`.
 
     Raises
     ------
@@ -98,8 +109,8 @@ def impact(
     impulses p of redundant contacts are one of the possible solutions.
 
     With friction the tangential impulses of a contact are within the kinetic coefficient times p, and against its slip
-    where that doesn't vanish; the impulses returned are normal ones. Coefficients of restitution are lowered together
-    where the energy would grow.
+    where that doesn't vanish; they are the `tangential` of the impulses. Coefficients of restitution are lowered
+    together where the energy would grow.
 
     Examples
     --------
@@ -143,9 +154,10 @@ def impact(
         names = listed(list(dict.fromkeys(gaps.names[i] for i in which)), NAMED)
         raise InconsistentState(f"impact: no impulses keep these contacts from penetrating: {names}.") from error
     after, _ = jumped(inertia, qd, change, which, before, share * e[which], p, law)
-    found = {gaps.names[i]: 0.0 for i in which}
-    for i, x in zip(which, p, strict=True):
-        found[gaps.names[i]] += float(x)
+    found = {gaps.names[i]: Impulse(0.0) for i in which}
+    for i, own in zip(which, p, strict=True):
+        before, more = found[gaps.names[i]], impulse_of(inertia, i, own)
+        found[gaps.names[i]] = Impulse(before + more, before.tangential + more.tangential)
     anchor = getattr(state, "anchor", None)
     levels = np.zeros(kept.n), np.zeros(len(scene.packed.system.segments))
     return RememberingState.of(scene.packed, slots, anchor, t, q.copy(), after, *levels), found

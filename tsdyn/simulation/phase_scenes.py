@@ -8,7 +8,7 @@ import numpy as np
 from ..calls import fitting
 from ..elements.force import Force
 from ..elements.unilateral import contacts_of
-from ..errors import InvalidArgument
+from ..errors import InconsistentState, InvalidArgument
 from ..model.handles import begins_of, handles_of
 from ..model.packed import pack
 from ..validation import listed
@@ -120,6 +120,7 @@ def gaps_of(scene, without=None, holds=()):
     free = phase_of(scene, [], holds, without)
     if free._gaps is None:
         free._gaps = _new_gaps(scene, free)
+    free._gaps.workspace.begin()
     return free._gaps
 
 
@@ -201,5 +202,21 @@ def where_it_stands(function):
     @wraps(function)
     def call(scene, *arguments, **keywords):
         return own(at_start(scene), *arguments, **keywords)
+
+    return fitting(call)
+
+
+def where_it_may_leave(function):
+    """Decorate `set`: as `where_it_stands`, and where closed contacts don't allow it they are left out, too."""
+    own = getattr(function, "__wrapped__", function)
+
+    @wraps(function)
+    def call(scene, *arguments, **keywords):
+        try:
+            return own(at_start(scene), *arguments, **keywords)
+        except InconsistentState:
+            if not has_contacts(scene):
+                raise
+        return own(phase_of(scene, []), *arguments, **keywords)
 
     return fitting(call)

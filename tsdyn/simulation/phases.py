@@ -68,6 +68,27 @@ def plain(value):
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
+class Impulse(float):
+    """The normal impulse of a contact, N s, or N m s of an angle.
+
+    Attributes
+    ----------
+    tangential : ndarray (3,)
+        The impulse of its friction on a, ground frame, N s.
+    """
+
+    def __new__(cls, normal, tangential=(0.0, 0.0, 0.0)):
+        """As a float, the normal impulse."""
+        made = super().__new__(cls, normal)
+        made._tangential = tuple(tangential)
+        return made
+
+    @property
+    def tangential(self):
+        """That of friction on a (3,), ground frame, N s; zeros without friction."""
+        return np.array(self._tangential, float)
+
+
 RECORD = {"modes": list, "derived": list, "names": list, "contacts": list, "changes": list, "changed": list}
 
 
@@ -85,8 +106,8 @@ class Phases:
     ----------
     list : list of (float, float, tuple of str)
         Start, end (s) and names of the closed contacts, then of what sticks.
-    impulses : list of (float, str, float)
-        Time (s), name, impulse (N s, or N m s of an angle).
+    impulses : list of (float, str, Impulse or ndarray)
+        Time (s), name, impulse: see `Solution.impulses`.
     starts : list of float
         s; before those of `list` where flights below rounding are left out.
     gains : dict of int to float
@@ -284,12 +305,13 @@ class Phases:
         numbers = {"modes": self.modes, "derived": derived, "names": names, "contacts": contacts}
         numbers |= {"changes": changes, "changed": changed}
         phases = [(*span, place[named]) for *span, named in self.list]
-        # Of an impulse with several components a line for each, numbered from one
-        impulses = [
-            (t, number[name], x, i + (np.ndim(p) > 0))
-            for t, name, p in self.impulses
-            for i, x in enumerate(np.atleast_1d(p).tolist())
-        ]
+        # Of an impulse with several components a line for each, numbered from one; of friction from minus one down
+        impulses = []
+        for t, name, p in self.impulses:
+            parts = enumerate(np.atleast_1d(p).tolist(), int(np.ndim(p) > 0))
+            impulses += [(t, number[name], x, i) for i, x in parts]
+            if isinstance(p, Impulse) and p.tangential.any():
+                impulses += [(t, number[name], x, -1 - i) for i, x in enumerate(p.tangential.tolist())]
         return numbers, {
             "phases": np.column_stack((self.starts, self.of, phases)) if phases else np.zeros((0, 5)),
             "gains": np.array(list(self.gains.items())).reshape(-1, 2),
@@ -317,10 +339,18 @@ class Phases:
         self.gains = {int(number): energy for number, energy in arrays["gains"].astype(float).reshape(-1, 2).tolist()}
         self.impulses = []
         for t, i, p, component in impulses.tolist():
-            if component > 1.0:
+            if component < 0.0:
+                demand(bool(self.impulses) and isinstance(self.impulses[-1][2], Impulse), "the impulses")
+                *_, last = self.impulses.pop()
+                p = Impulse(last, last.tangential + p * np.eye(3)[int(min(-1.0 - component, 2.0))])
+            elif component > 1.0:
                 demand(bool(self.impulses) and np.ndim(self.impulses[-1][2]) == 1, "the impulses")
                 p = np.append(self.impulses.pop()[2], p)
-            self.impulses.append((t, contacts[int(i)], np.array([p]) if component == 1.0 else p))
+            elif component == 1.0:
+                p = np.array([p])
+            elif component == 0.0:
+                p = Impulse(p)
+            self.impulses.append((t, contacts[int(i)], p))
         demand(len(numbers["changed"]) == len(self.of), "the changes")
         known = [(tuple(map(str, inactive)), dict(values)) for inactive, values in numbers["changes"]]
         self.changes = [known[i] for i in numbers["changed"]]

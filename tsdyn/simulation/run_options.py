@@ -299,7 +299,7 @@ def _demand_served(method, form):
         others = ", ".join(repr(name) for name, kind in registered().items() if _serves(kind, form))
         why = f"{type(method).__name__} solves its stages in the tangent and the null-space form only"
         if method.coupled:
-            why = f"{type(method).__name__} solves all stages at once, by sparse matrices of the tangent form only"
+            why = f"{type(method).__name__} solves its stages all at once, by sparse matrices of the tangent form only"
         if method.driver == "series":
             why = "Taylor series are of the motion itself and need no other form than 'tangent'"
         raise InvalidArgument(f"{why}; formulation={form.name!r} is served by {others}.")

@@ -40,7 +40,7 @@ from .analyses import linearise as _linearise
 from .analyses import set_start as _set_start
 from .given_motion import inverse_dynamics as _inverse_dynamics
 from .given_motion import kinematics as _kinematics
-from .phase_scenes import at_start, has_contacts, where_it_stands
+from .phase_scenes import at_start, has_contacts, where_it_may_leave, where_it_stands
 from .scene_cache import preparing
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
 from .variants import activate as _activate
@@ -611,7 +611,7 @@ class Scene:
     inverse_dynamics = _serving("along")(_inverse_dynamics)
     parameters = _parameters
     with_parameters = _with_parameters
-    set = where_it_stands(fitting(set_joint))
+    set = where_it_may_leave(set_joint)
     set_start = _serving("set_start")(_set_start)
     remove = _remove
     activate = fitting(_activate)

@@ -396,9 +396,10 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def impulses(self) -> list[tuple[float, str, float]]:
         """Time (s), name and impulse of contacts at impacts, of parts that become active, of impulses on bodies.
 
-        N s, or N m s of an angle; of a constraint of several rows an array (rows,) as of `multipliers`, of a body an
-        array (3,) in the ground frame. Negative, about the square root of rounding, of a contact without friction
-        that an impact elsewhere lifts by less than rounding: it stays closed.
+        N s, or N m s of an angle. Of a contact a float, the normal impulse, whose `tangential` (3,) is the impulse of
+        its friction on a, ground frame; negative, about the square root of rounding, where an impact elsewhere lifts
+        the contact by less than rounding: it stays closed. Of a constraint of several rows an array (rows,) as of
+        `multipliers`, of a body an array (3,) in the ground frame.
         """
         return [] if self._phases is None else list(self._phases.impulses)
 

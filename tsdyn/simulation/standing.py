@@ -106,8 +106,8 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
         except NoEquilibrium as error:
             others = [gaps.names[i] for i in range(gaps.count) if i not in closed]
             raise NoEquilibrium(
-                f"{error} Open contacts don't count: {listed(list(dict.fromkeys(others)), NAMED)}. Start where those "
-                "that carry are closed, such as from the state of a run that has come to rest."
+                f"{error} Open contacts carry no load: {listed(list(dict.fromkeys(others)), NAMED)}. Start where "
+                "those that are needed are closed, such as from the state of a run that has come to rest."
                 if others
                 else str(error)
             ) from None

@@ -270,9 +270,6 @@ def _suspect_of_many(solution, scene):
     )
 
 
-# Progress of a run: a bar in terminal or notebook, or a user's function.
-
-
 # Progress of a run, or of another calculation stage by stage: a bar in terminal or notebook, or a user's function.
 
 

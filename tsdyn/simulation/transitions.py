@@ -18,9 +18,9 @@ from ..observables.generalised_forces import force_loads
 from ..observables.state import begin_memory
 from ..validation import listed
 from .grips import gripped
-from .impacts import held, impact_of, jumped
+from .impacts import along_normals, held, impact_of, impulse_of, jumped
 from .phase_scenes import NAMED, gaps_of
-from .phases import UnitModes
+from .phases import Impulse, UnitModes
 from .scene_cache import prepared
 from .tolerances import (
     CREEPING,
@@ -96,7 +96,7 @@ class Transitions:
             noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
             if noise:  # a gap that closes with a rate of rounding, or a ratchet that takes hold
                 p, self.qd, rates = held(inertia, self.qd, noise, rates)
-                self._note_impulses(inertia, noise, p, qd)
+                self._note_impulses(inertia, noise, along_normals(p), qd)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
@@ -166,7 +166,7 @@ class Transitions:
             if known == {*self.modes.closed, *self.modes.idle}:
                 return None
         names = listed([*(self.gaps.names[i] for i in resting), *self.frictions.names], NAMED)
-        self.reason = f"No closed contacts and sticking frictions agree at t = {self.t:.9g} s: {names}."
+        self.reason = f"No set of closed contacts and sticking frictions is consistent at t = {self.t:.9g} s: {names}."
         return Status.CONTACT_FAILED
 
     def _gaps_with(self, holds):
@@ -247,7 +247,13 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        phase = self._scene_of([], [self._hold(i, ranks[i]) for i in free])
+        # With rows of those that slide, too, which don't count: it is packed once
+        holds = {i: self._hold(i, ranks[i]) for i in free}
+        for i in set(range(len(units))) - {*free, *self.off}:
+            numbers = np.ones((units[i].slide.freedom, units[i].slide.row_numbers))
+            numbers[:, -1] = 0.0
+            holds[i] = Hold(units[i], len(numbers), numbers)
+        phase = self._scene_of([], list(holds.values()))
         rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
@@ -258,6 +264,8 @@ class Transitions:
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
         problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
         rest = problem.settle({i: way for i, way in guess.items() if i in free}, fired)
+        # In a plane slips end where they are slow
+        self.qd = problem.stopped([i for i in rest.sticking if i in fresh and not self.frictions.signed[i]], self.qd)
         return rest, ranks, phase.packed
 
     def _motions_of(self, place, i):
@@ -285,7 +293,7 @@ class Transitions:
         height = ENDLESS * self.length if e == 1.0 else EPS * max(self.length, ROUNDED * length)
         if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * height:
             return False
-        self.phases.impulses.append((self.t, gaps.names[i], p))
+        self.phases.impulses.append((self.t, gaps.names[i], Impulse(p)))
         self.qd, self.modes = qd, UnitModes(opened={i: (self.t, self.gap[i], -e * rate)})
         return True
 
@@ -295,7 +303,7 @@ class Transitions:
         p, qd, after = self._jump(inertia, touching, before, e)
         # Impacts that are followed by flights below rounding are the last ones
         a = self._lowering(inertia, touching, qd, after)
-        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and p[k] > 0.0 and e[k] > 0.0]
+        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and p[k, 0] > 0.0 and e[k] > 0.0]
         if last:
             flights = [2.0 * after[touching[k]] / (a[touching[k]] * (1.0 - e[k])) for k in last if e[k] < 1.0]
             self.rest = float(max([self.rest, *(self.t + T for T in flights)]))
@@ -308,7 +316,7 @@ class Transitions:
                 break
             stays = [k for k, i in enumerate(touching) if a[i] > 0.0 or after[i] == 0.0]
             more, qd, after = held(inertia, qd, [touching[k] for k in stays], after)
-            p[stays] += more
+            p[stays, 0] += more
             if (after[touching] < 0.0).any():
                 more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
                 p = p + more
@@ -318,19 +326,16 @@ class Transitions:
         return after
 
     def _note_impulses(self, inertia, which, p, qd):
-        """Note the impulses (k,) of the gaps `which`, but those that change the rates at qd by less than rounding.
-
-        Pulls, of contacts that stay closed though they are lifted, are noted without friction, whose part isn't told.
-        """
-        small, rubs = AT_REST * inertia.sizes(qd), self.gaps.rubs
+        """Note the impulses (k, 3) of the gaps `which`, but those that change the rates at qd by less than rounding."""
+        small = AT_REST * inertia.sizes(qd)
         self.phases.impulses += [
-            (self.t, self.gaps.names[i], float(x))
-            for i, x in zip(which, p, strict=True)
-            if (x if rubs[i] else abs(x)) * inertia.G[i, i] > small[i]
+            (self.t, self.gaps.names[i], impulse_of(inertia, i, own))
+            for i, own in zip(which, p, strict=True)
+            if abs(own[0]) * inertia.G[i, i] > small[i]
         ]
 
     def _jump(self, inertia, touching, before, e, qd=None):
-        """Impulses (k,) of an impact, velocities (n,) and rates (count,) after it."""
+        """Impulses (k, 3) of an impact, velocities (n,) and rates (count,) after it."""
         qd, law = self.qd if qd is None else qd, self.options.law
         p, change, share = impact_of(inertia, touching, qd, before, e, law)
         if share < 1.0:

@@ -4,9 +4,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..analyses.contact_rows import ReactionWorkspace, measure_opened
+from ..analyses.contact_rows import measure_opened, reaction_workspace
 from ..analyses.tolerances import LEVEL
-from ..observables import reactions
 from .tolerances import LOADED, REACTION_NOISE
 
 
@@ -65,15 +64,11 @@ class Leaving:
     @cached_property
     def workspace(self):
         """Made at the first evaluation: the start of the phase may show that rows are redundant."""
-        return None if self.packed.system.normals.size else ReactionWorkspace(self.packed)
+        return reaction_workspace(self.packed)
 
     def over(self, states):
         """Values (k, closed) of `States`."""
-        if self.workspace is not None:
-            lam = self.workspace.multipliers(states.t, states.levels, states.memory)
-        else:
-            memory = np.tile(states.memory, (states.t.size, 1))
-            lam = reactions.multipliers(self.packed, states.t, states.q, states.qd, states.qdd, memory)
+        lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
         return self.slack - self.signs * lam[:, self.rows]
 
 
@@ -102,15 +97,15 @@ class Breaking:
         self.limits = LOADED * limits[len(sticking) :]
         self.noise = REACTION_NOISE * limits * ([unit.bound[0] for unit in sticking] + [1.0] * len(light))
 
+    @cached_property
+    def workspace(self):
+        """Made at the first evaluation, as of `Leaving`."""
+        return reaction_workspace(self.packed)
+
     def over(self, states):
         """Values (k, sticking and light units) of states at k times."""
-        memory = np.tile(states.memory, (states.t.size, 1))
-        motion = states.t, states.q, states.qd, states.qdd
-        wide = reactions.with_normal_loads(self.packed, *motion, memory)
-        loads = wide[:, memory.shape[1] :]
+        lam, loads = self.workspace.multipliers(states.t, states.levels, states.memory)
         values = np.zeros((states.t.size, len(self.sticking)))
-        if self.sticking:
-            lam = reactions.particular(reactions.multipliers(self.packed, *motion, wide))
         for unit, value in zip(self.sticking, values.T, strict=True):
             share, bound = unit.bound
             value += bound - np.linalg.norm(lam[:, self.packed.derived.holds[unit.slot]], axis=1)

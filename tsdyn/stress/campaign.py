@@ -51,27 +51,27 @@ def run_case(case):
     return CheckedRun(case, simulate(case.build(), (0.0, case.end), **options))
 
 
-def size(run_case):
+def size(run):
     """Bodies, constraint rows, steps, and the time of the run, s."""
-    scene, stats = run_case.solution.scene, run_case.solution.stats
-    rows = len(run_case.solution.system.segments)
+    scene, stats = run.solution.scene, run.solution.stats
+    rows = len(run.solution.system.segments)
     return {"bodies": len(scene.bodies), "rows": rows, "steps": stats.steps, "seconds": stats.seconds["run"]}
 
 
-def ending(run_case):
+def ending(run):
     """Whether the run reached its end, and what it said."""
-    return {"success": run_case.solution.success, "message": run_case.solution.message}
+    return {"success": run.solution.success, "message": run.solution.message}
 
 
-def constraint_errors(run_case):
+def constraint_errors(run):
     """Largest constraint errors of position, velocity and acceleration."""
-    return {name: float(error.max()) for name, error in run_case.solution.constraint_error._asdict().items()}
+    return {name: float(error.max()) for name, error in run.solution.constraint_error._asdict().items()}
 
 
-def energy(run_case):
+def energy(run):
     """Largest error of energy less work, relative to the energies, and the exponent of its growth with time."""
-    left, whole = energy_left(run_case.solution)
-    error = np.abs(run_case.solution.energy - run_case.solution.work - run_case.solution.energy[0]) / (whole or 1.0)
+    left, whole = energy_left(run.solution)
+    error = np.abs(run.solution.energy - run.solution.work - run.solution.energy[0]) / (whole or 1.0)
     ends = [(OUTPUTS - 1) >> part for part in range(PARTS)]
     sizes = np.array([np.sqrt(np.mean(error[end // 2 : end + 1] ** 2)) for end in ends])
     seen = sizes > SEEN
@@ -81,10 +81,10 @@ def energy(run_case):
     return {"energy": left / (whole or 1.0), "exponent": float(exponent), "growth": growth}
 
 
-def order(run_case):
+def order(run):
     """Return the observed order of Nystrom4, of three runs with steps halved; declared: 4."""
-    end, count = run_case.case.steps
-    scene, ends = run_case.case.build(), []
+    end, count = run.case.steps
+    scene, ends = run.case.build(), []
     for halving in range(3):
         method = Nystrom4(step=end / (count << halving))
         solution = simulate(scene, (0.0, end), integrator=method, t_eval=(0.0, end))
@@ -95,20 +95,20 @@ def order(run_case):
     return {"order": float(np.log2(coarse / fine)) if fine > 0.0 else np.nan}
 
 
-def agreement(run_case):
+def agreement(run):
     """Largest distance in q from a run by DOP853, relative to the largest coordinate."""
-    until = run_case.case.agree or run_case.case.end
-    t = run_case.solution.t[run_case.solution.t <= until]
-    other = simulate(run_case.case.build(), (0.0, t[-1]), integrator=DOP853(*2 * TOLERANCE[1:]), t_eval=t)
+    until = run.case.agree or run.case.end
+    t = run.solution.t[run.solution.t <= until]
+    other = simulate(run.case.build(), (0.0, t[-1]), integrator=DOP853(*2 * TOLERANCE[1:]), t_eval=t)
     if not other.success:
         return {"agreement": np.nan}
-    q = run_case.solution.q[: t.size]
+    q = run.solution.q[: t.size]
     return {"agreement": float(np.abs(other.q - q).max() / np.abs(q).max())}
 
 
-def laws(run_case):
+def laws(run):
     """The laws that the run breaks."""
-    return {"broken": [str(found) for found in findings(run_case.solution) if found.broken]}
+    return {"broken": [str(found) for found in findings(run.solution) if found.broken]}
 
 
 def repeated(first):
@@ -116,10 +116,10 @@ def repeated(first):
     return {"same": same_bits(first.solution, run_case(first.case).solution)}
 
 
-def resumed(run_case):
+def resumed(run):
     """Whether a run that was stopped, and goes on from its checkpoint, gives the same bits; None without h5py."""
-    case, options = run_case.case, {"integrator": Taylor(TOLERANCE[0]), "t_eval": run_case.solution.t}
-    return {"resumed": resumed_is_same(case.build(), (0.0, case.end), run_case.solution, **options)}
+    case, options = run.case, {"integrator": Taylor(TOLERANCE[0]), "t_eval": run.solution.t}
+    return {"resumed": resumed_is_same(case.build(), (0.0, case.end), run.solution, **options)}
 
 
 CHECKS = (size, ending, constraint_errors, energy, order, agreement, laws, repeated, resumed)

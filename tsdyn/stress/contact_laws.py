@@ -6,6 +6,7 @@ import numpy as np
 
 from ..constraints import PlaneContact, Rope, Stop
 from ..maths.tolerances import HALF_DIGITS
+from ..model.handles import index_of
 from ..observables.evaluate import constraint_arrays, mass_matrix
 from .findings import Finding, extent, some
 from .tolerances import IMPACTED, IMPACTS, OUTPUTS, PENETRATED
@@ -30,15 +31,12 @@ def unilateral(solution):
 
 
 def impacts(solution):
-    """What an impact changes are the momenta of its impulses, and of those of the bilateral constraints.
-
-    Impulses of friction aren't among those that a run tells.
-    """
+    """What an impact changes are the momenta of its impulses, and of those of the bilateral constraints."""
     contacts = [] if solution._phases is None else list(_contacts(solution.packed))
-    if not contacts or any(getattr(contact, "kinetic", 0.0) for contact, _ in contacts):
+    if not contacts:
         return
-    system = solution.packed.system
-    rows, fastest = [row for _, own in contacts for row in own], np.abs(solution.qd).max(axis=0)
+    system, fastest = solution.packed.system, np.abs(solution.qd).max(axis=0)
+    rows = [row for contact, own in contacts for row in (*own, *_slips(contact, own))]
     before, after = _events(solution)
     hit = [k for k, i in enumerate(before) if any(t == solution.t[i] for t, *_ in solution.impulses)]
     for k in np.array(hit, int)[some(len(hit), IMPACTS)] if hit else ():
@@ -47,9 +45,12 @@ def impacts(solution):
         M, Phi_q = mass_matrix(system, q), constraint_arrays(system, q, solution.qd[i], t)[1]
         change = M @ (solution.qd[j] - solution.qd[i])
         for contact, own in contacts:
-            p = sum(p for at, name, p in solution.impulses if (at, name) == (t, contact.name))
+            found = [p for at, name, p in solution.impulses if (at, name) == (t, contact.name)]
             nearest = int(np.argmin([abs(gap[i]) for gap in _gaps(contact, solution)]))
-            change = change - contact.sides[nearest].sign * Phi_q[own[nearest]] * p
+            change = change - contact.sides[nearest].sign * Phi_q[own[nearest]] * sum(found)
+            if found and _slips(contact, own):
+                slips, P = Phi_q[_slips(contact, own)], sum(p.tangential for p in found)
+                change = change - slips.T @ (_directions(solution.packed, contact, slips) @ P)
         B = np.delete(Phi_q, rows, axis=0)
         left = change - B.T @ np.linalg.lstsq(B.T, change, rcond=None)[0]
         share = np.abs(left).max() / ((np.abs(M) @ fastest).max() or 1.0)
@@ -75,6 +76,18 @@ def _contacts(packed):
     for member in packed.members:
         if getattr(member.constraint, "unilateral", False):
             yield member.constraint, [member.rows.start + i for i in range(len(member.constraint.sides))]
+
+
+def _slips(contact, own):
+    """The rows of the slips of a contact with friction, which follow that of its gap."""
+    return [own[0] + 1, own[0] + 2] if getattr(contact, "rubs", False) else []
+
+
+def _directions(packed, contact, slips):
+    """Directions (2, 3) of slips, ground frame, from their rows (2, n) of Phi_q."""
+    body, sign = (contact.a, 1.0) if contact.a.dimension else (contact.b, -1.0)
+    at = packed.system.bodies[index_of(packed, body), 0]
+    return sign * slips[:, at : at + 3]
 
 
 def _size(solution):

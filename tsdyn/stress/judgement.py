@@ -74,7 +74,7 @@ def implicit_methods(case, solution, run):
     if len(solution.scene.bodies) > FEW:
         return []
     found = []
-    with suppress(InvalidArgument):  # what the null-space form doesn't serve
+    with suppress(InvalidArgument):  # Radau: friction by reactions, the null-space form
         found += _agreeing("agreement with SDIRK54", case, solution, run, {"integrator": "sdirk54"})
         found += _agreeing("agreement with Radau", case, solution, run, {"integrator": "radau"})
     return found

@@ -106,7 +106,7 @@ function labels() {
   const largest = Object.entries(run.scales).filter(([, x]) => x > 0).map(([unit, x]) => `${x.toPrecision(3)} ${unit === "force" ? "N" : "N m"}`);
   field("legend").textContent = `grid ${Number(step.toPrecision(1))} m${largest.length ? `\nlongest arrows ${largest.join(", ")}` : ""}`
     + (run.arrows.every((arrow) => arrow.unique) ? "" : "\ngrey: reactions that are not unique")
-    + (contacts.length ? "\ncontacts: green pushes, red holds back, yellow is hit" : "");
+    + (contacts.length ? "\ncontacts: green pushes, blue sticks, red holds back, yellow is hit" : "");
   const usual = duration >= 1.5 && duration <= 60 ? 1 : Number((duration / 10).toPrecision(1)) || 1;
   for (const factor of [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10]) {
     const rate = Number((factor * usual).toPrecision(2));

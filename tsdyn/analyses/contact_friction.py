@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.tolerances import LEAST_SLIP
+from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
 from .contact_problem import NoSolution, Settled, depends, energy_gain, slack_of
@@ -109,7 +109,7 @@ class Cones:
 def settle_grips(inertia, resting, qd, fired=()):
     """Which of the gaps that are closed and at rest stay so, and which stick or slide; arguments as of `settle`.
 
-    Slips that are rounding have been ended in qd, see `halted`.
+    Slips that are rounding have been ended in qd, see `halted`; so have slow ones that come to rest, see `at_turn`.
 
     Returns
     -------
@@ -132,6 +132,32 @@ def settle_grips(inertia, resting, qd, fired=()):
     return again._replace(idle=found.idle, grips={**found.grips, **again.grips})
 
 
+def at_turn(inertia, resting, qd, fired, turned):
+    """Velocities (n,) and the `Settled`, with the slips ended that come to rest where they turn.
+
+    Below AHEAD friction keeps its direction, so that a slip which ends would turn again and again. It is ended where the
+    contact would stick: with all that are as slow, as of a body that comes to rest, or alone.
+
+    turned : list of int
+        Gaps whose slips have turned away from the direction of their friction.
+    """
+    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], AHEAD)
+    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rubs[i]], AHEAD)
+    closed = [i for i in inertia.held if i in resting]
+    for which in (slow, turned) if turned else ():
+        ended = halted(inertia, qd, closed, which)
+        if inertia.rates(ended)[resting].any():  # others have closed at once
+            ended = halted(inertia, qd, resting, which)
+        try:
+            settled = settle_grips(inertia, resting, ended, fired)
+        except NoSolution:
+            continue
+        if all(settled.grips.get(i, ()) is None for i in which):
+            return ended, settled
+    qd = halted(inertia, qd, resting)
+    return qd, settle_grips(inertia, resting, qd, fired)
+
+
 def _settled(inertia, resting, qd, fired):
     """As `settle_grips`, with the normal loads shared among all contacts."""
     gaps, resting = inertia.gaps, list(resting)
@@ -144,6 +170,7 @@ def _settled(inertia, resting, qd, fired):
     _demand_unique(G, d, mu, mode)
     gdd = c + inertia.J @ (response @ p)
     small, carried = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p)), inertia.carried()
+    mode = _sharing(G, b, p, mode, cones, response)
     closed, idle, spare, grips = [], [], [], {}
     for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
         i = resting[j]
@@ -166,6 +193,23 @@ def _settled(inertia, resting, qd, fired):
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
     slack = slack_of(inertia, closed, dict(zip(resting, N, strict=True)), small)
     return Settled(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack)
+
+
+def _sharing(G, b, p, mode, cones, response):
+    """Modes (k,) in which all contacts stick that don't accelerate, where friction in proportion to its bounds lets them.
+
+    Where slips depend on each other, the solution may have some at their bounds that others could relieve.
+    """
+    moves, terms = ((x @ y + z).reshape(-1, 3)[:, 1:] for x, y, z in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
+    still = cones.rubs & ~cones.slides & (mode != OPEN) & (np.abs(moves) <= LEVEL * terms).all(axis=1)
+    if (mode[still] == STICKS).all():
+        return mode
+    loads = p.reshape(-1, 3)[still]
+    slips = response.T.reshape(-1, 3, response.shape[0])[still, 1:]
+    bounds = cones.static[still] * loads[:, 0]
+    T = spread(bounds[None], slips[None], loads[None, :, 1:])[0]
+    within = np.hypot(*T.T) < (1.0 - AT_BOUND) * bounds
+    return np.where(still, STICKS, mode) if within.all() else mode
 
 
 def _independent(inertia, closed, grips):
@@ -233,25 +277,40 @@ def _carried(inertia, closed, idle, grips, N, resting):
     return sorted(closed), sorted(idle)
 
 
-def halted(inertia, qd, resting):
-    """Velocities (n,) with the slips ended that are rounding, of the gaps `resting` with friction."""
-    slow = [i for i in resting if inertia.gaps.rubs[i] and 0.0 < np.hypot(*inertia.slips(qd)[i]) <= LEAST_SLIP]
+def halted(inertia, qd, resting, which=None):
+    """Velocities (n,) with slips ended of the gaps `resting`: of `which`, by default those that are rounding.
+
+    What sticks goes on to, and what goes on sliding changes its friction with its load: as in the course of time.
+    """
+    rubbing = [i for i in resting if inertia.gaps.rubs[i]]
+    slow = slow_slips(inertia, qd, rubbing, LEAST_SLIP) if which is None else which
     if not slow:
         return qd
-    rows = np.concatenate([inertia.J[resting], inertia.tangents[slow].reshape(2 * len(slow), -1)])
-    response = inertia.free(rows.T)
-    left = np.concatenate([np.zeros(len(resting)), (inertia.tangents[slow] @ qd).ravel()])
-    return qd - response @ np.linalg.lstsq(rows @ response, left, rcond=RANK_TOL**2)[0]
+    slips, loads = inertia.slips(qd), inertia.J[resting]
+    for k, i in enumerate(resting):
+        if i in rubbing and i not in slow and slips[i].any():
+            loads[k] -= inertia.gaps.kinetic[i] * (slips[i] / np.hypot(*slips[i])) @ inertia.tangents[i]
+    held = [i for i in rubbing if i in slow or not slips[i].any()]
+    tangents = inertia.tangents[held].reshape(2 * len(held), -1)
+    response = inertia.free(np.concatenate([loads, tangents]).T)
+    left = np.concatenate([np.zeros(len(resting)), tangents @ qd])
+    G = np.concatenate([inertia.J[resting], tangents]) @ response
+    return qd - response @ np.linalg.lstsq(G, left, rcond=RANK_TOL**2)[0]
 
 
-def spread(N, responses, T):
-    """The same friction (k, c, 2) of c contacts at k states as N (k, c) would carry it where rows depend.
+def slow_slips(inertia, qd, which, limit):
+    """Of gaps with friction those that slip, by `limit`, m/s, at most."""
+    return [i for i in which if 0.0 < np.hypot(*inertia.slips(qd)[i]) <= limit]
 
-    responses (k, c, 2, n): accelerations by unit friction. The least sum of |T|^2 / N with the same accelerations: a
-    box on a plane that doesn't turn has T / N alike at all corners.
+
+def spread(bounds, responses, T):
+    """The same friction (k, c, 2) of c contacts at k states in proportion to its bounds (k, c) where rows depend.
+
+    responses (k, c, 2, n): accelerations by unit friction. The least sum of |T|^2 / (mu N) with the same accelerations:
+    a box on a plane that doesn't turn has T / (mu N) alike at all corners.
     """
-    k, c = N.shape
-    weight = np.repeat(np.sqrt(np.maximum(N, 0.0)), 2, axis=1)
+    k, c = bounds.shape
+    weight = np.repeat(np.sqrt(np.maximum(bounds, 0.0)), 2, axis=1)
     rows = responses.reshape(k, 2 * c, -1)
     loads = np.einsum("kr,krn->kn", T.reshape(k, 2 * c), rows)
     found = [

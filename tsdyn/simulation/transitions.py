@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from ..analyses.contact_friction import Cones, halted, settle_grips
+from ..analyses.contact_friction import Cones, at_turn, settle_grips
 from ..analyses.contact_problem import Inertia, NoSolution, settle
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
 from ..analyses.tolerances import AT_ONCE, AT_REST, LEVEL, RESTS, STOPPED
@@ -53,7 +53,8 @@ class Transitions:
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         hit = [i for i in fired if i < count]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
-        status = self._settle(sorted(touching), hit, [i - count for i in fired if count <= i < count + own])
+        turned = [i - count - own for i in fired if i >= count + own and before.slides(i - count - own)]
+        status = self._settle(sorted(touching), hit, [i - count for i in fired if count <= i < count + own], turned)
         if measured and self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status
@@ -74,10 +75,10 @@ class Transitions:
             self.judged = self.t, 0
         return False
 
-    def _settle(self, touching, fired, broken):
+    def _settle(self, touching, fired, broken, turned=()):
         """Impact, then which gaps stay closed, which frictions stick; the Status if there is no way on, else None.
 
-        fired, broken: gaps and frictions whose events have come.
+        fired, broken: gaps and frictions whose events have come; turned: gaps whose slips have turned.
         """
         slots, values, qd = self.remembered[self.count :], self.gap, self.qd
         before, self.modes, self.rest = self.modes, UnitModes(), self.t
@@ -103,9 +104,12 @@ class Transitions:
             opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
             # What grazes without a reaction has left: its gap was rounding
             leaving = [i for i in fired if i in before.closed or i in grazing]
-            self.qd = halted(inertia, self.qd, resting)
-            self.modes = UnitModes(opened=opened)
-            self._settle_contacts(settled_by(inertia, resting, self.qd, leaving), before)
+            self.modes, rubs = UnitModes(opened=opened), self.gaps.rubs[resting].any()
+            if rubs:
+                self.qd, settled = at_turn(inertia, resting, self.qd, leaving, turned)
+            else:
+                settled = settle(inertia, resting, self.qd, leaving)
+            self._settle_contacts(settled, before)
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
             status = self._settle_all(before, inertia, touching, resting, leaving, broken)
             kept = {*self.modes.closed, *self.modes.idle}
@@ -326,8 +330,12 @@ class Transitions:
         return after
 
     def _note_impulses(self, inertia, which, p, qd):
-        """Note the impulses (k, 3) of the gaps `which`, but those that change the rates at qd by less than rounding."""
-        small = AT_REST * inertia.sizes(qd)
+        """Note the impulses (k, 3) of the gaps `which`, but those that change rates at qd by less than rounding.
+
+        Rounding of the rates is a share of their terms, of those of all impulses, and of what the time leaves open.
+        """
+        small = AT_REST * (inertia.sizes(qd) + np.abs(inertia.G[:, which]) @ np.abs(p[:, 0]))
+        small += RESTS * EPS * abs(self.t) * inertia.sizes(self.qdd)
         self.phases.impulses += [
             (self.t, self.gaps.names[i], impulse_of(inertia, i, own))
             for i, own in zip(which, p, strict=True)

@@ -81,7 +81,7 @@ def extremes(coefficients):
 LARGEST = 32  # degree
 CALM = 12  # consecutive halvings that leave one half resolved: the other has a kink or a jump
 POLISH = 16  # degree of the interpolant for an extremum
-MOST = 1 << 20  # samples of one search
+MOST = 1 << 20  # samples of one search, by default
 
 
 class TooFast(Exception):
@@ -283,6 +283,8 @@ class Search:
         Error of the value at a time that rounding of the state causes.
     noise : float
         Known rounding error of the values.
+    most : int
+        Samples at most.
 
     Attributes
     ----------
@@ -293,8 +295,8 @@ class Search:
         Samples taken.
     """
 
-    def __init__(self, sample, shaken, noise=0.0):
-        self.sample, self.shaken, self.noise = sample, shaken, noise
+    def __init__(self, sample, shaken, noise=0.0, most=MOST):
+        self.sample, self.shaken, self.noise, self.most = sample, shaken, noise, most
         self.points, self.spent, self._shortest, self._unit = [], 0, 0.0, 1.0
 
     def run(self, a, value, b, degree):
@@ -327,7 +329,7 @@ class Search:
 
     def _values(self, times):
         self.spent += times.size
-        if self.spent > MOST:
+        if self.spent > self.most:
             raise TooFast
         return self._unit * self.sample(times)
 

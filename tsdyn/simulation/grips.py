@@ -118,9 +118,9 @@ def _slip_columns(contact, first):
 
 def carried(gaps, which, t, q, memory, N, T):
     """Friction (k, c, 2) of contacts that stick, where rows depend on others shared in proportion to N (k, c)."""
-    rows = np.isnan(T).any(axis=(1, 2))
+    rows = np.isnan(T).any(axis=(1, 2)) & np.isfinite(N).all(axis=1)  # at singular configurations N is NaN, too
     if rows.any():
-        T = np.nan_to_num(T)
+        T[rows] = np.nan_to_num(T[rows])
         responses = np.array([gaps.responses(t[k], q[k], memory[k], which) for k in np.flatnonzero(rows)])
         T[rows] = spread(N[rows], responses, T[rows])
     return T

@@ -9,7 +9,7 @@ from ..analyses.contact_problem import slip_rows
 from ..analyses.contact_rows import reaction_workspace
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
-from ..elements.tolerances import AHEAD, LEAST_SLIP
+from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
 from ..model.handles import index_of
 from .phase_scenes import first_row_of
@@ -136,16 +136,10 @@ class Halting:
     gaps : Gaps
     slides : list of int
         Those that slide.
-
-    Attributes
-    ----------
-    noise : ndarray (slides,)
-        Values that are noise, of slips that others hold.
     """
 
     def __init__(self, gaps, slides):
         self.gaps, self.slides, self.ways = gaps, slides, gaps.slots[slides][:, None] + np.arange(3)
-        self.noise = np.full(len(slides), LEAST_SLIP)
 
     def over(self, states):
         """Values (k, slides) of states at k times."""

@@ -3,6 +3,7 @@
 import pickle
 import subprocess
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -549,6 +550,24 @@ def test_links_that_lie_on_a_floor_hold_each_other():
     assert np.isfinite(solution.multipliers).all()
     for name, load in (("first", G), ("second", G / 2)):
         np.testing.assert_allclose(solution.reaction(name)[0], np.tile([0, 0, load], (len(solution.t), 1)), atol=1e-9)
+
+
+@pytest.mark.parametrize("who", ["run", "equilibrium"])
+def test_joints_carry_friction_that_blocks_share(who):
+    """Blocks of 1, 2 and 3 kg in a row, on rods; 12 N on the first: T = 2 N for each kg, rods carry 10 N and 6 N."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    blocks = [scene.add_point_mass(mass=m, position=(m, 0, 0), name=f"{m}") for m in (1, 2, 3)]
+    for block in blocks:
+        scene.add(C.PlaneContact(block, scene.ground, **FLOOR, kinetic=0.5, name=f"floor {block.name}"))
+    rods = [scene.add(C.Distance(a, b)) for a, b in pairwise(blocks)]
+    scene.add(ts.forces.PointForce(blocks[0], force=(-12, 0, 0)))
+    found = ts.simulate(scene, (0, 1)).raise_if_failed() if who == "run" else scene.equilibrium()
+    for block in blocks:
+        load = np.atleast_2d(found.reaction(f"floor {block.name}")[0])[-1]
+        np.testing.assert_allclose(load, (2 * block.mass, 0, G * block.mass), atol=1e-12)
+    for rod, a, pull in zip(rods, blocks, (10, 6), strict=False):
+        load = np.atleast_2d(found.reaction(rod, on=a)[0])[-1]
+        np.testing.assert_allclose(load, (pull, 0, 0), atol=1e-12)
 
 
 BOXES = [

@@ -144,6 +144,7 @@ def _settled(inertia, resting, qd, fired):
     _demand_unique(G, d, mu, mode)
     gdd = c + inertia.J @ (response @ p)
     small, carried = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p)), inertia.carried()
+    mode = _sharing(G, b, p, mode, cones, response)
     closed, idle, spare, grips = [], [], [], {}
     for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
         i = resting[j]
@@ -166,6 +167,22 @@ def _settled(inertia, resting, qd, fired):
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
     slack = slack_of(inertia, closed, dict(zip(resting, N, strict=True)), small)
     return Settled(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack)
+
+
+def _sharing(G, b, p, mode, cones, response):
+    """Modes (k,) in which all contacts stick that don't accelerate, where friction in proportion to loads lets them.
+
+    Where slips depend on each other, the solution may have some at their bounds that others could relieve.
+    """
+    moves, terms = ((x @ y + z).reshape(-1, 3)[:, 1:] for x, y, z in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
+    still = cones.rubs & ~cones.slides & (mode != OPEN) & (np.abs(moves) <= LEVEL * terms).all(axis=1)
+    if (mode[still] == STICKS).all():
+        return mode
+    loads = p.reshape(-1, 3)[still]
+    slips = response.T.reshape(-1, 3, response.shape[0])[still, 1:]
+    T = spread(loads[None, :, 0], slips[None], loads[None, :, 1:])[0]
+    within = np.hypot(*T.T) < (1.0 - AT_BOUND) * cones.static[still] * loads[:, 0]
+    return np.where(still, STICKS, mode) if within.all() else mode
 
 
 def _independent(inertia, closed, grips):

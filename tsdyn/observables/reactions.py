@@ -203,11 +203,15 @@ def multipliers(packed, t, q, qd, qdd, memory=None):
     memory (k, slots): memory of forces, zeros by default.
     """
     memory = with_normal_loads(packed, t, q, qd, qdd, memory)
-    found = taken(packed, q.shape[1])
-    out = np.zeros((t.size, len(packed.system.segments)))
-    f = applied_loads(packed.system, t, q, qd, memory)
-    f += velocity_forces(found.system, q, qd)
-    f -= inertial_forces(found.system, q, qdd)
+    system, f = with_short_rows(packed), applied_loads(packed.system, t, q, qd, memory)
+    f += velocity_forces(system, q, qd)
+    f -= inertial_forces(system, q, qdd)
+    return balancing(packed, t, q, f, memory)
+
+
+def balancing(packed, t, q, f, memory=None):
+    """Multipliers (k, m) of Phi_q^T lam = f, generalised forces (k, n) in balance; NaN as of `multipliers`."""
+    found, out = taken(packed, q.shape[1]), np.zeros((t.size, len(packed.system.segments)))
     memory = np.zeros((t.size, 0)) if memory is None else memory
     solve_multipliers(found.address, t, q, f, memory, np.zeros((len(found.system.segments), WIDTH)), out)
     give(packed, found)

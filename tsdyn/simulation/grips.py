@@ -12,6 +12,7 @@ from ..elements.friction import heading
 from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
 from ..model.handles import index_of
+from ..observables.reactions import balancing
 from .phase_scenes import first_row_of
 from .tolerances import SAME_WAY, SLOW
 
@@ -153,10 +154,11 @@ def losses(gaps, which, lam, t, q, qd):
     return (lam[:, gaps.slip_rows[which]] * slips).sum(axis=2)
 
 
-def add_friction(gaps, modes, packed, t, q, qd, memory, lam, out):
+def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
     """Write the multipliers of the slips in a phase into out (k, m): those of contacts that slide, and redundant ones.
 
-    memory (k, slots) has the directions; lam (k, rows) are the multipliers of the phase.
+    memory (k, slots) has the directions; lam (k, rows) are the multipliers of the phase, of which out has the rows
+    shared[0] from shared[1]. Joints between bodies that stick carry what redundant slips share.
     """
     rubbing = [i for i in modes.closed if gaps.rubs[i]]
     if not rubbing:
@@ -170,8 +172,13 @@ def add_friction(gaps, modes, packed, t, q, qd, memory, lam, out):
         T = -out[:, rows[sticks]]
         for j, i in enumerate(sticks):
             T[:, j, [k for k, held in enumerate(modes.grips[rubbing[i]]) if not held]] = np.nan
-        which = [rubbing[j] for j in sticks]
-        out[:, rows[sticks]] = -carried(gaps, which, t, q, memory, N[:, sticks], T)
+        redundant, T = np.isnan(T), carried(gaps, [rubbing[j] for j in sticks], t, q, memory, N[:, sticks], T)
+        if redundant.any():
+            # M qdd + Phi_q^T (lam + change) = Q + J^T T    J: redundant slips
+            f = np.einsum("kci,kcin->kn", np.where(redundant, T, 0.0), tangents[:, sticks])
+            change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
+            out[:, shared[0]] += change[:, shared[1]]
+        out[:, rows[sticks]] = -T
     slip = np.einsum("kcin,kn->kci", tangents, qd)
     for j, i in enumerate(rubbing):
         if modes.slides(i):

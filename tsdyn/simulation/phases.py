@@ -178,14 +178,14 @@ class Phases:
         """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
         out = np.zeros((len(numbers), m))
         for kind, mine, some in self._gathered(numbers, arrays):
-            rows, columns = self._columns[kind]
+            shared = rows, columns = self._columns[kind]
             *motion, memory = some
             lam = reactions.multipliers(self.packed[kind], *motion, self._own_memory(kind, memory))
             own = np.zeros((mine.size, m))
             own[:, rows] = lam[:, columns]
             modes = self._modes(kind)
             if modes.grips:
-                add_friction(self._gaps[kind], modes, self.packed[kind], *motion[:3], memory, lam, own)
+                add_friction(self._gaps[kind], modes, self.packed[kind], shared, *motion[:3], memory, lam, own)
             out[mine] = own
         return out
 

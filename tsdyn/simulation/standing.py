@@ -176,10 +176,10 @@ def _of_all(scene, found, gaps, phase, modes):
     levels = state.q[None], state.qd[None], state.qdd[None]
     lam = reactions.multipliers(phase.packed, t, *levels, state.memory[None])
     found.multipliers = np.zeros((1, len(scene.system.segments)))
-    rows, columns = shared_rows(scene.packed, phase.packed)
+    shared = rows, columns = shared_rows(scene.packed, phase.packed)
     found.multipliers[:, rows] = lam[:, columns]
     if modes.grips:
-        add_friction(gaps, modes, phase.packed, t, *levels[:2], state.memory[None], lam, found.multipliers)
+        add_friction(gaps, modes, phase.packed, shared, t, *levels[:2], state.memory[None], lam, found.multipliers)
     else:
         first = {id(part): row for part, row in first_rows(phase.packed.constraints)}
         for i in modes.closed:

@@ -331,8 +331,12 @@ class Transitions:
         return after
 
     def _note_impulses(self, inertia, which, p, qd):
-        """Note the impulses (k, 3) of the gaps `which`, but those that change the rates at qd by less than rounding."""
-        small = AT_REST * inertia.sizes(qd)
+        """Note the impulses (k, 3) of the gaps `which`, but those that change rates at qd by less than rounding.
+
+        Rounding of the rates is a share of their terms, of those of all impulses, and of what the time leaves open.
+        """
+        small = AT_REST * (inertia.sizes(qd) + np.abs(inertia.G[:, which]) @ np.abs(p[:, 0]))
+        small += RESTS * EPS * abs(self.t) * inertia.sizes(self.qdd)
         self.phases.impulses += [
             (self.t, self.gaps.names[i], impulse_of(inertia, i, own))
             for i, own in zip(which, p, strict=True)

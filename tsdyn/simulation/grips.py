@@ -137,10 +137,13 @@ class Halting:
     gaps : Gaps
     slides : list of int
         Those that slide.
+    noise : ndarray (slides,), m/s
+        Rounding of the slips: of one that others hold, nothing else is left.
     """
 
-    def __init__(self, gaps, slides):
-        self.gaps, self.slides, self.ways = gaps, slides, gaps.slots[slides][:, None] + np.arange(3)
+    def __init__(self, gaps, slides, noise):
+        self.gaps, self.slides, self.noise = gaps, slides, noise
+        self.ways = gaps.slots[slides][:, None] + np.arange(3)
 
     def over(self, states):
         """Values (k, slides) of states at k times."""

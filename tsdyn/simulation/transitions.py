@@ -108,6 +108,8 @@ class Transitions:
             # back by rounding: contacts that leave together would take turns
             left = [i for i, (at, _, rate) in before.opened.items() if rate == 0.0 and self._is_now(at)]
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
+            if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
+                self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
             self.qd = halted(inertia, self.qd, resting)
             self.modes = UnitModes(opened=opened)
             self._settle_contacts(settled_by(inertia, resting, self.qd, leaving), before)

@@ -81,7 +81,7 @@ def extremes(coefficients):
 LARGEST = 32  # degree
 CALM = 12  # consecutive halvings that leave one half resolved: the other has a kink or a jump
 POLISH = 16  # degree of the interpolant for an extremum
-MOST = 1 << 20  # samples of one search, by default
+MOST = 1 << 20  # samples of one search
 
 
 class TooFast(Exception):
@@ -283,8 +283,8 @@ class Search:
         Error of the value at a time that rounding of the state causes.
     noise : float
         Known rounding error of the values.
-    most : int
-        Samples at most.
+    most : int, optional
+        Samples at most; MOST by default.
 
     Attributes
     ----------
@@ -295,8 +295,8 @@ class Search:
         Samples taken.
     """
 
-    def __init__(self, sample, shaken, noise=0.0, most=MOST):
-        self.sample, self.shaken, self.noise, self.most = sample, shaken, noise, most
+    def __init__(self, sample, shaken, noise=0.0, most=None):
+        self.sample, self.shaken, self.noise, self.most = sample, shaken, noise, most or MOST
         self.points, self.spent, self._shortest, self._unit = [], 0, 0.0, 1.0
 
     def run(self, a, value, b, degree):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InvalidArgument, Status
-from ..maths.root_isolation import LARGEST, MOST, Search, TooFast
+from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import all_angles, counted, handles_of
 from ..model.kinematics import Anchor, Kinematics
@@ -413,7 +413,7 @@ class Watch:
     def _finite(self, i, t, value):
         """The value of a member of a group; raises `EventFailed`."""
         if not math.isfinite(value):
-            text = f"The reaction of {self.events[i].name} isn't determined at t = {t:.9g} s: a singular state."
+            text = f"The reaction of {self.events[i].name} isn't determined at t = {t:.9g} s: the state is singular."
             raise EventFailed(text, t, Status.CONTACT_FAILED)
         return value
 
@@ -516,7 +516,7 @@ class Watch:
         """Times up to `end`, and values of event i, between which its sign changes once at most; what `EventFailed`."""
         track, good, failure = self.tracks[i], [step.t0], None
         is_member = isinstance(self.events[i].function, GroupMember)
-        most, status = (limits.MOST_OF_MEMBER, Status.CONTACT_FAILED) if is_member else (MOST, Status.EVENT_FAILED)
+        most, status = (limits.MOST_OF_MEMBER, Status.CONTACT_FAILED) if is_member else (None, Status.EVENT_FAILED)
 
         def sample(times):
             values, function = np.full(times.size, np.nan), self.events[i].function

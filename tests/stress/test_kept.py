@@ -74,7 +74,7 @@ KEPT_CONTACTS = {
     (
         "chain_over_floor",
         700140,
-    ): "links in a line: others hold the slip of a contact at its bound",
+    ): "rows of contacts that stick lose rank: the run ends with an account",
     ("stack", 600024): "all corners of a box leave at one instant",
     ("stack", 910030): "velocities of 1e8 m/s end at an impact",
     ("ropes", 500014): "reactions of rounding, in free fall",

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.tolerances import LEAST_SLIP
+from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
 from .contact_problem import NoSolution, Settled, depends, energy_gain, slack_of
@@ -109,7 +109,7 @@ class Cones:
 def settle_grips(inertia, resting, qd, fired=()):
     """Which of the gaps that are closed and at rest stay so, and which stick or slide; arguments as of `settle`.
 
-    Slips that are rounding have been ended in qd, see `halted`.
+    Slips that are rounding have been ended in qd, see `halted`; so have slow ones that come to rest, see `at_turn`.
 
     Returns
     -------
@@ -130,6 +130,32 @@ def settle_grips(inertia, resting, qd, fired=()):
     if again.closed != found.closed or again.idle:
         return found
     return again._replace(idle=found.idle, grips={**found.grips, **again.grips})
+
+
+def at_turn(inertia, resting, qd, fired, turned):
+    """Velocities (n,) and the `Settled`, with the slips ended that come to rest where they turn.
+
+    Below AHEAD friction keeps its direction, so that a slip which ends would turn again and again. It is ended where
+    the contact would stick: with all that are as slow, as of a body that comes to rest, or alone.
+
+    turned : list of int
+        Gaps whose slips have turned away from the direction of their friction.
+    """
+    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], AHEAD)
+    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rubs[i]], AHEAD)
+    closed = [i for i in inertia.held if i in resting]
+    for which in (slow, turned) if turned else ():
+        ended = halted(inertia, qd, closed, which)
+        if inertia.rates(ended)[resting].any():  # others have closed at once
+            ended = halted(inertia, qd, resting, which)
+        try:
+            settled = settle_grips(inertia, resting, ended, fired)
+        except NoSolution:
+            continue
+        if all(settled.grips.get(i, ()) is None for i in which):
+            return ended, settled
+    qd = halted(inertia, qd, resting)
+    return qd, settle_grips(inertia, resting, qd, fired)
 
 
 def _settled(inertia, resting, qd, fired):
@@ -165,12 +191,13 @@ def _settled(inertia, resting, qd, fired):
             else:
                 grips[i] = inertia.along(i, -T[j] / length)
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
-    slack = slack_of(inertia, closed, dict(zip(resting, N, strict=True)), small)
+    pushes, v = dict(zip(resting, N, strict=True)), dict(zip(resting, b.reshape(-1, 3), strict=True))
+    slack = slack_of(inertia, closed, pushes, small, lambda: _held(inertia, closed, grips, v))
     return Settled(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack)
 
 
 def _sharing(G, b, p, mode, cones, response):
-    """Modes (k,) in which all contacts stick that don't accelerate, where friction in proportion to loads lets them.
+    """Modes (k,): all contacts stick that don't accelerate, where friction in proportion to its bounds lets them.
 
     Where slips depend on each other, the solution may have some at their bounds that others could relieve.
     """
@@ -180,8 +207,9 @@ def _sharing(G, b, p, mode, cones, response):
         return mode
     loads = p.reshape(-1, 3)[still]
     slips = response.T.reshape(-1, 3, response.shape[0])[still, 1:]
-    T = spread(loads[None, :, 0], slips[None], loads[None, :, 1:])[0]
-    within = np.hypot(*T.T) < (1.0 - AT_BOUND) * cones.static[still] * loads[:, 0]
+    bounds = cones.static[still] * loads[:, 0]
+    T = spread(bounds[None], slips[None], loads[None, :, 1:])[0]
+    within = np.hypot(*T.T) < (1.0 - AT_BOUND) * bounds
     return np.where(still, STICKS, mode) if within.all() else mode
 
 
@@ -236,11 +264,7 @@ def _carried(inertia, closed, idle, grips, N, resting):
     from scipy.optimize import nnls
 
     which = [*closed, *idle]
-    loads = inertia.J[which].copy()
-    for j, i in enumerate(which):
-        if grips.get(i) is not None:
-            loads[j] -= inertia.gaps.kinetic[i] * inertia.across(i, grips[i]) @ inertia.tangents[i]
-    columns = inertia.free(loads.T)
+    columns = inertia.free(_loads(inertia, which, grips).T)
     size = np.linalg.norm(columns, axis=0)
     given = np.array([max(N[resting.index(i)], 0.0) for i in which])
     shares, _ = nnls(columns / size, columns @ given)
@@ -250,25 +274,61 @@ def _carried(inertia, closed, idle, grips, N, resting):
     return sorted(closed), sorted(idle)
 
 
-def halted(inertia, qd, resting):
-    """Velocities (n,) with the slips ended that are rounding, of the gaps `resting` with friction."""
-    slow = [i for i in resting if inertia.gaps.rubs[i] and 0.0 < np.hypot(*inertia.slips(qd)[i]) <= LEAST_SLIP]
+def halted(inertia, qd, resting, which=None):
+    """Velocities (n,) with slips ended of the gaps `resting`: of `which`, by default those that are rounding.
+
+    What sticks goes on to, and what goes on sliding changes its friction with its load: as in the course of time.
+    """
+    rubbing = [i for i in resting if inertia.gaps.rubs[i]]
+    slow = slow_slips(inertia, qd, rubbing, LEAST_SLIP) if which is None else which
     if not slow:
         return qd
-    rows = np.concatenate([inertia.J[resting], inertia.tangents[slow].reshape(2 * len(slow), -1)])
-    response = inertia.free(rows.T)
-    left = np.concatenate([np.zeros(len(resting)), (inertia.tangents[slow] @ qd).ravel()])
-    return qd - response @ np.linalg.lstsq(rows @ response, left, rcond=RANK_TOL**2)[0]
+    slips, loads = inertia.slips(qd), inertia.J[resting]
+    for k, i in enumerate(resting):
+        if i in rubbing and i not in slow and slips[i].any():
+            loads[k] -= inertia.gaps.kinetic[i] * (slips[i] / np.hypot(*slips[i])) @ inertia.tangents[i]
+    held = [i for i in rubbing if i in slow or not slips[i].any()]
+    tangents = inertia.tangents[held].reshape(2 * len(held), -1)
+    response = inertia.free(np.concatenate([loads, tangents]).T)
+    left = np.concatenate([np.zeros(len(resting)), tangents @ qd])
+    G = np.concatenate([inertia.J[resting], tangents]) @ response
+    return qd - response @ np.linalg.lstsq(G, left, rcond=RANK_TOL**2)[0]
 
 
-def spread(N, responses, T):
-    """The same friction (k, c, 2) of c contacts at k states as N (k, c) would carry it where rows depend.
+def slow_slips(inertia, qd, which, limit):
+    """Of gaps with friction those that slip, by `limit`, m/s, at most."""
+    return [i for i in which if 0.0 < np.hypot(*inertia.slips(qd)[i]) <= limit]
 
-    responses (k, c, 2, n): accelerations by unit friction. The least sum of |T|^2 / N with the same accelerations: a
-    box on a plane that doesn't turn has T / N alike at all corners.
+
+def _loads(inertia, which, grips):
+    """Loads (k, n) by unit reactions of the gaps `which`, with the friction of those that slide."""
+    loads = inertia.J[which].copy()
+    for j, i in enumerate(which):
+        if grips.get(i) is not None:
+            loads[j] -= inertia.gaps.kinetic[i] * inertia.across(i, grips[i]) @ inertia.tangents[i]
+    return loads
+
+
+def _held(inertia, closed, grips, b):
+    """Reactions (k,) of closed gaps where they and the slips of those that stick have no accelerations.
+
+    b: accelerations (3,) of gaps and slips where all are open, by gaps.
     """
-    k, c = N.shape
-    weight = np.repeat(np.sqrt(np.maximum(N, 0.0)), 2, axis=1)
+    sticks = [i for i in closed if inertia.gaps.rubs[i] and grips[i] is None]
+    slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
+    rows, loads = np.concatenate([inertia.J[closed], slips]), np.concatenate([_loads(inertia, closed, grips), slips])
+    a = np.array([*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])])
+    return -np.linalg.lstsq(rows @ inertia.free(loads.T), a, rcond=RANK_TOL**2)[0][: len(closed)]
+
+
+def spread(bounds, responses, T):
+    """The same friction (k, c, 2) of c contacts at k states in proportion to its bounds (k, c) where rows depend.
+
+    responses (k, c, 2, n): accelerations by unit friction. The least sum of |T|^2 / (mu N) with the same accelerations:
+    a box on a plane that doesn't turn has T / (mu N) alike at all corners.
+    """
+    k, c = bounds.shape
+    weight = np.repeat(np.sqrt(np.maximum(bounds, 0.0)), 2, axis=1)
     rows = responses.reshape(k, 2 * c, -1)
     loads = np.einsum("kr,krn->kn", T.reshape(k, 2 * c), rows)
     found = [

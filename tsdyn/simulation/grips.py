@@ -123,7 +123,7 @@ def carried(gaps, which, t, q, memory, N, T):
     if rows.any():
         T[rows] = np.nan_to_num(T[rows])
         responses = np.array([gaps.responses(t[k], q[k], memory[k], which) for k in np.flatnonzero(rows)])
-        T[rows] = spread(N[rows], responses, T[rows])
+        T[rows] = spread(gaps.static[which] * N[rows], responses, T[rows])
     return T
 
 

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from ..analyses.contact_friction import Cones, halted, settle_grips
+from ..analyses.contact_friction import Cones, at_turn, settle_grips
 from ..analyses.contact_problem import Inertia, NoSolution, settle
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
 from ..analyses.tolerances import AT_ONCE, AT_REST, LEVEL, RESTS, STOPPED
@@ -53,7 +53,8 @@ class Transitions:
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         hit = [i for i in fired if i < count]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
-        status = self._settle(sorted(touching), hit, [i - count for i in fired if count <= i < count + own])
+        turned = [i - count - own for i in fired if i >= count + own and before.slides(i - count - own)]
+        status = self._settle(sorted(touching), hit, [i - count for i in fired if count <= i < count + own], turned)
         if measured and self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status
@@ -77,10 +78,10 @@ class Transitions:
         """Whether a time before the present one is the same instant, to rounding."""
         return self.t - t <= 16.0 * EPS * max(abs(self.t), EPS)
 
-    def _settle(self, touching, fired, broken):
+    def _settle(self, touching, fired, broken, turned=()):
         """Impact, then which gaps stay closed, which frictions stick; the Status if there is no way on, else None.
 
-        fired, broken: gaps and frictions whose events have come.
+        fired, broken: gaps and frictions whose events have come; turned: gaps whose slips have turned.
         """
         slots, values, qd = self.remembered[self.count :], self.gap, self.qd
         before, self.modes, self.rest = self.modes, UnitModes(), self.t
@@ -110,9 +111,12 @@ class Transitions:
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
             if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
                 self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
-            self.qd = halted(inertia, self.qd, resting)
-            self.modes = UnitModes(opened=opened)
-            self._settle_contacts(settled_by(inertia, resting, self.qd, leaving), before)
+            self.modes, rubs = UnitModes(opened=opened), self.gaps.rubs[resting].any()
+            if rubs:
+                self.qd, settled = at_turn(inertia, resting, self.qd, leaving, turned)
+            else:
+                settled = settle(inertia, resting, self.qd, leaving)
+            self._settle_contacts(settled, before)
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
             status = self._settle_all(before, inertia, touching, resting, leaving, broken)
             kept = {*self.modes.closed, *self.modes.idle}

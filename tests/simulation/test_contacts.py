@@ -10,6 +10,7 @@ from scipy.special import ellipk
 import tsdyn as ts
 from tests.helpers.contacts import G, bouncing, box, pendulum
 from tests.helpers.tolerances import EPS
+from tsdyn.simulation.unit_events import Leaving
 
 C = ts.constraints
 
@@ -114,6 +115,31 @@ def test_a_particle_leaves_a_ball_where_the_normal_force_vanishes(radius_a, radi
     assert solution.impulses == []
     assert np.ptp(solution.energy) < 1e-12
     np.testing.assert_array_equal(solution.reaction("touch")[0][-1], 0.0)
+
+
+@pytest.mark.parametrize(("values", "said"), [("fast", "too fast"), ("nan", "touch isn't determined")])
+def test_a_reaction_that_cannot_be_followed_ends_the_run_with_an_account(values, said, monkeypatch):
+    """No more than some ten thousand reactions are evaluated."""
+    over, count = Leaving.over, 0
+
+    def spoilt(self, states):
+        nonlocal count
+        count += states.t.size
+        found = over(self, states)
+        if values == "nan":  # near the zero
+            return np.where(np.abs(found) < 0.1, np.nan, found)
+        return found + np.sin(1e9 * states.t[:, None])
+
+    monkeypatch.setattr(Leaving, "over", spoilt)
+    scene = ts.Scene(gravity=(0, 0, -G))
+    bead = scene.add_point_mass(mass=0.3, position=(0, 0, 1.0), velocity=(0.5, 0, 0))
+    scene.add(C.SphereContact(bead, scene.ground, radius_a=0.0, radius_b=1.0, name="touch"))
+    solution = ts.simulate(scene, (0, 1.0), dense_output=True)
+    assert solution.status == ts.Status.CONTACT_FAILED
+    assert said in solution.message
+    assert solution.state.t < 1.0
+    assert solution.constraint_error.position.max() < 1e-13
+    assert count < 1e5
 
 
 @pytest.mark.parametrize("rigid", [False, True])

@@ -50,6 +50,33 @@ def test_a_stack_of_boxes_falls_and_comes_to_rest(count):
         np.testing.assert_allclose(force, [0, 0, (count - i) * G], atol=1e-9 * count)
 
 
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_all_corners_of_boxes_leave_a_platform_at_one_instant(count):
+    """A platform moves by A sin(w t), boxes slide on it; all loads vanish where A w^2 sin(w t) = g."""
+    A, w, scene = 0.5, 5.0, ts.Scene(gravity=(0, 0, -G))
+    table = scene.add_body(**ts.shapes.box((2, 2, 0.2), mass=5.0), velocity=(0, 0, A * w))
+    slide = scene.add(C.Translational.at(scene.ground, table, point=(0, 0, 0), axis=(0, 0, 1)))
+    scene.add(C.TranslationMotor.of(slide, displacement=ts.motions.Sine(A, w)))
+    below, top = table, 0.1
+    for i in range(count):
+        start = {"position": (0.05, -0.035, 0.1 + BOX[2] * (2 * i + 1)), "velocity": (0.3, 0.1, A * w)}
+        box = scene.add_body(**ts.shapes.box(2 * BOX, mass=1.0 + i), **start)
+        for corner in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            scene.add(C.PlaneContact(box, below, point_a=BOX * [*corner, -1], point_b=(0, 0, top), **FLOOR))
+        below, top = box, BOX[2]
+    leave, end = np.arcsin(G / (A * w**2)) / w, 0.3
+    solution = ts.simulate(scene, (0, end)).raise_if_failed()
+    starts = np.array([start for start, _, _ in solution.phases])
+    assert abs(starts[1] - leave) < 1e-14
+    assert np.abs(starts[1:] - leave).max() < 1e-10
+    assert not [name for name in solution.phases[-1][2] if "body1)" in name]  # boxes fly on each other, without loads
+    for i, box in enumerate(scene.bodies[1:]):
+        height = 0.1 + BOX[2] * (2 * i + 1) + A * np.sin(w * leave)
+        flight = end - leave
+        height += A * w * np.cos(w * leave) * flight - 0.5 * G * flight**2
+        assert abs(solution.state.position(box)[2] - height) < 1e-10
+
+
 def chain(links):
     """A chain along an inclined line, its lower end near the floor; a contact at each lower end of a link."""
     scene, length, angle = ts.Scene(gravity=(0, 0, -G)), 0.1, 0.5

@@ -135,8 +135,8 @@ def settle_grips(inertia, resting, qd, fired=()):
 def at_turn(inertia, resting, qd, fired, turned):
     """Velocities (n,) and the `Settled`, with the slips ended that come to rest where they turn.
 
-    Below AHEAD friction keeps its direction, so that a slip which ends would turn again and again. It is ended where the
-    contact would stick: with all that are as slow, as of a body that comes to rest, or alone.
+    Below AHEAD friction keeps its direction, so that a slip which ends would turn again and again. It is ended where
+    the contact would stick: with all that are as slow, as of a body that comes to rest, or alone.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
@@ -191,12 +191,13 @@ def _settled(inertia, resting, qd, fired):
             else:
                 grips[i] = inertia.along(i, -T[j] / length)
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
-    slack = slack_of(inertia, closed, dict(zip(resting, N, strict=True)), small)
+    pushes, v = dict(zip(resting, N, strict=True)), dict(zip(resting, b.reshape(-1, 3), strict=True))
+    slack = slack_of(inertia, closed, pushes, small, lambda: _held(inertia, closed, grips, v))
     return Settled(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack)
 
 
 def _sharing(G, b, p, mode, cones, response):
-    """Modes (k,) in which all contacts stick that don't accelerate, where friction in proportion to its bounds lets them.
+    """Modes (k,): all contacts stick that don't accelerate, where friction in proportion to its bounds lets them.
 
     Where slips depend on each other, the solution may have some at their bounds that others could relieve.
     """
@@ -263,11 +264,7 @@ def _carried(inertia, closed, idle, grips, N, resting):
     from scipy.optimize import nnls
 
     which = [*closed, *idle]
-    loads = inertia.J[which].copy()
-    for j, i in enumerate(which):
-        if grips.get(i) is not None:
-            loads[j] -= inertia.gaps.kinetic[i] * inertia.across(i, grips[i]) @ inertia.tangents[i]
-    columns = inertia.free(loads.T)
+    columns = inertia.free(_loads(inertia, which, grips).T)
     size = np.linalg.norm(columns, axis=0)
     given = np.array([max(N[resting.index(i)], 0.0) for i in which])
     shares, _ = nnls(columns / size, columns @ given)
@@ -301,6 +298,27 @@ def halted(inertia, qd, resting, which=None):
 def slow_slips(inertia, qd, which, limit):
     """Of gaps with friction those that slip, by `limit`, m/s, at most."""
     return [i for i in which if 0.0 < np.hypot(*inertia.slips(qd)[i]) <= limit]
+
+
+def _loads(inertia, which, grips):
+    """Loads (k, n) by unit reactions of the gaps `which`, with the friction of those that slide."""
+    loads = inertia.J[which].copy()
+    for j, i in enumerate(which):
+        if grips.get(i) is not None:
+            loads[j] -= inertia.gaps.kinetic[i] * inertia.across(i, grips[i]) @ inertia.tangents[i]
+    return loads
+
+
+def _held(inertia, closed, grips, b):
+    """Reactions (k,) of closed gaps where they and the slips of those that stick have no accelerations.
+
+    b: accelerations (3,) of gaps and slips where all are open, by gaps.
+    """
+    sticks = [i for i in closed if inertia.gaps.rubs[i] and grips[i] is None]
+    slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
+    rows, loads = np.concatenate([inertia.J[closed], slips]), np.concatenate([_loads(inertia, closed, grips), slips])
+    a = np.array([*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])])
+    return -np.linalg.lstsq(rows @ inertia.free(loads.T), a, rcond=RANK_TOL**2)[0][: len(closed)]
 
 
 def spread(bounds, responses, T):

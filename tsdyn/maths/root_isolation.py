@@ -283,6 +283,8 @@ class Search:
         Error of the value at a time that rounding of the state causes.
     noise : float
         Known rounding error of the values.
+    most : int, optional
+        Samples at most; MOST by default.
 
     Attributes
     ----------
@@ -293,8 +295,8 @@ class Search:
         Samples taken.
     """
 
-    def __init__(self, sample, shaken, noise=0.0):
-        self.sample, self.shaken, self.noise = sample, shaken, noise
+    def __init__(self, sample, shaken, noise=0.0, most=None):
+        self.sample, self.shaken, self.noise, self.most = sample, shaken, noise, most or MOST
         self.points, self.spent, self._shortest, self._unit = [], 0, 0.0, 1.0
 
     def run(self, a, value, b, degree):
@@ -327,7 +329,7 @@ class Search:
 
     def _values(self, times):
         self.spent += times.size
-        if self.spent > MOST:
+        if self.spent > self.most:
             raise TooFast
         return self._unit * self.sample(times)
 

@@ -16,18 +16,8 @@ from ..observables.reactions import Exerting
 from ..observables.state import RememberingState
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
+from . import tolerances as limits
 from .event_groups import Group, GroupMember, States
-from .tolerances import (
-    FAST_SMOOTH_TURN,
-    FAST_TURN,
-    LEAST_TIME,
-    NOISE,
-    ROOT,
-    SHAKEN,
-    SLOW_SMOOTH_TURN,
-    SLOW_TURN,
-    START_ZERO,
-)
 
 # Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp.
 
@@ -59,11 +49,11 @@ class Event(NamedTuple):
 
 
 class EventFailed(Exception):
-    """An event function raised, or gave no finite number; t is when, s."""
+    """An event function raised, or gave no finite number; t is when, s, and status how the run ends."""
 
-    def __init__(self, message, t):
+    def __init__(self, message, t, status=Status.EVENT_FAILED):
         super().__init__(message)
-        self.t = t
+        self.t, self.status = t, status
 
 
 def prepare(events):
@@ -279,8 +269,8 @@ class Watch:
             try:
                 self._begin(run, self.tracks is None)
             except EventFailed as failure:
-                if any(event.goes_on for event in self.events):
-                    return Status.EVENT_FAILED, str(failure)
+                if failure.status is Status.CONTACT_FAILED or any(event.goes_on for event in self.events):
+                    return failure.status, str(failure)
                 raise InvalidArgument(f"events: {failure}") from failure.__cause__
         stiff, answer = run.numbers.stiff, getattr(memory, "answer", None)  # of sampled loads
         # One step at a time, searched before the next one
@@ -296,7 +286,7 @@ class Watch:
                 try:
                     last = self._search_step(run, log)
                 except EventFailed as failure:
-                    return Status.EVENT_FAILED, str(failure)
+                    return failure.status, str(failure)
                 if last is not None and not self._is_resumed(memory, last):
                     return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
                 status = Status.SLICE_DONE if self.begins_again else status
@@ -320,7 +310,10 @@ class Watch:
         again = self.tracks is not None
         self.tracks = self.tracks or [Track() for _ in self.events]
         for group in self._groups:
-            group.begin(self._sample(group, np.array([self.t]), self.state[None])[0])
+            values = self._sample(group, np.array([self.t]), self.state[None])[0]
+            for i, value in zip(group.numbers, values, strict=True):
+                self._finite(i, self.t, value)
+            group.begin(values)
         for i in self._single:
             track = self.tracks[i]
             track.begin(self.t, self._value(i, self.t, self.state), False)
@@ -350,7 +343,7 @@ class Watch:
         try:
             self._begin(run, True)
         except EventFailed as failure:
-            return Status.EVENT_FAILED, str(failure)
+            return failure.status, str(failure)
         return status, ""
 
     def saved(self):
@@ -414,8 +407,15 @@ class Watch:
         event = self.events[i]
         if isinstance(event.function, GroupMember):
             over, which = event.function.over, event.function.which
-            return float(over(self._states(np.array([t]), state[None]))[0, which])
+            return self._finite(i, t, float(over(self._states(np.array([t]), state[None]))[0, which]))
         return event.value(t, self._instant(t, state))
+
+    def _finite(self, i, t, value):
+        """The value of a member of a group; raises `EventFailed`."""
+        if not math.isfinite(value):
+            text = f"The reaction of {self.events[i].name} isn't determined at t = {t:.9g} s: the state is singular."
+            raise EventFailed(text, t, Status.CONTACT_FAILED)
+        return value
 
     def _states(self, times, levels):
         """What groups are given: times t (k,), levels (k, 3, n)."""
@@ -430,7 +430,7 @@ class Watch:
 
     def _degree_of_group(self, turning, time):
         """As of `_degree`, for a group on a time, s, at this rate."""
-        return self._degree(turning * time, SLOW_SMOOTH_TURN, FAST_SMOOTH_TURN)
+        return self._degree(turning * time, limits.SLOW_SMOOTH_TURN, limits.FAST_SMOOTH_TURN)
 
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
@@ -459,7 +459,7 @@ class Watch:
             first, alone = group.search(step, sample, degree)
             if first is not None:
                 i, t = first
-                shift = self._least_time(step, step.t0, end) + ROOT * abs(t)
+                shift = self._least_time(step, step.t0, end) + limits.ROOT * abs(t)
                 t = self._beyond(i, step, t, shift, end, self.events[i].direction)
                 found.append(Occurrence(t, i, step.at(t)))
                 end = min(end, t)
@@ -502,23 +502,25 @@ class Watch:
 
     def _add_beside(self, step, last):
         """Add the events with an action that occur at the instant of the last one, to rounding of value and time."""
-        before = max(last.t - NOISE * ROOT * abs(last.t), step.t0)
+        before = max(last.t - limits.NOISE * limits.ROOT * abs(last.t), step.t0)
         for i, event in enumerate(self.events):
             track = self.tracks[i]
             if event.action is None or i == last.index or not track.before:
                 continue
             value = self._at(i, step, last.t)
-            noise = max(self._shaken(i, step, last.t), NOISE * abs(value - self._at(i, step, before)))
+            noise = max(self._shaken(i, step, last.t), limits.NOISE * abs(value - self._at(i, step, before)))
             if abs(value) <= noise and event.direction * track.before <= 0.0:
                 self.list[i].append(Occurrence(last.t, i, last.state))
 
     def _points(self, i, step, end):
         """Times up to `end`, and values of event i, between which its sign changes once at most; what `EventFailed`."""
         track, good, failure = self.tracks[i], [step.t0], None
+        is_member = isinstance(self.events[i].function, GroupMember)
+        most, status = (limits.MOST_OF_MEMBER, Status.CONTACT_FAILED) if is_member else (None, Status.EVENT_FAILED)
 
         def sample(times):
             values, function = np.full(times.size, np.nan), self.events[i].function
-            if isinstance(function, GroupMember):
+            if is_member:
                 return function.over(self._states(times, step.levels(times)))[:, function.which]
             states = step.states(times)
             for k, (t, state) in enumerate(zip(times.tolist(), states, strict=True)):
@@ -529,7 +531,7 @@ class Watch:
 
         # A function that fails at some time is searched up to the last time before
         while end > step.t0:
-            search = Search(sample, lambda t: self._shaken(i, step, t), track.noise)
+            search = Search(sample, lambda t: self._shaken(i, step, t), track.noise, most)
             try:
                 degree = max(step.degree, track.degree // 2)
                 track.degree, track.end = search.run(step.t0, track.value, end, degree)
@@ -538,14 +540,14 @@ class Watch:
             except EventFailed as failed:
                 failure, end = failed, max(t for t in good if t < failed.t)
             except TooFast:
-                return [(step.t0, track.value)], EventFailed(
+                text = (
                     f"{self.events[i].name} changes too fast to be followed: {search.spent} values between "
-                    f"t = {step.t0:.9g} and {end:.9g} s were not enough. Give a max_step, or a smoother function.",
-                    step.t0,
+                    f"t = {step.t0:.9g} and {end:.9g} s were not enough. Give a max_step, or a smoother function."
                 )
+                return [(step.t0, track.value)], EventFailed(text, step.t0, status)
         return [(step.t0, track.value)], failure
 
-    def _degree(self, turn, slow=SLOW_TURN, fast=FAST_TURN):
+    def _degree(self, turn, slow=limits.SLOW_TURN, fast=limits.FAST_TURN):
         """The degree that the interpolant and the turn of a body, rad, ask for."""
         return LARGEST if turn > fast else self.reader.degree if turn > slow else self.reader.degree // 2
 
@@ -562,7 +564,7 @@ class Watch:
         (before, value), *rest = points
         # A value near zero at the start of the run is a zero there, within rounding
         if track.sign == 0.0 and track.zero is None:  # the run's first step
-            if 0.0 < abs(track.value) <= START_ZERO * max(abs(value) for _, value in points):
+            if 0.0 < abs(track.value) <= limits.START_ZERO * max(abs(value) for _, value in points):
                 track.zero, track.passed, track.pending = before, value != 0.0, value == 0.0
             else:
                 rest = points
@@ -594,11 +596,11 @@ class Watch:
         try:
             # Rounding of the state, in three random directions
             state, value = step.at(t), self._at(i, step, t)
-            size = SHAKEN * np.abs(state).max(axis=1, keepdims=True)
+            size = limits.SHAKEN * np.abs(state).max(axis=1, keepdims=True)
             shaken = [self._value(i, t, state + size * sign) for sign in _signs(self._n)]
         except EventFailed:
             return 0.0
-        return NOISE * max(abs(each - value) for each in shaken)
+        return limits.NOISE * max(abs(each - value) for each in shaken)
 
     def _zero(self, i, step, t, other):
         """The `Occurrence` at a zero, or at the end next to another time of the zeros around it."""
@@ -632,7 +634,7 @@ class Watch:
 
     def _is_start(self, i, step, t, before):
         """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before, there."""
-        if t - self.start <= START_ZERO * max(abs(self.start), step.t1 - step.t0):
+        if t - self.start <= limits.START_ZERO * max(abs(self.start), step.t1 - step.t0):
             return True
         return before[0] == self.start and abs(before[1]) <= self._shaken(i, step, self.start)
 
@@ -649,13 +651,13 @@ class Watch:
 
         # Brent's method, as near as numbers of this size allow
         least = self._least_time(step, t0, t1)
-        root = brentq(value, t0, t1, xtol=least, rtol=ROOT, maxiter=1000)
-        return self._beyond(i, step, root, least + ROOT * abs(root), t1, b)
+        root = brentq(value, t0, t1, xtol=least, rtol=limits.ROOT, maxiter=1000)
+        return self._beyond(i, step, root, least + limits.ROOT * abs(root), t1, b)
 
     @staticmethod
     def _least_time(step, t0, t1):
         """By how much times between t0 and t1 differ at least, s: never zero."""
-        return max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), LEAST_TIME)
+        return max(EPS * abs(step.t0), EPS * EPS * (t1 - t0), limits.LEAST_TIME)
 
     def _beyond(self, i, step, root, shift, t1, b):
         """A root, or a time after it up to t1 where event i has the sign of b.

@@ -100,6 +100,10 @@ START_ZERO = 64.0 * EPS
 # factor on the largest of three changes.
 SHAKEN, NOISE = 4.0 * EPS, 4.0
 
+# Values of a gap or reaction in the search of one step at most, each a factorisation: seconds. Only near singular
+# states have interpolants of degree 32 on a thousandth of a step not sufficed.
+MOST_OF_MEMBER = 1 << 15
+
 # Of the time: how near to a zero Brent's method comes, as near as it can. s: the least distance there, a normal number.
 # Of the largest value of a group: one at the start that is rounding of zero, as reactions are that the complementarity
 # problem finds; and one at the end of the first step that no rounding makes.

@@ -12,6 +12,7 @@ from ..ahead import compile_ahead
 from ..analyses import contact_rows, friction_units
 from ..analyses.contact_problem import closed_gaps
 from ..analyses.friction_problem import Frictions, Hold, immobile
+from ..analyses.tolerances import AT_REST
 from ..elements.unilateral import contacts_of
 from ..errors import (
     InconsistentState,
@@ -425,9 +426,14 @@ class _ContactRun(Transitions):
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.slides(i)]
-        halting = Halting(gaps, slides)
+        halting = Halting(gaps, slides, AT_REST * self._slip_terms(slides))
         for k, i in enumerate(slides):
             yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
+
+    def _slip_terms(self, which):
+        """Sizes (k,) of the terms of slips at the present velocities."""
+        rows = self.gaps.slopes(self.t, self.q, which) if which else np.zeros((0, 2, self.q.size))
+        return np.abs(rows).max(axis=1) @ np.abs(self.qd)
 
     def _times(self):
         left = self.times[self.taken :]

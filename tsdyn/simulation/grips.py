@@ -10,7 +10,6 @@ from ..analyses.contact_rows import reaction_workspace
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
 from ..elements.tolerances import AHEAD
-from ..errors import SingularConfiguration
 from ..jit.kernels import twin
 from ..model.handles import index_of
 from ..observables.reactions import balancing
@@ -120,16 +119,10 @@ def _slip_columns(contact, first):
 
 
 def carried(gaps, which, t, q, memory, N, T):
-    """Friction (k, c, 2) of contacts that stick, where rows depend on others shared in proportion to N (k, c).
-
-    Raises SingularConfiguration where there are no reactions.
-    """
-    rows = np.isnan(T).any(axis=(1, 2))
-    if np.isnan(N[rows]).any():
-        names = listed([gaps.names[i] for i in which], NAMED)
-        raise SingularConfiguration(f"The rows of these contacts lose rank at t = {t[rows][0]:.9g} s: {names}.")
+    """Friction (k, c, 2) of contacts that stick, where rows depend on others shared in proportion to N (k, c)."""
+    rows = np.isnan(T).any(axis=(1, 2)) & np.isfinite(N).all(axis=1)  # at singular configurations N is NaN, too
     if rows.any():
-        T = np.nan_to_num(T)
+        T[rows] = np.nan_to_num(T[rows])
         responses = np.array([gaps.responses(t[k], q[k], memory[k], which) for k in np.flatnonzero(rows)])
         T[rows] = spread(gaps.static[which] * N[rows], responses, T[rows])
     return T
@@ -145,10 +138,13 @@ class Halting:
     gaps : Gaps
     slides : list of int
         Those that slide.
+    noise : ndarray (slides,), m/s
+        Rounding of the slips: of one that others hold, nothing else is left.
     """
 
-    def __init__(self, gaps, slides):
-        self.gaps, self.slides, self.ways = gaps, slides, gaps.slots[slides][:, None] + np.arange(3)
+    def __init__(self, gaps, slides, noise):
+        self.gaps, self.slides, self.noise = gaps, slides, noise
+        self.ways = gaps.slots[slides][:, None] + np.arange(3)
 
     def over(self, states):
         """Values (k, slides) of states at k times."""

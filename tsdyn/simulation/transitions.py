@@ -62,8 +62,7 @@ class Transitions:
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
         since, count = self.judged
-        length = self.t - self.phases.starts[-1]
-        self.at_once = self.at_once + 1 if length <= 16.0 * EPS * max(abs(self.t), EPS) else 0
+        self.at_once = self.at_once + 1 if self._is_now(self.phases.starts[-1]) else 0
         self.judged = since, count + 1
         if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count + self.frictions.count:
             self.reason = f"There are {self.at_once} events at t = {self.t:.9g} s."
@@ -74,6 +73,10 @@ class Transitions:
                 return True
             self.judged = self.t, 0
         return False
+
+    def _is_now(self, t):
+        """Whether a time before the present one is the same instant, to rounding."""
+        return self.t - t <= 16.0 * EPS * max(abs(self.t), EPS)
 
     def _settle(self, touching, fired, broken, turned=()):
         """Impact, then which gaps stay closed, which frictions stick; the Status if there is no way on, else None.
@@ -89,9 +92,9 @@ class Transitions:
                 return None
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
-            # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
+            # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies; so slow none opens
             small = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max()
-            rates[[i for i in before.closed if abs(rates[i]) <= small[i]]] = 0.0
+            rates[[i for i in touching if (rates[i] > 0.0 or i in before.closed) and abs(rates[i]) <= small[i]]] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
             opening = [i for i in fired if i not in before.closed]
             noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
@@ -102,8 +105,12 @@ class Transitions:
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
             opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
-            # What grazes without a reaction has left: its gap was rounding
-            leaving = [i for i in fired if i in before.closed or i in grazing]
+            # What grazes without a reaction has left: its gap was rounding. What has left at this instant doesn't come
+            # back by rounding: contacts that leave together would take turns
+            left = [i for i, (at, _, rate) in before.opened.items() if rate == 0.0 and self._is_now(at)]
+            leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
+            if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
+                self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
             self.modes, rubs = UnitModes(opened=opened), self.gaps.rubs[resting].any()
             if rubs:
                 self.qd, settled = at_turn(inertia, resting, self.qd, leaving, turned)

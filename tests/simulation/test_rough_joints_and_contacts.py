@@ -201,3 +201,19 @@ def test_a_gripper_holds_and_drops_its_load():
     slips = ts.simulate(gripper(10.0), (0, 0.1))
     np.testing.assert_allclose(slips.position("load")[-1, 2], -0.005 * (G - 8.0), atol=HELD)
     assert not slips.sticking("pad 1").any()
+
+
+@pytest.mark.parametrize("method", ["taylor", "dop853", "radau"])
+def test_a_block_comes_to_rest_on_a_cart_that_its_brake_holds(method):
+    """The end of the slip leaves the cart a rate of rounding, which is no sliding: the brake goes on to hold it."""
+    scene = ts.Scene(gravity=(0, 0, -10.0))
+    cart = scene.add_body(3.0, (1, 1, 1), name="cart")
+    rail = scene.add(C.Translational.at(scene.ground, cart, point=(0, 0, 0), axis=(1, 0, 0), name="rail"))
+    scene.add(F.TranslationalFriction(rail, kinetic=0.14, name="brake"))
+    block = scene.add_point_mass(1.0, velocity=(1.3, 0, 0), name="block")
+    scene.add(C.PlaneContact(block, cart, normal_b=(0, 0, 1), unilateral=True, kinetic=0.4, name="floor"))
+    solution = ts.simulate(scene, (0, 1), integrator=method)
+    assert [names for _, _, names in solution.phases] == [("floor", "brake")] * 2
+    assert abs(solution.phases[1][0] - 1.3 / 4.0) < HELD
+    np.testing.assert_allclose(solution.position("block")[-1, 0], 1.3**2 / 8.0, atol=HELD)
+    assert np.abs(solution.position("cart")).max() < ALGEBRA

@@ -103,11 +103,13 @@ class Transitions:
             opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
             # What grazes without a reaction has left: its gap was rounding
             leaving = [i for i in fired if i in before.closed or i in grazing]
-            self.qd = halted(inertia, self.qd, resting)
+            broken = broken if self.qd is qd else ()  # an impact has given them other velocities
+            struck, self.qd = self.qd, halted(inertia, self.qd, resting)
+            # Speeds of frictions that are rounding: of an impact, and what ends the slips of contacts
+            rounding = AT_REST * np.abs(struck - qd).max() + self.frictions.sizes(self.q, self.qd - struck)
             self.modes = UnitModes(opened=opened)
             self._settle_contacts(settled_by(inertia, resting, self.qd, leaving), before)
-            broken = broken if self.qd is qd else ()  # an impact has given them other velocities
-            status = self._settle_all(before, inertia, touching, resting, leaving, broken)
+            status = self._settle_all(before, inertia, touching, resting, leaving, broken, rounding)
             kept = {*self.modes.closed, *self.modes.idle}
             opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
             self._begin_memory([i for i in self.modes.closed if i not in before.closed])
@@ -139,14 +141,15 @@ class Transitions:
             angles, memory = self.remembered[: self.count], self.remembered[self.count :]
             begin_memory(packed, handles_of(packed), angles, memory, items)
 
-    def _settle_all(self, before, unheld, touching, resting, leaving, broken):
+    def _settle_all(self, before, unheld, touching, resting, leaving, broken, rounding):
         """Frictions beside the contacts at rest, and the rows that hold these then; as of `_settle`.
 
-        unheld: the `Inertia` without frictions. Again where other gaps close: the ways of frictions end there.
+        unheld: the `Inertia` without frictions; rounding: as of `_settle_frictions`. Again where other gaps close: the
+        ways of frictions end there.
         """
         cones = Cones(unheld, resting, self.qd) if self.frictions.count and resting else None
         for _ in range(ROUNDS):
-            status = self._settle_frictions(before, broken, cones)
+            status = self._settle_frictions(before, broken, cones, rounding)
             if status is not None or not (self.frictions.count and resting):
                 return status
             holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
@@ -179,10 +182,10 @@ class Transitions:
             self.held_gaps[key] = gaps_of(self.scene, self.without, holds)
         return self.held_gaps[key]
 
-    def _settle_frictions(self, before, fired, cones=None):
+    def _settle_frictions(self, before, fired, cones=None, rounding=0.0):
         """Which frictions stick, and what the others exert on contacts; the Status if there is no way on, else None.
 
-        cones: the `Cones` of contacts at rest.
+        cones: the `Cones` of contacts at rest; rounding: of speeds (units,), beside that of the bodies' velocities.
         """
         frictions, count = self.frictions, self.count
         if not frictions.count:
@@ -191,7 +194,7 @@ class Transitions:
         # Velocities that change within rounding of the time are at rest, too, and those that come to rest at
         # once: where loads vanish along a chain events would follow each other ever faster
         sizes, rates = frictions.sizes(self.q, self.qd), frictions.sizes(self.q, self.qdd)
-        least = np.maximum(AT_REST * sizes, RESTS * EPS * abs(self.t) * rates)
+        least = np.maximum(AT_REST * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
         least = np.maximum(least, AT_ONCE * np.minimum(sizes, (self.t - self.span[0]) * rates))
         self.remembered, resting, guess = self.remembered.copy(), [], {}
         memory = self.remembered[count:]  # a part of it

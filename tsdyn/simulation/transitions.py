@@ -82,7 +82,7 @@ class Transitions:
         slots, values, qd = self.remembered[self.count :], self.gap, self.qd
         before, self.modes, self.rest = self.modes, UnitModes(), self.t
         if not touching:
-            return self._settle_frictions(before, broken)
+            return self._settle_frictions(before, broken, self._rounding(before))
         try:
             if len(touching) == 1 and self._bounces(touching[0], before, slots):
                 return None
@@ -90,7 +90,7 @@ class Transitions:
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
             small = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max()
-            rates[[i for i in before.closed if abs(rates[i]) <= small[i]]] = 0.0
+            rates[[i for i in before.closed if self._is_unstruck() or abs(rates[i]) <= small[i]]] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
             opening = [i for i in fired if i not in before.closed]
             noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
@@ -104,9 +104,9 @@ class Transitions:
             # What grazes without a reaction has left: its gap was rounding
             leaving = [i for i in fired if i in before.closed or i in grazing]
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
+            rounding = self._rounding(before) + AT_REST * np.abs(self.qd - qd).max()
             struck, self.qd = self.qd, halted(inertia, self.qd, resting)
-            # Speeds of frictions that are rounding: of an impact, and what ends the slips of contacts
-            rounding = AT_REST * np.abs(struck - qd).max() + self.frictions.sizes(self.q, self.qd - struck)
+            rounding += self.frictions.sizes(self.q, self.qd - struck)
             self.modes = UnitModes(opened=opened)
             self._settle_contacts(settled_by(inertia, resting, self.qd, leaving), before)
             status = self._settle_all(before, inertia, touching, resting, leaving, broken, rounding)
@@ -149,7 +149,7 @@ class Transitions:
         """
         cones = Cones(unheld, resting, self.qd) if self.frictions.count and resting else None
         for _ in range(ROUNDS):
-            status = self._settle_frictions(before, broken, cones, rounding)
+            status = self._settle_frictions(before, broken, rounding, cones)
             if status is not None or not (self.frictions.count and resting):
                 return status
             holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
@@ -182,10 +182,21 @@ class Transitions:
             self.held_gaps[key] = gaps_of(self.scene, self.without, holds)
         return self.held_gaps[key]
 
-    def _settle_frictions(self, before, fired, cones=None, rounding=0.0):
+    def _rounding(self, before):
+        """Speeds (units,) at which frictions rest for sure: any of those that stick, but after an impact."""
+        found = np.zeros(self.frictions.count)
+        if self._is_unstruck():
+            found[list(before.sticking)] = np.inf
+        return found
+
+    def _is_unstruck(self):
+        """Whether velocities are those with which the phase before has ended: what has held still does."""
+        return np.array_equal(self.qd, self.ended)
+
+    def _settle_frictions(self, before, fired, rounding, cones=None):
         """Which frictions stick, and what the others exert on contacts; the Status if there is no way on, else None.
 
-        cones: the `Cones` of contacts at rest; rounding: of speeds (units,), beside that of the bodies' velocities.
+        rounding: of speeds (units,), beside that of the bodies' velocities; cones: the `Cones` of contacts at rest.
         """
         frictions, count = self.frictions, self.count
         if not frictions.count:

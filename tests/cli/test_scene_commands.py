@@ -35,6 +35,18 @@ def test_run_lasts_ten_seconds_by_default(folder, capsys):
     assert found["provenance"]["method"].startswith("Taylor")
 
 
+def test_a_run_with_a_contact_counts_phases_and_impulses(folder, capsys):
+    """A stone falls by 5 m, for 1.01 s, and stays."""
+    (folder / "fall.toml").write_text(
+        FALL + '[[constraint]]\ntype = "PlaneContact"\na = "stone"\nb = "ground"\nname = "floor"\n'
+        "normal_b = [0, 0, 1]\nunilateral = true\n"
+    )
+    found = json.loads(called(capsys, "run", "fall.toml", "--to", "2", "--json")[1])
+    assert (found["phases"], found["impulses"]) == (2, 1)
+    found = json.loads(called(capsys, "run", "fall.toml", "--to", "1", "--json")[1])
+    assert (found["phases"], found["impulses"]) == (1, 0)
+
+
 def test_options_come_before_the_file(folder, capsys):
     (folder / "fall.toml").write_text(FALL + '[run]\nend = 0.2\nevery = 0.1\nmethod = "rk45"\nrtol = 1e-7\n')
     found = json.loads(called(capsys, "run", "fall.toml", "--json")[1])

@@ -166,6 +166,24 @@ def test_solutions_print(method):
     assert "Newton sweep" in str(series)
 
 
+def cubic(t, a, b, par, out):
+    out[1] = 1e3 * a[1] ** 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("formulation", "method"), [("tangent", "radau"), ("null-space", "sdirk54")])
+def test_a_stiff_run_that_collapses_names_a_method_that_serves(formulation, method):
+    """Beside an overdamped spring a point runs away from y = 1 m by 1000 y^3."""
+    scene = ts.Scene()
+    damped = scene.add_point_mass(1.0, position=(1, 0, 0), name="damped")
+    scene.add(F.Spring(damped, scene.ground, stiffness=1e6, damping=1e6, free_length=1.0, name="damper"))
+    scene.add(F.UserForce(scene.add_point_mass(1.0, position=(0, 1, 0)), function=cubic, name="push"))
+    solution = ts.simulate(scene, (0, 5), integrator="dop853", formulation=formulation)
+    assert solution.status is ts.Status.STEP_COLLAPSED
+    assert f"The motion is stiff: integrator={method!r} may succeed." in solution.message
+    ts.prepare(scene, integrator=method, formulation=formulation)  # it does serve
+
+
 @pytest.mark.parametrize(
     ("call", "error"),
     [

@@ -201,3 +201,41 @@ def test_a_gripper_holds_and_drops_its_load():
     slips = ts.simulate(gripper(10.0), (0, 0.1))
     np.testing.assert_allclose(slips.position("load")[-1, 2], -0.005 * (G - 8.0), atol=HELD)
     assert not slips.sticking("pad 1").any()
+
+
+def carts(speeds, friction, block, mu):
+    """A block slides along x on a pile of carts, each of which has a brake on the one below."""
+    scene = ts.Scene(gravity=(0, 0, -10.0))
+    below = scene.ground
+    for i, (speed, own) in enumerate(zip(speeds, friction, strict=True)):
+        cart = scene.add_body(1.0 + i, (1, 1, 1), velocity=(speed, 0, 0), name=f"cart {i}")
+        rail = scene.add(C.Translational.at(below, cart, point=(0, 0, 0), axis=(1, 0, 0), name=f"rail {i}"))
+        scene.add(F.TranslationalFriction(rail, kinetic=own, name=f"brake {i}"))
+        below = cart
+    scene.add_point_mass(1.0, velocity=(block, 0, 0), name="block")
+    scene.add(C.PlaneContact(scene["block"], below, normal_b=(0, 0, 1), unilateral=True, kinetic=mu, name="floor"))
+    return scene
+
+
+@pytest.mark.parametrize("method", ["taylor", "dop853", "radau"])
+@pytest.mark.parametrize("friction", [(0.14,), (0.19, 0.08)], ids=str)
+def test_a_block_comes_to_rest_on_carts_that_their_brakes_hold(method, friction):
+    """The end of the slip leaves the carts rates of rounding, which are no sliding: the brakes go on to hold them."""
+    solution = ts.simulate(carts([0.0] * len(friction), friction, 1.3, 0.2), (0, 2), integrator=method)
+    names = ("floor", *(f"brake {i}" for i in range(len(friction))))
+    assert [held for _, _, held in solution.phases] == [names] * 2
+    assert abs(solution.phases[1][0] - 1.3 / 2.0) < HELD
+    np.testing.assert_allclose(solution.position("block")[-1, 0], 1.3**2 / 4.0, atol=HELD)
+    assert np.abs(solution.position("cart 0")).max() < ALGEBRA
+
+
+@pytest.mark.parametrize("method", ["dop853", "radau"])
+@pytest.mark.parametrize("seed", range(4))
+def test_carts_come_to_rest_one_after_the_other(method, seed):
+    """They, and the block, stand still after at most the sum of v / (mu g); nothing drives them again."""
+    rng = np.random.default_rng(seed)
+    scene = carts(rng.uniform(-2, 2, 2), rng.uniform(0.3, 0.4, 2), rng.uniform(-2, 2), rng.uniform(0.1, 0.2))
+    solution, other = (ts.simulate(scene, (0, 6), integrator=each, rtol=1e-10, atol=1e-10) for each in (method, None))
+    assert np.diff(solution.energy).max() <= TIGHT
+    assert np.abs(solution.qd[-1]).max() < ALGEBRA
+    np.testing.assert_allclose(solution.q[-1], other.q[-1], atol=CLOSE)

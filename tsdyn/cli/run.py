@@ -239,6 +239,8 @@ def summary(solution):
         "message": solution.message,
         "reached": float(solution.reached),
         "outputs": int(solution.t.size),
+        "phases": len(solution.phases),
+        "impulses": len(solution.impulses),
         "constraint_error": {name: _largest(getattr(error, name)) for name in ("position", "velocity", "acceleration")},
         "energy": {"start": float(energy[0]), "end": float(energy[-1]), "range": float(np.ptp(energy))}
         if energy.size

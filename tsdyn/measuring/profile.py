@@ -13,7 +13,8 @@ import numpy as np
 from ..calls import fitting, unknown_argument
 from ..drawing import GREY, Tabulated, new_figure
 from ..errors import InvalidArgument, Status, TsdynError
-from ..integrators import SDIRK54, Taylor
+from ..formulations.registry import FORMULATIONS
+from ..integrators import Taylor
 from ..jit.cache import statistics
 from ..jit.kernels import DEBUG
 from ..model.handles import has_rates
@@ -446,7 +447,8 @@ def _changes(profile, plain, options):
         yield f"The default method, {{}} at {given}, is", {"integrator": None, **same}
     if method.step is None:
         if solution.stats.stiff and not method.implicit:
-            yield "The motion is stiff: {} is", {"integrator": SDIRK54(method.rtol, method.atol)}
+            form = FORMULATIONS[plain.get("formulation", "tangent")]
+            yield "The motion is stiff: {} is", {"integrator": implicit(method, prepared(profile.scene), form)}
         looser = copy.copy(method)
         looser.rtol, looser.atol = limits.LOOSER * method.rtol, limits.LOOSER * method.atol
         if max(looser.rtol, looser.atol) <= limits.LOOSEST:

@@ -120,7 +120,7 @@ class _ContactRun(Transitions):
         self._demand_served(kept)
         self.t = self.span[0]
         self.q, self.qd = scene._initial() if call.state is None else state_arrays(call.state, kept.n)
-        self.qdd = np.zeros(kept.n)  # before the present transition
+        self.qdd, self.ended = np.zeros(kept.n), None  # before the present transition; velocities there
         self.remembered = remembered(call.state, kept, self.t, self.q)
         start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
         kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
@@ -318,6 +318,7 @@ class _ContactRun(Transitions):
         self._end_phase(t)
         before = self.modes
         self.t, (self.q, self.qd, self.qdd), self.remembered = t, run.now.copy(), run.remembered.copy()
+        self.ended = self.qd
         remembered = self.remembered
         self.settled = (self._transit([self.watched[i] for i in numbers]),)
         changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
@@ -486,6 +487,7 @@ class _ContactRun(Transitions):
             return self.settled[0]
         self.t, self.remembered = end.reached, end.remembered
         self.q, self.qd, self.qdd = (x.copy() for x in end.last)
+        self.ended = self.qd
         self.reason = outcome.reason
         self.acted = goes_on and bool(acting)
         if goes_on:

@@ -13,8 +13,7 @@ from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
 from ..model.handles import index_of
 from ..observables.reactions import balancing
-from ..validation import listed
-from .phase_scenes import NAMED, first_row_of
+from .phase_scenes import first_row_of
 from .tolerances import SAME_WAY, SLOW
 
 # A closed contact with friction sticks or slides. Where it sticks, all its rows hold; those of the slip of a point are

@@ -123,6 +123,11 @@ def _of_motion(solution, t, q, qd, near):
 
 
 FEW = 3  # items named in a message
+IMPLICIT = {  # what serves stiff motions, by the formulation
+    "tangent": "integrator='radau'",
+    "null-space": "integrator='sdirk54'",
+    "maggi-kane": "integrator='radau' in the tangent form",
+}
 NO_NUMBERS = Status.NOT_FINITE, Status.STEP_COLLAPSED
 AHEAD = 10.0 ** np.arange(-12, 2)  # parts of a usual step; the last ones may be longer
 
@@ -156,7 +161,7 @@ def account(solution, scene, reason, goes_on=""):
         found = _jump(solution)
     if not found and solution.status in (Status.STEP_COLLAPSED, Status.NOT_FINITE, Status.STAGE_FAILED):
         # Report that the motion is stiff, or that its velocities diverge
-        said = "The motion is stiff: an implicit method, such as SDIRK54, may succeed. " if solution.stats.stiff else ""
+        said = f"The motion is stiff: {IMPLICIT[solution.formulation]} may succeed. " if solution.stats.stiff else ""
         first, last = (float(np.abs(qd).max(initial=0.0)) for qd in (solution[:1].qd, solution._last[1]))
         if last > limits.BLOW_UP * (1.0 + first):
             said += f"The largest velocity has grown from {first:.3g} to {last:.3g}: the motion diverges."

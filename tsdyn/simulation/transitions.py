@@ -86,7 +86,7 @@ class Transitions:
         slots, values, qd = self.remembered[self.count :], self.gap, self.qd
         before, self.modes, self.rest = self.modes, UnitModes(), self.t
         if not touching:
-            return self._settle_frictions(before, broken)
+            return self._settle_frictions(before, broken, self._rounding(before))
         try:
             if len(touching) == 1 and self._bounces(touching[0], before, slots):
                 return None
@@ -94,7 +94,8 @@ class Transitions:
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies; so slow none opens
             small = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max()
-            rates[[i for i in touching if (rates[i] > 0.0 or i in before.closed) and abs(rates[i]) <= small[i]]] = 0.0
+            still = [i for i in before.closed if self._is_unstruck() or abs(rates[i]) <= small[i]]
+            rates[still + [i for i in touching if 0.0 < rates[i] <= small[i]]] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
             opening = [i for i in fired if i not in before.closed]
             noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
@@ -109,16 +110,18 @@ class Transitions:
             # back by rounding: contacts that leave together would take turns
             left = [i for i, (at, _, rate) in before.opened.items() if rate == 0.0 and self._is_now(at)]
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
+            broken = broken if self.qd is qd else ()  # an impact has given them other velocities
+            rounding = self._rounding(before) + AT_REST * np.abs(self.qd - qd).max()
             if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
                 self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
-            self.modes, rubs = UnitModes(opened=opened), self.gaps.rubs[resting].any()
-            if rubs:
+            self.modes, struck = UnitModes(opened=opened), self.qd
+            if self.gaps.rubs[resting].any():
                 self.qd, settled = at_turn(inertia, resting, self.qd, leaving, turned)
             else:
                 settled = settle(inertia, resting, self.qd, leaving)
+            rounding += self.frictions.sizes(self.q, self.qd - struck)
             self._settle_contacts(settled, before)
-            broken = broken if self.qd is qd else ()  # an impact has given them other velocities
-            status = self._settle_all(before, inertia, touching, resting, leaving, broken)
+            status = self._settle_all(before, inertia, touching, resting, leaving, broken, rounding)
             kept = {*self.modes.closed, *self.modes.idle}
             opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
             self._begin_memory([i for i in self.modes.closed if i not in before.closed])
@@ -150,14 +153,15 @@ class Transitions:
             angles, memory = self.remembered[: self.count], self.remembered[self.count :]
             begin_memory(packed, handles_of(packed), angles, memory, items)
 
-    def _settle_all(self, before, unheld, touching, resting, leaving, broken):
+    def _settle_all(self, before, unheld, touching, resting, leaving, broken, rounding):
         """Frictions beside the contacts at rest, and the rows that hold these then; as of `_settle`.
 
-        unheld: the `Inertia` without frictions. Again where other gaps close: the ways of frictions end there.
+        unheld: the `Inertia` without frictions; rounding: as of `_settle_frictions`. Again where other gaps close: the
+        ways of frictions end there.
         """
         cones = Cones(unheld, resting, self.qd) if self.frictions.count and resting else None
         for _ in range(ROUNDS):
-            status = self._settle_frictions(before, broken, cones)
+            status = self._settle_frictions(before, broken, rounding, cones)
             if status is not None or not (self.frictions.count and resting):
                 return status
             holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
@@ -190,10 +194,21 @@ class Transitions:
             self.held_gaps[key] = gaps_of(self.scene, self.without, holds)
         return self.held_gaps[key]
 
-    def _settle_frictions(self, before, fired, cones=None):
+    def _rounding(self, before):
+        """Speeds (units,) at which frictions rest for sure: any of those that stick, but after an impact."""
+        found = np.zeros(self.frictions.count)
+        if self._is_unstruck():
+            found[list(before.sticking)] = np.inf
+        return found
+
+    def _is_unstruck(self):
+        """Whether velocities are those with which the phase before has ended: what has held still does."""
+        return np.array_equal(self.qd, self.ended)
+
+    def _settle_frictions(self, before, fired, rounding, cones=None):
         """Which frictions stick, and what the others exert on contacts; the Status if there is no way on, else None.
 
-        cones: the `Cones` of contacts at rest.
+        rounding: of speeds (units,), beside that of the bodies' velocities; cones: the `Cones` of contacts at rest.
         """
         frictions, count = self.frictions, self.count
         if not frictions.count:
@@ -202,7 +217,7 @@ class Transitions:
         # Velocities that change within rounding of the time are at rest, too, and those that come to rest at
         # once: where loads vanish along a chain events would follow each other ever faster
         sizes, rates = frictions.sizes(self.q, self.qd), frictions.sizes(self.q, self.qdd)
-        least = np.maximum(AT_REST * sizes, RESTS * EPS * abs(self.t) * rates)
+        least = np.maximum(AT_REST * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
         least = np.maximum(least, AT_ONCE * np.minimum(sizes, (self.t - self.span[0]) * rates))
         self.remembered, resting, guess = self.remembered.copy(), [], {}
         memory = self.remembered[count:]  # a part of it

@@ -388,7 +388,7 @@ def refusal(packed):
     shown = found[:SHOWN] + ([f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else [])
     return (
         f"Taylor needs the series of every constraint and force, and these have none: {'; '.join(shown)}. All other "
-        "methods serve: DOP853 is the nearest to it, SDIRK54 is for stiff scenes. A plug-in may be given a kernel "
+        "methods serve: DOP853 is the nearest to it, Radau is for stiff scenes. A plug-in may be given a kernel "
         "`series` (docs/plug-ins.md); a function of time or state has one if it is arithmetic and functions of NumPy, "
         "without branches."
     )

@@ -1,4 +1,4 @@
-"""Contacts in tsdyn, MuJoCo and Drake: error against time.
+"""Contacts in tsdyn, MuJoCo, Exudyn and Drake: error against time.
 
 - ball: it falls from 1 m and bounces with e = 0.8; the error is that of its height after 1.5 s, in the third flight.
 - rocking: a slender block rocks on smooth ground, by plastic impacts of its edges; the error is that of its tilt after

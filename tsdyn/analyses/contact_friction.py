@@ -196,7 +196,7 @@ def _settled(inertia, resting, qd, fired):
 
 
 def _sharing(G, b, p, mode, cones, response):
-    """Modes (k,) in which all contacts stick that don't accelerate, where friction in proportion to its bounds lets them.
+    """Modes (k,) in which all contacts stick that don't accelerate, if friction in proportion to its bounds is within.
 
     Where slips depend on each other, the solution may have some at their bounds that others could relieve.
     """

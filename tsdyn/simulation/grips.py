@@ -10,10 +10,12 @@ from ..analyses.contact_rows import reaction_workspace
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
 from ..elements.tolerances import AHEAD
+from ..errors import SingularConfiguration
 from ..jit.kernels import twin
 from ..model.handles import index_of
 from ..observables.reactions import balancing
-from .phase_scenes import first_row_of
+from ..validation import listed
+from .phase_scenes import NAMED, first_row_of
 from .tolerances import SAME_WAY, SLOW
 
 # A closed contact with friction sticks or slides. Where it sticks, all its rows hold; those of the slip of a point are
@@ -118,8 +120,14 @@ def _slip_columns(contact, first):
 
 
 def carried(gaps, which, t, q, memory, N, T):
-    """Friction (k, c, 2) of contacts that stick, where rows depend on others shared in proportion to N (k, c)."""
+    """Friction (k, c, 2) of contacts that stick, where rows depend on others shared in proportion to N (k, c).
+
+    Raises SingularConfiguration where there are no reactions.
+    """
     rows = np.isnan(T).any(axis=(1, 2))
+    if np.isnan(N[rows]).any():
+        names = listed([gaps.names[i] for i in which], NAMED)
+        raise SingularConfiguration(f"The rows of these contacts lose rank at t = {t[rows][0]:.9g} s: {names}.")
     if rows.any():
         T = np.nan_to_num(T)
         responses = np.array([gaps.responses(t[k], q[k], memory[k], which) for k in np.flatnonzero(rows)])

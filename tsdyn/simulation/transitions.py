@@ -104,8 +104,8 @@ class Transitions:
             opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
             # What grazes without a reaction has left: its gap was rounding
             leaving = [i for i in fired if i in before.closed or i in grazing]
-            self.modes, rubs = UnitModes(opened=opened), self.gaps.rubs[resting].any()
-            if rubs:
+            self.modes = UnitModes(opened=opened)
+            if self.gaps.rubs[resting].any():
                 self.qd, settled = at_turn(inertia, resting, self.qd, leaving, turned)
             else:
                 settled = settle(inertia, resting, self.qd, leaving)

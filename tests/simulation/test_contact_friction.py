@@ -553,19 +553,21 @@ def test_links_that_lie_on_a_floor_hold_each_other():
 
 
 @pytest.mark.parametrize("who", ["run", "equilibrium"])
-def test_joints_carry_friction_that_blocks_share(who):
-    """Blocks of 1, 2 and 3 kg in a row, on rods; 12 N on the first: T = 2 N for each kg, rods carry 10 N and 6 N."""
-    scene = ts.Scene(gravity=(0, 0, -G))
-    blocks = [scene.add_point_mass(mass=m, position=(m, 0, 0), name=f"{m}") for m in (1, 2, 3)]
-    for block in blocks:
-        scene.add(C.PlaneContact(block, scene.ground, **FLOOR, kinetic=0.5, name=f"floor {block.name}"))
+@pytest.mark.parametrize("mu", [(0.5, 0.5, 0.5), (0.2, 0.6, 0.9)])
+def test_joints_carry_friction_that_blocks_share(who, mu):
+    """Blocks of 1, 2 and 3 kg in a row, on rods; 12 N on the first: friction in proportion to its bounds mu N."""
+    scene, masses = ts.Scene(gravity=(0, 0, -G)), np.array([1, 2, 3])
+    blocks = [scene.add_point_mass(mass=m, position=(m, 0, 0), name=f"{m}") for m in masses.tolist()]
+    for block, own in zip(blocks, mu, strict=True):
+        scene.add(C.PlaneContact(block, scene.ground, **FLOOR, kinetic=own, name=f"floor {block.name}"))
     rods = [scene.add(C.Distance(a, b)) for a, b in pairwise(blocks)]
     scene.add(ts.forces.PointForce(blocks[0], force=(-12, 0, 0)))
     found = ts.simulate(scene, (0, 1)).raise_if_failed() if who == "run" else scene.equilibrium()
-    for block in blocks:
+    T = 12 * masses * mu / (masses @ mu)
+    for block, own in zip(blocks, T, strict=True):
         load = np.atleast_2d(found.reaction(f"floor {block.name}")[0])[-1]
-        np.testing.assert_allclose(load, (2 * block.mass, 0, G * block.mass), atol=1e-12)
-    for rod, a, pull in zip(rods, blocks, (10, 6), strict=False):
+        np.testing.assert_allclose(load, (own, 0, G * block.mass), atol=1e-12)
+    for rod, a, pull in zip(rods, blocks, 12 - np.cumsum(T), strict=False):
         load = np.atleast_2d(found.reaction(rod, on=a)[0])[-1]
         np.testing.assert_allclose(load, (pull, 0, 0), atol=1e-12)
 
@@ -619,3 +621,19 @@ def test_a_box_on_corners_of_different_friction_slides_and_turns(mu, size, v, sp
     R = state.rotation("box")
     found = *state.position("box")[:2], np.arctan2(R[1, 0], R[0, 0])
     np.testing.assert_allclose(found, slid(mu, size, legs, v, spin, 0.1), atol=1e-8)
+
+
+def test_a_box_that_slides_and_turns_comes_to_rest_in_few_phases():
+    """Slips that end where they turn end at once; the box slides on three corners, by its equations."""
+    size, scene = (0.6, 0.4, 0.2), boxes(1, mu=0.3, velocity=(1, 0, 0), spin=3.0)
+    solution = ts.simulate(scene, (0, 1), rtol=1e-11, atol=1e-11).raise_if_failed()
+    assert np.count_nonzero(np.diff(solution.t) == 0.0) <= 5
+    (_, end, held), _ = solution.phases
+    places = [contact.point_a for contact in scene.constraints[:4] if contact.name in held]
+    legs = [np.argmin(np.linalg.norm(corners(size) - place, axis=1)) for place in places]
+    legs = [
+        leg for leg, contact in zip(legs, scene.constraints, strict=False) if solution.reaction(contact)[0][0, 2] > 0
+    ]
+    R = solution.rotation("0")[-1]
+    found = *solution.position("0")[-1, :2], np.arctan2(R[1, 0], R[0, 0])
+    np.testing.assert_allclose(found, slid([0.3] * 4, size, legs, (1, 0), 3.0, end - 1e-6), atol=1e-9)

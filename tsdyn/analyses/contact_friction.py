@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.tolerances import AHEAD, LEAST_SLIP
+from ..elements.tolerances import LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
 from .contact_problem import NoSolution, Settled, depends, energy_gain, slack_of
-from .tolerances import AT_BOUND, DEPENDENT, LEVEL, WITHIN_BOUND
+from .tolerances import AT_BOUND, DEPENDENT, LEVEL, STOPPED, WITHIN_BOUND
 
 
 def rows_of(inertia, which):
@@ -135,14 +135,14 @@ def settle_grips(inertia, resting, qd, fired=()):
 def at_turn(inertia, resting, qd, fired, turned):
     """Velocities (n,) and the `Settled`, with the slips ended that come to rest where they turn.
 
-    Below AHEAD friction keeps its direction, so that a slip which ends would turn again and again. It is ended where
-    the contact would stick: with all that are as slow, as of a body that comes to rest, or alone.
+    Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. Below STOPPED it is ended
+    where the contact would stick: with all that are as slow, as of a body that comes to rest, or alone.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
     """
-    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], AHEAD)
-    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rubs[i]], AHEAD)
+    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], STOPPED)
+    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rubs[i]], STOPPED)
     closed = [i for i in inertia.held if i in resting]
     for which in (slow, turned) if turned else ():
         ended = halted(inertia, qd, closed, which)
@@ -197,7 +197,7 @@ def _settled(inertia, resting, qd, fired):
 
 
 def _sharing(G, b, p, mode, cones, response):
-    """Modes (k,): all contacts stick that don't accelerate, where friction in proportion to its bounds lets them.
+    """Modes (k,) in which all contacts stick that don't accelerate, if friction in proportion to its bounds is within.
 
     Where slips depend on each other, the solution may have some at their bounds that others could relieve.
     """

@@ -127,7 +127,7 @@ AT_BOUND, WITHIN_BOUND = 1e-9, 1.0 - 1e-10
 
 # --- friction at rest ------------------------------------------------------------------------------------------------
 # m/s or rad/s: a body that slides in a plane, more slowly, has come to rest where its direction turns: ten times the
-# velocity below which its direction is kept.
+# velocity below which its direction is kept. So has a contact, if it would stick: m/s.
 STOPPED = 1e-8
 # Roundings of the time within which an acceleration changes velocities by none: an event's time is right to some ten.
 RESTS = 100.0

@@ -111,8 +111,8 @@ class Transitions:
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
             if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
                 self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
-            self.modes, rubs = UnitModes(opened=opened), self.gaps.rubs[resting].any()
-            if rubs:
+            self.modes = UnitModes(opened=opened)
+            if self.gaps.rubs[resting].any():
                 self.qd, settled = at_turn(inertia, resting, self.qd, leaving, turned)
             else:
                 settled = settle(inertia, resting, self.qd, leaving)

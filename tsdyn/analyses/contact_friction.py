@@ -191,8 +191,8 @@ def _settled(inertia, resting, qd, fired):
             else:
                 grips[i] = inertia.along(i, -T[j] / length)
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
-    pushes, v = dict(zip(resting, N, strict=True)), dict(zip(resting, b.reshape(-1, 3), strict=True))
-    slack = slack_of(inertia, closed, pushes, small, lambda: _held(inertia, closed, grips, v))
+    pushes = _held(inertia, closed, grips, dict(zip(resting, b.reshape(-1, 3), strict=True)))
+    slack = slack_of(inertia, closed, pushes, small)
     return Settled(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack)
 
 

@@ -398,24 +398,19 @@ def settle(inertia, resting, qd, fired=()):
             idle.append(i)
         else:
             closed.append(i)
-    pushes = dict(zip(resting, lam, strict=True))
-    slack = slack_of(inertia, closed, pushes, small, lambda: inertia.hold(closed, c[closed]))
-    return Settled(sorted(closed), idle, gdd, slack=slack)
+    pushes = lam[basic] if len(closed) == basic.sum() else inertia.hold(closed, c[closed])
+    return Settled(sorted(closed), idle, gdd, slack=slack_of(inertia, closed, pushes, small))
 
 
-def slack_of(inertia, closed, pushes, small, held):
+def slack_of(inertia, closed, pushes, small):
     """The `slack` of closed gaps, from which on their reactions leave them.
 
-    pushes: reactions by gaps, with idle ones; small (count,): rounding of accelerations of the gaps; held: a function
-    that returns the reactions (k,) in the phase, in which closed gaps alone hold. There they may be below zero by what
-    rounding allows: they leave when they have fallen from there, since no zero is found of what begins beyond it.
+    pushes (k,): reactions in the phase, in which closed gaps alone hold; small (count,): rounding of accelerations of
+    the gaps. Reactions may begin below zero by what rounding allows: they leave when they have fallen from there, since
+    no zero is found of what begins beyond it.
     """
-    small = small + inertia.carried()
-    light = [i for i in closed if pushes[i] * inertia.G[i, i] <= small[i]]
-    if not light:
-        return {}
-    found = dict(zip(closed, held(), strict=True))
-    return {i: float(small[i] / inertia.G[i, i] - min(found[i], 0.0)) for i in light}
+    small, found = small + inertia.carried(), zip(closed, pushes, strict=True)
+    return {i: float(small[i] / inertia.G[i, i] - min(p, 0.0)) for i, p in found if p * inertia.G[i, i] <= small[i]}
 
 
 def depends(inertia, closed, i, sticks=()):

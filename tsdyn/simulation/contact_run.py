@@ -259,6 +259,8 @@ class _ContactRun(Transitions):
                 outcome = self.run_task(task, phase, self.options.initial_tol)
                 other = self.instead(task, outcome.status)
             if other is None:
+                if outcome.status is Status.CONTACT_FAILED and outcome.end.reached == self.t and self.end is not None:
+                    raise InconsistentState(outcome.reason)  # the run ends with the phase before
                 outcome = pinned(outcome, resting, still)
                 if self.settled is None:
                     self._end_phase(outcome.end.reached)

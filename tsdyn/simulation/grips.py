@@ -7,6 +7,7 @@ import numpy as np
 from ..analyses.contact_friction import spread
 from ..analyses.contact_problem import slip_rows
 from ..analyses.contact_rows import reaction_workspace
+from ..analyses.tolerances import AT_BOUND
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
 from ..elements.tolerances import AHEAD
@@ -175,11 +176,16 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
         T = -out[:, rows[sticks]]
         for j, i in enumerate(sticks):
             T[:, j, [k for k, held in enumerate(modes.grips[rubbing[i]]) if not held]] = np.nan
-        redundant, T = np.isnan(T), carried(gaps, [rubbing[j] for j in sticks], t, q, memory, N[:, sticks], T)
+        redundant, alone = np.isnan(T), np.nan_to_num(T)
+        T = carried(gaps, [rubbing[j] for j in sticks], t, q, memory, N[:, sticks], T)
         if redundant.any():
             # M qdd + Phi_q^T (lam + change) = Q + J^T T    J: redundant slips
             f = np.einsum("kci,kcin->kn", np.where(redundant, T, 0.0), tangents[:, sticks])
             change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
+            # Near singular states that would take other normal loads: rows that hold carry the friction alone
+            pushing = [first[id(_gap_row(gaps, modes, i))] for i in rubbing]
+            moves = (np.abs(change[:, pushing]) > AT_BOUND * np.abs(N)).any(axis=1)
+            change[moves], T[moves] = 0.0, alone[moves]
             out[:, shared[0]] += change[:, shared[1]]
         out[:, rows[sticks]] = -T
     slip = np.einsum("kcin,kn->kci", tangents, qd)

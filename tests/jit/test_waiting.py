@@ -24,7 +24,7 @@ class Terminal:
 
 def test_one_line_counts_on_a_terminal(monkeypatch):
     monkeypatch.setattr(sys, "stderr", Terminal())
-    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.delenv("TSDYN_QUIET", raising=False)
     with interrupts.Waiting(2) as line:
         for name in (
@@ -34,7 +34,7 @@ def test_one_line_counts_on_a_terminal(monkeypatch):
             line.begin(name)
             line.end(name)
     lines = sys.stderr.text.split("\r")[1:]
-    assert {len(line.rstrip("\n")) for line in lines} == {99}
+    assert {len(line.rstrip("\n")) for line in lines} == {119}
     assert lines[0].split(":")[-1].strip() == "0 of 2, 0 s (initial_conditions.land_start)"
     assert lines[-1].strip() == "tsdyn: 2 of 2 kernels compiled in 0 s."
     assert sys.stderr.text.count("\n") == 1

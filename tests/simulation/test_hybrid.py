@@ -579,7 +579,7 @@ def _edited(path, before, after):
         (lambda change: change.activate("clutch"), r"clutch by 1[01]\."),
         (lambda change: change.set("load.mas", 1.0), "no parameter 'load.mas'"),
         (lambda change: change.set("load.mass", -1.0), "positive"),
-        (lambda change: change.set("load.velocity", (1, 0, 0)), "of the start"),
+        (lambda change: change.set("load.velocity", (1, 0, 0)), "belongs to the start"),
         (lambda change: change.impulse("lode", (1, 0, 0)), "no body is named 'lode'"),
         (lambda change: change.impulse("load", (1, 0)), "three"),
         (lambda change: change.push("load"), "no attribute 'push'"),

@@ -341,7 +341,7 @@ def test_wrong_calls_say_what_is_wrong():
         ts.Run(top.build(), {"rtol": 1e-9})
     with pytest.raises(ts.InvalidArgument, match="checkpoint needs a store"):
         run(SPAN, checkpoint=1.0)
-    with pytest.raises(ts.InvalidArgument, match="solves all stages at once"):
+    with pytest.raises(ts.InvalidArgument, match="solves its stages all at once"):
         ts.prepare(top.build(), integrator="radau", formulation="null-space")
 
 

@@ -241,12 +241,13 @@ def _jump(solution):
 
 def suspect(solution, scene):
     """Name the nearly singular item at the last state."""
-    if solution.status not in (Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED):
+    ends = Status.SINGULAR, Status.NEWTON_FAILED, Status.CHART_LOST, Status.STEP_COLLAPSED
+    if solution.status not in (*ends, Status.NOT_FINITE):
         return ""
     place = singular_place(solution.packed, solution._last[0])
     if place:
         return f"{place}: a singular configuration."
-    if solution._phases is not None:  # not all rows hold
+    if solution.status not in ends or solution._phases is not None:  # not all rows hold in a phase
         return ""
     if solution._last.shape[1] > limits.MOST_SINGULAR:
         return _suspect_of_many(solution, scene)

@@ -92,10 +92,9 @@ class Transitions:
                 return None
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
-            # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies; so slow none opens
-            small = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max()
-            still = [i for i in before.closed if self._is_unstruck() or abs(rates[i]) <= small[i]]
-            rates[still + [i for i in touching if 0.0 < rates[i] <= small[i]]] = 0.0
+            # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
+            small, unstruck = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max(), self._is_unstruck()
+            rates[[i for i in before.closed if unstruck or abs(rates[i]) <= small[i]]] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
             opening = [i for i in fired if i not in before.closed]
             noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]

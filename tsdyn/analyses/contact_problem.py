@@ -409,8 +409,8 @@ def slack_of(inertia, closed, pushes, small):
     the gaps. Reactions may begin below zero by what rounding allows: they leave when they have fallen from there, since
     no zero is found of what begins beyond it.
     """
-    small, found = small + inertia.carried(), zip(closed, pushes, strict=True)
-    return {i: float(small[i] / inertia.G[i, i] - min(p, 0.0)) for i, p in found if p * inertia.G[i, i] <= small[i]}
+    small, G, found = small + inertia.carried(), np.diag(inertia.G), zip(closed, pushes, strict=True)
+    return {i: float(max(small[i] / G[i], -2.0 * p)) for i, p in found if p * G[i] <= small[i]}
 
 
 def depends(inertia, closed, i, sticks=()):

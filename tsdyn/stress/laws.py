@@ -215,8 +215,8 @@ def _balances(solution, bodies, around, shaken=None):
 def _shaken(solution):
     """A copy of a solution, whose positions are off by one rounding of the largest.
 
-    Velocities are off by ten tolerances, as the error of a run may be, where contacts slide: friction of slower slips has
-    no direction of its own.
+    Velocities are off by ten tolerances, as the error of a run may be, where contacts slide: the direction of the
+    friction of slower slips is not determined.
     """
     other, method = copy(solution), solution._method
     for name in ("multipliers", "_memory"):

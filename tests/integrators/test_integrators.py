@@ -10,7 +10,7 @@ from tsdyn.maths.dense_linalg import copy
 from tsdyn.methods import integrator
 from tsdyn.methods.explicit import call_accelerate, call_place, callback, step_kernel, vector
 from tsdyn.methods.interpolants import HERMITE, VALUE, Interpolant
-from tsdyn.testing import integrator_checks
+from tsdyn.testing import integrator_checks, integrator_scenes
 
 I = ts.integrators
 CLASSICAL = I.Nystrom4.first_order
@@ -28,7 +28,7 @@ def restore_registry():
 @pytest.fixture
 def one_scene(monkeypatch):
     """The quickest of the scenes only."""
-    monkeypatch.setattr(integrator_checks, "SCENES", {"sliding top": (integrator_checks.sliding_top, 10.0)})
+    monkeypatch.setattr(integrator_scenes, "SCENES", {"sliding top": (integrator_scenes.sliding_top, 10.0)})
 
 
 @pytest.mark.slow_but("Taylor")
@@ -181,7 +181,7 @@ def test_rejected_steps_that_leave_a_trace():
             _, numbers, _ = super().kernel(first_order)
             return remembering, numbers, lambda nx, ny: 14 * nx + 1
 
-    case = next(iter(integrator_checks.cases(Remembering)))
+    case = next(iter(integrator_scenes.cases(Remembering)))
     with pytest.raises(ts.testing.CheckFailed, match=r"rejected steps leave a trace|and not at once"):
         integrator_checks.check_rejections(Remembering, case, "tangent", "here")
     fails(Remembering, "sliding top, formulation 'tangent'")
@@ -193,7 +193,7 @@ def test_limits_that_are_not_kept(monkeypatch):
     class Hasty(I.RK45):
         order = 5
 
-    case = next(iter(integrator_checks.cases(Hasty)))
+    case = next(iter(integrator_scenes.cases(Hasty)))
     integrator_checks.check_bounds(Hasty, case, "tangent", "here")
     plain = integrator_checks.run_case
 
@@ -212,7 +212,7 @@ def test_limits_that_are_not_kept(monkeypatch):
 
 
 def test_constraint_errors_are_seen():
-    scene = integrator_checks.two_body_pendulum()
+    scene = integrator_scenes.two_body_pendulum()
     solution = ts.simulate(scene, (0.0, 0.1), integrator=I.Nystrom4(0.01))
     integrator_checks.demand_levels(solution, "here")
     for name, level in (("q", "position"), ("qd", "velocity"), ("qdd", "acceleration")):

@@ -11,7 +11,7 @@ from tests.helpers.reference import load
 from tests.helpers.tolerances import FINE, HELD, NEAR
 from tsdyn.measuring import benchmark as agreement
 from tsdyn.measuring import benchmark as benchmark_report
-from tsdyn.testing.integrator_checks import sliding_top, two_body_pendulum
+from tsdyn.testing.integrator_scenes import sliding_top, two_body_pendulum
 
 I = ts.integrators
 SPAN = (0.0, 0.5)

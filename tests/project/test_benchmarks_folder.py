@@ -15,7 +15,7 @@ from benchmarks.measure import Measured, Row, measure
 from benchmarks.scenes import SCENES
 from tests.helpers.scenes import constraints
 from tests.helpers.tolerances import EXACT, FINE, HELD, LOOSE, ROUNDING, TIGHT
-from tsdyn.testing.integrator_checks import sliding_top
+from tsdyn.testing.integrator_scenes import sliding_top
 
 PEERS = peers.contenders()
 SMALL = ("sliding top", "two-body pendulum", "two-body pendulum in space", "chain of 4", "tree of 7", "loop of 4")

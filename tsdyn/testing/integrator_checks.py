@@ -7,105 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..constraints import Distance, PlaneContact, Spherical
 from ..errors import CheckFailed, InvalidArgument, StepFailure
 from ..formulations.registry import FORMULATIONS
-from ..integrators import DOP853, RK45
 from ..maths.tolerances import EPS
-from ..measuring.tolerances import REFERENCE_TOLERANCES
 from ..methods.integrator import Integrator
 from ..observables.diagnostics import ConstraintError, constraint_error
 from ..runs.tolerances import STRETCH
 from ..simulation.prepared_run import simulate
-from ..simulation.scene import Scene
 from . import tolerances as limits
+from .integrator_scenes import GRID, cases, distance
 from .series_checks import demand_kind
-from .tolerances import BRIEF
-
-# Test scenes of `check_integrator`, with their reference solutions.
-
-GRID = 16  # equal parts of the span, at whose ends fixed steps are compared
-INNER = np.sort(np.random.default_rng(1).uniform(0.01, 0.99, 40))  # fractions of the span, within the steps
-
-
-class ReferenceScene(NamedTuple):
-    """A scene and where it is at times t, by two methods that agree to `trusted`, relative to 1 + the size."""
-
-    name: str
-    scene: Scene
-    end: float
-    grid: np.ndarray  # (GRID + 1,), s
-    inner: np.ndarray  # (k,), s
-    q: np.ndarray  # (GRID + 1, n)
-    qd: np.ndarray
-    q_inner: np.ndarray  # (k, n)
-    qd_inner: np.ndarray
-    trusted: float
-
-
-def sliding_top():
-    """A top on a plane without friction: one constraint, fast rotation."""
-    scene = Scene(gravity=(0.0, 0.0, -9.6))
-    top = scene.add_body(30.0, (90.0, 90.0, 30.0), position=(0.0, 0.0, 1.0), angular_velocity=(0.5, 0.0, 12.0))
-    scene.add(PlaneContact(top, scene.ground, point_a=(0.0, 0.0, -1.0), normal_b=(0.0, 0.0, 1.0)))
-    return scene
-
-
-def two_body_pendulum():
-    """Two spheres on a joint and a rod, turning in space."""
-    scene = Scene(gravity=(0.0, 0.0, -9.6))
-    one = scene.add_body(75.0, (30.0, 30.0, 30.0), angular_velocity=(0.3, 0.0, 0.0))
-    two = scene.add_body(75.0, (30.0, 30.0, 30.0), position=(0.0, 0.0, -3.0), angular_velocity=(2.0, 5.0, 1.0))
-    scene.add(Spherical(scene.ground, one))
-    scene.add(Distance(one, two, point_a=(0.0, 0.0, -1.0), point_b=(0.0, 0.0, 1.0), length=1.0))
-    return scene
-
-
-def driven_pendulum():
-    """A rigid body on a rod whose length is a function of time."""
-    scene = Scene()
-    body = scene.add_body(
-        1.0, (0.02, 0.03, 0.04), position=(0.5, 0.0, 0.1), velocity=(0.4, 0.6, 0.0), angular_velocity=(1.0, 2.0, -1.0)
-    )
-    length = (
-        lambda t: 0.5 + 0.1 * np.sin(4.0 * t),
-        lambda t: 0.4 * np.cos(4.0 * t),
-        lambda t: -1.6 * np.sin(4.0 * t),
-    )
-    scene.add(Distance(body, scene.ground, point_a=(0.0, 0.0, -0.1), length=length))
-    scene.assemble()
-    return scene
-
-
-SCENES: dict[str, tuple[Callable[[], Scene], float]] = {
-    "sliding top": (sliding_top, 10.0),
-    "two-body pendulum": (two_body_pendulum, 10.0),
-    "driven pendulum": (driven_pendulum, 3.0),
-}
-
-
-def cases(kind, order=2):
-    """Yield a `ReferenceScene` for each scene, for methods of an order; its reference isn't by the judged `kind`."""
-    first, second = (RK45, DOP853) if isinstance(kind, type) and issubclass(kind, DOP853) else (DOP853, RK45)
-    for name, (build, end) in SCENES.items():
-        end *= BRIEF if order == 1 else 1.0
-        scene, grid, inner = build(), np.linspace(0.0, end, GRID + 1), end * INNER
-        times = np.union1d(grid, inner)
-        tightest = REFERENCE_TOLERANCES[-1]
-        best, other = (
-            simulate(scene, (0.0, end), integrator=method(tightest, tightest), t_eval=times).raise_if_failed()
-            for method in (first, second)
-        )
-        at, within = np.searchsorted(times, grid), np.searchsorted(times, inner)
-        yield ReferenceScene(
-            name, scene, end, grid, inner, best.q[at], best.qd[at], best.q[within], best.qd[within],
-            max(distance(best.q, other.q), distance(best.qd, other.qd)),
-        )  # fmt: skip
-
-
-def distance(found, expected):
-    """Largest difference, relative to 1 + the largest value."""
-    return np.abs(found - expected).max() / (1.0 + np.abs(expected).max())
 
 
 def mean_distance(found, expected):

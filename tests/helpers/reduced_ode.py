@@ -144,7 +144,8 @@ class Mixed:
         parts = allocate_linear(system, n, m, True, kept), *basis_free_parts(graph, n, True)
         self.context = form.context(packed, Context(system, work, *parts), 0)
         self.address, *self._keep = resident(self.context)
-        self.at = np.array([*form.addresses().values(), *form.implicit().values()][:10], np.int64)
+        found = form.addresses() | form.implicit()
+        self.at = np.array([found[name] for name in NAMES], np.int64)
         self.nx, self.ny = form.sizes(packed, graph)
         v, w, wd, vd = np.zeros(self.nx), np.zeros(self.ny), np.zeros(self.ny), np.zeros(self.nx)
         assert _start_mixed(self.address, self.at, 0.0, v, w, wd, vd) == 0

@@ -438,7 +438,9 @@ def test_random_scenes_keep_the_laws(build, seed):
     assert np.diff(solution.energy).max() < 1e-7 * size  # the tolerance of the run
     assert solution.constraint_error.position.max() < 1e-11
     assert solution.dissipation.min() > -1e-9 * size
-    assert min((impulse for *_, impulse in solution.impulses), default=1.0) > 0.0
+    impulses = [impulse for *_, impulse in solution.impulses]
+    # What keeps contacts closed that an impact lifts by less than rounding pulls: about its square root
+    assert min(impulses, default=0.0) >= -1e-6 * max(impulses, default=0.0)
 
 
 # methods, files, refusals

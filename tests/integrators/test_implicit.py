@@ -209,7 +209,7 @@ def test_a_stage_of_a_step_far_too_long(method, step):
 @pytest.mark.parametrize("method", METHODS, **by_name)
 def test_maggi_kane_is_refused(method):
     for integrator in (method(), method.__name__.lower()):
-        with pytest.raises(ts.InvalidArgument, match=r"tangent and the null-space.*'dop853', 'nystrom4', 'rk45'") as caught:
+        with pytest.raises(ts.InvalidArgument, match=r"null-space.*'dop853', 'nystrom4', 'rk45'") as caught:
             ts.simulate(load("sliding_top")[0], (0.0, 1.0), integrator=integrator, formulation="maggi-kane")
         assert "'sdirk54'" not in str(caught.value)
 

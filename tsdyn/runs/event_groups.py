@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..maths.root_isolation import survey
-from .tolerances import FALLEN, FROM_REST, LIKE_THE_LAST, PART, ROOT, ROOT_STEPS, ROUGH_ROOT
+from .tolerances import FALLEN, FROM_REST, ROOT, ROOT_STEPS, ROUGH_ROOT
 
 # A group is surveyed on a step at once (root_isolation.survey). Of the members that cross zero the earliest is located,
 # by the interpolant and Newton's method; the others are surveyed again up to there. Only members whose zeros are
@@ -64,7 +64,6 @@ class Group:
 
     def __init__(self, over, events, numbers):
         self.over, self.numbers, self.degree = over, numbers, 0
-        self._length, self._begun = math.inf, math.nan  # of the last phase that ended so, s; when the present one began
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
         known = getattr(getattr(over, "__self__", None), "noise", None)
@@ -126,21 +125,8 @@ class Group:
             The least degree of interpolants on a time, s.
         """
         self._first, self._was_new, self._is_new = self.value, self._is_new, False
-        self._begun = step.t0 if self._was_new else self._begun
-        # Where phases are much shorter than steps, such as flights of a ball that bounces, the step's begin comes first
-        part = step.t0 + LIKE_THE_LAST * self._length
-        found = None
-        if part - step.t0 < PART * (step.t1 - step.t0):
-            found, alone = self._search_to(part, step, sample, degree)
-        if found is None:
-            found, alone = self._search_to(step.t1, step, sample, degree)
-        self._length = found[1] - self._begun if found else math.inf
-        return found, alone
-
-    def _search_to(self, end, step, sample, degree):
-        """As of `search`, up to a time."""
-        found, last, least = None, self.value.copy(), degree(end - step.t0)
-        alone, left = {}, np.arange(len(last))
+        found, last, least = None, self.value.copy(), degree(step.t1 - step.t0)
+        alone, left, end = {}, np.arange(len(last)), step.t1
         while left.size:
             whole = left.size == len(last)
             values, noise = self.value[left], self.noise[left]
@@ -163,8 +149,7 @@ class Group:
             j, end = first
             found = self.numbers[left[j]], end
             left = np.array([i for i, since in alone.items() if since < end], int)
-        if found or end == step.t1:
-            self.value = last
+        self.value = last
         return found, [i for i, since in alone.items() if since < end]
 
     def _unclear(self, seen, left, noise):

@@ -229,7 +229,7 @@ class StageKernels(Record):
     residual: int
     correct: int
     distance: int
-    take_stage: int  # those of implicit_tangent.py: take_stage to solve_stages
+    take_stage: int  # those of collocation_stages.py: take_stage to solve_stages
     balance_stage: int
     factorise_stages: int
     solve_stages: int

@@ -21,8 +21,8 @@ from tsdyn.testing.plug_in_checks import evaluate_force_jacobian
 
 # Constraints that are no polynomials of the positions, and the step of their differences
 TRANSCENDENTAL = (
-    "Thread", "Gear", "AngleTerm", "Span", "SmoothContact", "RollingContact", "CylinderContact", "CylinderRolling",
-    "SphereRolling",
+    "Thread", "Gear", "AngleTerm", "AngleRate", "Span", "SmoothContact", "RollingContact", "CylinderContact",
+    "CylinderRolling", "SphereRolling",
 )  # fmt: skip
 SMOOTH = 2e-3
 CLOSE = 5e-4  # of spheres, whose centres may be near each other here

@@ -7,7 +7,6 @@ import tsdyn as ts
 from examples import bicycle, coin, turntable
 from tests.helpers import closed_loops, skates
 from tests.helpers.reduced_ode import Mixed, difference
-from tests.helpers.refusals import refuse
 from tests.helpers.tolerances import FINE, HELD, NEAR, TIGHT
 
 I = ts.integrators
@@ -57,9 +56,6 @@ def by_series(scene, **options):
 def test_methods_and_forms_agree_with_series(name, way):
     """The three levels hold to rounding, the motion is that of the series, by methods and forms of every kind."""
     scene, (options, tol) = SCENES[name](), way
-    if "rough" in name and isinstance(options["integrator"], I.Radau):
-        refuse(lambda: ts.simulate(scene, (0, SPAN), **options), ts.InvalidArgument, ("friction depends on", "SDIRK54"))
-        return
     solution = ts.simulate(scene, (0, SPAN), **options).raise_if_failed()
     assert off(solution, by_series(scene)) < tol
     errors = solution.constraint_error

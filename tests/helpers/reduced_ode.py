@@ -19,17 +19,17 @@ _call_vector, _call_number, _call_chart, _call_soften = caller("pp"), caller("pd
 
 
 @entry
-def _start(context, at, t, v, vd, vdd):
-    return _call_chart(at[4], context, t, v, vd, vdd, vdd)
+def _start(context, at, t, x, y, yd, xd):
+    return _call_chart(at[4], context, t, x, y, yd, xd)
 
 
 @entry
-def _accelerations(context, at, t, v, vd, vdd):
-    status = call_place(at[0], context, t, v)
+def _rates(context, at, t, x, y, yd, xd):
+    status = call_place(at[0], context, t, x)
     if status == 0:
-        status = call_accelerate(at[1], context, t, vd, vdd, vdd)
+        status = call_accelerate(at[1], context, t, y, yd, xd)
     if status == 0:
-        status = _call_vector(at[2], context, vdd)
+        status = _call_vector(at[2], context, yd)
     return status
 
 
@@ -39,21 +39,6 @@ def _linearise(context, at, t, renew, vdd):
     if renew:
         status = call_linearise(at[5], context, t, vdd)
     return _call_number(at[6], context, t) if status == 0 else status
-
-
-@entry
-def _rates(context, at, t, v, w, wd, vd):
-    status = call_place(at[0], context, t, v)
-    if status == 0:
-        status = call_accelerate(at[1], context, t, w, wd, vd)
-    if status == 0:
-        status = _call_vector(at[2], context, wd)
-    return status
-
-
-@entry
-def _start_mixed(context, at, t, v, w, wd, vd):
-    return _call_chart(at[4], context, t, v, w, wd, vd)
 
 
 @entry
@@ -101,12 +86,12 @@ class Tangent:
         self.at = np.array([found[name] for name in NAMES], np.int64)
         self.k, self.t = n - m, t
         v, self.vd, vdd = np.zeros((3, self.k))
-        assert _start(self.address, self.at, t, v, self.vd, vdd) == 0
+        assert _start(self.address, self.at, t, v, self.vd, vdd, vdd) == 0
 
     def f(self, v, vd, t):
         """Accelerations vdd; the place is taken."""
         vdd = np.zeros(self.k)
-        assert _accelerations(self.address, self.at, t, v, vd, vdd) == 0
+        assert _rates(self.address, self.at, t, v, vd, vdd, vdd) == 0
         self.vdd = vdd
         return vdd
 
@@ -148,7 +133,7 @@ class Mixed:
         self.at = np.array([found[name] for name in NAMES], np.int64)
         self.nx, self.ny = form.sizes(packed, graph)
         v, w, wd, vd = np.zeros(self.nx), np.zeros(self.ny), np.zeros(self.ny), np.zeros(self.nx)
-        assert _start_mixed(self.address, self.at, 0.0, v, w, wd, vd) == 0
+        assert _start(self.address, self.at, 0.0, v, w, wd, vd) == 0
         self.start = np.concatenate([v, w])
 
     def f(self, z, t):

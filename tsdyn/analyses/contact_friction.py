@@ -264,7 +264,7 @@ def _carried(inertia, closed, idle, grips, N, resting):
     from scipy.optimize import nnls
 
     which = [*closed, *idle]
-    columns = inertia.free(_loads(inertia, which, grips).T)
+    columns = inertia.free(_loads(inertia, which, _ways(inertia, grips)).T)
     size = np.linalg.norm(columns, axis=0)
     given = np.array([max(N[resting.index(i)], 0.0) for i in which])
     shares, _ = nnls(columns / size, columns @ given)
@@ -283,11 +283,10 @@ def halted(inertia, qd, resting, which=None):
     slow = slow_slips(inertia, qd, rubbing, LEAST_SLIP) if which is None else which
     if not slow:
         return qd
-    slips, loads = inertia.slips(qd), inertia.J[resting]
-    for k, i in enumerate(resting):
-        if i in rubbing and i not in slow and slips[i].any():
-            loads[k] -= inertia.gaps.kinetic[i] * (slips[i] / np.hypot(*slips[i])) @ inertia.tangents[i]
-    held = [i for i in rubbing if i in slow or not slips[i].any()]
+    slips = inertia.slips(qd)
+    moving = [i for i in rubbing if i not in slow and slips[i].any()]
+    loads = _loads(inertia, resting, {i: slips[i] / np.hypot(*slips[i]) for i in moving})
+    held = [i for i in rubbing if i not in moving]
     tangents = inertia.tangents[held].reshape(2 * len(held), -1)
     response = inertia.free(np.concatenate([loads, tangents]).T)
     left = np.concatenate([np.zeros(len(resting)), tangents @ qd])
@@ -300,12 +299,17 @@ def slow_slips(inertia, qd, which, limit):
     return [i for i in which if 0.0 < np.hypot(*inertia.slips(qd)[i]) <= limit]
 
 
-def _loads(inertia, which, grips):
-    """Loads (k, n) by unit reactions of the gaps `which`, with the friction of those that slide."""
+def _ways(inertia, grips):
+    """Directions (2,) along the slips of the contacts that slide."""
+    return {i: inertia.across(i, d) for i, d in grips.items() if d is not None}
+
+
+def _loads(inertia, which, ways):
+    """Loads (k, n) by unit reactions of the gaps `which`, with the friction of those that slide in directions (2,)."""
     loads = inertia.J[which].copy()
     for j, i in enumerate(which):
-        if grips.get(i) is not None:
-            loads[j] -= inertia.gaps.kinetic[i] * inertia.across(i, grips[i]) @ inertia.tangents[i]
+        if i in ways:
+            loads[j] -= inertia.gaps.kinetic[i] * ways[i] @ inertia.tangents[i]
     return loads
 
 
@@ -316,7 +320,8 @@ def _held(inertia, closed, grips, b):
     """
     sticks = [i for i in closed if inertia.gaps.rubs[i] and grips[i] is None]
     slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
-    rows, loads = np.concatenate([inertia.J[closed], slips]), np.concatenate([_loads(inertia, closed, grips), slips])
+    loads = np.concatenate([_loads(inertia, closed, _ways(inertia, grips)), slips])
+    rows = np.concatenate([inertia.J[closed], slips])
     a = np.array([*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])])
     return -np.linalg.lstsq(rows @ inertia.free(loads.T), a, rcond=RANK_TOL**2)[0][: len(closed)]
 

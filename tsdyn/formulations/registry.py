@@ -9,7 +9,16 @@ from ..model.handles import of_rates
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, graph_of, redundant_rows
 from ..rows.interface import redundancy
 from ..validation import unknown_name
-from . import accelerations, implicit_tangent, linearisation, maggi_kane, null_space, null_space_rates, tangent
+from . import (
+    accelerations,
+    collocation_stages,
+    implicit_tangent,
+    linearisation,
+    maggi_kane,
+    null_space,
+    null_space_rates,
+    tangent,
+)
 from .locked_orientations import moving_graph
 
 
@@ -112,7 +121,7 @@ class Formulation:
         """The kernels that implicit methods need, by their names in `StageKernels`; coupled: all stages at once."""
         module = self.kernels if self.basis_free or self.mixed else linearisation
         if coupled:
-            own = {name: getattr(implicit_tangent, name) for name in implicit_tangent.KERNELS}
+            own = {name: getattr(collocation_stages, name) for name in collocation_stages.KERNELS}
             shared = ("linearise", "reduce", "soften", "recall", "residual", "distance")
             return own | {name: getattr(module, name) for name in shared} | {"error_norm": self.kernels.error_norm}
         names = ("linearise", "reduce", "factorise", "soften", "recall")

@@ -2,10 +2,10 @@
 
     vd_i = vd + h sum_j a_ij k_j,    v_i = v + h sum_j a_ij vd_j,    k_i = f(t + c_i h, v_i, vd_i)
 
-The iteration is that of formulations/implicit_tangent.py. Its matrices are kept over iterations, steps and charts. They
-are formed again where the step has changed by more than SAME_STEP, or contraction is poor: from the same stiffness and
-damping; in the next step, or at once where iterations diverge, from those of the present configuration; then from new
-derivatives of the forces' laws.
+The iteration is that of formulations/collocation_stages.py. Its matrices are kept over iterations, steps and charts.
+They are formed again where the step has changed by more than SAME_STEP, or contraction is poor: from the same stiffness
+and damping; in the next step, or at once where iterations diverge, from those of the present configuration; then from
+new derivatives of the forces' laws.
 
 The first guess of a step is the polynomial through the last stages of the step before: as many as would have predicted
 that step best.

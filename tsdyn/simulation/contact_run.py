@@ -405,9 +405,8 @@ class _ContactRun(Transitions):
             return
         sticking = list(modes.sticking)
         light = [i for i in modes.limits if i not in modes.sticking]
-        units = [[frictions.units[i] for i in some] for some in (sticking, light)]
-        breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in (*sticking, *light)])).over
-        loaded = [*sticking, *light]
+        loaded, units = [*sticking, *light], [[frictions.units[i] for i in some] for some in (sticking, light)]
+        breaking = Breaking(packed, *units, np.array([modes.limits[i] for i in loaded])).over
         slowing = Slowing(frictions, modes.begun, frictions.sizes(self.q, self.qdd)).over
         for i in range(frictions.count):
             if i in modes.blocked:

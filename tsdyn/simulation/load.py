@@ -118,7 +118,6 @@ def load(
         raise InvalidArgument(f"{path}: expand the macros first, such as by xacro {path} > robot.urdf.")
     from ..files.formats import SUFFIXES
     from ..files.saved_file import STORE, kind_of
-    from .load import Outline
     from .saved_solutions import load as load_solution
 
     if suffix not in SUFFIXES:

@@ -315,7 +315,7 @@ class Search:
             whole = self._fit(a, b, self._unit * value, None, degree)
         self.points.append((a, self._unit * value))
         if not (whole.resolved or whole.off != whole.off):
-            self.noise = max(self._rounding(whole), self._unit * self.shaken(0.5 * (a + b)))
+            self.noise = max(self._rounding(whole), self._unit * max(map(self.shaken, (0.5 * (a + b), b))))
             whole = whole._replace(resolved=whole.off <= self.noise)
         self._follow(whole, 0)
         last = self.points[-1][1] if self.points[-1][0] == b else float(whole.samples[-1])

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..elements.bodies import largest_of_kind
 from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
@@ -592,12 +593,13 @@ class Watch:
         return found
 
     def _shaken(self, i, step, t):
-        """By how much the value of event i at t changes with rounding errors of the state."""
+        """By how much the value of event i at t changes with rounding errors of the time and the state."""
         try:
-            # Rounding of the state, in three random directions
+            # Rounding of t and of the state, in three random directions
             state, value = step.at(t), self._at(i, step, t)
-            size = limits.SHAKEN * np.abs(state).max(axis=1, keepdims=True)
-            shaken = [self._value(i, t, state + size * sign) for sign in _signs(self._n)]
+            size = limits.SHAKEN * largest_of_kind(self.packed.system.bodies, state)
+            near = np.clip(t + limits.SHAKEN * abs(t) * np.array([-1.0, 0.0, 1.0]), step.t0, step.t1).tolist()
+            shaken = [self._value(i, *each) for each in zip(near, state + size * _signs(self._n), strict=True)]
         except EventFailed:
             return 0.0
         return limits.NOISE * max(abs(each - value) for each in shaken)

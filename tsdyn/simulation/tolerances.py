@@ -69,6 +69,9 @@ PASSES, GOT_ON = 16, 1e-9
 # Of the scene's length, of angles in rad: a gap up to which a contact takes part in an event of another, some roundings
 # of positions; and a depth that no event leaves, which tells that an event was missed.
 TOUCHING, PENETRATION = 64.0 * EPS, 1e-9
+# Of TOUCHING: as long as the rate of a gap that has opened makes no more, the gap is taken from its rate and its
+# acceleration; a flight that reaches half of that takes so short that the third derivative changes no digit of the gap.
+LOW = 16.0
 # Roundings in a gap, of the sizes of its terms: lower flights than these are none.
 ROUNDED = 16.0
 # Height of flights, of the scene's length or in rad, below which elastic impacts (e = 1) end: others come lower by

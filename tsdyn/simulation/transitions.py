@@ -8,6 +8,7 @@ from ..analyses.contact_friction import Cones, at_turn, settle_grips
 from ..analyses.contact_problem import Inertia, NoSolution, settle
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
 from ..analyses.tolerances import AT_ONCE, AT_REST, LEVEL, RESTS, STOPPED
+from ..elements.bodies import largest_of_kind
 from ..errors import (
     SingularConfiguration,
     Status,
@@ -74,6 +75,10 @@ class Transitions:
             self.judged = self.t, 0
         return False
 
+    def _largest(self, qd):
+        """The largest size of rates of its kind, in place of each of qd (n,)."""
+        return largest_of_kind(self.scene.system.bodies, qd)
+
     def _is_now(self, t):
         """Whether a time before the present one is the same instant, to rounding."""
         return self.t - t <= 16.0 * EPS * max(abs(self.t), EPS)
@@ -93,7 +98,7 @@ class Transitions:
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
-            small, unstruck = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max(), self._is_unstruck()
+            small, unstruck = AT_REST * inertia.sizes(self._largest(self.qd)), self._is_unstruck()
             rates[[i for i in before.closed if unstruck or abs(rates[i]) <= small[i]]] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
             opening = [i for i in fired if i not in before.closed]
@@ -104,13 +109,13 @@ class Transitions:
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
-            opened = {i: (self.t, values[i], rates[i]) for i in touching if rates[i] > 0.0}
+            opened = {i: (self.t, values[i], rates[i], 0.0) for i in touching if rates[i] > 0.0}
             # What grazes without a reaction has left: its gap was rounding. What has left at this instant doesn't come
             # back by rounding: contacts that leave together would take turns
-            left = [i for i, (at, _, rate) in before.opened.items() if rate == 0.0 and self._is_now(at)]
+            left = [i for i, (at, _, rate, _) in before.opened.items() if rate == 0.0 and self._is_now(at)]
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
-            rounding = self._rounding(before) + AT_REST * np.abs(self.qd - qd).max()
+            rounding = self._rounding(before) + AT_REST * self.frictions.sizes(self.q, self._largest(self.qd - qd))
             if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
                 self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
             self.modes, struck = UnitModes(opened=opened), self.qd
@@ -122,7 +127,7 @@ class Transitions:
             self._settle_contacts(settled, before)
             status = self._settle_all(before, inertia, touching, resting, leaving, broken, rounding)
             kept = {*self.modes.closed, *self.modes.idle}
-            opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
+            opened |= {i: (self.t, values[i], 0.0, 0.0) for i in resting if i not in kept}
             self._begin_memory([i for i in self.modes.closed if i not in before.closed])
             return status
         except SingularConfiguration as error:
@@ -141,6 +146,7 @@ class Transitions:
     def _settle_contacts(self, settled, before):
         """Take what contacts do."""
         self.remembered, modes = self.remembered.copy(), self.modes
+        modes.opened.update({i: (*known, settled.accelerations[i]) for i, (*known, _) in modes.opened.items()})
         modes.closed, modes.idle, modes.slack = settled.closed, settled.idle, dict(settled.slack)
         modes.grips = gripped(self.gaps, before, settled, self.q, self.remembered[self.count :])
 
@@ -319,7 +325,7 @@ class Transitions:
         if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * height:
             return False
         self.phases.impulses.append((self.t, gaps.names[i], Impulse(p)))
-        self.qd, self.modes = qd, UnitModes(opened={i: (self.t, self.gap[i], -e * rate)})
+        self.qd, self.modes = qd, UnitModes(opened={i: (self.t, self.gap[i], -e * rate, acceleration)})
         return True
 
     def _hit(self, inertia, touching, rates):

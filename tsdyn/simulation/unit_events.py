@@ -6,20 +6,21 @@ import numpy as np
 
 from ..analyses.contact_rows import measure_opened, reaction_workspace
 from ..analyses.tolerances import LEVEL
-from .tolerances import LOADED, REACTION_NOISE
+from .tolerances import LOADED, LOW, REACTION_NOISE
 
 
 class Closing:
     """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
-    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero.
+    however soon it comes. Up to LOW times its rounding that gap follows from the rate and the acceleration where it has
+    opened. Of one that has opened without a rate, rounding of the gap is no zero.
 
     Parameters
     ----------
     gaps : Gaps
     opened : dict
-        Of contacts that have opened: time, gap and rate there, by their numbers.
+        Of contacts that have opened: time, gap, rate and acceleration there, by their numbers.
     rounding : ndarray (count,), m or rad
         Of the gaps.
     """
@@ -32,7 +33,7 @@ class Closing:
         """Take other contacts that have just opened."""
         which = [i for i in opened if i not in self.gaps.following]
         self.which = np.array(which, int)
-        self.start = np.array([opened[i] for i in which]).reshape(-1, 3).T.copy()
+        self.start = np.array([opened[i] for i in which]).reshape(-1, 4).T.copy()
 
     def over(self, states):
         """Values (k, count) of `States`."""
@@ -40,7 +41,7 @@ class Closing:
         for i, rate in self.gaps.following.items():
             values[:, i] = rate(states.q, states.qd)
         if self.which.size:
-            measure_opened(states.t, self.which, self.start, self.rounding, values)
+            measure_opened(states.t, self.which, self.start, LOW, self.rounding, values)
         return values
 
 

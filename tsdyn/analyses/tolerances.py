@@ -113,6 +113,9 @@ CONSISTENT = 1e-6
 DENSE_INSTANT = 120
 
 # --- contacts --------------------------------------------------------------------------------------------------------
+# Of coefficients of restitution: where less than that would act at an impact with friction, nothing acts. A jammed end
+# rises by no more than the tolerance of the cone at a share of 1e-10.
+LEAST_SHARE = 1e-3
 # Rate of a gap over the sum of its terms up to which it is zero: velocities after an impact are right to rounding,
 # those of a chain to some hundred.
 AT_REST = 1e-12

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..elements.bodies import rotation_matrix
+from ..elements.bodies import rotation_matrix, turning
 from ..elements.force import Force
 from ..elements.markers import POINT
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, ROUNDING_AT_MOST, SUM_ROUNDING
@@ -203,30 +203,25 @@ def newton_euler(solution):
 def _balances(solution, bodies, around, shaken=None):
     sums = [_loads(solution, body, around[id(body)]) for body in bodies]
     largest, limit, found = max(one.size_of_force.max() for one in sums), _balance_limit(solution), []
+    left, rate = _left_by_iteration(solution)
     for one, other in zip(sums, shaken or sums, strict=True):
-        found.append(_balance("force balance", one.force, other.force, one.size_of_force, largest, limit, one.body))
+        allowed = np.linalg.norm(one.force - other.force, axis=1).max() + one.body.mass * left
+        found.append(_balance("force balance", one.force, allowed, one.size_of_force, largest, limit, one.body))
         if one.body.dimension == 7:
             floor = max(one.size_of_torque.max(), largest * extent(solution))
-            parts = one.torque, other.torque, one.size_of_torque
-            found.append(_balance("torque balance", *parts, floor, limit, one.body))
+            allowed = np.linalg.norm(one.torque - other.torque, axis=1).max() + np.trace(one.body.inertia) * rate
+            found.append(_balance("torque balance", one.torque, allowed, one.size_of_torque, floor, limit, one.body))
     return found
 
 
-def _shaken(solution):
-    """A copy of a solution, whose positions are off by one rounding of the largest.
-
-    Velocities are off by ten tolerances, as the error of a run may be, where contacts slide: the direction of the
-    friction of slower slips is not determined.
-    """
-    other, method = copy(solution), solution._method
-    for name in ("multipliers", "_memory"):
-        vars(other).pop(name, None)
-    signs = np.random.default_rng(0).choice((-1.0, 1.0), solution.q.shape)
-    other.q = solution.q + EPS * np.abs(solution.q).max() * signs
-    if method.atol is not None and any(getattr(part, "rubs", False) for part in solution.scene.constraints):
-        off = method.atol + method.rtol * np.abs(solution.qd).max()
-        other.qd = solution.qd + 10.0 * off * signs
-    return other
+def _left_by_iteration(solution):
+    """What implicit methods may leave of accelerations (k,), m/s^2 and rad/s^2: the tolerance of a step's rates."""
+    method, h = solution._method, np.diff(solution.t, prepend=solution.t[0])
+    if not solution.stats.iteration_matrices or method.atol is None:
+        return np.zeros((2, h.size))
+    turns = turning(solution.system.bodies, solution.qd.shape[1])
+    largest = np.array([[np.abs(solution.qd[:, kind]).max(initial=0.0)] for kind in (~turns, turns)])
+    return [[1.0], [2.0]] * (method.atol + method.rtol * largest) / np.where(h > 0.0, h, np.inf)
 
 
 class BodyBalance(NamedTuple):
@@ -294,9 +289,9 @@ def _balance_limit(solution):
     return HALF_DIGITS * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + rounding_of_places(solution)
 
 
-def _balance(law, left, shaken, sizes, largest, limit, body):
+def _balance(law, left, allowed, sizes, largest, limit, body):
     """Relative to the body's own terms; what is rounding of the largest terms in the scene doesn't count."""
-    left = np.maximum(np.linalg.norm(left, axis=1) - np.linalg.norm(left - shaken, axis=1).max(), 0.0)
+    left = np.maximum(np.linalg.norm(left, axis=1) - allowed, 0.0)
     share = left / (sizes + (FLOOR / HALF_DIGITS * largest or 1.0))
     return Finding(law, float(share.max(initial=0.0)), limit, body.name)
 

@@ -224,6 +224,23 @@ def _left_by_iteration(solution):
     return [[1.0], [2.0]] * (method.atol + method.rtol * largest) / np.where(h > 0.0, h, np.inf)
 
 
+def _shaken(solution):
+    """A copy of a solution, whose positions are off by one rounding of the largest.
+
+    Velocities are off by ten tolerances, as the error of a run may be, where contacts slide: the direction of the
+    friction of slower slips is not determined.
+    """
+    other, method = copy(solution), solution._method
+    for name in ("multipliers", "_memory"):
+        vars(other).pop(name, None)
+    signs = np.random.default_rng(0).choice((-1.0, 1.0), solution.q.shape)
+    other.q = solution.q + EPS * np.abs(solution.q).max() * signs
+    if method.atol is not None and any(getattr(part, "rubs", False) for part in solution.scene.constraints):
+        off = method.atol + method.rtol * np.abs(solution.qd).max()
+        other.qd = solution.qd + 10.0 * off * signs
+    return other
+
+
 class BodyBalance(NamedTuple):
     """What acts on a body less the rate of its momentum, ground frame, and sums of absolute values."""
 

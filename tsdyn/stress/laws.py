@@ -18,7 +18,7 @@ from ..model.packed import member_of
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
 from ..observables.reactions import touching
-from ..simulation.load import resume
+from ..simulation.load import load, resume
 from ..simulation.prepared_run import Run, simulate
 from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
 from .contact_laws import energy_of_phases, impacts, unilateral
@@ -37,30 +37,43 @@ from .tolerances import (
     SMALL_SCENE,
 )
 
-# A run that is stopped at its first checkpoint and goes on from there.
+# A run that is stopped at a checkpoint and goes on from there; a solution that is saved and loaded.
 
-SELDOM = 1e9  # s between checkpoints: the first, after a slice, is the only one
+SELDOM, OFTEN = 1e9, 1e-9  # s between checkpoints: the first, after a slice, is the only one; every slice and phase
 
 
 class _Stop:
-    """Ctrl-C as soon as there is a checkpoint: after the first slice, or a later one where the first ends a segment."""
+    """Ctrl-C as soon as there is a checkpoint: after the first slice, or a later one where the first ends a segment.
 
-    def __init__(self, path):
-        self.checkpoint = Path(f"{path}.checkpoint")
+    after: the fraction of the run before which there is none.
+    """
+
+    def __init__(self, path, after):
+        self.checkpoint, self.after = Path(f"{path}.checkpoint"), after
 
     def __call__(self, fraction):
-        if self.checkpoint.exists():
+        if (fraction or 0.0) >= self.after and self.checkpoint.exists():
             raise KeyboardInterrupt
 
 
-def resumed_is_same(scene, span, solution, **options):
+def resumed_is_same(scene, span, solution, after=0.0, **options):
     """Whether such a run has the bits of `solution`, which was never stopped; None without h5py."""
     if find_spec("h5py") is None:
         return None
     with TemporaryDirectory() as folder:
-        path = f"{folder}/run.h5"
-        simulate(scene, span, progress=_Stop(path), store=path, checkpoint=SELDOM, **options)
+        path, every = f"{folder}/run.h5", OFTEN if after else SELDOM
+        simulate(scene, span, progress=_Stop(path, after), store=path, checkpoint=every, **options)
         return same_bits(solution, resume(path, scene=scene))
+
+
+def saved_is_same(solution):
+    """Whether a solution with dense output has the same bits when it is saved and loaded; None without h5py."""
+    if find_spec("h5py") is None:
+        return None
+    with TemporaryDirectory() as folder:
+        solution.save(path := f"{folder}/run.h5")
+        loaded, times = load(path), np.linspace(*solution.t[[0, -1]], OUTPUTS)
+        return same_bits(solution, loaded) and same_bits(solution.at(times), loaded.at(times))
 
 
 def prepared_twice(scene, span, **options):
@@ -72,9 +85,10 @@ def prepared_twice(scene, span, **options):
 
 
 def same_bits(one, two):
-    """Whether two solutions have the same outputs to the bit."""
+    """Whether two solutions, or states, have the same numbers, phases and impulses to the bit."""
     pairs = [(getattr(one, name), getattr(two, name)) for name in ("t", "q", "qd", "qdd")]
-    return all(np.array_equal(*pair) for pair in pairs)
+    events = [[getattr(each, name, None) for name in ("phases", "impulses")] for each in (one, two)]
+    return all(np.array_equal(*pair) for pair in pairs) and events[0] == events[1]
 
 
 # The law of motors: joints follow the motions that are prescribed, which rows of sines know modulo turns alone.

@@ -136,7 +136,8 @@ def at_turn(inertia, resting, qd, fired, turned):
     """Velocities (n,) and the `Settled`, with the slips ended that come to rest where they turn.
 
     Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. Below STOPPED it is ended
-    where the contact would stick: with all that are as slow, as of a body that comes to rest, or alone.
+    where the contact would stick: with all that are as slow, as of a body that comes to rest, or alone; and where it
+    slows down with its friction against it, to slide off in another direction at once.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
@@ -144,18 +145,24 @@ def at_turn(inertia, resting, qd, fired, turned):
     turned = slow_slips(inertia, qd, [i for i in turned if i in resting], STOPPED)
     slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rubs[i]], STOPPED)
     closed = [i for i in inertia.held if i in resting]
+
+    def ended(which):
+        found = halted(inertia, qd, closed, which)
+        if inertia.rates(found)[resting].any():  # others have closed at once
+            found = halted(inertia, qd, resting, which)
+        return found, settle_grips(inertia, resting, found, fired)
+
     for which in (slow, turned) if turned else ():
-        ended = halted(inertia, qd, closed, which)
-        if inertia.rates(ended)[resting].any():  # others have closed at once
-            ended = halted(inertia, qd, resting, which)
         try:
-            settled = settle_grips(inertia, resting, ended, fired)
+            found = ended(which)
         except NoSolution:
             continue
-        if all(settled.grips.get(i, ()) is None for i in which):
-            return ended, settled
-    qd = halted(inertia, qd, resting)
-    return qd, settle_grips(inertia, resting, qd, fired)
+        if all(found[1].grips.get(i, ()) is None for i in which):
+            return found
+    left = halted(inertia, qd, resting)
+    settled = settle_grips(inertia, resting, left, fired)
+    which = [i for i in turned if settled.gains.get(i, 0.0) < 0.0]
+    return ended(which) if which else (left, settled)
 
 
 def _settled(inertia, resting, qd, fired):
@@ -193,7 +200,9 @@ def _settled(inertia, resting, qd, fired):
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
     pushes = _held(inertia, closed, grips, dict(zip(resting, b.reshape(-1, 3), strict=True)))
     slack = slack_of(inertia, closed, pushes, small)
-    return Settled(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack)
+    moves = (G @ p + b).reshape(-1, 3)[:, 1:]
+    gains = {resting[j]: float(moves[j] @ d[j]) for j in np.flatnonzero(slides)}
+    return Settled(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack, gains)
 
 
 def _sharing(G, b, p, mode, cones, response):

@@ -356,6 +356,7 @@ class Settled(NamedTuple):
     grips: dict = MappingProxyType({})  # of those with friction, see contact_friction.py
     rows: dict = MappingProxyType({})  # of closed ones that stick: which of the two rows of the slip are independent
     slack: dict = MappingProxyType({})  # of closed ones whose reactions are rounding: what these may fall below zero
+    gains: dict = MappingProxyType({})  # of those that slide: what their slips gain, m/s^2
 
 
 def settle(inertia, resting, qd, fired=()):

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.tolerances import LEAST_SLIP
+from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
 from .contact_problem import NoSolution, Settled, depends, energy_gain, slack_of
@@ -142,8 +142,8 @@ def at_turn(inertia, resting, qd, fired, turned):
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
     """
-    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], STOPPED)
-    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rubs[i]], STOPPED)
+    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], AHEAD)
+    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rubs[i]], AHEAD)
     closed = [i for i in inertia.held if i in resting]
 
     def ended(which):
@@ -161,7 +161,7 @@ def at_turn(inertia, resting, qd, fired, turned):
             return found
     left = halted(inertia, qd, resting)
     settled = settle_grips(inertia, resting, left, fired)
-    which = [i for i in turned if settled.gains.get(i, 0.0) < 0.0]
+    which = [i for i in slow_slips(inertia, left, turned, STOPPED) if settled.gains.get(i, 0.0) < 0.0]
     return ended(which) if which else (left, settled)
 
 

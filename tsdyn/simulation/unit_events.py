@@ -13,19 +13,21 @@ class Closing:
     """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
-    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero.
+    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero. One that is lifted by
+    less than rounding has the rate of the gap: it closes at the top of its flight, where no impact is.
 
     Parameters
     ----------
     gaps : Gaps
     opened : dict
         Of contacts that have opened: time, gap and rate there, by their numbers.
+    lifted : list of int
     rounding : ndarray (count,), m or rad
         Of the gaps.
     """
 
-    def __init__(self, gaps, opened, rounding):
-        self.gaps, self.rounding = gaps, rounding
+    def __init__(self, gaps, opened, lifted, rounding):
+        self.gaps, self.lifted, self.rounding = gaps, lifted, rounding
         self.open(opened)
 
     def open(self, opened):
@@ -41,6 +43,8 @@ class Closing:
             values[:, i] = rate(states.q, states.qd)
         if self.which.size:
             measure_opened(states.t, self.which, self.start, self.rounding, values)
+        if self.lifted:
+            values[:, self.lifted] = self.gaps.rates(states.t, states.q, states.qd, self.lifted)
         return values
 
 

@@ -132,24 +132,29 @@ def settle_grips(inertia, resting, qd, fired=()):
     return again._replace(idle=found.idle, grips={**found.grips, **again.grips})
 
 
-def at_turn(inertia, resting, qd, fired, turned):
+def at_turn(inertia, resting, qd, fired, turned, opening=()):
     """Velocities (n,) and the `Settled`, with the slips ended that come to rest where they turn.
 
-    Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. Below STOPPED it is ended
-    where the contact would stick: with all that are as slow, as of a body that comes to rest, or alone; and where it
-    slows down with its friction against it, to slide off in another direction at once.
+    Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. It is ended where the
+    contact would stick: with all that are as slow, as of a body that comes to rest, or alone. Below STOPPED it is ended,
+    too, where it slows down with its friction against it, to slide off in another direction at once.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
+    opening : list of int
+        Gaps that open with a rate: they go on to.
     """
     turned = slow_slips(inertia, qd, [i for i in turned if i in resting], AHEAD)
     slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rubs[i]], AHEAD)
     closed = [i for i in inertia.held if i in resting]
 
-    def ended(which):
+    def ended(which, closed=closed):
         found = halted(inertia, qd, closed, which)
-        if inertia.rates(found)[resting].any():  # others have closed at once
-            found = halted(inertia, qd, resting, which)
+        if found is not qd:
+            rates = inertia.rates(found)
+            more = [i for i in opening if rates[i] <= 0.5 * inertia.rates(qd)[i]]
+            if rates[resting].any() or more:  # others have closed at once
+                found = halted(inertia, qd, [*resting, *more], which)
         return found, settle_grips(inertia, resting, found, fired)
 
     for which in (slow, turned) if turned else ():
@@ -159,10 +164,9 @@ def at_turn(inertia, resting, qd, fired, turned):
             continue
         if all(found[1].grips.get(i, ()) is None for i in which):
             return found
-    left = halted(inertia, qd, resting)
-    settled = settle_grips(inertia, resting, left, fired)
-    which = [i for i in slow_slips(inertia, left, turned, STOPPED) if settled.gains.get(i, 0.0) < 0.0]
-    return ended(which) if which else (left, settled)
+    found = ended(slow_slips(inertia, qd, slow, LEAST_SLIP), resting)
+    which = [i for i in slow_slips(inertia, qd, turned, STOPPED) if found[1].gains.get(i, 0.0) < 0.0]
+    return ended(which) if which else found
 
 
 def _settled(inertia, resting, qd, fired):
@@ -283,17 +287,15 @@ def _carried(inertia, closed, idle, grips, N, resting):
     return sorted(closed), sorted(idle)
 
 
-def halted(inertia, qd, resting, which=None):
-    """Velocities (n,) with slips ended of the gaps `resting`: of `which`, by default those that are rounding.
+def halted(inertia, qd, resting, which):
+    """Velocities (n,) with the slips ended of the gaps `which`, while the gaps `resting` keep their rates.
 
     What sticks goes on to, and what goes on sliding changes its friction with its load: as in the course of time.
     """
-    rubbing = [i for i in resting if inertia.gaps.rubs[i]]
-    slow = slow_slips(inertia, qd, rubbing, LEAST_SLIP) if which is None else which
-    if not slow:
+    if not which:
         return qd
-    slips = inertia.slips(qd)
-    moving = [i for i in rubbing if i not in slow and slips[i].any()]
+    rubbing, slips = [i for i in resting if inertia.gaps.rubs[i]], inertia.slips(qd)
+    moving = [i for i in rubbing if i not in which and slips[i].any()]
     loads = _loads(inertia, resting, {i: slips[i] / np.hypot(*slips[i]) for i in moving})
     held = [i for i in rubbing if i not in moving]
     tangents = inertia.tangents[held].reshape(2 * len(held), -1)

@@ -394,7 +394,7 @@ class _ContactRun(Transitions):
             sides = [gaps.list[i].side for i in modes.closed]
             rows, slack = [first[id(side.row)] for side in sides], [modes.slack.get(i, 0.0) for i in modes.closed]
             leaving = Leaving(packed, rows, [side.sign for side in sides], slack).over
-        self.closing = Closing(gaps, modes.opened, modes.lifted, TOUCHING * gaps.lengths(self.length))
+        self.closing = Closing(gaps, modes.opened, modes.lifted)
         for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue

@@ -84,7 +84,7 @@ class Transitions:
 
         fired, broken: gaps and frictions whose events have come; turned: gaps whose slips have turned.
         """
-        slots, values, qd = self.remembered[self.count :], self.gap, self.qd
+        slots, qd = self.remembered[self.count :], self.qd
         before, self.modes, self.rest = self.modes, UnitModes(), self.t
         if not touching:
             return self._settle_frictions(before, broken, self._rounding(before))
@@ -96,9 +96,8 @@ class Transitions:
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
             small, unstruck = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max(), self._is_unstruck()
             rates[[i for i in before.closed if unstruck or abs(rates[i]) <= small[i]]] = 0.0
-            # At the tops of flights below rounding rates are zero where the time, to rounding, leaves that open
-            top = RESTS * EPS * abs(self.t) * inertia.sizes(self.qdd)
-            rates[[i for i in before.lifted if abs(rates[i]) <= top[i]]] = 0.0
+            # What rounding of the time leaves open is no rate: several gaps close, or reach the tops of flights, at once
+            rates[np.abs(rates) <= RESTS * EPS * abs(self.t) * inertia.sizes(self.qdd)] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
             ratchets = [i for i in fired if i not in before.closed and i in self.gaps.following]
             if ratchets:  # they take hold
@@ -110,7 +109,7 @@ class Transitions:
             opening = [i for i in touching if rates[i] > 0.0]
             # What grazes without a reaction has left: its gap was rounding. What has left at this instant doesn't come
             # back by rounding: contacts that leave together would take turns
-            left = [i for i, (at, _, rate) in before.opened.items() if rate == 0.0 and self._is_now(at)]
+            left = [i for i, (at, _, rate, _) in before.opened.items() if rate == 0.0 and self._is_now(at)]
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
             rounding = self._rounding(before) + AT_REST * np.abs(self.qd - qd).max()
@@ -118,7 +117,9 @@ class Transitions:
                 self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
             self.modes, struck = UnitModes(), self.qd
             if self.gaps.rubs[resting].any():
-                self.qd, settled = at_turn(inertia, resting, self.qd, leaving, turned)
+                self.qd, settled = at_turn(inertia, resting, self.qd, leaving, turned, opening)
+                if self.qd is not struck and opening:
+                    rates = inertia.rates(self.qd)
             else:
                 settled = settle(inertia, resting, self.qd, leaving)
             rounding += self.frictions.sizes(self.q, self.qd - struck)
@@ -126,7 +127,7 @@ class Transitions:
             self._settle_contacts(settled, before)
             status = self._settle_all(before, inertia, touching, resting, leaving, broken, rounding)
             kept = {*self.modes.closed, *self.modes.idle}
-            self.modes.opened |= {i: (self.t, values[i], 0.0) for i in resting if i not in kept}
+            self.modes.opened |= {i: self._opened(i) for i in resting if i not in kept}
             self._begin_memory([i for i in self.modes.closed if i not in before.closed])
             return status
         except SingularConfiguration as error:
@@ -148,7 +149,14 @@ class Transitions:
         low = rates**2 < rounding * a
         grazes = (a <= 0.0) & (rates**2 < rounding * inertia.accelerations(self.qd)[1])
         modes.lifted = [i for i in which if low[i]]
-        modes.opened = {i: (self.t, self.gap[i], 0.0 if grazes[i] else rates[i]) for i in which if not low[i]}
+        modes.opened = {i: self._opened(i, rates[i], 0.125 * rounding[i]) for i in which if not (low[i] or grazes[i])}
+        modes.opened |= {i: self._opened(i) for i in which if grazes[i]}
+
+    def _opened(self, i, rate=0.0, rounding=None):
+        """What `UnitModes.opened` has of a gap that opens now."""
+        if rounding is None:
+            rounding = TOUCHING * self.gaps.lengths(self.length)[i]
+        return self.t, self.gap[i], rate, rounding
 
     def _heights(self, inertia):
         """Rounding of the gaps (count,), m or rad: lower flights are none."""
@@ -331,11 +339,12 @@ class Transitions:
         (rate, size, G, p, acceleration, length), qd = found
         if not (G > 0.0 and rate < -AT_REST * size):
             return False
-        height = ENDLESS * self.length if e == 1.0 else EPS * max(self.length, ROUNDED * length)
+        rounding = EPS * max(self.length, ROUNDED * length)
+        height = ENDLESS * self.length if e == 1.0 else rounding
         if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * height:
             return False
         self.phases.impulses.append((self.t, gaps.names[i], Impulse(p)))
-        self.qd, self.modes = qd, UnitModes(opened={i: (self.t, self.gap[i], -e * rate)})
+        self.qd, self.modes = qd, UnitModes(opened={i: self._opened(i, -e * rate, 0.25 * rounding)})
         return True
 
     def _hit(self, inertia, touching, rates):

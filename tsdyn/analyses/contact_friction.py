@@ -136,8 +136,8 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
     """Velocities (n,) and the `Settled`, with the slips ended that come to rest where they turn.
 
     Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. It is ended where the
-    contact would stick: with all that are as slow, as of a body that comes to rest, or alone. Below STOPPED it is ended,
-    too, where it slows down with its friction against it, to slide off in another direction at once.
+    contact would stick: with all that are as slow, as of a body that comes to rest, or alone. Below STOPPED it is
+    ended, too, where it slows down with its friction against it, to slide off in another direction at once.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.

@@ -46,7 +46,6 @@ from .termination import reporter, silent
 from .tolerances import (
     MOST_PINNED,
     PENETRATION,
-    TOUCHING,
 )
 from .transitions import Transitions
 from .unit_events import Breaking, Closing, Leaving, Slowing

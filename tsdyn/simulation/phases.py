@@ -22,9 +22,7 @@ class UnitModes:
 
     closed: list = field(default_factory=list)  # independent rows, with reactions
     idle: list = field(default_factory=list)  # closed by what others hold
-    opened: dict = field(
-        default_factory=dict
-    )  # time, gap, rate and rounding of the gap where a contact has just opened
+    opened: dict = field(default_factory=dict)  # time, gap, rate, rounding of the gap where one has just opened
     sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide

@@ -96,7 +96,7 @@ class Transitions:
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
             small, unstruck = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max(), self._is_unstruck()
             rates[[i for i in before.closed if unstruck or abs(rates[i]) <= small[i]]] = 0.0
-            # What rounding of the time leaves open is no rate: several gaps close, or reach the tops of flights, at once
+            # What rounding of the time leaves open is no rate: gaps close, or reach the tops of flights, at once
             none = RESTS * EPS * abs(self.t) * inertia.accelerations(self.qd)[1]
             rates[np.abs(rates) <= none] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
@@ -370,10 +370,9 @@ class Transitions:
             e[last] = 0.0
             p, qd, after = self._jump(inertia, touching, before, e)
             a = self._lowering(inertia, touching, qd, after)
-        # Contacts that another impact lifts by rounding, of its impulses or for that of the time, stay closed
-        after[
-            after <= np.maximum(RESTS * EPS * abs(self.t) * a, AT_REST * (np.abs(inertia.G[:, touching]) @ p[:, 0]))
-        ] = 0.0
+        # Contacts that another impact lifts by rounding, of its impulses or of the time, stay closed
+        rounding = AT_REST * np.abs(inertia.G[:, touching]) @ p[:, 0]
+        after[after <= np.maximum(rounding, RESTS * EPS * abs(self.t) * a)] = 0.0
         self._note_impulses(inertia, touching, p, self.qd)
         self.qd = qd
         return after

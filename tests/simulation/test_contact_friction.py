@@ -271,7 +271,7 @@ def test_impulses_of_friction_balance_the_momenta(law, mu, tmp_path):
             P, L = np.zeros(3), np.zeros(3)
             for _, name, p in (each for each in impulses if each[0] == t):
                 own = p.tangential + np.array([0, 0, p])
-                assert np.linalg.norm(p.tangential) <= mu * p + 1e-7  # a contact that is lifted within rounding is held
+                assert np.linalg.norm(p.tangential) <= mu * p * (1.0 + 1e-12)
                 P, L = P + own, L + np.cross(solution.rotation(body)[after] @ corners[int(name)], own)
             change = 2.0 * np.diff(solution.velocity(body)[[before, after]], axis=0)[0]
             np.testing.assert_allclose(P, change, atol=1e-13)
@@ -438,9 +438,7 @@ def test_random_scenes_keep_the_laws(build, seed):
     assert np.diff(solution.energy).max() < 1e-7 * size  # the tolerance of the run
     assert solution.constraint_error.position.max() < 1e-11
     assert solution.dissipation.min() > -1e-9 * size
-    impulses = [impulse for *_, impulse in solution.impulses]
-    # What keeps contacts closed that an impact lifts by less than rounding pulls: about its square root
-    assert min(impulses, default=0.0) >= -1e-6 * max(impulses, default=0.0)
+    assert min((impulse for *_, impulse in solution.impulses), default=1.0) > 0.0
 
 
 # methods, files, refusals

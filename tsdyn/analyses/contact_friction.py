@@ -18,7 +18,7 @@ from ..elements.tolerances import LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
 from .contact_problem import NoSolution, Settled, depends, energy_gain, slack_of
-from .tolerances import AT_BOUND, DEPENDENT, LEVEL, STOPPED, WITHIN_BOUND
+from .tolerances import EVENT_ERROR, LEVEL, STOPPED, WITHIN_BOUND
 
 
 def rows_of(inertia, which):
@@ -98,7 +98,7 @@ class Cones:
             if p is None:
                 raise NoSolution
             N, *T = p.reshape(-1, 3)[: mu.size].T
-            bound = np.hypot(*T) >= (1.0 - AT_BOUND) * mu * N
+            bound = np.hypot(*T) >= (1.0 - EVENT_ERROR) * mu * N
             leave = bound & ~self.slides & (mode[: mu.size] != OPEN) & self.rubs & (mu > self.kinetic * WITHIN_BOUND)
             if not leave.any():
                 break
@@ -209,7 +209,7 @@ def _sharing(G, b, p, mode, cones, response):
     slips = response.T.reshape(-1, 3, response.shape[0])[still, 1:]
     bounds = cones.static[still] * loads[:, 0]
     T = spread(bounds[None], slips[None], loads[None, :, 1:])[0]
-    within = np.hypot(*T.T) < (1.0 - AT_BOUND) * bounds
+    within = np.hypot(*T.T) < (1.0 - EVENT_ERROR) * bounds
     return np.where(still, STICKS, mode) if within.all() else mode
 
 
@@ -220,7 +220,7 @@ def _independent(inertia, closed, grips):
         return {}
     rows = np.concatenate([inertia.J[closed], inertia.tangents[sticks].reshape(2 * len(sticks), -1)])
     loads, kept = inertia.free(rows.T).T, np.ones(len(rows), bool)
-    held = DEPENDENT**2 * (rows * loads).sum(axis=1).max()  # by bilateral rows
+    held = RANK_TOL**2 * (rows * loads).sum(axis=1).max()  # by bilateral rows
     for k in range(len(rows)):  # Gram-Schmidt in the metric of kinetic energy
         size = rows[k] @ loads[k]
         for j in np.flatnonzero(kept[:k]):
@@ -228,7 +228,7 @@ def _independent(inertia, closed, grips):
             rows[k] -= share * rows[j]
             loads[k] -= share * loads[j]
         left = rows[k] @ loads[k]
-        kept[k] = k < len(closed) or left > max(DEPENDENT * size, held)
+        kept[k] = k < len(closed) or left > max(RANK_TOL * size, held)
         if kept[k]:
             rows[k] /= np.sqrt(max(left, TINY))
             loads[k] /= np.sqrt(max(left, TINY))
@@ -247,7 +247,7 @@ def _demand_unique(G, d, mu, mode):
             load[j, 1:, 0] = -mu[j] * d[j]
     held = [3 * j + i for j in np.flatnonzero(mode != OPEN) for i in range(1 if mode[j] != STICKS else 3)]
     size = np.diag(G)
-    held = [r for r in held if size[r] > DEPENDENT**2 * size.max()]  # bilateral rows hold the others
+    held = [r for r in held if size[r] > RANK_TOL**2 * size.max()]  # bilateral rows hold the others
     own = G.reshape(G.shape[0], -1, 3)
     A = np.einsum("rji,jik->rjk", own, load).reshape(G.shape)[np.ix_(held, held)]
     scale = np.sqrt(size[held])

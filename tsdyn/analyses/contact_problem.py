@@ -19,11 +19,11 @@ import numpy as np
 from ..configuration.tolerances import INITIAL_TOL
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
-from ..maths.tolerances import RANK_TOL
+from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
 from ..model.handles import angle as angle_of
 from ..model.handles import counted, displacement, first_rows, handles_of, index_of
 from .contact_rows import ContactWorkspace
-from .tolerances import AT_REST, DEPENDENT, LEVEL
+from .tolerances import LEVEL
 
 
 class Gap(NamedTuple):
@@ -266,7 +266,7 @@ class Inertia:
     def rates(self, qd, sizes=None):
         """Rates of the gaps (count,), zero where they are so to rounding of velocities of these `sizes` (n,)."""
         rates, terms = self._rows @ qd + self._drift, self._sizes @ (np.abs(qd) if sizes is None else sizes)
-        rates[np.abs(rates) <= AT_REST * (terms + np.abs(self._drift))] = 0.0
+        rates[np.abs(rates) <= NEGLIGIBLE * (terms + np.abs(self._drift))] = 0.0
         return self._of_all(rates)
 
     def hold(self, which, rates):
@@ -276,7 +276,7 @@ class Inertia:
     def slips(self, qd):
         """Velocities (count, 2) of the slips, zero where they are rounding."""
         found, terms = self.tangents @ qd, np.abs(self.tangents) @ np.abs(qd)
-        return np.where(np.abs(found) <= AT_REST * terms, 0.0, found)
+        return np.where(np.abs(found) <= NEGLIGIBLE * terms, 0.0, found)
 
     def slip_accelerations(self, qd):
         """Accelerations (count, 2) of the slips where all gaps are open."""
@@ -416,14 +416,14 @@ def slack_of(inertia, closed, pushes, small):
 def depends(inertia, closed, i, sticks=()):
     """Whether the row of a gap depends on those of closed ones, on slips of those that stick, and on bilateral rows."""
     own, alone, mobile = inertia.response[i], inertia.J[i], np.diag(inertia.G)
-    if mobile[i] <= DEPENDENT**2 * mobile.max():  # bilateral rows hold it
+    if mobile[i] <= RANK_TOL**2 * mobile.max():  # bilateral rows hold it
         return True
     if not closed:
-        return not inertia.G[i, i] > DEPENDENT**2 * np.linalg.norm(alone) * np.linalg.norm(own)
+        return not inertia.G[i, i] > RANK_TOL**2 * np.linalg.norm(alone) * np.linalg.norm(own)
     rows, loads = inertia.J[closed], inertia.response[closed]
     if len(sticks):
         slips = inertia.tangents[sticks].reshape(2 * len(sticks), -1)
         rows, loads = np.concatenate([rows, slips]), np.concatenate([loads, inertia.free(slips.T).T])
     share = np.linalg.lstsq(rows @ loads.T, rows @ own, rcond=RANK_TOL**2 if len(sticks) else None)[0]
     left = own - share @ loads
-    return bool(np.linalg.norm(left) <= DEPENDENT * np.linalg.norm(own))
+    return bool(np.linalg.norm(left) <= RANK_TOL * np.linalg.norm(own))

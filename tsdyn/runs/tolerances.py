@@ -90,7 +90,7 @@ SLOW_TURN, FAST_TURN = 0.1, 2.0
 SLOW_SMOOTH_TURN, FAST_SMOOTH_TURN = 1.0, 8.0
 
 # A value or time below this fraction of the others counts as zero at the start of a run: rounding of some dozen
-# operations of an event function.
+# operations of an event function. So does a gap of a contact, of the scene's length, at an event of another.
 START_ZERO = 64.0 * EPS
 
 # Relative perturbation of a state, with random signs, that measures the rounding error of an event function; safety

@@ -12,7 +12,6 @@ from ..ahead import compile_ahead
 from ..analyses import contact_rows, friction_units
 from ..analyses.contact_problem import closed_gaps
 from ..analyses.friction_problem import Frictions, Hold, immobile
-from ..analyses.tolerances import AT_REST
 from ..elements.unilateral import contacts_of
 from ..errors import (
     InconsistentState,
@@ -25,15 +24,18 @@ from ..errors import (
 from ..integrators import DOP853
 from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
+from ..maths.tolerances import NEGLIGIBLE
 from ..model.handles import handles_of
 from ..observables import diagnostics
 from ..observables.state import remembered
+from ..observables.tolerances import LARGE
 from ..runs.driver import Sampling
 from ..runs.event_groups import GroupMember
 from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome, interval, output_times, state_arrays
+from ..runs.tolerances import START_ZERO
 from ..validation import counted, damaged, demand, listed
 from . import hybrid
 from .grips import Halting, Reactions, items_of
@@ -43,11 +45,7 @@ from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
 from .termination import reporter, silent
-from .tolerances import (
-    MOST_PINNED,
-    PENETRATION,
-    TOUCHING,
-)
+from .tolerances import PENETRATION
 from .transitions import Transitions
 from .unit_events import Breaking, Closing, Leaving, Slowing
 
@@ -394,7 +392,7 @@ class _ContactRun(Transitions):
             sides = [gaps.list[i].side for i in modes.closed]
             rows, slack = [first[id(side.row)] for side in sides], [modes.slack.get(i, 0.0) for i in modes.closed]
             leaving = Leaving(packed, rows, [side.sign for side in sides], slack).over
-        self.closing = Closing(gaps, modes.opened, TOUCHING * gaps.lengths(self.length))
+        self.closing = Closing(gaps, modes.opened, START_ZERO * gaps.lengths(self.length))
         for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
@@ -417,7 +415,7 @@ class _ContactRun(Transitions):
     def _still(self, phase):
         """Coordinates of the bodies that rest where frictions stick."""
         sticks = self.modes.sticking or any(map(self.modes.sticks, self.modes.grips))
-        if not sticks or self.q.size > MOST_PINNED:
+        if not sticks or self.q.size > LARGE:
             return np.zeros(0, int)
         return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
 
@@ -428,7 +426,7 @@ class _ContactRun(Transitions):
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.slides(i)]
-        halting = Halting(gaps, slides, AT_REST * self._slip_terms(slides))
+        halting = Halting(gaps, slides, NEGLIGIBLE * self._slip_terms(slides))
         for k, i in enumerate(slides):
             yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 

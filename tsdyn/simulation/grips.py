@@ -7,7 +7,7 @@ import numpy as np
 from ..analyses.contact_friction import spread
 from ..analyses.contact_problem import slip_rows
 from ..analyses.contact_rows import reaction_workspace
-from ..analyses.tolerances import AT_BOUND
+from ..analyses.tolerances import EVENT_ERROR
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
 from ..elements.tolerances import AHEAD
@@ -184,7 +184,7 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
             change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
             # Near singular states that would take other normal loads: rows that hold carry the friction alone
             pushing = [first[id(_gap_row(gaps, modes, i))] for i in rubbing]
-            moves = (np.abs(change[:, pushing]) > AT_BOUND * np.abs(N)).any(axis=1)
+            moves = (np.abs(change[:, pushing]) > EVENT_ERROR * np.abs(N)).any(axis=1)
             change[moves], T[moves] = 0.0, alone[moves]
             out[:, shared[0]] += change[:, shared[1]]
         out[:, rows[sticks]] = -T

@@ -7,30 +7,23 @@ import numpy as np
 from ..analyses.contact_friction import Cones, at_turn, settle_grips
 from ..analyses.contact_problem import Inertia, NoSolution, settle
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
-from ..analyses.tolerances import AT_ONCE, AT_REST, LEVEL, RESTS, STOPPED
+from ..analyses.tolerances import EVENT_ERROR, LEVEL, PIVOTS, RESTS, STOPPED
 from ..errors import (
     SingularConfiguration,
     Status,
 )
-from ..maths.tolerances import EPS, RANK_TOL
+from ..maths.tolerances import EPS, NEGLIGIBLE, RANK_TOL
 from ..model.handles import handles_of
 from ..observables.generalised_forces import force_loads
 from ..observables.state import begin_memory
+from ..runs.tolerances import START_ZERO
 from ..validation import listed
 from .grips import gripped
 from .impacts import along_normals, held, impact_of, impulse_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import Impulse, UnitModes
 from .scene_cache import prepared
-from .tolerances import (
-    CREEPING,
-    ENDLESS,
-    EVENTS_JUDGED,
-    MOST_AT_AN_INSTANT,
-    ROUNDED,
-    ROUNDS,
-    TOUCHING,
-)
+from .tolerances import CREEPING, EVENTS_JUDGED, MOST_AT_AN_INSTANT, ROUNDED
 
 
 def settled_by(inertia, resting, qd, fired=()):
@@ -49,7 +42,7 @@ class Transitions:
         self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        (near,) = (self.gap <= TOUCHING * self.gaps.lengths(self.length)).nonzero()
+        (near,) = (self.gap <= START_ZERO * self.gaps.lengths(self.length)).nonzero()
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         hit = [i for i in fired if i < count]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
@@ -93,7 +86,7 @@ class Transitions:
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
-            small, unstruck = AT_REST * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max(), self._is_unstruck()
+            small, unstruck = NEGLIGIBLE * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max(), self._is_unstruck()
             rates[[i for i in before.closed if unstruck or abs(rates[i]) <= small[i]]] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
             opening = [i for i in fired if i not in before.closed]
@@ -110,7 +103,7 @@ class Transitions:
             left = [i for i, (at, _, rate) in before.opened.items() if rate == 0.0 and self._is_now(at)]
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
-            rounding = self._rounding(before) + AT_REST * np.abs(self.qd - qd).max()
+            rounding = self._rounding(before) + NEGLIGIBLE * np.abs(self.qd - qd).max()
             if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
                 self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
             self.modes, struck = UnitModes(opened=opened), self.qd
@@ -159,7 +152,7 @@ class Transitions:
         ways of frictions end there.
         """
         cones = Cones(unheld, resting, self.qd) if self.frictions.count and resting else None
-        for _ in range(ROUNDS):
+        for _ in range(PIVOTS):
             status = self._settle_frictions(before, broken, rounding, cones)
             if status is not None or not (self.frictions.count and resting):
                 return status
@@ -216,8 +209,8 @@ class Transitions:
         # Velocities that change within rounding of the time are at rest, too, and those that come to rest at
         # once: where loads vanish along a chain events would follow each other ever faster
         sizes, rates = frictions.sizes(self.q, self.qd), frictions.sizes(self.q, self.qdd)
-        least = np.maximum(AT_REST * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
-        least = np.maximum(least, AT_ONCE * np.minimum(sizes, (self.t - self.span[0]) * rates))
+        least = np.maximum(NEGLIGIBLE * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
+        least = np.maximum(least, EVENT_ERROR * np.minimum(sizes, (self.t - self.span[0]) * rates))
         self.remembered, resting, guess = self.remembered.copy(), [], {}
         memory = self.remembered[count:]  # a part of it
         self.modes.blocked = self.off
@@ -313,9 +306,9 @@ class Transitions:
             return False
         found = gaps.workspace.bounce(self.t, self.q, self.qd, slots, i, float(gaps.sign[i]), e)
         (rate, size, G, p, acceleration, length), qd = found
-        if not (G > 0.0 and rate < -AT_REST * size):
+        if not (G > 0.0 and rate < -NEGLIGIBLE * size):
             return False
-        height = ENDLESS * self.length if e == 1.0 else EPS * max(self.length, ROUNDED * length)
+        height = NEGLIGIBLE * self.length if e == 1.0 else EPS * max(self.length, ROUNDED * length)
         if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * height:
             return False
         self.phases.impulses.append((self.t, gaps.names[i], Impulse(p)))
@@ -355,7 +348,7 @@ class Transitions:
 
         Rounding of the rates is a share of their terms, of those of all impulses, and of what the time leaves open.
         """
-        small = AT_REST * (inertia.sizes(qd) + np.abs(inertia.G[:, which]) @ np.abs(p[:, 0]))
+        small = NEGLIGIBLE * (inertia.sizes(qd) + np.abs(inertia.G[:, which]) @ np.abs(p[:, 0]))
         small += RESTS * EPS * abs(self.t) * inertia.sizes(self.qdd)
         self.phases.impulses += [
             (self.t, self.gaps.names[i], impulse_of(inertia, i, own))
@@ -381,5 +374,5 @@ class Transitions:
         a = -settled_by(inertia, resting, qd).accelerations
         lengths, elastic = self.gaps.lengths(self.length), self.gaps.restitution == 1.0
         rounding = EPS * np.maximum(lengths, ROUNDED * inertia.sizes(self.q))
-        rounding[elastic] = ENDLESS * lengths[elastic]  # flights that would never get lower
+        rounding[elastic] = NEGLIGIBLE * lengths[elastic]  # flights that would never get lower
         return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)

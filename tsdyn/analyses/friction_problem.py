@@ -455,11 +455,11 @@ class RestProblem:
                 way = y[self.at[i]] @ self.bases[i]
                 ways[i] = way / np.linalg.norm(way)
         closed = mode[:count] != OPEN
-        rests = closed & (mode[:count] == STICKS) & self.cones.rubs
+        rests = closed & (mode[:count] == STICKS) & self.cones.rough
         self.normal_loads, self.pressed = N, pushing[np.column_stack([closed, rests, rests]).ravel()]
         return y, N
 
-    def settle(self, ways, fired):
+    def pivot(self, ways, fired):
         """The `FrictionAtRest` of the units, by pivoting from a guess: directions of those that slide.
 
         fired: units whose reactions have just reached their bounds. Raises `NoRest`.

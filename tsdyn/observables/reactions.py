@@ -649,7 +649,7 @@ def touching(packed, member, q):
         find = getattr(type(packed.constraints[i]), "contact", None)
         if find is not None:
             return tuple(level.T for level in twin(find)(_markers(packed, i, q), packed.parameters[i]))
-    if getattr(member.constraint, "rubs", False):  # a point on a plane
+    if getattr(member.constraint, "has_friction", False):  # a point on a plane
         x = _markers(packed, member.parts.start, q)
         return x[:3].T, x[6:9].T
     return None

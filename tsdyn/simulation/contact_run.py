@@ -212,7 +212,7 @@ class _ContactRun(Transitions):
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         touching = [i for i in touching if i in self.able]
-        return self._settle(touching, (), ())
+        return self._decide_modes(touching, (), ())
 
     def check(self):
         """Raise what a run raises before its first step; its `Task`, of the whole scene."""
@@ -250,7 +250,7 @@ class _ContactRun(Transitions):
                 max_steps=self._steps_left(), resume=None if other else self._resume, archive=self.archive,
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
-            self.names, self.packed, self.settled, self.again, self.known = names, phase.packed, None, [], None
+            self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
             if self.archive is not None:
                 self.archive.resting = still, resting[still]
             if not (other and self.replaced):
@@ -260,7 +260,7 @@ class _ContactRun(Transitions):
                 if outcome.status is Status.CONTACT_FAILED and outcome.end.reached == self.t and self.end is not None:
                     raise InconsistentState(outcome.reason)  # the run ends with the phase before
                 outcome = pinned(outcome, resting, still)
-                if self.settled is None:
+                if self.decided is None:
                     self._end_phase(outcome.end.reached)
                 said = (outcome.method or repr(task.method)).split(" and ")
                 self.methods += [method for method in said if method not in self.methods]
@@ -303,7 +303,7 @@ class _ContactRun(Transitions):
         return [self.modes.saved(), self.remembered.tolist(), plain((self.inactive, self.values))]
 
     def _recorded_scene(self, record):
-        """The scene that such a record tells, and its gaps."""
+        """The scene that such a record describes, and its gaps."""
         inactive, values = record[2]
         self.change(tuple(inactive), dict(values))
         self.modes, self.remembered = UnitModes.of(record[0]), np.array(record[1], float)
@@ -320,11 +320,11 @@ class _ContactRun(Transitions):
         self.t, (self.q, self.qd, self.qdd), self.remembered = t, run.now.copy(), run.remembered.copy()
         self.ended = self.qd
         remembered = self.remembered
-        self.settled = (self._transit([self.watched[i] for i in numbers]),)
+        self.decided = (self._transit([self.watched[i] for i in numbers]),)
         changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
-        if self.settled[0] is not None or changed:
+        if self.decided[0] is not None or changed:
             return False
-        run.now[1], self.settled = self.qd, None
+        run.now[1], self.decided = self.qd, None
         self.closing.open(self.modes.opened)
         self.again.append(t)
         return True
@@ -482,8 +482,8 @@ class _ContactRun(Transitions):
         else:
             archive.go_back({**archive.counts, "outputs": self.written["outputs"] + count})
             self.totals = summed([end.counts] if self.totals is None else [self.totals, end.counts])
-        if self.settled is not None:  # within the run of the phase
-            return self.settled[0]
+        if self.decided is not None:  # within the run of the phase
+            return self.decided[0]
         self.t, self.remembered = end.reached, end.remembered
         self.q, self.qd, self.qdd = (x.copy() for x in end.last)
         self.ended = self.qd

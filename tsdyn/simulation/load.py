@@ -49,8 +49,8 @@ def load(
         ended.
     scene : Scene, optional
         That of a solution or ensemble whose file holds none, because the scene has functions or classes of your own.
-        Without it a solution can be looked at and converted: reactions, dense output and further runs are refused. A
-        store doesn't tell multipliers, power, potential energy and constraint errors, which are NaN then.
+        Without it a solution can be inspected and converted: reactions, dense output and further runs are refused. A
+        store lacks multipliers, power, potential energy and constraint errors, which are NaN then.
     allow_code : bool
         Whether modules that a file names as those of plug-ins may be imported. Plug-ins that have been imported
         before are found anyway.

@@ -37,7 +37,7 @@ def inactive_of(scene):
 
 
 def with_own_parts(scene):
-    """Pack a scene of `with_parameters` anew if it is packed with the parts of another: phases take its own."""
+    """Pack a scene of `with_parameters` again if it is packed with the parts of another: phases take its own."""
     if scene._bodies and scene.packed.bodies[0] is not scene._bodies[0]:
         scene.touch()
 

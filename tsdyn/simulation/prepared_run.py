@@ -103,7 +103,7 @@ class _Last(NamedTuple):
     bits: tuple | None  # of the state
     engines: dict  # of the scene: replaced where other rows or bodies take part in the equations
     task: Task
-    is_regular: bool  # whether there is no more to look at, as of `run_task`
+    is_regular: bool  # whether nothing else is to be checked, as of `run_task`
 
 
 def _is_fixed(times):
@@ -233,7 +233,7 @@ class Run:
         return Run(self.scene.with_parameters(values), self.options)
 
     def _solve(self, call: RunCall, found: tuple[Any, Any] = (None, None), archive: Any = None) -> Solution:
-        """Run as of `__call__`, without a look at what has become of the scene.
+        """Run as of `__call__`, without checking whether the scene has changed.
 
         found: numbers and arrays of a checkpoint to go on from. archive: that of a run which begins again by another
         method.
@@ -307,7 +307,7 @@ class Run:
         """
         state, kept, last = call.state, self._prepared, self._last
         known, is_plain, bits = kept.packed.derived, call.progress is call.store is None, None
-        if state is not None:  # it is worth a look at its numbers if it is given again
+        if state is not None:  # its numbers are compared if it is given again
             bits = _bits_of(state, kept) if state is self._seen else None
             is_plain = is_plain and bits is not None
         self._seen = state
@@ -400,7 +400,7 @@ class Run:
             return stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
 
     def __reduce__(self):
-        """A Run that is pickled is prepared anew where it is read."""
+        """A pickled Run is prepared again where it is read."""
         return Run, (self.scene, self.options)
 
     def _facts(self):

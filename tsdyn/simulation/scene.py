@@ -466,7 +466,7 @@ class Scene:
 
     @property
     def packed(self) -> Packed:
-        """The scene as a `Packed`; packed anew only after a change. Raises InvalidBody without bodies."""
+        """The scene as a `Packed`; packed again only after a change. Raises InvalidBody without bodies."""
         if self._packed is None:
             if not self._bodies:
                 raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")

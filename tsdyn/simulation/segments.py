@@ -34,8 +34,8 @@ from .termination import silent
 # What the implicit method takes more than the explicit one would have taken for the same motion is lost: fast modes
 # have to be followed until they have decayed. It turns back where more is lost than a share of what the explicit method
 # would take for the rest. Otherwise the explicit one is tried for some steps, at growing intervals, and earlier where
-# the derivatives of the forces had to be taken anew: as long as old ones serve, the motion is as stiff as it was. With
-# friction of joints, where none is at rest.
+# the derivatives of the forces had to be evaluated again: as long as old ones serve, the motion is as stiff as it was.
+# With friction of joints, where none is at rest.
 
 KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "began", "lasted", "lost", "most_lost"
 

@@ -62,7 +62,7 @@ AGREE, DEEPEST = 1e-11, 8
 PASSES, GOT_ON = 16, 1e-9
 
 # --- contacts --------------------------------------------------------------------------------------------------------
-# Of the scene's length, of angles in rad: a depth that no event leaves, which tells that an event was missed.
+# Of the scene's length, of angles in rad: a depth that no event leaves, which shows that an event was missed.
 PENETRATION = 1e-9
 # Roundings in a gap, of the sizes of its terms: lower flights than these are none.
 ROUNDED = 16.0

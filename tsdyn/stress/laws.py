@@ -222,7 +222,7 @@ def _shaken(solution):
         vars(other).pop(name, None)
     signs = np.random.default_rng(0).choice((-1.0, 1.0), solution.q.shape)
     other.q = solution.q + EPS * np.abs(solution.q).max() * signs
-    if method.atol is not None and any(getattr(part, "rubs", False) for part in solution.scene.constraints):
+    if method.atol is not None and any(getattr(part, "has_friction", False) for part in solution.scene.constraints):
         off = method.atol + method.rtol * np.abs(solution.qd).max()
         other.qd = solution.qd + 10.0 * off * signs
     return other

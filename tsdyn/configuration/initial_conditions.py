@@ -69,8 +69,8 @@ class StartParts(NamedTuple):
     """What the kernels of a start find by one address: the same parts twice, but for the metric of their graphs."""
 
     own: Parts
-    lengths: Parts  # length_metric.by_lengths
-    unequal: np.ndarray  # int64 (1,): length_metric.are_unequal
+    lengths: Parts  # constraint_graph.by_lengths
+    unequal: np.ndarray  # int64 (1,): constraint_graph.are_unequal
 
 
 load_start = loader(StartParts(no_parts(), no_parts(), np.zeros(1, np.int64)))

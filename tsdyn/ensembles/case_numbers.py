@@ -417,8 +417,8 @@ def _points_of(items):
 class Weights:
     """Whether masses and inertias of the cases ask for no other equations than those of the arena.
 
-    They do where a body has next to no inertia about an axis, also beside others (`massless_axes.lean_bodies`), or
-    where masses become unequal (`length_metric.are_unequal`).
+    They do where a body has next to no inertia about an axis, also beside others (`inertia_rows.lean_bodies`), or
+    where masses become unequal (`constraint_graph.are_unequal`).
 
     Attributes
     ----------

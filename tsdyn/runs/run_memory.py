@@ -141,7 +141,7 @@ class Memory:
 
     reason = ""  # of the end of a run, beyond its status
     engine = None  # that it is laid out for
-    arrays = None  # of a first slice: `run.SliceArrays`
+    arrays = None  # of a first slice: `driver.SliceArrays`
     layout = None  # a `Layout`
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 

@@ -255,7 +255,7 @@ def _column(name, given, field):
     if field.attribute == "inertia" and isinstance(field.owner, Body) and array.ndim == MATRIX:
         if array.shape == (3, 3) and (array == array.T).all():
             raise InvalidArgument(
-                f"{name}: three cases of principal values, or one matrix? Give an array (cases, 3, 3)."
+                f"{name} is one matrix or three cases of principal values; give an array (cases, 3, 3)."
             )
         return array, True
     least = 1 if dimensions == MATRIX else dimensions  # principal values do for a matrix

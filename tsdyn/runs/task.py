@@ -47,7 +47,7 @@ def output_times(t_eval, t0, t1):
     if increasing and times.size and t0 <= times[0] and times[-1] <= t1:
         return times
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
-        raise InvalidArgument("t_eval must be a non-empty vector of finite times in s.")
+        raise InvalidArgument(f"t_eval must be a vector of at least one finite time, s, got {shown(t_eval)}.")
     if not increasing:
         raise InvalidArgument("t_eval must increase from each time to the next.")
     if times[0] < t0 or times[-1] > t1:

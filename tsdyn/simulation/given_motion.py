@@ -62,8 +62,8 @@ class GivenMotion(Solution):
 
     def _integrated(self, part):
         raise InvalidArgument(
-            f"work is integrated over dense output, which a result of {self._method} has none of: integrate "
-            "`.power` or `.power_of(item)` over its times, by scipy.integrate.simpson for one."
+            f"work is integrated over dense output, and a result of {self._method} has none. Integrate `.power` or "
+            "`.power_of(item)` over its times, by scipy.integrate.simpson for example."
         )
 
     def _facts(self):

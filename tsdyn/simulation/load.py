@@ -150,9 +150,9 @@ def scene_file(
 def _demand_robot(free_base, outside, loops, limits):
     """Refuse options of the files of other programs."""
     if free_base:
-        raise InvalidArgument("free_base= is for URDF files.")
+        raise InvalidArgument("free_base= is for URDF files; leave it out.")
     if outside:
-        raise InvalidArgument("outside= is for URDF, MJCF and SDF files.")
+        raise InvalidArgument("outside= is for URDF, MJCF and SDF files; leave it out.")
     if limits:
         raise InvalidArgument("limits= is for URDF, MJCF and SDF files; other scenes have stops, ts.constraints.Stop.")
     if loops:

@@ -27,8 +27,7 @@ from ..maths.tolerances import EPS, NEGLIGIBLE, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
 from ..observables.evaluate import ITERATIONS, NO_INERTIA, constraint_arrays, mass_matrix
 from ..observables.generalised_forces import applied_loads, velocity_forces
-from .friction_units import NormalLoads
-from .slip_velocities import ACROSS, ALONG, WHOLE, slip_velocities
+from .friction_units import ACROSS, ALONG, WHOLE, NormalLoads, slip_velocities
 from .tolerances import BROKEN, EVENT_ERROR, LEVEL, PIVOTS, RESTS
 
 if TYPE_CHECKING:

@@ -314,7 +314,7 @@ WRONG = {
     "a mapping of names to arrays": {"parameters": 3},
     "needs the number of cases": {"parameters": lambda i: {}},
     "neither one for all cases": {"parameters": {"bob.mass": np.ones((2, 2))}},
-    "one matrix or three cases of principal values": {"parameters": {"bob.inertia": np.eye(3)}},
+    "three cases of principal values": {"parameters": {"bob.inertia": np.eye(3)}},
     "keep must be": {"keep": "last"},
     "give them": {"keep": "t_eval"},
     "threads must be": {"threads": 0},

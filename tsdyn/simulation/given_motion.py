@@ -62,7 +62,7 @@ class GivenMotion(Solution):
 
     def _integrated(self, part):
         raise InvalidArgument(
-            f"work is integrated over dense output, and a result of {self._method} has none. Integrate `.power` or "
+            f"work is integrated over dense output, and a result of {self._method} has none: integrate `.power` or "
             "`.power_of(item)` over its times, by scipy.integrate.simpson for example."
         )
 

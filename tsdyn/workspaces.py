@@ -544,11 +544,11 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "inertia_bias": (inertias,),
     }
     work = Work(**carve(shapes, control=LevelControl, counters=Counters), redundant=np.zeros(redundant + 1, np.int64))
-    hold(work.control, constraint_tol, size, joint_rows is not None)
+    set_tolerances(work.control, constraint_tol, size, joint_rows is not None)
     return work
 
 
-def hold(control, constraint_tol, size, basis_free):
+def set_tolerances(control, constraint_tol, size, basis_free):
     """Set the tolerances of the constraints; without normalisations in Phi, a small scene is held as closely."""
     control.u_tol = control.b_tol = constraint_tol
     control.size = size

@@ -237,7 +237,7 @@ class _ContactRun(Transitions):
         run, call = self._run_of(phase)
         still = self._still(phase)
         if still.size == self.q.size and self.options.method is None:
-            run = run._by(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
+            run = run._with_method(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
         run._prepare_kernels(True)
         self._enter_archive()
         while True:
@@ -265,7 +265,7 @@ class _ContactRun(Transitions):
                 said = (outcome.method or repr(task.method)).split(" and ")
                 self.methods += [method for method in said if method not in self.methods]
                 return task, outcome
-            run, self.replaced = run._by(other), True
+            run, self.replaced = run._with_method(other), True
             if self.archive is not None and self.archive.resumed is None:
                 self.archive.go_back(self.written)
 

@@ -255,7 +255,7 @@ class Run:
         if outcome.status is not SUCCESS:
             other = instead(task, outcome.status)
             if other is not None:
-                return self._by(other)._solve(call)
+                return self._with_method(other)._solve(call)
         return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
     def _has_phases(self, call):
@@ -363,7 +363,7 @@ class Run:
             prepare_first_run(self._first, options.method, self._form, within, default)
             self._compiled.add(within)
 
-    def _by(self, method):
+    def _with_method(self, method):
         """The same by another method."""
         return Run(self.scene, replace(self.options, integrator=method, rtol=None, atol=None))
 
@@ -382,7 +382,7 @@ class Run:
             seconds = clock() - started
             other = instead(task, outcome.status)
             if other is not None:
-                run = self._by(other)
+                run = self._with_method(other)
                 given |= by_name(run.options, call)
                 return run._solve(call, archive=stored_runs.begin_again(archive, given))
             outcome = stored_runs.ended(archive, outcome, seconds, task)

@@ -25,7 +25,7 @@ from .scene_cache import prepared
 # are open.
 
 
-def standing(scene: Any, state: Any, who: str) -> tuple[Any, RememberingState]:
+def phase_at(scene: Any, state: Any, who: str) -> tuple[Any, RememberingState]:
     """The scene of the phase that a run begins with at a state, or at the start (None), and the state of that run.
 
     Refuses an impact.
@@ -55,7 +55,7 @@ def evaluate(scene, own, q=None, qd=None, t=0.0):
 
 def linearise(scene, own, state=None, *arguments, **keywords):
     """As of scenes without contacts: contacts that push at the state hold."""
-    return own(*standing(scene, state, "linearise"), *arguments, **keywords)
+    return own(*phase_at(scene, state, "linearise"), *arguments, **keywords)
 
 
 def along(scene, own, *arguments, **keywords):

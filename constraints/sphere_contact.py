@@ -102,9 +102,7 @@ class SphereContact(Unilateral, Joint):
         if self.radius_b is not None:
             not_negative(self.radius_b, f"{self.name}: radius_b (m)", InvalidConstraint)
             if self.radius_a == self.radius_b == 0.0:
-                raise InvalidConstraint(
-                    f"{self.name}: radius_a and radius_b are zero, and points don't collide; give one above 0 m."
-                )
+                raise InvalidConstraint(f"{self.name}: two points don't collide; give radius_a or radius_b above 0 m.")
         if self.has_friction and self.radius_b is not None and 3 in (self.a.dimension, self.b.dimension):
             body = self.a if self.a.dimension == 3 else self.b
             raise InvalidConstraint(

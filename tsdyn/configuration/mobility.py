@@ -287,7 +287,7 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
     -----
     The rank is that of Phi_q with rows of unit length, rotations times the longest arm of the body's joints: singular
     values above 1e-7 of the largest. Masses don't matter. A row is called redundant if it depends on those of its
-    joint and of joints added before it, so they gather in few joints. Whether a configuration is singular is told by
+    joint and of joints added before it, so they gather in few joints. Whether a configuration is singular is decided by
     consistent ones beside it. Above 1000 coordinates, what hangs in open chains is put aside first and costs O(N);
     closed loops cost the cube of their rows.
 

@@ -7,7 +7,7 @@ Shares are without unit; q has m and Euler parameters side by side, so residuals
 # A start whose residuals are below LAST_PLACE of 1 + max |q| is taken as it is: projection would only exchange one
 # rounding for another. Gauss-Newton steps end at ROUNDING: their sums round several times.
 #
-# Residuals that are accepted without being told otherwise, as by `initial_tol` of `simulate`, since positions may be
+# Residuals that are accepted by default, as where `initial_tol` of `simulate` is left out, since positions may be
 # typed: of a start's positions and velocities, of loops in files, of positions and rates of a joint beside what a motor
 # prescribes (rad, m), of configurations that are asked for their mobility, and of their neighbours.
 INITIAL_TOL = 1e-9

@@ -295,7 +295,7 @@ NOT_FINITE, SLICE_DONE = int(Status.NOT_FINITE), int(Status.SLICE_DONE)
 
 
 class Batch:
-    """Runs stretches of cases in the memory of a workspace.
+    """Runs successive cases in the memory of a workspace.
 
     Parameters
     ----------

@@ -351,7 +351,7 @@ class GeometryColumns(Columns):
     family : Family
     constraints : list of ConstraintColumns
     writer : NumberWriter
-        Its numbers of constraints are known, and its weights are told the longest levers on each body.
+        Its numbers of constraints are known, and its weights are given the longest levers on each body.
     tol : float
         The constraint tolerance of runs.
     """

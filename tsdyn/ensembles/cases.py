@@ -196,7 +196,7 @@ def cases_of(scene, parameters, count):
     Raises
     ------
     InvalidArgument
-        If a name is unknown, lengths differ, or the number of cases can't be told.
+        If a name is unknown, lengths differ, or the number of cases isn't known.
     """
     count = whole(count, "cases")
     if callable(parameters):
@@ -298,7 +298,7 @@ def _array(given):
         return found
 
 
-# What is wrong with every case of an ensemble, told before the first one runs.
+# What is wrong with every case of an ensemble, found before the first one runs.
 
 
 def demand_whole(study):

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class CaseProgress:
-    """What is told of cases that are finished.
+    """What is reported of cases that are finished.
 
     Parameters
     ----------

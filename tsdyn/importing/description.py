@@ -310,7 +310,7 @@ class ImportReport:
         said += [f"its loops are open by up to {open_by:.2g}, and can't be closed"] if open_by else []
         if said:
             warnings.warn(
-                ImportLosses(f"{self.source}: {'; '.join(said)}. print(scene.imported) tells all."),
+                ImportLosses(f"{self.source}: {'; '.join(said)}. print(scene.imported) lists all."),
                 stacklevel=line_of_user(),
             )
 

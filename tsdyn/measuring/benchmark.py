@@ -141,7 +141,7 @@ def figure(benchmarks):
 
 
 def _panel(ax, benchmark, names):
-    """One line a method, and the errors that the reference can't tell apart in grey."""
+    """One line a method, and the errors that the reference can't distinguish in grey."""
     ax.set(xscale="log", yscale="log", xlabel="largest error in position (m) and rotation matrix")
     ax.grid(True, which="major", color="#dddddd", linewidth=0.6)
     ax.spines[["top", "right"]].set_visible(False)
@@ -445,7 +445,7 @@ def _try(make, run, pressed):
 
 @contextlib.contextmanager
 def _interrupts():
-    """A list that Ctrl-C fills: a run that it meets at its very end would not tell of it."""
+    """A list that Ctrl-C fills: a run that it meets at its very end would not report it."""
     pressed = []
     if threading.current_thread() is not threading.main_thread():
         yield pressed

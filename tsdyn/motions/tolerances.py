@@ -20,7 +20,7 @@ TIMES = (0.37, 1.3, 11.0)
 OVERSHOOT, EXTREMUM = 0.1, 0.5
 
 # Samples of a function over a run, of which there are two or more in a pulse of a thousandth of the run; and strides at
-# which they are looked at, up to a 32nd of the run: steps are that long. Of a step, as many are sampled for noise as
+# which they are compared, up to a 32nd of the run: steps are that long. Of a step, as many are sampled for noise as
 # the longest stride.
 SAMPLES, STRIDES = 2048, (1, 4, 16, 64)
 # Ratio of a sixth difference of samples to those before it, above which there is a change: beside a double zero

@@ -94,7 +94,7 @@ def taken(packed, n):
 
 
 def give(packed, found):
-    """Take back one that is no longer in use, unless it is large, or has room to select rows anew."""
+    """Take back one that is no longer in use, unless it is large, or has room to select rows again."""
     if not packed.derived.row_parts and redundancy(found.graph) == 0 and found.size < KEPT_FLOATS:
         packed.derived.row_parts.append(found)
 

@@ -35,7 +35,6 @@ from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome, interval, output_times, state_arrays
-from ..runs.tolerances import START_ZERO
 from ..validation import counted, damaged, demand, listed
 from . import hybrid
 from .grips import Halting, Reactions, items_of
@@ -392,7 +391,7 @@ class _ContactRun(Transitions):
             sides = [gaps.list[i].side for i in modes.closed]
             rows, slack = [first[id(side.row)] for side in sides], [modes.slack.get(i, 0.0) for i in modes.closed]
             leaving = Leaving(packed, rows, [side.sign for side in sides], slack).over
-        self.closing = Closing(gaps, modes.opened, START_ZERO * gaps.lengths(self.length))
+        self.closing = Closing(gaps, modes.opened, modes.lifted)
         for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue

@@ -22,7 +22,7 @@ class UnitModes:
 
     closed: list = field(default_factory=list)  # independent rows, with reactions
     idle: list = field(default_factory=list)  # closed by what others hold
-    opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+    opened: dict = field(default_factory=dict)  # time, gap, rate, rounding of the gap: contacts just opened
     sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
@@ -31,6 +31,7 @@ class UnitModes:
         default_factory=dict
     )  # of closed contacts with friction: rows of the slip that hold; None: slides
     slack: dict = field(default_factory=dict)  # closed with a reaction of rounding: how far below zero it leaves, N
+    lifted: list = field(default_factory=list)  # opened to flights below rounding of the gap, which end at the top
 
     def sticks(self, i):
         """Whether a contact with friction sticks."""

@@ -79,7 +79,7 @@ def measure_opened(t, which, start, values):
     """Divide gaps by the time since they have opened, in values (k, gaps) at times t (k,), or add rounding to them.
 
     start (4, opened): time, gap, rate and rounding where those of the numbers `which` have opened; without a rate the
-    second. The first have the rounding, r, as r^2 / (rate time): above it at once, and gone where they close.
+    second. The first have the rounding, r, too, times (r / (rate time))^6: above noise at once, gone where they close.
     """
     for j in range(which.size):
         begun, first, rate, rounding = start[0, j], start[1, j], start[2, j], start[3, j]
@@ -88,7 +88,8 @@ def measure_opened(t, which, start, values):
             if not rate > 0.0:
                 values[k, which[j]] = grown + rounding
             else:
-                values[k, which[j]] = (grown + rounding * rounding / (rate * since)) / since if since > 0.0 else rate
+                share = (rounding / (rate * since)) ** 2 if since > 0.0 else 0.0
+                values[k, which[j]] = (grown + rounding * share * share * share) / since if since > 0.0 else rate
 
 
 @kernel

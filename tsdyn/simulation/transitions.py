@@ -91,8 +91,9 @@ class Transitions:
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
             small, unstruck = NEGLIGIBLE * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max(), self._is_unstruck()
             rates[[i for i in before.closed if unstruck or abs(rates[i]) <= small[i]]] = 0.0
-            # What rounding of the time leaves open is no rate: gaps close, or reach the tops of flights, together
-            rates[np.abs(rates) <= RESTS * EPS * abs(self.t) * inertia.sizes(self.qdd)] = 0.0
+            # What rounding of the time leaves open is no rate: gaps close, or reach the tops of flights, at once
+            none = RESTS * EPS * abs(self.t) * inertia.accelerations(self.qd)[1]
+            rates[np.abs(rates) <= none] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
             ratchets = [i for i in fired if i not in before.closed and i in self.gaps.following]
             if ratchets:  # they take hold
@@ -101,6 +102,10 @@ class Transitions:
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
+            if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
+                _, self.qd, left = held(inertia, self.qd, resting, inertia.rates(self.qd))
+                rates[np.abs(left) <= none] = 0.0  # of rows that depend on these, too
+                resting = [i for i in touching if rates[i] == 0.0]
             opening = [i for i in touching if rates[i] > 0.0]
             # What grazes without a reaction has left: its gap was rounding. What has left at this instant doesn't come
             # back by rounding: contacts that leave together would take turns
@@ -108,8 +113,6 @@ class Transitions:
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
             rounding = self._rounding(before) + NEGLIGIBLE * np.abs(self.qd - qd).max()
-            if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
-                self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
             self.modes, struck = UnitModes(), self.qd
             if self.gaps.rough[resting].any():
                 self.qd, contacts = at_turn(inertia, resting, self.qd, leaving, turned, opening)
@@ -139,13 +142,20 @@ class Transitions:
             return Status.CONTACT_FAILED
 
     def _open(self, inertia, which, rates, a):
-        """Open the gaps `which`, with these rates and decelerations a (count,): to flights below rounding or higher."""
-        rounding, modes = 2.0 * self._heights(inertia), self.modes
-        low = rates**2 < rounding * a
-        grazes = (a <= 0.0) & (rates**2 < rounding * inertia.accelerations(self.qd)[1])
-        modes.lifted = [i for i in which if low[i]]
-        modes.opened = {i: self._opened(i, rates[i], 0.125 * rounding[i]) for i in which if not (low[i] or grazes[i])}
-        modes.opened |= {i: self._opened(i) for i in which if grazes[i]}
+        """Open the gaps `which`, with these rates and decelerations a (count,).
+
+        Flights below rounding of the gap end at their tops; of a rate that is no more without a deceleration, rounding
+        of the gap is no end.
+        """
+        rounding, modes = self._heights(inertia), self.modes
+        below = rates**2 < 2.0 * rounding * np.maximum(a, 0.0)
+        grazes = rates**2 < 2.0 * rounding * inertia.accelerations(self.qd)[1]
+        rises = below & (inertia.rates(self.qd) > 0.0)
+        modes.lifted = [i for i in which if rises[i]]
+        none = grazes & (below | (a <= 0.0))
+        for i in which:
+            if not rises[i]:
+                modes.opened[i] = self._opened(i) if none[i] else self._opened(i, rates[i], 0.25 * rounding[i])
 
     def _opened(self, i, rate=0.0, rounding=None):
         """What `UnitModes.opened` has of a gap that opens now."""
@@ -348,15 +358,16 @@ class Transitions:
         p, qd, after = self._jump(inertia, touching, before, e)
         # Impacts that are followed by flights below rounding are the last ones
         a = self._lowering(inertia, touching, qd, after)
-        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and p[k, 0] > 0.0 and e[k] > 0.0]
+        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and before[k] < 0.0 and e[k] > 0.0]
         if last:
             flights = [2.0 * after[touching[k]] / (a[touching[k]] * (1.0 - e[k])) for k in last if e[k] < 1.0]
             self.rest = float(max([self.rest, *(self.t + T for T in flights)]))
             e[last] = 0.0
             p, qd, after = self._jump(inertia, touching, before, e)
             a = self._lowering(inertia, touching, qd, after)
-        # Contacts that another impact lifts for less than rounding of the time stay closed
-        after[after <= RESTS * EPS * abs(self.t) * a] = 0.0
+        # Contacts that another impact lifts by rounding, of its impulses or of the time, stay closed
+        rounding = NEGLIGIBLE * np.abs(inertia.G[:, touching]) @ p[:, 0]
+        after[after <= np.maximum(rounding, RESTS * EPS * abs(self.t) * a)] = 0.0
         self._note_impulses(inertia, touching, p, self.qd)
         self.qd = qd
         return after

@@ -123,8 +123,8 @@ def is_raised(graph):
 #
 #     |x|^2 = sum |dr|^2 + L^2 |w'|^2
 #
-# L is the longest arm of a body's joints, m. Where all arms are next to nothing, forces have arms that no point shows: a
-# wheel's radius, the way along a guide. L is then the longest distance between points that a constraint compares.
+# L is the longest arm of a body's joints, m. Where all arms are next to nothing, forces have arms that no point shows:
+# a wheel's radius, the way along a guide. L is then the longest distance between points that a constraint compares.
 
 MASS_REMEDY = "Give light bodies that carry heavy ones more mass, or make them one body with what they carry."
 

@@ -22,7 +22,7 @@ class UnitModes:
 
     closed: list = field(default_factory=list)  # independent rows, with reactions
     idle: list = field(default_factory=list)  # closed by what others hold
-    opened: dict = field(default_factory=dict)  # time, gap and rate where a contact has just opened with a rate
+    opened: dict = field(default_factory=dict)  # time, gap, rate, rounding of the gap: contacts just opened
     sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
@@ -31,6 +31,7 @@ class UnitModes:
         default_factory=dict
     )  # of closed contacts with friction: rows of the slip that hold; None: slides
     slack: dict = field(default_factory=dict)  # closed with a reaction of rounding: how far below zero it leaves, N
+    lifted: list = field(default_factory=list)  # opened to flights below rounding of the gap, which end at the top
 
     def sticks(self, i):
         """Whether a contact with friction sticks."""
@@ -192,7 +193,7 @@ class Phases:
     def _modes(self, kind):
         return UnitModes.of(self.modes[kind][0])
 
-    def told(self):
+    def merged(self):
         """The `list`, each name once; phases are one where the same rows hold, and no impact or action is between."""
         found, before, hit = [], None, {t for t, *_ in self.impulses}
         for (start, end, names), begun, changes in zip(self.list, self.starts, self.changes, strict=True):
@@ -324,7 +325,7 @@ class Phases:
         Raises
         ------
         KeyError, TypeError or ValueError
-            If they tell none.
+            If they describe none.
         """
         demand_record(numbers, RECORD)
         phases, impulses = arrays["phases"].astype(float), arrays["impulses"].astype(float)

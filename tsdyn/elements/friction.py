@@ -444,8 +444,8 @@ class JointFriction:
         self._demand_added(self.joint)
         if getattr(self.joint, "unilateral", False):
             raise self.error(
-                f"{self.name}: {self.joint.name!r} opens and closes, and has friction of its own: set kinetic and static "
-                "there, and leave this one out."
+                f"{self.name}: {self.joint.name!r} opens and closes, and has friction of its own: set kinetic and "
+                "static there, and leave this one out."
             )
         if self.__dict__.get("static") is not None and self.static < self.kinetic:
             raise self.error(

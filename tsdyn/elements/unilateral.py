@@ -91,8 +91,8 @@ class Unilateral:
         for force in self.scene.forces if self.unilateral and self.added else ():
             if getattr(force, "joint", None) is self:
                 raise InvalidConstraint(
-                    f"{self.name}: {force.name!r} is friction of a contact that doesn't open; remove it, and set kinetic "
-                    "and static of the contact."
+                    f"{self.name}: {force.name!r} is friction of a contact that doesn't open; remove it, and set "
+                    "kinetic and static of the contact."
                 )
 
     @property

@@ -465,6 +465,18 @@ def test_a_run_that_ends_at_an_impact_ends_before_it():
     assert solution.velocity("ball")[-1, 2] == pytest.approx(-G * fall, rel=1e-14)
 
 
+def test_the_text_of_a_solution_counts_its_phases():
+    """Friction that turns around beside rows that go on to hold begins no phase."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    block = scene.add_body(1.0, (1, 1, 1), position=(2.0, 0, 0), name="block")
+    scene.add(C.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(ts.forces.Spring(scene.ground, block, stiffness=10.0, free_length=1.0))
+    scene.add(ts.forces.CoulombFriction(block, scene.ground, force=0.1))
+    solution = ts.simulate(scene, (0, 5.0))
+    assert solution.phases == [(0, 5.0, ())]
+    assert "phases  1 phase, 0 impulses" in str(solution)
+
+
 def test_a_run_goes_on_from_a_state_in_contact():
     scene, _ = bouncing(0.5)
     whole = ts.simulate(scene, (0, 4.0))

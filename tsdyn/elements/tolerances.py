@@ -9,13 +9,10 @@ UNIT_LENGTH = 1e-6
 
 # Sine of an angle. Of a reference the part across an axis gives a direction; at 1e-6 ten digits of it are left.
 PARALLEL = 1e-6
-# The same for a direction that is found, not given: seven digits suffice to count turns by. Also 1 + cosine of two
-# axes, below which they are opposed, and the least turn from one to the other is not unique.
+# The same for a direction that is found, not given: seven digits suffice to count turns by, and for the lowest point of
+# a disc. Also 1 + cosine of two axes, below which they are opposed, and the least turn from one to the other is not
+# unique.
 UNDIRECTED = 1e-9
-# Cosines of directions that are at right angles, and their lengths from 1: nine digits of a slip are left.
-RIGHT_ANGLED = 1e-9
-# Sine of the angle of a disc to its plane: at it seven digits of the direction of the lowest point are left.
-FLAT = 1e-9
 
 # Complex step of constraints, in which no squares of small numbers count; of forces it is COMPLEX_STEP of maths.
 CONSTRAINT_STEP = 1e-100

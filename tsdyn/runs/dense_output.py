@@ -450,7 +450,7 @@ class Trajectory:
 
     @property
     def reading(self):
-        """The `TrajectoryReading`; made anew in another process than the run's."""
+        """The `TrajectoryReading`; made again in another process than the run's."""
         if self._reading is None:
             make, *arguments = self.again
             self._reading = make(*arguments)

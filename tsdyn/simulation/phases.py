@@ -192,7 +192,7 @@ class Phases:
     def _modes(self, kind):
         return UnitModes.of(self.modes[kind][0])
 
-    def told(self):
+    def merged(self):
         """The `list`, each name once; phases are one where the same rows hold, and no impact or action is between."""
         found, before, hit = [], None, {t for t, *_ in self.impulses}
         for (start, end, names), begun, changes in zip(self.list, self.starts, self.changes, strict=True):
@@ -324,7 +324,7 @@ class Phases:
         Raises
         ------
         KeyError, TypeError or ValueError
-            If they tell none.
+            If they describe none.
         """
         demand_record(numbers, RECORD)
         phases, impulses = arrays["phases"].astype(float), arrays["impulses"].astype(float)

@@ -262,7 +262,7 @@ def with_parameters(scene: Scene, values: Mapping[str, Any]) -> Scene:
     -------
     Scene
         Independent of this scene; handles of this scene serve for its solutions, too. A run of it has the bits of a
-        scene built anew with these values.
+        scene that is built with these values.
 
     Raises
     ------
@@ -277,7 +277,7 @@ def with_parameters(scene: Scene, values: Mapping[str, Any]) -> Scene:
     The constraint graph and the packed arrays are shared: masses, inertias, starts, gravity, and the numbers of forces
     and of constraints such as Distance take tens of microseconds, the geometry of a joint some hundreds. Functions of
     time, sampling periods, joints that a force refers to, and numbers of a file take milliseconds: the scene is packed
-    anew.
+    again.
 
     Examples
     --------

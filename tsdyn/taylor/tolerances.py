@@ -64,7 +64,7 @@ CLOSER, CLOSE, PASSED = 0.3, 0.1, 0.02
 AVOID, AVOIDING = 0.7, 5
 
 # Factor of the tolerance between tries to cross a singular configuration; loosest tolerance of a crossing that starts
-# far away, and of one that starts close, where lam has few digits; least order of the series.
+# far away, and of one that starts close, where lam has few digits, or that another method hands over; least order.
 LOOSER, FAR_PASSING, PASSING, LEAST_ORDER = 2.0, 1e-13, 1e-10, 5
 
 # Tolerance of a step that starts next to a singular configuration, over that of the run, and the least of it: rounding

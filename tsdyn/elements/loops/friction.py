@@ -184,7 +184,7 @@ def normal_load(stride, own, real, q, kept, side, what, f, out):
 
 
 def load_slope(stride, own, real, q, qd, t, side, f, out):
-    """out (13,) = as normal_load with derive = 1, by the series of the load; then the reaction about the point.
+    """out (13,) = as normal_load with DERIVE, by the series of the load; then the reaction about the point.
 
     What `normal_series` leaves out as negligible is left out here, too.
     """

@@ -456,8 +456,13 @@ class JointFriction:
         super().__setattr__(name, value)
 
     def check(self) -> None:
-        """A joint that the scene has, and friction no smaller at rest than sliding."""
+        """A joint that the scene has and that doesn't open, and friction no smaller at rest than sliding."""
         self._demand_added(self.joint)
+        if getattr(self.joint, "unilateral", False):
+            raise self.error(
+                f"{self.name}: {self.joint.name!r} opens and closes, and has friction of its own: set kinetic and "
+                "static there, and leave this one out."
+            )
         if self.__dict__.get("static") is not None and self.static < self.kinetic:
             raise self.error(
                 f"{self.name}: static must be at least kinetic = {self.kinetic:g}, got {self.static:g}; leave it out "

@@ -374,7 +374,7 @@ class _ContactRun(Transitions):
         pairs = zip(self.users, self.counts, strict=True)
         goes_on = self.end is not None
         found = [
-            event._replace(limit=1.0 if event.action else event.limit - count, goes_on=goes_on)
+            event._replace(limit=1.0 if event.action else event.limit - count, goes_on=goes_on, length=self.length)
             for event, count in pairs
         ]
         watches = list(self._watches(phase))
@@ -492,7 +492,10 @@ class _ContactRun(Transitions):
             return self._act(acting, fired, end.last) if acting else self._transit(fired)
         if self._is_deep():
             return Status.CONTACT_FAILED
-        return Status.SUCCESS if ends else outcome.status
+        if not ends:
+            return outcome.status
+        self.reason = ""  # which told what ends the phase
+        return Status.SUCCESS
 
     def _is_deep(self):
         """Whether contacts penetrate; says so."""

@@ -627,7 +627,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         if sweeps and s.placements:  # series place none
             sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement"
         known = self._phases
-        phases = f"{counted(len(known.list), 'phase')}, {counted(len(known.impulses), 'impulse')}" if known else ""
+        phases = f"{counted(len(self.phases), 'phase')}, {counted(len(known.impulses), 'impulse')}" if known else ""
         return {
             "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self._length(), 'output')}",
             **({"phases": phases} if phases else {}),

@@ -194,7 +194,7 @@ class Phases:
     def _modes(self, kind):
         return UnitModes.of(self.modes[kind][0])
 
-    def told(self):
+    def merged(self):
         """The `list`, each name once; phases are one where the same rows hold, and no impact or action is between.
 
         Without those of no duration: other events came during flights below rounding that were to end there.
@@ -333,7 +333,7 @@ class Phases:
         Raises
         ------
         KeyError, TypeError or ValueError
-            If they tell none.
+            If they describe none.
         """
         demand_record(numbers, RECORD)
         phases, impulses = arrays["phases"].astype(float), arrays["impulses"].astype(float)

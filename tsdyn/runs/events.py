@@ -511,6 +511,7 @@ class Watch:
 
         Of those without an action, where the run goes on: nobody finds them afterwards.
         """
+        self._add_members(step, last)
         just = max(last.t - limits.NOISE * limits.ROOT * abs(last.t), step.t0)
         goes_on = last.index not in self._single or self.events[last.index].action
         for i in self._single:
@@ -525,6 +526,18 @@ class Watch:
             since = max([step.t0, *(each.t for each in self.list[i][-1:])])
             before = self._at(i, step, last.t - limits.SHORTLY * (last.t - since))
             if abs(before) > noise and event.direction * before <= 0.0:
+                self.list[i].append(Occurrence(last.t, i, last.state))
+
+    def _add_members(self, step, last):
+        """The same, of events of the group of the last one: by how fast their values fall."""
+        group = next((group for group in self._groups if last.index in group.numbers), None)
+        if group is None or len(group.numbers) == 1:
+            return
+        before = last.t - limits.SHORTLY * (last.t - step.t0)
+        first, value = self._sample_within(group, step, np.array([before, last.t]))
+        falls = (value < first) & (value * (last.t - before) <= limits.TOGETHER * abs(last.t) * (first - value))
+        for i, also in zip(group.numbers, falls.tolist(), strict=True):
+            if also and i != last.index:
                 self.list[i].append(Occurrence(last.t, i, last.state))
 
     def _points(self, i, step, end):

@@ -357,8 +357,7 @@ def test_a_block_that_rocks_to_rest_is_only_pushed():
     """Housner: an impact leaves 1 - 3/2 sin^2 of the rate, the angle that of the diagonal; and so do its impulses."""
     scene, tilt, (b, h) = ts.Scene(gravity=(0, 0, -G)), 1e-3, (0.1, 0.3)
     turned = Rotation.from_euler("y", tilt)
-    place = turned.apply([b, 0, h]) + [-b, 0, 0]
-    place[2] = b * np.sin(tilt) + h * np.cos(tilt)
+    place = (0, 0, b * np.sin(tilt) + h * np.cos(tilt))
     block = scene.add_body(**ts.shapes.box((2 * b, 0.4, 2 * h), mass=2.0), position=place, orientation=turned)
     for x, y in ((-b, -0.2), (-b, 0.2), (b, -0.2), (b, 0.2)):
         contact = C.PlaneContact(block, scene.ground, point_a=(x, y, -h), **FLOOR, kinetic=0.8, name=f"{x} {y}")

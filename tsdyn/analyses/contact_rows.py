@@ -46,6 +46,7 @@ from ..rows.interface import (
     mark_redundant,
     reset_selection,
     weigh_bodies,
+    with_all_rows,
 )
 from ..workspaces import Parts, load_parts, no_parts, parts
 
@@ -308,11 +309,17 @@ class ReactionWorkspace:
     def __init__(self, packed, redundant=0.0):
         system, self.redundant, self.graph = with_short_rows(packed), redundant, graph_of(packed, REDUCED, BIAS)
         self.n, self.m, self.count = int(system.bodies[:, 1].sum()), len(packed.system.segments), system.normals.size
-        whole = parts(system._replace(reals=system.reals.copy()), self.graph, self.n)
+        graph = self.graph if packed.derived.switched is None else with_all_rows(self.graph)
+        whole = parts(system._replace(reals=system.reals.copy()), graph, self.n)
         self.address, *self._keep = resident(whole)
-        self.begin = partial(reset_selection, self.graph, whole.tangent)  # as if it were new
+        self._tangent = whole.tangent
         find = find_reactions if self.count else find_multipliers
         self._find = interrupts_answered()(find) if calls_laws(packed) else find
+
+    def begin(self, graph):
+        """As if it were new, with the redundant rows of a graph."""
+        self.graph = graph
+        reset_selection(graph, self._tangent)
 
     def multipliers(self, t, levels, memory):
         """Multipliers (k, m) at times t (k,), levels (k, 3, n), of normalisations zero; normal loads (k, frictions)."""
@@ -328,9 +335,10 @@ def reaction_workspace(packed, redundant=0.0):
     A start may have shown that rows are redundant.
     """
     known, key = packed.derived.reactions, (threading.get_ident(), redundant == 0.0)
-    if key not in known or known[key].graph is not graph_of(packed, REDUCED, BIAS):
+    graph = graph_of(packed, REDUCED, BIAS)
+    if key not in known or known[key].graph.row is not graph.row:
         known[key] = ReactionWorkspace(packed, redundant)
-    known[key].begin()
+    known[key].begin(graph)
     return known[key]
 
 

@@ -101,6 +101,13 @@ class Hold(NamedTuple):
         return [list(zip(self.unit.held(i), at, strict=True)) for i in range(self.rank)]
 
 
+def hold_of(unit):
+    """All rows of a `FrictionUnit`, with numbers to be packed with."""
+    numbers = np.ones((unit.slide.freedom, unit.slide.row_numbers))
+    numbers[:, -1] = 0.0
+    return Hold(unit, len(numbers), numbers)
+
+
 class Frictions:
     """The frictions of a scene that follow the exact law.
 
@@ -125,6 +132,7 @@ class Frictions:
                 self.units.append(FrictionUnit(load, force, slide, slot))
                 slot += slide.count
         self.count, self.names = len(self.units), [unit.force.name for unit in self.units]
+        self.held = [np.array([unit.held(k) for k in range(unit.slide.freedom)], int) for unit in self.units]
         # Of each unit the bodies a and b, numbers of rows of System.bodies; the ground is behind them
         spans, slides = self.packed.system.bodies, [unit.slide for unit in self.units]
         ends = [(unit.force.a, unit.force.b) for unit in self.units]

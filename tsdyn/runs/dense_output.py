@@ -212,6 +212,7 @@ def read(context, run, t, rows, blocks, charts, points, out):
     for i in range(t.size):
         # Every time begins at the same state of its chart
         block = blocks[rows[i]]
+        recall(c.system, block)  # rows that hold frictions depend on it
         if int(block[B_CHART]) == chart:
             bring_back(c, r.warm)
         else:
@@ -226,7 +227,6 @@ def read(context, run, t, rows, blocks, charts, points, out):
                 return status
             keep(c, r.warm)
         # The state at t
-        recall(c.system, block)
         status = between(context, w, r, t[i], block)
         if status != 0:
             return status

@@ -78,7 +78,18 @@ class Transitions:
         """Whether a time before the present one is the same instant, to rounding."""
         return self.t - t <= 16.0 * EPS * max(abs(self.t), EPS)
 
-    def _settle(self, touching, fired, broken, turned=()):
+    def _settle(self, *which):
+        """As `_settle_units`; rows of frictions that don't hold remember zeros."""
+        status = self._settle_units(*which)
+        memory, held = self.remembered[self.count :], self.frictions.held
+        ranks = [self.modes.sticking.get(i, 0) for i in range(self.frictions.count)]
+        left = [slot for rank, slots in zip(ranks, held, strict=True) for slot in slots[rank:].ravel().tolist()]
+        if memory[left].any():
+            self.remembered = self.remembered.copy()
+            self.remembered[self.count :][left] = 0.0
+        return status
+
+    def _settle_units(self, touching, fired, broken, turned=()):
         """Impact, then which gaps stay closed, which frictions stick; the Status if there is no way on, else None.
 
         fired, broken: gaps and frictions whose events have come; turned: gaps whose slips have turned.
@@ -272,14 +283,8 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        # With rows of those that slide, too, which don't count: it is packed once
-        holds = {i: self._hold(i, ranks[i]) for i in free}
-        for i in set(range(len(units))) - {*free, *self.off}:
-            numbers = np.ones((units[i].slide.freedom, units[i].slide.row_numbers))
-            numbers[:, -1] = 0.0
-            holds[i] = Hold(units[i], len(numbers), numbers)
-        phase = self._scene_of([], list(holds.values()))
-        rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
+        phase = self._scene_of([], self.every, self.every)  # rows of those that slide don't count: it is packed once
+        rows = {i: phase.packed.derived.holds[units[i].slot][: ranks[i]] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
             Phi = values_of(phase.packed, self.t, self.q, memory)

@@ -19,14 +19,16 @@ from ..jit.simd import add, cross, first, four, put, second, splat, third
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import LAST_PLACE
 from ..model.packed import System
-from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, with_loops
+from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, redundant_rows, with_loops
 from ..rows.interface import (
     add_products,
     allocate_tangent,
     evaluate_bias,
     note_loads,
+    set_selection,
     solve_friction_series,
     weigh_bodies,
+    with_all_rows,
 )
 from ..runs.dense_output import READ, TrajectoryReading, put_state, recall
 from ..runs.run_memory import Memory
@@ -294,9 +296,12 @@ class Series:
         if found:
             raise InvalidArgument(found)
         graph, self.kinds = moving_parts(packed)
+        if packed.derived.switched is not None:
+            graph = with_all_rows(graph)
         self.constant_columns = _masks_once(graph, packed)
         self.graph = with_ground_contacts(with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT), self.kinds)
         self.refined = int(len(graph.bodies) > MANY_BODIES or are_unequal(packed.system))
+        self.engines = {}  # scene_cache.Prepared.engine
 
 
 def _masks_once(graph, packed):
@@ -387,8 +392,8 @@ class SeriesEngine:
 
     def reading(self, memory, prepared, constraint_tol):
         """A `Reading` of the steps; a function and its arguments that make it in another process."""
-        packed, graph = prepared.packed, self.series.graph
-        return _reading(packed, graph, self.highest), (read_again, packed, self.highest)
+        packed = prepared.packed
+        return _reading(packed, self.series.graph, self.highest), (read_again, packed, self.highest)
 
 
 def read_again(packed, highest):
@@ -399,6 +404,8 @@ def read_again(packed, highest):
 def _reading(packed, graph, highest):
     def workspace():
         context, run = reading_workspace(system, graph, room(highest), packed.size)
+        if packed.derived.switched is not None:
+            set_selection(context.tangent, np.flatnonzero(np.isin(graph.row, redundant_rows(packed))))
         _set_kernels(run, graph, highest, True)
         return context, run
 

@@ -23,7 +23,7 @@ from ..elements.friction import GUIDE, PIN, PLANE
 from ..errors import SingularConfiguration
 from ..maths.complementarity import OPEN, STICKS
 from ..maths.dense_linalg import range_and_null_space
-from ..maths.tolerances import EPS, RANK_TOL, ROUNDING, TINY
+from ..maths.tolerances import EPS, HALF_DIGITS, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
 from ..observables.evaluate import ITERATIONS, NO_INERTIA, constraint_arrays, mass_matrix
 from ..observables.generalised_forces import applied_loads, velocity_forces
@@ -279,22 +279,31 @@ def _remembering(system, memory):
     return system
 
 
-def immobile(packed, t, q, memory):
+def immobile(packed, t, q, qd, memory):
     """Coordinates of the bodies that rows without time leave no motion, whatever others do."""
+    spans = packed.system.bodies.tolist()
+    slow = np.abs(qd) <= HALF_DIGITS * np.abs(qd).max() + ROUNDING
+    columns = _columns([(at, length) for at, length in spans if slow[at : at + length].all()])
+    if not columns.size:
+        return columns
     _, Phi_q, _, _ = constraint_arrays(_remembering(packed.system, memory), q, np.zeros_like(q), t)
-    steady, spans = [], packed.system.bodies.tolist()
+    steady = []
     for part, row in first_rows(packed.constraints):
         steady += [] if part.rheonomic else range(row, row + part.rows)
-    Phi_q, columns = Phi_q[steady], np.arange(q.size)
+    Phi_q = Phi_q[steady]
     while columns.size:
         mine = ~np.delete(Phi_q, columns, axis=1).any(axis=1)
         moved = _null_space(Phi_q[np.ix_(mine, columns)])
         moves = np.isin(np.arange(q.size), columns[np.abs(moved).max(axis=1, initial=0.0) > RANK_TOL])
         if not moves.any():
             break
-        still = [np.arange(at, at + length) for at, length in spans if not moves[at : at + length].any()]
-        columns = np.intersect1d(columns, np.concatenate([*still, np.zeros(0, int)]))
-    return columns.astype(int)
+        still = [(at, length) for at, length in spans if not moves[at : at + length].any()]
+        columns = np.intersect1d(columns, _columns(still))
+    return columns
+
+
+def _columns(spans):
+    return np.concatenate([np.zeros(0, int), *(np.arange(at, at + length) for at, length in spans)])
 
 
 def _null_space(rows):

@@ -434,7 +434,7 @@ class _ContactRun(Transitions):
         sticks = self.modes.sticking or any(map(self.modes.sticks, self.modes.grips))
         if not sticks or self.q.size > MOST_PINNED:
             return np.zeros(0, int)
-        return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
+        return immobile(phase.packed, self.t, self.q, self.qd, self.remembered[self.count :])
 
     def _rubbing(self, packed):
         """The same of closed contacts where there is friction: their reactions, their bounds, their slips."""

@@ -235,6 +235,12 @@ def accelerate_with_friction_here(context, t, h):
     return 0 if found else JAMMED
 
 
+@callback("pdd")
+def leave_accelerations(context, t, h):
+    """In place of `accelerate_here`, where nobody asks for qdd."""
+    return 0
+
+
 # Dense output of a Taylor run: the series of a step, evaluated and projected onto the manifold.
 
 
@@ -302,6 +308,7 @@ class Series:
         self.graph = with_ground_contacts(with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT), self.kinds)
         self.refined = int(len(graph.bodies) > MANY_BODIES or are_unequal(packed.system))
         self.engines = {}  # scene_cache.Prepared.engine
+        self.idle = {}  # readers that are not in use, by their highest orders: of phases
 
 
 def _masks_once(graph, packed):
@@ -393,24 +400,28 @@ class SeriesEngine:
     def reading(self, memory, prepared, constraint_tol):
         """A `Reading` of the steps; a function and its arguments that make it in another process."""
         packed = prepared.packed
-        return _reading(packed, self.series.graph, self.highest), (read_again, packed, self.highest)
+        return _reading(packed, self.series, self.highest), (read_again, packed, self.highest)
 
 
 def read_again(packed, highest):
     """A `Reading` in another process than the run's."""
-    return _reading(packed, Series(packed, refusal(packed)).graph, highest)
+    return _reading(packed, Series(packed, refusal(packed)), highest)
 
 
-def _reading(packed, graph, highest):
+def _reading(packed, series, highest):
     def workspace():
         context, run = reading_workspace(system, graph, room(highest), packed.size)
-        if packed.derived.switched is not None:
-            set_selection(context.tangent, np.flatnonzero(np.isin(graph.row, redundant_rows(packed))))
         _set_kernels(run, graph, highest, True)
         return context, run
 
-    system = packed.system
-    return TrajectoryReading(read_series, workspace, system, shift=0, degree=16)
+    def begin(context):
+        set_selection(context.tangent, off)
+
+    system, graph = packed.system, series.graph
+    if packed.derived.switched is None:
+        return TrajectoryReading(read_series, workspace, system, 0, 16, leave_accelerations)
+    off, idle = np.flatnonzero(np.isin(graph.row, redundant_rows(packed))), series.idle.setdefault(highest, [])
+    return TrajectoryReading(read_series, workspace, system, 0, 16, leave_accelerations, begin, idle)
 
 
 def expanding(rough, far):

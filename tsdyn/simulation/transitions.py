@@ -292,7 +292,7 @@ class Transitions:
                 for k, row in enumerate(rows[i]):
                     memory[units[i].held(k)[-1]] = Phi[row]
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
-        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
+        problem = RestProblem(place, self.gaps, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
         rest = problem.settle({i: way for i, way in guess.items() if i in free}, fired)
         # In a plane slips end where they are slow
         self.qd = problem.stopped([i for i in rest.sticking if i in fresh and not self.frictions.signed[i]], self.qd)

@@ -76,8 +76,8 @@ class Leaving:
 class Breaking:
     """What reactions lack of their limits, as event functions.
 
-    Of frictions that stick, by their bounds b and multipliers lam: (b^2 - lam^2) / (b + c), which is smooth at lam = 0, c
-    the bound at the limit. Of those without a load: the load, and one that counts.
+    Of frictions that stick: (b^2 - lam^2) / (b + c), with bound b, multipliers lam and the bound c at the limit; it is
+    smooth at lam = 0. Of those without a load: the load, and one that counts.
 
     Parameters
     ----------

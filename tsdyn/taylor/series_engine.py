@@ -250,12 +250,13 @@ def read_series(context, run, t, rows, blocks, charts, points, out):
     c, r = load_series(context), load_run(run)
     w, x = c.work, c.expansion
     for i in range(t.size):
-        # A block is the whole series of a step
+        # A block is the whole series of a step, which serves for all times in the step
         block = blocks[rows[i]]
         data = block[B_DATA:]
         x.order.top = int(data[0])
         copy(data[1:][: w.q.size], w.q)
-        copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
+        if i == 0 or rows[i] != rows[i - 1]:
+            copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
         # Poses of the start are where Euler parameters are followed from
         recall(c.system, block)
         set_floor(c, w.q)

@@ -184,6 +184,41 @@ def test_lengths_change_no_mobility(seed, count, power):
     assert facts(random_scene(seed, masses, 10.0**power)) == facts(random_scene(seed, masses))
 
 
+def leaning_disc(length, off):
+    """A disc of a radius of half the length rolls on a plane; it is off the centroid by a share of the length."""
+    scene = ts.Scene(gravity=(0, 0, -G * length))
+    body = scene.add_body(1.3, np.array((0.08, 0.15, 0.08)) * length**2, position=(0, 0, 0.46 * length), name="disc")
+    body.orientation, body.angular_velocity = (np.cos(0.2), np.sin(0.2), 0, 0), (0.4, 7.5, 0.7)
+    places = {"center_a": (0, 0, off * length), "axis_a": (0, 1, 0), "normal_b": (0, 0, 1)}
+    scene.add(C.RollingDisc(body, scene.ground, radius=0.5 * length, **places))
+    scene.assemble()
+    return scene, 3
+
+
+def sleeve_on_a_rod(length, off):
+    """A rod slides and doesn't turn, a sleeve slides along it: their points are off the centroids by the same share."""
+    scene, point = ts.Scene(gravity=(0, 0, -G * length)), np.array((off, 0, off)) * length
+    rod = scene.add_body(1.0, (length**2,) * 3, name="rod")
+    sleeve = scene.add_body(1.0, (length**2,) * 3, position=(0, 0.7 * length, 0), name="sleeve")
+    scene.add(C.Translational.at(rod, scene.ground, point=point, axis=(1, 0, 0)))
+    scene.add(C.PointOnLine(sleeve, rod, point_a=point, point_b=point, axis_b=(0, 1, 0)))
+    return scene, 5
+
+
+@pytest.mark.parametrize("length", [1e-8, 1.0, 1e8])
+@pytest.mark.parametrize("off", [0.0, 1e-17, 1e-9, 1e-3])
+@pytest.mark.parametrize("build", [leaning_disc, sleeve_on_a_rod])
+def test_arms_of_rounding_change_no_mobility(build, off, length):
+    """Forces have arms that no point shows: a radius, a way along a guide."""
+    scene, freedom = build(length, off)
+    found = scene.mobility()
+    assert (found.degrees_of_freedom, found.redundant, found.singular) == (freedom, (), False)
+    solution = ts.simulate(scene, (0.0, 0.1)).raise_if_failed()
+    near = ts.simulate(build(1.0, 0.0)[0], (0.0, 0.1))
+    np.testing.assert_allclose(solution.state.q[:3] / length, near.state.q[:3], atol=2.0 * off + 1e-8)
+    assert not np.isnan(solution.multipliers).any()
+
+
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6), powers=exponents)
 @example(seed=0, powers=[0.0, -7.0, 12.0])  # S is regular with the axis rows alone

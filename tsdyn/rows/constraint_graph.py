@@ -6,6 +6,7 @@ import numpy as np
 
 from ..elements.element import address
 from ..elements.loops.constraint_rows import BODY, INTS, PAIR, ROW, STILL
+from ..elements.markers import POINT
 from ..errors import InvalidConstraint
 from ..jit.kernels import Record, kernel, records, row_of
 from ..model.handles import first_rows
@@ -122,16 +123,33 @@ def is_raised(graph):
 #
 #     |x|^2 = sum |dr|^2 + L^2 |w'|^2
 #
-# L is the longest arm of a body's joints, m.
+# L is the longest arm of a body's joints, m. Where all arms are next to nothing, forces have arms that no point shows:
+# a wheel's radius, the way along a guide. L is then the longest distance between points that a constraint compares.
 
 MASS_REMEDY = "Give light bodies that carry heavy ones more mass, or make them one body with what they carry."
 
 
 def arms(packed):
-    """L of each body, (bodies,), m: no less than a share of the longest; one in a scene without arms."""
+    """L of each body, (bodies,), m: no less than a share of the longest; one in a scene without lengths."""
     found = levers(packed)
-    longest = found.max(initial=0.0)
-    return np.maximum(found, LEAST_SHARE * longest) if longest > 0.0 else np.ones(found.size)
+    longest, apart = found.max(initial=0.0), _farthest(packed)
+    if longest > LEAST_SHARE * apart:
+        return np.maximum(found, LEAST_SHARE * longest)
+    return np.full(found.size, apart or 1.0)
+
+
+def _farthest(packed):
+    """The longest distance at the start between the points of a constraint, m, but for their arms on bodies."""
+    farthest = 0.0
+    for constraint, coordinates in zip(packed.constraints, packed.coordinates, strict=True):
+        points = [
+            s if (body := constraint.body_of(marker)).dimension == 0 else body.position
+            for marker, s in zip(constraint.markers, coordinates, strict=True)
+            if marker.code == POINT
+        ]
+        if len(points) > 1:
+            farthest = max(farthest, float(np.linalg.norm(points[0] - points[1])))
+    return farthest
 
 
 def coordinate_scales(packed):

@@ -18,6 +18,7 @@ from ..errors import SingularConfiguration
 from ..formulations.accelerations import accelerate_with_friction, refine_accelerations, solve_accelerations
 from ..formulations.tolerances import EXACT, REFINEMENTS
 from ..jit.kernels import entry, kernel, loader, resident
+from ..maths.complementarity import CONES
 from ..maths.dense_linalg import copy, largest
 from ..maths.root_isolation import SURVEYING
 from ..maths.tolerances import LAST_PLACE
@@ -332,6 +333,7 @@ def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # te
 
 KERNELS = (
     find_gaps, measure_opened, find_rows, find_slips, respond, accelerate, bounce, gain, find_multipliers, *SURVEYING,
+    *CONES,
 )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from .hints import Function
 
-# from the palette of Okabe and Ito, told apart whatever the colour vision
+# from the palette of Okabe and Ito, distinct for every colour vision
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 GREY = "#6b6b6b"
 PICTURES = (".png", ".pdf", ".svg", ".jpg", ".jpeg", ".eps", ".ps", ".tif", ".tiff", ".webp", ".pgf")
@@ -153,7 +153,7 @@ SHOWN = {  # first argument: what it must be
     "linearisation": "a Linearisation, which scene.linearise() returns",
     "ensemble": "an Ensemble, which ts.ensemble returns",
 }
-POINTS = 400  # stretches of time, the largest error of each of which is drawn
+POINTS = 400  # intervals of time, the largest error of each of which is drawn
 
 
 def axes_of(ax: Any, rows: int = 1, columns: int = 1, **options: Any) -> Any:
@@ -192,7 +192,7 @@ def bare(ax: Any) -> None:
 
 
 def largest(t: Any, error: Any) -> tuple[Any, Any]:
-    """Points of a curve: the largest error of each stretch of time, zeros lifted to where a log axis has them."""
+    """Points of a curve: the largest error of each interval of time, zeros lifted to where a log axis has them."""
     size = max(1, -(-t.size // POINTS))
     at = [start + int(error[start : start + size].argmax()) for start in range(0, t.size, size)]
     return t[at], np.maximum(error[at], ZERO)

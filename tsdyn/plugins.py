@@ -67,7 +67,7 @@ from .elements.loads import (
 )
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
-from .elements.tolerances import FLAT, PARALLEL, RIGHT_ANGLED, SLIP
+from .elements.tolerances import PARALLEL, SLIP, UNDIRECTED
 from .elements.unilateral import Side, Unilateral
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
@@ -92,6 +92,7 @@ from .maths.recurrences import (
     sine_cosine,
     square,
 )
+from .maths.tolerances import TYPED
 from .methods.collocation import CollocationTableau
 from .methods.diagonally_implicit import trapezoid_error
 from .methods.explicit import (
@@ -137,7 +138,6 @@ __all__ = [
     "BEARING_ROWS",
     "COORDINATE_SLOPE_ROWS",
     "DOP853_INTERPOLANT",
-    "FLAT",
     "GUIDE",
     "HEADING_ROWS",
     "MOST_COORDINATES",
@@ -146,9 +146,10 @@ __all__ = [
     "PIN",
     "PLANE",
     "POINT_OF_BODY",
-    "RIGHT_ANGLED",
     "SLIP",
     "STATE",
+    "TYPED",
+    "UNDIRECTED",
     "Action",
     "Adaptive",
     "Angle",

@@ -74,20 +74,22 @@ def find_gaps(context, t, q, sign, out):
             out[k, i] *= sign[i]
 
 
-@entry("vwmvm")
-def measure_opened(t, which, start, rounding, values):
-    """Divide gaps by the time since they have opened, in values (k, gaps) at times t (k,), or add the rounding to them.
+@entry("vwmm")
+def measure_opened(t, which, start, values):
+    """Divide gaps by the time since they have opened, in values (k, gaps) at times t (k,), or add rounding to them.
 
-    start (3, opened): time, gap and rate where those of the numbers `which` have opened, without a rate the second.
+    start (4, opened): time, gap, rate and rounding where those of the numbers `which` have opened; without a rate the
+    second. The first have the rounding, r, too, times (r / (rate time))^6: above noise at once, gone where they close.
     """
     for j in range(which.size):
-        begun, first, rate = start[0, j], start[1, j], start[2, j]
+        begun, first, rate, rounding = start[0, j], start[1, j], start[2, j], start[3, j]
         for k in range(t.size):
             grown, since = values[k, which[j]] - first, t[k] - begun
             if not rate > 0.0:
-                values[k, which[j]] = grown + rounding[which[j]]
+                values[k, which[j]] = grown + rounding
             else:
-                values[k, which[j]] = grown / since if since > 0.0 else rate
+                share = (rounding / (rate * since)) ** 2 if since > 0.0 else 0.0
+                values[k, which[j]] = (grown + rounding * share * share * share) / since if since > 0.0 else rate
 
 
 @kernel

@@ -23,13 +23,12 @@ from ..elements.friction import GUIDE, PIN, PLANE
 from ..errors import SingularConfiguration
 from ..maths.complementarity import OPEN, STICKS
 from ..maths.dense_linalg import range_and_null_space
-from ..maths.tolerances import EPS, RANK_TOL, ROUNDING, TINY
+from ..maths.tolerances import EPS, NEGLIGIBLE, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
 from ..observables.evaluate import ITERATIONS, NO_INERTIA, constraint_arrays, mass_matrix
 from ..observables.generalised_forces import applied_loads, velocity_forces
-from .friction_units import NormalLoads
-from .slip_velocities import ACROSS, ALONG, WHOLE, slip_velocities
-from .tolerances import ASIDE, AT_REST, BROKEN, LEVEL, PIVOTS, RESTS, UNLOADED
+from .friction_units import ACROSS, ALONG, WHOLE, NormalLoads, slip_velocities
+from .tolerances import BROKEN, EVENT_ERROR, LEVEL, PIVOTS, RESTS
 
 if TYPE_CHECKING:
     from ..elements.friction import Sliding
@@ -140,7 +139,8 @@ class Frictions:
         points = np.array([unit.load.coordinates[0] for unit in self.units], float).reshape(-1, 3)
         self.points, arms = points.ravel(), np.where(self.turns, np.linalg.norm(points, axis=1), 1.0)
         shares = np.array([max(unit.bound[0], unit.sliding[0]) for unit in self.units])
-        self.unloaded = UNLOADED * np.maximum(arms / np.maximum(shares, TINY), 1.0)  # loads over the forces on bodies
+        # Loads over the forces on bodies
+        self.unloaded = EVENT_ERROR * np.maximum(arms / np.maximum(shares, TINY), 1.0)
         axes = [unit.load.coordinates[4] if one else np.zeros(3) for unit, one in zip(self.units, part, strict=True)]
         self.axes = np.array(axes, float).ravel()
         self.ways = np.array([range(unit.slot, unit.slot + 3) for unit in self.units], int).reshape(-1, 3)
@@ -186,7 +186,7 @@ class Frictions:
         v, sizes, axes = self.motions(q, qd)
         speeds = np.linalg.norm(v, axis=2)
         gained = RESTS * EPS * np.abs(t)[:, None] * self.motions(q, qdd)[1]
-        moves = speeds > np.maximum(AT_REST * sizes, gained)
+        moves = speeds > np.maximum(NEGLIGIBLE * sizes, gained)
         ways = np.where(moves[..., None], v / np.where(moves, speeds, 1.0)[..., None], 0.0)
         for i, unit in enumerate(self.units):
             along = np.sign((ways[:, i] * axes[:, i]).sum(axis=1))[:, None]
@@ -454,11 +454,11 @@ class RestProblem:
                 way = y[self.at[i]] @ self.bases[i]
                 ways[i] = way / np.linalg.norm(way)
         closed = mode[:count] != OPEN
-        rests = closed & (mode[:count] == STICKS) & self.cones.rubs
+        rests = closed & (mode[:count] == STICKS) & self.cones.rough
         self.normal_loads, self.pressed = N, pushing[np.column_stack([closed, rests, rests]).ravel()]
         return y, N
 
-    def settle(self, ways, fired):
+    def pivot(self, ways, fired):
         """The `FrictionAtRest` of the units, by pivoting from a guess: directions of those that slide.
 
         fired: units whose reactions have just reached their bounds. Raises `NoRest`.
@@ -567,7 +567,7 @@ class RestProblem:
             along = a[at] @ basis @ ways[i]
             if along < -small[at].max():
                 found[i] = None
-            elif len(at) > 1 and size > small[at].max() and along < size * (1.0 - ASIDE):
+            elif len(at) > 1 and size > small[at].max() and along < size * (1.0 - NEGLIGIBLE):
                 found[i] = a[at] @ basis / size
         return found
 

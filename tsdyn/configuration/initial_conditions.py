@@ -69,8 +69,8 @@ class StartParts(NamedTuple):
     """What the kernels of a start find by one address: the same parts twice, but for the metric of their graphs."""
 
     own: Parts
-    lengths: Parts  # length_metric.by_lengths
-    unequal: np.ndarray  # int64 (1,): length_metric.are_unequal
+    lengths: Parts  # constraint_graph.by_lengths
+    unequal: np.ndarray  # int64 (1,): constraint_graph.are_unequal
 
 
 load_start = loader(StartParts(no_parts(), no_parts(), np.zeros(1, np.int64)))
@@ -319,7 +319,7 @@ class StartWorkspace:
             whole = whole._replace(tangent=allocate_tangent(graph, n, redundant=True))
         self.reals, self.tangent, self.work, self.rates = own.reals, whole.tangent, whole.work, np.zeros(len(graph.row))
         measured = whole._replace(graph=by_lengths(packed, graph))
-        if packed.derived.redundant is not None:  # rows are selected anew in the same metric
+        if packed.derived.redundant is not None:  # rows are selected again in the same metric
             measured = measured._replace(tangent=with_reselection(measured.graph, whole.tangent))
         self.unequal = are_unequal(packed.system)
         self.address, *self._keep = resident(StartParts(whole, measured, np.array([self.unequal], np.int64)))

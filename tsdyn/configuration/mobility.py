@@ -26,7 +26,7 @@ from ..rows.constraint_graph import coordinate_scales
 from ..validation import counted, finite_vector, number
 from .continuation import Metric, close, unit_tangent
 from .motor_starts import demand_finite, demand_small, refuse_vanished
-from .tolerances import FIRM, INITIAL_TOL, MOST_NODES, NAMED_SHARE, NEIGHBOURHOOD, PROVED, SHOWN_CONSTRAINTS
+from .tolerances import DEPENDENCE, FIRM, INITIAL_TOL, MOST_NODES, NEIGHBOURHOOD, PROVED, SHOWN_CONSTRAINTS
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Attachment, Scene
@@ -66,9 +66,7 @@ def partners(A, kept, redundant):
     if not (kept and redundant):
         return [[] for _ in redundant]
     weights = np.linalg.lstsq(unit[kept].T, unit[redundant].T, rcond=None)[0]
-    return [
-        [row for row, weight in zip(kept, column, strict=True) if abs(weight) > NAMED_SHARE] for column in weights.T
-    ]
+    return [[row for row, weight in zip(kept, column, strict=True) if abs(weight) > DEPENDENCE] for column in weights.T]
 
 
 def put_aside(A, owners):
@@ -289,7 +287,7 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
     -----
     The rank is that of Phi_q with rows of unit length, rotations times the longest arm of the body's joints: singular
     values above 1e-7 of the largest. Masses don't matter. A row is called redundant if it depends on those of its
-    joint and of joints added before it, so they gather in few joints. Whether a configuration is singular is told by
+    joint and of joints added before it, so they gather in few joints. Whether a configuration is singular is decided by
     consistent ones beside it. Above 1000 coordinates, what hangs in open chains is put aside first and costs O(N);
     closed loops cost the cube of their rows.
 
@@ -588,7 +586,7 @@ def refuse(scene, metric, found, conflict, starts, held=()):
     left[metric.own] = np.abs(found.Phi)
     sizes = np.array([left[member.rows].max() for member in members])
     where = f" with {', '.join(body.name for body in held)} held fixed" if len(held) else ""
-    chosen = [member for member, size in zip(members, sizes, strict=True) if size > NAMED_SHARE * sizes.max()]
+    chosen = [member for member, size in zip(members, sizes, strict=True) if size > DEPENDENCE * sizes.max()]
     if conflict:
         chosen, reason = conflict
         alone = "This constraint is infeasible on its own" if len(chosen) == 1 else f"These {len(chosen)} conflict"

@@ -6,7 +6,7 @@
            = -mu(|v|) N e           of the exact law, e of friction.heading
     dissipation = mu(|v|) N |v|                                          (3)
 
-F is the force that the contact exerts; mu is given by friction_laws.coefficient.
+F is the force that the contact exerts; mu is given by friction.coefficient.
 """
 
 import numpy as np

@@ -5,7 +5,6 @@ import numpy as np
 from .tolerances import (
     CONE_FACTORS,
     CONE_LEFT,
-    CONE_ROUNDING,
     CONE_SLIP,
     CONE_STALLED,
     CONE_STEPS,
@@ -14,6 +13,7 @@ from .tolerances import (
     MOST_ENTRIES,
     NEGLIGIBLE,
     RANK_TOL,
+    SUM_ROUNDING,
     TINY,
     WITHOUT_SOLUTION,
 )
@@ -247,7 +247,7 @@ class _Problem:
             if not size < np.inf:
                 return None
             terms = 1.0 + (np.abs(self.G) @ np.abs(p)).max()
-            if size <= CONE_ROUNDING * terms and size >= 0.5 * best:  # as far as rounding lets it
+            if size <= SUM_ROUNDING * terms and size >= 0.5 * best:  # as far as rounding lets it
                 return self.image(y).ravel()  # without the rounding of zeros
             stalled = 0 if size < 0.5 * best else stalled + 1
             if size <= best:

@@ -94,7 +94,7 @@ def taken(packed, n):
 
 
 def give(packed, found):
-    """Take back one that is no longer in use, unless it is large, or has room to select rows anew."""
+    """Take back one that is no longer in use, unless it is large, or has room to select rows again."""
     if not packed.derived.row_parts and redundancy(found.graph) == 0 and found.size < KEPT_FLOATS:
         packed.derived.row_parts.append(found)
 
@@ -649,7 +649,7 @@ def touching(packed, member, q):
         find = getattr(type(packed.constraints[i]), "contact", None)
         if find is not None:
             return tuple(level.T for level in twin(find)(_markers(packed, i, q), packed.parameters[i]))
-    if getattr(member.constraint, "rubs", False):  # a point on a plane
+    if getattr(member.constraint, "has_friction", False):  # a point on a plane
         x = _markers(packed, member.parts.start, q)
         return x[:3].T, x[6:9].T
     return None

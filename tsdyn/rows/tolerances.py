@@ -68,7 +68,7 @@ LOOKUP = 1.1  # cost of one block over that of its parts up to which they are me
 
 # --- the metric of lengths
 # Ratio of masses, or of the largest inertias of bodies, above which factors of S lose as many digits: the start is
-# looked at once more, and multipliers of series are refined. Above its square, half of the digits, masses are named as
+# checked once more, and multipliers of series are refined. Above its square, half of the digits, masses are named as
 # the reason where a run can't begin, or ends singular.
 UNEQUAL_MASSES = 1e4
 

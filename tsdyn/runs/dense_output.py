@@ -76,19 +76,26 @@ def evaluate(context, w, r, t, x, y, yd, xd):
         status = call_accelerate(r.kernels.accelerate, context, t, y, yd, xd)
     if status == 0:
         status = call_complete(r.kernels.complete, context, yd)
+    return _checked(w, status)
+
+
+@kernel
+def _checked(w, status):
+    """The status; NOT_FINITE where the state isn't."""
     if status == 0 and not (is_finite(w.q) and is_finite(w.qd) and is_finite(w.qdd)):
         return NOT_FINITE
     return status
 
 
 @kernel
-def between(context, w, r, t, block):
+def between(context, c, r, t, block):
     """q, qd, qdd at a time within the step of this block. Status. xd, the next step's, is left alone.
 
     Positions are solved for twice: Newton's method starts further away than in a run, and ends closer to rounding when
-    repeated from nearby.
+    repeated from nearby. Accelerations of collocation methods are those of the interpolant: the right-hand side of a
+    stiff scene would amplify its error.
     """
-    h, data = block[B_H], block[B_DATA:]
+    w, chart, h, data = c.work, c.chart.state, block[B_H], block[B_DATA:]
     s = (t - block[B_START]) / h
     # Coordinates of the chart by the interpolant
     call_value(r.kernels.value, s, h, w.q.size, r.xs.size, r.ys.size, data, r.xs, r.ys)
@@ -96,17 +103,23 @@ def between(context, w, r, t, block):
     if r.numbers.normal_at > 0:
         cubic(s, h, block[r.numbers.normal_at :], w.u)
         copy(r.xs, w.v)
-    made = w.counters.factorizations
+    made, chart.bare = w.counters.factorizations, 1
     status = call_place(r.kernels.place, context, t, r.xs)
-    if status == 0 and w.counters.factorizations > made + (1 if r.numbers.normal_at > 0 else 2):
+    chart.bare = 0
+    if status == 0 and w.counters.factorizations > made + 1:
         status = _branch_status(context, w, r)
+    if status != 0 or r.kernels.second == 0:
+        return status if status != 0 else evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
+    factored = chart.factored
+    status = call_place(r.kernels.place, context, t, r.xs)
     if status == 0:
-        status = evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
-    # Accelerations by the interpolant: the right-hand side of a stiff scene would amplify its error
-    if status == 0 and r.kernels.second != 0:
+        chart.factored, chart.bare = max(chart.factored, factored), 1  # N of the first solve serves velocities
+        status = call_accelerate(r.kernels.accelerate, context, t, r.ys, r.yds, r.dx)
+        chart.bare = 0
+    if status == 0:
         call_value(r.kernels.second, s, h, w.q.size, r.xs.size, r.ys.size, data, r.xs, r.yds)
-        call_complete(r.kernels.complete, context, r.yds)
-    return status
+        status = call_complete(r.kernels.complete, context, r.yds)
+    return _checked(w, status)
 
 
 @long_kernel
@@ -227,7 +240,7 @@ def read(context, run, t, rows, blocks, charts, points, out):
             keep(c, r.warm)
         # The state at t
         recall(c.system, block)
-        status = between(context, w, r, t[i], block)
+        status = between(context, c, r, t[i], block)
         if status != 0:
             return status
         put_state(w, out[i])
@@ -308,7 +321,7 @@ def record_step(context, run, c, r, log, t0, t1):
         if t == t1:
             record(r, log, t, r.now[0], r.now[1], r.now[2])
             continue
-        status = between(context, w, r, t, r.block)
+        status = between(context, c, r, t, r.block)
         if status != 0:
             return status
         record(r, log, t, w.q, w.qd, w.qdd)
@@ -450,7 +463,7 @@ class Trajectory:
 
     @property
     def reading(self):
-        """The `TrajectoryReading`; made anew in another process than the run's."""
+        """The `TrajectoryReading`; made again in another process than the run's."""
         if self._reading is None:
             make, *arguments = self.again
             self._reading = make(*arguments)

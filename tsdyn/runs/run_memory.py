@@ -10,7 +10,7 @@ from ..jit.kernels import callback, resident
 from ..methods.explicit import ACCELERATE, PLACE
 from ..model.laws import calls_laws, interrupts_answered
 from ..rows.interface import reset_selection, selection_parts
-from ..workspaces import FILLED, STORED, divided, enter_joints, hold, words
+from ..workspaces import FILLED, STORED, divided, enter_joints, set_tolerances, words
 from .run_log import no_log, with_end
 from .task import step_count
 from .tolerances import LONG_STEPS, PIECE
@@ -141,7 +141,7 @@ class Memory:
 
     reason = ""  # of the end of a run, beyond its status
     engine = None  # that it is laid out for
-    arrays = None  # of a first slice: `run.SliceArrays`
+    arrays = None  # of a first slice: `driver.SliceArrays`
     layout = None  # a `Layout`
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 
@@ -243,7 +243,7 @@ class Memory:
         work, run = self.work, self.run
         work.q[...], work.qd[...] = task.q, task.qd
         run.now[0], run.now[1] = task.q, task.qd
-        hold(work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
+        set_tolerances(work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
 
     @property
     def begins_again(self):

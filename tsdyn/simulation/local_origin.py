@@ -187,7 +187,7 @@ def _away(function, packed, shift):
 
 
 class _Moved:
-    """A `trajectory.Trajectory` in the scene's coordinates."""
+    """A `dense_output.Trajectory` in the scene's coordinates."""
 
     def __init__(self, trajectory, shift):
         self.trajectory, self.shift = trajectory, shift

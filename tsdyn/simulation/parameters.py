@@ -324,7 +324,7 @@ class Edit:
         return self._enter_primitive(member.parts.start, owner, other)
 
     def _enter_joint(self, i, owner, changes):
-        """Enter the parts of a joint, which are made anew for the bodies of the packed scene."""
+        """Enter the parts of a joint, which are made again for the bodies of the packed scene."""
         other, member = sketch(owner), self.packed.members[i]
         vars(other).update(a=self.family.own_body(owner.a), b=self.family.own_body(owner.b))
         other = with_attributes(other, changes)
@@ -442,7 +442,7 @@ def with_values(body, changes):
 def with_attributes(item, changes):
     """Return a sketch of a constraint or force with other attributes, checked."""
     other = sketch(item)
-    vars(other)["added"] = False  # so that it tells no scene
+    vars(other)["added"] = False  # so that no scene is notified
     for name, value in changes.items():
         setattr(other, name, value)
     other.check()
@@ -504,7 +504,7 @@ def _plain(value):
 #
 # A value that only enters numbers of the packed arrays (mass, inertia, gravity, a start, what a force or a primitive
 # gets as par, where their markers are, those of the parts of a joint) is written into a copy of those arrays. All else,
-# such as functions of time, or a joint whose coordinate a force measures, asks for the scene to be packed anew.
+# such as functions of time, or a joint whose coordinate a force measures, requires the scene to be packed again.
 
 
 class Family:
@@ -580,7 +580,7 @@ class Family:
         return of_file(self.template, numbers, self._edits), others
 
     def numbers(self, values):
-        """The `Packed` and the start of a scene with other values, by name; None if it must be packed anew.
+        """The `Packed` and the start of a scene with other values, by name; None if it must be packed again.
 
         Raises
         ------

@@ -37,7 +37,7 @@ def inactive_of(scene):
 
 
 def with_own_parts(scene):
-    """Pack a scene of `with_parameters` anew if it is packed with the parts of another: phases take its own."""
+    """Pack a scene of `with_parameters` again if it is packed with the parts of another: phases take its own."""
     if scene._bodies and scene.packed.bodies[0] is not scene._bodies[0]:
         scene.touch()
 
@@ -129,8 +129,8 @@ def _new_gaps(scene, free):
 
     sides = [(contact, side) for contact in contacts_of(scene._added) for side in contact.sides]
     rows = [side.gap for _, side in sides]
-    rubbing = [part for contact, side in sides if side.grip for part in contact.parts]
-    rows += [part for part in rubbing if not any(part is row for row in rows)]
+    slips = [part for contact, side in sides if side.grip for part in contact.parts]
+    rows += [part for part in slips if not any(part is row for row in rows)]
     alone = phase_of(scene, rows, without=(*scene._added, *scene._forces))
     return Gaps(scene.packed, alone.packed, free.packed)
 
@@ -195,7 +195,7 @@ def demand_regular(scene, who):
         )
 
 
-def where_it_stands(function):
+def with_closed_contacts(function):
     """Decorate a method of scenes: contacts that are closed at the start hold, the others are left out."""
     own = getattr(function, "__wrapped__", function)
 
@@ -206,8 +206,8 @@ def where_it_stands(function):
     return fitting(call)
 
 
-def where_it_may_leave(function):
-    """Decorate `set`: as `where_it_stands`, and where closed contacts don't allow it they are left out, too."""
+def with_closed_or_open_contacts(function):
+    """Decorate `set`: as `with_closed_contacts`, and where closed contacts don't allow it they are left out, too."""
     own = getattr(function, "__wrapped__", function)
 
     @wraps(function)

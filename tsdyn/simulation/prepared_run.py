@@ -103,7 +103,7 @@ class _Last(NamedTuple):
     bits: tuple | None  # of the state
     engines: dict  # of the scene: replaced where other rows or bodies take part in the equations
     task: Task
-    is_regular: bool  # whether there is no more to look at, as of `run_task`
+    is_regular: bool  # whether nothing else is to be checked, as of `run_task`
 
 
 def _is_fixed(times):
@@ -233,7 +233,7 @@ class Run:
         return Run(self.scene.with_parameters(values), self.options)
 
     def _solve(self, call: RunCall, found: tuple[Any, Any] = (None, None), archive: Any = None) -> Solution:
-        """Run as of `__call__`, without a look at what has become of the scene.
+        """Run as of `__call__`, without checking whether the scene has changed.
 
         found: numbers and arrays of a checkpoint to go on from. archive: that of a run which begins again by another
         method.
@@ -255,7 +255,7 @@ class Run:
         if outcome.status is not SUCCESS:
             other = instead(task, outcome.status)
             if other is not None:
-                return self._by(other)._solve(call)
+                return self._with_method(other)._solve(call)
         return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
     def _has_phases(self, call):
@@ -307,7 +307,7 @@ class Run:
         """
         state, kept, last = call.state, self._prepared, self._last
         known, is_plain, bits = kept.packed.derived, call.progress is call.store is None, None
-        if state is not None:  # it is worth a look at its numbers if it is given again
+        if state is not None:  # its numbers are compared if it is given again
             bits = _bits_of(state, kept) if state is self._seen else None
             is_plain = is_plain and bits is not None
         self._seen = state
@@ -363,7 +363,7 @@ class Run:
             prepare_first_run(self._first, options.method, self._form, within, default)
             self._compiled.add(within)
 
-    def _by(self, method):
+    def _with_method(self, method):
         """The same by another method."""
         return Run(self.scene, replace(self.options, integrator=method, rtol=None, atol=None))
 
@@ -382,7 +382,7 @@ class Run:
             seconds = clock() - started
             other = instead(task, outcome.status)
             if other is not None:
-                run = self._by(other)
+                run = self._with_method(other)
                 given |= by_name(run.options, call)
                 return run._solve(call, archive=stored_runs.begin_again(archive, given))
             outcome = stored_runs.ended(archive, outcome, seconds, task)
@@ -400,7 +400,7 @@ class Run:
             return stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
 
     def __reduce__(self):
-        """A Run that is pickled is prepared anew where it is read."""
+        """A pickled Run is prepared again where it is read."""
         return Run, (self.scene, self.options)
 
     def _facts(self):

@@ -40,7 +40,7 @@ from .analyses import linearise as _linearise
 from .analyses import set_start as _set_start
 from .given_motion import inverse_dynamics as _inverse_dynamics
 from .given_motion import kinematics as _kinematics
-from .phase_scenes import at_start, has_contacts, where_it_may_leave, where_it_stands
+from .phase_scenes import at_start, has_contacts, with_closed_contacts, with_closed_or_open_contacts
 from .scene_cache import preparing
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
 from .variants import activate as _activate
@@ -103,7 +103,7 @@ def _rows(lines):
 
 
 def _serving(name):
-    """Decorate a method of scenes: where there are contacts, the function of this name in standing.py serves it.
+    """Decorate a method of scenes: with contacts, the function of this name in contact_analyses.py serves it.
 
     That is given the scene and the method, and the arguments of the call.
     """
@@ -115,9 +115,9 @@ def _serving(name):
         def call(scene, *arguments, **keywords):
             if not has_contacts(scene):
                 return own(scene, *arguments, **keywords)
-            from . import standing
+            from . import contact_analyses
 
-            return getattr(standing, name)(scene, own, *arguments, **keywords)
+            return getattr(contact_analyses, name)(scene, own, *arguments, **keywords)
 
         return fitting(call)
 
@@ -466,7 +466,7 @@ class Scene:
 
     @property
     def packed(self) -> Packed:
-        """The scene as a `Packed`; packed anew only after a change. Raises InvalidBody without bodies."""
+        """The scene as a `Packed`; packed again only after a change. Raises InvalidBody without bodies."""
         if self._packed is None:
             if not self._bodies:
                 raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
@@ -603,15 +603,15 @@ class Scene:
 
     place = _place
     evaluate = _serving("evaluate")(_evaluate)
-    assemble = where_it_stands(_assemble)
-    mobility = where_it_stands(_mobility)
+    assemble = with_closed_contacts(_assemble)
+    mobility = with_closed_contacts(_mobility)
     linearise = _serving("linearise")(_linearise)
     equilibrium = _serving("equilibrium")(_equilibrium)
     kinematics = _serving("along")(_kinematics)
     inverse_dynamics = _serving("along")(_inverse_dynamics)
     parameters = _parameters
     with_parameters = _with_parameters
-    set = where_it_may_leave(set_joint)
+    set = with_closed_or_open_contacts(set_joint)
     set_start = _serving("set_start")(_set_start)
     remove = _remove
     activate = fitting(_activate)

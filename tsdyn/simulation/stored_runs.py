@@ -101,7 +101,7 @@ def arguments_of(numbers: dict[str, Any], arrays: dict[str, Any], scene: Scene) 
 
 
 def method_record(method: Any) -> list[Any]:
-    """The class and the settings of a method; raises TypeError for one that numbers don't tell."""
+    """The class and the settings of a method; raises TypeError for one that numbers don't describe."""
     if not isinstance(method, tuple(registered().values())) or not is_own(type(method)) or "driver" in vars(method):
         raise TypeError(f"{type(method).__module__}.{type(method).__qualname__}")
     return own_record(method)
@@ -206,7 +206,7 @@ class RunOutputs:
         return self._phases.of_outputs(t)[self._slice]
 
     def _length(self):
-        """How many outputs there are; of a store without a look at them."""
+        """How many outputs there are; of a store without reading them."""
         return self.t.size if self._stored is None else len(range(self._stored.count)[self._slice])
 
     def __getitem__(self, part: slice) -> Self:
@@ -248,7 +248,7 @@ class RunOutputs:
 
 # Runs with a store: its archive, what a checkpoint holds beside the state, how a run ends in it.
 
-SETTINGS = ("rtol", "atol", "step", "max_step")  # of a method, as its provenance tells them
+SETTINGS = ("rtol", "atol", "step", "max_step")  # of a method, as in its provenance
 
 
 def demand_storable(call, options):
@@ -327,8 +327,8 @@ def ended(archive, outcome, seconds, task):
         archive.flush()
         if archive.has_checkpoints and outcome.status not in GOES_ON:
             method = task.method, outcome.method or repr(task.method)
-            told = provenance_of(archive.facts["scene"], *method, task.form.name, task.span, time.time())
-            archive.checkpoint(*_ending(outcome, seconds, told))
+            provenance = provenance_of(archive.facts["scene"], *method, task.form.name, task.span, time.time())
+            archive.checkpoint(*_ending(outcome, seconds, provenance))
     except OSError as error:
         outcome = outcome._replace(status=Status.STORE_FAILED, reason=f"{error.strerror or error}.")
     rows, steps, charts = _stored(archive)
@@ -420,13 +420,13 @@ def demand_same_place(path, numbers):
     if any(numbers[name] != here[name] for name in ("version", "kernels")):
         raise StorageError(
             f"{path} was written by tsdyn {clipped(numbers['version'])}, and other versions of it, NumPy or Numba are "
-            "here: the bits would differ. Go on there, or start anew from the last output: simulate(state=...)."
+            "here: the bits would differ. Go on there, or start a new run from the last output: simulate(state=...)."
         )
     if numbers["machine"] != here["machine"]:
         there = clipped(", ".join(map(str, numbers["machine"][:3])))
         raise StorageError(
             f"{path} was written on another machine ({there}): the bits would differ. Go on there, or start "
-            "anew from the last output: simulate(state=...)."
+            "a new run from the last output: simulate(state=...)."
         )
 
 
@@ -535,12 +535,12 @@ def outline_of(scene, packed):
 
 
 def scene_of(known, text, why, kind):
-    """The scene of the outline that numbers and a text (bytes, as an array) tell, which lacks something; `why` says.
+    """The scene of the outline that numbers and a text (bytes, as an array) describe; `why` says what it lacks.
 
     Raises
     ------
     KeyError, TypeError or ValueError
-        If they tell none.
+        If they describe none.
     """
     from ..files import scene_text
 

@@ -13,26 +13,26 @@ class Closing:
     """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
-    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero.
+    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero. One that is lifted by
+    less than rounding has the rate of the gap: it closes at the top of its flight, where no impact is.
 
     Parameters
     ----------
     gaps : Gaps
     opened : dict
-        Of contacts that have opened: time, gap and rate there, by their numbers.
-    rounding : ndarray (count,), m or rad
-        Of the gaps.
+        Of contacts that have opened: time, gap, rate and rounding of the gap there, by their numbers.
+    lifted : list of int
     """
 
-    def __init__(self, gaps, opened, rounding):
-        self.gaps, self.rounding = gaps, rounding
+    def __init__(self, gaps, opened, lifted):
+        self.gaps, self.lifted = gaps, lifted
         self.open(opened)
 
     def open(self, opened):
         """Take other contacts that have just opened."""
         which = [i for i in opened if i not in self.gaps.following]
         self.which = np.array(which, int)
-        self.start = np.array([opened[i] for i in which]).reshape(-1, 3).T.copy()
+        self.start = np.array([opened[i] for i in which]).reshape(-1, 4).T.copy()
 
     def over(self, states):
         """Values (k, count) of `States`."""
@@ -40,7 +40,9 @@ class Closing:
         for i, rate in self.gaps.following.items():
             values[:, i] = rate(states.q, states.qd)
         if self.which.size:
-            measure_opened(states.t, self.which, self.start, self.rounding, values)
+            measure_opened(states.t, self.which, self.start, values)
+        if self.lifted:
+            values[:, self.lifted] = self.gaps.rates(states.t, states.q, states.qd, self.lifted)
         return values
 
 
@@ -117,7 +119,7 @@ class Breaking:
 class Slowing:
     """The velocities of frictions, along the directions in which they slide, as event functions.
 
-    In a plane half of the speed is taken off: where the direction has turned by 60 degrees, it is taken anew. The
+    In a plane half of the speed is taken off: where the direction has turned by 60 degrees, a new one is taken. The
     velocity of one that has just begun to slide is divided by the time since.
 
     Parameters

@@ -179,7 +179,7 @@ def figure(found):
     return drawn
 
 
-MARKS = "<!-- tsdyn stress: begin -->", "<!-- tsdyn stress: end -->"  # of a page, around what is written anew
+MARKS = "<!-- tsdyn stress: begin -->", "<!-- tsdyn stress: end -->"  # of a page, around what is replaced
 LONGEST = 400  # characters of what a fault said
 NONE = "-"  # of a figure that a case doesn't have
 
@@ -524,7 +524,7 @@ def _one_blas_thread():
 
 
 def serve(connection, spent):
-    """Do the jobs that come in, and tell the processor time."""
+    """Do the jobs that come in, and report the processor time."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_beat, args=(spent,), daemon=True).start()
     warnings.simplefilter("ignore")

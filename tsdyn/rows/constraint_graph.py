@@ -140,6 +140,7 @@ def arms(packed):
 def _longest_shown(packed):
     """The largest |Phi_w'| / |Phi_r| of a row and a body at the start, m; zero where no row has both."""
     system, q = with_short_rows(packed), np.concatenate([body.q for body in packed.bodies])
+    system = system._replace(motions=system.motions[:0], signals=system.signals[:0])  # at no time
     halves = constraint_arrays(system, q, np.zeros_like(q), 0.0, WIDTH)[1].reshape(-1, 2, WIDTH // 2)
     at, length = places(packed)
     rows = np.concatenate((np.arange(len(packed.system.segments)), system.tails))
@@ -152,7 +153,8 @@ def _longest_shown(packed):
     p = q[(keys % q.size)[:, None] + np.arange(3, 7)]
     across = sums[:, 3:] - np.einsum("ki,ki->k", sums[:, 3:], p)[:, None] * p
     move, turn = np.linalg.norm(sums[:, :3], axis=1), 0.5 * np.linalg.norm(across, axis=1)
-    return float((turn[move > 0.0] / move[move > 0.0]).max(initial=0.0))
+    both = (move > 0.0) & np.isfinite(move) & np.isfinite(turn)  # neither where a row is singular
+    return float((turn[both] / move[both]).max(initial=0.0))
 
 
 def coordinate_scales(packed):

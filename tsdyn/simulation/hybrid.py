@@ -128,7 +128,9 @@ class Change:
         values = self._values | {parameter: value}
         found = with_values(self._scene, values)
         if found.system.memory.size != self._scene.system.memory.size:
-            raise InvalidArgument(f"{parameter} can't be set within a run: forces would remember other numbers.")
+            raise InvalidArgument(
+                f"{parameter} can't be set within a run: forces would remember other numbers. Begin another run."
+            )
         self._values = values
 
     def impulse(self, body: BodyLike, impulse: ArrayLike, point: ArrayLike | None = None) -> None:

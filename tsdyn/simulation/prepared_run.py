@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -231,6 +232,14 @@ class Run:
         [ 1.  0. -5.]
         """
         return Run(self.scene.with_parameters(values), self.options)
+
+    def _of_phase(self, phase):
+        """The same of a phase in which other rows hold."""
+        other = copy(self)
+        other.scene = other._first = phase
+        other._prepared, other._packed, other._start = prepared(phase), phase.packed, phase._initial()
+        other._last = other._seen = None
+        return other
 
     def _solve(self, call: RunCall, found: tuple[Any, Any] = (None, None), archive: Any = None) -> Solution:
         """Run as of `__call__`, without checking whether the scene has changed.
@@ -624,7 +633,8 @@ def _run_of(scene, options, call):
         if run.options == options:
             return run
     output_times(call.t_eval, *interval(call.t_span))
-    run = Run(scene, options)
+    base = scene._base
+    run = Run(scene, options) if base in (None, scene) else _run_of(base, options, call)._of_phase(scene)
     if options.events is None and is_plain(run.method):
         kept = prepared_numbers(scene)
         kept.runs = (run, *kept.runs[: KEPT - 1])  # and not written to: other threads may be reading

@@ -13,8 +13,7 @@ from ..maths.dense_linalg import range_and_null_space
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import handles_of
 from ..observables.evaluate import NO_INERTIA, constraint_arrays, mass_matrix
-from ..observables.state import begin_memory
-from ..runs.events import EventInstant
+from ..observables.state import EventInstant, begin_memory
 from ..validation import floats, listed, vector3
 from .phase_scenes import NAMED
 from .variants import family_of, packed_anew, switchable

@@ -103,7 +103,7 @@ class PlaneContact(Unilateral, Primitive):
     def check(self):
         """Refuse inadmissible coefficients of impact and friction."""
         self._check_law()
-        rows = 3 if self.rubs else 1
+        rows = 3 if self.has_friction else 1
         self.__dict__.update(rows=rows, all_rows=rows)
 
     @cached_property
@@ -121,17 +121,17 @@ class PlaneContact(Unilateral, Primitive):
     @property
     def parts(self):
         """Itself, or with friction its three rows."""
-        return self._three[0] if self.rubs else (self,)
+        return self._three[0] if self.has_friction else (self,)
 
     @property
     def sides(self):
         """One."""
-        return (Side(*self.parts[:1], 1.0, grip=self._three[1] if self.rubs else None),)
+        return (Side(*self.parts[:1], 1.0, grip=self._three[1] if self.has_friction else None),)
 
     @property
     def row_labels(self):
         """What follows its title in the names of its rows."""
-        return (" gap", " slip[0]", " slip[1]") if self.rubs else ("",)
+        return (" gap", " slip[0]", " slip[1]") if self.has_friction else ("",)
 
     @staticmethod
     def phi(x, par, t, out):

@@ -198,7 +198,7 @@ class RollsOnPlane(Unilateral, Rolls):
     def rolling(self) -> Iterator[tuple[str, Any]]:
         """The parts: the contact row and, where it rolls, the two of the slip."""
         places, sizes = self._geometry()
-        if self.slip or (self.unilateral and not self.rubs):
+        if self.slip or (self.unilateral and not self.has_friction):
             yield "contact", SmoothContact(self.a, self.b, **places, **sizes)
         else:
             first, second = across(self.normal_b)
@@ -225,7 +225,7 @@ class RollsOnPlane(Unilateral, Rolls):
     @property
     def sides(self):
         """One where it opens."""
-        return (Side(self.parts[0], 1.0, grip=self._friction if self.rubs else None),)
+        return (Side(self.parts[0], 1.0, grip=self._friction if self.has_friction else None),)
 
     @property
     def row_labels(self) -> tuple[str, ...]:

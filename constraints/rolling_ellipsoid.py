@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..plugins import RIGHT_ANGLED, Joint, Placing, Point, Vector, floats, rotation_matrix, shown
+from ..plugins import TYPED, Joint, Placing, Point, Vector, floats, rotation_matrix, shown
 from .rolling_contact import RollsOnPlane
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ class RollingEllipsoid(RollsOnPlane, Joint):
                 "RollingDisc."
             )
         axes = self.axes_a
-        if axes.shape != (3, 3) or not (np.abs(axes @ axes.T - np.eye(3)) <= RIGHT_ANGLED).all():
+        if axes.shape != (3, 3) or not (np.abs(axes @ axes.T - np.eye(3)) <= TYPED).all():
             raise self.error(
                 f"{self.name}: axes_a must be three directions of unit length at right angles, shape (3, 3), or a "
                 f"scipy Rotation; got {shown(axes)}."

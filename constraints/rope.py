@@ -60,7 +60,7 @@ class Rope(Unilateral, SumRow):
     Notes
     -----
     One row. The tension is the multiplier of the row, zero where the rope is slack; `solution.reaction(rope, on=body)`
-    is the force on each of its bodies, about the centroid. `solution.phases` tells when the rope is taut,
+    is the force on each of its bodies, about the centroid. `solution.phases` shows when the rope is taut,
     `solution.impulses` the impulses with which it becomes so. The masses of rope and pulleys are neglected. A pulley of
     radius R is a point where the rope turns about its axle; the wrapped length, which changes little, is left out. A
     run ends where a span of a taut rope shrinks to length zero and has no direction.

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..plugins import (
-    FLAT,
+    UNDIRECTED,
     Point,
     Primitive,
     Vector,
@@ -173,7 +173,7 @@ class SmoothContact(Primitive):
     @staticmethod
     def singular_place(x, par):
         """What is singular at marker coordinates x, if anything."""
-        if support(x, par) > FLAT * np.sqrt(max(par[:3])):
+        if support(x, par) > UNDIRECTED * np.sqrt(max(par[:3])):
             return ""
         return "the disc lies flat on its plane, and no point of its rim is the lowest"
 

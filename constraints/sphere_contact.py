@@ -102,8 +102,8 @@ class SphereContact(Unilateral, Joint):
         if self.radius_b is not None:
             not_negative(self.radius_b, f"{self.name}: radius_b (m)", InvalidConstraint)
             if self.radius_a == self.radius_b == 0.0:
-                raise InvalidConstraint(f"{self.name}: two points don't collide; give a radius above 0 m.")
-        if self.rubs and self.radius_b is not None and 3 in (self.a.dimension, self.b.dimension):
+                raise InvalidConstraint(f"{self.name}: two points don't collide; give radius_a or radius_b above 0 m.")
+        if self.has_friction and self.radius_b is not None and 3 in (self.a.dimension, self.b.dimension):
             body = self.a if self.a.dimension == 3 else self.b
             raise InvalidConstraint(
                 f"{self.name}: friction between balls can't turn the point mass {body.name!r}; use add_body, or leave "
@@ -116,7 +116,7 @@ class SphereContact(Unilateral, Joint):
 
     def compose(self):
         """Eqs. (1) to (3)."""
-        if self.rubs:
+        if self.has_friction:
             yield from self._gripping()
         else:
             yield "gap", self._gap()
@@ -166,12 +166,12 @@ class SphereContact(Unilateral, Joint):
     @property
     def row_labels(self):
         """What follows its title in the names of its rows."""
-        return (" gap", " slip[0]", " slip[1]") if self.rubs else super().row_labels
+        return (" gap", " slip[0]", " slip[1]") if self.has_friction else super().row_labels
 
     @property
     def sides(self):
         """One."""
-        return (Side(self.parts[0], -1.0 if self.inside else 1.0, grip=self._friction if self.rubs else None),)
+        return (Side(self.parts[0], -1.0 if self.inside else 1.0, grip=self._friction if self.has_friction else None),)
 
     @classmethod
     def example(cls, rng, a, b):

@@ -326,7 +326,7 @@ def _unfit(title, owner, signature, arguments, keywords):
 
 @cache
 def _hint(module, annotation):
-    """Return the type that an annotation of a module names; None if it can't be told."""
+    """Return the type that an annotation of a module names; None if it isn't known."""
     if not isinstance(annotation, str):
         return None
     hints = vars(import_module(".hints", __package__))  # by name: all of tsdyn stands below it
@@ -345,7 +345,7 @@ def _hint(module, annotation):
 
 
 def _fits(value, hint):
-    """Whether a value is of a type; True where that can't be told."""
+    """Whether a value is of a type; True where that isn't known."""
     origin, parts = typing.get_origin(hint), typing.get_args(hint)
     if origin in (typing.Union, types.UnionType):
         return any(_fits(value, part) for part in parts)

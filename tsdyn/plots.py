@@ -39,7 +39,7 @@ def tables_figure(tables: Sequence[Any]) -> Any:
 
     Parameters
     ----------
-    tables : sequence of haug_tables.Table
+    tables : sequence of PaperTable
 
     Returns
     -------

@@ -27,6 +27,7 @@ from .elements.friction import (
     PIN,
     PLANE,
     POINT_OF_BODY,
+    TANGENTIAL_ROWS,
     BodyFriction,
     JointFriction,
     act,
@@ -46,6 +47,8 @@ from .elements.friction import (
     slip_of,
     slip_series,
     slip_velocity,
+    tangential,
+    tangential_series,
 )
 from .elements.joint import FramedJoint, Joint, SumRow, across, beside, carried, turned_about
 from .elements.laws import Action, SceneLaw, arguments_of, instants, scene_law
@@ -67,7 +70,7 @@ from .elements.loads import (
 )
 from .elements.markers import Parameters, Point, Turn, Vector
 from .elements.primitive import Primitive
-from .elements.tolerances import FLAT, PARALLEL, RIGHT_ANGLED, SLIP
+from .elements.tolerances import PARALLEL, SLIP, UNDIRECTED
 from .elements.unilateral import Side, Unilateral
 from .errors import InvalidArgument, InvalidConstraint, InvalidForce
 from .jit.kernels import kernel, specialised, stack
@@ -92,6 +95,7 @@ from .maths.recurrences import (
     sine_cosine,
     square,
 )
+from .maths.tolerances import TYPED
 from .methods.collocation import CollocationTableau
 from .methods.diagonally_implicit import trapezoid_error
 from .methods.explicit import (
@@ -137,7 +141,6 @@ __all__ = [
     "BEARING_ROWS",
     "COORDINATE_SLOPE_ROWS",
     "DOP853_INTERPOLANT",
-    "FLAT",
     "GUIDE",
     "HEADING_ROWS",
     "MOST_COORDINATES",
@@ -146,9 +149,11 @@ __all__ = [
     "PIN",
     "PLANE",
     "POINT_OF_BODY",
-    "RIGHT_ANGLED",
     "SLIP",
     "STATE",
+    "TANGENTIAL_ROWS",
+    "TYPED",
+    "UNDIRECTED",
     "Action",
     "Adaptive",
     "Angle",
@@ -278,6 +283,8 @@ __all__ = [
     "state_load",
     "step_kernel",
     "stop_waiting",
+    "tangential",
+    "tangential_series",
     "trapezoid_error",
     "turned_about",
     "variant",

@@ -68,6 +68,7 @@ class ChartState(Record):
     off: float  # error of these factors at the configuration itself, relative
     made: int  # 1 if lower and upper hold factors of N at any configuration of this chart
     formed: int  # 1 if S is that of a stage, not factored yet
+    bare: int  # 1 if a position is asked for without factors of S, velocities without forces; tangent form
     placement: int  # number of the position solve at the end of the last step; 0 if the chart is of no use
     turn_limit: float  # |d| of a body beyond which the chart is left
     free: int  # 1 at a stage off the manifold, where S isn't factorised if there is joint friction
@@ -77,13 +78,13 @@ class ChartState(Record):
 class ChartWorkspace(NamedTuple):
     """b bodies and the ground, m rows that are no normalisations; "computed by" names the kernel."""
 
-    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; chart_validity.set_base_point
-    d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 at present; chart_coordinates.displace
+    base: np.ndarray  # ((b + 1) * 8,)  r0 and a zero, p0; charts.set_base_point
+    d: np.ndarray  # ((b + 1) * 4,)  d, d0 - 1 at present; charts.displace
     x: np.ndarray  # ((b + 1) * 8,)  its coordinates; tangent.place
     y: np.ndarray  # ((b + 1) * 8,)  their rates; tangent.accelerate
-    rows0: Rows  # H0, Y0, S0: the rows at q0; chart_validity.set_base_point
-    X: np.ndarray  # (pairs * 16,)  C Y0; chart_matrix.factorise_chart_matrix
-    lower: np.ndarray  # factors of N = H C Y0; chart_matrix.factorise_chart_matrix
+    rows0: Rows  # H0, Y0, S0: the rows at q0; charts.set_base_point
+    X: np.ndarray  # (pairs * 16,)  C Y0; schur_complement.factorise_chart_matrix
+    lower: np.ndarray  # factors of N = H C Y0; schur_complement.factorise_chart_matrix
     upper: np.ndarray
     drift: np.ndarray  # (m,)  Phi_t
     state: ChartState
@@ -315,7 +316,7 @@ class RunKernels(Record):
     fill: int
     value: int
     second: int
-    watch: int  # path_loads.watch, where functions of the state are loads
+    watch: int  # step_control.watch, where functions of the state are loads
     expand: int  # of a Taylor step: see taylor/step_parts.py
     reach: int
     accelerate_here: int
@@ -429,25 +430,25 @@ class Work(NamedTuple):
     "computed by" names the kernel. What belongs to a redundant row is zero, on the diagonal of N and B one.
     """
 
-    q: np.ndarray  # (n,)    positions; computed by newton_iterations.solve_positions
+    q: np.ndarray  # (n,)    positions; computed by null_space_chart.solve_positions
     qd: np.ndarray  # (n,)   velocities; computed by null_space.velocities
     qdd: np.ndarray  # (n,)  accelerations; computed by null_space.complete
-    Phi: np.ndarray  # (m,)  constraints at q; newton_iterations.solve_positions, and scratch of null_space.complete
+    Phi: np.ndarray  # (m,)  constraints at q; null_space_chart.solve_positions, and scratch of null_space.complete
     Phi_t: np.ndarray  # (m,)  their time derivative; null_space.velocities
     gamma: np.ndarray  # (m,)  acceleration bias; null_space.reduced_acceleration
-    z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; newton_iterations, null_space; scratch elsewhere
+    z: np.ndarray  # (m,)    B f, f being Phi, Phi_t, gamma, ...; null_space_chart, null_space; scratch elsewhere
     Phi_q: np.ndarray  # (m, n)  Jacobian at q; null_space_chart.tangent_map, new_chart
     q0: np.ndarray  # (n,)   base point of the chart; null_space_chart.new_chart
     U: np.ndarray  # (n, m)  spans W0 Phi_q(q0)^T, in place of Eq. 5; null_space_chart.new_chart
     V: np.ndarray  # (n, k)  orthonormal basis of ker Phi_q(q0); null_space_chart.new_chart
     L: np.ndarray  # (n, k)  transposed: V^T P0, P0 the projection along U; null_space_chart.new_chart
-    B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; newton_iterations.update_b
-    u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; newton_iterations, tangent.place
+    B: np.ndarray  # (m, m)  (Phi_q U)^-1, Eqs. 7, 28, warm-started; null_space_chart.update_b
+    u: np.ndarray  # (m,)    normal coordinates, Eqs. 19-21, warm-started; null_space_chart, tangent.place
     T: np.ndarray  # (m, k)  B Phi_q V = du/dv; null_space_chart.tangent_map
-    v: np.ndarray  # (k,)    tangent coordinates of the latest u; newton_iterations.solve_positions
-    base: np.ndarray  # (n,)   q0 + V v; newton_iterations.solve_positions
+    v: np.ndarray  # (k,)    tangent coordinates of the latest u; null_space_chart.solve_positions
+    base: np.ndarray  # (n,)   q0 + V v; null_space_chart.solve_positions
     N: np.ndarray  # (m, m)  Phi_q U; null_space_chart.tangent_map
-    R: np.ndarray  # (m, m)  residual of Eq. 28, and scratch of factorisations; newton_iterations.update_b
+    R: np.ndarray  # (m, m)  residual of Eq. 28, and scratch of factorisations; null_space_chart.update_b
     X: np.ndarray  # (m, k)  Phi_q V, or U^T V; null_space_chart.tangent_map, new_chart
     D: np.ndarray  # (n, k)  (I - U B Phi_q) V, Eq. 9; null_space_chart.tangent_map
     E: np.ndarray  # (3 b, k)  body angular velocity per tangent velocity, omega' = E vd; null_space.reduced_mass
@@ -460,7 +461,7 @@ class Work(NamedTuple):
     householder: np.ndarray  # (n, m)  R of U / scale = Q R, above the reflectors of Q; dense_linalg.null_space
     control: LevelControl
     counters: Counters
-    redundant: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; dense_rows.take_selection
+    redundant: np.ndarray  # int64 (d + 1,)  number of redundant rows of Phi, and which; null_space_chart.take_selection
 
 
 class ImplicitWorkspace(NamedTuple):
@@ -544,11 +545,11 @@ def allocate(n, m, bodies, constraint_tol, size=1.0, joint_rows=None, redundant=
         "inertia_bias": (inertias,),
     }
     work = Work(**carve(shapes, control=LevelControl, counters=Counters), redundant=np.zeros(redundant + 1, np.int64))
-    hold(work.control, constraint_tol, size, joint_rows is not None)
+    set_tolerances(work.control, constraint_tol, size, joint_rows is not None)
     return work
 
 
-def hold(control, constraint_tol, size, basis_free):
+def set_tolerances(control, constraint_tol, size, basis_free):
     """Set the tolerances of the constraints; without normalisations in Phi, a small scene is held as closely."""
     control.u_tol = control.b_tol = constraint_tol
     control.size = size

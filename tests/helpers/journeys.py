@@ -169,7 +169,7 @@ class Tour:
 
     def sticking(self):
         for item in self.items():
-            if getattr(item, "slides", ()) or (getattr(item, "unilateral", False) and item.rubs):
+            if getattr(item, "slides", ()) or (getattr(item, "unilateral", False) and item.has_friction):
                 assert self.on.sticking(item).shape == self.leading
             else:
                 with_message(ts.InvalidForce, lambda item=item: self.on.sticking(item))

@@ -135,3 +135,22 @@ def test_files_that_docstrings_and_comments_name_exist():
         source = module.read_text(encoding="utf-8")
         if {*PATH.findall(source)} - ends:  # in code too, which may name files of its own
             assert not {*PATH.findall(prose(source))} - ends, module.relative_to(ROOT)
+
+
+REFERENCE = re.compile(r"(?<![\w./])([a-z]+_[a-z_]{2,})\.(\w{3,})\b(?![/.])")
+
+
+def test_names_that_docstrings_and_comments_refer_to_exist():
+    """Of references `module.name` those with an underscore, which variables and files of examples lack."""
+    modules = {
+        path: path.read_text(encoding="utf-8") for folder in FOLDERS[:3] for path in (ROOT / folder).rglob("*.py")
+    }
+    names = {path.stem: set() for path in modules}
+    for path, source in modules.items():
+        for node in ast.walk(ast.parse(source)):
+            names[path.stem] |= {getattr(node, key, None) for key in ("name", "id", "arg", "attr", "asname")}
+    for path, source in modules.items():
+        said = "\n".join(line for line in prose(source).splitlines() if not line.lstrip().startswith((">>>", "...")))
+        for owner, name in REFERENCE.findall(said):
+            known = name in names.get(owner, ()) or owner in names[path.stem] or name in ("html", "toml")
+            assert known, f"{path.relative_to(ROOT)}: {owner}.{name}"

@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.tolerances import LEAST_SLIP
+from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
-from .contact_problem import NoSolution, Settled, depends, energy_gain, slack_of
-from .tolerances import AT_BOUND, DEPENDENT, LEAST_SHARE, LEVEL, STOPPED, WITHIN_BOUND
+from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
+from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, STOPPED, WITHIN_BOUND
 
 
 def rows_of(inertia, which):
@@ -89,7 +89,7 @@ class Cones:
         self.slides = speeds > LEAST_SLIP
         self.d = np.full(slips.shape, np.nan)
         self.d[self.slides] = slips[self.slides] / speeds[self.slides, None]
-        self.rubs, self.kinetic, self.static = (x[resting] for x in (gaps.rubs, gaps.kinetic, gaps.static))
+        self.rough, self.kinetic, self.static = (x[resting] for x in (gaps.rough, gaps.kinetic, gaps.static))
 
     def solve(self, G, b, bounds=()):
         """Reactions p (3 k,), modes and coefficients (k,), where accelerations are G p + b; raises NoSolution.
@@ -103,22 +103,22 @@ class Cones:
             if p is None:
                 raise NoSolution
             N, *T = p.reshape(-1, 3)[: mu.size].T
-            bound = np.hypot(*T) >= (1.0 - AT_BOUND) * mu * N
-            leave = bound & ~self.slides & (mode[: mu.size] != OPEN) & self.rubs & (mu > self.kinetic * WITHIN_BOUND)
+            bound = np.hypot(*T) >= (1.0 - EVENT_ERROR) * mu * N
+            leave = bound & ~self.slides & (mode[: mu.size] != OPEN) & self.rough & (mu > self.kinetic * WITHIN_BOUND)
             if not leave.any():
                 break
             mu = np.where(leave, self.kinetic * WITHIN_BOUND, mu)
         return p, mode, mu
 
 
-def settle_grips(inertia, resting, qd, fired=()):
-    """Which of the gaps that are closed and at rest stay so, and which stick or slide; arguments as of `settle`.
+def solve_rough_contacts(inertia, resting, qd, fired=()):
+    """Which gaps that are closed and at rest stay so, and which stick or slide; arguments as of `solve_contacts`.
 
     Slips that are rounding have been ended in qd, see `halted`; so have slow ones that come to rest, see `at_turn`.
 
     Returns
     -------
-    Settled
+    ContactState
         With `grips`: for each closed gap with friction None where it sticks, or the direction (3,) of its slip, ground
         frame.
 
@@ -127,44 +127,55 @@ def settle_grips(inertia, resting, qd, fired=()):
     NoSolution
         Where no reactions keep the contacts from penetrating, or several do: with much friction (Painleve).
     """
-    found = _settled(inertia, resting, qd, fired)
+    found = _solve(inertia, resting, qd, fired)
     if not found.idle:
         return found
     # Idle contacts carry nothing in the phase: what the others do follows from their own normal loads
-    again = _settled(inertia, found.closed, qd, fired)
+    again = _solve(inertia, found.closed, qd, fired)
     if again.closed != found.closed or again.idle:
         return found
     return again._replace(idle=found.idle, grips={**found.grips, **again.grips})
 
 
-def at_turn(inertia, resting, qd, fired, turned):
-    """Velocities (n,) and the `Settled`, with the slips ended that come to rest where they turn.
+def at_turn(inertia, resting, qd, fired, turned, opening=()):
+    """Velocities (n,) and the `ContactState`, with the slips ended that come to rest where they turn.
 
-    Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. Below STOPPED it is ended
-    where the contact would stick: with all that are as slow, as of a body that comes to rest, or alone.
+    Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. It is ended where the
+    contact would stick: with all that are as slow, as of a body that comes to rest, or alone. Below STOPPED it is
+    ended, too, where it slows down with its friction against it, to slide off in another direction at once.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
+    opening : list of int
+        Gaps that open with a rate: they go on to.
     """
-    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], STOPPED)
-    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rubs[i]], STOPPED)
+    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], AHEAD)
+    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rough[i]], AHEAD)
     closed = [i for i in inertia.held if i in resting]
+
+    def ended(which, closed=closed):
+        found = halted(inertia, qd, closed, which)
+        if found is not qd:
+            rates = inertia.rates(found)
+            more = [i for i in opening if rates[i] <= 0.5 * inertia.rates(qd)[i]]
+            if rates[resting].any() or more:  # others have closed at once
+                found = halted(inertia, qd, [*resting, *more], which)
+        return found, solve_rough_contacts(inertia, resting, found, fired)
+
     for which in (slow, turned) if turned else ():
-        ended = halted(inertia, qd, closed, which)
-        if inertia.rates(ended)[resting].any():  # others have closed at once
-            ended = halted(inertia, qd, resting, which)
         try:
-            settled = settle_grips(inertia, resting, ended, fired)
+            found = ended(which)
         except NoSolution:
             continue
-        if all(settled.grips.get(i, ()) is None for i in which):
-            return ended, settled
-    qd = halted(inertia, qd, resting)
-    return qd, settle_grips(inertia, resting, qd, fired)
+        if all(found[1].grips.get(i, ()) is None for i in which):
+            return found
+    found = ended(slow_slips(inertia, qd, slow, LEAST_SLIP), resting)
+    which = [i for i in slow_slips(inertia, qd, turned, STOPPED) if found[1].gains.get(i, 0.0) < 0.0]
+    return ended(which) if which else found
 
 
-def _settled(inertia, resting, qd, fired):
-    """As `settle_grips`, with the normal loads shared among all contacts."""
+def _solve(inertia, resting, qd, fired):
+    """As `solve_rough_contacts`, with the normal loads shared among all contacts."""
     gaps, resting = inertia.gaps, list(resting)
     cones = Cones(inertia, resting, qd)
     response = inertia.free(cones.rows.T)
@@ -187,7 +198,7 @@ def _settled(inertia, resting, qd, fired):
             spare.append(i)
         else:
             (idle if depends(inertia, closed, i) else closed).append(i)
-        if gaps.rubs[i]:
+        if gaps.rough[i]:
             length = np.hypot(*T[j])
             if slides[j]:
                 grips[i] = inertia.along(i, d[j])
@@ -198,7 +209,9 @@ def _settled(inertia, resting, qd, fired):
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
     pushes = _held(inertia, closed, grips, dict(zip(resting, b.reshape(-1, 3), strict=True)))
     slack = slack_of(inertia, closed, pushes, small)
-    return Settled(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack)
+    moves = (G @ p + b).reshape(-1, 3)[:, 1:]
+    gains = {resting[j]: float(moves[j] @ d[j]) for j in np.flatnonzero(slides)}
+    return ContactState(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack, gains)
 
 
 def _sharing(G, b, p, mode, cones, response):
@@ -207,14 +220,14 @@ def _sharing(G, b, p, mode, cones, response):
     Where slips depend on each other, the solution may have some at their bounds that others could relieve.
     """
     moves, terms = ((x @ y + z).reshape(-1, 3)[:, 1:] for x, y, z in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
-    still = cones.rubs & ~cones.slides & (mode != OPEN) & (np.abs(moves) <= LEVEL * terms).all(axis=1)
+    still = cones.rough & ~cones.slides & (mode != OPEN) & (np.abs(moves) <= LEVEL * terms).all(axis=1)
     if (mode[still] == STICKS).all():
         return mode
     loads = p.reshape(-1, 3)[still]
     slips = response.T.reshape(-1, 3, response.shape[0])[still, 1:]
     bounds = cones.static[still] * loads[:, 0]
     T = spread(bounds[None], slips[None], loads[None, :, 1:])[0]
-    within = np.hypot(*T.T) < (1.0 - AT_BOUND) * bounds
+    within = np.hypot(*T.T) < (1.0 - EVENT_ERROR) * bounds
     return np.where(still, STICKS, mode) if within.all() else mode
 
 
@@ -225,7 +238,7 @@ def _independent(inertia, closed, grips):
         return {}
     rows = np.concatenate([inertia.J[closed], inertia.tangents[sticks].reshape(2 * len(sticks), -1)])
     loads, kept = inertia.free(rows.T).T, np.ones(len(rows), bool)
-    held = DEPENDENT**2 * (rows * loads).sum(axis=1).max()  # by bilateral rows
+    held = RANK_TOL**2 * (rows * loads).sum(axis=1).max()  # by bilateral rows
     for k in range(len(rows)):  # Gram-Schmidt in the metric of kinetic energy
         size = rows[k] @ loads[k]
         for j in np.flatnonzero(kept[:k]):
@@ -233,7 +246,7 @@ def _independent(inertia, closed, grips):
             rows[k] -= share * rows[j]
             loads[k] -= share * loads[j]
         left = rows[k] @ loads[k]
-        kept[k] = k < len(closed) or left > max(DEPENDENT * size, held)
+        kept[k] = k < len(closed) or left > max(RANK_TOL * size, held)
         if kept[k]:
             rows[k] /= np.sqrt(max(left, TINY))
             loads[k] /= np.sqrt(max(left, TINY))
@@ -252,7 +265,7 @@ def _demand_unique(G, d, mu, mode):
             load[j, 1:, 0] = -mu[j] * d[j]
     held = [3 * j + i for j in np.flatnonzero(mode != OPEN) for i in range(1 if mode[j] != STICKS else 3)]
     size = np.diag(G)
-    held = [r for r in held if size[r] > DEPENDENT**2 * size.max()]  # bilateral rows hold the others
+    held = [r for r in held if size[r] > RANK_TOL**2 * size.max()]  # bilateral rows hold the others
     own = G.reshape(G.shape[0], -1, 3)
     A = np.einsum("rji,jik->rjk", own, load).reshape(G.shape)[np.ix_(held, held)]
     scale = np.sqrt(size[held])
@@ -279,19 +292,17 @@ def _carried(inertia, closed, idle, grips, N, resting):
     return sorted(closed), sorted(idle)
 
 
-def halted(inertia, qd, resting, which=None):
-    """Velocities (n,) with slips ended of the gaps `resting`: of `which`, by default those that are rounding.
+def halted(inertia, qd, resting, which):
+    """Velocities (n,) with the slips ended of the gaps `which`, while the gaps `resting` keep their rates.
 
     What sticks goes on to, and what goes on sliding changes its friction with its load: as in the course of time.
     """
-    rubbing = [i for i in resting if inertia.gaps.rubs[i]]
-    slow = slow_slips(inertia, qd, rubbing, LEAST_SLIP) if which is None else which
-    if not slow:
+    if not which:
         return qd
-    slips = inertia.slips(qd)
-    moving = [i for i in rubbing if i not in slow and slips[i].any()]
+    frictional, slips = [i for i in resting if inertia.gaps.rough[i]], inertia.slips(qd)
+    moving = [i for i in frictional if i not in which and slips[i].any()]
     loads = _loads(inertia, resting, {i: slips[i] / np.hypot(*slips[i]) for i in moving})
-    held = [i for i in rubbing if i not in moving]
+    held = [i for i in frictional if i not in moving]
     tangents = inertia.tangents[held].reshape(2 * len(held), -1)
     response = inertia.free(np.concatenate([loads, tangents]).T)
     left = np.concatenate([np.zeros(len(resting)), tangents @ qd])
@@ -323,7 +334,7 @@ def _held(inertia, closed, grips, b):
 
     b: accelerations (3,) of gaps and slips where all are open, by gaps.
     """
-    sticks = [i for i in closed if inertia.gaps.rubs[i] and grips[i] is None]
+    sticks = [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
     slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
     loads = np.concatenate([_loads(inertia, closed, _ways(inertia, grips)), slips])
     rows = np.concatenate([inertia.J[closed], slips])

@@ -20,11 +20,11 @@ from ..configuration.tolerances import INITIAL_TOL
 from ..elements.bodies import turning
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
-from ..maths.tolerances import RANK_TOL
+from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
 from ..model.handles import angle as angle_of
 from ..model.handles import counted, displacement, first_rows, handles_of, index_of
 from .contact_rows import ContactWorkspace
-from .tolerances import AT_REST, DEPENDENT, LEVEL
+from .tolerances import LEVEL
 
 
 class Gap(NamedTuple):
@@ -54,7 +54,7 @@ class Gaps:
     names : list of str
         Of their constraints.
     restitution, kinetic, static : ndarray (count,)
-    rubs : ndarray (count,), bool
+    rough : ndarray (count,), bool
         Whether there is friction.
     slots : ndarray (count,)
         Where the numbers of those with friction begin in what the run remembers.
@@ -74,15 +74,15 @@ class Gaps:
         self.sign = np.array([gap.side.sign for gap in self.list])
         self.restitution = np.array([gap.contact.restitution for gap in self.list], float)
         grips = [gap.side.grip for gap in self.list]
-        self.rubs = np.array([grip is not None for grip in grips], bool)
+        self.rough = np.array([grip is not None for grip in grips], bool)
         self.kinetic = np.array([grip.kinetic if grip else 0.0 for grip in grips], float)
         self.static = np.array([grip.static if grip else 0.0 for grip in grips], float)
         slots = {id(contact): slot for contact, slot in packed.contacts}
         self.slots = np.array([slots.get(id(gap.contact), 0) for gap in self.list], int)
-        self.slip_rows = np.where(self.rubs, self.rows, 0)[:, None] + [1, 2]
+        self.slip_rows = np.where(self.rough, self.rows, 0)[:, None] + [1, 2]
         own = {id(part): first for part, first in first_rows(contacts.constraints)}
         self._slips = np.zeros((self.count, 2), int)  # among the rows of `contacts`
-        for i in np.flatnonzero(self.rubs):
+        for i in np.flatnonzero(self.rough):
             self._slips[i] = slip_rows(self.list[i].contact, own)
         handles, bodies = handles_of(packed), packed.system.bodies
         self._places = ~turning(bodies, int(bodies[:, 1].sum()))
@@ -99,7 +99,7 @@ class Gaps:
         return np.where(self._angles > 0.0, self._angles, length)
 
     def __reduce__(self):
-        """Made anew in another process: kernels' memory is of this one."""
+        """Made again in another process: the memory of kernels belongs to this one."""
         return Gaps, self._made_of
 
     @property
@@ -113,7 +113,7 @@ class Gaps:
 
     def all_rows(self, which=slice(None)):
         """Rows of Phi of gaps and of their slips, by default of all."""
-        return np.concatenate((self.rows[which], self.slip_rows[which][self.rubs[which]].ravel()))
+        return np.concatenate((self.rows[which], self.slip_rows[which][self.rough[which]].ravel()))
 
     def _stop(self, handles, side):
         """A function of q (..., n) and counted angles (..., angles) that returns the gap (...) of a joint's angle."""
@@ -155,6 +155,14 @@ class Gaps:
         """Rows (k, 2, n) of the slips of the gaps `which`, which have friction."""
         return self.workspace.rows(t, q, self._slips[which].ravel())[0].reshape(len(which), 2, -1)
 
+    def rates(self, t, q, qd, which):
+        """Rates (k, c) of the gaps `which` at times t (k,), with q and qd (k, n)."""
+        found = np.empty((t.size, len(which)))
+        for k in range(t.size):
+            J, drift = self.workspace.rows(t[k], q[k], which)
+            found[k] = J @ qd[k] + drift[which]
+        return self.sign[which] * found
+
     def responses(self, t, q, memory, which):
         """Accelerations (k, 2, n) by unit friction of these gaps, with all gaps open."""
         rows = self.slopes(t, q, which).reshape(2 * len(which), -1)
@@ -162,7 +170,7 @@ class Gaps:
 
     def biases(self, gamma):
         """Of the accelerations of slips (count, 2), from those of all rows; zero without friction."""
-        return np.where(self.rubs[:, None], gamma[self._slips], 0.0)
+        return np.where(self.rough[:, None], gamma[self._slips], 0.0)
 
     def across(self, i, tangents, d):
         """Components (..., 2) of directions d (..., 3), ground frame, along slips of a gap; tangents (..., 2, n)."""
@@ -218,7 +226,7 @@ class Inertia:
     slots : ndarray
         What forces remember.
     which : list of int
-        Gaps that are looked at; all else is zero of others.
+        Gaps that are evaluated; values of others are zero.
     held : sequence of int
         Those that may be held closed, independent: a guess.
     loads : ndarray (n,), optional
@@ -242,9 +250,9 @@ class Inertia:
         self.G[self.which[:, None], self.which] = self._rows @ response.T
         self._sizes, self.tangents = np.abs(self._rows), np.zeros((gaps.count, 2, q.size))
         self._more = 0.0 if loads is None else self.free(loads)
-        rubbing = self.which[gaps.rubs[self.which]]
-        if rubbing.size:
-            self.tangents[rubbing] = gaps.slopes(t, q, rubbing)
+        frictional = self.which[gaps.rough[self.which]]
+        if frictional.size:
+            self.tangents[frictional] = gaps.slopes(t, q, frictional)
 
     def among(self, which):
         """G of some gaps."""
@@ -271,7 +279,7 @@ class Inertia:
     def rates(self, qd, sizes=None):
         """Rates of the gaps (count,), zero where they are so to rounding of velocities of these `sizes` (n,)."""
         rates, terms = self._rows @ qd + self._drift, self._sizes @ (np.abs(qd) if sizes is None else sizes)
-        rates[np.abs(rates) <= AT_REST * (terms + np.abs(self._drift))] = 0.0
+        rates[np.abs(rates) <= NEGLIGIBLE * (terms + np.abs(self._drift))] = 0.0
         return self._of_all(rates)
 
     def hold(self, which, rates):
@@ -281,7 +289,7 @@ class Inertia:
     def slips(self, qd):
         """Velocities (count, 2) of the slips, zero where they are rounding."""
         found, terms = self.tangents @ qd, np.abs(self.tangents) @ np.abs(qd)
-        return np.where(np.abs(found) <= AT_REST * terms, 0.0, found)
+        return np.where(np.abs(found) <= NEGLIGIBLE * terms, 0.0, found)
 
     def slip_accelerations(self, qd):
         """Accelerations (count, 2) of the slips where all gaps are open."""
@@ -352,7 +360,7 @@ def _solved(inertia, which, q):
     return p, held
 
 
-class Settled(NamedTuple):
+class ContactState(NamedTuple):
     """What becomes of the gaps that are closed, at rest and not."""
 
     closed: list  # of gaps: independent rows, with reactions
@@ -361,9 +369,10 @@ class Settled(NamedTuple):
     grips: dict = MappingProxyType({})  # of those with friction, see contact_friction.py
     rows: dict = MappingProxyType({})  # of closed ones that stick: which of the two rows of the slip are independent
     slack: dict = MappingProxyType({})  # of closed ones whose reactions are rounding: what these may fall below zero
+    gains: dict = MappingProxyType({})  # of those that slide: what their slips gain, m/s^2
 
 
-def settle(inertia, resting, qd, fired=()):
+def solve_contacts(inertia, resting, qd, fired=()):
     """Which of the gaps that are closed and at rest stay so, by the complementarity problem of accelerations.
 
     Parameters
@@ -381,7 +390,7 @@ def settle(inertia, resting, qd, fired=()):
     """
     c, terms = inertia.accelerations(qd)
     if not resting:
-        return Settled([], [], c)
+        return ContactState([], [], c)
     resting, fired, carried = list(resting), [i for i in fired if i in resting], inertia.carried()
     while True:
         lam, basic = _solved(inertia, resting, c[resting])
@@ -404,7 +413,7 @@ def settle(inertia, resting, qd, fired=()):
         else:
             closed.append(i)
     pushes = lam[basic] if len(closed) == basic.sum() else inertia.hold(closed, c[closed])
-    return Settled(sorted(closed), idle, gdd, slack=slack_of(inertia, closed, pushes, small))
+    return ContactState(sorted(closed), idle, gdd, slack=slack_of(inertia, closed, pushes, small))
 
 
 def slack_of(inertia, closed, pushes, small):
@@ -421,14 +430,14 @@ def slack_of(inertia, closed, pushes, small):
 def depends(inertia, closed, i, sticks=()):
     """Whether the row of a gap depends on those of closed ones, on slips of those that stick, and on bilateral rows."""
     own, alone, mobile = inertia.response[i], inertia.J[i], np.diag(inertia.G)
-    if mobile[i] <= DEPENDENT**2 * mobile.max():  # bilateral rows hold it
+    if mobile[i] <= RANK_TOL**2 * mobile.max():  # bilateral rows hold it
         return True
     if not closed:
-        return not inertia.G[i, i] > DEPENDENT**2 * np.linalg.norm(alone) * np.linalg.norm(own)
+        return not inertia.G[i, i] > RANK_TOL**2 * np.linalg.norm(alone) * np.linalg.norm(own)
     rows, loads = inertia.J[closed], inertia.response[closed]
     if len(sticks):
         slips = inertia.tangents[sticks].reshape(2 * len(sticks), -1)
         rows, loads = np.concatenate([rows, slips]), np.concatenate([loads, inertia.free(slips.T).T])
     share = np.linalg.lstsq(rows @ loads.T, rows @ own, rcond=RANK_TOL**2 if len(sticks) else None)[0]
     left = own - share @ loads
-    return bool(np.linalg.norm(left) <= DEPENDENT * np.linalg.norm(own))
+    return bool(np.linalg.norm(left) <= RANK_TOL * np.linalg.norm(own))

@@ -1,11 +1,15 @@
-"""Normal loads of frictions, and their forces for unit loads, at one state: kernels, and their workspace."""
+"""Frictions at given states: slip velocities, normal loads, forces for unit loads; kernels, and their workspace."""
+
+import threading
 
 import numpy as np
 
 from ..elements.bodies import transform_g
 from ..elements.loops.friction import DERIVE, HERE
+from ..elements.loops.template import turning
 from ..formulations.accelerations import normal_load, unit_friction
-from ..jit.kernels import entry, resident
+from ..jit.kernels import entry, kernel, resident, stack
+from ..maths.vectors import rotate
 from ..model.equations import evaluate_constraints, recall, set_time
 from ..model.handles import index_of
 from ..model.packed import coupled_loads
@@ -14,7 +18,75 @@ from ..observables.reactions import solve_multipliers, solve_normal_loads
 from ..rows.constraint_graph import REDUCED, graph_of
 from ..workspaces import load_parts, parts
 from .contact_rows import find_reactions
-from .slip_velocities import slip_velocities
+
+# Of a unit in the table: where the coordinates of a and b begin, and how many they are (none of the ground); whether
+# bodies turn on one another; what becomes of the component along an axis of a, or a normal of b.
+AT_A, SIZE_A, AT_B, SIZE_B, TURNS, PART, INTS = range(7)
+WHOLE, ALONG, ACROSS = 0, 1, 2  # parts of the velocity: all of it, along the axis of a, across the normal of b
+
+
+@kernel
+def _moved(at, size, q, qd, r, v, w):
+    """Centroid, its velocity and the angular velocity of a body, ground frame; zeros of the ground."""
+    for i in range(3):
+        r[i] = q[at + i] if size > 0 else 0.0
+        v[i] = qd[at + i] if size > 0 else 0.0
+        w[i] = 0.0
+    if size == 7:
+        turning(q[at + 3 : at + 7], qd[at + 3 : at + 7], w)
+
+
+@kernel
+def _turned(at, size, q, s, out):
+    """A direction of a body, ground frame."""
+    if size == 7:
+        rotate(q[at + 3 : at + 7], s, out)
+    else:
+        for i in range(3):
+            out[i] = s[i]
+
+
+@entry("mmwvvmmm")
+def slip_velocities(q, qd, table, points, axes, v, sizes, n):
+    """Slip velocities or rates v, axes n (k, 3 units), ground frame, and sizes of the terms of v (k, units).
+
+    v = v_a + w_a x s - v_b - w_b x (x_a - r_b), or w_a - w_b, at q, qd (k, n); points s and axes: (3 units,).
+    """
+    ra, va, wa, rb, vb, wb = stack(3), stack(3), stack(3), stack(3), stack(3), stack(3)
+    s, d = stack(3), stack(3)
+    for k in range(q.shape[0]):
+        for u in range(sizes.shape[1]):
+            one, o, size = table[INTS * u : INTS * (u + 1)], 3 * u, 0.0
+            _moved(one[AT_A], one[SIZE_A], q[k], qd[k], ra, va, wa)
+            _moved(one[AT_B], one[SIZE_B], q[k], qd[k], rb, vb, wb)
+            # v = w_a - w_b, or v_a + w_a x s - v_b - w_b x d with d = r_a + s - r_b
+            if one[TURNS]:
+                for i in range(3):
+                    v[k, o + i] = wa[i] - wb[i]
+                    size += abs(wa[i]) + abs(wb[i])
+            else:
+                _turned(one[AT_A], one[SIZE_A], q[k], points[o : o + 3], s)
+                for i in range(3):
+                    d[i] = ra[i] + s[i] - rb[i]
+                for i in range(3):
+                    j, m = (i + 1) % 3, (i + 2) % 3
+                    va[i] += wa[j] * s[m] - wa[m] * s[j]
+                    vb[i] += wb[j] * d[m] - wb[m] * d[j]
+                    size += abs(va[i]) + abs(vb[i]) + abs(wa[j] * s[m]) + abs(wb[j] * d[m])
+                for i in range(3):
+                    v[k, o + i] = va[i] - vb[i]
+            # Its part along the axis n of a, (v.n) n, or across the normal n of b, v - (v.n) n
+            sizes[k, u] = size
+            if one[PART] == WHOLE:
+                continue
+            if one[PART] == ALONG:
+                _turned(one[AT_A], one[SIZE_A], q[k], axes[o : o + 3], d)
+            else:
+                _turned(one[AT_B], one[SIZE_B], q[k], axes[o : o + 3], d)
+            along = v[k, o] * d[0] + v[k, o + 1] * d[1] + v[k, o + 2] * d[2]
+            for i in range(3):
+                n[k, o + i] = d[i]
+                v[k, o + i] = along * d[i] if one[PART] == ALONG else v[k, o + i] - along * d[i]
 
 
 @entry("pdvvvm")
@@ -44,51 +116,72 @@ KERNELS = (
 )  # fmt: skip
 
 
+def normal_loads_of(packed, t, q, qd, memory, Phi_q):
+    """The `NormalLoads` of a packed scene in this thread, at one state."""
+    known, key = packed.derived.reactions, (threading.get_ident(), NormalLoads)
+    if key not in known:
+        known[key] = NormalLoads(packed, q.size)
+    known[key].enter(t, q, qd, memory, Phi_q)
+    return known[key]
+
+
 class NormalLoads:
-    """Frictions of a packed scene that depend on reactions, at one state.
+    """Frictions of a packed scene that depend on reactions, at one state at a time.
 
     Parameters
     ----------
     packed : Packed
-    t : float, s
-    q, qd : ndarray (n,)
-    memory : ndarray (slots,)
-    Phi_q : ndarray (m, n)
+    n : int
+        Coordinates.
 
     Attributes
     ----------
-    units : ndarray (n, frictions)
+    units : ndarray (frictions, n)
         Generalised forces for unit normal loads.
     """
 
-    def __init__(self, packed, t, q, qd, memory, Phi_q):
+    def __init__(self, packed, n):
         own = packed.system._replace(reals=packed.system.reals.copy())
-        self.context, *self._keep = resident(parts(own, graph_of(packed, REDUCED), q.size))
-        self.q, self.frictions, spans = q, coupled_loads(packed), packed.system.bodies.tolist()
-        found = np.zeros((len(self.frictions), 14))
-        find_units(self.context, t, q, qd, memory, found)
-        self.units, self.wrenches = np.zeros((q.size, len(found))), []
-        members = {id(member.constraint): member.rows for member in packed.members}
-        for i, load in enumerate(self.frictions):
-            force, rows = load.force, members[id(load.force.joint)]
-            for k, body in enumerate((force.a, force.b)):
+        self.context, *self._keep = resident(parts(own, graph_of(packed, REDUCED), n))
+        loads, spans = coupled_loads(packed), packed.system.bodies.tolist()
+        count, members = len(loads), {id(member.constraint): member.rows for member in packed.members}
+        # Where the forces on both bodies are, behind the last coordinate of the ground; of a joint the rows, padded
+        self._at, self._on = np.full((count, 14), n), np.zeros((count, 2), int)
+        rows = [np.r_[members[id(load.force.joint)]] for load in loads]
+        self._m = len(packed.system.segments)
+        self._rows = np.full((count, max(map(len, rows))), self._m)
+        for i, load in enumerate(loads):
+            self._rows[i, : len(rows[i])] = rows[i]
+            for k, body in enumerate((load.force.a, load.force.b)):
                 if body.dimension:
                     at, length = spans[index_of(packed, body)]
-                    self.units[at : at + length, i] = found[i, 7 * k : 7 * k + length]
-            # The reaction on a body by the multipliers of the joint: -Phi_r^T lam, and -G Phi_p^T lam / 2
-            at, length = spans[index_of(packed, force.on)]
-            wrench = np.zeros((6, len(Phi_q[rows])))
-            wrench[:3] = -Phi_q[rows, at : at + 3].T
-            if length == 7:
-                wrench[3:] = -0.5 * transform_g(q[at + 3 : at + 7]) @ Phi_q[rows, at + 3 : at + 7].T
-            self.wrenches.append((rows, wrench))
+                    self._at[i, 7 * k : 7 * k + length] = np.arange(at, at + length)
+            self._on[i] = spans[index_of(packed, load.force.on)]
+        self._rigid = self._on[:, 1] == 7
+        self.units = np.zeros((count, n))
+
+    def enter(self, t, q, qd, memory, Phi_q):
+        """Take a state, and Phi_q (m, n) there."""
+        self._q, found, count = q, np.zeros((len(self.units), 14)), len(self.units)
+        find_units(self.context, t, q, qd, memory, found)
+        units = np.zeros((count, q.size + 1))
+        np.put_along_axis(units, self._at, found, 1)
+        self.units = units[:, :-1].copy()
+        # The reaction on a body by the multipliers of the joint: -Phi_r^T lam, and -G Phi_p^T lam / 2
+        Phi_q, at, rigid = np.vstack([Phi_q, np.zeros(q.size)]), self._on[:, :1], self._rigid
+        self._wrench = np.zeros((count, 6, self._rows.shape[1]))
+        self._wrench[:, :3] = -Phi_q[self._rows[:, None], (at + np.arange(3))[:, :, None]]
+        p = at[rigid] + np.arange(3, 7)
+        self._wrench[rigid, 3:] = -0.5 * transform_g(q[p]) @ Phi_q[self._rows[rigid, None], p[:, :, None]]
 
     def reactions(self, lam):
-        """Reactions (frictions, 6, ...) by multipliers (m, ...)."""
-        return np.array([wrench @ lam[rows] for rows, wrench in self.wrenches])
+        """Reactions (frictions, 6, ...) by multipliers (rows, ...) of the joints' rows, which are the first ones."""
+        padded = np.zeros((self._m + 1, *lam.shape[1:]))
+        padded[: len(lam)] = lam
+        return self._wrench @ padded[self._rows]
 
     def loads(self, reactions):
         """Normal loads (frictions,) of reactions (frictions, 6), and their derivatives by these."""
         out = np.zeros((len(reactions), 7))
-        find_loads(self.context, self.q, reactions, out)
+        find_loads(self.context, self._q, reactions, out)
         return out[:, 0], out[:, 1:]

@@ -116,17 +116,16 @@ DENSE_INSTANT = 120
 # Of coefficients of restitution: where less than that would act at an impact with friction, nothing acts. A jammed end
 # rises by no more than the tolerance of the cone at a share of 1e-10.
 LEAST_SHARE = 1e-3
-# Rate of a gap over the sum of its terms up to which it is zero: velocities after an impact are right to rounding,
-# those of a chain to some hundred.
-AT_REST = 1e-12
-# The same of accelerations, and of reactions as the accelerations that they make.
+# A rate of a gap is zero up to NEGLIGIBLE of its terms: velocities after an impact are right to rounding, those of a
+# chain to some hundred roundings. Of accelerations, and of reactions as the accelerations that they cause:
 LEVEL = 1e-11
-# Part of a row that is independent of others, up to which it depends on them: sines of angles, squares of which are
-# found to 1e-14.
-DEPENDENT = 1e-7
-# What the friction of a contact lacks of its bound, of that, where it has reached it: reactions are right to ten digits
-# at an event. Share of the bound that decides then: the contact slides, though its acceleration is rounding.
-AT_BOUND, WITHIN_BOUND = 1e-9, 1.0 - 1e-10
+# Relative error of reactions and velocities at an event, which are right to ten digits there. So the friction of a
+# contact has reached its bound where it lacks less of it; a load below this share of the forces and inertial forces on
+# the two bodies is none; and a friction that slips by less than this share of the two velocities, and of what
+# accelerations have made since the start, takes part in the event of another, as if it rested.
+EVENT_ERROR = 1e-9
+# Share of the bound of friction that decides then: the contact slides, though its acceleration is rounding.
+WITHIN_BOUND = 1.0 - 1e-10
 
 # --- friction at rest ------------------------------------------------------------------------------------------------
 # m/s or rad/s: a body that slides in a plane, more slowly, has come to rest where its direction turns: ten times the
@@ -134,19 +133,8 @@ AT_BOUND, WITHIN_BOUND = 1e-9, 1.0 - 1e-10
 STOPPED = 1e-8
 # Roundings of the time within which an acceleration changes velocities by none: an event's time is right to some ten.
 RESTS = 100.0
-# Slip over the velocities of the two bodies, and over what their accelerations have made since the start, up to which a
-# friction takes part in the event of another, as if it rested: less than ten digits of a run.
-AT_ONCE = 1e-9
-# Rounds of pivoting over those for all units at once; after as many, or where modes come back, one unit at a time.
+# Rounds of pivoting over those for all units at once; after as many, or where modes come back, one unit at a time. Also
+# rounds in which contacts and frictions of joints are decided in turn: each changes the modes of some.
 PIVOTS = 30
 # Reaction over the bound from which on a unit whose event has come slides.
 BROKEN = 1.0 - 1e-7
-# Friction, of the forces and inertial forces on the two bodies, or of their moments, below which the load counts as
-# none and the friction isn't followed: reactions are right to ten digits at an event.
-UNLOADED = 1e-9
-# What the cosine of the angle between the direction and the acceleration of a beginning slide may lack of one.
-ASIDE = 1e-12
-
-# --- kinematics with rows on velocities ----------------------------------------------------------------------------
-# Tolerance of the run that integrates the velocities: hundreds of roundings.
-FOLLOWED = 1e-12

@@ -161,7 +161,7 @@ def progress_of(parsed):
 def destinations(parsed, document):
     """Files of the results, and where to draw, by the options, else by the file; refused at once if not writable.
 
-    What the file itself names is written anew by each run of it.
+    What the file itself names is replaced by each run of it.
     """
     if parsed.csv is not None and Path(parsed.csv).suffix.lower() not in TABLES:
         raise InvalidArgument(f"--csv writes a file that ends in .csv, got {parsed.csv!r}.")

@@ -171,7 +171,7 @@ def _solution_info(parsed):
 
 
 def _say_what_lacks(found):
-    """Print, where errors go, what a file doesn't tell for the want of functions, or classes, of its owner."""
+    """Print to stderr what can't be shown of a file, for want of functions or classes of its owner."""
     if getattr(found, "_lacks", ""):
         print(f"tsdyn: {found._lacks}", file=sys.stderr)
 

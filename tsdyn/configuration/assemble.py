@@ -15,7 +15,7 @@ from ..elements.force import Force
 from ..errors import InconsistentState, InvalidArgument, InvalidBody
 from ..jit.interrupts import CollectionsDeferred
 from ..maths.dense_linalg import row_lengths
-from ..maths.tolerances import LAST_PLACE, NEGLIGIBLE
+from ..maths.tolerances import LAST_PLACE, NEGLIGIBLE, TYPED
 from ..model.handles import handles_of
 from ..validation import floats, number, one_of, positive, sequence
 from .continuation import (
@@ -35,7 +35,7 @@ from .continuation import (
 from .joint_space import Loops, coordinate_from
 from .mobility import proved, refuse
 from .motor_starts import approach, are_aligned, demand_aligned, demand_finite, has_motors, refuse_vanished
-from .tolerances import CLEAR_FOLD, FLAT_FOLD, INITIAL_TOL, POINT_LIKE, SHOWN, STAGES, STIFFER
+from .tolerances import CLEAR_FOLD, FLAT_FOLD, INITIAL_TOL, SHOWN, STAGES, STIFFER
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -238,7 +238,7 @@ def _link(edge, near, body, axis):
         across = None if n is None else np.cross(n, near.slide[body])
         return across if across is not None and np.linalg.norm(across) > FLAT_FOLD else None
     link = near.points[body] - edge.points[body]
-    return link if np.linalg.norm(link) > POINT_LIKE else None
+    return link if np.linalg.norm(link) > TYPED else None
 
 
 def _sides(edge, body):

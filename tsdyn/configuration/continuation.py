@@ -11,8 +11,9 @@ from ..maths.tolerances import NEGLIGIBLE, PIVOT_ROUNDING, RANK_TOL, ROUNDING, S
 from ..model.equations import WIDTH, added_inertia, as_csr, with_short_rows
 from ..observables.evaluate import constraint_arrays
 from ..rows.constraint_graph import arms
+from ..rows.tolerances import THIN
 from . import tolerances as limits
-from .tolerances import DENSE, FIRM, LIGHTEST, SMALL_ANGLE, SOLVED, THIN
+from .tolerances import DENSE, FIRM, LIGHTEST, SMALL_ANGLE, SOLVED
 
 # Continuation (homotopy) from a sketch to the nearest configuration that satisfies the constraints.
 #
@@ -73,9 +74,9 @@ def approach_sketch(metric, sketch, q):
     """Minimise the distance to the sketch along the constraints. Return q, Phi and the number of steps."""
     steps, last = 0, np.inf
     Phi, A = metric.linear(q)
-    while steps < limits.MOST_SETTLING and metric.columns.size:
+    while steps < limits.MOST_SKETCHED and metric.columns.size:
         wish = metric.towards(q, sketch)[1]
-        step = wish + least_step(A, A @ wish, limits.STEEP)
+        step = wish + least_step(A, A @ wish, limits.DEPENDENCE)
         size = np.linalg.norm(step)
         if size <= limits.SETTLED * np.linalg.norm(wish) or size >= limits.DECREASE * last:
             break
@@ -94,7 +95,7 @@ def stuck(metric, q, Phi):
     """Return violated rows whose derivative vanishes."""
     size = np.abs(Phi)
     return np.flatnonzero(
-        (row_lengths(metric.linear(q)[1]) == 0.0) & (size > limits.NAMED_SHARE * size.max(initial=0.0))
+        (row_lengths(metric.linear(q)[1]) == 0.0) & (size > limits.DEPENDENCE * size.max(initial=0.0))
     )
 
 
@@ -158,11 +159,11 @@ def close(metric, q):
     """Take Gauss-Newton steps of least kinetic energy, down to rounding. Return q, Phi and the number of steps."""
     Phi, A = metric.linear(q)
     steps = 0
-    while steps < limits.MOST_CLOSING and Phi.size and metric.columns.size:
+    while steps < limits.MOST_SKETCHED and Phi.size and metric.columns.size:
         if np.abs(Phi).max() <= ROUNDING * (1.0 + np.abs(q).max()):
             break
         steps += 1
-        step = least_step(A, Phi, limits.STEEP)
+        step = least_step(A, Phi, limits.DEPENDENCE)
         turn = metric.largest_turn(step)
         factor = min(1.0, limits.MOST_ROTATION / turn) if turn > 0.0 else 1.0
         size = np.linalg.norm(Phi)

@@ -16,15 +16,14 @@ import numpy as np
 
 from ..elements.bodies import rotation_matrix, transform_g
 from ..elements.element import AngleGeometry
-from ..maths.tolerances import TINY
+from ..maths.tolerances import NEGLIGIBLE, SUM_ROUNDING, TINY
 from ..model import handles as joint_motion
 from ..model.handles import handles_of
 from .continuation import close
 from .motor_starts import are_aligned, opposed
 from .tolerances import (
-    AIMED,
-    CLOSED_LOOPS,
     DAMPING,
+    DEPENDENCE,
     HINT,
     HINTED,
     INITIAL_TOL,
@@ -36,7 +35,6 @@ from .tolerances import (
     SMALL_ANGLE,
     SPREADS,
     STALLED,
-    TREE_RANK,
 )
 
 
@@ -154,7 +152,7 @@ class Loops:
                 length = np.linalg.norm(slope) or 1.0
                 blocks[place, first + k], residuals[place, first + k] = slope / length, away / length
         U, s, V = np.linalg.svd(blocks)
-        held = s > TREE_RANK
+        held = s > DEPENDENCE
         part = np.einsum("eri,er->ei", U[:, :, :6], residuals) / np.where(held, s, 1.0) * held
         return A, V, ~held, -np.einsum("ei,eij->ej", part, V)
 
@@ -233,7 +231,7 @@ class Loops:
         (r, beyond, size), damping, steps, slow, linearised = self._state(q, limited), DAMPING, 0, 0, None
         while steps < MOST_STEPS and damping < MOST_DAMPING and slow < STALLED[0]:
             aimed = self._aimed(q)
-            if size <= CLOSED_LOOPS**2 and aimed:
+            if size <= SUM_ROUNDING**2 and aimed:
                 break
             steps += 1
             linearised = linearised or self._linearised(q, r, self.aims, beyond)
@@ -274,7 +272,7 @@ class Loops:
         return Closed(*best[1:], not best[0][0], total, start + 1)
 
     def _aimed(self, q):
-        return all(abs(self.away(q, aim)) <= AIMED for aim in self.aims)
+        return all(abs(self.away(q, aim)) <= NEGLIGIBLE for aim in self.aims)
 
     def set_out(self):
         """Return the sketch with the joints at their values, or as near as they come; loops may be open."""
@@ -294,7 +292,7 @@ class Loops:
         q = self.sketch
         Z, free, closing, J, _ = self._linearised(q, self.tree.residuals(q), [*self.aims, *within])
         theta = rng.uniform(-1.0, 1.0, J.shape[1]) * (spread or 0.0)
-        theta[np.abs(J).max(axis=0, initial=0.0) < TREE_RANK] = 0.0  # in no loop
+        theta[np.abs(J).max(axis=0, initial=0.0) < DEPENDENCE] = 0.0  # in no loop
         theta[np.repeat([edge is None for edge in self.tree.joints], free.sum(axis=1))] = 0.0
         return self._moved(q, self._of_joints(Z, free, theta) + closing)
 
@@ -387,7 +385,7 @@ class Tree:
         self._lay_out()
         self.weights = np.ones(self.rows)
         lengths = np.sqrt(np.asarray(self.slopes(q).power(2).sum(axis=1)).ravel())
-        self.weights = 1.0 / np.where(lengths > TREE_RANK * self.reach, lengths, self.reach)
+        self.weights = 1.0 / np.where(lengths > DEPENDENCE * self.reach, lengths, self.reach)
 
     def of(self, body):
         """The number of a body."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,6 +14,7 @@ from ..constraints.dot1 import Dot1
 from ..constraints.dot2 import Dot2
 from ..constraints.euler_normalization import EulerNormalization
 from ..constraints.spherical import Spherical
+from ..drawing import html_table
 from ..elements.bodies import rotation_matrix
 from ..errors import InconsistentState, InvalidArgument, RedundantConstraints
 from ..jit.interrupts import CollectionsDeferred
@@ -26,7 +26,7 @@ from ..rows.constraint_graph import coordinate_scales
 from ..validation import counted, finite_vector, number
 from .continuation import Metric, close, unit_tangent
 from .motor_starts import demand_finite, demand_small, refuse_vanished
-from .tolerances import FIRM, INITIAL_TOL, MOST_NODES, NAMED_SHARE, NEIGHBOURHOOD, PROVED, SHOWN_CONSTRAINTS
+from .tolerances import DEPENDENCE, FIRM, INITIAL_TOL, MOST_NODES, NEIGHBOURHOOD, PROVED, SHOWN_CONSTRAINTS
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, Attachment, Scene
@@ -66,9 +66,7 @@ def partners(A, kept, redundant):
     if not (kept and redundant):
         return [[] for _ in redundant]
     weights = np.linalg.lstsq(unit[kept].T, unit[redundant].T, rcond=None)[0]
-    return [
-        [row for row, weight in zip(kept, column, strict=True) if abs(weight) > NAMED_SHARE] for column in weights.T
-    ]
+    return [[row for row, weight in zip(kept, column, strict=True) if abs(weight) > DEPENDENCE] for column in weights.T]
 
 
 def put_aside(A, owners):
@@ -257,8 +255,7 @@ class Mobility:
     def _repr_html_(self):
         """The same in a notebook."""
         facts = self._facts() | {said: f"on {_listed(on)}" for said, on in self._stories()}
-        rows = "".join(f"<tr><th>{html.escape(a)}</th><td>{html.escape(b)}</td></tr>" for a, b in facts.items())
-        return f"<table><caption>Mobility</caption>{rows}</table>"
+        return html_table(facts.items(), "Mobility", named=True)
 
 
 @fitting
@@ -289,7 +286,7 @@ def mobility(scene: Scene, q: ArrayLike | None = None, t: float = 0.0) -> Mobili
     -----
     The rank is that of Phi_q with rows of unit length, rotations times the longest arm of the body's joints: singular
     values above 1e-7 of the largest. Masses don't matter. A row is called redundant if it depends on those of its
-    joint and of joints added before it, so they gather in few joints. Whether a configuration is singular is told by
+    joint and of joints added before it, so they gather in few joints. Whether a configuration is singular is decided by
     consistent ones beside it. Above 1000 coordinates, what hangs in open chains is put aside first and costs O(N);
     closed loops cost the cube of their rows.
 
@@ -588,7 +585,7 @@ def refuse(scene, metric, found, conflict, starts, held=()):
     left[metric.own] = np.abs(found.Phi)
     sizes = np.array([left[member.rows].max() for member in members])
     where = f" with {', '.join(body.name for body in held)} held fixed" if len(held) else ""
-    chosen = [member for member, size in zip(members, sizes, strict=True) if size > NAMED_SHARE * sizes.max()]
+    chosen = [member for member, size in zip(members, sizes, strict=True) if size > DEPENDENCE * sizes.max()]
     if conflict:
         chosen, reason = conflict
         alone = "This constraint is infeasible on its own" if len(chosen) == 1 else f"These {len(chosen)} conflict"

@@ -7,7 +7,7 @@ Shares are without unit; q has m and Euler parameters side by side, so residuals
 # A start whose residuals are below LAST_PLACE of 1 + max |q| is taken as it is: projection would only exchange one
 # rounding for another. Gauss-Newton steps end at ROUNDING: their sums round several times.
 #
-# Residuals that are accepted without being told otherwise, as by `initial_tol` of `simulate`, since positions may be
+# Residuals that are accepted by default, as where `initial_tol` of `simulate` is left out, since positions may be
 # typed: of a start's positions and velocities, of loops in files, of positions and rates of a joint beside what a motor
 # prescribes (rad, m), of configurations that are asked for their mobility, and of their neighbours.
 INITIAL_TOL = 1e-9
@@ -29,20 +29,21 @@ SHORTENING, SHORTEST_LEG = 0.25, 1e-3
 LISTED_ENTRIES, DENSE_ENTRIES = 1 << 20, 1 << 23
 
 # --- dependence of rows at unit length ---
-# Weight from which on a row is named among those that another depends on; rounding of weights is RANK_TOL at most. Also
-# residual, as a share of the largest, above which a row is named whose derivative vanishes, or that is in conflict.
-NAMED_SHARE = 1e-6
-# The same below which a direction isn't corrected: by steps towards a sketch while the constraints aren't met yet, by
-# Gauss-Newton steps. The latter is below RANK_TOL, which is that of tangents.
-STEEP, SOLVED = 1e-6, 1e-10
+# Weight from which on a row is named among those that another depends on; rounding of weights is RANK_TOL at most.
+# Residual, as a share of the largest, above which a row is named whose derivative vanishes, or that is in conflict.
+# Share of unit rows below which a direction isn't corrected by steps towards a sketch while the constraints aren't met
+# yet, and a twist is free; joints that are open by more than its square are closed first.
+DEPENDENCE = 1e-6
+# The same below which Gauss-Newton steps don't correct a direction: below RANK_TOL, which is that of tangents.
+SOLVED = 1e-10
 # Distance of a unit row from the rows before it, or singular value as a share of the largest, down to which all are
 # independent for sure: the smallest singular value is hardly smaller than the distance by more than the square root of
 # their number, and normal equations lose its square.
 FIRM = 1e-2
-# Inertia of an axis that has none, as a share of the body's mean moment, or of its mass at the arm of its joints; and
-# mass and inertia of light bodies, as a share of the largest: the metric of kinetic energy stays a metric, of numbers
-# whose roots are four digits apart at most.
-THIN, LIGHTEST = 1e-6, 1e-8
+# Mass and inertia of light bodies, as a share of the largest: the metric of kinetic energy stays a metric, of numbers
+# whose roots are four digits apart at most. An axis without inertia gets THIN of the body's mean moment, or of its mass
+# at the arm of its joints (rows/tolerances.py).
+LIGHTEST = 1e-8
 
 # --- the way from a sketch ---
 # Coordinates up to which matrices are dense: with 30 bodies both ways take the same time, and dense ones know the rank.
@@ -55,7 +56,7 @@ NEAR_SKETCH = 0.02
 # holds, and predictions serve. The same of a step along the constraints.
 MOST_ROTATION, MOST_SLIDE = 0.5, 0.2
 # Steps at most: of Gauss-Newton, and of the descent along the constraints.
-MOST_CLOSING, MOST_SETTLING = 60, 60
+MOST_SKETCHED = 60
 # Length of a step, as a share of the wish, at which a stage has converged: the last one, and those before it. Springs
 # of softness 1e-8 round steps to 1e-8 of it and more; Gauss-Newton steps and the descent go on from there.
 LAST_CONVERGED, STAGE_CONVERGED = 1e-6, 0.03
@@ -68,8 +69,8 @@ STIFFER = (0.1, 0.01, 0.001)
 # rad; an angle of a fold that is drawn deliberately, and one that is reported when it comes out on the other side.
 CLEAR_FOLD, SHOWN = 0.2, 0.1
 # Rotations of the three directions of a fold, each by a quarter of SHOWN, reverse none of it: sin(0.1) > 3 * 0.025.
-# Share of a slide's direction across the axis beside it below which the two make no fold; m, of a link without length.
-FLAT_FOLD, POINT_LIKE = 0.1, 1e-9
+# Share of a slide's direction across the axis beside it below which the two make no fold.
+FLAT_FOLD = 0.1
 # Excess of a length (share of the largest, m) or an angle (rad) that proves a conflict: ten times the rounding of
 # arccos near one, 1e-9 times the steps of a way; and points or directions up to which ways are compared, for memory.
 PROVED, MOST_NODES = 1e-7, 600
@@ -88,8 +89,10 @@ DRIVE_TURN, DRIVE_SHARE, DRIVE_LEAST = 0.25, 0.05, 2.0**-8
 SMALL_ANGLE = 1e-3
 
 # --- joint coordinates ---
-# Share of unit rows below which a twist is free; joints that are open by more than its square are closed first.
-TREE_RANK = 1e-6
+# Loops are closed where their residuals at unit length are below SUM_ROUNDING, and joint coordinates are those given
+# to NEGLIGIBLE, rad or m: some tens of roundings. Gauss-Newton steps of all coordinates, which don't know what is held,
+# go on from there.
+#
 # Damping of the first step, of rows at unit length; the least, above rounding of dependent rows; and that from which on
 # steps are too short to help.
 DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-10, 1e8
@@ -99,9 +102,6 @@ MOST_STEPS, STALLED = 80, (6, 0.99)
 MOST_TURN = 1.0
 # Floats of the derivatives of loops by twists (32 MB): forty loops of 500 bodies. Steps take a second beyond.
 MOST_ENTRIES = 1 << 22
-# Residuals of loops at unit length from which on Gauss-Newton steps of all coordinates go on, which don't know what is
-# held; and how far coordinates of joints are from the values given, rad or m. Both are some tens of roundings.
-CLOSED_LOOPS, AIMED = 1e-14, 1e-12
 # Displacements of joints at random, rad and shares of the scene's size, from start to start; starts beyond the first
 # that closes in which one is sought that keeps within the limits.
 HINT = 0.3  # weight of a limit that is passed, rad or m, beside rows at unit length

@@ -187,7 +187,7 @@ class Force(Attachment):
 
 
 def _is_superseded(cls, name):
-    """Whether a kernel is the series of a law that a subclass has written anew."""
+    """Whether a kernel is the series of a law that a subclass has redefined."""
     by_class = [name in vars(each) for each in cls.__mro__]
     laws = [{"law", "normal_load"} & vars(each).keys() for each in cls.__mro__]
     return name in _SERIES and any(laws[: by_class.index(True)])

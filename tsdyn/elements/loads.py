@@ -470,7 +470,7 @@ class JointLoad:
 
     @property
     def geometry(self) -> Any:
-        """Where the coordinate is measured: a `joint_coordinates.AngleGeometry` or `DisplacementGeometry`."""
+        """Where the coordinate is measured: a `element.AngleGeometry` or `DisplacementGeometry`."""
         return self.geometries(self.joint)[self.which]
 
     @property

@@ -9,13 +9,10 @@ UNIT_LENGTH = 1e-6
 
 # Sine of an angle. Of a reference the part across an axis gives a direction; at 1e-6 ten digits of it are left.
 PARALLEL = 1e-6
-# The same for a direction that is found, not given: seven digits suffice to count turns by. Also 1 + cosine of two
-# axes, below which they are opposed, and the least turn from one to the other is not unique.
+# The same for a direction that is found, not given: seven digits suffice to count turns by, and for the lowest point of
+# a disc. Also 1 + cosine of two axes, below which they are opposed, and the least turn from one to the other is not
+# unique.
 UNDIRECTED = 1e-9
-# Cosines of directions that are at right angles, and their lengths from 1: nine digits of a slip are left.
-RIGHT_ANGLED = 1e-9
-# Sine of the angle of a disc to its plane: at it seven digits of the direction of the lowest point are left.
-FLAT = 1e-9
 
 # Complex step of constraints, in which no squares of small numbers count; of forces it is COMPLEX_STEP of maths.
 CONSTRAINT_STEP = 1e-100
@@ -26,7 +23,7 @@ FORCE_QUOTIENT = 7e-4
 # tolerance of a step. OFF_SELDOM: the same of laws that are analytic but at few places; flights past the anchor of a
 # spring are off by twice the tolerance at most at 200, as at 20, and by forty times at 1000. LAW_TOLERANCE: the least
 # velocity, m/s or rad/s, below which terms that cancel within a law count.
-OFF, OFF_SELDOM, LAW_TOLERANCE = 1000.0, 200.0, 1e-12
+OFF, OFF_SELDOM, LAW_TOLERANCE = 2000.0, 200.0, 1e-12
 
 # m/s and rad/s: velocity of the exact law below which the direction of sliding is kept; way and time of a stop from
 # there are rounding. The default slip velocity of a friction plug-in without an exact law, with 71% of the friction.

@@ -85,19 +85,25 @@ class Unilateral:
                 "they are the same."
             )
         friction = "kinetic" if kinetic else "static"
-        for what, given in (("restitution", self.restitution != 0.0), (friction, self.rubs)):
+        for what, given in (("restitution", self.restitution != 0.0), (friction, self.has_friction)):
             if given and not self.unilateral:
                 raise InvalidConstraint(f"{self.name}: {what} is of a constraint that opens; set {self._opens_by}.")
+        for force in self.scene.forces if self.unilateral and self.added else ():
+            if getattr(force, "joint", None) is self:
+                raise InvalidConstraint(
+                    f"{self.name}: {force.name!r} is friction of a contact that doesn't open; remove it, and set "
+                    "kinetic and static of the contact."
+                )
 
     @property
-    def rubs(self) -> bool:
+    def has_friction(self) -> bool:
         """Whether it has friction."""
         return bool(self.kinetic or self.static)
 
     @property
     def taken(self) -> int:
         """Numbers that a run sets, with friction: the direction in which it slides, points of b where it sticks."""
-        return 3 * len(self.parts) if self.rubs else 0
+        return 3 * len(self.parts) if self.has_friction else 0
 
     def _grip(self, gap: Primitive, **geometry: Any) -> Grip:
         """Its friction, on the row of its gap; geometry: arguments of the law of sliding, see sliding.py."""

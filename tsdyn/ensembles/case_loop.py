@@ -41,7 +41,7 @@ class Finished(NamedTuple):
 
 
 class FirstSlice:
-    """Runs a `Task` in the memory of an arena, if it ends within one slice.
+    """Runs a `Task` in the memory of a workspace, if it ends within one slice.
 
     Parameters
     ----------
@@ -83,11 +83,11 @@ class FirstSlice:
         return found
 
 
-# Consistent starts of the cases of an arena, checked as those of runs alone are.
+# Consistent starts of the cases of a workspace, checked as those of runs alone are.
 
 
 class Starts:
-    """Checks and projects the starts of an arena, one after the other.
+    """Checks and projects the starts of a workspace, one after the other.
 
     Attributes
     ----------
@@ -97,24 +97,24 @@ class Starts:
         Whether other rows were redundant at the last start than at the first.
     """
 
-    def __init__(self, arena):
-        self._arena, self.others, self.has_other_rows = arena, [], False
+    def __init__(self, workspace):
+        self._workspace, self.others, self.has_other_rows = workspace, [], False
         self._known, self._regular, self._redundant = (None, None), None, None
 
     def start(self, start):
         """The memory of forces and a consistent start; None if the start needs a scene of its own."""
-        arena, kept, packed = self._arena, self._arena.kept, self._arena.kept.packed
-        study = arena.study
+        workspace, kept, packed = self._workspace, self._workspace.kept, self._workspace.kept.packed
+        study = workspace.study
         t, tol, state = study.span[0], study.options.initial_tol, study.call.state
         q, qd = start if state is None else state_arrays(state, kept.n)
         known, found = self._known
-        if known is q and not arena.written & OF_ROWS:
+        if known is q and not workspace.written & OF_ROWS:
             return found
         memory = remembered(state, kept, t, q)
         if packed.system.memory.size:
             packed.system.reals[packed.system.memory] = memory[kept.handles.count :]
         started = self._started(q, qd, t, tol)
-        if started is None or arena.is_spoilt:
+        if started is None or workspace.is_spoilt:
             return None
         if known is not q:
             demand_aligned(packed, started[0], t)
@@ -129,30 +129,30 @@ class Starts:
 
     def _started(self, q, qd, t, tol):
         """A start as `consistent` returns it; None if it needs a scene of its own."""
-        arena, derived = self._arena, self._arena.packed.derived
+        workspace, derived = self._workspace, self._workspace.packed.derived
         if self._regular is None:
-            self._regular = RegularStarts(arena.scene, q, qd, t, tol)
+            self._regular = RegularStarts(workspace.scene, q, qd, t, tol)
         if derived.redundant is None and self._regular.are_plain(q, qd):
             return q, qd
-        if arena.kept.packed.coordinates is not arena.base.coordinates:
+        if workspace.kept.packed.coordinates is not workspace.base.coordinates:
             return None
         if derived.redundant is None:
-            return consistent(arena.scene, arena.packed.system, q, qd, t, tol, True)
+            return consistent(workspace.scene, workspace.packed.system, q, qd, t, tol, True)
         if self._redundant is None:
             self.others = [self._with_redundant(rows) for rows in (None, np.zeros(0, np.int64))]
-            self._redundant = RedundantStarts([*self.others, arena.scene], q, qd, t, tol)
+            self._redundant = RedundantStarts([*self.others, workspace.scene], q, qd, t, tol)
         started = self._redundant.landed(q, qd)
         self.has_other_rows = started is None
         return started
 
     def _with_redundant(self, rows):
         """The scene with the same arrays, and other redundant rows."""
-        arena = self._arena
-        derived = Derived(redundant=rows, shared=arena.study.family.shared)
+        workspace = self._workspace
+        derived = Derived(redundant=rows, shared=workspace.study.family.shared)
         for name in KEPT:
-            setattr(derived, name, getattr(arena.packed.derived, name))
-        own = SimpleNamespace(**vars(arena.scene))
-        own.packed = arena.packed._replace(derived=derived)
+            setattr(derived, name, getattr(workspace.packed.derived, name))
+        own = SimpleNamespace(**vars(workspace.scene))
+        own.packed = workspace.packed._replace(derived=derived)
         return own
 
 
@@ -289,59 +289,62 @@ def run_cases(context, run, where, chunk_at, first, end):
     return end
 
 
-# The cases of a chunk that the compiled loop runs: what it needs of an arena, laid out once.
+# The cases of a chunk that the compiled loop runs: what it needs of a workspace, laid out once.
 
 NOT_FINITE, SLICE_DONE = int(Status.NOT_FINITE), int(Status.SLICE_DONE)
 
 
 class Batch:
-    """Runs stretches of cases in the memory of an arena.
+    """Runs successive cases in the memory of a workspace.
 
     Parameters
     ----------
-    arena : Arena
+    workspace : CaseWorkspace
     task : Task
         Of a case that has ended within the driver's first slice, its start regular.
     first_slice : FirstSlice
     """
 
-    def __init__(self, arena, task, first_slice):
-        self._arena, self._task, self._slice = arena, task, first_slice
-        self._numbers = LoopNumbers(most=first_slice.rows, moves=arena.pen.moves, grid=arena.study.keep == TIMES)
+    def __init__(self, workspace, task, first_slice):
+        self._workspace, self._task, self._slice = workspace, task, first_slice
+        self._numbers = LoopNumbers(
+            most=first_slice.rows, moves=workspace.writer.moves, grid=workspace.study.keep == TIMES
+        )
         self._long, self._cases, self._memory, self._places, self._chunk = 0, 0, None, None, None
         self._start = None
-        if arena.pen.moves or arena.pen.written & OF_ROWS or arena.pen.geometry is not None:
-            numbers, (arguments, self._start) = self._numbers, arena.starts.kernel()
+        if workspace.writer.moves or workspace.writer.written & OF_ROWS or workspace.writer.geometry is not None:
+            numbers, (arguments, self._start) = self._numbers, workspace.starts.kernel()
             (
                 numbers.take_start, numbers.start_context, numbers.start_rates, numbers.start_at, numbers.start_count,
                 numbers.start_t, numbers.start_tol,
             ) = arguments  # fmt: skip
-            numbers.may_land = not still(arena.packed).bodies.size
+            numbers.may_land = not still(workspace.packed).bodies.size
 
     @staticmethod
-    def serves(arena):
-        """Whether Python has nothing to do between the cases of an arena."""
-        packed, pen, state = arena.packed, arena.pen, arena.study.call.state
-        if DEBUG or pen is None or arena.kept.n >= LONG_STEPS:
+    def serves(workspace):
+        """Whether Python has nothing to do between the cases of a workspace."""
+        packed, writer, state = workspace.packed, workspace.writer, workspace.study.call.state
+        if DEBUG or writer is None or workspace.kept.n >= LONG_STEPS:
             return False
-        selects = pen.moves or pen.written & OF_ROWS or pen.geometry is not None  # redundant rows, in each case
+        # Redundant rows are selected in each case
+        selects = writer.moves or writer.written & OF_ROWS or writer.geometry is not None
         if packed.derived.redundant is not None and selects:
             return False
-        moved = still(packed).bodies.size or packed.system.memory.size or not arena.kept.handles.begin_at_zero
-        return not (pen.moves and (moved or state is not None))
+        moved = still(packed).bodies.size or packed.system.memory.size or not workspace.kept.handles.begin_at_zero
+        return not (writer.moves and (moved or state is not None))
 
     def enter(self, chunk):
-        """Take the chunk that the arena's pen has laid out, and arrays for its results."""
+        """Take the chunk that the workspace's writer has laid out, and arrays for its results."""
         arrays, status = chunk.arrays, chunk.status
-        pen, study = self._arena.pen, self._arena.study
-        fits, packed = pen.fits, self._arena.packed
-        if pen.moves:
-            q = pen.starts[:, 0]
-            fits = fits & are_near(packed, q) if pen.geometry is None else fits.copy()
+        writer, study = self._workspace.writer, self._workspace.study
+        fits, packed = writer.fits, self._workspace.packed
+        if writer.moves:
+            q = writer.starts[:, 0]
+            fits = fits & are_near(packed, q) if writer.geometry is None else fits.copy()
             fits[fits] = are_aligned(packed, q[fits], study.span[0])
         count = len(status)
         self._at, *self._chunk = resident(CaseArrays(
-            pen.numbers, pen.starts, fits.astype(np.int64), arrays["t"], arrays["q"].reshape(count, -1),
+            writer.numbers, writer.starts, fits.astype(np.int64), arrays["t"], arrays["q"].reshape(count, -1),
             arrays["qd"].reshape(count, -1), status, study.halt,
         ))  # fmt: skip
 
@@ -360,8 +363,8 @@ class Batch:
 
     def _take(self):
         """The memory of runs, laid out for this batch."""
-        kept, task = self._arena.kept, self._task
-        engine, places = kept.engine(SeriesEngine, task.method, task.form, task.within), self._arena.pen.places()
+        kept, task = self._workspace.kept, self._task
+        engine, places = kept.engine(SeriesEngine, task.method, task.form, task.within), self._workspace.writer.places()
         memory = kept.take(engine)
         if memory is not self._memory or places is not self._places:
             self._lay_out(memory, engine, places)
@@ -370,7 +373,7 @@ class Batch:
 
     def _give(self, memory):
         """Let others use the memory."""
-        self._arena.kept.give(self._kind, memory)
+        self._workspace.kept.give(self._kind, memory)
 
     def _lay_out(self, memory, engine, places):
         memory.enter(engine, self._task, False)
@@ -380,15 +383,15 @@ class Batch:
         self._images = [(array, array.copy() if array.any() else None) for array in arrays]
         images = [[a.ctypes.data, 0 if b is None else b.ctypes.data, a.nbytes // 8] for a, b in self._images]
         targets = [[place.to.ctypes.data, place.column, place.to.size] for place in (*places, *self._own(memory))]
-        start = np.zeros((2, self._arena.study.n))
+        start = np.zeros((2, self._workspace.study.n))
         self._plan, *self._kept = resident(Plan(self._numbers, _words(images), _words(targets), start, self._slice.log))
 
     def _own(self, memory):
         """Places of numbers that follow from points of constraints, in the memory of runs and of starts."""
-        pen = self._arena.pen
-        if pen.geometry is None:
+        writer = self._workspace.writer
+        if writer.geometry is None:
             return []
-        at, found, control = pen.geometry.column, pen.places_in(self._start.reals), memory.work.control
+        at, found, control = writer.geometry.column, writer.places_in(self._start.reals), memory.work.control
         found += [Place(_number(each, "size"), at) for each in (control, self._start.work.control)]
         return [*found, Place(_number(control, "u_tol"), at + 1)]
 

@@ -350,15 +350,15 @@ class GeometryColumns(Columns):
     ----------
     family : Family
     constraints : list of ConstraintColumns
-    pen : Pen
-        Its numbers of constraints are known, and its weights are told the longest levers on each body.
+    writer : NumberWriter
+        Its numbers of constraints are known, and its weights are given the longest levers on each body.
     tol : float
         The constraint tolerance of runs.
     """
 
-    def __init__(self, family, constraints, pen, tol):
+    def __init__(self, family, constraints, writer, tol):
         super().__init__(2, self._fill)
-        self._family, self._constraints, self._pen, self._tol = family, constraints, pen, tol
+        self._family, self._constraints, self._writer, self._tol = family, constraints, writer, tol
         packed, varied = family.packed, {i for columns in constraints for i in columns.parts}
         self._lean = bool(lean_bodies(packed))
         self._reaches = [pair for i, pair in enumerate(family.reaches) if i not in varied]
@@ -373,11 +373,11 @@ class GeometryColumns(Columns):
         for columns in constraints:  # the inertia of a body depends on how far its points are
             for body, _ in columns.points:
                 if id(body) in self._bodies:
-                    pen.weights.follow(self._bodies[id(body)])
+                    writer.weights.follow(self._bodies[id(body)])
 
     def _fill(self, values, numbers, starts):
         """Sizes and bounds, and which cases ask for no more than numbers; after all constraints."""
-        table, far = self._pen.numbers, self._pen.weights.far
+        table, far = self._writer.numbers, self._writer.weights.far
         found = [(body, table[:, columns.column + at : columns.column + at + 3])
                  for columns in self._constraints for body, at in columns.points]  # fmt: skip
         points = found + [(body, s[None]) for body, s in self._points]
@@ -415,10 +415,10 @@ def _points_of(items):
 
 
 class Weights:
-    """Whether masses and inertias of the cases ask for no other equations than those of the arena.
+    """Whether masses and inertias of the cases ask for no other equations than those of the workspace.
 
-    They do where a body has next to no inertia about an axis, also beside others (`massless_axes.lean_bodies`), or
-    where masses become unequal (`length_metric.are_unequal`).
+    They do where a body has next to no inertia about an axis, also beside others (`inertia_rows.lean_bodies`), or
+    where masses become unequal (`constraint_graph.are_unequal`).
 
     Attributes
     ----------
@@ -475,9 +475,9 @@ class Place(NamedTuple):
     column: int
 
 
-def pen_of(arena, names):
-    """The `Pen` for these parameters of all cases; None if there is one of a constraint or function, or none at all."""
-    family, owners = arena.study.family, {}
+def writer_of(workspace, names):
+    """The `NumberWriter` of these parameters of all cases; None without any, or for one of a constraint or function."""
+    family, owners = workspace.study.family, {}
     for name in names:
         field = family.field(name)
         if field.keyword:
@@ -487,21 +487,21 @@ def pen_of(arena, names):
     forces = [(owner, changed) for owner, changed in owners.values() if id(owner) in family.loads]
     if any(family.is_structural(owner, changed) for owner, changed in forces):
         return None
-    if not owners or (constraints and not _are_numbers(arena, constraints)):
+    if not owners or (constraints and not _are_numbers(workspace, constraints)):
         return None
-    pen = Pen(arena, owners.values())
-    return pen if all(columns.serves for columns in pen.constraints) else None
+    writer = NumberWriter(workspace, owners.values())
+    return writer if all(columns.serves for columns in writer.constraints) else None
 
 
-def _are_numbers(arena, constraints):
+def _are_numbers(workspace, constraints):
     """Whether no more than numbers can follow from what differs of constraints, and runs need none of it beside."""
-    family, kept = arena.study.family, arena.kept
-    if not arena.is_brief or kept.packed.system.memory.size or not kept.handles.begin_at_zero:
+    family, kept = workspace.study.family, workspace.kept
+    if not workspace.ends_in_first_slice or kept.packed.system.memory.size or not kept.handles.begin_at_zero:
         return False
     return not any(family.is_structural(owner, changed) for owner, changed in constraints)
 
 
-class Pen:
+class NumberWriter:
     """Checks the values of a chunk, and writes the numbers of one case after the other.
 
     Attributes
@@ -520,23 +520,23 @@ class Pen:
 
     moves = False
 
-    def __init__(self, arena, owners):
-        self.arena, self._parts, self._known = arena, [], ([], [])
-        self.weights = Weights(arena.base, arena.is_unequal)
+    def __init__(self, workspace, owners):
+        self.workspace, self._parts, self._known = workspace, [], ([], [])
+        self.weights = Weights(workspace.base, workspace.is_unequal)
         for owner, names in owners:
             self._parts += self._parts_of(owner, names)
         self.constraints = [part for part in self._parts if isinstance(part, ConstraintColumns)]
         self.geometry, at = None, 0
         if self.constraints:  # last: it follows from the numbers of the others
-            tol = arena.study.options.constraint_tol
-            self.geometry = GeometryColumns(arena.study.family, self.constraints, self, tol)
+            tol = workspace.study.options.constraint_tol
+            self.geometry = GeometryColumns(workspace.study.family, self.constraints, self, tol)
             self._parts.append(self.geometry)
         for part in self._parts:
             part.column, at = at, at + part.width
         self.width, self.written = at, {name for part in self._parts for name, *_ in part.systems}
 
     def _parts_of(self, owner, names):
-        family = self.arena.study.family
+        family = self.workspace.study.family
         if owner is family.template:
             return [gravity_columns(names["gravity"])]
         if not isinstance(owner, PointMass):
@@ -548,13 +548,13 @@ class Pen:
             parts.append(inertia_columns(owner.index, names["inertia"], self.weights))
         moved = {attribute: name for attribute, name in names.items() if attribute not in OF_ROWS}
         self.moves = self.moves or bool(moved)
-        return [*parts, start_columns(owner, moved, self.arena.base.system.bodies)] if moved else parts
+        return [*parts, start_columns(owner, moved, self.workspace.base.system.bodies)] if moved else parts
 
     def take(self, values, count):
         """Lay out the values of so many cases: arrays (count, ...) by name."""
         self.fits, self.numbers = np.ones(count, bool), np.zeros((count, self.width))
-        self.starts = np.empty((count if self.moves else 1, 2, self.arena.study.n))
-        self.starts[:] = self.arena.study.family.start
+        self.starts = np.empty((count if self.moves else 1, 2, self.workspace.study.n))
+        self.starts[:] = self.workspace.study.family.start
         if any(array.dtype != float for array in values.values()):
             self.fits[:] = False
             return
@@ -574,8 +574,8 @@ class Pen:
         return [_place(part, reals, *where) for part in self.constraints for _, *where in part.systems]
 
     def places(self):
-        """All `Place`s, in the arrays of the arena and of its runs."""
-        systems, graphs = self.arena.systems(), self.arena.graphs()
+        """All `Place`s, in the arrays of the workspace and of its runs."""
+        systems, graphs = self.workspace.systems(), self.workspace.graphs()
         if not (_same(systems, self._known[0]) and _same(graphs, self._known[1])):
             self._known, self._places = (systems, graphs), []
             for part in self._parts:
@@ -592,7 +592,7 @@ class Pen:
         row = self.numbers[k]
         for to, column in self.places():
             to[...] = row[column : column + to.size]
-        return (self.starts[k, 0], self.starts[k, 1]) if self.moves else self.arena.study.family.start
+        return (self.starts[k, 0], self.starts[k, 1]) if self.moves else self.workspace.study.family.start
 
 
 def _place(part, array, begin, words, at):

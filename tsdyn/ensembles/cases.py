@@ -196,7 +196,7 @@ def cases_of(scene, parameters, count):
     Raises
     ------
     InvalidArgument
-        If a name is unknown, lengths differ, or the number of cases can't be told.
+        If a name is unknown, lengths differ, or the number of cases isn't known.
     """
     count = whole(count, "cases")
     if callable(parameters):
@@ -255,7 +255,7 @@ def _column(name, given, field):
     if field.attribute == "inertia" and isinstance(field.owner, Body) and array.ndim == MATRIX:
         if array.shape == (3, 3) and (array == array.T).all():
             raise InvalidArgument(
-                f"{name}: three cases of principal values, or one matrix? Give an array (cases, 3, 3)."
+                f"{name} is one matrix or three cases of principal values; give an array (cases, 3, 3)."
             )
         return array, True
     least = 1 if dimensions == MATRIX else dimensions  # principal values do for a matrix
@@ -298,7 +298,7 @@ def _array(given):
         return found
 
 
-# What is wrong with every case of an ensemble, told before the first one runs.
+# What is wrong with every case of an ensemble, found before the first one runs.
 
 
 def demand_whole(study):

@@ -21,7 +21,7 @@ from ..validation import damaged, demand, demand_record, sequence, whole
 from .cases import FINAL, TIMES, Cases, cases_of, demand_arguments, demand_whole, started
 from .executors import Collected, run_executor, run_threads
 from .results import FORMAT, REDUCED, Ensemble
-from .runner import Arena, Study
+from .runner import CaseWorkspace, Study
 from .tolerances import LANES
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class CaseProgress:
-    """What is told of cases that are finished.
+    """What is reported of cases that are finished.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def ensemble(  # many arguments, by name: each is an option of the ensemble; the
     if lanes > 1:
         from .lanes import prepare_lanes
 
-        prepare_lanes(study, Arena)
+        prepare_lanes(study, CaseWorkspace)
     sink = sink_of(study, store, resume)
     report, used = CaseProgress(progress, study.cases.count, sink.first), 0
     try:
@@ -300,7 +300,7 @@ class SavedEnsemble(Ensemble):
             except InvalidFile as error:
                 raise StorageError(f"{self._path}: {error}") from error
         if not isinstance(scene, Scene) or hash_of(scene.packed) != self._record.get("scene", hash_of(scene.packed)):
-            raise StorageError(f"{self._path}: the scene is another one than that of the ensemble.")
+            raise StorageError(f"{self._path}: the scene is another one than that of the ensemble; pass that.")
         return scene
 
     def case(self, i: int) -> Any:

@@ -156,7 +156,7 @@ def run_threads(study, sink, threads, report):
     """Run the cases of a study on threads, which give their chunks to the sink; the number of threads.
 
     None: this thread alone where all cases together are short, else as many as there are processors. `report(cases)` is
-    told of progress. Ctrl-C ends it: whether it did.
+    informed of progress. Ctrl-C ends it: whether it did.
     """
     queue = Queue(sink.first, study.cases.count, least=study.lanes)
     runner, began = Runner(study), time.perf_counter()

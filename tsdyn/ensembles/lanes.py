@@ -226,8 +226,8 @@ class LaneBatch(Batch):
     how cases are shared out to threads.
     """
 
-    def __init__(self, arena, task, first_slice, width):
-        super().__init__(arena, task, first_slice)
+    def __init__(self, workspace, task, first_slice, width):
+        super().__init__(workspace, task, first_slice)
         self.width, self._lanes, self._of, self._passed = width, None, None, False
         nothing = [np.zeros((0, 3), np.int64) for _ in range(2)]
         self._loop = LaneLoop(LaneLoopNumbers(), np.full(width, -1), *nothing, np.zeros((0, width)))
@@ -242,7 +242,7 @@ class LaneBatch(Batch):
         """Run cases of the chunk; the first of all that was not."""
         if not self._passed:
             self._pass(end)
-        while not self._arena.study.stopped and (left := np.flatnonzero(self._status[:end] == NOT_RUN)).size:
+        while not self._workspace.study.stopped and (left := np.flatnonzero(self._status[:end] == NOT_RUN)).size:
             k = int(left[0])
             if super().run(k, k + 1) == k:
                 return k
@@ -264,8 +264,8 @@ class LaneBatch(Batch):
         self._give(memory)
 
     def _lay_out_lanes(self, memory):
-        pen, kept = self._arena.pen, self._arena.kept
-        self._lanes = LaneMemory(kept.series, kept.packed, memory, self.width, "inertia" in pen.written)
+        writer, kept = self._workspace.writer, self._workspace.kept
+        self._lanes = LaneMemory(kept.series, kept.packed, memory, self.width, "inertia" in writer.written)
         self._loop = self._loop._replace(pairs=self._lanes.pairs, arrays=self._lanes.arrays, poses=self._lanes.poses)
         self._where, *self._keep_loop = resident(self._loop)
         self._of = memory
@@ -277,8 +277,8 @@ INSTEAD = "Leave lanes out: one case at a time serves every scene and method."
 PLAIN = ("formulation", "chart_interval", "redundancy")  # of which lanes have the default
 
 
-def prepare_lanes(study, make_arena):
-    """Load the kernels of lanes for a study, of which `make_arena` makes the `Arena`.
+def prepare_lanes(study, make_workspace):
+    """Load the kernels of lanes for a study, of which `make_workspace` makes the `CaseWorkspace`.
 
     Raises
     ------
@@ -287,13 +287,13 @@ def prepare_lanes(study, make_arena):
     """
     reason = _of_options(study)
     if not reason:
-        arena = make_arena(study)
-        _examine_start(arena)
-        reason = _of_scene(arena)
+        workspace = make_workspace(study)
+        _examine_start(workspace)
+        reason = _of_scene(workspace)
     if reason:
         raise InvalidArgument(f"lanes={study.lanes}: {reason}. {INSTEAD}")
     try:
-        _load(study, arena.kept)
+        _load(study, workspace.kept)
     except TsdynError as error:
         raise InvalidArgument(f"lanes={study.lanes}: {error} {INSTEAD}") from error
 
@@ -322,17 +322,17 @@ def _of_options(study):
     return ""
 
 
-def _examine_start(arena):
+def _examine_start(workspace):
     """Find the redundant rows of the scene's own start; cases may start elsewhere, so whatever is wrong is theirs."""
     with contextlib.suppress(TsdynError):
-        arena.starts.start(arena.study.family.start)
+        workspace.starts.start(workspace.study.family.start)
 
 
-def _of_scene(arena):
+def _of_scene(workspace):
     """The parts of a scene that have no lanes."""
-    study, packed, found = arena.study, arena.kept.packed, []
-    graph = arena.kept.series.graph
-    if not study.has_arena or arena.pen is None:
+    study, packed, found = workspace.study, workspace.kept.packed, []
+    graph = workspace.kept.series.graph
+    if not study.has_workspace or workspace.writer is None:
         return "the parameters are not all numbers that cases can share arrays for (docs/ensembles.md)"
     found += [f"{each.name} depends on time" for each in packed.constraints if each.rheonomic]
     what = {False: "counts turns", True: "remembers directions from step to step"}
@@ -362,8 +362,8 @@ def _of_scene(arena):
     if found:
         more = [f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else []
         return "; ".join(found[:SHOWN] + more)
-    moved = arena.pen.moves and (study.call.state is not None or not arena.kept.handles.begin_at_zero)
-    if moved or (arena.pen.moves and (graph.bodies[:, 1] == 4).any()):
+    moved = workspace.writer.moves and (study.call.state is not None or not workspace.kept.handles.begin_at_zero)
+    if moved or (workspace.writer.moves and (graph.bodies[:, 1] == 4).any()):
         return "starts differ in a scene whose joint angles count from a given value, or with locked orientations"
     return ""
 

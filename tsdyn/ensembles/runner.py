@@ -28,7 +28,7 @@ from ..simulation.scene_cache import prepared
 from ..simulation.solution import Solution
 from ..simulation.variants import family_of, of_numbers, packed_anew, start_names
 from .case_loop import Batch, Finished, FirstSlice, Starts
-from .case_numbers import OF_ROWS, pen_of
+from .case_numbers import OF_ROWS, writer_of
 from .cases import TIMES, keep_of, record_of, reduced, started
 from .tolerances import MOST_KEPT
 
@@ -71,7 +71,7 @@ def have_same_zeros(parameters, base):
 # the same bits.
 
 
-class Arena:
+class CaseWorkspace:
     """Arrays of a scene, and the memory of its runs; for one thread.
 
     Parameters
@@ -94,7 +94,7 @@ class Arena:
         self.is_unequal = are_unequal(system)
         self.written, self.starts = set(), Starts(self)
         self._slice = FirstSlice(study) if FirstSlice.serves(study) and not study.retimes else None
-        self.pen = None if study.names is None else pen_of(self, study.names)
+        self.writer = None if study.names is None else writer_of(self, study.names)
         self._chunk, self._batch = None, None
 
     def systems(self):
@@ -128,7 +128,7 @@ class Arena:
         return True
 
     @property
-    def is_brief(self):
+    def ends_in_first_slice(self):
         """Whether nothing is asked of runs that end within a slice but their states."""
         return self._slice is not None
 
@@ -152,7 +152,7 @@ class Arena:
         return [memory for spare in self.kept._spare.values() for memory in spare]
 
     def graphs(self):
-        """The constraint graphs of the arena and of its runs."""
+        """The constraint graphs of the workspace and of its runs."""
         known, series = self.packed.derived, vars(self.kept).get("series")
         others = [other.packed.derived.graph for other in self.starts.others]
         graphs = [found[0] for found in (known.graph, known.moving_graph, *others) if found is not None]
@@ -172,12 +172,12 @@ class Arena:
         return self._batch.run(k, len(chunk.status))
 
     def _takes(self, chunk):
-        """Have the pen lay out a chunk; False if there is none, or the chunk has no values for it."""
-        if self.pen is None or chunk.values is None:
+        """Have the writer lay out a chunk; False if there is none, or the chunk has no values for it."""
+        if self.writer is None or chunk.values is None:
             return False
         if chunk is not self._chunk:
             self._chunk = chunk
-            self.pen.take(chunk.values, len(chunk.status))
+            self.writer.take(chunk.values, len(chunk.status))
             if self._batch is not None:
                 self._batch.enter(chunk)
         return True
@@ -187,8 +187,8 @@ class Arena:
         self.starts.has_other_rows = False
         if not self._takes(chunk):
             return None
-        start, size = self.pen.write(k), self.pen.size(k)
-        self.written |= self.pen.written
+        start, size = self.writer.write(k), self.writer.size(k)
+        self.written |= self.writer.written
         if start is None:
             return None
         self.kept.packed = self.scene.packed = self.packed
@@ -229,7 +229,7 @@ class Arena:
         if is_resized:  # what is packed beside the arrays is that of the base
             if self.packed.derived.redundant is not None:
                 return None
-            self.packed.derived.origin = q, None  # the pen has looked
+            self.packed.derived.origin = q, None  # the writer has compared
         options, method, span = study.options, study.method, study.span
         choose = None
         if options.method is None:
@@ -303,7 +303,7 @@ class Study:
             self.names |= start_names(self.kept.packed)
         self.retimes = self._retimes()
         alike = options.redundancy == "drop" and not self.has_phases
-        self.has_arena = alike and serves(self.family, self.kept, self.names)
+        self.has_workspace = alike and serves(self.family, self.kept, self.names)
         self.halt, self.idle = np.zeros(1, np.int64), []  # runners of the threads of an executor
 
     def _retimes(self):
@@ -353,7 +353,7 @@ class Chunk(NamedTuple):
     status: np.ndarray  # int64 (k,)
     messages: dict  # case -> message, of those that are not the sentence of their status
     arrays: dict  # name -> (k, ...)
-    values: dict | None = None  # name -> (k, ...), for arenas
+    values: dict | None = None  # name -> (k, ...), for workspaces
 
     @property
     def count(self):
@@ -365,12 +365,12 @@ class Runner:
     """Runs cases of a `Study`; for one thread."""
 
     def __init__(self, study):
-        self.study, self._arenas = study, []
+        self.study, self._workspaces = study, []
 
     def values(self, cases):
-        """Values of some cases, a slice, as arrays by name; None where arenas take none."""
+        """Values of some cases, a slice, as arrays by name; None where workspaces take none."""
         study = self.study
-        if not study.has_arena or study.names is None or study.free is not None:
+        if not study.has_workspace or study.names is None or study.free is not None:
             return None
         given, count = {**study.changes, **study.cases.fixed}, cases.stop - cases.start
         values = {name: _repeated(value, count) for name, value in given.items()}
@@ -378,7 +378,7 @@ class Runner:
 
     def run_many(self, chunk, k):
         """Run cases from k on that need no Python; the first that was not run."""
-        return self._arenas[0].run_cases(chunk, k) if self._arenas else k
+        return self._workspaces[0].run_cases(chunk, k) if self._workspaces else k
 
     def run(self, chunk, k):
         """The `CaseRecord` of case k of a chunk."""
@@ -393,13 +393,13 @@ class Runner:
         study = self.study
         values = study.values(chunk.first + k)
         changes = {**study.changes, **values} if study.changes else values
-        if study.has_arena:
-            ran = self._in_arena(lambda arena: arena.run_case(chunk, k, lambda: self._scene(changes)))
+        if study.has_workspace:
+            ran = self._in_workspace(lambda workspace: workspace.run_case(chunk, k, lambda: self._scene(changes)))
             if ran is not None:
                 return self._record(changes, *ran)
         found = study.family.numbers(changes)
-        if study.has_arena and found is not None:
-            ran = self._in_arena(lambda arena: arena.run_packed(*found, lambda: self._scene(changes)))
+        if study.has_workspace and found is not None:
+            ran = self._in_workspace(lambda workspace: workspace.run_packed(*found, lambda: self._scene(changes)))
             if ran is not None:
                 return self._record(changes, *ran)
         scene = self._scene(changes)
@@ -407,26 +407,26 @@ class Runner:
         rows = np.column_stack((solution.t, solution.q, solution.qd)) if study.keep == TIMES else None
         return self._recorded(solution, SimpleNamespace(end=solution._end, rows=rows))
 
-    def _in_arena(self, run):
-        """An arena, that of the last case first, and what `run` makes of it; None if a case can't be run in any.
+    def _in_workspace(self, run):
+        """A workspace, that of the last case first, and what `run` makes of it; None if a case can't be run in any.
 
         Each has the redundant rows of its first case, if there are any: the order of these follows from the numbers.
         """
-        for arena in (*self._arenas, None):
-            if arena is None and len(self._arenas) < MOST_KEPT:
-                arena = Arena(self.study)
-                self._arenas.append(arena)
-            if arena is None:
+        for workspace in (*self._workspaces, None):
+            if workspace is None and len(self._workspaces) < MOST_KEPT:
+                workspace = CaseWorkspace(self.study)
+                self._workspaces.append(workspace)
+            if workspace is None:
                 return None
-            ran = run(arena)
-            if arena.is_spoilt:
-                self._arenas.remove(arena)
-            elif ran is not None and arena is not self._arenas[0]:
-                self._arenas.remove(arena)
-                self._arenas.insert(0, arena)
+            ran = run(workspace)
+            if workspace.is_spoilt:
+                self._workspaces.remove(workspace)
+            elif ran is not None and workspace is not self._workspaces[0]:
+                self._workspaces.remove(workspace)
+                self._workspaces.insert(0, workspace)
             if ran is not None:
-                return arena, *ran
-            if not arena.has_other_rows:
+                return workspace, *ran
+            if not workspace.has_other_rows:
                 return None
         return None
 
@@ -438,16 +438,16 @@ class Runner:
             return packed_anew(family, changes)
         return of_numbers(self.study.scene, family, changes, *found)
 
-    def _record(self, changes, arena, task, outcome):
-        """The `CaseRecord` of a run in an arena."""
+    def _record(self, changes, workspace, task, outcome):
+        """The `CaseRecord` of a run in a workspace."""
         study, keep = self.study, self.study.keep
         plain = isinstance(outcome, Finished) or (
             outcome.status is Status.SUCCESS and not (outcome.reason or outcome.end.near_steps or callable(keep))
         )
-        if plain and not arena.is_immobile:
+        if plain and not workspace.is_immobile:
             return CaseRecord(Status.SUCCESS, PLAIN, record_of(keep, outcome, study.n, task.times))
         scene = self._scene(changes)
-        scene._packed.derived.redundant = arena.packed.derived.redundant
+        scene._packed.derived.redundant = workspace.packed.derived.redundant
         solution = Solution(scene, task._replace(prepared=scene._prepared), outcome, {"prepare": 0.0, "run": 0.0})
         return self._recorded(solution, outcome)
 

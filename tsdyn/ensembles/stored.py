@@ -16,12 +16,13 @@ import numpy as np
 from .. import validation
 from .._version import __version__
 from ..errors import Status, StorageError
+from ..files.archive import READERS
 from ..files.formats import Column, StoredTable, demand_shapes, demand_writable, format_of, writing
 from ..simulation.stored_runs import demand_path, hash_of, sources_of
 from ..validation import NO_LINKS, damaged
 from .cases import TIMES, coordinate_names
 from .executors import empty, fitted
-from .tolerances import FLUSH, WAITING
+from .tolerances import WAITING
 
 GO_ON = "Free space there, and go on: resume=True.", "Mend that, and go on: resume=True."
 
@@ -46,7 +47,7 @@ class StoredResults:
         self._format, self._store, self._table = format_of(path), None, None
         self.study, self.path = study, Path(path).absolute()
         self._said = self.path.with_name(f"{self.path.name}.messages")
-        self._waiting, self._due = {}, time.perf_counter() + FLUSH
+        self._waiting, self._due = {}, time.perf_counter() + READERS
         with writing(self.path):
             taken = self.path.exists()
         if taken and not resume:
@@ -149,7 +150,7 @@ class StoredResults:
     def _flush(self):
         with writing(self.path, GO_ON):
             self._store.flush()
-        self._due = time.perf_counter() + FLUSH
+        self._due = time.perf_counter() + READERS
 
     def close(self):
         """Bring everything to the store and close it; cases after one that is missing are left out."""

@@ -15,8 +15,6 @@ AHEAD = 2
 RETRIES = 3
 # cases that may wait for one before them until it can be written
 WAITING = 1 << 16
-# s: after which readers of a store see what has been written
-FLUSH = 1.0
 # sets of arrays that a thread keeps, one for each selection of redundant rows; studies whose runners a worker keeps
 MOST_KEPT = 8
 # cases that one thread may run at once

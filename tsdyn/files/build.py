@@ -185,7 +185,7 @@ def _is_left_out(value, argument):
 
 
 def _history(item):
-    """What remains of edits of a scene: the orientations at which angles are zero, and turns."""
+    """What is left of edits of a scene: the orientations at which angles are zero, and turns."""
     if not item.joint_coordinates or "built" not in vars(item):
         return {}
     found = {}

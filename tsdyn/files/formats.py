@@ -143,7 +143,7 @@ class StoredTable(NamedTuple):
 def demand_rows(path, column, found, count):
     """Raise StorageError if a column has fewer rows than were written."""
     if found < count:
-        raise StorageError(f"{path}: {column} has {found} rows of {count} that were written.")
+        raise StorageError(f"{path} is damaged: {column} has {found} rows, and {count} were written.")
 
 
 def demand_shapes(path, tables):

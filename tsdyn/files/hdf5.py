@@ -178,7 +178,7 @@ def demand_plain(path, size=0):
     """As formats.py says; every function that reads asks for it, for it takes a millisecond."""
     validation.demand_regular(path)
     if (found := os.path.getsize(path)) < size:  # HDF5 would wait for the missing part for ever
-        raise StorageError(f"{path} is damaged: it has {found} bytes of {size} that were written.")
+        raise StorageError(f"{path} is damaged: it has {found} bytes, and {size} were written.")
     with reading(path), _opened(path):
         pass
 

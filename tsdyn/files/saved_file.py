@@ -150,7 +150,7 @@ def read(path, kind=FORMAT):
     attributes = form.attributes(path)
     if attributes.get("format") != kind:
         raise StorageError(
-            f"{path} is no saved {kind.rpartition(' ')[2]} of tsdyn: it has no attribute 'format' that says so."
+            f"{path} is no saved {kind.rpartition(' ')[2]} of tsdyn: its attribute 'format' is another, or missing."
         )
     if attributes.get("format_version") != VERSION:
         version, source = attributes.get("format_version"), attributes.get("source", "another tsdyn")

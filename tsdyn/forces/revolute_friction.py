@@ -6,7 +6,7 @@
            = -mu(|v|) s R N n of the exact law, s the sign of w while it slides
     dissipation = mu(v) N v                                                 (3)
 
-F and T are the force and the torque that the joint exerts at its point; mu is given by friction_laws.coefficient. A
+F and T are the force and the torque that the joint exerts at its point; mu is given by friction.coefficient. A
 tilting torque on the pin is carried by a couple of two forces, L apart.
 """
 

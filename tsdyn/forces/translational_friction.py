@@ -7,7 +7,7 @@
     dissipation = mu(v) N v                                          (3)
 
 F and T are the force and the torque that the joint exerts at its point on a (on b if a is the ground); mu is given by
-friction_laws.coefficient. A tilting torque on the slide is carried by a couple of two forces, L apart; a torque about
+friction.coefficient. A tilting torque on the slide is carried by a couple of two forces, L apart; a torque about
 the axis by a force with lever arm W.
 """
 

@@ -165,7 +165,7 @@ def _find_bases(graph, system, w, f, t, vdd):
 
 @kernel
 def _find_load(graph, system, w, f, friction, lam, out, by_row):  # eight: as `normal_load`, and the rows
-    """out (7,) as of friction_solve.normal_load, and by_row (m,) its derivative by the multipliers, of its own rows."""
+    """out (7,) as of accelerations.normal_load, and by_row (m,) its derivative by the multipliers, of its own rows."""
     body = body_of(friction, friction.on)
     at, turns = system.bodies[body, 0], system.bodies[body, 1] == 7
     reaction, half, torque = stack(6), stack(4), stack(3)

@@ -202,7 +202,7 @@ LEVELS = {"position": ("m", BLUE), "velocity": ("m/s", VERMILION), "acceleration
 def constraint_error(solution: Solution, ax: Any = None) -> Any:
     """Draw the constraint errors of a solution over time: position, velocity and acceleration, log scale.
 
-    Of a long run the largest error in each of 400 stretches of time is drawn; zeros are drawn at 1e-17.
+    Of a long run the largest error in each of 400 intervals of time is drawn; zeros are drawn at 1e-17.
 
     Parameters
     ----------

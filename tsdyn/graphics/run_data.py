@@ -173,7 +173,7 @@ def _closed(frames):
 
 def _of_phases(frames, item, closed):
     run, states = frames.run, np.where([item.name in names for names in closed], PUSHES, OPEN)
-    if item.rubs:
+    if item.has_friction:
         states[run.sticking(item)[np.searchsorted(run.t, frames.times, side="right") - 1]] = STICKS
     hits = np.array([-np.inf, *(t for t, hit, _ in run.impulses if hit == item.name)])
     last = hits[np.searchsorted(hits, frames.times, side="right") - 1]

@@ -97,7 +97,7 @@ class Link:
     mass: float = 0.0  # kg
     centroid: Any = field(default_factory=lambda: np.zeros(3))  # (3,), m, own frame
     inertia: Any = field(default_factory=lambda: np.zeros((3, 3)))  # about the centroid, kg m^2, own frame
-    shapes: list = field(default_factory=list)  # `shapes.DrawnShape`s, own frame
+    shapes: list = field(default_factory=list)  # `drawn_shapes.DrawnShape`s, own frame
     helps: bool = False  # stands between joints without mass of its own: where it has no shape, nothing is drawn
     line: int = 0  # of the file
     start: Frame = HERE  # in the ground frame, at the start, where joints have one
@@ -168,7 +168,7 @@ class TendonItem:
 
 @dataclass(eq=False)
 class Coupling:
-    """q_follower = offset + the drivers' coordinates times their ratios, or + a polynomial of one driver's.
+    """q_follower = offset + the drivers' coordinates times their ratios, or + a polynomial of one driver's, or of none.
 
     Coordinates are named by (joint, index), the index being that of a universal joint's axis.
     """
@@ -310,7 +310,7 @@ class ImportReport:
         said += [f"its loops are open by up to {open_by:.2g}, and can't be closed"] if open_by else []
         if said:
             warnings.warn(
-                ImportLosses(f"{self.source}: {'; '.join(said)}. print(scene.imported) tells all."),
+                ImportLosses(f"{self.source}: {'; '.join(said)}. print(scene.imported) lists all."),
                 stacklevel=line_of_user(),
             )
 

@@ -53,7 +53,7 @@ class Waiting:
         self.show()
 
     def show(self):
-        """Write the line anew."""
+        """Write the line again."""
         now = time.perf_counter()
         if self.terminal:
             names = ", ".join(map(_short, self.now))

@@ -257,7 +257,8 @@ def survey(sample, a, first, b, degree, noise):
     -------
     Survey
     """
-    samples = np.concatenate((first[None], sample(_points(degree, a, b)[1:])))
+    samples = np.empty((degree + 2, first.size))  # in the order that the kernel is compiled for
+    samples[0], samples[1:] = first, sample(_points(degree, a, b)[1:])
     while True:
         grid, out = table(degree), np.zeros((first.size, 4))
         scratch = np.empty((2, grid.fine.size))
@@ -315,7 +316,7 @@ class Search:
             whole = self._fit(a, b, self._unit * value, None, degree)
         self.points.append((a, self._unit * value))
         if not (whole.resolved or whole.off != whole.off):
-            self.noise = max(self._rounding(whole), self._unit * max(map(self.shaken, (0.5 * (a + b), b))))
+            self.noise = max(self._rounding(whole), self._unit * self.shaken(0.5 * (a + b)))
             whole = whole._replace(resolved=whole.off <= self.noise)
         self._follow(whole, 0)
         last = self.points[-1][1] if self.points[-1][0] == b else float(whole.samples[-1])
@@ -371,7 +372,8 @@ class Search:
 
     def _follow(self, fit, calm):
         """Collect the points of a fit or of its halves; calm: consecutive halvings that left one half resolved."""
-        if fit.resolved:
+        # Rounding may be larger here than in the middle of the search
+        if fit.resolved or fit.off <= self._unit * self.shaken(0.5 * (fit.a + fit.b)):
             self._take(fit)
         elif calm == CALM or fit.off != fit.off or fit.b - fit.a <= self._shortest:
             self._take_rough(fit)

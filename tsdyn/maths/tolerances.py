@@ -46,11 +46,11 @@ ORTHOGONAL, CONVERGED = 1e-15, 1e-10
 LEAST_PIVOT, WITHOUT_SOLUTION = 1e-11, 1e-8
 # Rows that enter, for each row: about one does; more are rounding.
 MOST_ENTRIES = 20
-# Newton's method on Coulomb's cone: residual over its terms at the end, some dozen roundings; steps at most; steps
-# without half the residual after which it has stalled; sweeps over the contacts before each start; factors of u.
-# What is left where dependent rows disagree by rounding; of slips that no bounded force would end, where rows depend on
-# each other to half of the digits.
-CONE_ROUNDING, CONE_STEPS, CONE_STALLED, CONE_LEFT, CONE_SLIP = 1e-14, 60, 8, 1e-11, 1e-8
+# Newton's method on Coulomb's cone, to a residual of SUM_ROUNDING of its terms: steps at most; steps without half the
+# residual after which it has stalled. What is left where dependent rows disagree by rounding; of slips that no bounded
+# force would end, where rows depend on each other to half of the digits. Sweeps over the contacts before each start;
+# factors of u.
+CONE_STEPS, CONE_STALLED, CONE_LEFT, CONE_SLIP = 60, 8, 1e-11, 1e-8
 CONE_SWEEPS, CONE_FACTORS = (0, 3, 30, 300, 3000), (1.0, 3.0, 10.0, 0.3)
 
 # Rows of a sparse matrix from which a factorisation may take more than 0.1 s.

@@ -24,7 +24,7 @@ from ..methods.integrator import Integrator, registered
 from ..runs.task import interval, kind_named
 from ..simulation.prepared_run import simulate
 from ..simulation.scene import Scene
-from ..validation import floats, positive, unknown_name, whole
+from ..validation import floats, positive, shown, unknown_name, whole
 from .tolerances import ENOUGH, REFERENCE_TOLERANCES, ROOM
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ def figure(benchmarks):
 
 
 def _panel(ax, benchmark, names):
-    """One line a method, and the errors that the reference can't tell apart in grey."""
+    """One line a method, and the errors that the reference can't distinguish in grey."""
     ax.set(xscale="log", yscale="log", xlabel="largest error in position (m) and rotation matrix")
     ax.grid(True, which="major", color="#dddddd", linewidth=0.6)
     ax.spines[["top", "right"]].set_visible(False)
@@ -230,7 +230,7 @@ class Benchmark(Tabulated):
     Attributes
     ----------
     rows : tuple of Row
-    reference : agreement.Reference, or None if it was interrupted before there was one
+    reference : Reference, or None if it was interrupted before there was one
     reference_digits : float
         Decimals of positions (m) and rotation matrices that the reference is trusted to.
     interrupted : bool
@@ -348,8 +348,8 @@ def benchmark(  # many arguments, by name: those of runs, and of how they are me
         As for `simulate`. The reference always uses the tangent-space ODE.
     max_steps : int
         A run with more steps is reported as failed.
-    reference : reference_solution.Reference, optional
-        Default: two methods, refined until they agree.
+    reference : Reference, optional
+        That of another `Benchmark`. Default: two methods, refined until they agree.
     progress : callable, optional
         Receives the fraction done, 0 to 1.
 
@@ -389,7 +389,7 @@ def benchmark(  # many arguments, by name: those of runs, and of how they are me
     if progress is not None and not callable(progress):
         raise InvalidArgument(f"progress must be a callable that is given the fraction done, got {progress!r}.")
     if reference is not None and not isinstance(reference, Reference):
-        raise InvalidArgument(f"reference must be a reference_solution.Reference of benchmarking, got {reference!r}.")
+        raise InvalidArgument(f"reference must be the attribute reference of a Benchmark, got {shown(reference)}.")
     plan = _plan(methods, tolerances, steps, form)
     t_span = interval(t_span)
     times = np.linspace(*t_span, 101) if t_eval is None else floats(t_eval)
@@ -445,7 +445,7 @@ def _try(make, run, pressed):
 
 @contextlib.contextmanager
 def _interrupts():
-    """A list that Ctrl-C fills: a run that it meets at its very end would not tell of it."""
+    """A list that Ctrl-C fills: a run that it meets at its very end would not report it."""
     pressed = []
     if threading.current_thread() is not threading.main_thread():
         yield pressed

@@ -140,7 +140,7 @@ def compare(
     outputs: int = 200,
     options: Any = None,
 ) -> Comparison:
-    """Run a scene in another engine, at the step that you use there, and tell how wrong the run is.
+    """Run a scene in another engine, at the step that you use there, and measure the errors of that run.
 
     Parameters
     ----------

@@ -133,7 +133,7 @@ def reproduce(experiments=EXPERIMENTS):
 
     Returns
     -------
-    tuple of Table
+    tuple of PaperTable
 
     Raises
     ------

@@ -53,7 +53,7 @@ TIMED = {
     "stages.solve_stages": "pdpp", "kernels.expand": "pii",
 }  # fmt: skip
 SERIES, FLOATS = "kernels.expand", ("error_norm", "correct", "distance", "solve_stages")  # which return a float
-ORDERS = 40  # of series, told apart; higher ones count as the last
+ORDERS = 40  # of series, distinguished; higher ones count as the last
 # The notes: the clock where the processor has none, what it is given first, what it writes, the factor of its first
 # number; the time of all timers so far; half the time that a timer takes; then of each timer the address of its kernel,
 # calls and time, and of the last one, of series, calls and time of each order.
@@ -227,7 +227,7 @@ class Timing:
 
 # Phases of a run: times of timers, shared among the parts of a kernel by their prices.
 #
-# The price of a part is its time at the final state of the run, from repetitions; counters tell how often it ran.
+# The price of a part is its time at the final state of the run, from repetitions; counters say how often it ran.
 
 
 class Phase(NamedTuple):
@@ -328,7 +328,7 @@ def _price(function, context, run, what):
 
 
 class _Run:
-    """What of a run tells its parts apart: its memory, and the watch's times of its kernels."""
+    """By what the parts of a run are distinguished: its memory, and the watch's times of its kernels."""
 
     def __init__(self, memory, times, stats):
         self.memory, self.times, self.stats, c = memory, times, stats, memory.context

@@ -85,32 +85,33 @@ class SignalPlace(Record):
 class Derived:
     """Of one `Packed`: each entry is None, or empty, until the function named beside it has been called."""
 
-    redundant: object = None  # int64 (k,): redundant rows of the constraint graph; constraint_graphs.set_redundant
+    redundant: object = None  # int64 (k,): redundant rows of the constraint graph; constraint_graph.set_redundant
+    switched: object = None  # int64 (k,): of a phase, rows of Phi that may hold frictions; those that don't: redundant
     turning: set = field(default_factory=set)  # bodies that count as turning; locked_orientations.keep_turning
     handles: object = None  # handles.handles_of
-    body_indices: dict = None  # packed.index_of
+    body_indices: dict = None  # handles.index_of
     members: dict = None  # packed.member_of
-    short_rows: object = None  # a `System`: sparse_jacobian.with_short_rows
+    short_rows: object = None  # a `System`: equations.with_short_rows
     graph: tuple = None  # constraint_graph.graph_of, and by the loops asked for:
     graphs: dict = field(default_factory=dict)
     locked: object = None  # a `Still`: locked_orientations.still
     moving_graph: tuple = None  # locked_orientations.moving_graph, and by the loops asked for:
     moving_networks: dict = field(default_factory=dict)
-    saddle: tuple = None  # a graph, a system, and their `SaddleGraph`: saddle_graph.saddle_of
-    examined: object = None  # a `Packed` without redundant rows so far: dependent_rows.dependent_rows
-    start_workspaces: list = field(default_factory=list)  # idle: start_workspace.taken
-    aligned: tuple = None  # mirrored_branches.demand_aligned
-    holonomic: bool = False  # whether plug-ins have been found so: holonomic.demand_holonomic
+    saddle: tuple = None  # a graph, a system, and their `SaddleGraph`: saddle_matrix.saddle_of
+    examined: object = None  # a `Packed` without redundant rows so far: evaluate.dependent_rows
+    start_workspaces: list = field(default_factory=list)  # idle: initial_conditions.taken
+    aligned: tuple = None  # motor_starts.demand_aligned
+    holonomic: bool = False  # whether plug-ins have been found so: motor_starts.demand_holonomic
     loads: dict = None  # reactions.loads_of
     holds: dict = field(default_factory=dict)  # of a phase, phase_scenes.phase_of: slot of a friction -> rows that hold
     places: dict = field(default_factory=dict)  # it; and id of such a row -> slots, and where its numbers are
-    row_parts: list = field(default_factory=list)  # idle: observables.row_parts.taken
+    row_parts: list = field(default_factory=list)  # idle: reactions.taken
     reactions: dict = field(default_factory=dict)  # of each thread: contact_rows.reaction_workspace
-    with_singular_places: list = None  # indices of primitives: contacts.singular_place
+    with_singular_places: list = None  # indices of primitives: reactions.singular_place
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts
     engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine
-    levers: object = None  # (bodies,), m: rounding_limit.within_rounding, and the start last found near the origin:
+    levers: object = None  # (bodies,), m: local_origin.within_rounding, and the start last found near the origin:
     near: object = None
     grounded: tuple = None  # local_origin.origin_of, and for the start last seen:
     origin: tuple = (None, None)
@@ -137,11 +138,11 @@ class Derived:
 
     def __reduce__(self):
         """In another process: what doesn't depend on where things are in memory."""
-        return _of, (self.redundant, self.turning, self.handles)
+        return _of, (self.redundant, self.switched, self.turning, self.handles)
 
 
-def _of(redundant, turning, handles):
-    return Derived(redundant, turning, handles)
+def _of(redundant, switched, turning, handles):
+    return Derived(redundant, switched, turning, handles)
 
 
 WIDTH = 14  # floats of a short row of Phi_q; those of body b begin in the middle
@@ -188,7 +189,7 @@ class Load(NamedTuple):
     force: object
     parameters: tuple  # floats and Signals
     coordinates: tuple  # where its markers are, (3,) each
-    alone: np.ndarray  # (1,) of tables.ForceKind: a System.forces that has this instance alone
+    alone: np.ndarray  # (1,) of packed.ForceKind: a System.forces that has this instance alone
     slot: int  # of System.memory, the first; -1 for none
     normal: int  # of System.normals; -1 for none
     programs: tuple  # for each number of par: where in System.reals the program of its series begins; -1 for none
@@ -380,19 +381,19 @@ class System(NamedTuple):
     mass: np.ndarray  # float64 (nb,)
     inertia: np.ndarray  # float64 (nb, 9): J' row by row; zero for a point mass
     gravity: np.ndarray  # float64 (3,)
-    kinds: np.ndarray  # (kinds,) of tables.ConstraintKind
-    table: np.ndarray  # int64: for each instance the places in q and Phi_q, primitive.INTS numbers
+    kinds: np.ndarray  # (kinds,) of packed.ConstraintKind
+    table: np.ndarray  # int64: for each instance the places in q and Phi_q, coordinate_rows.INTS numbers
     reals: np.ndarray  # float64: for each instance marker coordinates, then parameters
-    motions: np.ndarray  # (motions,) of tables.MotionPlace
+    motions: np.ndarray  # (motions,) of packed.MotionPlace
     rheonomic: np.ndarray  # int64 (1,): whether any row depends on time
     segments: np.ndarray  # int64 (m, 4): the nonzero columns of a row of Phi_q: begin, length, twice; of a sum one span
     sums: np.ndarray  # int64 (sums,): rows that several instances add to
     tails: np.ndarray  # int64 (tails,): of every instance but the first of a sum, its row
-    forces: np.ndarray  # (kinds,) of tables.ForceKind
-    signals: np.ndarray  # (signals,) of tables.SignalPlace
+    forces: np.ndarray  # (kinds,) of packed.ForceKind
+    signals: np.ndarray  # (signals,) of packed.SignalPlace
     memory: np.ndarray  # int64 (slots,): places in reals of what forces, then constraints remember from step to step
     normals: np.ndarray  # int64 (frictions,): places in reals of the normal loads of joints' frictions
-    inertias: np.ndarray  # (kinds,) of tables.ConstraintKind: the rows h of M + h^T h, short; see rows/inertia_rows.py
+    inertias: np.ndarray  # (kinds,) of packed.ConstraintKind: the rows h of M + h^T h, short; see rows/inertia_rows.py
     inertia_segments: np.ndarray  # int64 (i, 4): as segments, of these rows
 
 
@@ -439,7 +440,7 @@ class Packed(NamedTuple):
     parameters: tuple  # of each constraint: floats and Motions
     coordinates: tuple  # of each constraint: where its markers are, (3,) each
     size: float  # largest number among the coordinates; of small scenes the largest length, m
-    loads: tuple  # a packed_forces.Load for each force, in the order added
+    loads: tuple  # a packed.Load for each force, in the order added
     members: tuple  # a Member for each constraint of the scene, in the order of their rows
     slots: tuple  # of System.memory, the first of each constraint; -1 for none
     contacts: tuple  # of contacts with friction, each with the first slot of its numbers

@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import InvalidConstraint
 from ..jit.kernels import entry, kernel
 from ..maths.tolerances import NEGLIGIBLE, TYPED
-from .tolerances import CLEAR_CHANGE, LEAST_SPAN, NO_CHANGE, SAMPLES, STRIDES, TOGETHER
+from .tolerances import CLEAR_CHANGE, LEAST_SPAN, SAME_VALUE, SAMPLES, STRIDES, TOGETHER
 
 # Knots of piecewise motions and loads: stops of a run, and jumps that no run may cross.
 
@@ -143,7 +143,7 @@ def is_noise(samples):
     """Whether most differences of samples within a step are as large as what they vary by."""
     with np.errstate(all="ignore"):
         varies = np.ptp(samples)
-        return bool(NO_CHANGE * np.abs(samples).max() < varies < np.median(np.abs(np.diff(samples, ORDER))))
+        return bool(SAME_VALUE * np.abs(samples).max() < varies < np.median(np.abs(np.diff(samples, ORDER))))
 
 
 @kernel
@@ -183,7 +183,7 @@ def mark_changes(values, strides, d, marks):
             if i >= count:
                 continue
             # Large: far above the differences before it; within REACH of a large one, above `least`
-            limit = CLEAR_CHANGE * _before(d, i, s == 1) + NO_CHANGE
+            limit = CLEAR_CHANGE * _before(d, i, s == 1) + SAME_VALUE
             if d[i] > limit:
                 least = least if i <= until else limit
                 until, quiet = i + REACH, False

@@ -9,8 +9,8 @@ TOGETHER, LEAST_SPAN = 1e-14, 1e-3
 QUOTIENT_STEPS = (1e-2, 1e-3, 1e-4, 1e-5)
 QUOTIENT_ERROR = 1e-3
 
-# Noise that a function may have, relative to 1 + size: a traced function has the same values but for it; times (s) at
-# which a function of time is compared.
+# Noise that a function may have, relative to 1 + size: a traced function has the same values but for it, and a change
+# by less, of the largest value, is none. Times (s) at which a function of time is compared.
 SAME_VALUE = 1e-9
 TIMES = (0.37, 1.3, 11.0)
 
@@ -20,12 +20,11 @@ TIMES = (0.37, 1.3, 11.0)
 OVERSHOOT, EXTREMUM = 0.1, 0.5
 
 # Samples of a function over a run, of which there are two or more in a pulse of a thousandth of the run; and strides at
-# which they are looked at, up to a 32nd of the run: steps are that long. Of a step, as many are sampled for noise as
+# which they are compared, up to a 32nd of the run: steps are that long. Of a step, as many are sampled for noise as
 # the longest stride.
 SAMPLES, STRIDES = 2048, (1, 4, 16, 64)
 # Ratio of a sixth difference of samples to those before it, above which there is a change: beside a double zero
-# differences grow by 20 within nine samples, at a pulse on a sine of 26 samples a period by 1e5. Share of the largest
-# value, below which a change is none.
-CLEAR_CHANGE, NO_CHANGE = 100.0, 1e-9
+# differences grow by 20 within nine samples, at a pulse on a sine of 26 samples a period by 1e5.
+CLEAR_CHANGE = 100.0
 # Degree up to which a polynomial of the state is seen by the stages of a step; x^40 is a wall.
 PLAIN_DEGREE = 8

@@ -344,7 +344,7 @@ def _turning(p, pd):
 def power_of(solution, item):
     """Power (k,) of a constraint, lam . Phi_t of its rows, or of a force: applied power less dissipation.
 
-    item is a packed.Member or a packed_forces.Load.
+    item is a packed.Member or a packed.Load.
     """
     if not hasattr(item, "rows"):
         _, lost, applied = load_powers(solution.packed, item, solution.t, solution.q, solution.qd, solution._memory)

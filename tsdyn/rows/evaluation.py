@@ -93,11 +93,11 @@ class TangentWorkspace(NamedTuple):
     selection: Selection
     indicator: Indicator
     redundant: RedundantRows
-    dropped: np.ndarray  # int64 (m + 1,)  how many rows are redundant, and which; independent_rows.select
+    dropped: np.ndarray  # int64 (m + 1,)  how many rows are redundant, and which; row_selection.select
     best: np.ndarray  # (m,), or (0,)  pivots of S relative to their diagonal entries: the largest since the selection
     saved: np.ndarray  # int64 (m + 1,)  rows before a passing selection; redundant_rows.save_selection
     saved_best: np.ndarray  # and pivots
-    chosen: np.ndarray  # int64 (m + 1,)  scratch of independent_rows.select, as the next two
+    chosen: np.ndarray  # int64 (m + 1,)  scratch of row_selection.select, as the next two
     order: np.ndarray  # int64 (m,)
     block: np.ndarray  # (largest block, or m, squared)
     friction: Friction

@@ -103,7 +103,7 @@ class Slices:
         return Pace(self.task.span[0])
 
     def drive(self, first=None):
-        """Advance until the end, from the `run.StartedRun` of a run on."""
+        """Advance until the end, from the `StartedRun` of a run on."""
         rows = self._rows() if first is None else first.rows
         while self.status is SLICE_DONE:
             if first is None:
@@ -259,7 +259,7 @@ def _warn_of(error, t):
 
 
 def drive(memory, task, watch, first=None):
-    """Drive a run to its end; Status, what there is to say of it, and the closed `Recorder`. first: a `run.StartedRun`.
+    """Drive a run to its end; Status, what there is to say of it, and the closed `Recorder`. first: a `StartedRun`.
 
     Where `task.choose` says that another method goes on, the run ends with Status.STIFF.
     """
@@ -552,7 +552,7 @@ class StartedRun(NamedTuple):
 class SliceArrays(NamedTuple):
     """Where a memory keeps the records of a first slice."""
 
-    first: int  # slices.FIRST_SLICE
+    first: int  # driver.FIRST_SLICE
     most: int  # steps
     width: int  # of a row of outputs
     history: np.ndarray

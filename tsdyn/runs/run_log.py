@@ -234,9 +234,9 @@ class Counts(Mapping):
 # The state of a run between two slices: what a run that goes on begins with, to the bit.
 #
 # All that kernels see is in the context and in the `RunState` of a memory: arrays and records. What follows from the
-# scene and the method (tables, programs, addresses, places in memory) is laid out anew by the process that goes on; all
-# else is saved. What comes from a file is checked before kernels see it: shapes, and each number that is a place or a
-# count.
+# scene and the method (tables, programs, addresses, places in memory) is laid out again by the process that goes on;
+# all else is saved. What comes from a file is checked before kernels see it: shapes, and each number that is a place or
+# a count.
 
 LAID_OUT = (  # fields that follow from scene and method, or are filled in before they are read
     "system", "graph", "kernels", "friction_solver", "reselection", "joints", "watched", "loaded", "path", "tableau",

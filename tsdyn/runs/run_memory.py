@@ -4,13 +4,15 @@ import math
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+
 from ..errors import Status
 from ..jit.interrupts import interruptible
 from ..jit.kernels import callback, resident
 from ..methods.explicit import ACCELERATE, PLACE
 from ..model.laws import calls_laws, interrupts_answered
-from ..rows.interface import reset_selection, selection_parts
-from ..workspaces import FILLED, STORED, divided, enter_joints, hold, words
+from ..rows.interface import reset_selection, selection_parts, set_selection
+from ..workspaces import FILLED, STORED, divided, enter_joints, set_tolerances, words
 from .run_log import no_log, with_end
 from .task import step_count
 from .tolerances import LONG_STEPS, PIECE
@@ -141,7 +143,7 @@ class Memory:
 
     reason = ""  # of the end of a run, beyond its status
     engine = None  # that it is laid out for
-    arrays = None  # of a first slice: `run.SliceArrays`
+    arrays = None  # of a first slice: `driver.SliceArrays`
     layout = None  # a `Layout`
     advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
 
@@ -189,6 +191,8 @@ class Memory:
                 array[...] = image
             if task.q is not self._start[0] or task.qd is not self._start[1]:
                 self._enter_start(task)
+        if task.prepared.off is not None:
+            set_selection(self.context.tangent, np.flatnonzero(np.isin(self.graph.row, task.prepared.off)))
         self.context.system.reals[...] = self.reals  # motions, signals and what forces remember are written there
         if task.remembered.size:
             # Angles of joints, and what forces remember
@@ -243,7 +247,7 @@ class Memory:
         work, run = self.work, self.run
         work.q[...], work.qd[...] = task.q, task.qd
         run.now[0], run.now[1] = task.q, task.qd
-        hold(work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
+        set_tolerances(work.control, task.constraint_tol, task.prepared.packed.size, self.engine.form.basis_free)
 
     @property
     def begins_again(self):

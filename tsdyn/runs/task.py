@@ -47,7 +47,7 @@ def output_times(t_eval, t0, t1):
     if increasing and times.size and t0 <= times[0] and times[-1] <= t1:
         return times
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
-        raise InvalidArgument("t_eval must be a non-empty vector of finite times in s.")
+        raise InvalidArgument(f"t_eval must be a vector of at least one finite time, s, got {shown(t_eval)}.")
     if not increasing:
         raise InvalidArgument("t_eval must increase from each time to the next.")
     if times[0] < t0 or times[-1] > t1:
@@ -145,8 +145,8 @@ def kind_named(name):
 
 # The run request (`Task`) that a driver receives, and the `Outcome` that it returns.
 #
-# The attribute `driver` of a method is a name in simulate.DRIVERS, or a driver function that takes a `Task` and returns
-# an `Outcome`.
+# The attribute `driver` of a method is a name in prepared_run.DRIVERS, or a driver function that takes a `Task` and
+# returns an `Outcome`.
 
 
 def between(times, span):
@@ -178,7 +178,7 @@ class Task(NamedTuple):
     history: bool  # whether the histories of steps and charts are kept
     choose: object  # a function that makes the `Turns` of a run, or the `Turns`; None where no other method goes on
     stops: np.ndarray = NO_STOPS  # times at which a step ends, as of `motions.knots.stops_of`
-    sampling: object = None  # a `sampling.Sampling`, or None
+    sampling: object = None  # a `driver.Sampling`, or None
     resume: object = None  # a function of time, run and numbers of events: whether a run goes on after them
     archive: object = None  # a `files.archive.Archive` that outputs and histories go to, or None
 
@@ -195,7 +195,7 @@ class Outcome(NamedTuple):
     reason: str  # what there is to say about the status
     rows: np.ndarray  # (k, 1 + 3 n + angles + slots)  t, q, qd, qdd, remembered; a range where an archive has them
     end: RunEnd  # or a `RecordedEnd`
-    trajectory: object  # a `trajectory.Trajectory`, or None
+    trajectory: object  # a `dense_output.Trajectory`, or None
     events: tuple  # times, positions, velocities of each event; or None
     began: float  # by `jit.compiled.clock` when the driver began, prepared
     method: str = ""  # the methods of a run that has turned from one to another

@@ -86,16 +86,21 @@ TURN_GAIN = 1.05
 # rad, rotation of a body in a step: below the first, half the samples suffice; above the second, the most are taken.
 SLOW_TURN, FAST_TURN = 0.1, 2.0
 # rad: the same as SLOW_TURN and FAST_TURN for gaps, reactions and slips. They are analytic: an interpolant of degree 8
-# of the cosine of a turn by 1 rad is in error by 1e-11, and one of degree 16 tells that more than 8 rad need another.
+# of the cosine of a turn by 1 rad is in error by 1e-11, and one of degree 16 shows that more than 8 rad need another.
 SLOW_SMOOTH_TURN, FAST_SMOOTH_TURN = 1.0, 8.0
 
 # A value or time below this fraction of the others counts as zero at the start of a run: rounding of some dozen
-# operations of an event function.
+# operations of an event function. So does a gap of a contact, of the scene's length, at an event of another.
 START_ZERO = 64.0 * EPS
 
 # Relative perturbation of a state, with random signs, that measures the rounding error of an event function; safety
 # factor on the largest of three changes.
 SHAKEN, NOISE = 4.0 * EPS, 4.0
+
+# Share of the time since the last zero of a function, before another one, at which its sign is that before the zero.
+SHORTLY = 0.01
+# Of the time: members of a group that vanish within that of an event do so with it. Roundings of an event's time.
+TOGETHER = 100.0 * EPS
 
 # Values of a gap or reaction in the search of one step at most, each a factorisation: seconds. Only near singular
 # states have interpolants of degree 32 on a thousandth of a step not sufficed.

@@ -97,7 +97,7 @@ def linearise(
         if isinstance(given, str) or not isinstance(given, Sequence):
             raise InvalidArgument(f"{what} must be a sequence of handles or names, such as [motor], got {given!r}.")
     with StageProgress(progress, "linearise") as report:
-        report(0.0, "the start is looked at")
+        report(0.0, "the start is checked")
         kept = prepared(scene)
         q, qd = scene._initial() if state is None else state_arrays(state, kept.n)
         t = 0.0 if state is None else number(getattr(state, "t", 0.0))
@@ -188,7 +188,7 @@ def equilibrium(
     [ 0.   0.  -0.5] [ 0.  0. 27.]
     """
     with StageProgress(progress, "equilibrium") as report:
-        report(0.0, "the start is looked at")
+        report(0.0, "the start is checked")
         return _equilibrium(scene, guess, t, spin, about, rotors, report)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from copy import copy
 from dataclasses import replace
 from functools import cache
@@ -11,8 +12,8 @@ import numpy as np
 from ..ahead import compile_ahead
 from ..analyses import contact_rows, friction_units
 from ..analyses.contact_problem import closed_gaps
-from ..analyses.friction_problem import Frictions, Hold, immobile
-from ..analyses.tolerances import AT_REST
+from ..analyses.friction_problem import Frictions, Hold, hold_of, immobile
+from ..configuration.initial_conditions import DependentRows
 from ..elements.unilateral import contacts_of
 from ..errors import (
     InconsistentState,
@@ -25,9 +26,11 @@ from ..errors import (
 from ..integrators import DOP853
 from ..jit.compiled import clock
 from ..jit.interrupts import deferred_interrupts
+from ..maths.tolerances import NEGLIGIBLE
 from ..model.handles import handles_of
 from ..observables import diagnostics
 from ..observables.state import remembered
+from ..observables.tolerances import LARGE
 from ..runs.driver import Sampling
 from ..runs.event_groups import GroupMember
 from ..runs.events import Event
@@ -43,11 +46,7 @@ from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
 from .termination import reporter, silent
-from .tolerances import (
-    MOST_PINNED,
-    PENETRATION,
-    TOUCHING,
-)
+from .tolerances import PENETRATION
 from .transitions import Transitions
 from .unit_events import Breaking, Closing, Leaving, Slowing
 
@@ -125,6 +124,8 @@ class _ContactRun(Transitions):
         self.remembered = remembered(call.state, kept, self.t, self.q)
         start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
         kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
+        # Whether phases of frictions that stick and slide are packed once, with the rows of all: see `phase_of`
+        self.switches = run_task is not None and free.packed.derived.redundant is None
         self.length = self.gaps.extent(self.q)
         demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol, self.able)
         self.users = prepared_events(options.events) or []
@@ -165,9 +166,10 @@ class _ContactRun(Transitions):
         off = {id(item) for item in self.without}
         self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]
         self.off = [i for i, unit in enumerate(self.frictions.units) if id(unit.force) in off]
+        self.every = [hold_of(unit) for i, unit in enumerate(self.frictions.units) if i not in self.off]
 
-    def _scene_of(self, rows, holds):
-        return phase_of(self.scene, rows, holds, self.without)
+    def _scene_of(self, rows, holds, every=()):
+        return phase_of(self.scene, rows, holds, self.without, every)
 
     def _demand_served(self, kept):
         rough = [load.force.title for load in kept.packed.loads if load.normal >= 0 and load.force.slips]
@@ -240,7 +242,7 @@ class _ContactRun(Transitions):
         run, call = self._run_of(phase)
         still = self._still(phase)
         if still.size == self.q.size and self.options.method is None:
-            run = run._by(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
+            run = run._with_method(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
         run._prepare_kernels(True)
         self._enter_archive()
         while True:
@@ -253,7 +255,7 @@ class _ContactRun(Transitions):
                 max_steps=self._steps_left(), resume=None if other else self._resume, archive=self.archive,
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
-            self.names, self.packed, self.settled, self.again, self.known = names, phase.packed, None, [], None
+            self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
             if self.archive is not None:
                 self.archive.resting = still, resting[still]
             if not (other and self.replaced):
@@ -263,12 +265,12 @@ class _ContactRun(Transitions):
                 if outcome.status is Status.CONTACT_FAILED and outcome.end.reached == self.t and self.end is not None:
                     raise InconsistentState(outcome.reason)  # the run ends with the phase before
                 outcome = pinned(outcome, resting, still)
-                if self.settled is None:
+                if self.decided is None:
                     self._end_phase(outcome.end.reached)
                 said = (outcome.method or repr(task.method)).split(" and ")
                 self.methods += [method for method in said if method not in self.methods]
                 return task, outcome
-            run, self.replaced = run._by(other), True
+            run, self.replaced = run._with_method(other), True
             if self.archive is not None and self.archive.resumed is None:
                 self.archive.go_back(self.written)
 
@@ -309,15 +311,16 @@ class _ContactRun(Transitions):
 
     def _record(self):
         """What the scene of the present phase is made of, for files."""
-        return [self.modes.saved(), self.remembered.tolist(), plain((self.inactive, self.values))]
+        switched = self.packed.derived.switched is not None
+        return [self.modes.saved(), self.remembered.tolist(), plain((self.inactive, self.values)), switched]
 
     def _recorded_scene(self, record):
-        """The scene that such a record tells, and its gaps."""
+        """The scene that such a record describes, and its gaps."""
         inactive, values = record[2]
         self.change(tuple(inactive), dict(values))
         self.modes, self.remembered = UnitModes.of(record[0]), np.array(record[1], float)
         demand(self.remembered.shape == (self.count + self.scene.system.memory.size,), "what is remembered")
-        return self._scene(), self.gaps
+        return self._phase_of_modes(self.every if record[3] else ()), self.gaps
 
     def _resume(self, t, run, numbers):
         """After events of these numbers: whether the run of the phase goes on, with other velocities.
@@ -329,18 +332,27 @@ class _ContactRun(Transitions):
         self.t, (self.q, self.qd, self.qdd), self.remembered = t, run.now.copy(), run.remembered.copy()
         self.ended = self.qd
         remembered = self.remembered
-        self.settled = (self._transit([self.watched[i] for i in numbers]),)
+        self.decided = (self._transit([self.watched[i] for i in numbers]),)
         changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
-        if self.settled[0] is not None or changed:
+        if self.decided[0] is not None or changed:
             return False
-        run.now[1], self.settled = self.qd, None
+        run.now[1], self.decided = self.qd, None
         self.closing.open(self.modes.opened)
         self.again.append(t)
         return True
 
     def _scene(self):
         """The scene of the present modes."""
-        return self._scene_of(self._items(), [self._hold(i, rank) for i, rank in self.modes.sticking.items()])
+        if self.switches and self.every and not self.modes.grips:
+            phase, start = self._phase_of_modes(self.every), (self.q, self.qd)
+            with suppress(DependentRows):
+                prepared(phase).start(phase, start, self.t, self.options.initial_tol, self.remembered, True)
+                return phase
+        return self._phase_of_modes()
+
+    def _phase_of_modes(self, every=()):
+        holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
+        return self._scene_of(self._items(), holds, every)
 
     def holds(self):
         """Whether each friction sticks, or is held by what sticks."""
@@ -384,7 +396,7 @@ class _ContactRun(Transitions):
         pairs = zip(self.users, self.counts, strict=True)
         goes_on = self.end is not None
         found = [
-            event._replace(limit=1.0 if event.action else event.limit - count, goes_on=goes_on)
+            event._replace(limit=1.0 if event.action else event.limit - count, goes_on=goes_on, length=self.length)
             for event, count in pairs
         ]
         watches = list(self._watches(phase))
@@ -401,7 +413,7 @@ class _ContactRun(Transitions):
             sides = [gaps.list[i].side for i in modes.closed]
             rows, slack = [first[id(side.row)] for side in sides], [modes.slack.get(i, 0.0) for i in modes.closed]
             leaving = Leaving(packed, rows, [side.sign for side in sides], slack).over
-        self.closing = Closing(gaps, modes.opened, TOUCHING * gaps.lengths(self.length))
+        self.closing = Closing(gaps, modes.opened, modes.lifted)
         for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):
                 continue
@@ -424,9 +436,9 @@ class _ContactRun(Transitions):
     def _still(self, phase):
         """Coordinates of the bodies that rest where frictions stick."""
         sticks = self.modes.sticking or any(map(self.modes.sticks, self.modes.grips))
-        if not sticks or self.q.size > MOST_PINNED:
+        if not sticks or self.q.size > LARGE:
             return np.zeros(0, int)
-        return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
+        return immobile(phase.packed, self.t, self.q, self.qd, self.remembered[self.count :])
 
     def _rubbing(self, packed):
         """The same of closed contacts where there is friction: their reactions, their bounds, their slips."""
@@ -435,7 +447,7 @@ class _ContactRun(Transitions):
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.slides(i)]
-        halting = Halting(gaps, slides, AT_REST * self._slip_terms(slides))
+        halting = Halting(gaps, slides, NEGLIGIBLE * self._slip_terms(slides))
         for k, i in enumerate(slides):
             yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 
@@ -491,8 +503,8 @@ class _ContactRun(Transitions):
         else:
             archive.go_back({**archive.counts, "outputs": self.written["outputs"] + count})
             self.totals = summed([end.counts] if self.totals is None else [self.totals, end.counts])
-        if self.settled is not None:  # within the run of the phase
-            return self.settled[0]
+        if self.decided is not None:  # within the run of the phase
+            return self.decided[0]
         self.t, self.remembered = end.reached, end.remembered
         self.q, self.qd, self.qdd = (x.copy() for x in end.last)
         self.ended = self.qd
@@ -502,7 +514,10 @@ class _ContactRun(Transitions):
             return self._act(acting, fired, end.last) if acting else self._transit(fired)
         if self._is_deep():
             return Status.CONTACT_FAILED
-        return Status.SUCCESS if ends else outcome.status
+        if not ends:
+            return outcome.status
+        self.reason = ""  # which told what ends the phase
+        return Status.SUCCESS
 
     def _is_deep(self):
         """Whether contacts penetrate; says so."""

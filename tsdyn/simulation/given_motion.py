@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
 
-from ..analyses.tolerances import CONSISTENT, FOLLOWED
+from ..analyses.tolerances import CONSISTENT
 from ..calls import fitting, fitting_methods
 from ..configuration.tolerances import INITIAL_TOL
 from ..drawing import Drawn, new_figure
@@ -18,6 +18,7 @@ from ..errors import InvalidArgument, Status
 from ..formulations.registry import FORMULATIONS
 from ..integrators import DOP853
 from ..jit.compiled import clock
+from ..maths.tolerances import NEGLIGIBLE
 from ..model.handles import has_rates
 from ..observables import diagnostics, reactions
 from ..observables.reactions import acted
@@ -61,8 +62,8 @@ class GivenMotion(Solution):
 
     def _integrated(self, part):
         raise InvalidArgument(
-            f"work is integrated over dense output, which a result of {self._method} has none of: integrate "
-            "`.power` or `.power_of(item)` over its times, by scipy.integrate.simpson for one."
+            f"work is integrated over dense output, and a result of {self._method} has none: integrate `.power` or "
+            "`.power_of(item)` over its times, by scipy.integrate.simpson for example."
         )
 
     def _facts(self):
@@ -132,10 +133,10 @@ def _rolled(kept, times, t0, q, qd, memory, who):
         )
     span, method, form = (
         (t0, max(float(times[-1]), np.nextafter(t0, np.inf))),
-        DOP853(FOLLOWED, FOLLOWED),
+        DOP853(NEGLIGIBLE, NEGLIGIBLE),
         FORMULATIONS["tangent"],
     )
-    own = method, form, span, q, qd, memory, times, True, False, None, FOLLOWED, None, 0, silent, False, None
+    own = method, form, span, q, qd, memory, times, True, False, None, NEGLIGIBLE, None, 0, silent, False, None
     found = run_segments(Task(kept, *own, kept.stops(*span)), engine=StepEngine)
     end, counts = found.end, (found.end.counts[name] for name in ("steps", "rejected", "newton_iterations"))
     return Followed(found.status, found.rows, end.reached, end.last, end.remembered, *counts, 0, clock() - found.began)

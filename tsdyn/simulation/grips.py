@@ -7,7 +7,7 @@ import numpy as np
 from ..analyses.contact_friction import spread
 from ..analyses.contact_problem import slip_rows
 from ..analyses.contact_rows import reaction_workspace
-from ..analyses.tolerances import AT_BOUND
+from ..analyses.tolerances import EVENT_ERROR
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
 from ..elements.tolerances import AHEAD
@@ -50,10 +50,10 @@ def held_point(packed, part, q):
     return x
 
 
-def gripped(gaps, before, settled, q, memory):
+def gripped(gaps, before, contacts, q, memory):
     """`grips` of the next phase; writes directions, and places of those that come to rest, into memory (slots,)."""
     grips = {}
-    for i, d in settled.grips.items():
+    for i, d in contacts.grips.items():
         way, others = memory[gaps.slots[i] :][:3], gaps.list[i].contact.parts[1:]
         if d is not None:
             grips[i] = None
@@ -61,7 +61,7 @@ def gripped(gaps, before, settled, q, memory):
                 way[:] = d
             continue
         way[:] = 0.0
-        grips[i] = tuple(map(int, settled.rows.get(i, ()))) if others else (1, 1)
+        grips[i] = tuple(map(int, contacts.rows.get(i, ()))) if others else (1, 1)
         if grips[i] and not before.grips.get(i):
             for k, part in enumerate(others, 1):
                 memory[gaps.slots[i] + 3 * k :][:3] = held_point(gaps.packed, part, q)
@@ -164,32 +164,32 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
     memory (k, slots) has the directions; lam (k, rows) are the multipliers of the phase, of which out has the rows
     shared[0] from shared[1]. Joints between bodies that stick carry what redundant slips share.
     """
-    rubbing = [i for i in modes.closed if gaps.rubs[i]]
-    if not rubbing:
+    frictional = [i for i in modes.closed if gaps.rough[i]]
+    if not frictional:
         return
     first = first_row_of(packed)
-    N = np.array([-gaps.sign[i] * lam[:, first[id(_gap_row(gaps, modes, i))]] for i in rubbing]).T
-    tangents = np.array([gaps.slopes(*pair, rubbing) for pair in zip(t, q, strict=True)])  # (k, c, 2, n)
-    rows = gaps.slip_rows[rubbing]
-    sticks = [j for j, i in enumerate(rubbing) if modes.sticks(i)]
+    N = np.array([-gaps.sign[i] * lam[:, first[id(_gap_row(gaps, modes, i))]] for i in frictional]).T
+    tangents = np.array([gaps.slopes(*pair, frictional) for pair in zip(t, q, strict=True)])  # (k, c, 2, n)
+    rows = gaps.slip_rows[frictional]
+    sticks = [j for j, i in enumerate(frictional) if modes.sticks(i)]
     if sticks:
         T = -out[:, rows[sticks]]
         for j, i in enumerate(sticks):
-            T[:, j, [k for k, held in enumerate(modes.grips[rubbing[i]]) if not held]] = np.nan
+            T[:, j, [k for k, held in enumerate(modes.grips[frictional[i]]) if not held]] = np.nan
         redundant, alone = np.isnan(T), np.nan_to_num(T)
-        T = carried(gaps, [rubbing[j] for j in sticks], t, q, memory, N[:, sticks], T)
+        T = carried(gaps, [frictional[j] for j in sticks], t, q, memory, N[:, sticks], T)
         if redundant.any():
             # M qdd + Phi_q^T (lam + change) = Q + J^T T    J: redundant slips
             f = np.einsum("kci,kcin->kn", np.where(redundant, T, 0.0), tangents[:, sticks])
             change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
             # Near singular states that would take other normal loads: rows that hold carry the friction alone
-            pushing = [first[id(_gap_row(gaps, modes, i))] for i in rubbing]
-            moves = (np.abs(change[:, pushing]) > AT_BOUND * np.abs(N)).any(axis=1)
+            pushing = [first[id(_gap_row(gaps, modes, i))] for i in frictional]
+            moves = (np.abs(change[:, pushing]) > EVENT_ERROR * np.abs(N)).any(axis=1)
             change[moves], T[moves] = 0.0, alone[moves]
             out[:, shared[0]] += change[:, shared[1]]
         out[:, rows[sticks]] = -T
     slip = np.einsum("kcin,kn->kci", tangents, qd)
-    for j, i in enumerate(rubbing):
+    for j, i in enumerate(frictional):
         if modes.slides(i):
             out[:, gaps.rows[i]] = -gaps.sign[i] * N[:, j]
             d = gaps.across(i, tangents[:, j], memory[:, gaps.slots[i] :][:, :3])  # (k, 2)

@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
 def impulse_of(inertia, i, p):
     """The `Impulse` of a gap, of its impulses p (3,) along the normal and the slips."""
-    return Impulse(p[0], inertia.along(i, p[1:]).tolist() if inertia.gaps.rubs[i] else (0.0, 0.0, 0.0))
+    return Impulse(p[0], inertia.along(i, p[1:]).tolist() if inertia.gaps.rough[i] else (0.0, 0.0, 0.0))
 
 
 def impact_of(inertia, which, qd, before, e, law="newton"):
     """Impulses (k, 3) of the gaps `which`, the change of velocities (n,), and the share of e that acts."""
-    if inertia.gaps.rubs[which].any():
+    if inertia.gaps.rough[which].any():
         return strike(inertia, which, qd, before, e, law)
     p = impulses(inertia, which, before, e, law)
     return along_normals(p), inertia.pushed(which, p), 1.0

@@ -49,8 +49,8 @@ def load(
         ended.
     scene : Scene, optional
         That of a solution or ensemble whose file holds none, because the scene has functions or classes of your own.
-        Without it a solution can be looked at and converted: reactions, dense output and further runs are refused. A
-        store doesn't tell multipliers, power, potential energy and constraint errors, which are NaN then.
+        Without it a solution can be inspected and converted: reactions, dense output and further runs are refused. A
+        store lacks multipliers, power, potential energy and constraint errors, which are NaN then.
     allow_code : bool
         Whether modules that a file names as those of plug-ins may be imported. Plug-ins that have been imported
         before are found anyway.
@@ -150,9 +150,9 @@ def scene_file(
 def _demand_robot(free_base, outside, loops, limits):
     """Refuse options of the files of other programs."""
     if free_base:
-        raise InvalidArgument("free_base= is for URDF files.")
+        raise InvalidArgument("free_base= is for URDF files; leave it out.")
     if outside:
-        raise InvalidArgument("outside= is for URDF, MJCF and SDF files.")
+        raise InvalidArgument("outside= is for URDF, MJCF and SDF files; leave it out.")
     if limits:
         raise InvalidArgument("limits= is for URDF, MJCF and SDF files; other scenes have stops, ts.constraints.Stop.")
     if loops:

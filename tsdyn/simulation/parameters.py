@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import inspect
 import math
 import re
@@ -15,6 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..calls import SECTION
+from ..drawing import aligned, html_table
 from ..elements.bodies import Attribute, Ground, PointMass
 from ..elements.element import Attachment, checked_parameters
 from ..elements.joint import Joint, SumRow
@@ -243,18 +243,14 @@ class ParameterList(Mapping[str, "float | Floats"]):
         return [(name, shown(value), self.units[name]) for name, value in self._values.items()]
 
     def __str__(self) -> str:
-        rows = self._rows()
-        names, values = (max(len(row[i]) for row in rows) for i in (0, 1))
-        return "\n".join(f"{name:{names}}  {value:>{values}}  {unit}".rstrip() for name, value, unit in rows)
+        return "\n".join(aligned(self._rows(), (0, 2)))
 
     def __repr__(self) -> str:
         return f"<{counted(len(self), 'parameter')}>\n{self}"
 
     def _repr_html_(self) -> str:
         """Return a table, for notebooks."""
-        cells = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in self._rows()]
-        head = "<tr><th>parameter</th><th>value</th><th>unit</th></tr>"
-        return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+        return html_table(self._rows(), heads=("parameter", "value", "unit"))
 
 
 def shown(value: Any) -> str:
@@ -324,7 +320,7 @@ class Edit:
         return self._enter_primitive(member.parts.start, owner, other)
 
     def _enter_joint(self, i, owner, changes):
-        """Enter the parts of a joint, which are made anew for the bodies of the packed scene."""
+        """Enter the parts of a joint, which are made again for the bodies of the packed scene."""
         other, member = sketch(owner), self.packed.members[i]
         vars(other).update(a=self.family.own_body(owner.a), b=self.family.own_body(owner.b))
         other = with_attributes(other, changes)
@@ -442,7 +438,7 @@ def with_values(body, changes):
 def with_attributes(item, changes):
     """Return a sketch of a constraint or force with other attributes, checked."""
     other = sketch(item)
-    vars(other)["added"] = False  # so that it tells no scene
+    vars(other)["added"] = False  # so that no scene is notified
     for name, value in changes.items():
         setattr(other, name, value)
     other.check()
@@ -504,7 +500,7 @@ def _plain(value):
 #
 # A value that only enters numbers of the packed arrays (mass, inertia, gravity, a start, what a force or a primitive
 # gets as par, where their markers are, those of the parts of a joint) is written into a copy of those arrays. All else,
-# such as functions of time, or a joint whose coordinate a force measures, asks for the scene to be packed anew.
+# such as functions of time, or a joint whose coordinate a force measures, requires the scene to be packed again.
 
 
 class Family:
@@ -580,7 +576,7 @@ class Family:
         return of_file(self.template, numbers, self._edits), others
 
     def numbers(self, values):
-        """The `Packed` and the start of a scene with other values, by name; None if it must be packed anew.
+        """The `Packed` and the start of a scene with other values, by name; None if it must be packed again.
 
         Raises
         ------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import html
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,6 +12,7 @@ import numpy as np
 from ..ahead import kernels_of, prepare_first_run
 from ..calls import ELSEWHERE, fitting
 from ..configuration.motor_starts import demand_holonomic
+from ..drawing import html_table
 from ..elements.element import warn_of_waiting
 from ..errors import InvalidArgument, Status
 from ..integrators import DOP853, Taylor
@@ -103,7 +104,7 @@ class _Last(NamedTuple):
     bits: tuple | None  # of the state
     engines: dict  # of the scene: replaced where other rows or bodies take part in the equations
     task: Task
-    is_regular: bool  # whether there is no more to look at, as of `run_task`
+    is_regular: bool  # whether nothing else is to be checked, as of `run_task`
 
 
 def _is_fixed(times):
@@ -232,8 +233,16 @@ class Run:
         """
         return Run(self.scene.with_parameters(values), self.options)
 
+    def _of_phase(self, phase):
+        """The same of a phase in which other rows hold."""
+        other = copy(self)
+        other.scene = other._first = phase
+        other._prepared, other._packed, other._start = prepared(phase), phase.packed, phase._initial()
+        other._last = other._seen = None
+        return other
+
     def _solve(self, call: RunCall, found: tuple[Any, Any] = (None, None), archive: Any = None) -> Solution:
-        """Run as of `__call__`, without a look at what has become of the scene.
+        """Run as of `__call__`, without checking whether the scene has changed.
 
         found: numbers and arrays of a checkpoint to go on from. archive: that of a run which begins again by another
         method.
@@ -255,7 +264,7 @@ class Run:
         if outcome.status is not SUCCESS:
             other = instead(task, outcome.status)
             if other is not None:
-                return self._by(other)._solve(call)
+                return self._with_method(other)._solve(call)
         return Solution(self.scene, task, outcome, {"prepare": outcome.began - started, "run": ended - outcome.began})
 
     def _has_phases(self, call):
@@ -307,7 +316,7 @@ class Run:
         """
         state, kept, last = call.state, self._prepared, self._last
         known, is_plain, bits = kept.packed.derived, call.progress is call.store is None, None
-        if state is not None:  # it is worth a look at its numbers if it is given again
+        if state is not None:  # its numbers are compared if it is given again
             bits = _bits_of(state, kept) if state is self._seen else None
             is_plain = is_plain and bits is not None
         self._seen = state
@@ -367,7 +376,7 @@ class Run:
             prepare_first_run(self._first, options.method, self._form, within, default)
             self._compiled.add(within)
 
-    def _by(self, method):
+    def _with_method(self, method):
         """The same by another method."""
         return Run(self.scene, replace(self.options, integrator=method, rtol=None, atol=None))
 
@@ -386,7 +395,7 @@ class Run:
             seconds = clock() - started
             other = instead(task, outcome.status)
             if other is not None:
-                run = self._by(other)
+                run = self._with_method(other)
                 given |= by_name(run.options, call)
                 return run._solve(call, archive=stored_runs.begin_again(archive, given))
             outcome = stored_runs.ended(archive, outcome, seconds, task)
@@ -404,7 +413,7 @@ class Run:
             return stored_runs.ended_outcome(numbers, arrays, archive, kept.n, slots)
 
     def __reduce__(self):
-        """A Run that is pickled is prepared anew where it is read."""
+        """A pickled Run is prepared again where it is read."""
         return Run, (self.scene, self.options)
 
     def _facts(self):
@@ -436,8 +445,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         """Return the text as a table, for notebooks."""
-        rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in self._facts().items())
-        return f"<table><caption>Run of {html.escape(repr(self.scene))}</caption>{rows}</table>"
+        return html_table(self._facts().items(), f"Run of {self.scene!r}", named=True)
 
     def __repr__(self) -> str:
         return f"<Run of {self.scene!r} by {self.method!r}, {self.options.formulation}>"
@@ -629,7 +637,8 @@ def _run_of(scene, options, call):
         if run.options == options:
             return run
     output_times(call.t_eval, *interval(call.t_span))
-    run = Run(scene, options)
+    base = scene._base
+    run = Run(scene, options) if base in (None, scene) else _run_of(base, options, call)._of_phase(scene)
     if options.events is None and is_plain(run.method):
         kept = prepared_numbers(scene)
         kept.runs = (run, *kept.runs[: KEPT - 1])  # and not written to: other threads may be reading

@@ -1,6 +1,6 @@
 """The options of a run, each once: default, unit, check, and what it means.
 
-`RunOptions` has what belongs to a `Run`, `RunCall` what each call of it gives anew. Tables of scene files, the JSON
+`RunOptions` has what belongs to a `Run`, `RunCall` what each call of it gives. Tables of scene files, the JSON
 Schema, the command line, ensembles and docstrings are derived from these two; a test holds the signatures of `simulate`
 and `prepare` equal to them.
 """

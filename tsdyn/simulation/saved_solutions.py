@@ -52,7 +52,7 @@ ARRAYS = ("blocks", "charts", "points", "first", "angles", "asked")
 
 
 def record_of(trajectory):
-    """Numbers (for JSON) and arrays by name of a trajectory; raises TypeError for a method that numbers don't tell."""
+    """Numbers (for JSON) and arrays by name of a trajectory; TypeError if numbers don't describe a method."""
     if isinstance(trajectory, StepPieces):
         parts = [record_of(part) for part in trajectory.parts]
         arrays = {f"{i}_{name}": array for i, (_, found) in enumerate(parts) for name, array in found.items()}
@@ -153,7 +153,7 @@ RECORD = {  # of every file, with the types of it
     "reached": (int, float), "counts": dict, "seconds": dict, "derived": dict, "tables": dict,
 }  # fmt: skip
 LEVELS = tuple(f"{level}_error" for level in ConstraintError._fields)
-HELD = "multipliers", "power", "potential_energy", *LEVELS  # of an outline: its scene doesn't tell them
+HELD = "multipliers", "power", "potential_energy", *LEVELS  # of an outline: they don't follow from its scene
 LOGS = {"steps": "_step_log", "charts": "_chart_log"}
 
 
@@ -162,8 +162,8 @@ def provenance(solution: Solution) -> dict[str, Any]:
     known = vars(solution).get("_provenance")
     if known is not None:
         return dict(known)
-    told = solution._method, solution.method, solution.formulation, solution.span
-    return provenance_of(hash_of(solution.packed), *told, solution._made)
+    run = solution._method, solution.method, solution.formulation, solution.span
+    return provenance_of(hash_of(solution.packed), *run, solution._made)
 
 
 def save(solution: Solution, path: Place) -> Path:
@@ -254,7 +254,7 @@ def labelled_rows(solution):
 
 
 def _held(solution, width):
-    """The arrays of an outline that its scene doesn't tell, of a solution with its scene."""
+    """The arrays of an outline that don't follow from its scene, of a solution with its scene."""
     found = {"multipliers": solution.multipliers, "power": solution.power}
     found |= {"potential_energy": solution.potential_energy}
     found |= dict(zip(LEVELS, solution.constraint_error, strict=True))
@@ -338,20 +338,20 @@ def _outlined(path, record, arrays, why, kinds):
 
 
 def outlined_run(path, numbers, arrays, why, kinds):
-    """The `Outline` of the store of a run that has ended, from its checkpoint; what its scene doesn't tell is NaN."""
+    """The `Outline` of the store of a run that has ended, from its checkpoint; NaN for what its scene doesn't give."""
     from ..files.archive import tables_of
     from ..files.formats import format_of
 
-    known, told = numbers["arguments"]["outline"], numbers["provenance"]
+    known, origin = numbers["arguments"]["outline"], numbers["provenance"]
     scene = scene_of(known, arrays["outline"], why, kinds[0])
-    demand_record(told, {"method": str, "formulation": str, "t_start": (int, float), "t_end": (int, float)})
+    demand_record(origin, {"method": str, "formulation": str, "t_start": (int, float), "t_end": (int, float)})
     demand_record(numbers, {"reason": str, "seconds": (int, float)})
     format_of(path).demand_plain(path)
     tables = tables_of(scene.packed.bodies, known["width"], "steps" in numbers["counts"])
     angles, remembered = len(known["angles"]), arrays["remembered"]
     record = {
-        "provenance": told, "formulation": told["formulation"], "span": [told["t_start"], told["t_end"]],
-        "method": told["method"], "status": numbers["status"], "reason": numbers["reason"],
+        "provenance": origin, "formulation": origin["formulation"], "span": [origin["t_start"], origin["t_end"]],
+        "method": origin["method"], "status": numbers["status"], "reason": numbers["reason"],
         "message": f"{Status(numbers['status']).sentence} {numbers['reason']}".rstrip(), "reached": numbers["t"],
         "counts": numbers["statistics"], "seconds": {"prepare": 0.0, "run": numbers["seconds"]}, "energy_error": None,
         "derived": {"redundant": None, "turning": []}, "events": numbers.get("watched"), "outline": known,

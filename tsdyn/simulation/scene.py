@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import os
 from collections import Counter
 from contextlib import suppress
@@ -19,6 +18,7 @@ from ..configuration.mobility import mobility as _mobility
 from ..configuration.motor_starts import demand_aligned, elsewhere
 from ..configuration.set_joint_coordinates import set_joint
 from ..constraints.euler_normalization import EulerNormalization
+from ..drawing import html_table
 from ..elements.bodies import IDENTITY, Body, Ground, PointMass, named
 from ..elements.element import admit, stop_waiting
 from ..elements.force import Force
@@ -40,7 +40,7 @@ from .analyses import linearise as _linearise
 from .analyses import set_start as _set_start
 from .given_motion import inverse_dynamics as _inverse_dynamics
 from .given_motion import kinematics as _kinematics
-from .phase_scenes import at_start, has_contacts, where_it_may_leave, where_it_stands
+from .phase_scenes import at_start, has_contacts, with_closed_contacts, with_closed_or_open_contacts
 from .scene_cache import preparing
 from .variants import HANDLES, WHAT, demand_present, found, make_handles
 from .variants import activate as _activate
@@ -61,7 +61,6 @@ if TYPE_CHECKING:
 
 PARTICLE = 3  # coordinates of a point mass
 SHOWN = 25  # rows at most of bodies, of constraints and of forces
-HEAD = "<tr><th>name</th><th>kind</th><th></th></tr>"
 
 
 def table(scene: Scene) -> str:
@@ -69,8 +68,7 @@ def table(scene: Scene) -> str:
     bodies = [(body.name, type(body).__name__, f"{body.mass:g} kg") for body in scene.bodies]
     constraints = [one for one in scene.constraints if not getattr(one, "normalises", False)]
     rows = [*_rows(bodies), *_rows(map(_item, constraints)), *_rows(map(_item, scene.forces))]
-    caption = html.escape(summary(scene).strip("<>"))
-    return f"<table><caption>{caption}</caption>{HEAD}{''.join(rows)}</table>"
+    return html_table(rows, summary(scene).strip("<>"), ("name", "kind", ""))
 
 
 def summary(scene: Scene) -> str:
@@ -93,17 +91,14 @@ def _item(item):
 
 def _rows(lines):
     lines = list(lines)
-    for line in lines[:SHOWN]:
-        yield f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in line)}</tr>"
-    if len(lines) > SHOWN:
-        yield f"<tr><td>and {len(lines) - SHOWN} more</td><td></td><td></td></tr>"
+    return lines[:SHOWN] + [(f"and {len(lines) - SHOWN} more", "", "")] * (len(lines) > SHOWN)
 
 
 # Methods of scenes with contacts, beside those of other scenes.
 
 
 def _serving(name):
-    """Decorate a method of scenes: where there are contacts, the function of this name in standing.py serves it.
+    """Decorate a method of scenes: with contacts, the function of this name in contact_analyses.py serves it.
 
     That is given the scene and the method, and the arguments of the call.
     """
@@ -115,9 +110,9 @@ def _serving(name):
         def call(scene, *arguments, **keywords):
             if not has_contacts(scene):
                 return own(scene, *arguments, **keywords)
-            from . import standing
+            from . import contact_analyses
 
-            return getattr(standing, name)(scene, own, *arguments, **keywords)
+            return getattr(contact_analyses, name)(scene, own, *arguments, **keywords)
 
         return fitting(call)
 
@@ -245,6 +240,7 @@ class Scene:
     _phases = _opens = None  # of a scene with contacts, or inactive parts: see phase_scenes.py
     _pack = pack  # what packs it; of a phase its own
     _whole = None  # of a phase: the scene
+    _base = None  # of a phase whose frictions are packed with the rows that hold them: that in which all of these hold
     _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:
@@ -466,7 +462,7 @@ class Scene:
 
     @property
     def packed(self) -> Packed:
-        """The scene as a `Packed`; packed anew only after a change. Raises InvalidBody without bodies."""
+        """The scene as a `Packed`; packed again only after a change. Raises InvalidBody without bodies."""
         if self._packed is None:
             if not self._bodies:
                 raise InvalidBody("the scene has no bodies; add one with scene.add_body(...).")
@@ -603,15 +599,15 @@ class Scene:
 
     place = _place
     evaluate = _serving("evaluate")(_evaluate)
-    assemble = where_it_stands(_assemble)
-    mobility = where_it_stands(_mobility)
+    assemble = with_closed_contacts(_assemble)
+    mobility = with_closed_contacts(_mobility)
     linearise = _serving("linearise")(_linearise)
     equilibrium = _serving("equilibrium")(_equilibrium)
     kinematics = _serving("along")(_kinematics)
     inverse_dynamics = _serving("along")(_inverse_dynamics)
     parameters = _parameters
     with_parameters = _with_parameters
-    set = where_it_may_leave(set_joint)
+    set = with_closed_or_open_contacts(set_joint)
     set_start = _serving("set_start")(_set_start)
     remove = _remove
     activate = fitting(_activate)

@@ -21,7 +21,7 @@ from ..runs.step_engine import StepEngine
 from ..runs.task import Outcome
 from ..runs.tolerances import SLIVER
 from ..taylor.series_engine import SeriesEngine
-from ..taylor.tolerances import SHARP_TOL
+from ..taylor.tolerances import PASSING, SHARP_TOL
 from ..validation import damaged, demand, demand_numbers, is_count
 from . import tolerances as limits
 from .local_origin import within_rounding
@@ -34,8 +34,8 @@ from .termination import silent
 # What the implicit method takes more than the explicit one would have taken for the same motion is lost: fast modes
 # have to be followed until they have decayed. It turns back where more is lost than a share of what the explicit method
 # would take for the rest. Otherwise the explicit one is tried for some steps, at growing intervals, and earlier where
-# the derivatives of the forces had to be taken anew: as long as old ones serve, the motion is as stiff as it was. With
-# friction of joints, where none is at rest.
+# the derivatives of the forces had to be evaluated again: as long as old ones serve, the motion is as stiff as it was.
+# With friction of joints, where none is at rest.
 
 KEPT = "known", "patience", "taken", "tried", "ask", "window", "jacobians", "began", "lasted", "lost", "most_lost"
 
@@ -201,9 +201,7 @@ class Turns:
 
 def by_series(task):
     """The `Task` of a crossing."""
-    rtol, atol = (
-        limits.FINEST if tol is None else min(tol, limits.FINEST) for tol in (task.method.rtol, task.method.atol)
-    )
+    rtol, atol = (PASSING if tol is None else min(tol, PASSING) for tol in (task.method.rtol, task.method.atol))
     return task._replace(
         method=Taylor(rtol=rtol, atol=atol, max_step=task.method.max_step), form=formulation("tangent"), choose=None
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import time
 from functools import cached_property
 from types import SimpleNamespace
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from ..calls import fitting, fitting_methods
+from ..drawing import html_table
 from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
 from ..formulations.charts import REASONS
@@ -267,7 +267,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
             self._message = account(self, scene, self._reason, goes_on)  # written now, since the scene may change
 
     def __setstate__(self, state):
-        """Restore a pickled solution; the packed scene looks its kernels up."""
+        """Restore a pickled solution; the packed scene finds its kernels again."""
         self.__dict__.update(state, system=state["packed"].system)
 
     @property
@@ -390,7 +390,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         These are closed contacts, frictions that stick, and those active of the parts that come and go by actions. A
         phase ends, too, where a closed contact begins or ends to stick: see `sticking`.
         """
-        return [(self.span[0], self.reached, ())] if self._phases is None else self._phases.told()
+        return [(self.span[0], self.reached, ())] if self._phases is None else self._phases.merged()
 
     @property
     def impulses(self) -> list[tuple[float, str, float]]:
@@ -451,7 +451,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
 
     def _losses_at(self, t, q, qd, qdd, memory, numbers=None):
         """The same at times of the run, by number or by time of their phases."""
-        if self._phases is None or not self._phases.gaps.rubs.any():
+        if self._phases is None or not self._phases.gaps.rough.any():
             return np.zeros((t.size, 1))
         numbers = self._phases.at(t) if numbers is None else numbers
         lam = self._multipliers_at(t, q, qd, qdd, memory, numbers)
@@ -550,7 +550,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         """
         item = self.handles.item(friction)
         mine = [] if self._phases is None else self._phases.gaps.of_contact(item)
-        if mine and self._phases.gaps.rubs[mine].any():
+        if mine and self._phases.gaps.rough[mine].any():
             return self._phases.sticking(self._phase_of_rows, mine[0])
         load = reactions.loads_of(self.packed).get(id(item))
         if load is None or not getattr(item, "slides", ()):
@@ -627,7 +627,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         if sweeps and s.placements:  # series place none
             sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement"
         known = self._phases
-        phases = f"{counted(len(known.list), 'phase')}, {counted(len(known.impulses), 'impulse')}" if known else ""
+        phases = f"{counted(len(self.phases), 'phase')}, {counted(len(known.impulses), 'impulse')}" if known else ""
         return {
             "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self._length(), 'output')}",
             **({"phases": phases} if phases else {}),
@@ -644,8 +644,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def _repr_html_(self) -> str:
         """Return the text as a table, for notebooks."""
         facts = self._facts() | ({} if self.success else {"message": self.message})
-        rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in facts.items())
-        return f"<table><caption>Solution</caption>{rows}</table>"
+        return html_table(facts.items(), "Solution", named=True)
 
     def __repr__(self) -> str:
         s = self.stats

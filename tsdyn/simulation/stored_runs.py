@@ -101,7 +101,7 @@ def arguments_of(numbers: dict[str, Any], arrays: dict[str, Any], scene: Scene) 
 
 
 def method_record(method: Any) -> list[Any]:
-    """The class and the settings of a method; raises TypeError for one that numbers don't tell."""
+    """The class and the settings of a method; raises TypeError for one that numbers don't describe."""
     if not isinstance(method, tuple(registered().values())) or not is_own(type(method)) or "driver" in vars(method):
         raise TypeError(f"{type(method).__module__}.{type(method).__qualname__}")
     return own_record(method)
@@ -206,7 +206,7 @@ class RunOutputs:
         return self._phases.of_outputs(t)[self._slice]
 
     def _length(self):
-        """How many outputs there are; of a store without a look at them."""
+        """How many outputs there are; of a store without reading them."""
         return self.t.size if self._stored is None else len(range(self._stored.count)[self._slice])
 
     def __getitem__(self, part: slice) -> Self:
@@ -248,7 +248,7 @@ class RunOutputs:
 
 # Runs with a store: its archive, what a checkpoint holds beside the state, how a run ends in it.
 
-SETTINGS = ("rtol", "atol", "step", "max_step")  # of a method, as its provenance tells them
+SETTINGS = ("rtol", "atol", "step", "max_step")  # of a method, as in its provenance
 
 
 def demand_storable(call, options):
@@ -327,8 +327,8 @@ def ended(archive, outcome, seconds, task):
         archive.flush()
         if archive.has_checkpoints and outcome.status not in GOES_ON:
             method = task.method, outcome.method or repr(task.method)
-            told = provenance_of(archive.facts["scene"], *method, task.form.name, task.span, time.time())
-            archive.checkpoint(*_ending(outcome, seconds, told))
+            provenance = provenance_of(archive.facts["scene"], *method, task.form.name, task.span, time.time())
+            archive.checkpoint(*_ending(outcome, seconds, provenance))
     except OSError as error:
         outcome = outcome._replace(status=Status.STORE_FAILED, reason=f"{error.strerror or error}.")
     rows, steps, charts = _stored(archive)
@@ -420,20 +420,22 @@ def demand_same_place(path, numbers):
     if any(numbers[name] != here[name] for name in ("version", "kernels")):
         raise StorageError(
             f"{path} was written by tsdyn {clipped(numbers['version'])}, and other versions of it, NumPy or Numba are "
-            "here: the bits would differ. Go on there, or start anew from the last output: simulate(state=...)."
+            "here: the bits would differ. Go on there, or start a new run from the last output: simulate(state=...)."
         )
     if numbers["machine"] != here["machine"]:
         there = clipped(", ".join(map(str, numbers["machine"][:3])))
         raise StorageError(
             f"{path} was written on another machine ({there}): the bits would differ. Go on there, or start "
-            "anew from the last output: simulate(state=...)."
+            "a new run from the last output: simulate(state=...)."
         )
 
 
 def demand_same_scene(path, packed, known):
     """Raise StorageError unless a packed scene is that of a run, whose hash is known."""
     if hash_of(packed) != known:
-        raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
+        raise StorageError(
+            f"{path}: the scene is another one than that of the run: its packed numbers differ. Pass it as it was run."
+        )
 
 
 def _demand_same_functions(path, facts, numbers):
@@ -442,13 +444,15 @@ def _demand_same_functions(path, facts, numbers):
         known, found = numbers[kind], facts[kind]
         missing = [name for name in known if name not in found]
         if missing:
-            raise StorageError(f"{path}: the run had {kind} that are missing here: {', '.join(missing)}.")
+            raise StorageError(
+                f"{path}: the run had {kind} that are missing here: {', '.join(missing)}. Pass the same."
+            )
         other = [name for name in found if name not in known]
         if other:
-            raise StorageError(f"{path}: the run had no such {kind}: {', '.join(other)}.")
+            raise StorageError(f"{path}: the run had no such {kind}: {', '.join(other)}. Leave them out.")
         changed = [name for name, source in found.items() if source != known[name]]
         if changed:
-            raise StorageError(f"{path}: the source of {', '.join(changed)} has changed since the run.")
+            raise StorageError(f"{path}: the source of {', '.join(changed)} has changed since the run. Restore it.")
 
 
 def _facts(given, kept):
@@ -460,7 +464,7 @@ def _facts(given, kept):
     return {
         **_here(),
         "scene": hash_of(kept.packed),
-        "functions": sources_of(functions),
+        "functions": sources_of(one for one in functions if not is_ours(getattr(one, "__module__", ""))),
         "events": sources_of(events),
         "max_steps": given["max_steps"],
         "interval": given["checkpoint"] if given["checkpoint"] is None else float(given["checkpoint"]),
@@ -535,12 +539,12 @@ def outline_of(scene, packed):
 
 
 def scene_of(known, text, why, kind):
-    """The scene of the outline that numbers and a text (bytes, as an array) tell, which lacks something; `why` says.
+    """The scene of the outline that numbers and a text (bytes, as an array) describe; `why` says what it lacks.
 
     Raises
     ------
     KeyError, TypeError or ValueError
-        If they tell none.
+        If they describe none.
     """
     from ..files import scene_text
 

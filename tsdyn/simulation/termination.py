@@ -78,7 +78,7 @@ def _rounding(solution, method):
         own = np.where(rates > 0.0, rates, np.inf)
         return rates, da / own / (method.atol + method.rtol * np.hypot(qd, qdd / own))
 
-    if _norm(compared(_of_loads(solution, t, q, qd, near))[1]) < 1.0:  # without constraints: most are told apart by it
+    if _norm(compared(_of_loads(solution, t, q, qd, near))[1]) < 1.0:  # without constraints: this decides for most
         return ""
     da = _of_motion(solution, t, q, qd, near)
     rates, ratios = compared(da)
@@ -329,7 +329,7 @@ FORM = "{desc}{percentage:3.0f}%|{bar}| {elapsed}{postfix}"
 
 
 class StageProgress:
-    """A context in which report(fraction, said) tells how far a calculation is, and what it is at.
+    """A context in which report(fraction, said) reports the progress of a calculation, and what is being done.
 
     Parameters
     ----------

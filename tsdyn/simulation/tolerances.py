@@ -1,7 +1,5 @@
 """Limits of the preparation and assessment of runs; dimensionless unless a unit is named."""
 
-from ..maths.tolerances import EPS
-
 # --- choice of the method ---
 # Steps over which work is measured first; each measurement takes as many steps as there were before. Up to SETTLED
 # steps the implicit method may take (SETTLED / steps)^2 times the work of the explicit one: its steps are short until
@@ -36,8 +34,6 @@ FAR_ORIGIN = 100.0
 FAR_LEVER = 1e4
 
 # --- singular configurations ---
-# Tolerance of the series that cross a singular configuration, if the method has none that is tighter.
-FINEST = 1e-10
 # Smallest singular value, of the largest, below which a failure is put down to a singular configuration; coordinates up
 # to which singular values are computed for that.
 NEARLY_SINGULAR, MOST_SINGULAR = 0.05, 600
@@ -66,30 +62,19 @@ AGREE, DEEPEST = 1e-11, 8
 PASSES, GOT_ON = 16, 1e-9
 
 # --- contacts --------------------------------------------------------------------------------------------------------
-# Of the scene's length, of angles in rad: a gap up to which a contact takes part in an event of another, some roundings
-# of positions; and a depth that no event leaves, which tells that an event was missed.
-TOUCHING, PENETRATION = 64.0 * EPS, 1e-9
-# Of TOUCHING: as long as the rate of a gap that has opened makes no more, the gap is taken from its rate and its
-# acceleration; a flight that reaches half of that takes so short that the third derivative changes no digit of the gap.
-LOW = 16.0
+# Of the scene's length, of angles in rad: a depth that no event leaves, which shows that an event was missed.
+PENETRATION = 1e-9
 # Roundings in a gap, of the sizes of its terms: lower flights than these are none.
 ROUNDED = 16.0
-# Height of flights, of the scene's length or in rad, below which elastic impacts (e = 1) end: others come lower by
-# themselves.
-ENDLESS = 1e-12
 # Events in a row without progress in time, beside one for each gap: a chain of openings that follow from each other.
 MOST_AT_AN_INSTANT = 100
 # Events after which progress is judged: a run that would need CREEPING times as many more is ended.
 EVENTS_JUDGED, CREEPING = 1000, 1e3
-# Rounds in which contacts and frictions of joints are decided in turn: each changes the modes of some.
-ROUNDS = 30
 # Cosine of the turn of a slip since its phase began, above which the next one keeps its direction; m/s: V, the velocity
 # from which on a slip that slows down may turn less and less.
-SAME_WAY, SLOW = 1.0 - 1e-12, 1e-2
+SAME_WAY, SLOW = 1.0 - 1e-12, 1e-5
 
 # Load of a friction over that up to which it counts as none, from which on it counts.
 LOADED = 4.0
 # Of the load that counts as none: rounding of reactions, along chains too.
 REACTION_NOISE = 1e-3
-# Coordinates of a scene up to which bodies that rest, where frictions stick, are found, by dense matrices.
-MOST_PINNED = 1000

@@ -4,39 +4,33 @@ from functools import partial
 
 import numpy as np
 
-from ..analyses.contact_friction import Cones, at_turn, settle_grips
-from ..analyses.contact_problem import Inertia, NoSolution, settle
+from ..analyses.contact_friction import Cones, at_turn, solve_rough_contacts
+from ..analyses.contact_problem import Inertia, NoSolution, solve_contacts
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
-from ..analyses.tolerances import AT_ONCE, AT_REST, LEVEL, RESTS, STOPPED
+from ..analyses.tolerances import EVENT_ERROR, LEVEL, PIVOTS, RESTS, STOPPED
 from ..elements.bodies import largest_of_kind
 from ..errors import (
     SingularConfiguration,
     Status,
 )
-from ..maths.tolerances import EPS, RANK_TOL
+from ..maths.tolerances import EPS, NEGLIGIBLE, RANK_TOL
 from ..model.handles import handles_of
 from ..observables.generalised_forces import force_loads
 from ..observables.state import begin_memory
+from ..runs.tolerances import START_ZERO
 from ..validation import listed
 from .grips import gripped
 from .impacts import along_normals, held, impact_of, impulse_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import Impulse, UnitModes
 from .scene_cache import prepared
-from .tolerances import (
-    CREEPING,
-    ENDLESS,
-    EVENTS_JUDGED,
-    MOST_AT_AN_INSTANT,
-    ROUNDED,
-    ROUNDS,
-    TOUCHING,
-)
+from .tolerances import CREEPING, EVENTS_JUDGED, MOST_AT_AN_INSTANT, ROUNDED
 
 
-def settled_by(inertia, resting, qd, fired=()):
-    """The `Settled` contacts, with friction and without; arguments as of `settle`."""
-    return (settle_grips if inertia.gaps.rubs[resting].any() else settle)(inertia, resting, qd, fired)
+def contact_state(inertia, resting, qd, fired=()):
+    """The `ContactState`, with friction or without; arguments as of `solve_contacts`."""
+    solve = solve_rough_contacts if inertia.gaps.rough[resting].any() else solve_contacts
+    return solve(inertia, resting, qd, fired)
 
 
 class Transitions:
@@ -50,12 +44,14 @@ class Transitions:
         self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        (near,) = (self.gap <= TOUCHING * self.gaps.lengths(self.length)).nonzero()
+        (near,) = (self.gap <= START_ZERO * self.gaps.lengths(self.length)).nonzero()
         count, own, before = self.gaps.count, self.frictions.count, self.modes
-        hit = [i for i in fired if i < count]
+        # What was to rise by less than rounding, and has risen by more, is open
+        hit = [i for i in fired if i < count and (i not in before.lifted or i in near)]
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
         turned = [i - count - own for i in fired if i >= count + own and before.slides(i - count - own)]
-        status = self._settle(sorted(touching), hit, [i - count for i in fired if count <= i < count + own], turned)
+        broken = [i - count for i in fired if count <= i < count + own]
+        status = self._settle(sorted(touching), hit, broken, turned)
         if measured and self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status
@@ -83,51 +79,70 @@ class Transitions:
         """Whether a time before the present one is the same instant, to rounding."""
         return self.t - t <= 16.0 * EPS * max(abs(self.t), EPS)
 
-    def _settle(self, touching, fired, broken, turned=()):
+    def _settle(self, *which):
+        """As `_decide_modes`; rows of frictions that don't hold remember zeros."""
+        status = self._decide_modes(*which)
+        memory, held = self.remembered[self.count :], self.frictions.held
+        ranks = [self.modes.sticking.get(i, 0) for i in range(self.frictions.count)]
+        left = [slot for rank, slots in zip(ranks, held, strict=True) for slot in slots[rank:].ravel().tolist()]
+        if memory[left].any():
+            self.remembered = self.remembered.copy()
+            self.remembered[self.count :][left] = 0.0
+        return status
+
+    def _decide_modes(self, touching, fired, broken, turned=()):
         """Impact, then which gaps stay closed, which frictions stick; the Status if there is no way on, else None.
 
         fired, broken: gaps and frictions whose events have come; turned: gaps whose slips have turned.
         """
-        slots, values, qd = self.remembered[self.count :], self.gap, self.qd
+        slots, qd = self.remembered[self.count :], self.qd
         before, self.modes, self.rest = self.modes, UnitModes(), self.t
         if not touching:
-            return self._settle_frictions(before, broken, self._rounding(before))
+            return self._decide_frictions(before, broken, self._rounding(before))
         try:
             if len(touching) == 1 and self._bounces(touching[0], before, slots):
                 return None
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
-            small, unstruck = AT_REST * inertia.sizes(self._largest(self.qd)), self._is_unstruck()
+            small, unstruck = NEGLIGIBLE * inertia.sizes(self._largest(self.qd)), self._is_unstruck()
             rates[[i for i in before.closed if unstruck or abs(rates[i]) <= small[i]]] = 0.0
+            # What rounding of the time leaves open is no rate: gaps close, or reach the tops of flights, at once
+            none = RESTS * EPS * abs(self.t) * inertia.accelerations(self.qd)[1]
+            rates[np.abs(rates) <= none] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
-            opening = [i for i in fired if i not in before.closed]
-            noise = [i for i in opening if rates[i] > 0.0 or i in self.gaps.following]
-            if noise:  # a gap that closes with a rate of rounding, or a ratchet that takes hold
-                p, self.qd, rates = held(inertia, self.qd, noise, rates)
-                self._note_impulses(inertia, noise, along_normals(p), qd)
+            ratchets = [i for i in fired if i not in before.closed and i in self.gaps.following]
+            if ratchets:  # they take hold
+                p, self.qd, rates = held(inertia, self.qd, ratchets, rates)
+                self._note_impulses(inertia, ratchets, along_normals(p), qd)
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
-            opened = {i: (self.t, values[i], rates[i], 0.0) for i in touching if rates[i] > 0.0}
+            if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
+                _, self.qd, left = held(inertia, self.qd, resting, inertia.rates(self.qd))
+                rates[np.abs(left) <= none] = 0.0  # of rows that depend on these, too
+                resting = [i for i in touching if rates[i] == 0.0]
+            opening = [i for i in touching if rates[i] > 0.0]
             # What grazes without a reaction has left: its gap was rounding. What has left at this instant doesn't come
             # back by rounding: contacts that leave together would take turns
             left = [i for i, (at, _, rate, _) in before.opened.items() if rate == 0.0 and self._is_now(at)]
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
-            rounding = self._rounding(before) + AT_REST * self.frictions.sizes(self.q, self._largest(self.qd - qd))
-            if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
-                self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
-            self.modes, struck = UnitModes(opened=opened), self.qd
-            if self.gaps.rubs[resting].any():
-                self.qd, settled = at_turn(inertia, resting, self.qd, leaving, turned)
+            rounding = self._rounding(before) + NEGLIGIBLE * self.frictions.sizes(self.q, self._largest(self.qd - qd))
+            self.modes, struck = UnitModes(), self.qd
+            if self.gaps.rough[resting].any():
+                self.qd, contacts = at_turn(inertia, resting, self.qd, leaving, turned, opening)
+                if self.qd is not struck and opening:
+                    rates = inertia.rates(self.qd)
             else:
-                settled = settle(inertia, resting, self.qd, leaving)
+                contacts = solve_contacts(inertia, resting, self.qd, leaving)
             rounding += self.frictions.sizes(self.q, self.qd - struck)
-            self._settle_contacts(settled, before)
-            status = self._settle_all(before, inertia, touching, resting, leaving, broken, rounding)
+            if opening:
+                self._open(inertia, opening, rates, -contacts.accelerations)
+            self._take_contacts(contacts, before)
+            status = self._decide_all(before, inertia, touching, resting, leaving, broken, rounding)
             kept = {*self.modes.closed, *self.modes.idle}
-            opened |= {i: (self.t, values[i], 0.0, 0.0) for i in resting if i not in kept}
+            self.modes.opened |= {i: self._opened(i) for i in resting if i not in kept}
             self._begin_memory([i for i in self.modes.closed if i not in before.closed])
             return status
         except SingularConfiguration as error:
@@ -136,19 +151,44 @@ class Transitions:
         except NoSolution:
             names = listed(list(dict.fromkeys(self.gaps.names[i] for i in touching)), NAMED)
             self.reason = f"No reactions keep these contacts from penetrating at t = {self.t:.9g} s: {names}."
-            if self.gaps.rubs[touching].any():
+            if self.gaps.rough[touching].any():
                 self.reason += (
                     " With much friction rigid bodies that slide may have none, or several (Painleve's paradox): lower "
                     "kinetic, or use a compliant contact."
                 )
             return Status.CONTACT_FAILED
 
-    def _settle_contacts(self, settled, before):
-        """Take what contacts do."""
+    def _open(self, inertia, which, rates, a):
+        """Open the gaps `which`, with these rates and decelerations a (count,).
+
+        Flights below rounding of the gap end at their tops; of a rate that is no more without a deceleration, rounding
+        of the gap is no end.
+        """
+        rounding, modes = self._heights(inertia), self.modes
+        below = rates**2 < 2.0 * rounding * np.maximum(a, 0.0)
+        grazes = rates**2 < 2.0 * rounding * inertia.accelerations(self.qd)[1]
+        rises = below & (inertia.rates(self.qd) > 0.0)
+        modes.lifted = [i for i in which if rises[i]]
+        none = grazes & (below | (a <= 0.0))
+        for i in which:
+            if not rises[i]:
+                modes.opened[i] = self._opened(i) if none[i] else self._opened(i, rates[i], 0.25 * rounding[i])
+
+    def _opened(self, i, rate=0.0, rounding=None):
+        """What `UnitModes.opened` has of a gap that opens now."""
+        if rounding is None:
+            rounding = START_ZERO * self.gaps.lengths(self.length)[i]
+        return self.t, self.gap[i], rate, rounding
+
+    def _heights(self, inertia):
+        """Rounding of the gaps (count,), m or rad: lower flights are none."""
+        return EPS * np.maximum(self.gaps.lengths(self.length), ROUNDED * inertia.sizes(self.q))
+
+    def _take_contacts(self, contacts, before):
+        """Take over a `ContactState`."""
         self.remembered, modes = self.remembered.copy(), self.modes
-        modes.opened.update({i: (*known, settled.accelerations[i]) for i, (*known, _) in modes.opened.items()})
-        modes.closed, modes.idle, modes.slack = settled.closed, settled.idle, dict(settled.slack)
-        modes.grips = gripped(self.gaps, before, settled, self.q, self.remembered[self.count :])
+        modes.closed, modes.idle, modes.slack = contacts.closed, contacts.idle, dict(contacts.slack)
+        modes.grips = gripped(self.gaps, before, contacts, self.q, self.remembered[self.count :])
 
     def _begin_memory(self, closed):
         """Rows that come remember nothing of a time when they held: a rope may have turned over since."""
@@ -158,15 +198,15 @@ class Transitions:
             angles, memory = self.remembered[: self.count], self.remembered[self.count :]
             begin_memory(packed, handles_of(packed), angles, memory, items)
 
-    def _settle_all(self, before, unheld, touching, resting, leaving, broken, rounding):
-        """Frictions beside the contacts at rest, and the rows that hold these then; as of `_settle`.
+    def _decide_all(self, before, unheld, touching, resting, leaving, broken, rounding):
+        """Frictions beside the contacts at rest, and the rows that hold these then; as of `_decide_modes`.
 
-        unheld: the `Inertia` without frictions; rounding: as of `_settle_frictions`. Again where other gaps close: the
+        unheld: the `Inertia` without frictions; rounding: as of `_decide_frictions`. Again where other gaps close: the
         ways of frictions end there.
         """
         cones = Cones(unheld, resting, self.qd) if self.frictions.count and resting else None
-        for _ in range(ROUNDS):
-            status = self._settle_frictions(before, broken, rounding, cones)
+        for _ in range(PIVOTS):
+            status = self._decide_frictions(before, broken, rounding, cones)
             if status is not None or not (self.frictions.count and resting):
                 return status
             holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
@@ -175,14 +215,14 @@ class Transitions:
                 slots[unit.way] = 0.0  # their loads are known
             inertia = Inertia(gaps, self.t, self.q, slots, touching, self.modes.closed, self.friction)
             dead = [i for i in resting if inertia.G[i, i] <= RANK_TOL * unheld.G[i, i]]  # frictions hold these
-            settled = settled_by(inertia, [i for i in resting if i not in dead], self.qd, leaving)
-            a = settled.accelerations
+            contacts = contact_state(inertia, [i for i in resting if i not in dead], self.qd, leaving)
+            a = contacts.accelerations
             small = LEVEL * np.maximum(*(each.accelerations(self.qd)[1] for each in (inertia, unheld)))
             if (a[dead] < -small[dead]).any():
                 raise NoSolution
             idle, known = [i for i in dead if a[i] <= small[i]], {*self.modes.closed, *self.modes.idle}
-            grips = {**settled.grips, **{i: None for i in idle if self.gaps.rubs[i]}}
-            self._settle_contacts(settled._replace(idle=sorted([*settled.idle, *idle]), grips=grips), before)
+            grips = {**contacts.grips, **{i: None for i in idle if self.gaps.rough[i]}}
+            self._take_contacts(contacts._replace(idle=sorted([*contacts.idle, *idle]), grips=grips), before)
             if known == {*self.modes.closed, *self.modes.idle}:
                 return None
         names = listed([*(self.gaps.names[i] for i in resting), *self.frictions.names], NAMED)
@@ -210,7 +250,7 @@ class Transitions:
         """Whether velocities are those with which the phase before has ended: what has held still does."""
         return np.array_equal(self.qd, self.ended)
 
-    def _settle_frictions(self, before, fired, rounding, cones=None):
+    def _decide_frictions(self, before, fired, rounding, cones=None):
         """Which frictions stick, and what the others exert on contacts; the Status if there is no way on, else None.
 
         rounding: of speeds (units,), beside that of the bodies' velocities; cones: the `Cones` of contacts at rest.
@@ -222,8 +262,8 @@ class Transitions:
         # Velocities that change within rounding of the time are at rest, too, and those that come to rest at
         # once: where loads vanish along a chain events would follow each other ever faster
         sizes, rates = frictions.sizes(self.q, self.qd), frictions.sizes(self.q, self.qdd)
-        least = np.maximum(AT_REST * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
-        least = np.maximum(least, AT_ONCE * np.minimum(sizes, (self.t - self.span[0]) * rates))
+        least = np.maximum(NEGLIGIBLE * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
+        least = np.maximum(least, EVENT_ERROR * np.minimum(sizes, (self.t - self.span[0]) * rates))
         self.remembered, resting, guess = self.remembered.copy(), [], {}
         memory = self.remembered[count:]  # a part of it
         self.modes.blocked = self.off
@@ -278,14 +318,8 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        # With rows of those that slide, too, which don't count: it is packed once
-        holds = {i: self._hold(i, ranks[i]) for i in free}
-        for i in set(range(len(units))) - {*free, *self.off}:
-            numbers = np.ones((units[i].slide.freedom, units[i].slide.row_numbers))
-            numbers[:, -1] = 0.0
-            holds[i] = Hold(units[i], len(numbers), numbers)
-        phase = self._scene_of([], list(holds.values()))
-        rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
+        phase = self._scene_of([], self.every, self.every)  # rows of those that slide don't count: it is packed once
+        rows = {i: phase.packed.derived.holds[units[i].slot][: ranks[i]] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
             Phi = values_of(phase.packed, self.t, self.q, memory)
@@ -293,8 +327,8 @@ class Transitions:
                 for k, row in enumerate(rows[i]):
                     memory[units[i].held(k)[-1]] = Phi[row]
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
-        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
-        rest = problem.settle({i: way for i, way in guess.items() if i in free}, fired)
+        problem = RestProblem(place, self.gaps, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
+        rest = problem.pivot({i: way for i, way in guess.items() if i in free}, fired)
         # In a plane slips end where they are slow
         self.qd = problem.stopped([i for i in rest.sticking if i in fresh and not self.frictions.signed[i]], self.qd)
         return rest, ranks, phase.packed
@@ -315,17 +349,18 @@ class Transitions:
         As `_hit` has it, of several gaps: here by one kernel, since balls bounce often.
         """
         gaps, e = self.gaps, float(self.gaps.restitution[i])
-        if self.frictions.count or gaps.rubs[i] or i in gaps.following or before.closed or before.idle or e == 0.0:
+        if self.frictions.count or gaps.rough[i] or i in gaps.following or before.closed or before.idle or e == 0.0:
             return False
         found = gaps.workspace.bounce(self.t, self.q, self.qd, slots, i, float(gaps.sign[i]), e)
         (rate, size, G, p, acceleration, length), qd = found
-        if not (G > 0.0 and rate < -AT_REST * size):
+        if not (G > 0.0 and rate < -NEGLIGIBLE * size):
             return False
-        height = ENDLESS * self.length if e == 1.0 else EPS * max(self.length, ROUNDED * length)
+        rounding = EPS * max(self.length, ROUNDED * length)
+        height = NEGLIGIBLE * self.length if e == 1.0 else rounding
         if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * height:
             return False
         self.phases.impulses.append((self.t, gaps.names[i], Impulse(p)))
-        self.qd, self.modes = qd, UnitModes(opened={i: (self.t, self.gap[i], -e * rate, acceleration)})
+        self.qd, self.modes = qd, UnitModes(opened={i: self._opened(i, -e * rate, 0.25 * rounding)})
         return True
 
     def _hit(self, inertia, touching, rates):
@@ -334,24 +369,16 @@ class Transitions:
         p, qd, after = self._jump(inertia, touching, before, e)
         # Impacts that are followed by flights below rounding are the last ones
         a = self._lowering(inertia, touching, qd, after)
-        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and p[k, 0] > 0.0 and e[k] > 0.0]
+        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and before[k] < 0.0 and e[k] > 0.0]
         if last:
             flights = [2.0 * after[touching[k]] / (a[touching[k]] * (1.0 - e[k])) for k in last if e[k] < 1.0]
             self.rest = float(max([self.rest, *(self.t + T for T in flights)]))
             e[last] = 0.0
             p, qd, after = self._jump(inertia, touching, before, e)
             a = self._lowering(inertia, touching, qd, after)
-        # Contacts that another impact lifts by less than rounding stay closed
-        for _ in touching:
-            if not a.any():
-                break
-            stays = [k for k, i in enumerate(touching) if a[i] > 0.0 or after[i] == 0.0]
-            more, qd, after = held(inertia, qd, [touching[k] for k in stays], after)
-            p[stays, 0] += more
-            if (after[touching] < 0.0).any():
-                more, qd, after = self._jump(inertia, touching, after[touching], np.zeros(len(touching)), qd)
-                p = p + more
-            a = self._lowering(inertia, touching, qd, after)
+        # Contacts that another impact lifts by rounding, of its impulses or of the time, stay closed
+        rounding = NEGLIGIBLE * np.abs(inertia.G[:, touching]) @ p[:, 0]
+        after[after <= np.maximum(rounding, RESTS * EPS * abs(self.t) * a)] = 0.0
         self._note_impulses(inertia, touching, p, self.qd)
         self.qd = qd
         return after
@@ -361,7 +388,7 @@ class Transitions:
 
         Rounding of the rates is a share of their terms, of those of all impulses, and of what the time leaves open.
         """
-        small = AT_REST * (inertia.sizes(qd) + np.abs(inertia.G[:, which]) @ np.abs(p[:, 0]))
+        small = NEGLIGIBLE * (inertia.sizes(qd) + np.abs(inertia.G[:, which]) @ np.abs(p[:, 0]))
         small += RESTS * EPS * abs(self.t) * inertia.sizes(self.qdd)
         self.phases.impulses += [
             (self.t, self.gaps.names[i], impulse_of(inertia, i, own))
@@ -384,8 +411,7 @@ class Transitions:
         if not opening.any():
             return np.zeros(self.gaps.count)
         resting = [i for i in touching if rates[i] == 0.0]
-        a = -settled_by(inertia, resting, qd).accelerations
-        lengths, elastic = self.gaps.lengths(self.length), self.gaps.restitution == 1.0
-        rounding = EPS * np.maximum(lengths, ROUNDED * inertia.sizes(self.q))
-        rounding[elastic] = ENDLESS * lengths[elastic]  # flights that would never get lower
+        a = -contact_state(inertia, resting, qd).accelerations
+        rounding, elastic = self._heights(inertia), self.gaps.restitution == 1.0
+        rounding[elastic] = NEGLIGIBLE * self.gaps.lengths(self.length)[elastic]  # flights that would never get lower
         return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)

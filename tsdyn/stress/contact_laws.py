@@ -82,7 +82,7 @@ def _contacts(packed):
 
 def _slips(contact, own):
     """The rows of the slips of a contact with friction, which follow that of its gap."""
-    return [own[0] + 1, own[0] + 2] if getattr(contact, "rubs", False) else []
+    return [own[0] + 1, own[0] + 2] if getattr(contact, "has_friction", False) else []
 
 
 def _directions(packed, contact, slips):

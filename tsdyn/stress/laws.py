@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..configuration.tolerances import DENSE
 from ..elements.bodies import rotation_matrix, turning
 from ..elements.force import Force
 from ..elements.markers import POINT
@@ -25,7 +26,6 @@ from .contact_laws import energy_of_phases, impacts, unilateral
 from .findings import Finding, extent, radius_of_gyration, some
 from .tolerances import (
     BODIES,
-    FLOOR,
     ILL_CONDITIONED,
     NEAR_SINGULAR,
     NEAR_SINGULAR_ENDS,
@@ -34,7 +34,6 @@ from .tolerances import (
     ROUNDED_ROWS,
     ROUNDINGS,
     ROW_SHARE,
-    SMALL_SCENE,
 )
 
 # A run that is stopped at a checkpoint and goes on from there; a solution that is saved and loaded.
@@ -140,7 +139,7 @@ def constraints(solution):
         return
     at = some(solution.t.size, OUTPUTS)
     arrays = [array[at] for array in (solution.t, solution.q, solution.qd, solution.qdd, solution._memory)]
-    floors, limit = FLOOR / ROW_SHARE * _scales(solution), ROW_SHARE + rounding_of_places(solution)
+    floors, limit = NEGLIGIBLE / ROW_SHARE * _scales(solution), ROW_SHARE + rounding_of_places(solution)
     parts = [(solution.packed, arrays)]
     phases = solution._phases
     if phases is not None:  # the rows that hold
@@ -249,7 +248,7 @@ def _shaken(solution):
         vars(other).pop(name, None)
     signs = np.random.default_rng(0).choice((-1.0, 1.0), solution.q.shape)
     other.q = solution.q + EPS * np.abs(solution.q).max() * signs
-    if method.atol is not None and any(getattr(part, "rubs", False) for part in solution.scene.constraints):
+    if method.atol is not None and any(getattr(part, "has_friction", False) for part in solution.scene.constraints):
         off = method.atol + method.rtol * np.abs(solution.qd).max()
         other.qd = solution.qd + 10.0 * off * signs
     return other
@@ -323,7 +322,7 @@ def _balance_limit(solution):
 def _balance(law, left, allowed, sizes, largest, limit, body):
     """Relative to the body's own terms; what is rounding of the largest terms in the scene doesn't count."""
     left = np.maximum(np.linalg.norm(left, axis=1) - allowed, 0.0)
-    share = left / (sizes + (FLOOR / HALF_DIGITS * largest or 1.0))
+    share = left / (sizes + (NEGLIGIBLE / HALF_DIGITS * largest or 1.0))
     return Finding(law, float(share.max(initial=0.0)), limit, body.name)
 
 
@@ -363,7 +362,7 @@ def dense_output(solution):
 def weakest_rows(solution, at):
     """Smallest singular value of independent unit rows at outputs, (k,); 1 in large scenes."""
     scene, found = solution.scene, np.ones(len(at))
-    if not 0 < solution.q.shape[1] <= SMALL_SCENE:
+    if not 0 < solution.q.shape[1] <= DENSE:
         return found
     for i, k in enumerate(at):
         rows = constraint_arrays(scene.system, solution.q[k], solution.qd[k], solution.t[k])[1]

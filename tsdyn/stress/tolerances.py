@@ -1,8 +1,8 @@
 """Limits of the laws; shares of the largest terms unless a unit is named."""
 
 # A constraint error above this share of the sum of the absolute terms of its row is a wrong result. Terms that are
-# themselves rounding count as FLOOR of the largest coordinates of their kind in the scene.
-ROW_SHARE, FLOOR = 1e-9, 1e-12
+# themselves rounding count as NEGLIGIBLE of the largest coordinates of their kind in the scene.
+ROW_SHARE = 1e-9
 # Roundings of positions and of moments about the origin that are allowed: they are differences of large numbers.
 ROUNDINGS = 1e5
 # Energy less work, momenta, and two methods or forms: this multiple of the tolerance, relative to the motion's size;
@@ -17,8 +17,8 @@ NEAR_SINGULAR_ENDS = 1e-4
 # so much.
 NEAR_SINGULAR, ILL_CONDITIONED = 1e3, 1e8
 # Velocities change by a rounding of positions over the square of the smallest singular value of unit rows; so many
-# roundings. Values below NEGLIGIBLE are those of redundant rows. Coordinates up to which they are computed.
-ROUNDED_ROWS, SMALL_SCENE = 10.0, 200
+# roundings. Values below NEGLIGIBLE are those of redundant rows.
+ROUNDED_ROWS = 10.0
 # Outputs of a run that are judged, and bodies whose balance is: the first, the last, and some between.
 OUTPUTS, BODIES = 25, 12
 # Gaps below zero, of the largest coordinate (m) or in rad; momenta that no impulse explains, of the largest: rounding

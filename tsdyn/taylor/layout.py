@@ -41,7 +41,7 @@ class ConstraintSeries(Record):
     stride: int  # reals of each
     width: int  # floats of each one's series
     orders: int  # that there is room for
-    loop: int  # address of constraint_series.loop
+    loop: int  # address of constraint_series.series
     values: int  # where the series of the first begin in Expansion.constraints
 
 
@@ -52,7 +52,7 @@ class ForceSeries(Record):
     stride: int  # reals of each
     width: int  # floats of each one's series
     orders: int  # that there is room for
-    loop: int  # address of force_series.loop
+    loop: int  # address of force_series.series
     values: int  # where the series of the first begin in Expansion.loads
     table: int  # where the entries of the first begin in Expansion.table
     reals: int  # and in System.reals
@@ -120,14 +120,14 @@ class Expansion(NamedTuple):
     start: np.ndarray  # (b, 4)  p at the start of the step
     low_r2: np.ndarray  # (b, 4)  what r_2 lacks to rounding; coefficients.py
     constraints: np.ndarray  # each kind's instances; constraint_series.series
-    places: np.ndarray  # (kinds,) of tables.ConstraintSeries
-    forces: np.ndarray  # (kinds,) of tables.ForceSeries
+    places: np.ndarray  # (kinds,) of layout.ConstraintSeries
+    forces: np.ndarray  # (kinds,) of layout.ForceSeries
     table: np.ndarray  # int64: the bodies of each force
     loads: np.ndarray  # each kind of force's instances
-    motions: np.ndarray  # (motions,) of tables.MotionSeries
-    drives: np.ndarray  # (numbers of loads,) of tables.MotionSeries
-    frictions: np.ndarray  # (frictions,) of tables.FrictionSeries
-    sources: np.ndarray  # of tables.ReactionSource
+    motions: np.ndarray  # (motions,) of layout.MotionSeries
+    drives: np.ndarray  # (numbers of loads,) of layout.MotionSeries
+    frictions: np.ndarray  # (frictions,) of layout.FrictionSeries
+    sources: np.ndarray  # of layout.ReactionSource
     kept: np.ndarray  # (m,)  multipliers of the step's start, in scenes with joint friction; series_engine.py
 
 
@@ -593,7 +593,8 @@ def _mask(kind, series, par, grounded, motion):
     # A random motion shows which columns have coefficients beyond order zero
     for k, x in enumerate(motion):
         out = np.zeros((kind.all_rows, len(x)))
-        series(x, par, k, scratch, out)
+        with np.errstate(all="ignore"):  # not finite where the motion is inadmissible for these numbers: varies
+            series(x, par, k, scratch, out)
         if k > 0:
             varies |= out.any(axis=0)
             if varies.all():

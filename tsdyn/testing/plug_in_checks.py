@@ -126,7 +126,7 @@ def _example(kind, rng, a, b):
 
 
 def _check_perturbed(constraint, name, rng):
-    """The kernels with other numbers as par: where they are defaults such as 1, a power of them can't be told."""
+    """The kernels with other numbers as par: where they are defaults such as 1, a power of them isn't seen."""
     timed = "phi_t" in type(constraint).kernels  # zeros may be the rates of what stands still
     par = [
         p if isinstance(p, Motion) or (timed and p == 0.0) else p * rng.uniform(0.5, 2.0) if p else rng.normal()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, settle
+from ..analyses.contact_problem import Inertia, NoSolution, closed_gaps, solve_contacts
 from ..configuration.tolerances import INITIAL_TOL
 from ..errors import InconsistentState, InvalidArgument, NoEquilibrium
 from ..model.handles import first_rows
@@ -25,7 +25,7 @@ from .scene_cache import prepared
 # are open.
 
 
-def standing(scene: Any, state: Any, who: str) -> tuple[Any, RememberingState]:
+def phase_at(scene: Any, state: Any, who: str) -> tuple[Any, RememberingState]:
     """The scene of the phase that a run begins with at a state, or at the start (None), and the state of that run.
 
     Refuses an impact.
@@ -55,7 +55,7 @@ def evaluate(scene, own, q=None, qd=None, t=0.0):
 
 def linearise(scene, own, state=None, *arguments, **keywords):
     """As of scenes without contacts: contacts that push at the state hold."""
-    return own(*standing(scene, state, "linearise"), *arguments, **keywords)
+    return own(*phase_at(scene, state, "linearise"), *arguments, **keywords)
 
 
 def along(scene, own, *arguments, **keywords):
@@ -90,7 +90,7 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
     """
     gaps, kept = gaps_of(scene), prepared(phase_of(scene, []))
     frictions = [force for force in scene._forces if getattr(force, "slides", ())]
-    if frictions or gaps.rubs.any():
+    if frictions or gaps.rough.any():
         _demand_still(frictions, gaps, *arguments, **keywords)
         found = _held(scene, own, guess, t, *arguments, **keywords)
         if found is not None:
@@ -120,13 +120,13 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
             continue
         inertia = Inertia(gaps, float(t), state.q, state.memory, closed)
         try:
-            settled = settle(inertia, closed, state.qd)
+            contacts = solve_contacts(inertia, closed, state.qd)
         except NoSolution:
             break
-        pushing = sorted([*settled.closed, *settled.idle])
+        pushing = sorted([*contacts.closed, *contacts.idle])
         if pushing == closed:
-            phase = phase_of(scene, [gaps.list[i].side.gap for i in settled.closed], without=without)
-            return _of_all(scene, found, gaps, phase, UnitModes(settled.closed))
+            phase = phase_of(scene, [gaps.list[i].side.gap for i in contacts.closed], without=without)
+            return _of_all(scene, found, gaps, phase, UnitModes(contacts.closed))
         guess, q, closed = state, state.q, pushing
     raise NoEquilibrium(
         "no set of closed contacts was found that push while the others stay open. Start nearer to the equilibrium, "
@@ -137,7 +137,7 @@ def equilibrium(scene, own, guess=None, t=0.0, *arguments, **keywords):
 def _demand_still(frictions, gaps, spin=None, about=None, rotors=None, **_):
     """Refuse friction of the exact law in steady motion."""
     if spin is not None or rotors is not None:
-        items = [*frictions, *(gaps.list[i].contact for i in np.flatnonzero(gaps.rubs))]
+        items = [*frictions, *(gaps.list[i].contact for i in np.flatnonzero(gaps.rough))]
         raise InvalidArgument(
             f"equilibrium: a spin doesn't go with friction of the exact law ({named(items)}). "
             "Leave the friction out, or give slip_velocity (slip_rate of a torque), such as 1e-3 m/s."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from copy import copy
 from dataclasses import replace
 from functools import partial
@@ -13,6 +12,7 @@ import numpy as np
 from ..ahead import kernels_of, prepare_first_run
 from ..calls import ELSEWHERE, fitting
 from ..configuration.motor_starts import demand_holonomic
+from ..drawing import html_table
 from ..elements.element import warn_of_waiting
 from ..errors import InvalidArgument, Status
 from ..integrators import DOP853, Taylor
@@ -441,8 +441,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         """Return the text as a table, for notebooks."""
-        rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in self._facts().items())
-        return f"<table><caption>Run of {html.escape(repr(self.scene))}</caption>{rows}</table>"
+        return html_table(self._facts().items(), f"Run of {self.scene!r}", named=True)
 
     def __repr__(self) -> str:
         return f"<Run of {self.scene!r} by {self.method!r}, {self.options.formulation}>"

@@ -43,7 +43,7 @@ from .runs.stepper import advance
 from .runs.task import adaptive
 from .taylor import step_parts
 from .taylor.layout import FAR, no_series, pays, room
-from .taylor.series_engine import accelerating, expanding
+from .taylor.series_engine import accelerating, expanding, leave_accelerations
 from .taylor.stepper import advance_series
 
 # Which kernels a run needs, so that a first one can have them compiled at the same time.
@@ -133,7 +133,7 @@ def of_method(method, form, within, far=False, rough=False):
     yield initial_conditions.evaluate_start
     if isinstance(method, Taylor):
         yield from (expanding(rough, far), step_parts.reach, advance_series)
-        yield from (accelerating(rough), step_parts.pass_singular) if within else ()
+        yield from (accelerating(rough), leave_accelerations, step_parts.pass_singular) if within else ()
         return
     kernels = form.kernels
     yield from (kernels.place, kernels.accelerate, kernels.complete)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections import Counter
 from contextlib import contextmanager
@@ -14,31 +15,33 @@ from ..simulation.contact_run import _ContactRun
 from ..simulation.transitions import Transitions
 from .phase_times import Phase
 
-# What is timed: the owner of each function, its name, and the group and part that its own time belongs to: without
+# What is timed: the owner of each function, the function, and the group and part that its own time belongs to: without
 # that of other functions of this table that it calls.
 TIMED = (
-    (Memory, "advance", "steps", "compiled driver"),
-    (Watch, "_search_step", "events", "searches of steps"),
-    (Transitions, "_hit", "events", "impacts"),
-    (Transitions, "_bounces", "events", "impacts"),
-    (Transitions, "_settle", "events", "contacts and frictions that hold afterwards"),
-    (hybrid, "ask", "events", "actions asked"),
-    (hybrid, "carry_out", "events", "actions carried out"),
-    (_ContactRun, "_scene_of", "phases", "packed"),
-    (_ContactRun, "_phase", "phases", "prepared and driven"),
+    (Memory, Memory.advance, "steps", "compiled driver"),
+    (Watch, Watch._search_step, "events", "searches of steps"),
+    (Transitions, Transitions._hit, "events", "impacts"),
+    (Transitions, Transitions._bounces, "events", "impacts"),
+    (Transitions, Transitions._decide_modes, "events", "contacts and frictions that hold afterwards"),
+    (hybrid, hybrid.ask, "events", "actions asked"),
+    (hybrid, hybrid.carry_out, "events", "actions carried out"),
+    (_ContactRun, _ContactRun._scene_of, "phases", "packed"),
+    (_ContactRun, _ContactRun._phase, "phases", "prepared and driven"),
 )
 GROUPS = tuple(dict.fromkeys(group for _, _, group, _ in TIMED))
 
 
 class Stopwatch:
-    """Own time, and calls, of the functions of the table while it watches."""
+    """Own time, and calls, of the functions of the table in this thread while it watches."""
 
     def __init__(self):
-        self.calls, self.seconds, self.inner = Counter(), Counter(), [0.0]
+        self.calls, self.seconds, self.inner, self.thread = Counter(), Counter(), [0.0], threading.get_ident()
 
     def _timed(self, function, part):
         @wraps(function)
         def timed(*arguments, **named):
+            if threading.get_ident() != self.thread:
+                return function(*arguments, **named)
             began = time.perf_counter()
             self.inner.append(0.0)
             try:
@@ -54,14 +57,13 @@ class Stopwatch:
     @contextmanager
     def watching(self):
         """Time the functions of the table."""
-        own = [(owner, name, vars(owner)[name]) for owner, name, *_ in TIMED]
         try:
-            for (owner, name, function), (*_, group, part) in zip(own, TIMED, strict=True):
-                setattr(owner, name, self._timed(function, (group, part)))
+            for owner, function, *part in TIMED:
+                setattr(owner, function.__name__, self._timed(function, tuple(part)))
             yield self
         finally:
-            for owner, name, function in own:
-                setattr(owner, name, function)
+            for owner, function, *_ in TIMED:
+                setattr(owner, function.__name__, function)
 
     @property
     def driver(self):

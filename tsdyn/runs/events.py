@@ -153,9 +153,9 @@ class Inside:
         return [known[t] for t in times]
 
     def levels(self, times):
-        """The same as an array (k, 3, n), NaN where there is none; not kept."""
+        """The same as an array (k, 3, n), NaN where there is none; accelerations may be missing; not kept."""
         rows = np.zeros(times.size, int)
-        found, status = self._reader(times, rows, self._block, self._log.charts, self._log.points)
+        found, status = self._reader.rates(times, rows, self._block, self._log.charts, self._log.points)
         if status != Status.SUCCESS:
             none = np.full_like(self._known[self.t0], np.nan)
             return np.reshape([none if state is None else state for state in self.states(times)], (-1, *none.shape))
@@ -686,7 +686,8 @@ class Watch:
         return root
 
     def _at(self, i, step, t):
-        return self._value(i, t, step.at(t))
+        is_member = isinstance(self.events[i].function, GroupMember)
+        return self._value(i, t, step.levels(np.array([t]))[0] if is_member else step.at(t))
 
     @staticmethod
     def _end(run, log, t, state, start):

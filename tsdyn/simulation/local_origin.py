@@ -143,7 +143,7 @@ def _local(prepared, scene, origin):
 
 def _moved(packed, origin):
     """The packed scene with the points of the ground relative to an origin."""
-    reals = packed.system.reals.copy()
+    reals, known = packed.system.reals.copy(), packed.derived
 
     def move(item, coordinates, begin):
         found = []
@@ -169,7 +169,7 @@ def _moved(packed, origin):
         coordinates=coordinates,
         size=size_of(packed.constraints, coordinates),
         loads=loads,
-        derived=Derived(),
+        derived=Derived() if known.switched is None else Derived(known.redundant, known.switched),
     )
 
 

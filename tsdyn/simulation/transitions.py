@@ -50,7 +50,7 @@ class Transitions:
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
         turned = [i - count - own for i in fired if i >= count + own and before.slides(i - count - own)]
         broken = [i - count for i in fired if count <= i < count + own]
-        status = self._decide_modes(sorted(touching), hit, broken, turned)
+        status = self._settle(sorted(touching), hit, broken, turned)
         if measured and self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status
@@ -73,6 +73,17 @@ class Transitions:
     def _is_now(self, t):
         """Whether a time before the present one is the same instant, to rounding."""
         return self.t - t <= 16.0 * EPS * max(abs(self.t), EPS)
+
+    def _settle(self, *which):
+        """As `_decide_modes`; rows of frictions that don't hold remember zeros."""
+        status = self._decide_modes(*which)
+        memory, held = self.remembered[self.count :], self.frictions.held
+        ranks = [self.modes.sticking.get(i, 0) for i in range(self.frictions.count)]
+        left = [slot for rank, slots in zip(ranks, held, strict=True) for slot in slots[rank:].ravel().tolist()]
+        if memory[left].any():
+            self.remembered = self.remembered.copy()
+            self.remembered[self.count :][left] = 0.0
+        return status
 
     def _decide_modes(self, touching, fired, broken, turned=()):
         """Impact, then which gaps stay closed, which frictions stick; the Status if there is no way on, else None.
@@ -301,14 +312,8 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        # With rows of those that slide, too, which don't count: it is packed once
-        holds = {i: self._hold(i, ranks[i]) for i in free}
-        for i in set(range(len(units))) - {*free, *self.off}:
-            numbers = np.ones((units[i].slide.freedom, units[i].slide.row_numbers))
-            numbers[:, -1] = 0.0
-            holds[i] = Hold(units[i], len(numbers), numbers)
-        phase = self._scene_of([], list(holds.values()))
-        rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
+        phase = self._scene_of([], self.every, self.every)  # rows of those that slide don't count: it is packed once
+        rows = {i: phase.packed.derived.holds[units[i].slot][: ranks[i]] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
             Phi = values_of(phase.packed, self.t, self.q, memory)
@@ -316,7 +321,7 @@ class Transitions:
                 for k, row in enumerate(rows[i]):
                     memory[units[i].held(k)[-1]] = Phi[row]
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
-        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
+        problem = RestProblem(place, self.gaps, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
         rest = problem.pivot({i: way for i, way in guess.items() if i in free}, fired)
         # In a plane slips end where they are slow
         self.qd = problem.stopped([i for i in rest.sticking if i in fresh and not self.frictions.signed[i]], self.qd)

@@ -56,9 +56,8 @@ from . import tolerances as limits
 from .mobility import check_rank, mobility_at
 from .motor_starts import demand_finite, demand_small, refuse_masses, refuse_vanished
 
-# Kernels of initial conditions: residuals, projection, selection of independent rows, motion to a place near by.
-#
-# Rows are compared in the metric of lengths, and projected in that of kinetic energy.
+# Kernels of initial conditions: residuals, projection, selection of independent rows, motion to a place near by. Rows
+# are compared in the metric of lengths, and projected in that of kinetic energy.
 #
 # In place of a row that depends on others: there is none; rounding may hide one.
 NONE, DOUBTFUL = -1, -2

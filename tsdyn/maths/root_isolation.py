@@ -372,7 +372,8 @@ class Search:
 
     def _follow(self, fit, calm):
         """Collect the points of a fit or of its halves; calm: consecutive halvings that left one half resolved."""
-        if fit.resolved:
+        # Rounding may be larger here than in the middle of the search
+        if fit.resolved or fit.off <= self._unit * self.shaken(0.5 * (fit.a + fit.b)):
             self._take(fit)
         elif calm == CALM or fit.off != fit.off or fit.b - fit.a <= self._shortest:
             self._take_rough(fit)

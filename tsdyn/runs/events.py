@@ -10,10 +10,8 @@ from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import all_angles, counted, handles_of
-from ..model.kinematics import Anchor, Kinematics
-from ..observables import reactions
-from ..observables.reactions import Exerting
-from ..observables.state import RememberingState
+from ..model.kinematics import Anchor
+from ..observables.state import EventInstant, RememberingState
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
 from . import tolerances as limits
@@ -83,48 +81,6 @@ def prepare(events):
             raise InvalidArgument(f"{name}: action must be a function action(change), got {action!r}.")
         found.append(Event(function, name, limit or math.inf, number(direction), action=action))
     return found
-
-
-class EventInstant(Exerting, Kinematics):
-    """What an event function is given: a `State`, with multipliers made when asked for.
-
-    Parameters
-    ----------
-    packed : Packed
-    memory : ndarray (slots,)
-        What forces remember.
-    beside : tuple
-        The start of its step, or itself: t, state (3, n) and the joints' angles there.
-    t : float, s
-    state : ndarray (3, n)
-    """
-
-    __slots__ = ("_beside", "memory", "packed", "q", "qd", "qdd", "t")
-
-    def __init__(self, packed, memory, beside, t, state):
-        self.packed, self.memory, self._beside, self.t = packed, memory, beside, t
-        self.q, self.qd, self.qdd = state.copy()  # the function may keep or change it
-
-    @property
-    def anchor(self):
-        """What its angles are counted from."""
-        t, state, angles = self._beside
-        return Anchor(angles) if t == self.t else Anchor(angles, self.t - t, (state[0], state[1]))
-
-    @property
-    def multipliers(self):
-        """Multipliers (m,)."""
-        parts = (part[None] for part in (self.q, self.qd, self.qdd))
-        return reactions.multipliers(self.packed, np.array([self.t]), *parts, self.memory[None])[0]
-
-    def __iter__(self):
-        return iter((self.t, self.q, self.qd, self.qdd, self.multipliers))
-
-    def __len__(self):
-        return 5
-
-    def __getitem__(self, i):
-        return tuple(self)[i]
 
 
 # States inside the last step of a run, for event location.
@@ -511,6 +467,7 @@ class Watch:
 
         Of those without an action, where the run goes on: nobody finds them afterwards.
         """
+        self._add_members(step, last)
         just = max(last.t - limits.NOISE * limits.ROOT * abs(last.t), step.t0)
         goes_on = last.index not in self._single or self.events[last.index].action
         for i in self._single:
@@ -525,6 +482,18 @@ class Watch:
             since = max([step.t0, *(each.t for each in self.list[i][-1:])])
             before = self._at(i, step, last.t - limits.SHORTLY * (last.t - since))
             if abs(before) > noise and event.direction * before <= 0.0:
+                self.list[i].append(Occurrence(last.t, i, last.state))
+
+    def _add_members(self, step, last):
+        """The same, of events of the group of the last one: by how fast their values fall."""
+        group = next((group for group in self._groups if last.index in group.numbers), None)
+        if group is None or len(group.numbers) == 1:
+            return
+        before = last.t - limits.SHORTLY * (last.t - step.t0)
+        first, value = self._sample_within(group, step, np.array([before, last.t]))
+        falls = (value < first) & (value * (last.t - before) <= limits.TOGETHER * abs(last.t) * (first - value))
+        for i, also in zip(group.numbers, falls.tolist(), strict=True):
+            if also and i != last.index:
                 self.list[i].append(Occurrence(last.t, i, last.state))
 
     def _points(self, i, step, end):

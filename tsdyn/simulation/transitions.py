@@ -132,7 +132,8 @@ class Transitions:
             else:
                 contacts = solve_contacts(inertia, resting, self.qd, leaving)
             rounding += self.frictions.sizes(self.q, self.qd - struck)
-            self._open(inertia, opening, rates, -contacts.accelerations)
+            if opening:
+                self._open(inertia, opening, rates, -contacts.accelerations)
             self._take_contacts(contacts, before)
             status = self._decide_all(before, inertia, touching, resting, leaving, broken, rounding)
             kept = {*self.modes.closed, *self.modes.idle}

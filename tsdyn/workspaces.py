@@ -256,6 +256,7 @@ class Clock(Record):
     max_step: float
     exponent: float  # of the error, in the choice of a step
     error_before: float  # of the last accepted step, over the tolerance
+    acceleration: float  # of all coordinates, |qdd|, at its end; at least FADING of the one before; zero: not known
     stability_limit: float  # of h |lambda|; zero: not watched
     turn_share: float  # of the longest step that rotations allow
     largest_landing: float  # m; how far a projection near a singular configuration has moved a body at most

@@ -83,8 +83,32 @@ def _size(context, r):
 
 
 @kernel
-def accept(context, linear, r, h):
+def _change_of_scale(w, r):
+    """Return the factor by which the time scale of the motion has changed within the step, sqrt(|qdd before| / |qdd|).
+
+    Where a path is run through twice as fast, accelerations are four times as large. Of an implicit method 1: stiff
+    forces leave accelerations of another scale.
+    """
+    if r.numbers.stage_at > 0:
+        return 1.0
+    before = r.clock.acceleration if r.clock.acceleration > 0.0 else _length(r.now[2])
+    r.clock.acceleration = max(_length(w.qdd), limits.FADING * before)
+    return math.sqrt(before / r.clock.acceleration) if before > 0.0 else 1.0
+
+
+@kernel
+def _length(x):
+    """|x|."""
+    total = 0.0
+    for i in range(x.size):
+        total += x[i] * x[i]
+    return math.sqrt(total)
+
+
+@kernel
+def accept(context, c, r, h):
     """Accept or reject the step h and choose the next one (Gustafsson's PI control). True if accepted."""
+    linear = c.linear
     end = r.xd if r.numbers.first_order != 0 else r.y
     # Error estimate, filtered by (I - g J)^-1 in stiff scenes
     _estimate(r, r.kernels.error, h, end)
@@ -103,9 +127,10 @@ def accept(context, linear, r, h):
         r.clock.h = h * max(factor, limits.SHRINK)
         r.numbers.rejected_last = 1
         return False
-    # Accepted: PI control with the error before; no growth right after a rejection
+    # Accepted: PI control with the error before, and the time scale; no growth right after a rejection
     error = max(error, limits.LEAST_ERROR)
     factor = limits.SAFETY * error ** (-limits.PI_ERROR * power) * r.clock.error_before ** (limits.PI_BEFORE * power)
+    factor *= _change_of_scale(c.work, r)
     factor = min(max(factor, limits.SHRINK), 1.0 if r.numbers.rejected_last != 0 else limits.GROW)
     # An unchanged step keeps the matrix
     if linear.numbers.g > 0.0 and limits.SAME_FROM <= factor <= limits.SAME_TO:

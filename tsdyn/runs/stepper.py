@@ -269,6 +269,7 @@ def _enter(context, c, r, log):
     set_time(c.system, t)
     remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
     # First chart and its accelerations
+    r.clock.acceleration = 0.0
     status = begin_chart(context, c, r, log, AT_START)
     if status == 0:
         status = evaluate(context, w, r, t, r.x, r.y, r.yd, r.xd)
@@ -296,6 +297,7 @@ def _cross_stop(context, c, r, log, implicit):
     iteration has left.
     """
     w, status = c.work, 0
+    r.clock.acceleration = 0.0
     # f before and after the switch, both at the same state
     if implicit:
         status = evaluate(context, w, r, r.clock.t, r.x, r.y, r.dy, r.dx)
@@ -419,14 +421,15 @@ def _reach(c, h):
 @kernel
 def _is_accepted(context, run, c, r, t1, h):
     """Accept or reject the step h to t1, by its error and by the loads along its path. True if accepted."""
-    before = r.clock.error_before
-    if not accept(context, c.linear, r, h):
+    before, acceleration = r.clock.error_before, r.clock.acceleration
+    if not accept(context, c, r, h):
         return False
     if r.kernels.watch == 0:
         return True
     share = call_watch(r.kernels.watch, context, run, t1, h)
     if share < 1.0:
         r.clock.h, r.clock.error_before, r.numbers.rejected_last = share * h, before, 1
+        r.clock.acceleration = acceleration
     return share == 1.0
 
 

@@ -33,6 +33,10 @@ PI_ERROR, PI_BEFORE = 0.7, 0.4
 # cosine in a step of one radian are 1e-9 then, and with IMPLICIT_PLACES in one of three radians, as at order 13, 1e-8.
 DISTINCT, LEAST_PLACES, IMPLICIT_PLACES = 100.0, 8, 16
 
+# Share of |qdd| that counts after another step: where a body swings or vibrates by little, |qdd| passes zero twice a
+# period, and the time scale stays. With 0.8 linear oscillators take 0 to 5 % more steps at equal error, with none 25 %.
+FADING = 0.8
+
 # Ratio of steps within which an implicit method goes on with the same step, and so with the same matrix: chains make
 # 0.04 to 0.5 matrices a step, not 0.5 to 0.8, and as many steps. A longer one only, as in Solving ODEs II, IV.8, takes
 # a tenth more steps.

@@ -82,18 +82,39 @@ def _size(context, r):
     return call_norm(r.kernels.error_norm, context, r.dx, r.dy, r.now, r.clock.rtol, r.clock.atol)
 
 
-@kernel
-def _change_of_scale(w, r):
-    """Return the factor by which the time scale of the motion has changed within the step, sqrt(|qdd before| / |qdd|).
+# The time scale of the motion. An error tells of it when it has changed; accelerations tell at once.
+#
+#     h <- h (a0 / a1)^s,      a0, a1 = |qdd| at both ends of a step
+#
+# Where a path is run through twice as fast, accelerations are four times as large: s = 1/2. A linear spring changes
+# accelerations, but not the time scale: s = 0. So s is fitted to the steps of the run, by least squares:
+#
+#     log H_i - log H_(i-1) = s log(a0 / a1)_(i-1),      H = h e^(-1/k) the step with an error e of the tolerance
 
-    Where a path is run through twice as fast, accelerations are four times as large. Of an implicit method 1: stiff
-    forces leave accelerations of another scale.
-    """
+
+@kernel
+def _change_of_scale(w, r, h, error):
+    """Return (a0 / a1)^s of an accepted step h; 1 for implicit methods: in stiff scenes accelerations tell nothing."""
+    clock = r.clock
     if r.numbers.stage_at > 0:
         return 1.0
-    before = r.clock.acceleration if r.clock.acceleration > 0.0 else _length(r.now[2])
-    r.clock.acceleration = max(_length(w.qdd), limits.FADING * before)
-    return math.sqrt(before / r.clock.acceleration) if before > 0.0 else 1.0
+    # The change of H that this step shows
+    ideal, known = math.log(h) - clock.exponent * math.log(error), clock.acceleration > 0.0
+    if known:
+        clock.along = limits.FADING * clock.along + clock.change * (ideal - clock.ideal)
+        clock.square = limits.FADING * clock.square + clock.change * clock.change
+    before, after = clock.acceleration if known else _length(r.now[2]), _length(w.qdd)
+    clock.acceleration, clock.ideal, clock.change = after, ideal, 0.0
+    if after < limits.JUMP * before and before < limits.JUMP * after:
+        clock.change = math.log(before / after)
+    s = (clock.along + limits.SCALE * limits.LEARNED) / (clock.square + limits.LEARNED)
+    return math.exp(min(max(s, 0.0), limits.STEEPEST) * clock.change)
+
+
+@kernel
+def forget_scale(r):
+    """Accelerations have changed without a step: the next one doesn't show how the time scale has."""
+    r.clock.acceleration = 0.0
 
 
 @kernel
@@ -130,7 +151,7 @@ def accept(context, c, r, h):
     # Accepted: PI control with the error before, and the time scale; no growth right after a rejection
     error = max(error, limits.LEAST_ERROR)
     factor = limits.SAFETY * error ** (-limits.PI_ERROR * power) * r.clock.error_before ** (limits.PI_BEFORE * power)
-    factor *= _change_of_scale(c.work, r)
+    factor *= _change_of_scale(c.work, r, h, error)
     factor = min(max(factor, limits.SHRINK), 1.0 if r.numbers.rejected_last != 0 else limits.GROW)
     # An unchanged step keeps the matrix
     if linear.numbers.g > 0.0 and limits.SAME_FROM <= factor <= limits.SAME_TO:

@@ -256,11 +256,11 @@ class Clock(Record):
     max_step: float
     exponent: float  # of the error, in the choice of a step
     error_before: float  # of the last accepted step, over the tolerance
-    acceleration: float  # |qdd| at its end; zero: not known
-    change: float  # within it, of -log |qdd|
-    ideal: float  # the logarithm of the step from its start with an error of the tolerance
-    along: float  # sums over steps that fade: changes of `ideal` times changes of -log |qdd| before
-    square: float  # and squares of the latter
+    acceleration: float  # |qdd| at the end of that step; zero: not known
+    change: float  # log(a0 / a1) of that step, step_control.py
+    ideal: float  # log H of that step
+    along: float  # faded sum of log(a0 / a1) times the change of log H after it
+    square: float  # faded sum of log(a0 / a1)^2
     stability_limit: float  # of h |lambda|; zero: not watched
     turn_share: float  # of the longest step that rotations allow
     largest_landing: float  # m; how far a projection near a singular configuration has moved a body at most

@@ -82,7 +82,7 @@ def _size(context, r):
     return call_norm(r.kernels.error_norm, context, r.dx, r.dy, r.now, r.clock.rtol, r.clock.atol)
 
 
-# The time scale of the motion. An error tells of it when it has changed; accelerations tell at once.
+# The time scale of the motion: an error shows that it has changed after a step that was too long, accelerations before.
 #
 #     h <- h (a0 / a1)^s,      a0, a1 = |qdd| at both ends of a step
 #
@@ -94,7 +94,7 @@ def _size(context, r):
 
 @kernel
 def _change_of_scale(w, r, h, error):
-    """Return (a0 / a1)^s of an accepted step h; 1 for implicit methods: in stiff scenes accelerations tell nothing."""
+    """Return (a0 / a1)^s of an accepted step h; 1 for implicit methods, since stiff accelerations don't show it."""
     clock = r.clock
     if r.numbers.stage_at > 0:
         return 1.0
@@ -113,7 +113,7 @@ def _change_of_scale(w, r, h, error):
 
 @kernel
 def forget_scale(r):
-    """Accelerations have changed without a step: the next one doesn't show how the time scale has."""
+    """Leave the next step out of the fit, since accelerations have changed before it."""
     r.clock.acceleration = 0.0
 
 

@@ -219,6 +219,18 @@ def test_the_motion_is_that_of_other_methods(make, end, tol):
 
 
 @compiles
+def test_an_output_between_steps_takes_two_factorisations():
+    """Of Phi_q U for positions and velocities, of S for accelerations, which are the interpolant's: no forces."""
+    scene, method = chain(8), I.Radau(1e-3, 1e-3)
+    few, many = (ts.simulate(scene, (0.0, 0.2), integrator=method, t_eval=np.linspace(0, 0.2, n)) for n in (2, 102))
+    exact = ts.simulate(scene, (0.0, 0.2), integrator=I.SDIRK54(1e-9, 1e-9), t_eval=many.t)
+    np.testing.assert_allclose(many.q, exact.q, rtol=0, atol=1e-3)
+    demand_on_the_manifold(many, many)
+    assert many.stats.factorizations - few.stats.factorizations <= 2 * 100
+    assert many.stats.evaluations == few.stats.evaluations
+
+
+@compiles
 def test_less_than_half_the_evaluations_of_sdirk54_at_tight_tolerances():
     """For an error no larger; less than 0.6 matrices a step, and memory in proportion to the number of bodies."""
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.tolerances import LEAST_SLIP
+from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
@@ -132,30 +132,41 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     return again._replace(idle=found.idle, grips={**found.grips, **again.grips})
 
 
-def at_turn(inertia, resting, qd, fired, turned):
+def at_turn(inertia, resting, qd, fired, turned, opening=()):
     """Velocities (n,) and the `ContactState`, with the slips ended that come to rest where they turn.
 
-    Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. Below STOPPED it is ended
-    where the contact would stick: with all that are as slow, as of a body that comes to rest, or alone.
+    Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. It is ended where the
+    contact would stick: with all that are as slow, as of a body that comes to rest, or alone. Below STOPPED it is
+    ended, too, where it slows down with its friction against it, to slide off in another direction at once.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
+    opening : list of int
+        Gaps that open with a rate: they go on to.
     """
-    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], STOPPED)
-    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rough[i]], STOPPED)
+    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], AHEAD)
+    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rough[i]], AHEAD)
     closed = [i for i in inertia.held if i in resting]
+
+    def ended(which, closed=closed):
+        found = halted(inertia, qd, closed, which)
+        if found is not qd:
+            rates = inertia.rates(found)
+            more = [i for i in opening if rates[i] <= 0.5 * inertia.rates(qd)[i]]
+            if rates[resting].any() or more:  # others have closed at once
+                found = halted(inertia, qd, [*resting, *more], which)
+        return found, solve_rough_contacts(inertia, resting, found, fired)
+
     for which in (slow, turned) if turned else ():
-        ended = halted(inertia, qd, closed, which)
-        if inertia.rates(ended)[resting].any():  # others have closed at once
-            ended = halted(inertia, qd, resting, which)
         try:
-            contacts = solve_rough_contacts(inertia, resting, ended, fired)
+            found = ended(which)
         except NoSolution:
             continue
-        if all(contacts.grips.get(i, ()) is None for i in which):
-            return ended, contacts
-    qd = halted(inertia, qd, resting)
-    return qd, solve_rough_contacts(inertia, resting, qd, fired)
+        if all(found[1].grips.get(i, ()) is None for i in which):
+            return found
+    found = ended(slow_slips(inertia, qd, slow, LEAST_SLIP), resting)
+    which = [i for i in slow_slips(inertia, qd, turned, STOPPED) if found[1].gains.get(i, 0.0) < 0.0]
+    return ended(which) if which else found
 
 
 def _solve(inertia, resting, qd, fired):
@@ -193,7 +204,9 @@ def _solve(inertia, resting, qd, fired):
     closed, idle = _carried(inertia, closed, idle, grips, N, resting)
     pushes = _held(inertia, closed, grips, dict(zip(resting, b.reshape(-1, 3), strict=True)))
     slack = slack_of(inertia, closed, pushes, small)
-    return ContactState(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack)
+    moves = (G @ p + b).reshape(-1, 3)[:, 1:]
+    gains = {resting[j]: float(moves[j] @ d[j]) for j in np.flatnonzero(slides)}
+    return ContactState(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack, gains)
 
 
 def _sharing(G, b, p, mode, cones, response):
@@ -274,17 +287,15 @@ def _carried(inertia, closed, idle, grips, N, resting):
     return sorted(closed), sorted(idle)
 
 
-def halted(inertia, qd, resting, which=None):
-    """Velocities (n,) with slips ended of the gaps `resting`: of `which`, by default those that are rounding.
+def halted(inertia, qd, resting, which):
+    """Velocities (n,) with the slips ended of the gaps `which`, while the gaps `resting` keep their rates.
 
     What sticks goes on to, and what goes on sliding changes its friction with its load: as in the course of time.
     """
-    frictional = [i for i in resting if inertia.gaps.rough[i]]
-    slow = slow_slips(inertia, qd, frictional, LEAST_SLIP) if which is None else which
-    if not slow:
+    if not which:
         return qd
-    slips = inertia.slips(qd)
-    moving = [i for i in frictional if i not in slow and slips[i].any()]
+    frictional, slips = [i for i in resting if inertia.gaps.rough[i]], inertia.slips(qd)
+    moving = [i for i in frictional if i not in which and slips[i].any()]
     loads = _loads(inertia, resting, {i: slips[i] / np.hypot(*slips[i]) for i in moving})
     held = [i for i in frictional if i not in moving]
     tangents = inertia.tangents[held].reshape(2 * len(held), -1)

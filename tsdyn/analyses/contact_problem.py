@@ -149,6 +149,14 @@ class Gaps:
         """Rows (k, 2, n) of the slips of the gaps `which`, which have friction."""
         return self.workspace.rows(t, q, self._slips[which].ravel())[0].reshape(len(which), 2, -1)
 
+    def rates(self, t, q, qd, which):
+        """Rates (k, c) of the gaps `which` at times t (k,), with q and qd (k, n)."""
+        found = np.empty((t.size, len(which)))
+        for k in range(t.size):
+            J, drift = self.workspace.rows(t[k], q[k], which)
+            found[k] = J @ qd[k] + drift[which]
+        return self.sign[which] * found
+
     def responses(self, t, q, memory, which):
         """Accelerations (k, 2, n) by unit friction of these gaps, with all gaps open."""
         rows = self.slopes(t, q, which).reshape(2 * len(which), -1)
@@ -356,6 +364,7 @@ class ContactState(NamedTuple):
     grips: dict = MappingProxyType({})  # of those with friction, see contact_friction.py
     rows: dict = MappingProxyType({})  # of closed ones that stick: which of the two rows of the slip are independent
     slack: dict = MappingProxyType({})  # of closed ones whose reactions are rounding: what these may fall below zero
+    gains: dict = MappingProxyType({})  # of those that slide: what their slips gain, m/s^2
 
 
 def solve_contacts(inertia, resting, qd, fired=()):

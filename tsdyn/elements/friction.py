@@ -66,6 +66,15 @@ def heading(v0, v1, v2, d, v_0):
 
 
 @kernel
+def tangential(n0, n1, n2, e0, e1, e2):
+    """e less its part along n, of length one; zero where e is."""
+    off = n0 * e0 + n1 * e1 + n2 * e2
+    e0, e1, e2 = e0 - off * n0, e1 - off * n1, e2 - off * n2
+    size = np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + TINY)
+    return e0 / size, e1 / size, e2 / size
+
+
+@kernel
 def slip(x, xd):
     """xd_a - xd_b - omega_b x (x_a - x_b)."""
     d0, d1, d2 = x[0] - x[6], x[1] - x[7], x[2] - x[8]
@@ -123,6 +132,22 @@ def heading_series(s, v, first, d, v_0, k):
     s[first + 9, k] = dot(s, u, u, k) + TINY * zero
     s[first + 10, k] = inverse_root(s[first + 9], s[first + 10], k)
     return scaled(s, u, first + 10, k)
+
+
+TANGENTIAL_ROWS = 9
+
+
+@kernel
+def tangential_series(s, n, e0, e1, e2, first, k):
+    """Coefficient k, a tuple of three, of `tangential`; n in rows n to n + 2 of s, TANGENTIAL_ROWS rows are its own."""
+    s[first, k], s[first + 1, k], s[first + 2, k] = e0, e1, e2
+    s[first + 3, k] = dot(s, n, first, k)
+    off = scaled(s, n, first + 3, k)
+    for i in range(3):
+        s[first + 4 + i, k] = s[first + i, k] - off[i]
+    s[first + 7, k] = dot(s, first + 4, first + 4, k) + (TINY if k == 0 else 0.0)
+    s[first + 8, k] = inverse_root(s[first + 7], s[first + 8], k)
+    return scaled(s, first + 4, first + 8, k)
 
 
 @kernel
@@ -282,10 +307,10 @@ def magnitude(s, a, k, counts):
 
 
 @kernel
-def _length(s, v, square, r, k, counts):
+def _length(s, v, squares, r, k, counts):
     """Write coefficient k of |v| into row r of s, v in rows v to v + 2."""
-    s[square, k] = dot(s, v, v, k)
-    s[r, k] = root(s[square], s[r], k) if k == 0 or counts else 0.0
+    s[squares, k] = square(s[v], k) + square(s[v + 1], k) + square(s[v + 2], k)
+    s[r, k] = root(s[squares], s[r], k) if k == 0 or counts else 0.0
 
 
 @kernel
@@ -295,21 +320,37 @@ def _counts(s, r, weight, load, k):
 
 
 @kernel
+def _part_along(f, k, s, n, v, along):
+    """Write coefficient k of f into rows v to v + 2 of s, and that of n.f into row `along`."""
+    for i in range(3):
+        s[v + i, k] = f[i]
+    s[along, k] = dot(s, n, v, k)
+
+
+@kernel
+def _split(f, k, s, n, v, along, across):
+    """The same, and f - n n.f in rows `across` to across + 2."""
+    _part_along(f, k, s, n, v, along)
+    for i in range(3):
+        s[across + i, k] = f[i] - product(s[n + i], s[along], k)
+
+
+@kernel
 def bearing_series(f, k, s, n, first, preload, turns, weight, tilt):  # nine: the rows, and the numbers of Eq. (2)
     """Coefficient k of N, Eq. (2), from that of the reaction f; n is in rows n to n + 2 of s.
 
     G is the torque where `turns`; BEARING_ROWS rows from `first` on are its own.
     """
     along, turn, load = first + ALONG, first + TURNING, first + LOAD
-    for i in range(3):
-        s[first + F + i, k], s[first + T + i, k] = f[i], f[3 + i]
-    s[along, k], s[turn, k] = dot(s, n, first + F, k), dot(s, n, first + T, k)
-    for i in range(3):
-        s[first + F_ACROSS + i, k] = f[i] - product(s[n + i], s[along], k)
-        s[first + T_ACROSS + i, k] = f[3 + i] - product(s[n + i], s[turn], k)
     across, tilted, part, axial = first + ROOTS, first + ROOTS + 1, first + PART, turn if turns else along
+    _split(f, k, s, n, first + F, along, first + F_ACROSS)
     _length(s, first + F_ACROSS, first + SQUARES, across, k, _counts(s, across, 1.0, load, k))
-    _length(s, first + T_ACROSS, first + SQUARES + 1, tilted, k, _counts(s, tilted, tilt, load, k))
+    s[tilted, k] = 0.0
+    if tilt != 0.0:
+        _split(f[3:], k, s, n, first + T, turn, first + T_ACROSS)
+        _length(s, first + T_ACROSS, first + SQUARES + 1, tilted, k, _counts(s, tilted, tilt, load, k))
+    elif turns:
+        _part_along(f[3:], k, s, n, first + T, turn)
     s[part, k] = magnitude(s, axial, k, _counts(s, axial, weight, load, k))
     s[load, k] = s[across, k] + weight * s[part, k] + tilt * s[tilted, k] + (preload if k == 0 else 0.0)
     return s[load, k]
@@ -440,8 +481,13 @@ class JointFriction:
         super().__setattr__(name, value)
 
     def check(self) -> None:
-        """A joint that the scene has, and friction no smaller at rest than sliding."""
+        """A joint that the scene has and that doesn't open, and friction no smaller at rest than sliding."""
         self._demand_added(self.joint)
+        if getattr(self.joint, "unilateral", False):
+            raise self.error(
+                f"{self.name}: {self.joint.name!r} opens and closes, and has friction of its own: set kinetic and "
+                "static there, and leave this one out."
+            )
         if self.__dict__.get("static") is not None and self.static < self.kinetic:
             raise self.error(
                 f"{self.name}: static must be at least kinetic = {self.kinetic:g}, got {self.static:g}; leave it out "

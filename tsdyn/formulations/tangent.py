@@ -14,6 +14,7 @@ from ..rows.interface import (
     DYNAMICS,
     apply_multipliers,
     clear_rates,
+    evaluate_bias,
     evaluate_drift,
     evaluate_residuals,
     evaluate_rows,
@@ -186,7 +187,7 @@ def place(context, t, x):
         status = _solve_positions(graph, system, w, f, l, t, x, RENEWALS * attempt)
         if status == OK or f.b.size == 0:
             break
-    if status != OK:
+    if status != OK or l.state.bare == 1:
         return status
     return _prepare_accelerations(graph, system, w, f, l, False)
 
@@ -370,7 +371,11 @@ def accelerate(context, t, y, yd, unused):
     copy(vector(y, n), l.y)
     if not solve_velocities(graph, system, w, f, l, t):
         return NOT_FINITE
-    return _accelerate(context, c, t, yd)
+    if l.state.bare == 0:
+        return _accelerate(context, c, t, yd)
+    if f.b.size > 0:
+        evaluate_bias(graph, system, f, t)
+    return OK
 
 
 @callback(ACCELERATE)

@@ -76,19 +76,26 @@ def evaluate(context, w, r, t, x, y, yd, xd):
         status = call_accelerate(r.kernels.accelerate, context, t, y, yd, xd)
     if status == 0:
         status = call_complete(r.kernels.complete, context, yd)
+    return _checked(w, status)
+
+
+@kernel
+def _checked(w, status):
+    """The status; NOT_FINITE where the state isn't."""
     if status == 0 and not (is_finite(w.q) and is_finite(w.qd) and is_finite(w.qdd)):
         return NOT_FINITE
     return status
 
 
 @kernel
-def between(context, w, r, t, block):
+def between(context, c, r, t, block):
     """q, qd, qdd at a time within the step of this block. Status. xd, the next step's, is left alone.
 
     Positions are solved for twice: Newton's method starts further away than in a run, and ends closer to rounding when
-    repeated from nearby.
+    repeated from nearby. Accelerations of collocation methods are those of the interpolant: the right-hand side of a
+    stiff scene would amplify its error.
     """
-    h, data = block[B_H], block[B_DATA:]
+    w, chart, h, data = c.work, c.chart.state, block[B_H], block[B_DATA:]
     s = (t - block[B_START]) / h
     # Coordinates of the chart by the interpolant
     call_value(r.kernels.value, s, h, w.q.size, r.xs.size, r.ys.size, data, r.xs, r.ys)
@@ -96,17 +103,23 @@ def between(context, w, r, t, block):
     if r.numbers.normal_at > 0:
         cubic(s, h, block[r.numbers.normal_at :], w.u)
         copy(r.xs, w.v)
-    made = w.counters.factorizations
+    made, chart.bare = w.counters.factorizations, 1
     status = call_place(r.kernels.place, context, t, r.xs)
-    if status == 0 and w.counters.factorizations > made + (1 if r.numbers.normal_at > 0 else 2):
+    chart.bare = 0
+    if status == 0 and w.counters.factorizations > made + 1:
         status = _branch_status(context, w, r)
+    if status != 0 or r.kernels.second == 0:
+        return status if status != 0 else evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
+    factored = chart.factored
+    status = call_place(r.kernels.place, context, t, r.xs)
     if status == 0:
-        status = evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
-    # Accelerations by the interpolant: the right-hand side of a stiff scene would amplify its error
-    if status == 0 and r.kernels.second != 0:
+        chart.factored, chart.bare = max(chart.factored, factored), 1  # N of the first solve serves velocities
+        status = call_accelerate(r.kernels.accelerate, context, t, r.ys, r.yds, r.dx)
+        chart.bare = 0
+    if status == 0:
         call_value(r.kernels.second, s, h, w.q.size, r.xs.size, r.ys.size, data, r.xs, r.yds)
-        call_complete(r.kernels.complete, context, r.yds)
-    return status
+        status = call_complete(r.kernels.complete, context, r.yds)
+    return _checked(w, status)
 
 
 @long_kernel
@@ -212,6 +225,7 @@ def read(context, run, t, rows, blocks, charts, points, out):
     for i in range(t.size):
         # Every time begins at the same state of its chart
         block = blocks[rows[i]]
+        recall(c.system, block)  # rows that hold frictions depend on it
         if int(block[B_CHART]) == chart:
             bring_back(c, r.warm)
         else:
@@ -226,8 +240,7 @@ def read(context, run, t, rows, blocks, charts, points, out):
                 return status
             keep(c, r.warm)
         # The state at t
-        recall(c.system, block)
-        status = between(context, w, r, t[i], block)
+        status = between(context, c, r, t[i], block)
         if status != 0:
             return status
         put_state(w, out[i])
@@ -308,7 +321,7 @@ def record_step(context, run, c, r, log, t0, t1):
         if t == t1:
             record(r, log, t, r.now[0], r.now[1], r.now[2])
             continue
-        status = between(context, w, r, t, r.block)
+        status = between(context, c, r, t, r.block)
         if status != 0:
             return status
         record(r, log, t, w.q, w.qd, w.qdd)
@@ -330,6 +343,8 @@ class TrajectoryReading:
     system: object  # the `System` as it was run
     shift: int  # from a step to the block that ends with the angles at its start
     degree: int  # power of two, of a polynomial that can be expected to follow a function of the states in a step
+    leave: object = None  # a kernel in place of `accelerate_here`, which leaves accelerations out
+    begin: object = None  # what a context of the workspace begins with, a function, where phases share their readers
     idle: list = field(default_factory=list)  # a `Reader` that is not in use
 
     def reader(self):
@@ -337,8 +352,11 @@ class TrajectoryReading:
         try:
             found = self.idle.pop()
         except IndexError:
-            return Reader(self)
-        found.enter(self.system)
+            found = Reader(self)
+        else:
+            found.enter(self.system)
+        if self.begin is not None:
+            self.begin(found.context)
         return found
 
     def give(self, reader):
@@ -353,7 +371,9 @@ class Reader:
     def __init__(self, reading):
         context, run = reading.workspace()
         self._read, self.degree, self.n = reading.read, reading.degree, run.now.shape[1]
+        self._leave = reading.leave
         (self._context, *kept), (self._run, *more) = resident(context), resident(run)
+        self.context = context
         self._kept, self._kernels, self._reals = (kept, more), run.kernels, context.system.reals
         own = [part for name, part in context._asdict().items() if name not in ("system", "graph")]
         arrays = [array for array in arrays_of((*own, run)) if array.size]
@@ -365,6 +385,16 @@ class Reader:
         for array, image in self._images:
             array[...] = image
         self._reals[...] = system.reals
+
+    def rates(self, *steps):
+        """As a call; accelerations may be missing."""
+        if self._leave is None:
+            return self(*steps)
+        known, self._kernels.accelerate_here = self._kernels.accelerate_here, self._leave.address
+        try:
+            return self(*steps)
+        finally:
+            self._kernels.accelerate_here = known
 
     def __call__(self, t, rows, blocks, charts, points):
         """States (k, 3, n) at times t (k,), in the steps blocks[rows]; and the Status."""

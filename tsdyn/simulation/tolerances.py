@@ -72,7 +72,7 @@ MOST_AT_AN_INSTANT = 100
 EVENTS_JUDGED, CREEPING = 1000, 1e3
 # Cosine of the turn of a slip since its phase began, above which the next one keeps its direction; m/s: V, the velocity
 # from which on a slip that slows down may turn less and less.
-SAME_WAY, SLOW = 1.0 - 1e-12, 1e-2
+SAME_WAY, SLOW = 1.0 - 1e-12, 1e-5
 
 # Load of a friction over that up to which it counts as none, from which on it counts.
 LOADED = 4.0

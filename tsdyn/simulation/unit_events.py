@@ -6,6 +6,7 @@ import numpy as np
 
 from ..analyses.contact_rows import measure_opened, reaction_workspace
 from ..analyses.tolerances import LEVEL
+from ..maths.tolerances import TINY
 from .tolerances import LOADED, REACTION_NOISE
 
 
@@ -13,26 +14,26 @@ class Closing:
     """The gaps of open contacts, as event functions.
 
     The gap of a contact that has just opened, with a rate, is divided by the time since: so its next zero is found
-    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero.
+    however soon it comes. Of one that has opened without a rate, rounding of the gap is no zero. One that is lifted by
+    less than rounding has the rate of the gap: it closes at the top of its flight, where no impact is.
 
     Parameters
     ----------
     gaps : Gaps
     opened : dict
-        Of contacts that have opened: time, gap and rate there, by their numbers.
-    rounding : ndarray (count,), m or rad
-        Of the gaps.
+        Of contacts that have opened: time, gap, rate and rounding of the gap there, by their numbers.
+    lifted : list of int
     """
 
-    def __init__(self, gaps, opened, rounding):
-        self.gaps, self.rounding = gaps, rounding
+    def __init__(self, gaps, opened, lifted):
+        self.gaps, self.lifted = gaps, lifted
         self.open(opened)
 
     def open(self, opened):
         """Take other contacts that have just opened."""
         which = [i for i in opened if i not in self.gaps.following]
         self.which = np.array(which, int)
-        self.start = np.array([opened[i] for i in which]).reshape(-1, 3).T.copy()
+        self.start = np.array([opened[i] for i in which]).reshape(-1, 4).T.copy()
 
     def over(self, states):
         """Values (k, count) of `States`."""
@@ -40,7 +41,9 @@ class Closing:
         for i, rate in self.gaps.following.items():
             values[:, i] = rate(states.q, states.qd)
         if self.which.size:
-            measure_opened(states.t, self.which, self.start, self.rounding, values)
+            measure_opened(states.t, self.which, self.start, values)
+        if self.lifted:
+            values[:, self.lifted] = self.gaps.rates(states.t, states.q, states.qd, self.lifted)
         return values
 
 
@@ -75,7 +78,8 @@ class Leaving:
 class Breaking:
     """What reactions lack of their limits, as event functions.
 
-    Of frictions that stick: what holds them, and its bound. Of those without a load: the load, and one that counts.
+    Of frictions that stick: (b^2 - lam^2) / (b + c), with bound b, multipliers lam and the bound c at the limit; it is
+    smooth at lam = 0. Of those without a load: the load, and one that counts.
 
     Parameters
     ----------
@@ -94,6 +98,7 @@ class Breaking:
 
     def __init__(self, packed, sticking, light, limits):
         self.packed, self.sticking, self.normals = packed, sticking, [unit.load.normal for unit in light]
+        self.least = limits[: len(sticking)]
         self.limits = LOADED * limits[len(sticking) :]
         self.noise = REACTION_NOISE * limits * ([unit.bound[0] for unit in sticking] + [1.0] * len(light))
 
@@ -106,11 +111,10 @@ class Breaking:
         """Values (k, sticking and light units) of states at k times."""
         lam, loads = self.workspace.multipliers(states.t, states.levels, states.memory)
         values = np.zeros((states.t.size, len(self.sticking)))
-        for unit, value in zip(self.sticking, values.T, strict=True):
-            share, bound = unit.bound
-            value += bound - np.linalg.norm(lam[:, self.packed.derived.holds[unit.slot]], axis=1)
-            if share:
-                value += share * loads[:, unit.load.normal]
+        for unit, value, limit in zip(self.sticking, values.T, self.least, strict=True):
+            (share, bound), held = unit.bound, lam[:, self.packed.derived.holds[unit.slot]]
+            bound = bound + share * loads[:, unit.load.normal] if share else bound
+            value += (bound * bound - (held * held).sum(axis=1)) / (bound + share * limit + TINY)
         return np.hstack((values, self.limits - loads[:, self.normals])) if self.normals else values
 
 

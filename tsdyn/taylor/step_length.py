@@ -7,7 +7,7 @@ from ..jit.kernels import kernel, long_kernel
 from ..jit.simd import first, fma, four, larger, second, splat, third
 from ..maths.tolerances import ROUNDING
 from ..rows.interface import is_near_singular
-from .tolerances import FAINT, FAR_PASSING, LEAST_ORDER, PASSING, STEP_COST, STIFF_RATES, VAST
+from .tolerances import FAINT, FAR_PASSING, LEAST_ORDER, PASSING, RATES, STEP_COST, STIFF_RATES, VAST
 
 
 @kernel
@@ -101,14 +101,22 @@ def _weigh(c, r):
 
 
 @kernel
-def _held(h, rate, k):
+def _held(c, h, k):
     """Shorten h, whose error is term k, so that the velocity error also meets the tolerance.
 
-    The velocity error is the position error times k / h. The bound is squared, since short steps are numerous.
+    The velocity error is the position error times k / h. The bound of stiff motions is squared, since short steps are
+    numerous.
     """
     # Velocity error over its bound: position error times k / h
-    share = STIFF_RATES * rate * h / k
-    return h * share ** (2.0 / k) if share < 1.0 else h
+    share = STIFF_RATES * c.trial.rate * h / k
+    h *= share ** (2.0 / k) if share < 1.0 else 1.0
+    return held_sharp(c, h, k)
+
+
+@kernel
+def held_sharp(c, h, k):
+    """The same for the bound of sharp laws, where there are any."""
+    return h * min(1.0, RATES * h / k) ** (1.0 / k) if c.trial.sharp == 1 else h
 
 
 @kernel
@@ -120,9 +128,9 @@ def step_length(c, r):
     # Longest step by all orders, then by two orders less
     x.order.top = top = order_in_range(x.bodies, nb, orders, x.order.top, far, fast)
     c.trial.rate = rate
-    h = _held(radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2)), rate, top + 2)
+    h = _held(c, radius(x.bodies, nb, orders, top, far, fast) * tol ** (1.0 / (top + 2)), top + 2)
     if x.order.highest > x.order.lowest:
-        lower = _held(radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top), rate, top)
+        lower = _held(c, radius(x.bodies, nb, orders, top - 2, far, fast) * tol ** (1.0 / top), top)
         # Higher order if it advances further per unit of work
         change = 1 if h * (top + STEP_COST - 2) > lower * (top + STEP_COST) else -1
         x.order.next = min(max(top + change, x.order.lowest), x.order.highest)

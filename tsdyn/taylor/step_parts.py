@@ -16,7 +16,7 @@ from ..elements.loops.constraint_rows import (
     write_velocities,
 )
 from ..elements.loops.constraint_series import BODY_ROW, S_OMEGA, S_R
-from ..elements.loops.law_check import ATOL, LENGTH, LIMITS, MOST, RTOL, TAU, TIME, call_check, call_margin
+from ..elements.loops.law_check import ATOL, EXCESS, LENGTH, LIMITS, MOST, RTOL, TAU, TIME, call_check, call_margin
 from ..elements.tolerances import OFF, OFF_SELDOM
 from ..errors import Status
 from ..formulations.accelerations import accelerate_bodies
@@ -45,7 +45,7 @@ from ..rows.interface import (
 from ..rows.tolerances import UNEQUAL_MASSES
 from .coefficients import begin, expand, put_sum
 from .layout import L_OMEGA, L_P, L_R, L_RD, LOW, load_series
-from .tolerances import GONE, ILL_ORDERS, MOST_PARTS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL, WIDE
+from .tolerances import GONE, ILL_ORDERS, MOST_PARTS, NEXT_TO_SINGULAR, PLACES, STIFF_RATES, STILL, WIDE, WITHIN
 
 # State at the end of a Taylor step: sums of the series, projected velocities, both with compensated summation.
 #
@@ -385,6 +385,10 @@ def check_laws(context, t, h, atol, rtol):
             kind = c.expansion.forces[i]
             if kind.near != 0 and (kind.users == 1 or (j + 1) % every == 0) and _is_off(c, i, limits):
                 c.trial.good = j / places
+                # A series errs by tau^top, its velocity by h besides: where that is what it may be
+                if kind.sharp == 1 and limits[EXCESS] > 1.0:
+                    share = WITHIN * limits[EXCESS] ** (-1.0 / (c.expansion.order.top + 1))
+                    c.trial.good = max(c.trial.good, share * (j + 1) / places)
                 return 1
     return 0
 
@@ -409,7 +413,7 @@ def _set_place(c, t, tau, limits):
 def _is_off(c, i, limits):
     """Whether the series of a kind of force are not its laws at a place of the step."""
     x, kind = c.expansion, c.expansion.forces[i]
-    limits[MOST] = OFF if kind.sharp == 1 else OFF_SELDOM
+    limits[MOST], limits[EXCESS] = OFF if kind.sharp == 1 else OFF_SELDOM, 0.0
     off = call_check(
         kind.check, kind.run, x.order.top, kind, limits, x.table[kind.table :], c.system.reals[kind.reals :],
         x.bodies, x.loads[kind.values :], c.graph.inverse,

@@ -20,7 +20,7 @@ from ..runs.tolerances import AT_LONGEST, FROM_ZERO, HALVED, MOST_TURN, SHORTEST
 from ..workspaces import B_DATA, load_run
 from . import tolerances as limits
 from .layout import load_series
-from .step_length import finite_top, is_near, longest, loosest, radius, step_length, weights
+from .step_length import finite_top, held_sharp, is_near, longest, loosest, radius, step_length, weights
 from .step_parts import call_expand, call_laws, call_reach, hold_accelerations, is_singular, set_floor, state_within
 
 # Stops of a Taylor run: continuation after a step that ends at a stop.
@@ -107,11 +107,10 @@ def _propose(c, r, tol):
     # By a tighter tolerance and any order
     if is_near_singular(c.tangent, c.tangent.indicator.start):
         s.tol = max(limits.TIGHTER * tol, min(tol, limits.TIGHTEST))
-        s.h = longest(c, r, s.tol, s.highest)
+        s.h = held_sharp(c, longest(c, r, s.tol, s.highest), order.top + 2)
     # Bounds that no coefficient knows of: sharp laws, counted turns, the first step
     s.limit = r.clock.max_step
     if s.sharp == 1:
-        s.h *= min(1.0, limits.RATES * s.h / (order.top + 2)) ** (1.0 / (order.top + 2))
         s.limit = min(s.limit, (r.clock.t_end - r.clock.t_origin) / limits.LEAST_STEPS)
     if c.system.memory.size > 0:  # what counts turns must see each of them
         s.limit = min(s.limit, MOST_TURN / max(_fastest(c), TINY))

@@ -26,6 +26,8 @@ STIFF_RATES = 1000.0
 # Places of a step, equally far apart, at which series of sharp forces are compared with their laws; those of users at
 # more (motions/tolerances.py, SAMPLES). Steps of a run at least, since a pulse between two places is missed.
 PLACES, LEAST_STEPS = 4, 8
+# Length of a step that is cut where a sharp law and its series part, over the one at which they differ by the limit.
+WITHIN = 0.95
 # atol and rtol of that comparison where steps are fixed and have no tolerance: above the errors of series in too long a
 # step, below those of series that have ended. Also the loosest tolerance of Radau where there are sharp forces: at
 # 0.005 a step flies over the place where a body breaks loose, whose error is a hundred times that at 0.001.

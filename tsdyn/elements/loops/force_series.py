@@ -121,6 +121,12 @@ def run_traced(run, program, x, xd, par, k, rows, orders, scratch):
     call_order(run, program, scratch, rows, orders, k)
 
 
+@part
+def _acts(f, c, wider):
+    """Whether f isn't zero at a marker that begins at c."""
+    return some(f[c]) or some(f[c + 1]) or some(f[c + 2]) or (wider and some(f[c + 3]))
+
+
 def series(run, k, kind, table, reals, bodies, values, poses, Z):
     """Order k of the forces, onto the bodies' Z; p_0 from the poses."""
     table, reals, bodies = integers(table, ANY), vector(reals, ANY), vector(bodies, ANY)
@@ -159,8 +165,14 @@ def series(run, k, kind, table, reals, bodies, values, poses, Z):
         kernel_series(x, xd, real[3 * MARKERS :], k, scratch, f)
         # In proportion to the normal load: what is known of it
         if FRICTIONAL:
-            kept = values[first + own_scratch + rows * orders + MARKERS :]
-            known_friction(k, wide, x, real[3 * MARKERS :], kept, scratch, values[first + MARKERS * wide :], f)
+            ends = values[first + own_scratch + rows * orders :]
+            for j in range(MARKERS):
+                # Once g acts at a marker, its product with N does
+                acts = _acts(f, STARTS[j], CODES[j] == PARAMETERS) or (k > 0 and ends[j] >= 0.0)
+                ends[j] = float(k) if acts else -1.0
+            known_friction(
+                k, wide, x, real[3 * MARKERS :], ends, ends[MARKERS:], scratch, values[first + MARKERS * wide :], f
+            )
         # x and xd are kept for the comparison with the law
         if SHARP:
             kept = first + own_scratch + rows * orders + MARKERS + 2 * SIZE * k
@@ -175,9 +187,9 @@ def series(run, k, kind, table, reals, bodies, values, poses, Z):
             at, forces = own[OWNERS[j]] * body_size, first + (MARKERS + j) * wide
             ends = first + own_scratch + rows * orders + j
             wider = CODES[j] == PARAMETERS
-            acts = some(f[c]) or some(f[c + 1]) or some(f[c + 2]) or (wider and some(f[c + 3]))
-            if acts or FRICTIONAL or k == 0:
-                values[ends] = float(k) if acts or FRICTIONAL else -1.0
+            acts = _acts(f, c, wider)
+            if (not FRICTIONAL) and (acts or k == 0):
+                values[ends] = float(k) if acts else -1.0
             put(values, forces + 4 * k, four(f, c) if wider else lanes(f[c], f[c + 1], f[c + 2]))
             last = whole(values[ends])
             if last < 0:

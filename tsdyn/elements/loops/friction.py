@@ -1,6 +1,7 @@
 """Kernels of one friction for the solver: force for unit normal load, normal load, their Taylor series."""
 
 from ...jit.kernels import ANY, caller, complex_stack, data_of, integers, kernel, matrix, part, stack, stack2, vector
+from ...maths.recurrences import product
 from ...maths.tolerances import COMPLEX_STEP
 from ...maths.vectors import matrix_a
 from ..markers import PARAMETERS
@@ -55,8 +56,11 @@ def _complete(k, wide, par, kept, s, forces):
 
 
 @part
-def known_friction(k, wide, x, par, kept, s, forces, f):
-    """Replace f, order k of g, by what is known of f_k, Eq. (1), after order k - 1 has been completed."""
+def known_friction(k, wide, x, par, ends, kept, s, forces, f):
+    """Replace f, order k of g, by what is known of f_k, Eq. (1), after order k - 1 has been completed.
+
+    ends: of each marker, negative where g is zero up to this order.
+    """
     g, N = stack(6), SLOTS + SIZE
     # The law has given g_k: keep it
     for c in range(SIZE):
@@ -71,9 +75,10 @@ def known_friction(k, wide, x, par, kept, s, forces, f):
         g[c] = s[N + REACTION + c, k]
     s[N, k] = kernel_normal_series(x, g, par, k, s)
     # f_k = sum_j g_j N_{k-j}
-    for c in range(SIZE):
-        for j in range(k + 1):
-            f[c] += s[SLOTS + c, j] * s[N, k - j]
+    for m in range(MARKERS):
+        if ends[m] >= 0.0:
+            for c in range(STARTS[m], STARTS[m] + (4 if CODES[m] == PARAMETERS else 3)):
+                f[c] = product(s[SLOTS + c], s[N], k)
 
 
 @part

@@ -44,8 +44,9 @@ from .template import (
 
 # what runs a program, orders that are known, extent, limits, table, reals, bodies, values, inverse
 SIGNATURE = "iippppppp"
-# numbers of `limits`: place and length of the step, tolerances, velocity that f may be off by over them
-TAU, TIME, LENGTH, ATOL, RTOL, MOST, LIMITS = range(7)
+# numbers of `limits`: place and length of the step, tolerances, velocity that f may be off by over them; out: that
+# velocity over what it may be
+TAU, TIME, LENGTH, ATOL, RTOL, MOST, EXCESS, LIMITS = range(8)
 MARGIN = "ipppp"  # orders that are known, extent, h, values, least
 call_check, call_margin = caller(SIGNATURE), caller(MARGIN)
 
@@ -77,7 +78,8 @@ def _is_off(j, own, s, f, xd, limits, known, values, forces, inverse):
         speed = max(speed, abs(xd[c + i]))
     # Within tolerance as a velocity over the step
     tol = limits[ATOL] + limits[RTOL] * speed
-    if weight * off * limits[LENGTH] <= max(limits[MOST] * tol, LAW_TOLERANCE):
+    limits[EXCESS] = weight * off * limits[LENGTH] / max(limits[MOST] * tol, LAW_TOLERANCE)
+    if limits[EXCESS] <= 1.0:
         return False
     # or within rounding of the terms of the series
     for i in range(size):

@@ -37,14 +37,13 @@ from .model.handles import has_rates
 from .motions import program, tracing
 from .motions.signals import Signal
 from .rows.interface import ELIMINATION
-from .runs import dense_output
 from .runs.step_control import watch
 from .runs.step_engine import second_derivative
 from .runs.stepper import advance
 from .runs.task import adaptive
 from .taylor import step_parts
 from .taylor.layout import FAR, no_series, pays, room
-from .taylor.series_engine import accelerating, expanding, read_series
+from .taylor.series_engine import accelerating, expanding, leave_accelerations
 from .taylor.stepper import advance_series
 
 # Which kernels a run needs, so that a first one can have them compiled at the same time.
@@ -134,7 +133,7 @@ def of_method(method, form, within, far=False, rough=False):
     yield initial_conditions.evaluate_start
     if isinstance(method, Taylor):
         yield from (expanding(rough, far), step_parts.reach, advance_series)
-        yield from (accelerating(rough), step_parts.pass_singular) if within else ()
+        yield from (accelerating(rough), leave_accelerations, step_parts.pass_singular) if within else ()
         return
     kernels = form.kernels
     yield from (kernels.place, kernels.accelerate, kernels.complete)
@@ -151,14 +150,6 @@ def of_method(method, form, within, far=False, rough=False):
         yield from (interpolant.fill, interpolant.value)
         yield from (kernels.normal,) if form.has_normals else ()
         yield from filter(None, (second_derivative(method, form),))
-
-
-def of_phases():
-    """The kernels that runs with contacts or exact friction need beside: of impacts, events and changes of modes."""
-    from .analyses import contact_rows, friction_units
-
-    yield from (initial_conditions.land_start, read_series, dense_output.read)
-    yield from (*contact_rows.KERNELS, *friction_units.KERNELS)
 
 
 def _is_checked(force):
@@ -398,14 +389,17 @@ def named(everything):
     return {name: kernel for kernel in (_all() if everything else _default()) if (name := name_of(kernel))}
 
 
+# Packages whose kernels are of a method, of a form or of a check. Those of all others are compiled, so that none that a
+# run may need is forgotten; of these, and of constraints and forces, what the default method calls.
+OF_CHOICE = "formulations", "methods", "measuring", "testing"
+
+
 def _default():
-    form = FORMULATIONS["tangent"]
-    yield from (*ELIMINATION["symmetric"], *ELIMINATION["unsymmetric"], form.friction_solver)
-    yield from (step_parts.check_laws, tracing.run_order, program.run_program, watch)
+    form, modules = FORMULATIONS["tangent"], list(_of_modules())
     for rough in (False, True):
         yield from of_method(Taylor(1e-8), form, True, rough=rough)
     yield from of_method(DOP853(1e-8, 1e-8), form, True)
-    yield from of_phases()
+    yield form.friction_solver
     for kind in _built_in():
         if issubclass(kind, primitive.Primitive):
             for moving in (False, *[True] * ("phi_t" in kind.kernels)):
@@ -413,16 +407,23 @@ def _default():
         else:
             for driven in ("", "driven_"):
                 yield from of_force(kind.own_kernels, driven=driven)
+    yield from (kernel for kernel in modules if kernel.py_func.__module__.split(".")[1] not in OF_CHOICE)
 
 
 def _all():
+    modules = list(_of_modules())
+    for kind in _built_in():
+        yield from _loops_of(kind).values()
+    yield from modules
+
+
+def _of_modules():
+    """The kernels of all modules, which are imported; not those of classes."""
     home = Path(__file__).parent
-    for file in home.rglob("*.py"):  # modules that are imported when they are needed have kernels, too
+    for file in home.rglob("*.py"):
         if not file.stem.startswith("__"):
             with contextlib.suppress(ModuleNotFoundError):  # an optional package's
                 import_module(".".join((home.name, *file.relative_to(home).with_suffix("").parts)))
-    for kind in _built_in():
-        yield from _loops_of(kind).values()
     for module in [value for name, value in sys.modules.items() if is_ours(name)]:
         yield from filter(is_declared, vars(module).values())
 

@@ -16,7 +16,7 @@ from .calls import fitting
 from .errors import InvalidArgument, MissingDependency
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from .hints import Function
 
@@ -99,12 +99,19 @@ class Tabulated(Drawn):
     def _repr_html_(self) -> str:
         """The table in a notebook."""
         above, rows, below = self._shown()
-        body = "".join(
-            f"<tr>{''.join(f'<{tag}>{_escaped(cell)}</{tag}>' for cell in row)}</tr>"
-            for tag, row in zip(["th", *["td"] * len(rows)], rows, strict=False)
-        )
-        caption, notes = ("<br>".join(map(_escaped, filter(None, lines))) for lines in (above, below))
-        return f"<table>{caption and f'<caption>{caption}</caption>'}{body}</table>{notes and f'<p>{notes}</p>'}"
+        notes = "<br>".join(map(_escaped, filter(None, below)))
+        return html_table(rows[1:], "\n".join(filter(None, above)), *rows[:1]) + (notes and f"<p>{notes}</p>")
+
+
+def html_table(rows: Iterable[Sequence[str]], caption: str = "", heads: Sequence[str] = (), named: bool = False) -> str:
+    """A table of texts for notebooks; named: the first one of each row is a head."""
+    lines = [[f"<th>{_escaped(cell)}</th>" for cell in heads]] if heads else []
+    for row in rows:
+        tags = ["th" if named else "td", *["td"] * (len(row) - 1)]
+        lines.append([f"<{tag}>{_escaped(cell)}</{tag}>" for tag, cell in zip(tags, row, strict=True)])
+    body = "".join(f"<tr>{''.join(line)}</tr>" for line in lines)
+    caption = "<br>".join(map(_escaped, caption.splitlines()))
+    return f"<table>{caption and f'<caption>{caption}</caption>'}{body}</table>"
 
 
 def _escaped(text):

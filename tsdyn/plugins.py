@@ -27,6 +27,7 @@ from .elements.friction import (
     PIN,
     PLANE,
     POINT_OF_BODY,
+    TANGENTIAL_ROWS,
     BodyFriction,
     JointFriction,
     act,
@@ -46,6 +47,8 @@ from .elements.friction import (
     slip_of,
     slip_series,
     slip_velocity,
+    tangential,
+    tangential_series,
 )
 from .elements.joint import FramedJoint, Joint, SumRow, across, beside, carried, turned_about
 from .elements.laws import Action, SceneLaw, arguments_of, instants, scene_law
@@ -148,6 +151,7 @@ __all__ = [
     "POINT_OF_BODY",
     "SLIP",
     "STATE",
+    "TANGENTIAL_ROWS",
     "TYPED",
     "UNDIRECTED",
     "Action",
@@ -279,6 +283,8 @@ __all__ = [
     "state_load",
     "step_kernel",
     "stop_waiting",
+    "tangential",
+    "tangential_series",
     "trapezoid_error",
     "turned_about",
     "variant",

@@ -11,6 +11,7 @@ SCENES = """
 import numpy as np
 import tsdyn as ts
 from tsdyn import ahead
+from tsdyn.jit.cache import statistics
 from tsdyn.jit.compiled import is_loaded
 
 C, F, half = ts.constraints, ts.forces, np.sqrt(0.5)
@@ -88,6 +89,21 @@ def rubbing():
     scene.add(C.Planar.at(scene.ground, body, point=(0, 0, 0), axis=(0, 0, 1)))
     return with_(scene, F.CoulombFriction(body, scene.ground, force=2.0))
 
+def loop():
+    scene = empty()
+    points = np.array([(0, 0, 0), (0.3, 0, 1), (2, 0, 1.5), (2, 0, 0)], float)
+    rods = [scene.add_body(mass=1.0, inertia=(0.1, 0.1, 0.1), position=x) for x in 0.5 * (points[1:] + points[:-1])]
+    sides = zip((scene.ground, *rods), (*rods, scene.ground), points)
+    joints = [scene.add(C.Revolute.at(a, b, point=x, axis=(0, 1, 0))) for a, b, x in sides]
+    return with_(scene, C.Stop(joints[0], upper=0.3, restitution=0.5))
+
+def set_and_read():
+    scene, joint = hinged()
+    scene.set(joint, rate=-1.0)
+    stop = scene.add(C.Stop(joint, lower=-0.1))
+    solution = ts.simulate(scene, (0, 1), dense_output=True)
+    return solution.reaction(joint), solution.reaction(stop), solution.work, solution.at(0.5).multipliers
+
 def simulated(scene, **options):
     ts.simulate(scene, (0, 1), **options)
 
@@ -125,11 +141,18 @@ RUNS = {
     "an impact": struck,
     "an ensemble of boxes": lambda: ensemble(box(kinetic=0.3)),
     "an ensemble of ropes": lambda: ensemble(rope()),
+    "a loop with redundant rows": lambda: simulated(loop()),
+    "a joint that is set, and what is read": set_and_read,
 }
 listed, found = set(ahead.named(False).values()), set()
 for name, run in RUNS.items():
     run()
-    used = {kernel for kernel in ahead._all() if is_loaded(kernel)} - listed - found
+    loaded = {kernel for kernel in ahead._all() if is_loaded(kernel)}
+    strays = statistics["hits"] + statistics["misses"] - len(loaded)
+    if strays:  # of kernels for arguments of other types than declared, and of those that none but kernels should call
+        print(f"{name}: {strays} more are loaded")
+        break
+    used = loaded - listed - found
     found |= used
     for kernel in used:
         print(f"{name}: {kernel.py_func.__module__}.{kernel.py_func.__qualname__}")

@@ -1,5 +1,7 @@
 """Rank is geometry: masses change neither mobility nor redundant rows; runs of unequal masses are right or refused."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -9,7 +11,7 @@ from scipy.integrate import solve_ivp
 import tsdyn as ts
 from tests.helpers.tolerances import CLOSE, FINE, HELD, ROUNDING
 
-C = ts.constraints
+C, I = ts.constraints, ts.integrators
 G = 9.81
 RATIOS = [1e-15, 1e-12, 1e-9, 1e-7, 1e-5]
 
@@ -182,6 +184,59 @@ def test_masses_change_no_mobility(seed, powers):
 def test_lengths_change_no_mobility(seed, count, power):
     masses = np.ones(count)
     assert facts(random_scene(seed, masses, 10.0**power)) == facts(random_scene(seed, masses))
+
+
+def leaning_disc(length, off):
+    """A disc of a radius of half the length rolls on a plane; it is off the centroid by a share of the length."""
+    scene = ts.Scene(gravity=(0, 0, -G * length))
+    body = scene.add_body(1.3, np.array((0.08, 0.15, 0.08)) * length**2, position=(0, 0, 0.46 * length), name="disc")
+    body.orientation, body.angular_velocity = (np.cos(0.2), np.sin(0.2), 0, 0), (0.4, 7.5, 0.7)
+    places = {"center_a": (0, 0, off * length), "axis_a": (0, 1, 0), "normal_b": (0, 0, 1)}
+    scene.add(C.RollingDisc(body, scene.ground, radius=0.5 * length, **places))
+    scene.assemble()
+    return scene, 3
+
+
+def sleeve_on_a_rod(length, off):
+    """A rod slides and doesn't turn, a sleeve slides along it: their points are off the centroids by the same share."""
+    scene, point = ts.Scene(gravity=(0, 0, -G * length)), np.array((off, 0, off)) * length
+    rod = scene.add_body(1.0, (length**2,) * 3, name="rod")
+    sleeve = scene.add_body(1.0, (length**2,) * 3, position=(0, 0.7 * length, 0), name="sleeve")
+    scene.add(C.Translational.at(rod, scene.ground, point=point, axis=(1, 0, 0)))
+    scene.add(C.PointOnLine(sleeve, rod, point_a=point, point_b=point, axis_b=(0, 1, 0)))
+    return scene, 5
+
+
+def driven_thread(length, off, coupled=False):
+    """A nut turned by a motor rises by its lead, as a Screw or by a Coupler."""
+    scene, lead = ts.Scene(gravity=(0, 0, -G * length)), 0.2 * length
+    nut = scene.add_body(1.0, (length**2,) * 3, name="nut", velocity=(0, 0, lead), angular_velocity=(0, 0, 1))
+    places = {"point": np.array((off, 0, off)) * length, "axis": (0, 0, 1)}
+    if coupled:
+        joint = scene.add(C.Cylindrical.at(scene.ground, nut, **places))
+        scene.add(C.Coupler((joint, "displacement"), (joint, "angle"), ratio=lead))
+    else:
+        joint = scene.add(C.Screw.at(scene.ground, nut, **places, lead=lead))
+    scene.add(C.RotationMotor.of(joint, angle=ts.motions.time))
+    scene.assemble()
+    return scene, 0
+
+
+@pytest.mark.slow_for("1e*08")
+@pytest.mark.parametrize("length", [1e-8, 1.0, 1e8])
+@pytest.mark.parametrize("off", [0.0, 1e-17, 1e-9, 1e-3])
+@pytest.mark.parametrize("build", [leaning_disc, sleeve_on_a_rod, driven_thread, partial(driven_thread, coupled=True)])
+def test_arms_of_rounding_change_neither_mobility_nor_tolerances(build, off, length):
+    """Rows have arms that no point shows: a radius, a way along a guide, a lead."""
+    scene, freedom = build(length, off)
+    found = scene.mobility()
+    assert (found.degrees_of_freedom, found.redundant, found.singular) == (freedom, (), False)
+    near = ts.simulate(build(1.0, 0.0)[0], (0.0, 0.1), rtol=1e-11, atol=1e-11)
+    for method in (I.Taylor(), I.DOP853(1e-9, 1e-9 * length)):
+        solution = ts.simulate(scene, (0.0, 0.1), integrator=method).raise_if_failed()
+        np.testing.assert_allclose(solution.state.q[:3] / length, near.state.q[:3], atol=2.0 * off + 1e-8)
+        assert not np.isnan(solution.multipliers).any()
+        assert "tolerances" not in solution.message
 
 
 @settings(max_examples=20, deadline=None)

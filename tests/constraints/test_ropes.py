@@ -37,6 +37,17 @@ def test_atwoods_machine(method):
     assert np.ptp(solution.energy) < 1e-7
 
 
+@pytest.mark.parametrize("length", [1e-10, 1e10])
+def test_any_length(length):
+    scene, weights = ts.Scene(gravity=(0, 0, -G * length)), []
+    for i, mass in enumerate((3.0, 1.0)):
+        weights.append(scene.add_point_mass(mass, position=(i * length, 0, -2 * length)))
+    over = [(scene.ground, ORIGIN), (scene.ground, (length, 0, 0))]
+    scene.add(C.Rope([(weights[0], ORIGIN), *over, (weights[1], ORIGIN)], always_taut=True))
+    solution = ts.simulate(scene, (0.0, 0.4))
+    np.testing.assert_allclose(solution.velocity(weights[1])[-1], (0.0, 0.0, 0.2 * G * length), rtol=1e-9, atol=0)
+
+
 @pytest.mark.parametrize("parts", [2, 3, 4, 6, 9])
 def test_a_tackle_divides_the_load_by_its_parts(parts):
     """Parts of rope carry the block of mass M, the free end the mass m: M a = n T - M g, m n a = m g - T."""

@@ -1,6 +1,7 @@
 """A run that was stopped, or killed, and goes on from its checkpoint gives the bits of one never stopped."""
 
 import os
+from inspect import signature
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import tsdyn as ts
 from benchmarks.stiff import jointed
 from examples import driven_pivot, four_bar, geared_pair, top
+from tests.helpers.built_in import FORCES, by_name
 from tests.helpers.refusals import refuse
 from tests.helpers.resuming import Stop, same
 from tests.helpers.skates import sleigh
@@ -109,6 +111,18 @@ def drawn():
 )
 def test_rotors_couplers_cables_and_ropes(method, tmp_path):
     stop_and_go_on(drawn, 0.7, tmp_path / "run.h5", again=drawn(), integrator=method)
+
+
+@pytest.mark.slow_but("Cable", "Spring")
+@pytest.mark.parametrize("kind", [kind for kind in FORCES if "function" not in signature(kind).parameters], **by_name)
+def test_forces_without_functions_of_the_user_need_no_scene(kind, tmp_path, rng):
+    """A store holds all of a scene whose laws are tsdyn's own."""
+    scene = ts.Scene()
+    bodies = [scene.add_body(1.0, (0.1, 0.2, 0.3), rng.normal(size=3)) for _ in range(2)]
+    scene.add(kind.example(rng, *bodies))
+    scene.assemble()
+    solution = ts.simulate(scene, (0.0, 0.01), store=tmp_path / "run.h5", checkpoint=60.0, history=True)
+    same(solution, ts.resume(tmp_path / "run.h5"))
 
 
 @pytest.mark.slow_but("redundant-dop853", "turns-default")

@@ -258,3 +258,33 @@ def test_a_run_with_armature_is_that_of_mujoco():
     for name in ("trunk", "thigh", "rod"):
         origin = state.position(name, scene.imported.frames[name].position)
         assert np.abs(origin - data.body(name).xpos).max() < FINE
+
+
+SLIDES = {"plane": ("x", "z"), "space": ("x", "y", "z")}
+AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+
+
+@pytest.mark.parametrize("slides", SLIDES.values(), ids=SLIDES)
+def test_slides_with_armature_are_those_of_mujoco(slides, tmp_path):
+    """A root of slides and a hinge, a link that swings from it; between slides are links of a trifle, 1e-7 kg."""
+    mujoco = pytest.importorskip("mujoco")
+    roots = "".join(f"<joint name='{name}' type='slide' axis='{AXES[name]}' armature='0.{i}'/>"
+                    for i, name in enumerate(slides, 3))  # fmt: skip
+    inertial = "<inertial pos='0.2 0 0.1' mass='1' diaginertia='.02 .03 .04'/>"
+    arm = f"<body name='arm' pos='0.4 0 0'><joint name='elbow' axis='0 1 0' armature='0.1'/>{inertial}</body>"
+    root = f"<body name='root'>{roots}<joint name='turn' axis='0 1 0' armature='0.2'/>{inertial}{arm}</body>"
+    (tmp_path / "planar.xml").write_text(f"<mujoco><worldbody>{root}</worldbody></mujoco>")
+    scene = load(tmp_path / "planar.xml")
+    assert set(scene.imported.groups()) == {"link without mass or inertia, given a trifle"}
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "planar.xml"))
+    model.opt.timestep, model.opt.integrator = 1e-4, mujoco.mjtIntegrator.mjINT_RK4
+    data = mujoco.MjData(model)
+    for name, rate in (("turn", 2.0), ("elbow", -3.0)):
+        scene.set(name, rate=rate)
+        data.joint(name).qvel[:] = rate
+    for _ in range(3000):
+        mujoco.mj_step(model, data)
+    state = ts.simulate(scene, (0.0, 0.3), rtol=1e-11, atol=1e-11).state
+    for name in ("root", "arm"):
+        origin = state.position(name, scene.imported.frames[name].position)
+        assert np.abs(origin - data.body(name).xpos).max() < 1e-6

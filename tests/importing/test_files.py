@@ -252,7 +252,8 @@ TWO_SLIDES = """<mujoco><worldbody>
 <body pos="2 0 0"><joint name="c" type="hinge" axis="0 1 0"/><geom size=".1"/></body>
 </worldbody>
 <tendon><fixed name="t"><joint joint="a" coef="2"/><joint joint="b" coef="-1"/></fixed>
-<fixed name="u"><joint joint="c" coef="0.5"/></fixed></tendon>
+<fixed name="u"><joint joint="c" coef="0.5"/></fixed>
+<fixed name="v"><joint joint="b" coef="-2"/></fixed><fixed name="w"><joint joint="a" coef="3"/></fixed></tendon>
 <equality>{0}</equality></mujoco>"""
 EQUALITIES = {
     "polynomial": ('<joint joint1="b" joint2="a" polycoef="0 1 0.5 0 -0.1"/>', lambda a: a + 0.5 * a**2 - 0.1 * a**4),
@@ -261,6 +262,8 @@ EQUALITIES = {
     "joint of another kind": ('<joint joint1="c" joint2="b"/><tendon tendon1="t"/>', lambda a: 2.0 * a),
     "two tendons": ('<tendon tendon1="t" tendon2="u" polycoef="0 4 0 0 0"/><joint joint1="c" joint2="b"/>',
                     lambda a: 2.0 * a / 3.0),
+    "polynomial of a tendon": ('<tendon tendon1="v" tendon2="w" polycoef="0 1 0.25 0 0"/>',
+                               lambda a: -0.5 * (3.0 * a + 0.25 * 9.0 * a**2)),
 }  # fmt: skip
 
 
@@ -275,6 +278,27 @@ def test_equalities_of_mjcf(equality, law, tmp_path):
     a, b = solution.displacement("a"), solution.displacement("b")
     assert abs(a[-1]) > 0.05
     assert np.abs(b - law(a)).max() < CLOSE
+
+
+HELD = {
+    "slide": ('<joint joint1="b" polycoef="0.2"/>', "displacement", "b", 0.2),
+    "hinge": ('<joint joint1="c" polycoef="-0.4"/>', "angle", "c", -0.4),
+    "tendon": ('<tendon tendon1="u" polycoef="0.1 0 0 0 0"/>', "angle", "c", 0.2),  # c / 2 = 0.1
+    "tendon at its start": ('<tendon tendon1="v"/>', "position", "body2", 0.0),
+}
+
+
+@pytest.mark.parametrize(("equality", "asked", "name", "value"), HELD.values(), ids=HELD)
+def test_joints_that_mjcf_holds(equality, asked, name, value, tmp_path):
+    pytest.importorskip("mujoco")
+    scene = load(text(tmp_path, TWO_SLIDES.format(equality), "r.xml"))
+    assert not {what for what in left_out(scene) if "equality" in what or "mimic" in what or "held" in what}
+    scene.assemble()
+    assert scene.mobility().degrees_of_freedom == 2
+    if asked == "position":  # one body with the ground: there is no joint
+        assert name not in {body.name for body in scene.bodies}
+    else:
+        np.testing.assert_allclose(getattr(ts.simulate(scene, (0.0, 1.0)), asked)(name), value, atol=CLOSE)
 
 
 def test_mimics_of_sdf(tmp_path):

@@ -285,6 +285,79 @@ def test_a_run_that_ends_early():
     assert said.startswith("The run ended early: The run reached max_steps.")
 
 
+# runs with phases: contacts, exact friction, actions of events
+
+
+def bouncing():
+    scene = ts.Scene()
+    ball = scene.add_point_mass(1.0, position=(0, 0, 1.0), velocity=(1, 0, 0), name="ball")
+    floor = {"normal_b": (0, 0, 1), "restitution": 0.8, "kinetic": 0.2, "name": "floor"}
+    scene.add(ts.constraints.PlaneContact(ball, scene.ground, unilateral=True, **floor))
+    return scene
+
+
+def braked():
+    scene = ts.Scene()
+    block = scene.add_point_mass(1.0, velocity=(1, 0, 0), name="block")
+    scene.add(ts.constraints.PlaneContact(block, scene.ground, normal_b=(0, 0, 1), name="floor"))
+    scene.add(ts.forces.ContactFriction(scene["floor"], kinetic=0.2, name="brake"))
+    return scene
+
+
+def kicked():
+    """A stone that an event throws up again whenever it is at rest above the ground."""
+    scene = ts.Scene()
+    scene.add_point_mass(1.0, velocity=(0, 0, 1), name="stone")
+
+    def top(t, state):
+        return state.velocity("stone")[2]
+
+    top.direction, top.action = -1, lambda change: change.impulse("stone", (0, 0, 2.0))
+    return scene, top
+
+
+@pytest.mark.slow
+def test_phases_of_a_run_with_impacts():
+    scene = bouncing()
+    found = ts.profile(scene, (0.0, 6.0))
+    solution = found.solution
+    assert calls(found, "steps", "compiled driver") == solution.stats.steps
+    assert calls(found, "events", "searches of steps") == solution.stats.steps
+    assert calls(found, "events", "impacts") == len(solution.impulses) > 30
+    assert calls(found, "phases", "packed") == 2  # it flies, and rests: impacts end the slip
+    assert sum(map(found.share, found.groups())) == pytest.approx(1.0)
+    assert found.accounted == pytest.approx(1.0)
+    assert all(phase.seconds > 0.0 and phase.calls > 0 for phase in found.phases)
+    assert f"{len(solution.phases)} phases, {len(solution.impulses)} impulses" in str(found)
+    assert found._repr_html_().count("<tr>") == 1 + len(list(found._rows()))
+    assert any(item.startswith(f"Half of the {len(solution.impulses)} impulses lie between") for item in found.advice)
+    again = ts.simulate(scene, (0.0, 6.0))
+    assert again.q.tobytes() == solution.q.tobytes()
+
+
+@pytest.mark.slow
+def test_phases_of_a_run_with_exact_friction():
+    found = ts.profile(braked(), (0.0, 1.0), integrator="radau", advice=False)
+    assert found.solution.sticking("brake")[-1]
+    assert isinstance(found.method, I.Radau)
+    assert calls(found, "events", "contacts and frictions that hold afterwards") == 2
+    assert not any(phase.part == "impacts" for phase in found.phases)
+
+
+@pytest.mark.slow
+def test_phases_of_a_run_with_actions():
+    scene, top = kicked()
+    found = ts.profile(scene, (0.0, 1.0), events=top)
+    assert calls(found, "events", "actions carried out") == len(found.solution.t_events[0]) == 5
+
+
+@pytest.mark.slow
+def test_plot_of_phases(tmp_path):
+    pytest.importorskip("matplotlib")
+    found = ts.profile(bouncing(), (0.0, 1.0), advice=False)
+    assert len(found.plot(tmp_path / "figure.png").axes[0].patches) == len(found.phases)
+
+
 # what it looks like, and what it refuses
 
 

@@ -168,11 +168,6 @@ def test_kinematics_off_the_stops():
         scene.kinematics([0.0, 2.0])
 
 
-def test_a_profile_is_refused_by_name():
-    with pytest.raises(ts.InvalidArgument, match=r"profile is of one phase of a run.*floor"):
-        ts.profile(ball_on_floor(), (0, 1))
-
-
 # friction of the exact law
 
 
@@ -193,11 +188,6 @@ def test_a_brake_that_holds_leaves_no_freedom():
     scene = braked(0.1)
     scene.set("guide", rate=1.0)
     assert scene.linearise().coordinates == ("guide.displacement",)
-
-
-def test_a_profile_of_exact_friction_is_refused_by_name():
-    with pytest.raises(ts.InvalidArgument, match=r"profile .* brake\. Give slip_velocity"):
-        ts.profile(braked(0.1), (0, 1))
 
 
 def test_what_friction_holds_is_an_equilibrium_where_it_stands():

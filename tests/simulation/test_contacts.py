@@ -406,6 +406,77 @@ def test_events_of_the_user_beside_contacts():
     assert abs(ended.reached - 2.25 * fall) < 1e-12
 
 
+@pytest.mark.parametrize("height", [0.3, 1.0, 100.0])
+@pytest.mark.parametrize("direction", [0, -1])
+def test_an_event_at_the_instants_of_impacts(height, direction):
+    """The height vanishes at the impacts themselves: each is an event, and none is two."""
+    scene, fall = bouncing(0.5, height=height)
+
+    def lands(t, state):
+        return state.position("ball")[2]
+
+    lands.direction = direction
+    solution = ts.simulate(scene, (0, 10 * fall), events=lands)
+    impacts = np.array([t for t, *_ in solution.impulses])
+    exact = fall * (1 + 2 * np.append(0.0, np.cumsum(0.5 ** np.arange(1, 15))))
+    np.testing.assert_allclose(solution.t_events[0][:15], exact, rtol=1e-12)
+    np.testing.assert_allclose(solution.t_events[0][:15], impacts[:15], rtol=1e-12)
+    np.testing.assert_allclose(solution.qd_events[0][:5, 2], -G * fall * 0.5 ** np.arange(5), rtol=1e-12)
+
+
+@pytest.mark.parametrize("of_time", [True, False])
+def test_a_terminal_event_at_the_instant_of_an_impact(of_time):
+    """The run ends before the impact, with which the next run begins."""
+    scene, fall = bouncing(0.5)
+
+    def lands(t, state):
+        return t - fall if of_time else state.position("ball")[2]
+
+    lands.terminal = True
+    solution = ts.simulate(scene, (0, 2.0), events=lands)
+    assert solution.status is ts.Status.EVENT
+    assert "event 0 (lands)" in solution.message
+    assert solution.t[-1] == pytest.approx(fall, rel=1e-15)
+    assert solution.velocity("ball")[-1, 2] == pytest.approx(-G * fall, rel=1e-14)
+    on = ts.simulate(scene, (solution.t[-1], 2.0), state=solution.state)
+    assert next(t for t, *_ in (*solution.impulses, *on.impulses)) == solution.t[-1]
+
+
+def test_an_event_where_sliding_ends():
+    """The velocity vanishes at v / (mu g), where the block begins to stick."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    block = scene.add_point_mass(1.0, velocity=(1, 0, 0), name="block")
+    floor = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": 0.3}
+    scene.add(C.PlaneContact(block, scene.ground, **floor, name="floor"))
+
+    def stops(t, state):
+        return state.velocity("block")[0]
+
+    stops.terminal = True
+    solution = ts.simulate(scene, (0, 1), events=stops)
+    assert solution.t_events[0] == pytest.approx([1 / (0.3 * G)], rel=1e-14)
+    assert solution.status is ts.Status.EVENT
+
+
+def test_a_run_that_ends_at_an_impact_ends_before_it():
+    scene, fall = bouncing(0.5)
+    solution = ts.simulate(scene, (0, fall))
+    assert (solution.message, solution.impulses) == ("The run reached the end of the interval.", [])
+    assert solution.velocity("ball")[-1, 2] == pytest.approx(-G * fall, rel=1e-14)
+
+
+def test_the_text_of_a_solution_counts_its_phases():
+    """Friction that turns around beside rows that go on to hold begins no phase."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    block = scene.add_body(1.0, (1, 1, 1), position=(2.0, 0, 0), name="block")
+    scene.add(C.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(ts.forces.Spring(scene.ground, block, stiffness=10.0, free_length=1.0))
+    scene.add(ts.forces.CoulombFriction(block, scene.ground, force=0.1))
+    solution = ts.simulate(scene, (0, 5.0))
+    assert solution.phases == [(0, 5.0, ())]
+    assert "phases  1 phase, 0 impulses" in str(solution)
+
+
 def test_a_run_goes_on_from_a_state_in_contact():
     scene, _ = bouncing(0.5)
     whole = ts.simulate(scene, (0, 4.0))

@@ -76,6 +76,23 @@ def test_every_method_sees_the_values(which, method):
     assert one == same != base
 
 
+def test_values_that_are_admissible_together_come_in_any_order():
+    """A block of 1 m/s comes to rest after v^2 / (2 mu g)."""
+    scene = ts.Scene()
+    block = scene.add_point_mass(mass=1.0, velocity=(1, 0, 0), name="block")
+    floor = {"normal_b": (0, 0, 1), "unilateral": True, "kinetic": 0.2, "static": 0.3, "name": "floor"}
+    scene.add(ts.constraints.PlaneContact(block, scene.ground, **floor))
+    values = {"floor.kinetic": 0.4, "floor.static": 0.5}
+    for given in (values, dict(reversed(values.items()))):
+        solution = ts.simulate(scene.with_parameters(given), (0, 1))
+        assert solution.q[-1, 0] == pytest.approx(0.5 / (0.4 * 9.81), rel=1e-12)
+        study = ts.ensemble(scene, {name: [value] for name, value in given.items()}, (0, 1))
+        assert study.q[0, 0] == solution.q[-1, 0]
+    for wrong in ({"floor.kinetic": 0.4}, {"floor.kinetic": 0.4, "floor.static": 0.35}):
+        with pytest.raises(ts.InvalidConstraint, match=r"static must be at least kinetic = 0\.4"):
+            scene.with_parameters(wrong)
+
+
 def test_values_add_up_and_handles_are_its_own():
     scene = top.build()
     body = scene.bodies[0]

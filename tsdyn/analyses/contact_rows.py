@@ -16,8 +16,10 @@ import numpy as np
 from ..elements.loops.constraint_rows import move_bodies, place_bodies, take_loads, write_accelerations
 from ..errors import SingularConfiguration
 from ..formulations.accelerations import accelerate_with_friction, refine_accelerations, solve_accelerations
+from ..formulations.tolerances import EXACT, REFINEMENTS
 from ..jit.kernels import entry, kernel, loader, resident
-from ..maths.dense_linalg import copy
+from ..maths.complementarity import CONES
+from ..maths.dense_linalg import copy, largest
 from ..maths.root_isolation import SURVEYING
 from ..maths.tolerances import LAST_PLACE
 from ..maths.vectors import add, spin, subtract
@@ -39,6 +41,7 @@ from ..observables.evaluate import NO_INERTIA
 from ..rows.constraint_graph import BIAS, REDUCED, graph_of
 from ..rows.interface import (
     DYNAMICS,
+    constrain,
     constrain_accelerations,
     evaluate_bias,
     evaluate_rows,
@@ -46,6 +49,7 @@ from ..rows.interface import (
     mark_redundant,
     reset_selection,
     weigh_bodies,
+    with_all_rows,
 )
 from ..workspaces import Parts, load_parts, no_parts, parts
 
@@ -79,7 +83,7 @@ def measure_opened(t, which, start, values):
     """Divide gaps by the time since they have opened, in values (k, gaps) at times t (k,), or add rounding to them.
 
     start (4, opened): time, gap, rate and rounding where those of the numbers `which` have opened; without a rate the
-    second. The first have the rounding, r, as r^2 / (rate time): above it at once, and gone where they close.
+    second. The first have the rounding, r, too, times (r / (rate time))^6: above noise at once, gone where they close.
     """
     for j in range(which.size):
         begun, first, rate, rounding = start[0, j], start[1, j], start[2, j], start[3, j]
@@ -88,7 +92,8 @@ def measure_opened(t, which, start, values):
             if not rate > 0.0:
                 values[k, which[j]] = grown + rounding
             else:
-                values[k, which[j]] = (grown + rounding * rounding / (rate * since)) / since if since > 0.0 else rate
+                share = (rounding / (rate * since)) ** 2 if since > 0.0 else 0.0
+                values[k, which[j]] = (grown + rounding * share * share * share) / since if since > 0.0 else rate
 
 
 @kernel
@@ -114,7 +119,23 @@ def find_rows(context, t, q, place, short, J, drift):
 
 
 @kernel
-def _respond(c, t, q, memory, loads, out):
+def _write_multipliers(graph, f, lam):
+    """Refine accelerations Z as `refine_accelerations` does, and write the multipliers into lam, by rows of Phi."""
+    for e in range(f.b.size):
+        if graph.row[e] >= 0:
+            lam[graph.row[e]] = f.b[e]
+    far = largest(f.Z)
+    for _ in range(REFINEMENTS if f.b.size > 0 else 0):
+        more = constrain(graph, f.rows, f.gamma, f.Z, f.b)
+        for e in range(f.b.size):
+            if graph.row[e] >= 0:
+                lam[graph.row[e]] += f.b[e]
+        if more <= EXACT * far:
+            break
+
+
+@kernel
+def _respond(c, t, q, memory, loads, out, lam, left):
     graph, s, w, f = c.graph, c.system, c.work, c.tangent
     recall(s, memory)
     set_time(s, t)
@@ -133,34 +154,48 @@ def _respond(c, t, q, memory, loads, out):
     for k in range(loads.shape[0]):
         take_loads(graph.bodies, q, loads[k], f.Z)
         weigh_bodies(graph, f.Z)
+        alone = largest(f.Z)
         if f.b.size > 0:
             constrain_accelerations(graph, f.rows, f.gamma, f.Z, f.b)
-        refine_accelerations(graph, f)
+        if k < lam.shape[0]:
+            _write_multipliers(graph, f, lam[k])
+            left[k] = largest(f.Z) / alone if alone > 0.0 else 0.0
+        else:
+            refine_accelerations(graph, f)
         write_accelerations(graph.bodies, f.poses, f.Z, out[k])
     return 1
 
 
-@entry("pdvvmm")
-def respond(context, t, q, memory, loads, out):
-    """out (k, n): accelerations by loads (k, n), Eq. (1). The factors stay; 0 where there are none, else 1."""
-    return _respond(load_contacts(context).free, t, q, memory, loads, out)
+@entry("pdvvmmmv")
+def respond(context, t, q, memory, loads, out, lam, left):
+    """out (k, n): accelerations by loads (k, n), Eq. (1). The factors stay; 0 where there are none, else 1.
+
+    lam (k or 0, m): multipliers of the bilateral rows; left (k or 0,): the shares of accelerations that these leave.
+    """
+    return _respond(load_contacts(context).free, t, q, memory, loads, out, lam, left)
 
 
 @kernel
-def _accelerate(c, t, q, qd, out, gamma):
+def _accelerate(c, t, q, qd, out, gamma, lam):
     graph, s, w, f = c.free.graph, c.free.system, c.free.work, c.free.tangent
     copy(qd, w.qd)
     move_bodies(graph.bodies, q, qd, f.poses)
     solve_accelerations(graph, s, w, f, t)
-    refine_accelerations(graph, f)
+    if lam.size > 0:
+        _write_multipliers(graph, f, lam)
+    else:
+        refine_accelerations(graph, f)
     write_accelerations(graph.bodies, f.poses, f.Z, out)
     acceleration_bias(c.rows, q, qd, t, gamma)
 
 
-@entry("pdvvvv")
-def accelerate(context, t, q, qd, out, gamma):
-    """Accelerations out (n,) with all contacts open, and gamma (m,) of their rows, where `respond` has been called."""
-    _accelerate(load_contacts(context), t, q, qd, out, gamma)
+@entry("pdvvvvv")
+def accelerate(context, t, q, qd, out, gamma, lam):
+    """Accelerations out (n,) with all contacts open, and gamma (m,) of their rows, where `respond` has been called.
+
+    lam (m or 0,): multipliers of the bilateral rows.
+    """
+    _accelerate(load_contacts(context), t, q, qd, out, gamma, lam)
 
 
 @entry("pdvvvwmmmv")
@@ -176,7 +211,8 @@ def bounce(context, t, q, qd, memory, place, short, rows, gamma, numbers):
     J, response, after, qdd = rows[0], rows[1], rows[2], rows[3]
     for j in range(J.size):
         J[j] *= sign
-    if not _respond(c.free, t, q, memory, rows[:1], rows[1:2]):
+    none = rows[:0]
+    if not _respond(c.free, t, q, memory, rows[:1], rows[1:2], none, q[:0]):
         return 0
     rate, size, G, length = sign * gamma[0, i], abs(gamma[0, i]), 0.0, 0.0
     for j in range(J.size):
@@ -187,7 +223,7 @@ def bounce(context, t, q, qd, memory, place, short, rows, gamma, numbers):
     p = -(rate + e * rate) / G
     for j in range(J.size):
         after[j] = qd[j] + p * response[j]
-    _accelerate(c, t, q, after, qdd, gamma[1])
+    _accelerate(c, t, q, after, qdd, gamma[1], q[:0])
     gdd = sign * gamma[1, i]
     for j in range(J.size):
         gdd += J[j] * qdd[j]
@@ -297,6 +333,7 @@ def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # te
 
 KERNELS = (
     find_gaps, measure_opened, find_rows, find_slips, respond, accelerate, bounce, gain, find_multipliers, *SURVEYING,
+    *CONES,
 )  # fmt: skip
 
 
@@ -309,11 +346,17 @@ class ReactionWorkspace:
     def __init__(self, packed, redundant=0.0):
         system, self.redundant, self.graph = with_short_rows(packed), redundant, graph_of(packed, REDUCED, BIAS)
         self.n, self.m, self.count = int(system.bodies[:, 1].sum()), len(packed.system.segments), system.normals.size
-        whole = parts(system._replace(reals=system.reals.copy()), self.graph, self.n)
+        graph = self.graph if packed.derived.switched is None else with_all_rows(self.graph)
+        whole = parts(system._replace(reals=system.reals.copy()), graph, self.n)
         self.address, *self._keep = resident(whole)
-        self.begin = partial(reset_selection, self.graph, whole.tangent)  # as if it were new
+        self._tangent = whole.tangent
         find = find_reactions if self.count else find_multipliers
         self._find = interrupts_answered()(find) if calls_laws(packed) else find
+
+    def begin(self, graph):
+        """As if it were new, with the redundant rows of a graph."""
+        self.graph = graph
+        reset_selection(graph, self._tangent)
 
     def multipliers(self, t, levels, memory):
         """Multipliers (k, m) at times t (k,), levels (k, 3, n), of normalisations zero; normal loads (k, frictions)."""
@@ -329,9 +372,10 @@ def reaction_workspace(packed, redundant=0.0):
     A start may have shown that rows are redundant.
     """
     known, key = packed.derived.reactions, (threading.get_ident(), redundant == 0.0)
-    if key not in known or known[key].graph is not graph_of(packed, REDUCED, BIAS):
+    graph = graph_of(packed, REDUCED, BIAS)
+    if key not in known or known[key].graph.row is not graph.row:
         known[key] = ReactionWorkspace(packed, redundant)
-    known[key].begin()
+    known[key].begin(graph)
     return known[key]
 
 
@@ -350,6 +394,7 @@ class ContactWorkspace:
         self.n, self.m, self._free = int(contacts.system.bodies[:, 1].sum()), len(contacts.system.segments), free
         rows, self._graph = with_short_rows(contacts), None
         self._rows, self._all = rows._replace(reals=rows.reals.copy()), np.arange(self.m)
+        self._bilateral = len(free.system.segments)
         spans = rows.segments, free.system.inertia_segments
         self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in spans)
         answered = interrupts_answered() if calls_laws(free) else lambda kernel: kernel
@@ -394,17 +439,30 @@ class ContactWorkspace:
 
     def respond(self, t, q, memory, loads):
         """Accelerations (k, n) by loads (k, n), which must be contiguous."""
+        return self._respond(t, q, memory, loads, np.empty((0, 0)), np.empty(0))
+
+    def _respond(self, t, q, memory, loads, lam, left):
         out = np.empty_like(loads)
         self._enter()
-        if not respond(self.address, t, q, memory, loads, out):
+        if not respond(self.address, t, q, memory, loads, out, lam, left):
             raise SingularConfiguration(NO_INERTIA)
         return out
 
     def accelerations(self, t, q, qd):
         """Accelerations (n,) with all contacts open, and gamma (m,); after `respond` at these t and q."""
         qdd, gamma = np.empty(self.n), np.zeros(self.m)
-        self._accelerate(self.address, t, q, qd, qdd, gamma)
+        self._accelerate(self.address, t, q, qd, qdd, gamma, np.empty(0))
         return qdd, gamma
+
+    def solve(self, t, q, qd, memory, loads):
+        """Accelerations (k + 1, n) and multipliers (k + 1, m) of bilateral rows, and the shares (k,) that these leave.
+
+        By loads (k, n), contiguous, then those of the motion with all contacts open.
+        """
+        lam, left, qdd = np.zeros((len(loads) + 1, self._bilateral)), np.zeros(len(loads)), np.empty(self.n)
+        out = self._respond(t, q, memory, loads, lam[:-1], left)
+        self._accelerate(self.address, t, q, qd, qdd, np.zeros(self.m), lam[-1])
+        return np.vstack([out, qdd]), lam, left
 
     def bounce(self, t, q, qd, memory, i, sign, e):
         """Numbers (6,) of an impact of the gap in row i alone, as of the kernel, and velocities (n,) afterwards."""

@@ -20,14 +20,13 @@ from ..constraints.dot2 import Dot2
 from ..elements.bodies import rotation_matrix
 from ..elements.element import stop_waiting
 from ..elements.friction import GUIDE, PIN, PLANE
-from ..errors import SingularConfiguration
 from ..maths.complementarity import OPEN, STICKS
 from ..maths.dense_linalg import range_and_null_space
-from ..maths.tolerances import EPS, NEGLIGIBLE, RANK_TOL, ROUNDING, TINY
+from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, RANK_TOL, ROUNDING, TINY
 from ..model.handles import first_rows
-from ..observables.evaluate import ITERATIONS, NO_INERTIA, constraint_arrays, mass_matrix
-from ..observables.generalised_forces import applied_loads, velocity_forces
-from .friction_units import ACROSS, ALONG, WHOLE, NormalLoads, slip_velocities
+from ..observables.evaluate import ITERATIONS, constraint_arrays
+from ..observables.generalised_forces import applied_loads
+from .friction_units import ACROSS, ALONG, WHOLE, normal_loads_of, slip_velocities
 from .tolerances import BROKEN, EVENT_ERROR, LEVEL, PIVOTS, RESTS
 
 if TYPE_CHECKING:
@@ -100,6 +99,13 @@ class Hold(NamedTuple):
         return [list(zip(self.unit.held(i), at, strict=True)) for i in range(self.rank)]
 
 
+def hold_of(unit):
+    """All rows of a `FrictionUnit`, with numbers to be packed with."""
+    numbers = np.ones((unit.slide.freedom, unit.slide.row_numbers))
+    numbers[:, -1] = 0.0
+    return Hold(unit, len(numbers), numbers)
+
+
 class Frictions:
     """The frictions of a scene that follow the exact law.
 
@@ -124,6 +130,7 @@ class Frictions:
                 self.units.append(FrictionUnit(load, force, slide, slot))
                 slot += slide.count
         self.count, self.names = len(self.units), [unit.force.name for unit in self.units]
+        self.held = [np.array([unit.held(k) for k in range(unit.slide.freedom)], int) for unit in self.units]
         # Of each unit the bodies a and b, numbers of rows of System.bodies; the ground is behind them
         spans, slides = self.packed.system.bodies, [unit.slide for unit in self.units]
         ends = [(unit.force.a, unit.force.b) for unit in self.units]
@@ -271,22 +278,31 @@ def _remembering(system, memory):
     return system
 
 
-def immobile(packed, t, q, memory):
+def immobile(packed, t, q, qd, memory):
     """Coordinates of the bodies that rows without time leave no motion, whatever others do."""
+    spans = packed.system.bodies.tolist()
+    slow = np.abs(qd) <= HALF_DIGITS * np.abs(qd).max() + ROUNDING
+    columns = _columns([(at, length) for at, length in spans if slow[at : at + length].all()])
+    if not columns.size:
+        return columns
     _, Phi_q, _, _ = constraint_arrays(_remembering(packed.system, memory), q, np.zeros_like(q), t)
-    steady, spans = [], packed.system.bodies.tolist()
+    steady = []
     for part, row in first_rows(packed.constraints):
         steady += [] if part.rheonomic else range(row, row + part.rows)
-    Phi_q, columns = Phi_q[steady], np.arange(q.size)
+    Phi_q = Phi_q[steady]
     while columns.size:
         mine = ~np.delete(Phi_q, columns, axis=1).any(axis=1)
         moved = _null_space(Phi_q[np.ix_(mine, columns)])
         moves = np.isin(np.arange(q.size), columns[np.abs(moved).max(axis=1, initial=0.0) > RANK_TOL])
         if not moves.any():
             break
-        still = [np.arange(at, at + length) for at, length in spans if not moves[at : at + length].any()]
-        columns = np.intersect1d(columns, np.concatenate([*still, np.zeros(0, int)]))
-    return columns.astype(int)
+        still = [(at, length) for at, length in spans if not moves[at : at + length].any()]
+        columns = np.intersect1d(columns, _columns(still))
+    return columns
+
+
+def _columns(spans):
+    return np.concatenate([np.zeros(0, int), *(np.arange(at, at + length) for at, length in spans)])
 
 
 def _null_space(rows):
@@ -317,11 +333,13 @@ class RestProblem:
 
         x                  multipliers of these rows, then reactions of contacts; N: normal loads
         J qdd + gamma      c + G x + D N       D: of the frictions that slide already
-        multipliers        l + L x + K N       of the other rows, of which the normal loads follow
+        reactions          l + L x + K N       of the joints (frictions, 6), of which the normal loads follow
 
     Parameters
     ----------
     place : FrictionFrames
+    gaps : contact_problem.Gaps
+        Of the scene.
     packed : Packed
         Of a phase with the rows of these units; other units may have rows, which don't hold.
     rows : dict of int to ndarray
@@ -334,47 +352,32 @@ class RestProblem:
         Contacts that are closed and at rest, which the phase has no rows of.
     """
 
-    def __init__(self, place, packed, rows, bases, t, q, qd, memory, cones=None):
-        from scipy.linalg import cho_factor, cho_solve, solve_triangular
-
+    def __init__(self, place, gaps, packed, rows, bases, t, q, qd, memory, cones=None):
         self.place, self.units, self.rows, self.bases = place, place.frictions.units, rows, bases
         system = _remembering(packed.system, memory)
         _, Phi_q, _, gamma = constraint_arrays(system, q, qd, t)
-        M = mass_matrix(system, q)
         mine = np.concatenate([*rows.values(), np.zeros(0, int)])
-        others = np.setdiff1d(np.arange(len(gamma)), np.concatenate([*packed.derived.holds.values(), mine]))
-        own, Z, R, order = range_and_null_space(Phi_q[others])
-        rank, order = len(order), others[order]
-        try:
-            factor = cho_factor(Z.T @ M @ Z) if Z.size else None
-        except np.linalg.LinAlgError as error:
-            raise SingularConfiguration(NO_INERTIA) from error
-        fixed = own @ solve_triangular(R, -gamma[order], trans="T") if rank else np.zeros(q.size)
         known = applied_loads(system, np.array([t]), q[None], qd[None], memory[None])[0]
         self.r, self.mass = system.bodies[:, :1] + np.arange(3), system.mass
         self.applied = np.linalg.norm(known[self.r], axis=1)
-        known += velocity_forces(system, q[None], qd[None])[0] - M @ fixed
         self.normals = packed.system.normals.size
-        self.coupled = NormalLoads(packed, t, q, qd, memory, Phi_q) if self.normals else None
-        sliding = self.coupled.units if self.normals else np.zeros((q.size, 0))
-        self.cones, self.J, self.gamma, own_loads = cones, Phi_q[mine], gamma[mine], -Phi_q[mine].T
+        self.coupled = normal_loads_of(packed, t, q, qd, memory, Phi_q) if self.normals else None
+        sliding = self.coupled.units if self.normals else np.zeros((0, q.size))
+        self.cones, self.J, self.gamma, own_loads = cones, Phi_q[mine], gamma[mine], -Phi_q[mine]
         if cones is not None:
             self.J, self.gamma = np.vstack([self.J, cones.rows]), np.append(self.gamma, cones.bias)
-            own_loads = np.hstack([own_loads, cones.rows.T])
+            own_loads = np.vstack([own_loads, cones.rows])
         self.pushing, self.normal_loads = np.arange(mine.size, len(self.J)), np.zeros(self.normals)
         self.pressed = self.pushing[:0]  # rows that contacts hold
-        loads = np.column_stack([known, own_loads, sliding])
-        free = Z @ cho_solve(factor, Z.T @ loads) if Z.size else np.zeros_like(loads)
-        lam = np.zeros((len(gamma), loads.shape[1]))
-        if rank:
-            lam[order] = solve_triangular(R, own.T @ (loads - M @ free))
-        count, self.qdd = 1 + len(self.J), free
-        self.qdd[:, 0] += fixed
-        G = self.J @ self.qdd
-        self.c, self.G, self.D = G[:, 0] + self.gamma, G[:, 1:count], G[:, count:]
-        self.dead = dead = np.linalg.norm(self.J @ Z, axis=1) <= RANK_TOL * np.linalg.norm(self.J, axis=1)
+        found, lam, left = gaps.workspace.solve(t, q, qd, memory, np.vstack([own_loads, sliding]))
+        count, self.qdd = len(self.J), np.roll(found, 1, axis=0).T
+        G = self.J @ found.T
+        self.c, self.G, self.D = G[:, -1] + self.gamma, G[:, :count], G[:, count:-1]
+        self.dead = dead = left[:count] <= RANK_TOL
         self.G[dead], self.G[:, dead], self.D[dead] = 0.0, 0.0, 0.0  # rates that no motion changes, as at a dead centre
-        self.l, self.L, self.K = lam[:, 0], lam[:, 1:count], lam[:, count:]
+        if self.normals:
+            reactions = self.coupled.reactions(lam.T)
+            self.l, self.L, self.K = reactions[..., -1], reactions[..., :count], reactions[..., count:-1]
         places = np.cumsum([0, *(len(each) for each in rows.values())])
         self.at = {i: np.arange(*places[k : k + 2]) for k, i in enumerate(rows)}
 
@@ -395,8 +398,8 @@ class RestProblem:
         if not self.normals:
             return x, np.zeros(0)
         # N = N(l + L x + K N), by Newton's method
-        first = self.coupled.reactions(self.l + self.L @ x)
-        slopes, N = self.coupled.reactions(self.L @ P + self.K), np.zeros(self.normals)
+        first = self.l + self.L @ x
+        slopes, N = self.L @ P + self.K, np.zeros(self.normals)
         for _ in range(ITERATIONS):
             values, changes = self.coupled.loads(first + slopes @ N)
             try:
@@ -444,7 +447,7 @@ class RestProblem:
             y[stick] = -held - by_u @ p
             before = N
             if self.normals:
-                N = self.coupled.loads(self.coupled.reactions(self.l + self.L @ y + self.K @ N))[0]
+                N = self.coupled.loads(self.l + self.L @ y + self.K @ N)[0]
             if not (np.abs(N - before) > LEVEL * np.abs(N).max(initial=0.0)).any():
                 break
         else:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import html
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..calls import fitting_methods
+from ..drawing import html_table
 from ..elements.bodies import PointMass, rotation_matrix
 from ..elements.primitive import Primitive
 from ..errors import InvalidArgument
@@ -217,10 +217,7 @@ class Modes:
 
     def _repr_html_(self) -> str:
         """Return a table, for notebooks."""
-        head = "".join(f"<th>{word}</th>" for word in HEADS)
-        rows = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in self._rows()]
-        body = "".join(f"<tr>{row}</tr>" for row in (head, *rows))
-        return f"<table><caption>Modes of {len(self.coordinates)} coordinates</caption>{body}</table>"
+        return html_table(self._rows(), f"Modes of {len(self.coordinates)} coordinates", HEADS)
 
 
 class StateSpace(NamedTuple):

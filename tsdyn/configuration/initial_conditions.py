@@ -48,6 +48,7 @@ from ..rows.interface import (
     selection_parts,
     set_selection,
     singularity_indicator,
+    with_all_rows,
     with_reselection,
 )
 from ..workspaces import Parts, no_parts, parts, words
@@ -314,12 +315,13 @@ class StartWorkspace:
     def __init__(self, packed, graph, n):
         self.graph = graph
         own = packed.system._replace(reals=packed.system.reals.copy())
-        whole = parts(own, graph, n)
-        if packed.derived.redundant is not None:
+        selects = packed.derived.redundant is not None and packed.derived.switched is None
+        whole = parts(own, graph if selects else with_all_rows(graph), n)
+        if selects:
             whole = whole._replace(tangent=allocate_tangent(graph, n, redundant=True))
         self.reals, self.tangent, self.work, self.rates = own.reals, whole.tangent, whole.work, np.zeros(len(graph.row))
         measured = whole._replace(graph=by_lengths(packed, graph))
-        if packed.derived.redundant is not None:  # rows are selected again in the same metric
+        if selects:  # rows are selected again in the same metric
             measured = measured._replace(tangent=with_reselection(measured.graph, whole.tangent))
         self.unequal = are_unequal(packed.system)
         self.address, *self._keep = resident(StartParts(whole, measured, np.array([self.unequal], np.int64)))
@@ -354,13 +356,16 @@ def taken(packed, graph, n):
         found = packed.derived.start_workspaces.pop()
     except IndexError:
         found = None
-    return found if found is not None and found.graph is graph else StartWorkspace(packed, graph, n)
+    if found is None or found.graph.row is not graph.row:
+        return StartWorkspace(packed, graph, n)
+    found.graph = graph  # with other redundant rows, of another phase
+    return found
 
 
 def give(packed, workspace):
     """Take back a workspace that is no longer in use, unless it is large."""
-    small = workspace.tangent.rows.S.size + workspace.tangent.rows.H.size < KEPT_FLOATS
-    if small and packed.derived.redundant is None and not packed.derived.start_workspaces:
+    small, known = workspace.tangent.rows.S.size + workspace.tangent.rows.H.size < KEPT_FLOATS, packed.derived
+    if small and (known.redundant is None or known.switched is not None) and not known.start_workspaces:
         packed.derived.start_workspaces.append(workspace)
 
 
@@ -390,6 +395,8 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
         release_loose_bodies(packed, start.graph, start.tangent.rows.H)
         give(packed, start.workspace)
         return q, qd
+    if packed.derived.switched is not None:
+        return start.of_phase()
     dependent = start.check()
     if dependent >= 0 and not allowed:
         _refuse(scene, start, dependent)
@@ -481,6 +488,10 @@ class RedundantStarts:
         return last.landed()
 
 
+class DependentRows(SingularConfiguration):
+    """Other rows than the known ones are redundant."""
+
+
 class _Start:
     """A start under check, with its workspace."""
 
@@ -566,6 +577,17 @@ class _Start:
         """Whether rows are independent and hold to rounding, as `check` finds it, with inertia about every axis."""
         self.found = self.evaluate()
         return self.found == HOLDS and self.failing_row() < 0
+
+    def of_phase(self):
+        """As `consistent`, of a phase whose redundant rows are known; raises `DependentRows` where others are, too."""
+        self.found = self.evaluate(0)
+        if self.check() != NONE or self.failing_row() >= 0:
+            raise DependentRows(NO_CHOICE)
+        self.demand_velocities()
+        release_loose_bodies(self.packed, self.graph, self.tangent.rows.H)
+        landed = self.landed()
+        give(self.packed, self.workspace)
+        return landed
 
     def redundant_rows(self):
         """Return the rows that are redundant here and nearby; refuse a singular configuration."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,6 +14,7 @@ from ..constraints.dot1 import Dot1
 from ..constraints.dot2 import Dot2
 from ..constraints.euler_normalization import EulerNormalization
 from ..constraints.spherical import Spherical
+from ..drawing import html_table
 from ..elements.bodies import rotation_matrix
 from ..errors import InconsistentState, InvalidArgument, RedundantConstraints
 from ..jit.interrupts import CollectionsDeferred
@@ -255,8 +255,7 @@ class Mobility:
     def _repr_html_(self):
         """The same in a notebook."""
         facts = self._facts() | {said: f"on {_listed(on)}" for said, on in self._stories()}
-        rows = "".join(f"<tr><th>{html.escape(a)}</th><td>{html.escape(b)}</td></tr>" for a, b in facts.items())
-        return f"<table><caption>Mobility</caption>{rows}</table>"
+        return html_table(facts.items(), "Mobility", named=True)
 
 
 @fitting

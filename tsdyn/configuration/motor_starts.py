@@ -13,7 +13,6 @@ from ..elements.loops.template import state
 from ..errors import InconsistentState, InvalidConstraint, SingularConfiguration
 from ..jit.code_hash import is_ours
 from ..jit.kernels import twin
-from ..maths.vectors import cross
 from ..model import handles as joint_motion
 from ..model.handles import counts, handles_of
 from ..motions.elementary import Polynomial
@@ -88,7 +87,7 @@ class RigidShift:
     def _line(self, goal):
         """Return the axis of a goal's coordinate (ground frame), a point on it, and the sign for the moving side."""
         geometry, point = goal.geometry, "point_a" if self.goes is self.joint.a else "point_b"
-        direction = cross(geometry.f, geometry.g) if goal.turns else geometry.e
+        direction = np.cross(geometry.f, geometry.g) if goal.turns else geometry.e
         axis = rotation_matrix(_orientation(geometry.own)) @ direction
         s = getattr(self.joint, point, np.zeros(3))
         centre = self.goes.position + rotation_matrix(_orientation(self.goes)) @ s

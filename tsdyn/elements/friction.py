@@ -66,6 +66,15 @@ def heading(v0, v1, v2, d, v_0):
 
 
 @kernel
+def tangential(n0, n1, n2, e0, e1, e2):
+    """e less its part along n, of length one; zero where e is."""
+    off = n0 * e0 + n1 * e1 + n2 * e2
+    e0, e1, e2 = e0 - off * n0, e1 - off * n1, e2 - off * n2
+    size = np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + TINY)
+    return e0 / size, e1 / size, e2 / size
+
+
+@kernel
 def slip(x, xd):
     """xd_a - xd_b - omega_b x (x_a - x_b)."""
     d0, d1, d2 = x[0] - x[6], x[1] - x[7], x[2] - x[8]
@@ -123,6 +132,22 @@ def heading_series(s, v, first, d, v_0, k):
     s[first + 9, k] = dot(s, u, u, k) + TINY * zero
     s[first + 10, k] = inverse_root(s[first + 9], s[first + 10], k)
     return scaled(s, u, first + 10, k)
+
+
+TANGENTIAL_ROWS = 9
+
+
+@kernel
+def tangential_series(s, n, e0, e1, e2, first, k):
+    """Coefficient k, a tuple of three, of `tangential`; n in rows n to n + 2 of s, TANGENTIAL_ROWS rows are its own."""
+    s[first, k], s[first + 1, k], s[first + 2, k] = e0, e1, e2
+    s[first + 3, k] = dot(s, n, first, k)
+    off = scaled(s, n, first + 3, k)
+    for i in range(3):
+        s[first + 4 + i, k] = s[first + i, k] - off[i]
+    s[first + 7, k] = dot(s, first + 4, first + 4, k) + (TINY if k == 0 else 0.0)
+    s[first + 8, k] = inverse_root(s[first + 7], s[first + 8], k)
+    return scaled(s, first + 4, first + 8, k)
 
 
 @kernel
@@ -456,8 +481,13 @@ class JointFriction:
         super().__setattr__(name, value)
 
     def check(self) -> None:
-        """A joint that the scene has, and friction no smaller at rest than sliding."""
+        """A joint that the scene has and that doesn't open, and friction no smaller at rest than sliding."""
         self._demand_added(self.joint)
+        if getattr(self.joint, "unilateral", False):
+            raise self.error(
+                f"{self.name}: {self.joint.name!r} opens and closes, and has friction of its own: set kinetic and "
+                "static there, and leave this one out."
+            )
         if self.__dict__.get("static") is not None and self.static < self.kinetic:
             raise self.error(
                 f"{self.name}: static must be at least kinetic = {self.kinetic:g}, got {self.static:g}; leave it out "

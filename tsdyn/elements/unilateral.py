@@ -88,6 +88,12 @@ class Unilateral:
         for what, given in (("restitution", self.restitution != 0.0), (friction, self.has_friction)):
             if given and not self.unilateral:
                 raise InvalidConstraint(f"{self.name}: {what} is of a constraint that opens; set {self._opens_by}.")
+        for force in self.scene.forces if self.unilateral and self.added else ():
+            if getattr(force, "joint", None) is self:
+                raise InvalidConstraint(
+                    f"{self.name}: {force.name!r} is friction of a contact that doesn't open; remove it, and set "
+                    "kinetic and static of the contact."
+                )
 
     @property
     def has_friction(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 import time
 from collections import Counter
@@ -14,6 +13,7 @@ import numpy as np
 
 from .._version import __version__
 from ..calls import fitting, fitting_methods, lacking
+from ..drawing import html_table
 from ..errors import InvalidArgument, MissingDependency, Status
 from ..files import scene_text
 from ..simulation.stored_runs import demand_path, hash_of
@@ -409,11 +409,10 @@ class Ensemble:
 
     def _repr_html_(self) -> str:
         """Return a table, for notebooks."""
-        facts = {"cases": len(self), "ended": self._facts(), "parameters": ", ".join(self.parameters)}
+        facts = {"cases": str(len(self)), "ended": self._facts(), "parameters": ", ".join(self.parameters)}
         if reason := self._reason():
             facts["first failure"] = reason
-        rows = "".join(f"<tr><th>{name}</th><td>{html.escape(str(fact))}</td></tr>" for name, fact in facts.items())
-        return f"<table><caption>Ensemble</caption>{rows}</table>"
+        return html_table(facts.items(), "Ensemble", named=True)
 
 
 def _flat(name, values):

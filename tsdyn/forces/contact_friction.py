@@ -3,7 +3,7 @@
     n      normal, v = velocity of a's point over b, less its part along n
     N      = N_0 + |n.F|                                                 (1)
     force  = -mu(|v|) N v / |v|     on a at its point, the opposite on b (2)
-           = -mu(|v|) N e           of the exact law, e of friction.heading
+           = -mu(|v|) N e           of the exact law, e of friction.heading in the plane
     dissipation = mu(|v|) N |v|                                          (3)
 
 F is the force that the contact exerts; mu is given by friction.coefficient.
@@ -16,6 +16,7 @@ from ..plugins import (
     HEADING_ROWS,
     PLANE,
     SLIP,
+    TANGENTIAL_ROWS,
     Force,
     JointFriction,
     Point,
@@ -34,6 +35,8 @@ from ..plugins import (
     sliding_series,
     slip,
     slip_series,
+    tangential,
+    tangential_series,
 )
 
 WAY = -1 - PLANE.count  # in par, the direction near which it slides
@@ -64,7 +67,7 @@ class ContactFriction(JointFriction, Force):
 
     joints = (PlaneContact,)
     markers = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("b", "normal_b"))
-    slots = 30 + HEADING_ROWS
+    slots = 30 + HEADING_ROWS + TANGENTIAL_ROWS
     place = PLANE
 
     @staticmethod
@@ -75,7 +78,7 @@ class ContactFriction(JointFriction, Force):
         v0, v1, v2 = v0 - off * x[12], v1 - off * x[13], v2 - off * x[14]
         if par[3] == 0.0:
             f = -par[-1] * sliding(v0 * v0 + v1 * v1 + v2 * v2, par)
-            v0, v1, v2 = heading(v0, v1, v2, par[WAY : WAY + 3], SLIP)
+            v0, v1, v2 = tangential(x[12], x[13], x[14], *heading(v0, v1, v2, par[WAY : WAY + 3], SLIP))
         else:
             f = -par[-1] * coefficient(v0 * v0 + v1 * v1 + v2 * v2, par)
         act(x, f * v0, f * v1, f * v2, 0.0, 0.0, 0.0, out)
@@ -100,7 +103,8 @@ class ContactFriction(JointFriction, Force):
         way = 13
         if par[3] == 0.0:
             s[22, k], way = -sliding_series(s, 16, 17, par, k), 19
-            s[19, k], s[20, k], s[21, k] = heading_series(s, 13, 30, par[WAY : WAY + 3], SLIP, k)
+            u0, u1, u2 = heading_series(s, 13, 30, par[WAY : WAY + 3], SLIP, k)
+            s[19, k], s[20, k], s[21, k] = tangential_series(s, 9, u0, u1, u2, 30 + HEADING_ROWS, k)
         else:
             s[22, k] = -coefficient_series(s, 16, 17, par, k)
         s[23, k], s[24, k], s[25, k] = scaled(s, way, 22, k)
@@ -122,6 +126,6 @@ class ContactFriction(JointFriction, Force):
         v0, v1, v2 = v0 - off * x[12], v1 - off * x[13], v2 - off * x[14]
         vv = v0 * v0 + v1 * v1 + v2 * v2
         if par[3] == 0.0:
-            e0, e1, e2 = heading(v0, v1, v2, par[WAY : WAY + 3], SLIP)
+            e0, e1, e2 = tangential(x[12], x[13], x[14], *heading(v0, v1, v2, par[WAY : WAY + 3], SLIP))
             return par[-1] * sliding(vv, par) * (e0 * v0 + e1 * v1 + e2 * v2)
         return par[-1] * coefficient(vv, par) * vv

@@ -153,8 +153,10 @@ def _joints(packed):
     """For each body and, last, the ground: (place in Packed.constraints, both bodies, rows) of what may hold it."""
     bodies, nb = {id(body): i for i, body in enumerate(packed.bodies)}, len(packed.bodies)
     holds, found, row = {kind: _holds(kind) for kind in classes(packed)}, [[] for _ in range(nb + 1)], 0
+    switched = () if packed.derived.switched is None else set(packed.derived.switched.tolist())
     for i, (constraint, given) in enumerate(zip(packed.constraints, packed.parameters, strict=True)):
-        if holds[type(constraint)] and not any(isinstance(value, Motion) for value in given):
+        moves = row in switched or any(isinstance(value, Motion) for value in given)
+        if holds[type(constraint)] and not moves:
             pair = tuple(bodies.get(id(body), nb) for body in (constraint.a, constraint.b))
             for body in set(pair):
                 found[body].append((i, pair, range(row, row + constraint.all_rows)))

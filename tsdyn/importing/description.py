@@ -168,7 +168,7 @@ class TendonItem:
 
 @dataclass(eq=False)
 class Coupling:
-    """q_follower = offset + the drivers' coordinates times their ratios, or + a polynomial of one driver's.
+    """q_follower = offset + the drivers' coordinates times their ratios, or + a polynomial of one driver's, or of none.
 
     Coordinates are named by (joint, index), the index being that of a universal joint's axis.
     """

@@ -267,22 +267,32 @@ def _add_loop(mujoco, model, data, i, found, names, report):
 
 
 def _add_coupling(model, i, found, names, report):
-    """A joint that follows a polynomial of another one; one that is held becomes fixed."""
+    """A joint that follows a polynomial of another one, or is held."""
     name, follower = names.of("equality", i), names.of("joint", int(model.eq_obj1id[i]))
-    a = np.trim_zeros(np.array(model.eq_data[i, :5]), "b")
-    if int(model.eq_obj2id[i]) < 0 and not model.eq_data[i, 0]:
-        for joint in found.joints:
-            if joint.name == follower:
-                joint.kind = "fixed"
-        report.note(f"{name}: the joint {follower} is held")
-    elif int(model.eq_obj2id[i]) < 0:
-        report.leave("joint that is held off its start", name, f"({follower}, {model.eq_data[i, 0]:g})")
+    a = np.array(model.eq_data[i, :5])
+    if int(model.eq_obj2id[i]) < 0:
+        _hold(found, name, follower, float(a[0]), report)
     else:
-        driver = names.of("joint", int(model.eq_obj2id[i])), 0
-        polynomial = tuple(a.tolist()) if len(a) > 2 else ()
-        offset, ratio = (*a.tolist(), 0.0, 0.0)[:2]
-        found.couplings.append(Coupling(name, (follower, 0), (driver,), (ratio,), offset, polynomial))
-        _note_offset(name, offset, report)
+        _follow(found, name, follower, names.of("joint", int(model.eq_obj2id[i])), a, report)
+
+
+def _hold(found, name, held, at, report):
+    """A joint that is held at its start becomes fixed; elsewhere it depends on nothing."""
+    if at:
+        found.couplings.append(Coupling(name, (held, 0), (), (), at))
+    else:
+        next(joint for joint in found.joints if joint.name == held).kind = "fixed"
+        report.note(f"{name}: the joint {held} is held")
+    _note_offset(name, at, report)
+
+
+def _follow(found, name, follower, driver, a, report):
+    """A joint that follows the polynomial a_0 + a_1 q + ... of another one."""
+    polynomial = np.trim_zeros(a, "b").tolist() if a[2:].any() else ()
+    found.couplings.append(
+        Coupling(name, (follower, 0), ((driver, 0),), (float(a[1]),), float(a[0]), tuple(polynomial))
+    )
+    _note_offset(name, float(a[0]), report)
 
 
 def _note_offset(name, offset, report):
@@ -301,8 +311,14 @@ def _add_tendon_coupling(mujoco, model, data, i, found, names, report):
         _note_offset(name, float(a[0]), report)
         return
     one, other = (_coefficients(mujoco, model, int(t[i]), names) for t in (model.eq_obj1id, model.eq_obj2id))
+    if not other:
+        a[1:] = 0.0
+    if one and other and len(one) == len(other) == 1 and a[2:].any() and all(one.values()):
+        ((follower, c),), ((driver, d),) = one.items(), other.items()  # c q = a0 + a1 d q' + a2 (d q')^2 + ...
+        _follow(found, name, follower, driver, a * d ** np.arange(5) / c, report)
+        return
     if one is None or other is None or a[2:].any():
-        report.leave("equality of tendons", name, "(around geoms, of two through sites, or by a polynomial)")
+        report.leave("equality of tendons", name, "(around geoms, of two through sites, or by a polynomial of several)")
         return
     # sum c q = a0 + a1 sum d q, solved for the joint of the largest coefficient
     terms = dict(one)
@@ -310,10 +326,13 @@ def _add_tendon_coupling(mujoco, model, data, i, found, names, report):
         terms[joint] = terms.get(joint, 0.0) - a[1] * d
     follower = max(terms, key=lambda joint: abs(terms[joint]))
     drivers = {joint: -c / terms[follower] for joint, c in terms.items() if joint != follower and c}
-    if not terms[follower] or not drivers:
-        report.leave("equality of tendons", name, "(of one joint alone)")
+    if not terms[follower]:
+        report.leave("equality of tendons", name, "(of no joint)")
         return
     offset = float(a[0] / terms[follower])
+    if not drivers:
+        _hold(found, name, follower, offset, report)
+        return
     drivers, ratios = tuple((joint, 0) for joint in drivers), tuple(float(c) for c in drivers.values())
     found.couplings.append(Coupling(name, (follower, 0), drivers, ratios, offset))
     _note_offset(name, offset, report)

@@ -21,9 +21,11 @@ from ..constraints.parallel import Parallel
 from ..constraints.planar import Planar
 from ..constraints.revolute import Revolute
 from ..constraints.rope import Rope
+from ..constraints.rotation_motor import RotationMotor
 from ..constraints.screw import Screw
 from ..constraints.spherical import Spherical
 from ..constraints.stop import Stop
+from ..constraints.translation_motor import TranslationMotor
 from ..constraints.translational import Translational
 from ..constraints.universal import Universal
 from ..elements.bodies import rotation_matrix
@@ -149,6 +151,7 @@ def _close(scene: Scene, report: ImportReport) -> float:
 
 WHAT = "joint that mimics another one"
 COORDINATES = {"revolute": "angle", "prismatic": "displacement", "screw": "angle", "universal": "angle"}
+MOTORS = {"angle": RotationMotor, "displacement": TranslationMotor}
 
 
 def couple(scene, description, made, report):
@@ -160,8 +163,13 @@ def couple(scene, description, made, report):
             joints = [(made[name][0], COORDINATES[made[name][1]], index) for name, index in names]
             given = {"polynomial": coupling.polynomial} if coupling.polynomial else {}
             given = given or {"ratio": _plain(coupling.ratios), "offset": coupling.offset}
+            name = unused(scene, coupling.name)
             try:
-                scene.add(Coupler(*joints, **given, name=unused(scene, coupling.name)))
+                if coupling.drivers:
+                    scene.add(Coupler(*joints, **given, name=name))
+                else:
+                    joint, coordinate, _ = joints[0]
+                    scene.add(MOTORS[coordinate].of(joint, **{coordinate: coupling.offset}, name=name))
             except InvalidConstraint as error:
                 reason = str(error)
         if reason:

@@ -277,19 +277,17 @@ def gather(description, report):
     coupled = {name for each in description.couplings for name, _ in (each.follower, *each.drivers)}
 
     def joins(first, second):
-        return _joins(first, second) and coupled.isdisjoint((first.name, second.name))
+        alone = coupled.isdisjoint((first.name, second.name)) and not (first.armature or second.armature)
+        return alone and _joins(first, second)
 
     for first, link, second in _pairs(description, joints, joins):
         slides = [*_slides(first), *_slides(second)]
-        for joint in (first, second):
-            _leave_armature(joint, report)
         second.kind, second.slides = "translations", slides
         second.servos = first.servos + second.servos  # without counterpart there, so listed
         second.stiffness = second.damping = second.free = second.load = 0.0
         second.name = ", ".join(slide.name for slide in slides)
         _drop(description, joints, first, link)
     for first, link, second in _pairs(description, joints, _is_planar):
-        _leave_armature(first, report)
         second.kind, second.slides = "planar", first.slides
         for servo in first.servos:
             report.leave("actuator", servo.name)
@@ -301,12 +299,6 @@ def gather(description, report):
     description.frames = {
         name: (owner, at) for name, (owner, at) in description.frames.items() if owner in joints
     }  # fmt: skip
-
-
-def _leave_armature(joint, report):
-    if joint.armature:
-        report.leave("armature of a slide in a plane or in space", joint.name, f"{joint.armature:g}")
-    joint.armature = 0.0
 
 
 def _pairs(description, joints, fits):

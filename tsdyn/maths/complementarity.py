@@ -1,7 +1,10 @@
 """Complementarity: 0 <= z, w = M z + q >= 0, z.w = 0 with symmetric M, by an active set; with Coulomb's cone."""
 
+import math
+
 import numpy as np
 
+from ..jit.kernels import entry, kernel, stack
 from .tolerances import (
     CONE_FACTORS,
     CONE_LEFT,
@@ -181,6 +184,73 @@ def solve_cone(G, b, mu, slip=None, given=None, bounds=()):
     return None, np.zeros(k, int)
 
 
+CONE, KNOWN, BALL = 0, 1, 2  # of a contact, of one whose T follows from N, of a force of friction alone
+
+
+@kernel
+def _image(kind, mu, given, d, y):
+    """The right-hand sides of Eqs. (1), (2) of one contact, for its y (3,)."""
+    if kind == BALL:
+        share = min(1.0, given / max(math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2]), TINY))
+        return share * y[0], share * y[1], share * y[2]
+    N = max(0.0, y[0])
+    bound, length = mu * (N + given), math.hypot(y[1], y[2])
+    if kind == KNOWN:
+        return N, -bound * d[0], -bound * d[1]
+    share = bound / length if length > bound else 1.0
+    return N, share * y[1], share * y[2]
+
+
+@entry("vvmwmm")
+def _images(mu, given, d, kinds, y, out):
+    """The same of all contacts, out (k, 3) for y (k, 3)."""
+    for i in range(kinds.size):
+        out[i, 0], out[i, 1], out[i, 2] = _image(kinds[i], mu[i], given[i], d[i], y[i])
+
+
+@entry("vvmwmvvvi")
+def _sweep(mu, given, d, kinds, G, b, sizes, p, sweeps):
+    """Sweeps of Eqs. (1), (2) over the contacts in turn, p in place; sizes (k,): norms of diagonal blocks of G."""
+    y = stack(3)
+    for _ in range(sweeps):
+        for i in range(kinds.size):
+            for c in range(3):
+                u = b[3 * i + c]
+                for j in range(p.size):
+                    u += G[3 * i + c, j] * p[j]
+                y[c] = p[3 * i + c] - u / sizes[i]
+            p[3 * i], p[3 * i + 1], p[3 * i + 2] = _image(kinds[i], mu[i], given[i], d[i], y)
+
+
+@entry("vvmwmm")
+def _slope(mu, given, d, kinds, y, D):
+    """D (3 k, 3 k), zero on entry: the derivative of Eqs. (1), (2) by y (k, 3), of one branch at a kink."""
+    for i in range(kinds.size):
+        o, pushes = 3 * i, 1.0 if y[i, 0] > 0.0 else 0.0
+        # Of a ball I, or bound / |y| (I - e e^T); of a cone the same in two directions
+        first = 0 if kinds[i] == BALL else 1
+        square = 0.0
+        for c in range(first, 3):
+            square += y[i, c] * y[i, c]
+        length, bound = math.sqrt(square), given[i]
+        if first == 1:
+            D[o, o], bound = pushes, mu[i] * (max(y[i, 0], 0.0) + given[i])
+        if kinds[i] == KNOWN:
+            D[o + 1, o], D[o + 2, o] = -mu[i] * pushes * d[i, 0], -mu[i] * pushes * d[i, 1]
+            continue
+        slides = length > bound
+        for c in range(first, 3):
+            D[o + c, o + c] = bound / length if slides else 1.0
+            if slides:
+                if first == 1:
+                    D[o + c, o] = mu[i] * pushes * y[i, c] / length
+                for e in range(first, 3):
+                    D[o + c, o + e] -= bound / length * (y[i, c] / length) * (y[i, e] / length)
+
+
+CONES = _images, _sweep, _slope
+
+
 class _Problem:
     """One problem in scaled units; arguments as of `solve_cone`."""
 
@@ -190,21 +260,16 @@ class _Problem:
         if slip is not None:
             known[: len(slip)] = np.isfinite(slip).all(axis=1)
         self.known = (known | (mu == 0.0)) & ~self.balls  # T follows from N
-        self.direction = np.zeros((mu.size, 2))
+        direction = np.zeros((mu.size, 2))
         if slip is not None:
-            self.direction[known] = slip[known[: len(slip)]]
+            direction[known] = slip[known[: len(slip)]]
+        kinds = np.where(self.balls, BALL, np.where(self.known, KNOWN, CONE))
+        self.laws = mu, given, direction, kinds
 
-    def image(self, y, contacts=slice(None)):
+    def image(self, y):
         """Right-hand sides of Eqs. (1), (2) (k, 3) for y (k, 3)."""
-        mu, known, d = self.mu[contacts], self.known[contacts], self.direction[contacts]
-        N = np.maximum(0.0, y[:, 0])
-        bound, length = mu * (N + self.given[contacts]), np.hypot(y[:, 1], y[:, 2])
-        share = np.where(length > bound, bound / np.where(length > 0.0, length, 1.0), 1.0)
-        T = np.where(known[:, None], -bound[:, None] * d, share[:, None] * y[:, 1:])
-        found, balls = np.column_stack([N, T]), self.balls[contacts]
-        if balls.any():
-            size = np.linalg.norm(y[balls], axis=1)
-            found[balls] = y[balls] * np.minimum(1.0, self.given[contacts][balls] / np.maximum(size, TINY))[:, None]
+        found = np.empty_like(y)
+        _images(*self.laws, y, found)
         return found
 
     def residual(self, p, factor=1.0):
@@ -215,24 +280,7 @@ class _Problem:
     def slope(self, y):
         """The derivative (3 k, 3 k) of the right-hand sides by y, of one branch at a kink."""
         D = np.zeros((y.size, y.size))
-        for i, (n, *t) in enumerate(y):
-            o, mu, pushes = 3 * i, self.mu[i], float(n > 0.0)
-            if self.balls[i]:
-                size, bound = np.linalg.norm(y[i]), self.given[i]
-                e = y[i] / max(size, TINY)
-                part = np.eye(3) if size <= bound else bound / size * (np.eye(3) - np.outer(e, e))
-                D[o : o + 3, o : o + 3] = part
-                continue
-            D[o, o] = pushes
-            length, bound = np.hypot(*t), mu * (max(n, 0.0) + self.given[i])
-            if self.known[i]:
-                D[o + 1 : o + 3, o] = -mu * pushes * self.direction[i]
-            elif length <= bound:
-                D[o + 1, o + 1] = D[o + 2, o + 2] = 1.0
-            else:
-                e = np.array(t) / length
-                D[o + 1 : o + 3, o] = mu * pushes * e
-                D[o + 1 : o + 3, o + 1 : o + 3] = bound / length * (np.eye(2) - np.outer(e, e))
+        _slope(*self.laws, y, D)
         return D
 
     def newton(self, p, factor, left):
@@ -267,13 +315,9 @@ class _Problem:
 
     def swept(self, p, sweeps):
         """p after sweeps of Eqs. (1), (2) over the contacts in turn."""
-        p = p.copy()
-        rows = [slice(3 * i, 3 * i + 3) for i in range(self.mu.size)]
-        lengths = [np.linalg.norm(self.G[r, r], 2) for r in rows]
-        for _ in range(sweeps):
-            for i, r in enumerate(rows):
-                u = self.G[r] @ p + self.b[r]
-                p[r] = self.image((p[r] - u / (lengths[i] or 1.0))[None], [i])[0]
+        p, k = p.copy(), self.mu.size
+        sizes = np.linalg.norm(self.G.reshape(k, 3, k, 3)[range(k), :, range(k)], 2, axis=(1, 2))
+        _sweep(*self.laws, self.G, self.b, np.where(sizes > 0.0, sizes, 1.0), p, sweeps)
         return p
 
     def modes(self, p):

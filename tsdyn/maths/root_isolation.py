@@ -257,7 +257,8 @@ def survey(sample, a, first, b, degree, noise):
     -------
     Survey
     """
-    samples = np.concatenate((first[None], sample(_points(degree, a, b)[1:])))
+    samples = np.empty((degree + 2, first.size))  # in the order that the kernel is compiled for
+    samples[0], samples[1:] = first, sample(_points(degree, a, b)[1:])
     while True:
         grid, out = table(degree), np.zeros((first.size, 4))
         scratch = np.empty((2, grid.fine.size))

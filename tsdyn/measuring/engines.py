@@ -20,6 +20,7 @@ from ..errors import InvalidArgument, MissingDependency, StepFailure
 from ..validation import floats
 
 OUTPUTS = 200
+OPENS = "it opens and closes, at events that other engines have not: leave it out, or closed by unilateral=False"
 
 
 class EngineMotion(NamedTuple):
@@ -67,7 +68,7 @@ class Engine:
             if any(not isinstance(value, (int, float)) for part in item.parts for value in part.parameters())
         ]
         changing = [
-            (item, "it opens and closes" if getattr(item, "unilateral", False) else "it is switched off")
+            (item, OPENS if getattr(item, "unilateral", False) else "it is switched off")
             for item in (*scene.constraints, *scene.forces)
             if getattr(item, "unilateral", False) or not item.active
         ]

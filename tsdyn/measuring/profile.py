@@ -21,8 +21,8 @@ from ..model.handles import has_rates
 from ..observables.state import remembered
 from ..runs.task import interval, state_arrays
 from ..simulation import prepared_run
-from ..simulation.phase_scenes import demand_bilateral
-from ..simulation.prepared_run import DRIVERS, simulate
+from ..simulation.phase_scenes import at_start
+from ..simulation.prepared_run import DRIVERS, Run, simulate
 from ..simulation.run_options import OPTIONS, from_names
 from ..simulation.scene import Scene
 from ..simulation.scene_cache import prepared
@@ -31,6 +31,7 @@ from ..taylor.layout import lacking, without_series
 from . import tolerances as limits
 from .benchmark import COLOURS, poses
 from .phase_times import Phase, Timing, calibrate, duration, phases
+from .run_phases import GROUPS, Stopwatch
 from .tolerances import FEWEST, LONG, MOST, RESOLUTION, SAMPLE
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ SKIPPED = {
     "forces_skipped": "evaluations without forces",
 }
 COUNTS = "steps", "rejected", "evaluations", "placements", "factorizations", "charts"
-OUTSIDE = "Python", "outputs", "choice of the method"  # of the compiled driver
+OUTSIDE = "Python", "outputs", "choice of the method", *GROUPS[1:]  # of the compiled driver
 
 
 @dataclass(eq=False, repr=False)
@@ -134,7 +135,10 @@ class Profile(Tabulated):
             f"the phases add up to {100.0 * self.accounted:.0f} % of the compiled driver's {duration(self.driver)}.",
             "",
         ]
-        if " and " in solution.method:
+        if solution._phases is not None:
+            counted = f"{len(solution.phases)} phases, {len(solution.impulses)} impulses;"
+            above[3] = f"{counted} the compiled driver takes {duration(self.driver)}."
+        elif " and " in solution.method:
             kind = type(self.method).__name__
             above.insert(3, f"it turns from one to the other; calls and phases are those of {kind} alone;")
         notes = {"Once for a scene": [", ".join(f"{name} {duration(x)}" for name, x in self.once.items())]}
@@ -189,6 +193,9 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     compiled driver, and once with timers in place of the kernels that the driver calls. Parts of these kernels, such as
     constraint rows and each force, are timed by repetition at the final state, and counted. Other runs pay nothing.
 
+    Of a run with contacts, exact friction or events with an action, phases are those of its Python code: steps of the
+    compiled driver as a whole, searches for events, impacts, what holds after them, and packing.
+
     Parameters
     ----------
     scene : Scene
@@ -220,7 +227,6 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
         raise InvalidArgument("profile times compiled kernels, and with TSDYN_DEBUG=1 there are none.")
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
-    demand_bilateral(scene, "profile")
     for name in options:
         if name == "progress":
             raise InvalidArgument("profile makes many runs and has no progress; leave progress out.")
@@ -237,6 +243,9 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     if not end > start:
         solution.raise_if_failed()
     wanted, call = from_names({"t_span": t_span, **options})
+    run = Run(scene, wanted)
+    if run._has_phases(call):
+        return _of_phases(run, solution, (t_span, options), seconds, loaded, advice)
     method = _method(scene, solution, wanted)
     asked = {name: options[name] for name in OUTPUTS if not (options.get(name) is None or options[name] is False)}
     plain = {name: value for name, value in options.items() if name not in (*OUTPUTS, "integrator", "rtol", "atol")}
@@ -256,6 +265,30 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     once = _once(scene.copy(), method, wanted, call.state, start)
     result = Profile(scene, solution, method, (start, end), least["asked"], driver, tuple(found), orders, once, loaded)
     result.advice = advise(result, plain, options) if advice else ()
+    return result
+
+
+def _of_phases(run, solution, call, seconds, loaded, advice):
+    """The `Profile` of a run with phases, call: its interval and options, of which a call took these seconds."""
+    scene, least, best, began, rounds = run.scene, np.inf, (np.inf, None), time.perf_counter(), 0
+    while rounds < (FEWEST if seconds < LONG else 1) or (rounds < MOST and time.perf_counter() - began < 2 * SAMPLE):
+        least, rounds = min(least, timed(scene, *call)[1]), rounds + 1
+        with Stopwatch().watching() as watch:
+            _, spent = timed(scene, *call)
+        best = min(best, (spent, watch), key=lambda pair: pair[0])
+    spent, watch = best
+    found = watch.phases(solution)
+    found.append(
+        Phase("Python", "arguments, outputs, the solution", 1, max(spent - sum(p.seconds for p in found), 0.0))
+    )
+    bare, began = copy.copy(scene), time.perf_counter()
+    bare.touch()
+    Run(bare, run.options)
+    once = {"packing of the first phase": time.perf_counter() - began}
+    span, options = (solution.span[0], solution.reached), call[1]
+    result = Profile(scene, solution, run.method, span, least, watch.driver, tuple(found), (), once, loaded)
+    plain = {name: value for name, value in options.items() if name not in ("t_eval", "dense_output")}
+    result.advice = advise(result, {**plain, "t_eval": span}, options) if advice else ()
     return result
 
 
@@ -351,7 +384,7 @@ def timed(scene, t_span, options):
 
 def advise(profile, plain, options):
     """Advice, a tuple of sentences; plain, options: those of the call with two outputs, and of the call as it is."""
-    said = [*_about_outputs(profile), *_parts(profile), *_steps(profile)]
+    said = [*_about_outputs(profile), *_parts(profile), *_steps(profile), *_impacts(profile)]
     if not profile.solution.success:
         return (f"The run ended early: {profile.solution.message}", *said)
     try:
@@ -416,6 +449,17 @@ def _steps(profile):
         )
 
 
+def _impacts(profile):
+    times, (start, end) = np.array([t for t, *_ in profile.solution.impulses]), profile.span
+    if times.size and profile.share("events") >= limits.EVENTS:
+        low, high = np.quantile(times, (0.25, 0.75))
+        if high - low < limits.CROWDED * (end - start):
+            yield (
+                f"Half of the {times.size} impulses lie between t = {low:.9g} and {high:.9g} s, and events take "
+                f"{_percent(profile.share('events'))} of the call: a lower restitution ends such a series sooner."
+            )
+
+
 def _alternatives(profile, plain, options, limit):
     """The alternatives that are faster than the limit, s."""
     method, solution, astray = profile.method, profile.solution, []
@@ -448,7 +492,10 @@ def _changes(profile, plain, options):
     if method.step is None:
         if solution.stats.stiff and not method.implicit:
             form = FORMULATIONS[plain.get("formulation", "tangent")]
-            yield "The motion is stiff: {} is", {"integrator": implicit(method, prepared(profile.scene), form)}
+            yield (
+                "The motion is stiff: {} is",
+                {"integrator": implicit(method, prepared(at_start(profile.scene)), form)},
+            )
         looser = copy.copy(method)
         looser.rtol, looser.atol = limits.LOOSER * method.rtol, limits.LOOSER * method.atol
         if max(looser.rtol, looser.atol) <= limits.LOOSEST:
@@ -474,7 +521,7 @@ def _allowed(integrator, method):
 def _series(profile, plain, limit):
     """The reason why the scene has no Taylor series, and the time of a run without the forces at fault."""
     scene, method = profile.scene, profile.method
-    packed = prepared(scene).packed
+    packed = prepared(at_start(scene)).packed
     found, names = lacking(packed), without_series(packed)
     if method.driver == "series" or not found:
         return

@@ -19,7 +19,9 @@ BRIEF, ROUNDS = 2e-3, 5
 RESOLUTION = 1e-9
 
 # --- advice: shares of the call above which a part is mentioned ---
-CHARTS, OUTPUTS, PYTHON, FORCE, REJECTED, CAPPED = 0.03, 0.1, 0.3, 0.25, 0.2, 0.5
+CHARTS, OUTPUTS, PYTHON, FORCE, REJECTED, CAPPED, EVENTS = 0.03, 0.1, 0.3, 0.25, 0.2, 0.5, 0.25
+# Share of the interval that half of the impulses lie within, below which they are a series that ends.
+CROWDED = 0.1
 # An alternative is advised if it is faster by the first factor; costs of a first call, if they exceed so many calls.
 QUICKER, ONCE = 1.2, 3.0
 # Looser tolerances: factor, and upper bound.

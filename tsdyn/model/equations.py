@@ -218,6 +218,16 @@ def evaluate_constraints(s, q, qd, t, Phi, Phi_q, Phi_t, gamma):
     acceleration_bias(s, q, qd, t, gamma)
 
 
+def constraint_arrays(system, q, qd, t, width=None):
+    """Return Phi, Phi_q, Phi_t and gamma by the kernels; width: length of short rows."""
+    system = system._replace(reals=system.reals.copy())  # kernels write motions there
+    lines, n = system.segments.shape[0], width or q.size
+    m = lines - (system.tails.size if width else 0)
+    Phi, Phi_q, Phi_t, gamma = np.zeros(m), np.zeros((lines, n)), np.zeros(m), np.zeros(m)
+    evaluate_constraints(system, q, qd, float(t), Phi, Phi_q, Phi_t, gamma)
+    return Phi, Phi_q, Phi_t, gamma
+
+
 @entry(no_system(), "mmmm")
 def _fill_inertia_rows(s, q, qd, h, gamma):
     """h (k, 14 i) and gamma (k, i) of the inertia rows at states q, qd (k, n)."""

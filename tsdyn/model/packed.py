@@ -86,6 +86,7 @@ class Derived:
     """Of one `Packed`: each entry is None, or empty, until the function named beside it has been called."""
 
     redundant: object = None  # int64 (k,): redundant rows of the constraint graph; constraint_graph.set_redundant
+    switched: object = None  # int64 (k,): of a phase, rows of Phi that may hold frictions; those that don't: redundant
     turning: set = field(default_factory=set)  # bodies that count as turning; locked_orientations.keep_turning
     handles: object = None  # handles.handles_of
     body_indices: dict = None  # handles.index_of
@@ -137,11 +138,11 @@ class Derived:
 
     def __reduce__(self):
         """In another process: what doesn't depend on where things are in memory."""
-        return _of, (self.redundant, self.turning, self.handles)
+        return _of, (self.redundant, self.switched, self.turning, self.handles)
 
 
-def _of(redundant, turning, handles):
-    return Derived(redundant, turning, handles)
+def _of(redundant, switched, turning, handles):
+    return Derived(redundant, switched, turning, handles)
 
 
 WIDTH = 14  # floats of a short row of Phi_q; those of body b begin in the middle

@@ -14,7 +14,7 @@ from ..jit.interrupts import CollectionsDeferred
 from ..jit.kernels import entry, resident, twin
 from ..maths.dense_linalg import dependent, farthest_first, sparse_lu
 from ..maths.tolerances import COMPLEX_STEP, PIVOT_ROUNDING, RANK_TOL, ROUNDING, SUM_ROUNDING, TINY
-from ..model.equations import WIDTH, added_inertia, as_csr, evaluate_constraints, set_time, with_short_rows
+from ..model.equations import WIDTH, added_inertia, as_csr, constraint_arrays, set_time, with_short_rows
 from ..model.packed import Derived, coupled_loads
 from ..rows.constraint_graph import REDUCED, by_lengths, coordinate_scales, graph_of
 from ..rows.interface import allocate_tangent, redundant_of, select_rows
@@ -297,16 +297,6 @@ def _dense_solver(M, Phi_q):
     if kkt.size and np.linalg.cond(scaled) > 1.0 / SUM_ROUNDING:
         return None
     return lambda load, gamma: np.linalg.solve(scaled, np.concatenate((load, -gamma)) * scale) * scale
-
-
-def constraint_arrays(system, q, qd, t, width=None):
-    """Return Phi, Phi_q, Phi_t and gamma by the kernels; width: length of short rows."""
-    system = system._replace(reals=system.reals.copy())  # kernels write motions there
-    lines, n = system.segments.shape[0], width or q.size
-    m = lines - (system.tails.size if width else 0)
-    Phi, Phi_q, Phi_t, gamma = np.zeros(m), np.zeros((lines, n)), np.zeros(m), np.zeros(m)
-    evaluate_constraints(system, q, qd, float(t), Phi, Phi_q, Phi_t, gamma)
-    return Phi, Phi_q, Phi_t, gamma
 
 
 def mass_matrix(system, q):

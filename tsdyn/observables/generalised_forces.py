@@ -5,11 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.bodies import transform_g
-from ..elements.element import AngleGeometry
+from ..elements.element import AngleGeometry, to_ground
 from ..elements.laws import SceneLaw
 from ..elements.loads import STATE, ByState
 from ..jit.kernels import entry
-from ..maths.vectors import to_ground
 from ..model.equations import added_inertia, applied_forces, recall, set_time
 from ..model.handles import BodyMotion, angle, displacement, handles_of
 from ..model.laws import interrupts_answered

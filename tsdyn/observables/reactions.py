@@ -25,7 +25,7 @@ from ..maths.tolerances import LAST_PLACE, RANK_TOL, TINY
 from ..model.equations import WIDTH, added_inertia, constraint_jacobian, recall, set_time, with_short_rows
 from ..model.handles import classes, first_rows, handles_of, index_of
 from ..model.packed import member_of, no_system
-from ..rows.constraint_graph import REDUCED, graph_of
+from ..rows.constraint_graph import REDUCED, graph_of, redundant_rows
 from ..rows.interface import (
     METRIC,
     Rows,
@@ -36,8 +36,10 @@ from ..rows.interface import (
     factorise_rows,
     mark_redundant,
     redundancy,
+    reset_selection,
     self_stress,
     weigh_bodies,
+    with_all_rows,
 )
 from ..workspaces import arrays_of, load_parts, parts
 from .generalised_forces import applied_loads, force_loads, inertial_forces, velocity_forces
@@ -59,12 +61,15 @@ class RowParts:
     graph : ConstraintGraph
     n : int
         Coordinates.
+    selects : bool
+        Whether redundant rows are selected anew where that is needed.
     """
 
-    def __init__(self, system, graph, n):
-        self.source, self.graph = system, graph
+    def __init__(self, system, graph, n, selects=True):
+        self.source, self.graph, self.selects = system, graph, selects
         self.system = system._replace(reals=system.reals.copy())
-        whole = parts(self.system, graph, n)
+        whole = parts(self.system, graph if selects else with_all_rows(graph), n)
+        reset_selection(graph, whole.tangent)
         self._images = [(array, array.copy()) for array in arrays_of((whole.work, whole.tangent)) if array.size]
         self.address, *self._keep = resident(whole)
 
@@ -88,14 +93,15 @@ def taken(packed, n):
     except IndexError:
         found = None
     if found is None or found.graph is not graph or found.source is not system:
-        return RowParts(system, graph, n)
+        return RowParts(system, graph, n, packed.derived.switched is None)
     found.enter()
     return found
 
 
 def give(packed, found):
     """Take back one that is no longer in use, unless it is large, or has room to select rows again."""
-    if not packed.derived.row_parts and redundancy(found.graph) == 0 and found.size < KEPT_FLOATS:
+    fixed = redundancy(found.graph) == 0 or not found.selects
+    if not packed.derived.row_parts and fixed and found.size < KEPT_FLOATS:
         packed.derived.row_parts.append(found)
 
 
@@ -215,6 +221,9 @@ def balancing(packed, t, q, f, memory=None):
     memory = np.zeros((t.size, 0)) if memory is None else memory
     solve_multipliers(found.address, t, q, f, memory, np.zeros((len(found.system.segments), WIDTH)), out)
     give(packed, found)
+    if packed.derived.switched is not None:  # rows of frictions that slide carry nothing, unless none has multipliers
+        off = np.isin(np.arange(out.shape[1]), redundant_rows(packed))
+        out[:, off] = np.where(np.isnan(out[:, ~off]).any(axis=1), np.nan, 0.0)[:, None]
     return out
 
 
@@ -469,7 +478,7 @@ def _free_loads(context, t, q, whole, out):
 def demand_unique(packed, q, t):
     """Raise RedundantConstraints if a friction depends on a reaction that isn't unique at q."""
     graph = graph_of(packed, REDUCED)
-    if not (redundancy(graph) and len(graph.frictions)):
+    if packed.derived.switched is not None or not (redundancy(graph) and len(graph.frictions)):
         return
     system = packed.system._replace(reals=packed.system.reals.copy())
     context, *_keep = resident(parts(system, graph, q.size))

@@ -8,12 +8,13 @@ from ..elements.element import address
 from ..elements.loops.constraint_rows import BODY, INTS, PAIR, ROW, STILL
 from ..errors import InvalidConstraint
 from ..jit.kernels import Record, kernel, records, row_of
+from ..model.equations import WIDTH, constraint_arrays, places, with_short_rows
 from ..model.handles import first_rows
 from ..model.packed import FrictionPlace, frictions_of, has_lengths, is_small
 from .elimination import with_kernels
 from .inertia_rows import AXIS_OWN, MasslessAxes, Share, axes_of, inverses, lean_bodies, levers, no_axes
 from .symbolic import Pattern, analyse
-from .tolerances import FAN, LARGEST, LEAF, LEAST_SHARE, UNEQUAL_MASSES
+from .tolerances import FAN, LARGEST, LEAF, LEAST_SHARE, NO_ARM, UNEQUAL_MASSES
 
 # The constraint graph of a scene for the basis-free forms: rows, bodies, and the addresses of their products.
 #
@@ -122,16 +123,38 @@ def is_raised(graph):
 #
 #     |x|^2 = sum |dr|^2 + L^2 |w'|^2
 #
-# L is the longest arm of a body's joints, m.
+# L is the longest arm of a body's joints, m. Where all of these are next to nothing, rows may still have arms that no
+# point shows: the radius of a wheel, the way along a guide, the lead of a screw. L is then the longest of those,
+# |Phi_w'| / |Phi_r| of a row and a body at the start.
 
 MASS_REMEDY = "Give light bodies that carry heavy ones more mass, or make them one body with what they carry."
 
 
 def arms(packed):
-    """L of each body, (bodies,), m: no less than a share of the longest; one in a scene without arms."""
+    """L of each body, (bodies,), m: no less than a share of the longest; one in a scene without lengths."""
     found = levers(packed)
-    longest = found.max(initial=0.0)
-    return np.maximum(found, LEAST_SHARE * longest) if longest > 0.0 else np.ones(found.size)
+    longest, shown = found.max(initial=0.0), _longest_shown(packed)
+    return np.maximum(found, LEAST_SHARE * longest if longest > NO_ARM * shown else shown or 1.0)
+
+
+def _longest_shown(packed):
+    """The largest |Phi_w'| / |Phi_r| of a row and a body at the start, m; zero where no row has both."""
+    system, q = with_short_rows(packed), np.concatenate([body.q for body in packed.bodies])
+    system = system._replace(motions=system.motions[:0], signals=system.signals[:0])  # at no time
+    halves = constraint_arrays(system, q, np.zeros_like(q), 0.0, WIDTH)[1].reshape(-1, 2, WIDTH // 2)
+    at, length = places(packed)
+    rows = np.concatenate((np.arange(len(packed.system.segments)), system.tails))
+    rigid = length == 7
+    # Terms of a row on the same body add up
+    keys, term_of = np.unique((q.size * rows[:, None] + at)[rigid], return_inverse=True)
+    sums = np.zeros((keys.size, WIDTH // 2))
+    np.add.at(sums, term_of, halves[rigid])
+    # Phi_p = 2 Phi_w' G, and a part along p
+    p = q[(keys % q.size)[:, None] + np.arange(3, 7)]
+    across = sums[:, 3:] - np.einsum("ki,ki->k", sums[:, 3:], p)[:, None] * p
+    move, turn = np.linalg.norm(sums[:, :3], axis=1), 0.5 * np.linalg.norm(across, axis=1)
+    both = (move > 0.0) & np.isfinite(move) & np.isfinite(turn)  # neither where a row is singular
+    return float((turn[both] / move[both]).max(initial=0.0))
 
 
 def coordinate_scales(packed):

@@ -128,6 +128,11 @@ def allocate_tangent(graph, n, redundant=False, basis=False):
     return with_reselection(graph, tangent) if redundant else tangent
 
 
+def with_all_rows(graph):
+    """The graph without redundant rows: of a workspace in which those of phases are selected, and no others."""
+    return graph._replace(dropped=graph.dropped[:0])
+
+
 def allocate_rows(graph):
     """Allocate `Rows`."""
     size, inertias = 16 * len(graph.sides), zeros(INERTIA_WIDTH * len(graph.inertias))

@@ -23,6 +23,9 @@ HELD = 2e-10
 # are themselves rounding, and rotations of bodies with short arms, or none, are as visible as the longest allow. Pivots
 # are squares of it, far above rounding.
 LEAST_SHARE = 1e-3
+# The longest arm of a scene over the longest that its rows show: below it points are off the centroids by rounding.
+# Rotations would weigh a million times as much as translations: rows would depend on each other to six digits.
+NO_ARM = 1e-6
 # Velocities of a scene at rest over those of a fall through its extent under its loads; rates over that extent (1/s, or
 # 1/s^2 for accelerations): smaller ones are rounding.
 RESTING, NO_RATE = 1e-9, 1e-20

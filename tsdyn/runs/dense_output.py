@@ -225,6 +225,7 @@ def read(context, run, t, rows, blocks, charts, points, out):
     for i in range(t.size):
         # Every time begins at the same state of its chart
         block = blocks[rows[i]]
+        recall(c.system, block)  # rows that hold frictions depend on it
         if int(block[B_CHART]) == chart:
             bring_back(c, r.warm)
         else:
@@ -239,7 +240,6 @@ def read(context, run, t, rows, blocks, charts, points, out):
                 return status
             keep(c, r.warm)
         # The state at t
-        recall(c.system, block)
         status = between(context, c, r, t[i], block)
         if status != 0:
             return status
@@ -343,6 +343,8 @@ class TrajectoryReading:
     system: object  # the `System` as it was run
     shift: int  # from a step to the block that ends with the angles at its start
     degree: int  # power of two, of a polynomial that can be expected to follow a function of the states in a step
+    leave: object = None  # a kernel in place of `accelerate_here`, which leaves accelerations out
+    begin: object = None  # what a context of the workspace begins with, a function, where phases share their readers
     idle: list = field(default_factory=list)  # a `Reader` that is not in use
 
     def reader(self):
@@ -350,8 +352,11 @@ class TrajectoryReading:
         try:
             found = self.idle.pop()
         except IndexError:
-            return Reader(self)
-        found.enter(self.system)
+            found = Reader(self)
+        else:
+            found.enter(self.system)
+        if self.begin is not None:
+            self.begin(found.context)
         return found
 
     def give(self, reader):
@@ -366,7 +371,9 @@ class Reader:
     def __init__(self, reading):
         context, run = reading.workspace()
         self._read, self.degree, self.n = reading.read, reading.degree, run.now.shape[1]
+        self._leave = reading.leave
         (self._context, *kept), (self._run, *more) = resident(context), resident(run)
+        self.context = context
         self._kept, self._kernels, self._reals = (kept, more), run.kernels, context.system.reals
         own = [part for name, part in context._asdict().items() if name not in ("system", "graph")]
         arrays = [array for array in arrays_of((*own, run)) if array.size]
@@ -378,6 +385,16 @@ class Reader:
         for array, image in self._images:
             array[...] = image
         self._reals[...] = system.reals
+
+    def rates(self, *steps):
+        """As a call; accelerations may be missing."""
+        if self._leave is None:
+            return self(*steps)
+        known, self._kernels.accelerate_here = self._kernels.accelerate_here, self._leave.address
+        try:
+            return self(*steps)
+        finally:
+            self._kernels.accelerate_here = known
 
     def __call__(self, t, rows, blocks, charts, points):
         """States (k, 3, n) at times t (k,), in the steps blocks[rows]; and the Status."""

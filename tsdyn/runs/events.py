@@ -33,6 +33,7 @@ class Event(NamedTuple):
     falls: bool = False  # of a `GroupMember`: whether it may begin at zero within rounding, and fall at once
     action: object = None  # a function of a `Change` that each occurrence calls, or None
     goes_on: bool = False  # whether the run has begun before, and a zero at the start has been counted
+    length: float = 0.0  # m: rounding of positions is relative to it, too
 
     def value(self, t, instant):
         """The function's value; raises `EventFailed`."""
@@ -152,9 +153,9 @@ class Inside:
         return [known[t] for t in times]
 
     def levels(self, times):
-        """The same as an array (k, 3, n), NaN where there is none; not kept."""
+        """The same as an array (k, 3, n), NaN where there is none; accelerations may be missing; not kept."""
         rows = np.zeros(times.size, int)
-        found, status = self._reader(times, rows, self._block, self._log.charts, self._log.points)
+        found, status = self._reader.rates(times, rows, self._block, self._log.charts, self._log.points)
         if status != Status.SUCCESS:
             none = np.full_like(self._known[self.t0], np.nan)
             return np.reshape([none if state is None else state for state in self.states(times)], (-1, *none.shape))
@@ -208,7 +209,6 @@ class Track:
         """Take the value at t, the start of a run; has_sign: whether it is no rounding of zero where it is positive."""
         self.value = self.end = value  # at that time, and at the end of the present step
         self.sign = 0.0  # the last it had; 0 for none yet
-        self.before = 0.0  # the same at the last step's start, or soon after it
         self.significant = None  # time and value at which it had that sign
         if has_sign and value != 0.0:
             self.sign, self.significant = math.copysign(1.0, value), (t, value)
@@ -288,7 +288,9 @@ class Watch:
                 except EventFailed as failure:
                     return failure.status, str(failure)
                 if last is not None and not self._is_resumed(memory, last):
-                    return Status.EVENT, f"It was {self.events[last.index].name} at t = {last.t:.9g} s."
+                    ends = (i for i in self._single if self._ends(i) and not self.events[i].action)
+                    which = next(ends, last.index)
+                    return Status.EVENT, f"It was {self.events[which].name} at t = {last.t:.9g} s."
                 status = Status.SLICE_DONE if self.begins_again else status
                 if self.begins_again and log.t_eval.size:  # outputs of the slice may have to be taken back
                     status, reason = self._begin_again(memory, log)
@@ -317,7 +319,7 @@ class Watch:
         for i in self._single:
             track = self.tracks[i]
             track.begin(self.t, self._value(i, self.t, self.state), False)
-            if (again or self.events[i].goes_on) and track.value == 0.0:
+            if (again or self.events[i].goes_on) and abs(track.value) <= self._shaken(i, self.t, lambda _: self.state):
                 track.zero, track.passed = self.t, True
 
     def _is_resumed(self, memory, last):
@@ -325,10 +327,14 @@ class Watch:
         run, is_member = memory.run, isinstance(self.events[last.index].function, GroupMember)
         if self.resume is None or not is_member or not memory.begins_again or last.t >= run.clock.t_end:
             return False
-        if any(self.list[i] and self.events[i].action for i in self._single):
+        if any(self.list[i] and (self.events[i].action or self._ends(i)) for i in self._single):
             return False
         self.begins_again = self.resume(last.t, run, [i for i in self._members if self.list[i]])
         return self.begins_again
+
+    def _ends(self, i):
+        """Whether event i has occurred as often as ends the run."""
+        return len(self.list[i]) >= self.events[i].limit
 
     def _begin_again(self, memory, log):
         """Begin the run again where it is; the Status, and what there is to say of it."""
@@ -488,7 +494,7 @@ class Watch:
             if failure is not None and each.t >= failure.t:
                 break
             self.list[each.index].append(each)
-            if len(self.list[each.index]) >= self.events[each.index].limit:
+            if self._ends(each.index):
                 self._add_beside(step, each)
                 if self.angles:
                     run.remembered[: self.angles] = self._angles(each.t, each.state)
@@ -501,15 +507,24 @@ class Watch:
         return None
 
     def _add_beside(self, step, last):
-        """Add the events with an action that occur at the instant of the last one, to rounding of value and time."""
-        before = max(last.t - limits.NOISE * limits.ROOT * abs(last.t), step.t0)
-        for i, event in enumerate(self.events):
-            track = self.tracks[i]
-            if event.action is None or i == last.index or not track.before:
+        """Add the events that occur at the instant of the last one, to rounding of value and time.
+
+        Of those without an action, where the run goes on: nobody finds them afterwards.
+        """
+        just = max(last.t - limits.NOISE * limits.ROOT * abs(last.t), step.t0)
+        goes_on = last.index not in self._single or self.events[last.index].action
+        for i in self._single:
+            event = self.events[i]
+            if i == last.index or not (event.action or goes_on):
                 continue
             value = self._at(i, step, last.t)
-            noise = max(self._shaken(i, step, last.t), limits.NOISE * abs(value - self._at(i, step, before)))
-            if abs(value) <= noise and event.direction * track.before <= 0.0:
+            noise = max(self._shaken(i, last.t, step.at), limits.NOISE * abs(value - self._at(i, step, just)))
+            if abs(value) > noise:
+                continue
+            # Another zero than that of the step's start, and than the last one: the function is off zero before
+            since = max([step.t0, *(each.t for each in self.list[i][-1:])])
+            before = self._at(i, step, last.t - limits.SHORTLY * (last.t - since))
+            if abs(before) > noise and event.direction * before <= 0.0:
                 self.list[i].append(Occurrence(last.t, i, last.state))
 
     def _points(self, i, step, end):
@@ -531,7 +546,7 @@ class Watch:
 
         # A function that fails at some time is searched up to the last time before
         while end > step.t0:
-            search = Search(sample, lambda t: self._shaken(i, step, t), track.noise, most)
+            search = Search(sample, lambda t: self._shaken(i, t, step.at), track.noise, most)
             try:
                 degree = max(step.degree, track.degree // 2)
                 track.degree, track.end = search.run(step.t0, track.value, end, degree)
@@ -560,7 +575,6 @@ class Watch:
     def _walk(self, i, step, points):
         """The occurrences of event i among these points."""
         track, direction, found = self.tracks[i], self.events[i].direction, []
-        track.before = track.sign or next((math.copysign(1.0, v) for _, v in points if abs(v) > track.noise), 0.0)
         (before, value), *rest = points
         # A value near zero at the start of the run is a zero there, within rounding
         if track.sign == 0.0 and track.zero is None:  # the run's first step
@@ -591,12 +605,14 @@ class Watch:
         track.value = track.end
         return found
 
-    def _shaken(self, i, step, t):
-        """By how much the value of event i at t changes with rounding errors of the state."""
+    def _shaken(self, i, t, state_at):
+        """By how much the value of event i at t changes with rounding errors of the state, a function of t."""
         try:
             # Rounding of the state, in three random directions
-            state, value = step.at(t), self._at(i, step, t)
-            size = limits.SHAKEN * np.abs(state).max(axis=1, keepdims=True)
+            state = state_at(t)
+            value, size = self._value(i, t, state), np.abs(state).max(axis=1, keepdims=True)
+            size[0] = max(size[0, 0], self.events[i].length)
+            size *= limits.SHAKEN
             shaken = [self._value(i, t, state + size * sign) for sign in _signs(self._n)]
         except EventFailed:
             return 0.0
@@ -636,7 +652,7 @@ class Watch:
         """Whether a zero at t is that of the run's start: by rounding of the time, or of the value before, there."""
         if t - self.start <= limits.START_ZERO * max(abs(self.start), step.t1 - step.t0):
             return True
-        return before[0] == self.start and abs(before[1]) <= self._shaken(i, step, self.start)
+        return before[0] == self.start and abs(before[1]) <= self._shaken(i, self.start, step.at)
 
     def _between(self, i, step, first, last):
         """Where event i changes its sign between two times with values."""
@@ -670,7 +686,8 @@ class Watch:
         return root
 
     def _at(self, i, step, t):
-        return self._value(i, t, step.at(t))
+        is_member = isinstance(self.events[i].function, GroupMember)
+        return self._value(i, t, step.levels(np.array([t]))[0] if is_member else step.at(t))
 
     @staticmethod
     def _end(run, log, t, state, start):

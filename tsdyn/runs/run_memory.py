@@ -4,12 +4,14 @@ import math
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+
 from ..errors import Status
 from ..jit.interrupts import interruptible
 from ..jit.kernels import callback, resident
 from ..methods.explicit import ACCELERATE, PLACE
 from ..model.laws import calls_laws, interrupts_answered
-from ..rows.interface import reset_selection, selection_parts
+from ..rows.interface import reset_selection, selection_parts, set_selection
 from ..workspaces import FILLED, STORED, divided, enter_joints, set_tolerances, words
 from .run_log import no_log, with_end
 from .task import step_count
@@ -189,6 +191,8 @@ class Memory:
                 array[...] = image
             if task.q is not self._start[0] or task.qd is not self._start[1]:
                 self._enter_start(task)
+        if task.prepared.off is not None:
+            set_selection(self.context.tangent, np.flatnonzero(np.isin(self.graph.row, task.prepared.off)))
         self.context.system.reals[...] = self.reals  # motions, signals and what forces remember are written there
         if task.remembered.size:
             # Angles of joints, and what forces remember

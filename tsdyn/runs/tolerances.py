@@ -97,6 +97,9 @@ START_ZERO = 64.0 * EPS
 # factor on the largest of three changes.
 SHAKEN, NOISE = 4.0 * EPS, 4.0
 
+# Share of the time since the last zero of a function, before another one, at which its sign is that before the zero.
+SHORTLY = 0.01
+
 # Values of a gap or reaction in the search of one step at most, each a factorisation: seconds. Only near singular
 # states have interpolants of degree 32 on a thousandth of a step not sufficed.
 MOST_OF_MEMBER = 1 << 15

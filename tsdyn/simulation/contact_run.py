@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from copy import copy
 from dataclasses import replace
 from functools import cache
@@ -11,7 +12,8 @@ import numpy as np
 from ..ahead import compile_ahead
 from ..analyses import contact_rows, friction_units
 from ..analyses.contact_problem import closed_gaps
-from ..analyses.friction_problem import Frictions, Hold, immobile
+from ..analyses.friction_problem import Frictions, Hold, hold_of, immobile
+from ..configuration.initial_conditions import DependentRows
 from ..elements.unilateral import contacts_of
 from ..errors import (
     InconsistentState,
@@ -121,6 +123,8 @@ class _ContactRun(Transitions):
         self.remembered = remembered(call.state, kept, self.t, self.q)
         start = (self.q, self.qd), self.t, options.initial_tol, self.remembered
         kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
+        # Whether phases of frictions that stick and slide are packed once, with the rows of all: see `phase_of`
+        self.switches = run_task is not None and free.packed.derived.redundant is None
         self.length = max(scene.packed.size, float(np.abs(self.q).max()))
         demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol, self.able)
         self.users = prepared_events(options.events) or []
@@ -161,9 +165,10 @@ class _ContactRun(Transitions):
         off = {id(item) for item in self.without}
         self.able = [i for i, gap in enumerate(self.gaps.list) if id(gap.contact) not in off]
         self.off = [i for i, unit in enumerate(self.frictions.units) if id(unit.force) in off]
+        self.every = [hold_of(unit) for i, unit in enumerate(self.frictions.units) if i not in self.off]
 
-    def _scene_of(self, rows, holds):
-        return phase_of(self.scene, rows, holds, self.without)
+    def _scene_of(self, rows, holds, every=()):
+        return phase_of(self.scene, rows, holds, self.without, every)
 
     def _demand_served(self, kept):
         rough = [load.force.title for load in kept.packed.loads if load.normal >= 0 and load.force.slips]
@@ -211,7 +216,7 @@ class _ContactRun(Transitions):
         touching = closed_gaps(self.gaps, self.q, self.remembered[: self.count], self.options.initial_tol)
         self.gap = self.gaps.at(self.q, self.remembered[: self.count])
         touching = [i for i in touching if i in self.able]
-        return self._decide_modes(touching, (), ())
+        return self._settle(touching, (), ())
 
     def check(self):
         """Raise what a run raises before its first step; its `Task`, of the whole scene."""
@@ -299,7 +304,8 @@ class _ContactRun(Transitions):
 
     def _record(self):
         """What the scene of the present phase is made of, for files."""
-        return [self.modes.saved(), self.remembered.tolist(), plain((self.inactive, self.values))]
+        switched = self.packed.derived.switched is not None
+        return [self.modes.saved(), self.remembered.tolist(), plain((self.inactive, self.values)), switched]
 
     def _recorded_scene(self, record):
         """The scene that such a record describes, and its gaps."""
@@ -307,7 +313,7 @@ class _ContactRun(Transitions):
         self.change(tuple(inactive), dict(values))
         self.modes, self.remembered = UnitModes.of(record[0]), np.array(record[1], float)
         demand(self.remembered.shape == (self.count + self.scene.system.memory.size,), "what is remembered")
-        return self._scene(), self.gaps
+        return self._phase_of_modes(self.every if record[3] else ()), self.gaps
 
     def _resume(self, t, run, numbers):
         """After events of these numbers: whether the run of the phase goes on, with other velocities.
@@ -330,7 +336,16 @@ class _ContactRun(Transitions):
 
     def _scene(self):
         """The scene of the present modes."""
-        return self._scene_of(self._items(), [self._hold(i, rank) for i, rank in self.modes.sticking.items()])
+        if self.switches and self.every and not self.modes.grips:
+            phase, start = self._phase_of_modes(self.every), (self.q, self.qd)
+            with suppress(DependentRows):
+                prepared(phase).start(phase, start, self.t, self.options.initial_tol, self.remembered, True)
+                return phase
+        return self._phase_of_modes()
+
+    def _phase_of_modes(self, every=()):
+        holds = [self._hold(i, rank) for i, rank in self.modes.sticking.items()]
+        return self._scene_of(self._items(), holds, every)
 
     def holds(self):
         """Whether each friction sticks, or is held by what sticks."""
@@ -374,7 +389,7 @@ class _ContactRun(Transitions):
         pairs = zip(self.users, self.counts, strict=True)
         goes_on = self.end is not None
         found = [
-            event._replace(limit=1.0 if event.action else event.limit - count, goes_on=goes_on)
+            event._replace(limit=1.0 if event.action else event.limit - count, goes_on=goes_on, length=self.length)
             for event, count in pairs
         ]
         watches = list(self._watches(phase))
@@ -416,7 +431,7 @@ class _ContactRun(Transitions):
         sticks = self.modes.sticking or any(map(self.modes.sticks, self.modes.grips))
         if not sticks or self.q.size > LARGE:
             return np.zeros(0, int)
-        return immobile(phase.packed, self.t, self.q, self.remembered[self.count :])
+        return immobile(phase.packed, self.t, self.q, self.qd, self.remembered[self.count :])
 
     def _rubbing(self, packed):
         """The same of closed contacts where there is friction: their reactions, their bounds, their slips."""
@@ -492,7 +507,10 @@ class _ContactRun(Transitions):
             return self._act(acting, fired, end.last) if acting else self._transit(fired)
         if self._is_deep():
             return Status.CONTACT_FAILED
-        return Status.SUCCESS if ends else outcome.status
+        if not ends:
+            return outcome.status
+        self.reason = ""  # which told what ends the phase
+        return Status.SUCCESS
 
     def _is_deep(self):
         """Whether contacts penetrate; says so."""

@@ -143,7 +143,7 @@ def _local(prepared, scene, origin):
 
 def _moved(packed, origin):
     """The packed scene with the points of the ground relative to an origin."""
-    reals = packed.system.reals.copy()
+    reals, known = packed.system.reals.copy(), packed.derived
 
     def move(item, coordinates, begin):
         found = []
@@ -169,7 +169,7 @@ def _moved(packed, origin):
         coordinates=coordinates,
         size=size_of(packed.constraints, coordinates),
         loads=loads,
-        derived=Derived(),
+        derived=Derived() if known.switched is None else Derived(known.redundant, known.switched),
     )
 
 
@@ -223,6 +223,9 @@ def within_rounding(method, packed, q):
         packed.derived.near = q
         return method, ""
     far = np.abs(q[packed.system.bodies[:, :1] + np.arange(3)]).max(axis=1)
+    # Rounding of positions turns a body of mass m, moment of inertia J and lever s by m s / (m s^2 + J): 1 / s or less
+    least = np.linalg.eigvalsh(packed.system.inertia.reshape(-1, 3, 3))[:, 0].clip(0.0)
+    arms = np.where(arms > 0.0, np.maximum(arms, np.sqrt(least / packed.system.mass)), 0.0)
     ratios = np.where(arms > 0.0, far / np.where(arms > 0.0, arms, 1.0), 0.0)
     worst = int(np.argmax(ratios))
     noise = NOISE * ratios[worst]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import inspect
 import math
 import re
@@ -15,6 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..calls import SECTION
+from ..drawing import aligned, html_table
 from ..elements.bodies import Attribute, Ground, PointMass
 from ..elements.element import Attachment, checked_parameters
 from ..elements.joint import Joint, SumRow
@@ -243,18 +243,14 @@ class ParameterList(Mapping[str, "float | Floats"]):
         return [(name, shown(value), self.units[name]) for name, value in self._values.items()]
 
     def __str__(self) -> str:
-        rows = self._rows()
-        names, values = (max(len(row[i]) for row in rows) for i in (0, 1))
-        return "\n".join(f"{name:{names}}  {value:>{values}}  {unit}".rstrip() for name, value, unit in rows)
+        return "\n".join(aligned(self._rows(), (0, 2)))
 
     def __repr__(self) -> str:
         return f"<{counted(len(self), 'parameter')}>\n{self}"
 
     def _repr_html_(self) -> str:
         """Return a table, for notebooks."""
-        cells = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in self._rows()]
-        head = "<tr><th>parameter</th><th>value</th><th>unit</th></tr>"
-        return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+        return html_table(self._rows(), heads=("parameter", "value", "unit"))
 
 
 def shown(value: Any) -> str:

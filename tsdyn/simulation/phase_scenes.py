@@ -1,5 +1,6 @@
 """Scenes of the phases of a run: what of a scene stays, and what its contacts and frictions are in their modes."""
 
+from copy import copy
 from functools import partial, wraps
 from itertools import chain
 
@@ -9,8 +10,10 @@ from ..calls import fitting
 from ..elements.force import Force
 from ..elements.unilateral import contacts_of
 from ..errors import InconsistentState, InvalidArgument
+from ..formulations.locked_orientations import still
 from ..model.handles import begins_of, handles_of
 from ..model.packed import pack
+from ..rows.constraint_graph import parts_of
 from ..validation import listed
 
 # A phase is a scene of its own, packed once for each combination of modes: the bodies, joints and forces of the scene,
@@ -21,6 +24,7 @@ from ..validation import listed
 # remember, whether these are active or not.
 
 NAMED = 5  # contacts in a message
+SHARED = "holds", "places", "members", "short_rows", "start_workspaces", "reactions"  # of `Derived`: by such phases
 
 
 def has_contacts(scene):
@@ -49,29 +53,56 @@ def dependent(scene, items):
     return *items, *(force for force in frictions if id(force.joint) in gone)
 
 
-def phase_of(scene, rows, holds=(), without=None):
+def phase_of(scene, rows, holds=(), without=None, every=()):
     """The scene with these rows, primitives, and forces in place of its contacts; kept until the scene changes.
 
     holds: rows with numbers that the run remembers, as `friction_problem.Hold`. without: constraints and forces left
-    out, by default those that are inactive at the start.
+    out, by default those that are inactive at the start. every: all that may hold; the phase is packed with their rows,
+    and of those that don't hold the run remembers zeros.
     """
     known = scene._phases
     if known is None:
         known = scene._phases = {}
     without = dependent(scene, inactive_of(scene)) if without is None else without
-    key = frozenset(map(id, rows)), frozenset(map(id, without)), frozenset(hold.key for hold in holds)
+    packed = every or holds  # whose rows are
+    key = frozenset(map(id, rows)), frozenset(map(id, without)), frozenset(hold.key for hold in packed), bool(every)
     if key not in known:
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
         constraints, forces = ([each for each in rows if isinstance(each, Force) is given] for given in (False, True))
-        held = [hold.rows() for hold in holds]
+        held = [hold.rows() for hold in packed]
         phase = known[key] = object.__new__(type(scene))
         vars(phase).update(vars(scene))
         vars(phase).update(
             _added=[each for each in scene._added if id(each) not in gone] + [*constraints, *chain(*held)],
             _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None, _start=None,
             _prepared=None, _phases=None, _gaps=None, _spare={}, _waiting={}, _opens=False,
-            _pack=partial(_pack_phase, phase, scene, holds, held), _whole=scene,
+            _pack=partial(_pack_phase, phase, scene, packed, held), _whole=scene,
         )  # fmt: skip
+    return _with_rows_held(known[key], holds) if every else known[key]
+
+
+def _with_rows_held(base, holds):
+    """The phase `base` with the rows of these holds alone; kept as long.
+
+    The other rows are zero, and redundant. What doesn't depend on which rows hold is shared by these phases: arrays,
+    elimination, series, and the memory of runs.
+    """
+    known, ranks, whole = base._phases, dict(hold.key for hold in holds), base.packed.derived
+    if known is None:
+        known = base._phases = {}
+        base._base, whole.redundant = base, np.zeros(0, np.int64)
+        whole.switched = np.concatenate([*whole.holds.values()])
+    key = frozenset(ranks.items())
+    if key not in known:
+        graph, kinds = parts_of(base.packed)
+        off = np.concatenate([rows[ranks.get(slot, 0) :] for slot, rows in whole.holds.items()])
+        own = copy(whole)
+        for name in SHARED:
+            setattr(own, name, getattr(whole, name))
+        own.redundant, own.locked = np.flatnonzero(np.isin(graph.row, off)), still(base.packed)._replace(redundant=off)
+        own.graph = graph._replace(dropped=own.redundant), kinds
+        phase = known[key] = object.__new__(type(base))
+        vars(phase).update(vars(base), _packed=base.packed._replace(derived=own), _prepared=None, _phases=None)
     return known[key]
 
 

@@ -22,7 +22,7 @@ class UnitModes:
 
     closed: list = field(default_factory=list)  # independent rows, with reactions
     idle: list = field(default_factory=list)  # closed by what others hold
-    opened: dict = field(default_factory=dict)  # time, gap, rate, rounding of the gap: contacts just opened
+    opened: dict = field(default_factory=dict)  # time, gap, rate, rounding of the gap where one has just opened
     sticking: dict = field(default_factory=dict)  # frictions that stick: how many rows hold each
     blocked: list = field(default_factory=list)  # frictions without motion that others hold
     begun: dict = field(default_factory=dict)  # time and acceleration where a friction has begun to slide
@@ -149,7 +149,8 @@ class Phases:
         """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
         self.changes.append(changes)
         if self.list:
-            self.list[-1] = (self.list[-1][0], rest, self.list[-1][2])
+            begun, _, held = self.list[-1]
+            self.list[-1] = (min(begun, rest), rest, held)
         self.starts.append(begin)
         self.of.append(kind)
         self.list.append((rest, max(rest, end), names))
@@ -194,14 +195,21 @@ class Phases:
         return UnitModes.of(self.modes[kind][0])
 
     def merged(self):
-        """The `list`, each name once; phases are one where the same rows hold, and no impact or action is between."""
-        found, before, hit = [], None, {t for t, *_ in self.impulses}
+        """The `list`, each name once; phases are one where the same rows hold, and no impact or action is between.
+
+        Without those of no duration: other events came during flights below rounding that were to end there.
+        """
+        found, before, hit, struck = [], None, {t for t, *_ in self.impulses}, False
         for (start, end, names), begun, changes in zip(self.list, self.starts, self.changes, strict=True):
-            if found and names == found[-1][2] and changes == before and begun not in hit:
+            struck |= begun in hit or changes != before
+            before = changes
+            if end <= start < self.list[-1][1]:
+                continue
+            if found and names == found[-1][2] and not struck:
                 found[-1] = (found[-1][0], end, names)
             else:
                 found.append((start, end, names))
-            before = changes
+            struck = False
         return [(start, end, tuple(dict.fromkeys(names))) for start, end, names in found]
 
     def sticking(self, numbers, i):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import html
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,6 +12,7 @@ import numpy as np
 from ..ahead import kernels_of, prepare_first_run
 from ..calls import ELSEWHERE, fitting
 from ..configuration.motor_starts import demand_holonomic
+from ..drawing import html_table
 from ..elements.element import warn_of_waiting
 from ..errors import InvalidArgument, Status
 from ..integrators import DOP853, Taylor
@@ -232,6 +233,14 @@ class Run:
         """
         return Run(self.scene.with_parameters(values), self.options)
 
+    def _of_phase(self, phase):
+        """The same of a phase in which other rows hold."""
+        other = copy(self)
+        other.scene = other._first = phase
+        other._prepared, other._packed, other._start = prepared(phase), phase.packed, phase._initial()
+        other._last = other._seen = None
+        return other
+
     def _solve(self, call: RunCall, found: tuple[Any, Any] = (None, None), archive: Any = None) -> Solution:
         """Run as of `__call__`, without checking whether the scene has changed.
 
@@ -432,8 +441,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         """Return the text as a table, for notebooks."""
-        rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in self._facts().items())
-        return f"<table><caption>Run of {html.escape(repr(self.scene))}</caption>{rows}</table>"
+        return html_table(self._facts().items(), f"Run of {self.scene!r}", named=True)
 
     def __repr__(self) -> str:
         return f"<Run of {self.scene!r} by {self.method!r}, {self.options.formulation}>"
@@ -625,7 +633,8 @@ def _run_of(scene, options, call):
         if run.options == options:
             return run
     output_times(call.t_eval, *interval(call.t_span))
-    run = Run(scene, options)
+    base = scene._base
+    run = Run(scene, options) if base in (None, scene) else _run_of(base, options, call)._of_phase(scene)
     if options.events is None and is_plain(run.method):
         kept = prepared_numbers(scene)
         kept.runs = (run, *kept.runs[: KEPT - 1])  # and not written to: other threads may be reading

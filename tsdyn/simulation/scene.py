@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import os
 from collections import Counter
 from contextlib import suppress
@@ -19,6 +18,7 @@ from ..configuration.mobility import mobility as _mobility
 from ..configuration.motor_starts import demand_aligned, elsewhere
 from ..configuration.set_joint_coordinates import set_joint
 from ..constraints.euler_normalization import EulerNormalization
+from ..drawing import html_table
 from ..elements.bodies import IDENTITY, Body, Ground, PointMass, named
 from ..elements.element import admit, stop_waiting
 from ..elements.force import Force
@@ -61,7 +61,6 @@ if TYPE_CHECKING:
 
 PARTICLE = 3  # coordinates of a point mass
 SHOWN = 25  # rows at most of bodies, of constraints and of forces
-HEAD = "<tr><th>name</th><th>kind</th><th></th></tr>"
 
 
 def table(scene: Scene) -> str:
@@ -69,8 +68,7 @@ def table(scene: Scene) -> str:
     bodies = [(body.name, type(body).__name__, f"{body.mass:g} kg") for body in scene.bodies]
     constraints = [one for one in scene.constraints if not getattr(one, "normalises", False)]
     rows = [*_rows(bodies), *_rows(map(_item, constraints)), *_rows(map(_item, scene.forces))]
-    caption = html.escape(summary(scene).strip("<>"))
-    return f"<table><caption>{caption}</caption>{HEAD}{''.join(rows)}</table>"
+    return html_table(rows, summary(scene).strip("<>"), ("name", "kind", ""))
 
 
 def summary(scene: Scene) -> str:
@@ -93,10 +91,7 @@ def _item(item):
 
 def _rows(lines):
     lines = list(lines)
-    for line in lines[:SHOWN]:
-        yield f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in line)}</tr>"
-    if len(lines) > SHOWN:
-        yield f"<tr><td>and {len(lines) - SHOWN} more</td><td></td><td></td></tr>"
+    return lines[:SHOWN] + [(f"and {len(lines) - SHOWN} more", "", "")] * (len(lines) > SHOWN)
 
 
 # Methods of scenes with contacts, beside those of other scenes.
@@ -245,6 +240,7 @@ class Scene:
     _phases = _opens = None  # of a scene with contacts, or inactive parts: see phase_scenes.py
     _pack = pack  # what packs it; of a phase its own
     _whole = None  # of a phase: the scene
+    _base = None  # of a phase whose frictions are packed with the rows that hold them: that in which all of these hold
     _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:

@@ -24,14 +24,15 @@ from ..model.equations import (
 from ..model.handles import handles_of
 from ..motions.knots import NO_CHANGES, NO_STOPS, changes, is_noise, sample_times, stops_of, within_step
 from ..observables.reactions import demand_unique
+from ..rows.constraint_graph import redundant_rows
 from ..runs.driver import instants_of, sampled
 from ..taylor.layout import pays, refusal
-from ..taylor.series_engine import Series
+from ..taylor.series_engine import Series, SeriesEngine
 from .phase_scenes import demand_bilateral
 
 preparing = RLock()  # threads that prepare a scene at once share what they find
 SPARE = 8  # idle memories of a kind that are kept: as many runs at once allocate nothing
-OF_NUMBERS = {"implicit", "spheres", "series", "sampled"}  # what `Prepared` derives from them
+OF_NUMBERS = {"implicit", "spheres", "series", "sampled", "off"}  # what `Prepared` derives from them
 KINDS = 8  # kinds of memory, and shapes of a scene, at most
 LARGEST = 1 << 24  # bytes of a memory that is kept, at most
 STARTS = 4  # that are kept: a run with contacts has two, with all of them open and as they are
@@ -56,8 +57,10 @@ def prepared_numbers(scene):
     if kept is None:
         with preparing:
             kept = scene._prepared
-            if kept is None:
+            if kept is None and scene._base in (None, scene):
                 kept = scene._prepared = Prepared(scene, scene.packed)
+            elif kept is None:
+                kept = scene._prepared = prepared_numbers(scene._base).of_phase(scene.packed)
     return kept
 
 
@@ -90,6 +93,19 @@ class Prepared:
         other._changes = None, []
         other.handles = handles_of(packed)
         return other
+
+    def of_phase(self, packed):
+        """The same for a phase in which other rows hold, with the same series and memory."""
+        other = self.like(packed)
+        other._spare = self._spare
+        if not self.refusal:
+            other.series = self.series
+        return other
+
+    @cached_property
+    def off(self):
+        """The rows of Phi that hold nothing in a phase, None where there are no such rows."""
+        return None if self.packed.derived.switched is None else redundant_rows(self.packed)
 
     @cached_property
     def implicit(self):
@@ -222,7 +238,8 @@ class Prepared:
 
         That of a plain method serves again until other rows or bodies take part in the equations.
         """
-        known, key = self.packed.derived.engines, (kind, method, form.name, within)
+        known = self.series.engines if kind is SeriesEngine else self.packed.derived.engines
+        key = kind, method, form.name, within
         engine = known.get(key)
         if engine is None:
             with CollectionsDeferred():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import time
 from functools import cached_property
 from types import SimpleNamespace
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 
 from ..calls import fitting, fitting_methods
+from ..drawing import html_table
 from ..elements.force import Force
 from ..errors import InvalidArgument, InvalidForce, Status, StepFailure
 from ..formulations.charts import REASONS
@@ -627,7 +627,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         if sweeps and s.placements:  # series place none
             sweeps = f", {s.newton_iterations / s.placements:.1f} Newton sweeps a placement"
         known = self._phases
-        phases = f"{counted(len(known.list), 'phase')}, {counted(len(known.impulses), 'impulse')}" if known else ""
+        phases = f"{counted(len(self.phases), 'phase')}, {counted(len(known.impulses), 'impulse')}" if known else ""
         return {
             "ended": f"{self.status.name.lower()} at t = {self._reached:g} s, {counted(self._length(), 'output')}",
             **({"phases": phases} if phases else {}),
@@ -644,8 +644,7 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
     def _repr_html_(self) -> str:
         """Return the text as a table, for notebooks."""
         facts = self._facts() | ({} if self.success else {"message": self.message})
-        rows = "".join(f"<tr><th>{name}</th><td>{html.escape(fact)}</td></tr>" for name, fact in facts.items())
-        return f"<table><caption>Solution</caption>{rows}</table>"
+        return html_table(facts.items(), "Solution", named=True)
 
     def __repr__(self) -> str:
         s = self.stats

@@ -460,7 +460,7 @@ def _facts(given, kept):
     return {
         **_here(),
         "scene": hash_of(kept.packed),
-        "functions": sources_of(functions),
+        "functions": sources_of(one for one in functions if not is_ours(getattr(one, "__module__", ""))),
         "events": sources_of(events),
         "max_steps": given["max_steps"],
         "interval": given["checkpoint"] if given["checkpoint"] is None else float(given["checkpoint"]),

@@ -50,7 +50,7 @@ class Transitions:
         touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
         turned = [i - count - own for i in fired if i >= count + own and before.slides(i - count - own)]
         broken = [i - count for i in fired if count <= i < count + own]
-        status = self._decide_modes(sorted(touching), hit, broken, turned)
+        status = self._settle(sorted(touching), hit, broken, turned)
         if measured and self.qd is not qd:
             self.phases.gain(self.gaps.workspace.gain(self.q, qd, self.qd))
         return status
@@ -74,6 +74,17 @@ class Transitions:
         """Whether a time before the present one is the same instant, to rounding."""
         return self.t - t <= 16.0 * EPS * max(abs(self.t), EPS)
 
+    def _settle(self, *which):
+        """As `_decide_modes`; rows of frictions that don't hold remember zeros."""
+        status = self._decide_modes(*which)
+        memory, held = self.remembered[self.count :], self.frictions.held
+        ranks = [self.modes.sticking.get(i, 0) for i in range(self.frictions.count)]
+        left = [slot for rank, slots in zip(ranks, held, strict=True) for slot in slots[rank:].ravel().tolist()]
+        if memory[left].any():
+            self.remembered = self.remembered.copy()
+            self.remembered[self.count :][left] = 0.0
+        return status
+
     def _decide_modes(self, touching, fired, broken, turned=()):
         """Impact, then which gaps stay closed, which frictions stick; the Status if there is no way on, else None.
 
@@ -91,8 +102,9 @@ class Transitions:
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
             small, unstruck = NEGLIGIBLE * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max(), self._is_unstruck()
             rates[[i for i in before.closed if unstruck or abs(rates[i]) <= small[i]]] = 0.0
-            # What rounding of the time leaves open is no rate: gaps close, or reach the tops of flights, together
-            rates[np.abs(rates) <= RESTS * EPS * abs(self.t) * inertia.sizes(self.qdd)] = 0.0
+            # What rounding of the time leaves open is no rate: gaps close, or reach the tops of flights, at once
+            none = RESTS * EPS * abs(self.t) * inertia.accelerations(self.qd)[1]
+            rates[np.abs(rates) <= none] = 0.0
             grazing = [i for i in fired if i not in before.closed and rates[i] >= 0.0 and i not in self.gaps.following]
             ratchets = [i for i in fired if i not in before.closed and i in self.gaps.following]
             if ratchets:  # they take hold
@@ -101,6 +113,10 @@ class Transitions:
             if (rates[touching] < 0.0).any():
                 rates = self._hit(inertia, touching, rates)
             resting = [i for i in touching if rates[i] == 0.0]
+            if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
+                _, self.qd, left = held(inertia, self.qd, resting, inertia.rates(self.qd))
+                rates[np.abs(left) <= none] = 0.0  # of rows that depend on these, too
+                resting = [i for i in touching if rates[i] == 0.0]
             opening = [i for i in touching if rates[i] > 0.0]
             # What grazes without a reaction has left: its gap was rounding. What has left at this instant doesn't come
             # back by rounding: contacts that leave together would take turns
@@ -108,8 +124,6 @@ class Transitions:
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
             rounding = self._rounding(before) + NEGLIGIBLE * np.abs(self.qd - qd).max()
-            if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
-                self.qd = held(inertia, self.qd, resting, inertia.rates(self.qd))[1]
             self.modes, struck = UnitModes(), self.qd
             if self.gaps.rough[resting].any():
                 self.qd, contacts = at_turn(inertia, resting, self.qd, leaving, turned, opening)
@@ -139,13 +153,20 @@ class Transitions:
             return Status.CONTACT_FAILED
 
     def _open(self, inertia, which, rates, a):
-        """Open the gaps `which`, with these rates and decelerations a (count,): to flights below rounding or higher."""
-        rounding, modes = 2.0 * self._heights(inertia), self.modes
-        low = rates**2 < rounding * a
-        grazes = (a <= 0.0) & (rates**2 < rounding * inertia.accelerations(self.qd)[1])
-        modes.lifted = [i for i in which if low[i]]
-        modes.opened = {i: self._opened(i, rates[i], 0.125 * rounding[i]) for i in which if not (low[i] or grazes[i])}
-        modes.opened |= {i: self._opened(i) for i in which if grazes[i]}
+        """Open the gaps `which`, with these rates and decelerations a (count,).
+
+        Flights below rounding of the gap end at their tops; of a rate that is no more without a deceleration, rounding
+        of the gap is no end.
+        """
+        rounding, modes = self._heights(inertia), self.modes
+        below = rates**2 < 2.0 * rounding * np.maximum(a, 0.0)
+        grazes = rates**2 < 2.0 * rounding * inertia.accelerations(self.qd)[1]
+        rises = below & (inertia.rates(self.qd) > 0.0)
+        modes.lifted = [i for i in which if rises[i]]
+        none = grazes & (below | (a <= 0.0))
+        for i in which:
+            if not rises[i]:
+                modes.opened[i] = self._opened(i) if none[i] else self._opened(i, rates[i], 0.25 * rounding[i])
 
     def _opened(self, i, rate=0.0, rounding=None):
         """What `UnitModes.opened` has of a gap that opens now."""
@@ -291,14 +312,8 @@ class Transitions:
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
         free = [i for i in resting if ranks[i]]
-        # With rows of those that slide, too, which don't count: it is packed once
-        holds = {i: self._hold(i, ranks[i]) for i in free}
-        for i in set(range(len(units))) - {*free, *self.off}:
-            numbers = np.ones((units[i].slide.freedom, units[i].slide.row_numbers))
-            numbers[:, -1] = 0.0
-            holds[i] = Hold(units[i], len(numbers), numbers)
-        phase = self._scene_of([], list(holds.values()))
-        rows = {i: phase.packed.derived.holds[units[i].slot] for i in free}
+        phase = self._scene_of([], self.every, self.every)  # rows of those that slide don't count: it is packed once
+        rows = {i: phase.packed.derived.holds[units[i].slot][: ranks[i]] for i in free}
         fresh = [i for i in free if i not in before.sticking]
         if fresh:  # their rows hold to the last bit where they are
             Phi = values_of(phase.packed, self.t, self.q, memory)
@@ -306,7 +321,7 @@ class Transitions:
                 for k, row in enumerate(rows[i]):
                     memory[units[i].held(k)[-1]] = Phi[row]
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
-        problem = RestProblem(place, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
+        problem = RestProblem(place, self.gaps, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
         rest = problem.pivot({i: way for i, way in guess.items() if i in free}, fired)
         # In a plane slips end where they are slow
         self.qd = problem.stopped([i for i in rest.sticking if i in fresh and not self.frictions.signed[i]], self.qd)
@@ -348,15 +363,16 @@ class Transitions:
         p, qd, after = self._jump(inertia, touching, before, e)
         # Impacts that are followed by flights below rounding are the last ones
         a = self._lowering(inertia, touching, qd, after)
-        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and p[k, 0] > 0.0 and e[k] > 0.0]
+        last = [k for k, i in enumerate(touching) if a[i] > 0.0 and before[k] < 0.0 and e[k] > 0.0]
         if last:
             flights = [2.0 * after[touching[k]] / (a[touching[k]] * (1.0 - e[k])) for k in last if e[k] < 1.0]
             self.rest = float(max([self.rest, *(self.t + T for T in flights)]))
             e[last] = 0.0
             p, qd, after = self._jump(inertia, touching, before, e)
             a = self._lowering(inertia, touching, qd, after)
-        # Contacts that another impact lifts for less than rounding of the time stay closed
-        after[after <= RESTS * EPS * abs(self.t) * a] = 0.0
+        # Contacts that another impact lifts by rounding, of its impulses or of the time, stay closed
+        rounding = NEGLIGIBLE * np.abs(inertia.G[:, touching]) @ p[:, 0]
+        after[after <= np.maximum(rounding, RESTS * EPS * abs(self.t) * a)] = 0.0
         self._note_impulses(inertia, touching, p, self.qd)
         self.qd = qd
         return after

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..analyses.contact_rows import measure_opened, reaction_workspace
 from ..analyses.tolerances import LEVEL
+from ..maths.tolerances import TINY
 from .tolerances import LOADED, REACTION_NOISE
 
 
@@ -77,7 +78,8 @@ class Leaving:
 class Breaking:
     """What reactions lack of their limits, as event functions.
 
-    Of frictions that stick: what holds them, and its bound. Of those without a load: the load, and one that counts.
+    Of frictions that stick: (b^2 - lam^2) / (b + c), with bound b, multipliers lam and the bound c at the limit; it is
+    smooth at lam = 0. Of those without a load: the load, and one that counts.
 
     Parameters
     ----------
@@ -96,6 +98,7 @@ class Breaking:
 
     def __init__(self, packed, sticking, light, limits):
         self.packed, self.sticking, self.normals = packed, sticking, [unit.load.normal for unit in light]
+        self.least = limits[: len(sticking)]
         self.limits = LOADED * limits[len(sticking) :]
         self.noise = REACTION_NOISE * limits * ([unit.bound[0] for unit in sticking] + [1.0] * len(light))
 
@@ -108,11 +111,10 @@ class Breaking:
         """Values (k, sticking and light units) of states at k times."""
         lam, loads = self.workspace.multipliers(states.t, states.levels, states.memory)
         values = np.zeros((states.t.size, len(self.sticking)))
-        for unit, value in zip(self.sticking, values.T, strict=True):
-            share, bound = unit.bound
-            value += bound - np.linalg.norm(lam[:, self.packed.derived.holds[unit.slot]], axis=1)
-            if share:
-                value += share * loads[:, unit.load.normal]
+        for unit, value, limit in zip(self.sticking, values.T, self.least, strict=True):
+            (share, bound), held = unit.bound, lam[:, self.packed.derived.holds[unit.slot]]
+            bound = bound + share * loads[:, unit.load.normal] if share else bound
+            value += (bound * bound - (held * held).sum(axis=1)) / (bound + share * limit + TINY)
         return np.hstack((values, self.limits - loads[:, self.normals])) if self.normals else values
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..calls import fitting
 from ..elements.bodies import START, Ground, PointMass, named
 from ..elements.unilateral import contacts_of
-from ..errors import InvalidArgument, InvalidBody
+from ..errors import InvalidArgument, InvalidBody, TsdynError
 from ..model.handles import classes, handles_of
 from ..validation import listed
 from .scene_cache import prepared_numbers
@@ -396,10 +396,18 @@ def _made(family, changes):
     """Return a copy of the template with other values; pairs of each handle of the original and its counterpart."""
     template, packed = family.template, family.packed
     twin, others = family.copied(changes)
-    for name, value in others.items():
-        field = family.field(name)
-        owner = twin if field.owner is template else twin[field.owner]
-        setattr(owner, field.attribute, field.entered(value, getattr(owner, field.attribute)))
+    refused = dict.fromkeys(others)
+    while refused:  # values that are admissible together only, in any order
+        tried, refused = refused, {}
+        for name in tried:
+            field = family.field(name)
+            owner = twin if field.owner is template else twin[field.owner]
+            try:
+                setattr(owner, field.attribute, field.entered(others[name], getattr(owner, field.attribute)))
+            except TsdynError as error:
+                refused[name] = error
+        if len(refused) == len(tried):
+            raise next(iter(refused.values()))
     known = (*packed.bodies, *(member.constraint for member in packed.members), *(load.force for load in packed.loads))
     owners = (*template.bodies, *template.constraints, *template.forces)
     pairs = {one: twin[owner] for one, owner in zip(known, owners, strict=True)}

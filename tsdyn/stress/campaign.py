@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..drawing import BLUE, GREEN, GREY, VERMILION, ZERO, new_figure
+from ..drawing import BLUE, GREEN, GREY, VERMILION, ZERO, aligned, new_figure
 from ..errors import TsdynError
 from ..integrators import DOP853, Nystrom4, Taylor
 from ..maths.tolerances import EPS
@@ -234,17 +234,6 @@ def cells(found, columns=COLUMNS):
     return [[column.head for column in columns], *([cell(figures, column) for column in columns] for figures in found)]
 
 
-def widths(table):
-    """Return the width of each column."""
-    return [max(map(len, column)) for column in zip(*table, strict=True)]
-
-
-def line(row, sizes):
-    """Return a row, aligned: the case on the left, figures on the right."""
-    first, *rest = (text.rjust(size) for text, size in zip(row, sizes, strict=True))
-    return "  ".join([row[0].ljust(len(first)), *rest])
-
-
 def wrong(figures):
     """Return what is wrong with a case, one line each; nothing if all went well."""
     said = [] if figures["success"] else [figures["message"]]
@@ -258,10 +247,7 @@ def wrong(figures):
 
 def gallery_text(found):
     """Return the table of the gallery, and what went wrong."""
-    table = cells(found)
-    sizes = widths(table)
-    lines = [line(row, sizes) for row in table]
-    return "\n".join([*lines, "", *LEGEND, *(text for figures in found for text in wrong(figures))])
+    return "\n".join([*aligned(cells(found)), "", *LEGEND, *(text for figures in found for text in wrong(figures))])
 
 
 def closed_forms_text(found):
@@ -270,10 +256,7 @@ def closed_forms_text(found):
     rows += [
         (each.name, f"{each.error:.1e}", f"{each.allowed:.1e}", "holds" if each.holds else "OFF") for each in found
     ]
-    sizes = widths(rows)
-    return "\n".join(
-        [*(line(row, sizes) for row in rows), *(f"{each.name}: {each.message}" for each in found if each.message)]
-    )
+    return "\n".join([*aligned(rows), *(f"{each.name}: {each.message}" for each in found if each.message)])
 
 
 def fault_text(job, outcome):

@@ -593,7 +593,8 @@ def _mask(kind, series, par, grounded, motion):
     # A random motion shows which columns have coefficients beyond order zero
     for k, x in enumerate(motion):
         out = np.zeros((kind.all_rows, len(x)))
-        series(x, par, k, scratch, out)
+        with np.errstate(all="ignore"):  # not finite where the motion is inadmissible for these numbers: varies
+            series(x, par, k, scratch, out)
         if k > 0:
             varies |= out.any(axis=0)
             if varies.all():

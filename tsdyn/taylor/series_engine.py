@@ -19,14 +19,16 @@ from ..jit.simd import add, cross, first, four, put, second, splat, third
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import LAST_PLACE
 from ..model.packed import System
-from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, with_loops
+from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, are_unequal, redundant_rows, with_loops
 from ..rows.interface import (
     add_products,
     allocate_tangent,
     evaluate_bias,
     note_loads,
+    set_selection,
     solve_friction_series,
     weigh_bodies,
+    with_all_rows,
 )
 from ..runs.dense_output import READ, TrajectoryReading, put_state, recall
 from ..runs.run_memory import Memory
@@ -233,6 +235,12 @@ def accelerate_with_friction_here(context, t, h):
     return 0 if found else JAMMED
 
 
+@callback("pdd")
+def leave_accelerations(context, t, h):
+    """In place of `accelerate_here`, where nobody asks for qdd."""
+    return 0
+
+
 # Dense output of a Taylor run: the series of a step, evaluated and projected onto the manifold.
 
 
@@ -242,12 +250,13 @@ def read_series(context, run, t, rows, blocks, charts, points, out):
     c, r = load_series(context), load_run(run)
     w, x = c.work, c.expansion
     for i in range(t.size):
-        # A block is the whole series of a step
+        # A block is the whole series of a step, which serves for all times in the step
         block = blocks[rows[i]]
         data = block[B_DATA:]
         x.order.top = int(data[0])
         copy(data[1:][: w.q.size], w.q)
-        copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
+        if i == 0 or rows[i] != rows[i - 1]:
+            copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
         # Poses of the start are where Euler parameters are followed from
         recall(c.system, block)
         set_floor(c, w.q)
@@ -294,9 +303,13 @@ class Series:
         if found:
             raise InvalidArgument(found)
         graph, self.kinds = moving_parts(packed)
+        if packed.derived.switched is not None:
+            graph = with_all_rows(graph)
         self.constant_columns = _masks_once(graph, packed)
         self.graph = with_ground_contacts(with_loops(graph, self.kinds, REDUCED, VALUES, BIAS, DRIFT), self.kinds)
         self.refined = int(len(graph.bodies) > MANY_BODIES or are_unequal(packed.system))
+        self.engines = {}  # scene_cache.Prepared.engine
+        self.idle = {}  # readers that are not in use, by their highest orders: of phases
 
 
 def _masks_once(graph, packed):
@@ -387,23 +400,29 @@ class SeriesEngine:
 
     def reading(self, memory, prepared, constraint_tol):
         """A `Reading` of the steps; a function and its arguments that make it in another process."""
-        packed, graph = prepared.packed, self.series.graph
-        return _reading(packed, graph, self.highest), (read_again, packed, self.highest)
+        packed = prepared.packed
+        return _reading(packed, self.series, self.highest), (read_again, packed, self.highest)
 
 
 def read_again(packed, highest):
     """A `Reading` in another process than the run's."""
-    return _reading(packed, Series(packed, refusal(packed)).graph, highest)
+    return _reading(packed, Series(packed, refusal(packed)), highest)
 
 
-def _reading(packed, graph, highest):
+def _reading(packed, series, highest):
     def workspace():
         context, run = reading_workspace(system, graph, room(highest), packed.size)
         _set_kernels(run, graph, highest, True)
         return context, run
 
-    system = packed.system
-    return TrajectoryReading(read_series, workspace, system, shift=0, degree=16)
+    def begin(context):
+        set_selection(context.tangent, off)
+
+    system, graph = packed.system, series.graph
+    if packed.derived.switched is None:
+        return TrajectoryReading(read_series, workspace, system, 0, 16, leave_accelerations)
+    off, idle = np.flatnonzero(np.isin(graph.row, redundant_rows(packed))), series.idle.setdefault(highest, [])
+    return TrajectoryReading(read_series, workspace, system, 0, 16, leave_accelerations, begin, idle)
 
 
 def expanding(rough, far):

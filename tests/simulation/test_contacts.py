@@ -55,6 +55,21 @@ def test_a_bouncing_ball_comes_to_rest_and_slides_on(e):
     assert penetration(scene, solution) > -1e-13
 
 
+@pytest.mark.parametrize("radius", [0.1, 0.3])
+def test_a_ball_whose_gap_is_rounded_comes_to_rest_in_time(radius):
+    """Gaps have the rounding of the radius; flights end as high as they began, to the last digit."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    ball = scene.add_point_mass(1.0, position=(0, 0, 1.0 + radius), velocity=(1, 0, 0), name="ball")
+    floor = {"normal_b": (0, 0, 1), "restitution": 0.8, "name": "floor"}
+    scene.add(C.SphereContact(ball, scene.ground, radius_a=radius, **floor))
+    solution = ts.simulate(scene, (0, 6.0))
+    fall = np.sqrt(2 / G)
+    times = np.array([t for t, *_ in solution.impulses])
+    exact = fall * (1 + 2 * np.append(0.0, np.cumsum(0.8 ** np.arange(1, times.size))))
+    assert np.abs(times - exact).max() < 1e-12
+    assert abs(solution.phases[-1][0] - 9 * fall) < 1e-12
+
+
 def test_both_sides_of_an_impact():
     """The outputs have the instant twice; dense output has the later side at it, and the earlier one before."""
     scene, fall = bouncing(0.5)

@@ -52,6 +52,7 @@ from ..rows.interface import (
     with_all_rows,
 )
 from ..workspaces import Parts, load_parts, no_parts, parts
+from .tolerances import GONE
 
 
 class ContactParts(NamedTuple):
@@ -83,7 +84,8 @@ def measure_opened(t, which, start, values):
     """Divide gaps by the time since they have opened, in values (k, gaps) at times t (k,), or add rounding to them.
 
     start (4, opened): time, gap, rate and rounding where those of the numbers `which` have opened; without a rate the
-    second. The first have the rounding, r, too, times (r / (rate time))^6: above noise at once, gone where they close.
+    second. The first have the rounding, r, too, times (r / (rate time))^6: above noise at once, and zero where they
+    close: there gaps are zero, not one digit less.
     """
     for j in range(which.size):
         begun, first, rate, rounding = start[0, j], start[1, j], start[2, j], start[3, j]
@@ -93,6 +95,7 @@ def measure_opened(t, which, start, values):
                 values[k, which[j]] = grown + rounding
             else:
                 share = (rounding / (rate * since)) ** 2 if since > 0.0 else 0.0
+                share = share if share > GONE else 0.0
                 values[k, which[j]] = (grown + rounding * share * share * share) / since if since > 0.0 else rate
 
 

@@ -124,6 +124,9 @@ EVENT_ERROR = 1e-9
 # Share of the bound of friction that decides then: the contact slides, though its acceleration is rounding.
 WITHIN_BOUND = 1.0 - 1e-10
 
+# (r / (rate time))^2 of a gap of rounding r that has just opened, below which r is left out: its cube is 1e-6 of r.
+GONE = 1e-2
+
 # --- friction at rest ------------------------------------------------------------------------------------------------
 # m/s or rad/s: a body that slides in a plane, more slowly, has come to rest where its direction turns: ten times the
 # velocity below which its direction is kept. So has a contact, if it would stick: m/s.

@@ -55,6 +55,19 @@ def test_a_bouncing_ball_comes_to_rest_and_slides_on(e):
     assert penetration(scene, solution) > -1e-13
 
 
+@pytest.mark.parametrize("e", [0.1, 0.5, 0.8])
+def test_impacts_where_the_gap_has_coarse_digits(e):
+    """Of a ball whose centre comes down to 0.1 m: the gap is zero over a whole digit, with flights down to 1e-8 s."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    ball = scene.add_point_mass(1.0, position=(0, 0, 1.0), velocity=(1.0, 0, 0))
+    scene.add(ts.constraints.SphereContact(ball, scene.ground, radius_a=0.1, normal_b=(0, 0, 1), restitution=e))
+    solution = ts.simulate(scene, (0, 5.0))
+    fall, count = np.sqrt(1.8 / G), len(solution.impulses)
+    times = fall * (1 + 2 * e * (1 - e ** np.arange(count)) / (1 - e))
+    np.testing.assert_allclose([t for t, *_ in solution.impulses], times, rtol=0, atol=1e-13)
+    assert abs(solution.phases[-1][0] - fall * (1 + e) / (1 - e)) < 1e-13
+
+
 def test_both_sides_of_an_impact():
     """The outputs have the instant twice; dense output has the later side at it, and the earlier one before."""
     scene, fall = bouncing(0.5)

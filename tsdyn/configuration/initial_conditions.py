@@ -386,8 +386,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     graphs of the packed scene drop them from now on.
     """
     packed = scene.packed
-    place = singular_place(packed, q)
-    if place:
+    if place := singular_place(packed, q):
         raise SingularConfiguration(f"{place}: a singular configuration. Start from another one.")
     start = _Start(scene, system, q, qd, t, tol)
     if packed.derived.redundant is None and start.is_regular():

@@ -387,7 +387,7 @@ def test_a_box_falls_and_comes_to_rest_on_four_corners(tilt, e, spin):
 
 
 def test_impulses_account_for_the_momentum_of_a_stack():
-    """Also those that keep corners closed which another impact lifts by less than rounding."""
+    """Also where an impact lifts other corners by less than rounding."""
     scene, below, floor = ts.Scene(gravity=(0, 0, -G)), None, []
     for i, half in enumerate((0.0012, -0.0013)):
         given = {"position": (0, 0, 0.28 + 0.53 * i), "orientation": (np.cos(half), np.sin(half), 0, 0)}

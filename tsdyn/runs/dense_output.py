@@ -408,9 +408,10 @@ class Reader:
 
 
 class StepPieces:
-    """The trajectories of a run's parts, one after the other, as one `Trajectory`."""
+    """The trajectories of a run's parts, one after the other, as one `Trajectory`.
 
-    side = "left"  # at the end of a part: that part
+    At the end of a part that part counts, but where a step counts that begins there.
+    """
 
     def __init__(self, parts):
         self.parts, self.start, self.end = parts, parts[0].start, parts[-1].end
@@ -425,6 +426,10 @@ class StepPieces:
         for part in self.parts:
             part.begin_at(times)
 
+    def _begins(self, t):
+        """Whether a part that begins at times t (k,) counts there."""
+        return np.isin(t, np.concatenate([part.asked for part in self.parts]))
+
     def __call__(self, t):
         """As of a `Trajectory`."""
         states, memory, status = self._gathered(t, lambda part, times: part(times))
@@ -436,7 +441,8 @@ class StepPieces:
 
     def _gathered(self, t, ask):
         """What the parts say of times t, in their order; where it is no array, a list."""
-        piece = np.searchsorted([part.end for part in self.parts[:-1]], t, side=self.side)
+        ends = [part.end for part in self.parts[:-1]]
+        piece = np.where(self._begins(t), np.searchsorted(ends, t, side="right"), np.searchsorted(ends, t))
         order, found = [], []
         for i in np.unique(piece).tolist() or [0]:
             at = np.flatnonzero(piece == i)

@@ -108,8 +108,10 @@ def between(context, c, r, t, block):
     chart.bare = 0
     if status == 0 and w.counters.factorizations > made + 1:
         status = _branch_status(context, w, r)
-    if status != 0 or r.kernels.second == 0:
-        return status if status != 0 else evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
+    if status != 0:
+        return status
+    if r.kernels.second == 0:
+        return evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
     factored = chart.factored
     status = call_place(r.kernels.place, context, t, r.xs)
     if status == 0:

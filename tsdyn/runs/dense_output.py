@@ -92,7 +92,7 @@ def between(context, c, r, t, block):
     """q, qd, qdd at a time within the step of this block. Status. xd, the next step's, is left alone.
 
     Positions are solved for twice: Newton's method starts further away than in a run, and ends closer to rounding when
-    repeated from nearby. Accelerations of collocation methods are those of the interpolant: the right-hand side of a
+    repeated from nearby. Accelerations of implicit methods are those of the interpolant: the right-hand side of a
     stiff scene would amplify its error.
     """
     w, chart, h, data = c.work, c.chart.state, block[B_H], block[B_DATA:]

@@ -257,6 +257,11 @@ class Clock(Record):
     max_step: float
     exponent: float  # of the error, in the choice of a step
     error_before: float  # of the last accepted step, over the tolerance
+    acceleration: float  # |qdd| at the end of that step; zero: not known
+    change: float  # log(a0 / a1) of that step, step_control.py
+    ideal: float  # log H of that step
+    along: float  # faded sum of log(a0 / a1) times the change of log H after it
+    square: float  # faded sum of log(a0 / a1)^2
     stability_limit: float  # of h |lambda|; zero: not watched
     turn_share: float  # of the longest step that rotations allow
     largest_landing: float  # m; how far a projection near a singular configuration has moved a body at most

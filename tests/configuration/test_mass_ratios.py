@@ -222,10 +222,24 @@ def driven_thread(length, off, coupled=False):
     return scene, 0
 
 
-@pytest.mark.slow_for("1e*08")
+def tied_bar(length, off):
+    """A bar on a vertical axle between two ropes' ends, which pull in opposite directions: a couple alone."""
+    scene = ts.Scene(gravity=(0, 0, -G * length))
+    bar = scene.add_body(1.0, (length**2,) * 3, name="bar")
+    scene.add(C.Revolute.at(scene.ground, bar, point=np.array((off, 0, 0)) * length, axis=(0, 0, 1)))
+    ends = [(scene.ground, (-length, -0.5 * length, 0)), (bar, (-0.5 * length, 0, 0))]
+    ends += [(bar, (0.5 * length, 0, 0)), (scene.ground, (length, 0.5 * length, 0))]
+    scene.add(C.Rope(ends, always_taut=True))
+    return scene, 0
+
+
+BUILDS = (leaning_disc, sleeve_on_a_rod, driven_thread, partial(driven_thread, coupled=True), tied_bar)
+
+
+@pytest.mark.slow_but("*-1.0")
 @pytest.mark.parametrize("length", [1e-8, 1.0, 1e8])
 @pytest.mark.parametrize("off", [0.0, 1e-17, 1e-9, 1e-3])
-@pytest.mark.parametrize("build", [leaning_disc, sleeve_on_a_rod, driven_thread, partial(driven_thread, coupled=True)])
+@pytest.mark.parametrize("build", BUILDS)
 def test_arms_of_rounding_change_neither_mobility_nor_tolerances(build, off, length):
     """Rows have arms that no point shows: a radius, a way along a guide, a lead."""
     scene, freedom = build(length, off)

@@ -260,16 +260,20 @@ def test_a_run_with_armature_is_that_of_mujoco():
         assert np.abs(origin - data.body(name).xpos).max() < FINE
 
 
-SLIDES = {"plane": ("x", "z"), "space": ("x", "y", "z")}
-AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+ROTORS = [f"axis='{axis}' armature='0.{i}'" for i, axis in enumerate(("1 0 0", "0 0 1", "0 1 0"), 3)]
+SLIDES = {
+    "plane": ROTORS[:2],
+    "space": ROTORS,
+    "oblique springs": ["axis='1 0 0'", "axis='0.6 0 0.8' stiffness='5' damping='2'"],
+    "springs across the body": ["axis='0.6 0 0.8' damping='2'", "axis='-0.8 0 0.6' stiffness='5'"],
+}
 
 
 @pytest.mark.parametrize("slides", SLIDES.values(), ids=SLIDES)
-def test_slides_with_armature_are_those_of_mujoco(slides, tmp_path):
+def test_slides_that_do_not_become_one_joint_are_those_of_mujoco(slides, tmp_path):
     """A root of slides and a hinge, a link that swings from it; between slides are links of a trifle, 1e-7 kg."""
     mujoco = pytest.importorskip("mujoco")
-    roots = "".join(f"<joint name='{name}' type='slide' axis='{AXES[name]}' armature='0.{i}'/>"
-                    for i, name in enumerate(slides, 3))  # fmt: skip
+    roots = "".join(f"<joint name='slide {i}' type='slide' {given}/>" for i, given in enumerate(slides))
     inertial = "<inertial pos='0.2 0 0.1' mass='1' diaginertia='.02 .03 .04'/>"
     arm = f"<body name='arm' pos='0.4 0 0'><joint name='elbow' axis='0 1 0' armature='0.1'/>{inertial}</body>"
     root = f"<body name='root'>{roots}<joint name='turn' axis='0 1 0' armature='0.2'/>{inertial}{arm}</body>"

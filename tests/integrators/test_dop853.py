@@ -113,6 +113,38 @@ def test_steps_follow_the_charts_of_a_linkage():
     demand_every_level(solution)
 
 
+@pytest.mark.parametrize("name", ["two_body_pendulum", "two_body_pendulum_spatial"])
+def test_steps_follow_the_time_scale(name):
+    """Swings quicken and slow down within a step; by errors alone a twelfth of the steps is rejected, and more."""
+    for tol in (1e-4, 1e-6):
+        solution, off = run(name, DOP853(rtol=tol, atol=tol))
+        assert solution.stats.rejected < 0.065 * solution.stats.steps
+        assert off < tol
+
+
+def test_accelerations_of_a_spring_are_no_time_scale():
+    """x = 1 + 0.3 cos(w t): accelerations pass zero twice a period, the steps don't change."""
+    scene, w = ts.Scene(gravity=(0.0, 0.0, 0.0)), np.sqrt(40.0)
+    ball = scene.add_point_mass(mass=1.0, position=(1.3, 0.0, 0.0))
+    scene.add(ts.forces.Spring(ball, scene.ground, stiffness=40.0, free_length=1.0))
+    solution = ts.simulate(scene, (0.0, 20.0), integrator=DOP853(1e-6, 1e-6))
+    assert solution.stats.rejected == 0
+    settled = solution.steps.h[len(solution.steps.h) // 5 : -1]
+    assert settled.max() < 1.4 * settled.min()
+    exact = 1.0 + 0.3 * np.cos(w * solution.t)
+    assert np.abs(solution.position(ball)[:, 0] - exact).max() < 1e-7
+
+
+def test_from_rest_and_a_load_that_jumps():
+    """Nothing moves for a second, then a force acts: x = 5 (t - 1)^2, and x = 5 + 10 (t - 2) after another."""
+    scene = ts.Scene(gravity=(0.0, 0.0, 0.0))
+    ball = scene.add_point_mass(mass=0.1, position=(0.0, 0.0, 0.0))
+    push = ts.Table([0.0, 1.0, 1.0, 2.0, 2.0, 3.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    scene.add(ts.forces.PointForce(ball, force=(push, 0.0, 0.0)))
+    solution = ts.simulate(scene, (0.0, 3.0), integrator=DOP853(1e-10, 1e-10), t_eval=(0.0, 1.0, 1.5, 2.0, 3.0))
+    assert np.abs(solution.position(ball)[:, 0] - (0.0, 0.0, 1.25, 5.0, 15.0)).max() < HELD
+
+
 @pytest.mark.parametrize("method", [RK45, DOP853])
 def test_a_new_chart_does_not_make_the_control_forget(method):
     """The error before enters the next step; forgotten at every chart, steps would be a fifth longer or shorter.

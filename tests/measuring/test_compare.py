@@ -147,6 +147,12 @@ def test_scenes_that_an_engine_cannot_have():
     with pytest.raises(ts.InvalidArgument, match="MuJoCo can't have this scene:\n  spindle: Screw has no counterpart"):
         ts.compare(scene, with_="mujoco")
     scene = pendulum()
+    wheel = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(3, 0, 0), name="wheel")
+    axle = scene.add(C.Revolute.at(scene.ground, wheel, point=(3, 0, 0), axis=(0, 0, 1), name="axle"))
+    scene.add(C.Coupler(axle, scene["hinge"], polynomial=(0, 1, 0.1), name="cam"))
+    with pytest.raises(ts.InvalidArgument, match=r"scene:\n  cam: Coupler has no counterpart$"):
+        ts.compare(scene, with_="mujoco")
+    scene = pendulum()
     scene.add(C.RotationMotor.of(scene["hinge"], angle=lambda t: 0.1 * t, name="drive"))
     with pytest.raises(ts.InvalidArgument, match="drive"):
         ts.compare(scene, with_="mujoco")

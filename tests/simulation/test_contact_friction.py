@@ -727,16 +727,3 @@ def test_a_box_that_slides_and_turns_comes_to_rest_in_few_phases():
     R = state.rotation("0")
     found = *state.position("0")[:2], np.arctan2(R[1, 0], R[0, 0])
     np.testing.assert_allclose(found, slid([0.3] * 4, size, legs, (1, 0), 3.0, 0.05), atol=1e-9)
-
-
-def test_friction_of_joints_is_refused_on_contacts_that_open():
-    scene = ts.Scene()
-    block = scene.add_point_mass(mass=1.0, name="block")
-    floor = scene.add(C.PlaneContact(block, scene.ground, **FLOOR, name="floor"))
-    with pytest.raises(ts.InvalidForce, match=r"'floor' opens and closes, .*set kinetic and static there"):
-        scene.add(ts.forces.ContactFriction(floor, kinetic=0.3))
-    floor.unilateral = False
-    scene.add(ts.forces.ContactFriction(floor, kinetic=0.3, name="brake"))
-    with pytest.raises(ts.InvalidConstraint, match="'brake' is friction of a contact that doesn't open; remove it"):
-        floor.unilateral = True
-    assert not floor.unilateral

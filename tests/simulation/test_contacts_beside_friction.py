@@ -80,3 +80,16 @@ def test_an_arm_with_a_rough_pin_on_a_stop(kinetic):
     else:
         assert solution.phases == [(0.0, 0.2, ())]
         assert solution.angle("pin")[-1] < 0.0
+
+
+def test_friction_of_joints_is_refused_on_contacts_that_open():
+    scene = ts.Scene()
+    block = scene.add_point_mass(mass=1.0, name="block")
+    floor = scene.add(C.PlaneContact(block, scene.ground, normal_b=(0, 0, 1), unilateral=True, name="floor"))
+    with pytest.raises(ts.InvalidForce, match=r"'floor' opens and closes, .*set kinetic and static there"):
+        scene.add(ts.forces.ContactFriction(floor, kinetic=0.3))
+    floor.unilateral = False
+    scene.add(ts.forces.ContactFriction(floor, kinetic=0.3, name="brake"))
+    with pytest.raises(ts.InvalidConstraint, match="'brake' is friction of a contact that doesn't open; remove it"):
+        floor.unilateral = True
+    assert not floor.unilateral

@@ -39,6 +39,7 @@ CONTACT_SCENES = (
     *(("ropes", seed) for seed in (107, 110, 118)),  # a rope that comes back, after others have run
     ("cradle", 115), ("balls", 138),  # reactions that are rounding
     ("chain_over_floor", 9), ("chain_over_floor", 118),  # slips and links that bilateral constraints hold
+    pytest.param("stack", 11, marks=pytest.mark.slow),  # low flights within long steps
 )  # fmt: skip
 
 

@@ -52,7 +52,7 @@ from ..rows.interface import (
     with_all_rows,
 )
 from ..workspaces import Parts, load_parts, no_parts, parts
-from .tolerances import GONE
+from .tolerances import JUST_OPENED
 
 
 class ContactParts(NamedTuple):
@@ -84,8 +84,7 @@ def measure_opened(t, which, start, values):
     """Divide gaps by the time since they have opened, in values (k, gaps) at times t (k,), or add rounding to them.
 
     start (4, opened): time, gap, rate and rounding where those of the numbers `which` have opened; without a rate the
-    second. The first have the rounding, r, too, times (r / (rate time))^6: above noise at once, and zero where they
-    close: there gaps are zero, not one digit less.
+    second. The first have the rounding, r, too, times (r / (rate time))^6: above noise at once, none where they close.
     """
     for j in range(which.size):
         begun, first, rate, rounding = start[0, j], start[1, j], start[2, j], start[3, j]
@@ -93,10 +92,13 @@ def measure_opened(t, which, start, values):
             grown, since = values[k, which[j]] - first, t[k] - begun
             if not rate > 0.0:
                 values[k, which[j]] = grown + rounding
+            elif since > 0.0:
+                share = (rounding / (rate * since)) ** 2
+                if share > JUST_OPENED**2:  # else it would be the sign of gaps that are zero to the last digit
+                    grown += rounding * share * share * share
+                values[k, which[j]] = grown / since
             else:
-                share = (rounding / (rate * since)) ** 2 if since > 0.0 else 0.0
-                share = share if share > GONE else 0.0
-                values[k, which[j]] = (grown + rounding * share * share * share) / since if since > 0.0 else rate
+                values[k, which[j]] = rate
 
 
 @kernel

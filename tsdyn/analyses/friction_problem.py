@@ -220,16 +220,20 @@ class FrictionFrames:
         numbers = memory[self.frictions.units[i].way]
         return numbers[0] * self.axes[i] if numbers.size == 1 else numbers
 
-    def basis(self, i, free):
+    def basis(self, i, free, mobility):
         """Orthonormal directions (r, 3), ground frame, in which a unit may slide.
 
-        free: function of a unit that returns its velocities (3, motions), of all motions that the rows leave free.
+        free: function of a unit that returns its velocities (3, motions), of all motions that the rows leave free;
+        mobility: of a unit and directions (r, 3), its accelerations (r, r) along these by unit forces.
         """
         slide = self.frictions.units[i].slide
         if slide in (PIN, GUIDE):
             return self.axes[i][None]
         if slide is PLANE:
-            return np.array(perpendiculars(self.axes[i]))
+            basis = np.array(perpendiculars(self.axes[i]))
+            size, ways = np.linalg.eigh(mobility(i, basis))
+            moves = size > NEGLIGIBLE * size.max()
+            return basis if moves.all() else ways.T[moves] @ basis
         U, size, _ = np.linalg.svd(free(i))
         return U[:, : int((size > RANK_TOL * max(size.max(initial=0.0), 1.0)).sum())].T
 
@@ -266,9 +270,14 @@ def values_of(packed, t, q, memory):
     return constraint_arrays(_remembering(packed.system, memory), q, np.zeros_like(q), t)[0]
 
 
+def gradients(packed, t, q, memory):
+    """Phi_q (m, n) with what a run remembers, memory (slots,)."""
+    return constraint_arrays(_remembering(packed.system, memory), q, np.zeros_like(q), t)[1]
+
+
 def free_motions(packed, t, q, memory, rows):
     """Velocities (rows, motions) of some rows of all motions that the others leave free."""
-    _, Phi_q, _, _ = constraint_arrays(_remembering(packed.system, memory), q, np.zeros_like(q), t)
+    Phi_q = gradients(packed, t, q, memory)
     return Phi_q[rows] @ _null_space(np.delete(Phi_q, rows, axis=0))
 
 

@@ -299,7 +299,9 @@ class Linearisation:
     def modes(self) -> Modes:
         """Frequencies, damping ratios, shapes, and what moves in each, a `Modes`."""
         if not len(self.coordinates):
-            raise InvalidArgument("modes: the scene has no degrees of freedom.")
+            raise InvalidArgument(
+                "modes: the scene has no degrees of freedom, so nothing vibrates. Remove a constraint."
+            )
         first, zero = np.flatnonzero(self._pairs.values.imag >= 0.0), int((self._pairs.values == 0.0).sum())
         first = first[zero // 2 :] if zero else first
         first[: zero - zero // 2] = np.arange(zero - zero // 2)  # zeros are first, and a pair of them is one mode, too

@@ -100,7 +100,9 @@ class Reduced:
         rows = kinetic_rows(self._motion.system, self._motion.q, self.T)
         R = interruptible(lambda: np.linalg.qr(rows, mode="r")) if k else np.zeros((0, 0))
         if k and np.abs(np.diagonal(R)).min() == 0.0:
-            raise SingularConfiguration("linearise: a coordinate carries no inertia.")
+            raise SingularConfiguration(
+                "linearise: a coordinate moves no inertia. Give the bodies that it moves some, or hold it by a joint."
+            )
         return R
 
     @cached_property
@@ -289,7 +291,9 @@ def _solvers(H, Z):
     try:
         factors = sparse_lu((diags_array(weights) @ A).tocsc())
     except RuntimeError as error:
-        raise SingularConfiguration("linearise: the coordinates chosen are not independent here.") from error
+        raise SingularConfiguration(
+            "linearise: the coordinates chosen are not independent at this state. Linearise about another one."
+        ) from error
     weights = weights[:, None]
     solve = interruptible_solver(factors)
     return (

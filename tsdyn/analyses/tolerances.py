@@ -123,9 +123,9 @@ LEVEL = 1e-11
 EVENT_ERROR = 1e-9
 # Share of the bound of friction that decides then: the contact slides, though its acceleration is rounding.
 WITHIN_BOUND = 1.0 - 1e-10
-
-# (r / (rate time))^2 of a gap of rounding r that has just opened, below which r is left out: its cube is 1e-6 of r.
-GONE = 1e-2
+# Rounding of a gap that has just opened, over its rate times the time since, from which on it is added: flights above
+# rounding end at 1/16.
+JUST_OPENED = 1.0 / 14.0
 
 # --- friction at rest ------------------------------------------------------------------------------------------------
 # m/s or rad/s: a body that slides in a plane, more slowly, has come to rest where its direction turns: ten times the

@@ -56,9 +56,8 @@ from . import tolerances as limits
 from .mobility import check_rank, mobility_at
 from .motor_starts import demand_finite, demand_small, refuse_masses, refuse_vanished
 
-# Kernels of initial conditions: residuals, projection, selection of independent rows, motion to a place near by.
-#
-# Rows are compared in the metric of lengths, and projected in that of kinetic energy.
+# Kernels of initial conditions: residuals, projection, selection of independent rows, motion to a place near by. Rows
+# are compared in the metric of lengths, and projected in that of kinetic energy.
 #
 # In place of a row that depends on others: there is none; rounding may hide one.
 NONE, DOUBTFUL = -1, -2
@@ -387,8 +386,7 @@ def consistent(scene, system, q, qd, t, tol, allowed=False):
     graphs of the packed scene drop them from now on.
     """
     packed = scene.packed
-    place = singular_place(packed, q)
-    if place:
+    if place := singular_place(packed, q):
         raise SingularConfiguration(f"{place}: a singular configuration. Start from another one.")
     start = _Start(scene, system, q, qd, t, tol)
     if packed.derived.redundant is None and start.is_regular():

@@ -300,7 +300,7 @@ class SavedEnsemble(Ensemble):
             except InvalidFile as error:
                 raise StorageError(f"{self._path}: {error}") from error
         if not isinstance(scene, Scene) or hash_of(scene.packed) != self._record.get("scene", hash_of(scene.packed)):
-            raise StorageError(f"{self._path}: the scene is another one than that of the ensemble.")
+            raise StorageError(f"{self._path}: the scene is another one than that of the ensemble; pass that.")
         return scene
 
     def case(self, i: int) -> Any:

@@ -278,19 +278,17 @@ def gather(description, report):
 
     def joins(first, second):
         alone = coupled.isdisjoint((first.name, second.name)) and not (first.armature or second.armature)
-        return alone and _joins(first, second)
+        alone = alone and not (first.servos or second.servos)
+        return alone and _joins(first, second) and _act_apart(first, second, description.frame_of(first.a).R)
 
     for first, link, second in _pairs(description, joints, joins):
         slides = [*_slides(first), *_slides(second)]
         second.kind, second.slides = "translations", slides
-        second.servos = first.servos + second.servos  # without counterpart there, so listed
         second.stiffness = second.damping = second.free = second.load = 0.0
         second.name = ", ".join(slide.name for slide in slides)
         _drop(description, joints, first, link)
     for first, link, second in _pairs(description, joints, _is_planar):
         second.kind, second.slides = "planar", first.slides
-        for servo in first.servos:
-            report.leave("actuator", servo.name)
         _drop(description, joints, first, link)
         report.note(f"{first.name}, {second.name}: one planar joint")
     for joint in [joint for joint in description.joints if len(joint.slides) == 3]:
@@ -317,6 +315,19 @@ def _joins(first, second):
         return False
     axes = np.array([slide.axis for slide in (*_slides(first), *_slides(second))])
     return len(axes) <= 3 and np.linalg.svd(axes, compute_uv=False)[-1] > TYPED
+
+
+def _act_apart(first, second, axes):
+    """Whether springs, dampers and loads of slides act as those of a Bushing: along axes of the body, (3, 3)."""
+    slides = [*_slides(first), *_slides(second)]
+    acting = [slide for slide in slides if slide.stiffness or slide.damping or slide.load]
+    return all(
+        not slide.load
+        and min(slide.stiffness, slide.damping) >= 0.0
+        and abs(np.abs(slide.axis @ axes).max() - 1.0) < TYPED
+        and all(abs(slide.axis @ other.axis) < TYPED for other in slides if other is not slide)
+        for slide in acting
+    )
 
 
 def _slides(joint):

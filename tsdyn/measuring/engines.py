@@ -63,9 +63,7 @@ class Engine:
     def demand(cls, scene):
         """Raise InvalidArgument where the engine can't have a scene, with the reason of each constraint and force."""
         timed = [
-            (item, "it depends on time")
-            for item in scene.constraints
-            if any(not isinstance(value, (int, float)) for part in item.parts for value in part.parameters())
+            (item, "it depends on time") for item in scene.constraints if any(part.rheonomic for part in item.parts)
         ]
         changing = [
             (item, OPENS if getattr(item, "unilateral", False) else "it is switched off")

@@ -343,6 +343,8 @@ def _is_solved(c, size, adaptive, is_last):
     if size <= one.floor or (theta > limits.DIVERGING and size <= ROUNDING_AT_MOST * one.floor):
         return True
     # What is left: the sum of the corrections to come, or what first corrections have left before
+    if numbers.slips == 1:
+        theta = max(theta, limits.LEAST_SLIPPING)
     left = size * theta / (1.0 - theta) if theta < 1.0 else math.inf
     if one.trusted == 1 and one.measured == 0:
         left = min(left, _expected(numbers, size, adaptive))

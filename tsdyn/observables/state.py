@@ -9,7 +9,7 @@ import numpy as np
 from ..calls import fitting, lacking
 from ..elements.force import Force
 from ..errors import InvalidArgument
-from ..model.kinematics import Kinematics
+from ..model.kinematics import Anchor, Kinematics
 from .reactions import Exerting, multipliers
 
 if TYPE_CHECKING:
@@ -187,3 +187,45 @@ def begin_memory(packed, handles, angles, memory, items=None):
                 memory[slot : slot + part.memory] = part.first_memory
             for i, (joint, which) in enumerate(part.counted):
                 memory[slot + i] = angles[handles.row(joint, "angle").first + which]
+
+
+class EventInstant(Exerting, Kinematics):
+    """What an event function is given: a `State`, with multipliers made when asked for.
+
+    Parameters
+    ----------
+    packed : Packed
+    memory : ndarray (slots,)
+        What forces remember.
+    beside : tuple
+        The start of its step, or itself: t, state (3, n) and the joints' angles there.
+    t : float, s
+    state : ndarray (3, n)
+    """
+
+    __slots__ = ("_beside", "memory", "packed", "q", "qd", "qdd", "t")
+
+    def __init__(self, packed, memory, beside, t, state):
+        self.packed, self.memory, self._beside, self.t = packed, memory, beside, t
+        self.q, self.qd, self.qdd = state.copy()  # the function may keep or change it
+
+    @property
+    def anchor(self):
+        """What its angles are counted from."""
+        t, state, angles = self._beside
+        return Anchor(angles) if t == self.t else Anchor(angles, self.t - t, (state[0], state[1]))
+
+    @property
+    def multipliers(self):
+        """Multipliers (m,)."""
+        parts = (part[None] for part in (self.q, self.qd, self.qdd))
+        return multipliers(self.packed, np.array([self.t]), *parts, self.memory[None])[0]
+
+    def __iter__(self):
+        return iter((self.t, self.q, self.qd, self.qdd, self.multipliers))
+
+    def __len__(self):
+        return 5
+
+    def __getitem__(self, i):
+        return tuple(self)[i]

@@ -145,15 +145,14 @@ def _longest_shown(packed):
     at, length = places(packed)
     rows = np.concatenate((np.arange(len(packed.system.segments)), system.tails))
     rigid = length == 7
-    # Terms of a row on the same body add up
-    keys, term_of = np.unique((q.size * rows[:, None] + at)[rigid], return_inverse=True)
-    sums = np.zeros((keys.size, WIDTH // 2))
-    np.add.at(sums, term_of, halves[rigid])
     # Phi_p = 2 Phi_w' G, and a part along p
-    p = q[(keys % q.size)[:, None] + np.arange(3, 7)]
-    across = sums[:, 3:] - np.einsum("ki,ki->k", sums[:, 3:], p)[:, None] * p
-    move, turn = np.linalg.norm(sums[:, :3], axis=1), 0.5 * np.linalg.norm(across, axis=1)
-    both = (move > 0.0) & np.isfinite(move) & np.isfinite(turn)  # neither where a row is singular
+    p = q[at[rigid][:, None] + np.arange(3, 7)]
+    move, turn = halves[rigid][:, :3], 0.5 * halves[rigid][:, 3:]
+    turn = turn - np.einsum("ki,ki->k", turn, p)[:, None] * p
+    # Terms of a row on the same body: |Phi_r| and |Phi_w'| add up, so opposite pulls don't cancel
+    _, row_of = np.unique((q.size * rows[:, None] + at)[rigid], return_inverse=True)
+    move, turn = (np.bincount(row_of, np.linalg.norm(part, axis=1)) for part in (move, turn))
+    both = (move > 0.0) & np.isfinite(move + turn)  # neither where a row is singular
     return float((turn[both] / move[both]).max(initial=0.0))
 
 

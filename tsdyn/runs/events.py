@@ -1,7 +1,7 @@
 """Events: users' functions of time and state, and their zeros inside every step, on states of the manifold."""
 
 import math
-from functools import cache, partial
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -10,10 +10,8 @@ from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import all_angles, counted, handles_of
-from ..model.kinematics import Anchor, Kinematics
-from ..observables import reactions
-from ..observables.reactions import Exerting
-from ..observables.state import RememberingState
+from ..model.kinematics import Anchor
+from ..observables.state import EventInstant, RememberingState
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
 from . import tolerances as limits
@@ -85,48 +83,6 @@ def prepare(events):
     return found
 
 
-class EventInstant(Exerting, Kinematics):
-    """What an event function is given: a `State`, with multipliers made when asked for.
-
-    Parameters
-    ----------
-    packed : Packed
-    memory : ndarray (slots,)
-        What forces remember.
-    beside : tuple
-        The start of its step, or itself: t, state (3, n) and the joints' angles there.
-    t : float, s
-    state : ndarray (3, n)
-    """
-
-    __slots__ = ("_beside", "memory", "packed", "q", "qd", "qdd", "t")
-
-    def __init__(self, packed, memory, beside, t, state):
-        self.packed, self.memory, self._beside, self.t = packed, memory, beside, t
-        self.q, self.qd, self.qdd = state.copy()  # the function may keep or change it
-
-    @property
-    def anchor(self):
-        """What its angles are counted from."""
-        t, state, angles = self._beside
-        return Anchor(angles) if t == self.t else Anchor(angles, self.t - t, (state[0], state[1]))
-
-    @property
-    def multipliers(self):
-        """Multipliers (m,)."""
-        parts = (part[None] for part in (self.q, self.qd, self.qdd))
-        return reactions.multipliers(self.packed, np.array([self.t]), *parts, self.memory[None])[0]
-
-    def __iter__(self):
-        return iter((self.t, self.q, self.qd, self.qdd, self.multipliers))
-
-    def __len__(self):
-        return 5
-
-    def __getitem__(self, i):
-        return tuple(self)[i]
-
-
 # States inside the last step of a run, for event location.
 
 ROOM = 64  # states that are kept
@@ -153,7 +109,7 @@ class Inside:
         return [known[t] for t in times]
 
     def levels(self, times):
-        """The same as an array (k, 3, n), NaN where there is none; accelerations may be missing; not kept."""
+        """The same (k, 3, n), NaN where there is none; accelerations may be missing; not kept."""
         rows = np.zeros(times.size, int)
         found, status = self._reader.rates(times, rows, self._block, self._log.charts, self._log.points)
         if status != Status.SUCCESS:
@@ -170,11 +126,11 @@ class Inside:
             return states
         return [self._read(times[i : i + 1])[0] for i in range(times.size)] if times.size > 1 else [None]
 
-    def at(self, t):
-        """The state (3, n) at t."""
+    def at(self, t, whole=True):
+        """The state (3, n) at t; unless it is to be whole, accelerations may be missing."""
         state = self._known.get(t)
         if state is None:
-            (state,) = self.states(np.array([t]))
+            (state,) = (self.states if whole else self.levels)(np.array([t]))
         if state is None:
             raise EventFailed(f"there is no state at t = {t:.9g} s to evaluate events at.", t)
         return state
@@ -431,13 +387,6 @@ class Watch:
         """Values (k, members) of a group."""
         return group.over(self._states(times, levels))[:, group.which]
 
-    def _sample_within(self, group, step, times):
-        return self._sample(group, times, step.levels(times))
-
-    def _degree_of_group(self, turning, time):
-        """As of `_degree`, for a group on a time, s, at this rate."""
-        return self._degree(turning * time, limits.SLOW_SMOOTH_TURN, limits.FAST_SMOOTH_TURN)
-
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
         self._note_start()
@@ -460,8 +409,8 @@ class Watch:
         step.degree = self._degree(turning * (step.t1 - step.t0))
         members = {}
         for group in self._groups:
-            sample = partial(self._sample_within, group, step)
-            degree = partial(self._degree_of_group, turning)
+            sample = lambda times, group=group: self._sample(group, times, step.levels(times))  # noqa: E731
+            degree = lambda time: self._degree(turning * time, limits.SLOW_SMOOTH_TURN, limits.FAST_SMOOTH_TURN)  # noqa: E731
             first, alone = group.search(step, sample, degree)
             if first is not None:
                 i, t = first
@@ -703,8 +652,7 @@ class Watch:
         return root
 
     def _at(self, i, step, t):
-        is_member = isinstance(self.events[i].function, GroupMember)
-        return self._value(i, t, step.levels(np.array([t]))[0] if is_member else step.at(t))
+        return self._value(i, t, step.at(t, not isinstance(self.events[i].function, GroupMember)))
 
     @staticmethod
     def _end(run, log, t, state, start):

@@ -82,9 +82,54 @@ def _size(context, r):
     return call_norm(r.kernels.error_norm, context, r.dx, r.dy, r.now, r.clock.rtol, r.clock.atol)
 
 
+# The time scale of the motion: an error shows that it has changed after a step that was too long, accelerations before.
+#
+#     h <- h (a0 / a1)^s,      a0, a1 = |qdd| at both ends of a step
+#
+# Where a path is run through twice as fast, accelerations are four times as large: s = 1/2. A linear spring changes
+# accelerations, but not the time scale: s = 0. So s is fitted to the steps of the run, by least squares:
+#
+#     log H_i - log H_(i-1) = s log(a0 / a1)_(i-1),      H = h e^(-1/k) the step with an error e of the tolerance
+
+
 @kernel
-def accept(context, linear, r, h):
+def _change_of_scale(w, r, h, error):
+    """Return (a0 / a1)^s of an accepted step h; 1 for implicit methods, since stiff accelerations don't show it."""
+    clock = r.clock
+    if r.numbers.stage_at > 0:
+        return 1.0
+    # The change of H that this step shows
+    ideal, known = math.log(h) - clock.exponent * math.log(error), clock.acceleration > 0.0
+    if known:
+        clock.along = limits.FADING * clock.along + clock.change * (ideal - clock.ideal)
+        clock.square = limits.FADING * clock.square + clock.change * clock.change
+    before, after = clock.acceleration if known else _length(r.now[2]), _length(w.qdd)
+    clock.acceleration, clock.ideal, clock.change = after, ideal, 0.0
+    if after < limits.JUMP * before and before < limits.JUMP * after:
+        clock.change = math.log(before / after)
+    s = (clock.along + limits.SCALE * limits.LEARNED) / (clock.square + limits.LEARNED)
+    return math.exp(min(max(s, 0.0), limits.STEEPEST) * clock.change)
+
+
+@kernel
+def forget_scale(r):
+    """Leave the next step out of the fit, since accelerations have changed before it."""
+    r.clock.acceleration = 0.0
+
+
+@kernel
+def _length(x):
+    """|x|."""
+    total = 0.0
+    for i in range(x.size):
+        total += x[i] * x[i]
+    return math.sqrt(total)
+
+
+@kernel
+def accept(context, c, r, h):
     """Accept or reject the step h and choose the next one (Gustafsson's PI control). True if accepted."""
+    linear = c.linear
     end = r.xd if r.numbers.first_order != 0 else r.y
     # Error estimate, filtered by (I - g J)^-1 in stiff scenes
     _estimate(r, r.kernels.error, h, end)
@@ -103,9 +148,10 @@ def accept(context, linear, r, h):
         r.clock.h = h * max(factor, limits.SHRINK)
         r.numbers.rejected_last = 1
         return False
-    # Accepted: PI control with the error before; no growth right after a rejection
+    # Accepted: PI control with the error before, and the time scale; no growth right after a rejection
     error = max(error, limits.LEAST_ERROR)
     factor = limits.SAFETY * error ** (-limits.PI_ERROR * power) * r.clock.error_before ** (limits.PI_BEFORE * power)
+    factor *= _change_of_scale(c.work, r, h, error)
     factor = min(max(factor, limits.SHRINK), 1.0 if r.numbers.rejected_last != 0 else limits.GROW)
     # An unchanged step keeps the matrix
     if linear.numbers.g > 0.0 and limits.SAME_FROM <= factor <= limits.SAME_TO:

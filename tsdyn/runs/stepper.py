@@ -37,7 +37,7 @@ from .dense_output import (
     store_now,
 )
 from .run_log import close_chart, is_full, no_log, note_accepted, note_try, open_chart
-from .step_control import accept, call_watch, first_step, gets_on, stretch, watch_stiffness
+from .step_control import accept, call_watch, first_step, forget_scale, gets_on, stretch, watch_stiffness
 
 # Rotation limit of a step in driven scenes.
 #
@@ -268,6 +268,8 @@ def _enter(context, c, r, log):
     take_pieces(c.system, r, log)
     set_time(c.system, t)
     remember(c.system, w.q, w.qd, t, r.remembered[r.joints.shape[0] :])
+    forget_scale(r)
+    r.clock.along = r.clock.square = 0.0
     # First chart and its accelerations
     status = begin_chart(context, c, r, log, AT_START)
     if status == 0:
@@ -296,6 +298,7 @@ def _cross_stop(context, c, r, log, implicit):
     iteration has left.
     """
     w, status = c.work, 0
+    forget_scale(r)
     # f before and after the switch, both at the same state
     if implicit:
         status = evaluate(context, w, r, r.clock.t, r.x, r.y, r.dy, r.dx)
@@ -420,13 +423,14 @@ def _reach(c, h):
 def _is_accepted(context, run, c, r, t1, h):
     """Accept or reject the step h to t1, by its error and by the loads along its path. True if accepted."""
     before = r.clock.error_before
-    if not accept(context, c.linear, r, h):
+    if not accept(context, c, r, h):
         return False
     if r.kernels.watch == 0:
         return True
     share = call_watch(r.kernels.watch, context, run, t1, h)
     if share < 1.0:
         r.clock.h, r.clock.error_before, r.numbers.rejected_last = share * h, before, 1
+        forget_scale(r)
     return share == 1.0
 
 

@@ -33,6 +33,11 @@ PI_ERROR, PI_BEFORE = 0.7, 0.4
 # cosine in a step of one radian are 1e-9 then, and with IMPLICIT_PLACES in one of three radians, as at order 13, 1e-8.
 DISTINCT, LEAST_PLACES, IMPLICIT_PLACES = 100.0, 8, 16
 
+# The power of a0 / a1 by which a step changes (step_control.py): at first SCALE, as if steps with the sum LEARNED of
+# log(a0 / a1)^2 had shown it; at most STEEPEST. Sums fade by FADING a step. With LEARNED from 0.1 to 0.4 and FADING
+# from 0.9 to 0.98, steps at equal error differ by 1 %. A ratio beyond JUMP is of forces that jump.
+SCALE, STEEPEST, LEARNED, FADING, JUMP = 0.5, 1.0, 0.1, 0.95, 25.0
+
 # Ratio of steps within which an implicit method goes on with the same step, and so with the same matrix: chains make
 # 0.04 to 0.5 matrices a step, not 0.5 to 0.8, and as many steps. A longer one only, as in Solving ODEs II, IV.8, takes
 # a tenth more steps.

@@ -13,8 +13,7 @@ from ..maths.dense_linalg import range_and_null_space
 from ..maths.tolerances import RANK_TOL
 from ..model.handles import handles_of
 from ..observables.evaluate import NO_INERTIA, constraint_arrays, mass_matrix
-from ..observables.state import begin_memory
-from ..runs.events import EventInstant
+from ..observables.state import EventInstant, begin_memory
 from ..validation import floats, listed, vector3
 from .phase_scenes import NAMED
 from .variants import family_of, packed_anew, switchable
@@ -128,7 +127,9 @@ class Change:
         values = self._values | {parameter: value}
         found = with_values(self._scene, values)
         if found.system.memory.size != self._scene.system.memory.size:
-            raise InvalidArgument(f"{parameter} can't be set within a run: forces would remember other numbers.")
+            raise InvalidArgument(
+                f"{parameter} can't be set within a run: forces would remember other numbers. Begin another run."
+            )
         self._values = values
 
     def impulse(self, body: BodyLike, impulse: ArrayLike, point: ArrayLike | None = None) -> None:

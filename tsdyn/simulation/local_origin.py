@@ -13,8 +13,8 @@ from ..jit.code_hash import is_ours
 from ..maths.tolerances import ROUNDING
 from ..model.handles import classes
 from ..model.packed import Derived, size_of
+from ..observables.state import EventInstant
 from ..rows.inertia_rows import levers
-from ..runs.events import EventInstant
 from ..runs.run_log import RunEnd
 from .scene_cache import Prepared
 from .tolerances import FAR_LEVER, FAR_ORIGIN

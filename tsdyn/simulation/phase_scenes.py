@@ -16,12 +16,12 @@ from ..model.packed import pack
 from ..rows.constraint_graph import parts_of
 from ..validation import listed
 
-# A phase is a scene of its own, packed once for each combination of modes: the bodies, joints and forces of the scene,
-# less those that are switched off, and the rows that its units add in their modes, such as that of a closed gap. So
-# nothing below it knows of contacts, and a scene without contacts loads nothing of this. Numbers of these rows that are
-# taken at a transition, such as the place where a block sticks, are among what the run remembers: nothing is packed
-# for other values. All phases remember the same: angles of all joints, and what all forces and constraints of the scene
-# remember, whether these are active or not.
+# A phase is a scene of its own, packed once for each combination of contacts: the bodies, joints and forces of the
+# scene, less those that are switched off, and the rows that its units add in their modes, such as that of a closed gap.
+# So nothing below it knows of contacts, and a scene without contacts loads nothing of this. Numbers of these rows that
+# are taken at a transition, such as the place where a block sticks, are among what the run remembers: nothing is packed
+# for other values, nor for frictions of joints that stick or slide. All phases remember the same: angles of all joints,
+# and what all forces and constraints of the scene remember, whether these are active or not.
 
 NAMED = 5  # contacts in a message
 SHARED = "holds", "places", "members", "short_rows", "start_workspaces", "reactions"  # of `Derived`: by such phases
@@ -89,9 +89,9 @@ def _with_rows_held(base, holds):
     """
     known, ranks, whole = base._phases, dict(hold.key for hold in holds), base.packed.derived
     if known is None:
-        known = base._phases = {}
-        base._base, whole.redundant = base, np.zeros(0, np.int64)
-        whole.switched = np.concatenate([*whole.holds.values()])
+        whole.redundant, whole.switched = np.zeros(0, np.int64), np.concatenate([*whole.holds.values()])
+        base._base, known = base, {}
+        base._phases = known
     key = frozenset(ranks.items())
     if key not in known:
         graph, kinds = parts_of(base.packed)

@@ -433,7 +433,9 @@ def demand_same_place(path, numbers):
 def demand_same_scene(path, packed, known):
     """Raise StorageError unless a packed scene is that of a run, whose hash is known."""
     if hash_of(packed) != known:
-        raise StorageError(f"{path}: the scene is another one than that of the run: its packed numbers differ.")
+        raise StorageError(
+            f"{path}: the scene is another one than that of the run: its packed numbers differ. Pass it as it was run."
+        )
 
 
 def _demand_same_functions(path, facts, numbers):
@@ -442,13 +444,15 @@ def _demand_same_functions(path, facts, numbers):
         known, found = numbers[kind], facts[kind]
         missing = [name for name in known if name not in found]
         if missing:
-            raise StorageError(f"{path}: the run had {kind} that are missing here: {', '.join(missing)}.")
+            raise StorageError(
+                f"{path}: the run had {kind} that are missing here: {', '.join(missing)}. Pass the same."
+            )
         other = [name for name in found if name not in known]
         if other:
-            raise StorageError(f"{path}: the run had no such {kind}: {', '.join(other)}.")
+            raise StorageError(f"{path}: the run had no such {kind}: {', '.join(other)}. Leave them out.")
         changed = [name for name, source in found.items() if source != known[name]]
         if changed:
-            raise StorageError(f"{path}: the source of {', '.join(changed)} has changed since the run.")
+            raise StorageError(f"{path}: the source of {', '.join(changed)} has changed since the run. Restore it.")
 
 
 def _facts(given, kept):

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..analyses.contact_friction import Cones, at_turn, solve_rough_contacts
 from ..analyses.contact_problem import Inertia, NoSolution, solve_contacts
-from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, values_of
+from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, gradients, values_of
 from ..analyses.tolerances import EVENT_ERROR, LEVEL, PIVOTS, RESTS, STOPPED
 from ..errors import (
     SingularConfiguration,
@@ -132,7 +132,8 @@ class Transitions:
             else:
                 contacts = solve_contacts(inertia, resting, self.qd, leaving)
             rounding += self.frictions.sizes(self.q, self.qd - struck)
-            self._open(inertia, opening, rates, -contacts.accelerations)
+            if opening:
+                self._open(inertia, opening, rates, -contacts.accelerations)
             self._take_contacts(contacts, before)
             status = self._decide_all(before, inertia, touching, resting, leaving, broken, rounding)
             kept = {*self.modes.closed, *self.modes.idle}
@@ -307,7 +308,7 @@ class Transitions:
         for i in resting:
             ranks[i] = before.sticking.get(i, -1)
             if ranks[i] < 0:
-                basis = place.basis(i, partial(self._motions_of, place))
+                basis = place.basis(i, partial(self._motions_of, place), partial(self._mobility, place))
                 ranks[i] = len(basis)
                 for k, numbers in enumerate(place.numbers(i, basis)):
                     memory[np.array(units[i].held(k))] = numbers
@@ -326,6 +327,15 @@ class Transitions:
         # In a plane slips end where they are slow
         self.qd = problem.stopped([i for i in rest.sticking if i in fresh and not self.frictions.signed[i]], self.qd)
         return rest, ranks, phase.packed
+
+    def _mobility(self, place, i, basis):
+        """Accelerations (r, r) of a friction along directions (r, 3) by unit forces where bilateral rows hold."""
+        unit, packed = self.frictions.units[i], self._scene_of([], self.every, self.every).packed
+        memory = self.remembered[self.count :].copy()
+        for k, numbers in enumerate(place.numbers(i, basis)):
+            memory[np.array(unit.held(k))] = numbers
+        rows = gradients(packed, self.t, self.q, memory)[packed.derived.holds[unit.slot]]
+        return rows @ self.gaps.workspace.respond(self.t, self.q, memory, rows).T
 
     def _motions_of(self, place, i):
         """Velocities (3, motions) of a friction, ground frame, of the motions that bilateral and closed rows leave."""

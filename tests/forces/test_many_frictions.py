@@ -1,0 +1,83 @@
+"""Many frictions that stick and slide in one scene: each as it does alone, and packed once for all combinations."""
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+from tests.helpers.tolerances import FINE
+from tsdyn.simulation import phase_scenes
+
+C, F, M = ts.constraints, ts.forces, ts.motions
+G = 9.81
+
+
+@pytest.fixture
+def packs(monkeypatch):
+    """The phases that are packed."""
+    found, pack = [], phase_scenes.pack
+    monkeypatch.setattr(phase_scenes, "pack", lambda *given: found.append(given) or pack(*given))
+    return found
+
+
+def blocks_on_a_belt(stiffness, speed=0.5, mu=0.4, static=0.6):
+    """Blocks side by side, each on its spring, in guides that leave them one direction."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    band = scene.add_body(10.0, (1, 1, 1), velocity=(speed, 0, 0), name="band")
+    way = scene.add(C.Translational.at(scene.ground, band, point=(0, 0, 0), axis=(1, 0, 0)))
+    scene.add(C.TranslationMotor.of(way, displacement=M.Ramp(0.0, speed)))
+    for i, k in enumerate(stiffness):
+        block = scene.add_point_mass(1.0, position=(0, i, 0), velocity=(speed, 0, 0), name=f"block {i}")
+        contact = scene.add(C.PlaneContact(block, band, normal_b=(0, 0, 1)))
+        scene.add(C.Dot2(scene.ground, block, axis_a=(0, 1, 0), value=float(i)))
+        scene.add(F.Spring(block, scene.ground, point_b=(-5, i, 0), stiffness=k, free_length=5.0))
+        scene.add(F.ContactFriction(contact, kinetic=mu, static=static, name=f"friction {i}"))
+    return scene
+
+
+def test_each_block_on_a_belt_has_the_period_of_one_alone(packs):
+    """Sticks for 2 (mu_s - mu) m g / (k V), slips half an ellipse about mu m g / k: in closed form."""
+    stiffness, speed, mu, static = 100.0 * (1.0 + 0.07 * np.arange(6)), 0.5, 0.4, 0.6
+    scene = blocks_on_a_belt(stiffness, speed, mu, static)
+    solution = ts.simulate(scene, (0.0, 2.5), rtol=1e-12, atol=1e-12)
+    w, b = np.sqrt(stiffness), (static - mu) * G / stiffness
+    period = 2.0 * b / speed + 2.0 * (np.pi - np.arctan(w * b / speed)) / w
+    assert len({names for *_, names in solution.phases}) > 12
+    for i in range(6):
+        sticks = [f"friction {i}" in names for *_, names in solution.phases]
+        begins = [
+            begin for (begin, *_), now, before in zip(solution.phases[1:], sticks[1:], sticks, strict=False)
+            if now and not before
+        ]  # fmt: skip
+        assert len(begins) > 2
+        np.testing.assert_allclose(np.diff(begins), period[i], atol=FINE)
+    assert len(packs) <= 4  # the whole scene's gaps, with open contacts, and with all rows that hold frictions
+
+
+def rough_chain(count):
+    """Links on rough pins, released from the horizontal."""
+    scene = ts.Scene()
+    last = scene.ground
+    for i in range(count):
+        link = scene.add_body(1.0, (0.002, 0.02, 0.02), position=(0.25 + 0.5 * i, 0, 0), name=f"link {i}")
+        pin = scene.add(C.Revolute.at(link, last, point=(0.5 * i, 0, 0), axis=(0, 1, 0)))
+        scene.add(F.RevoluteFriction(pin, radius=0.02, kinetic=0.2, static=0.3, name=f"pin {i}"))
+        last = link
+    return scene
+
+
+def test_a_chain_of_rough_pins(packs):
+    """What sticks doesn't turn, all else does, and friction takes what energy is lost."""
+    count = 18
+    solution = ts.simulate(rough_chain(count), (0.0, 2e-3), dense_output=True)
+    kinds = {names for *_, names in solution.phases}
+    assert len(kinds) > 8
+    assert len(packs) <= 4
+    np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=FINE)
+    middles = np.array([0.5 * (begin + end) for begin, end, _ in solution.phases])
+    states, held = solution.at(middles), [names for *_, names in solution.phases]
+    spins = np.array([states.angular_velocity(f"link {i}")[:, 1] for i in range(count)])
+    turns = np.abs(np.diff(spins, axis=0, prepend=0.0))
+    sticks = np.array([[f"pin {i}" in names for names in held] for i in range(count)])
+    assert turns[sticks].max() < FINE
+    assert turns[~sticks].max() > 1e3 * FINE
+    assert solution.constraint_error.position.max() < 1e-12

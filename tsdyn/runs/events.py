@@ -487,7 +487,8 @@ class Watch:
         if group is None or len(group.numbers) == 1:
             return
         before = last.t - limits.SHORTLY * (last.t - step.t0)
-        first, value = self._sample_within(group, step, np.array([before, last.t]))
+        times = np.array([before, last.t])
+        first, value = self._sample(group, times, step.levels(times))
         falls = (value < first) & (value * (last.t - before) <= limits.TOGETHER * abs(last.t) * (first - value))
         for i, also in zip(group.numbers, falls.tolist(), strict=True):
             if also and i != last.index:

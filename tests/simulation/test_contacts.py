@@ -68,6 +68,22 @@ def test_impacts_where_the_gap_has_coarse_digits(e):
     assert abs(solution.phases[-1][0] - fall * (1 + e) / (1 - e)) < 1e-13
 
 
+@pytest.mark.parametrize("feet", [2, 4])
+def test_feet_that_land_at_one_instant_come_to_rest_in_time(feet):
+    """As one foot does: each impact at its time, to rounding of the time."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    body = scene.add_body(1.0, (1, 1, 1), position=(0, 0, 1.5), name="body")
+    for k, (x, y) in enumerate([(1, 1), (-1, -1), (1, -1), (-1, 1)][:feet]):
+        foot = {"point_a": (x, y, -0.5), "normal_b": (0, 0, 1), "unilateral": True, "restitution": 0.5}
+        scene.add(C.PlaneContact(body, scene.ground, **foot, name=f"foot {k}"))
+    solution = ts.simulate(scene, (0, 2.0))
+    fall = np.sqrt(2 / G)
+    times = np.array(sorted({t for t, *_ in solution.impulses}))
+    exact = fall * (1 + 2 * np.append(0.0, np.cumsum(0.5 ** np.arange(1, times.size))))
+    assert np.abs(times - exact).max() < 1e-12
+    assert abs(solution.phases[-1][0] - 3 * fall) < 1e-12
+
+
 def test_both_sides_of_an_impact():
     """The outputs have the instant twice; dense output has the later side at it, and the earlier one before."""
     scene, fall = bouncing(0.5)

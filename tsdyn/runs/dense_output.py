@@ -92,7 +92,7 @@ def between(context, c, r, t, block):
     """q, qd, qdd at a time within the step of this block. Status. xd, the next step's, is left alone.
 
     Positions are solved for twice: Newton's method starts further away than in a run, and ends closer to rounding when
-    repeated from nearby. Accelerations of collocation methods are those of the interpolant: the right-hand side of a
+    repeated from nearby. Accelerations of implicit methods are those of the interpolant: the right-hand side of a
     stiff scene would amplify its error.
     """
     w, chart, h, data = c.work, c.chart.state, block[B_H], block[B_DATA:]
@@ -108,8 +108,10 @@ def between(context, c, r, t, block):
     chart.bare = 0
     if status == 0 and w.counters.factorizations > made + 1:
         status = _branch_status(context, w, r)
-    if status != 0 or r.kernels.second == 0:
-        return status if status != 0 else evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
+    if status != 0:
+        return status
+    if r.kernels.second == 0:
+        return evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
     factored = chart.factored
     status = call_place(r.kernels.place, context, t, r.xs)
     if status == 0:

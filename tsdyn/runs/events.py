@@ -423,8 +423,12 @@ class Watch:
                 members[group.numbers[i]] = group, i
                 group.lend(self.tracks[group.numbers[i]], i, step.t0)
         for i in sorted([*self._single, *members]) if members else self._single:
-            # Times that bracket the zeros of event i
-            points, failed = self._points(i, step, end)
+            # Times that bracket the zeros of event i. Of a member beyond the end, too, where it can be followed: gaps
+            # that close at one instant are searched for a change of sign, not for rounding of zero
+            beyond = step.t1 if i in members else end
+            points, failed = self._points(i, step, beyond)
+            if failed is not None and beyond > end:
+                points, failed = self._points(i, step, end)
             if failed is not None:
                 failure, end = failed, min(end, failed.t)
             try:

@@ -101,8 +101,8 @@ def test_dense_output_has_the_later_side_where_a_segment_ends():
     scene = ts.Scene(gravity=(0, 0, -g))
     ball = scene.add_point_mass(mass=1.0, position=(0, 0, height))
     scene.add(C.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True, restitution=1.0))
-    damped = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
-    scene.add(ts.forces.Spring(damped, scene.ground, stiffness=1e5, damping=1e2, free_length=1.01))
+    damped, spring = scene.add_point_mass(mass=1.0, position=(1, 0, 5)), {"stiffness": 1e5, "damping": 1e2}
+    scene.add(ts.forces.Spring(damped, scene.ground, point_b=(0, 0, 5), free_length=1.01, **spring))
     solution = ts.simulate(scene, (0, 0.5), dense_output=True)
     rates = solution.at([t for t, *_ in solution.impulses]).velocity(ball)[:, 2]
     assert len(rates) == int(0.5 + 0.25 * np.sqrt(0.5 * g / height))

@@ -1,8 +1,9 @@
 """Cost of contacts: of an event beside the step that it ends, and of a step where contacts are watched.
 
 Balls bounce without loss, alone, as one of ten bodies, and ten at once; a stack of ten boxes with 40 contacts falls
-and comes to rest. Steps of ten boxes that slide on springs follow: without contacts, with 40 open ones, and with 30
-closed ones, three points of each, in place of planar joints. Runs of a group are interleaved; least times of rounds.
+and comes to rest; pins of a chain stick and slide. Steps of ten boxes that slide on springs follow: without contacts,
+with 40 open ones, and with 30 closed ones, three points of each, in place of planar joints. Runs of a group are
+interleaved; least times of rounds.
 
 Run it: python -m benchmarks.events
 """
@@ -10,6 +11,7 @@ Run it: python -m benchmarks.events
 import numpy as np
 
 import tsdyn as ts
+from benchmarks import friction
 from benchmarks.contender import timed
 
 G, ROUNDS = 9.81, 7
@@ -87,6 +89,7 @@ def main():
     """Print microseconds an event and a step."""
     scenes = {
         "a ball": balls(1, 1), "one ball of ten": balls(10, 1), "ten balls": balls(10, 10), "a stack of ten": stack(),
+        "twenty rough pins": (friction.build(20, True, 0.0), (0.0, 0.1)),
     }  # fmt: skip
     seconds, found = least({name: lambda given=given: ts.simulate(*given) for name, given in scenes.items()})
     print("an event, with the step that it ends")

@@ -224,9 +224,10 @@ def test_the_motion_is_that_of_other_methods(make, end, tol):
 
 
 @compiles
-def test_an_output_between_steps_takes_two_factorisations():
+@pytest.mark.parametrize("kind", [I.Radau, I.SDIRK54])
+def test_an_output_between_steps_takes_two_factorisations(kind):
     """Of Phi_q U for positions and velocities, of S for accelerations, which are the interpolant's: no forces."""
-    scene, method = chain(8), I.Radau(1e-3, 1e-3)
+    scene, method = chain(8), kind(1e-3, 1e-3)
     few, many = (ts.simulate(scene, (0.0, 0.2), integrator=method, t_eval=np.linspace(0, 0.2, n)) for n in (2, 102))
     exact = ts.simulate(scene, (0.0, 0.2), integrator=I.SDIRK54(1e-9, 1e-9), t_eval=many.t)
     np.testing.assert_allclose(many.q, exact.q, rtol=0, atol=1e-3)

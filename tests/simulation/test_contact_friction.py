@@ -282,6 +282,26 @@ def test_restitution_is_lowered_where_friction_would_add_energy():
     assert 0 < solution.energy[-1] <= solution.energy[0]
 
 
+@pytest.mark.parametrize("law", ["newton", "poisson"])
+@pytest.mark.parametrize("kinetic", [0.2, 0.6])
+def test_a_pinned_rod_jams_where_it_hits_the_floor_too_steeply(kinetic, law):
+    """Its end can't rise without a slip whose friction holds it down, where kinetic times the slope is above one."""
+    scene, a, e, w = ts.Scene(gravity=(0, 0, -G)), 1.1, 0.5, 2.0
+    tilted = Rotation.from_euler("y", a)
+    place, turn = 0.5 * np.array((np.cos(a), 0, -np.sin(a))), np.array((0, w, 0))
+    start = {"velocity": np.cross(turn, place), "angular_velocity": turn}
+    rod = scene.add_body(1.0, (1e-3, 1 / 12, 1 / 12), place, orientation=tilted, name="rod", **start)
+    scene.add(C.Spherical.at(scene.ground, rod, point=(0, 0, 0)))
+    level = {"point_a": (0.5, 0, 0), "point_b": (0, 0, -np.sin(a)), "normal_b": (0, 0, 1), "unilateral": True}
+    scene.add(C.PlaneContact(rod, scene.ground, kinetic=kinetic, restitution=e, name="tip", **level))
+    after, _ = ts.impact(scene, ts.State(0.0, *scene.start), law=law)
+    assert np.tan(a) * 0.2 < 1 < np.tan(a) * 0.6
+    rises = 0.0 if kinetic == 0.6 else e * w
+    if law == "newton" or kinetic == 0.6:
+        np.testing.assert_allclose(after.angular_velocity("rod"), [0, -rises, 0], atol=1e-12)
+    assert ts.simulate(scene, (0, 0.1), law=law).success
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_random_impacts_keep_the_laws(seed):
     """Of a box with five contacts: no approach, impulses that push, no energy gained, by both laws."""

@@ -95,6 +95,20 @@ def test_both_sides_of_an_impact():
     np.testing.assert_allclose(sides, [-G * fall, 0.5 * G * fall], rtol=1e-13)
 
 
+def test_dense_output_has_the_later_side_where_a_segment_ends():
+    """A stiff spring has another method try at an impact: the step that begins there has other velocities."""
+    height, g = 1e-5, 10.0
+    scene = ts.Scene(gravity=(0, 0, -g))
+    ball = scene.add_point_mass(mass=1.0, position=(0, 0, height))
+    scene.add(C.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True, restitution=1.0))
+    damped = scene.add_point_mass(mass=1.0, position=(1, 0, 0))
+    scene.add(ts.forces.Spring(damped, scene.ground, stiffness=1e5, damping=1e2, free_length=1.01))
+    solution = ts.simulate(scene, (0, 0.5), dense_output=True)
+    rates = solution.at([t for t, *_ in solution.impulses]).velocity(ball)[:, 2]
+    assert len(rates) == int(0.5 + 0.25 * np.sqrt(0.5 * g / height))
+    np.testing.assert_allclose(rates, np.sqrt(2.0 * g * height), rtol=1e-9)
+
+
 def test_output_times_across_impacts():
     scene, fall = bouncing(0.5, height=G / 2)  # the first impact is at 1 s
     times = np.array([0.0, 0.5, fall, 1.5, 2.0])
@@ -389,7 +403,7 @@ def test_a_box_falls_and_comes_to_rest_on_four_corners(tilt, e, spin):
 
 
 def test_impulses_account_for_the_momentum_of_a_stack():
-    """Also those that keep corners closed which another impact lifts by less than rounding."""
+    """Also where an impact lifts other corners by less than rounding."""
     scene, below, floor = ts.Scene(gravity=(0, 0, -G)), None, []
     for i, half in enumerate((0.0012, -0.0013)):
         given = {"position": (0, 0, 0.28 + 0.53 * i), "orientation": (np.cos(half), np.sin(half), 0, 0)}

@@ -1,6 +1,6 @@
 """Scenes far from the origin, and small ones: as exact as those of metres beside it."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -164,3 +164,51 @@ def test_velocities_hold_along_a_link_that_is_much_shorter_than_a_small_scene(rn
         line, rate = solution.position(b) - solution.position(a), solution.velocity(b) - solution.velocity(a)
         along = np.abs((line * rate).sum(axis=1)) / np.linalg.norm(rate, axis=1)
         assert along.max() < FINE * link.length
+
+
+def falling_stack(L):
+    """Three boxes above each other, in units of L, and the time unit, s."""
+    scene, low, top, half, size = ts.Scene(), None, 0.0, 0.0, L * np.array((0.6, 0.5, 0.4))
+    spread, floor = size @ size - size * size, {"unilateral": True, "restitution": 0.5, "normal_b": Z}
+    for i in range(3):
+        body = scene.add_body(L**3, L**3 * spread / 12, (0.0, 0.0, top + 0.05 * L * (i + 1) + size[2] / 2))
+        for corner in product((-0.5, 0.5), (-0.5, 0.5), (-0.5,)):
+            point = size * corner
+            scene.add(C.PlaneContact(body, low or scene.ground, point_a=point, point_b=(0, 0, half), **floor))
+        low, top, half = body, top + size[2], size[2] / 2
+    return scene, np.sqrt(L)
+
+
+@pytest.mark.parametrize("L", [1e-6, 1e3, 5e5])
+def test_a_stack_falls_alike_in_all_units(L):
+    phases = []
+    for scene, T in map(falling_stack, (1.0, L)):
+        solution = ts.simulate(scene, (0.0, 0.6 * T), integrator="dop853", rtol=1e-8, atol=1e-8 * min(L, 1.0))
+        assert solution.success
+        phases.append(np.array([start / T for start, *_ in solution.phases]))
+    np.testing.assert_allclose(*phases, rtol=0.0, atol=1e-8)
+    assert len(phases[0]) > 50
+
+
+def test_a_small_pin_at_the_middle_of_its_eye_is_free():
+    """It falls through the clearance of 2e-9 m, by its closed form."""
+    scene, clearance = ts.Scene(gravity=(0.0, 0.0, -10.0)), 2e-9
+    pin = scene.add_point_mass(mass=1.0)
+    eye = {"radius_a": 1e-7, "radius_b": 1e-7 + clearance, "inside": True}
+    scene.add(C.SphereContact(pin, scene.ground, **eye))
+    solution = ts.simulate(scene, (0.0, 1e-4))
+    assert solution.success
+    np.testing.assert_allclose(solution.impulses[0][0], np.sqrt(2.0 * clearance / 10.0), rtol=1e-6)
+
+
+def test_a_stop_ends_a_fast_motion_in_large_units():
+    """What is left of 1e7 m/s by rounding is no velocity that breaks a constraint."""
+    scene, L, rate = ts.Scene(gravity=np.zeros(3)), 2e5, 70.0
+    arm = scene.add_body(1.0, (L * L, L * L, L * L), (L, 0.0, 0.0), velocity=(0.0, L * rate, 0.0))
+    arm.angular_velocity = (0.0, 0.0, rate)
+    hinge = scene.add(C.Revolute.at(scene.ground, arm, point=(0.0, 0.0, 0.0), axis=Z))
+    scene.add(C.Stop(hinge, upper=0.3))
+    solution = ts.simulate(scene, (0.0, 0.01))
+    assert solution.success
+    np.testing.assert_allclose(solution.impulses[0][0], 0.3 / rate, rtol=1e-9)
+    assert np.abs(solution.qd[-1]).max() <= 1e-12 * L * rate

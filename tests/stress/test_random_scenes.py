@@ -37,6 +37,7 @@ def test_a_random_scene(seed):
 
 CONTACT_SCENES = (
     *(("ropes", seed) for seed in (107, 110, 118)),  # a rope that comes back, after others have run
+    ("ropes", 700089),  # flights of some hundred roundings
     ("cradle", 115), ("balls", 138),  # reactions that are rounding
     ("chain_over_floor", 9), ("chain_over_floor", 118),  # slips and links that bilateral constraints hold
     pytest.param("stack", 11, marks=pytest.mark.slow),  # low flights within long steps

@@ -4,8 +4,8 @@
     impact         b = (gd- + e min(gd-, 0), v-): Newton's law along normals, in tangents the cone of kinetic friction
     accelerations  b = (gdd, vd) of open contacts; a contact that slides has T = -mu N v / |v|, one at rest the cone
 
-See maths/complementarity.py for the cone. With friction Newton's law can add energy: coefficients of restitution are
-lowered together until it doesn't; without restitution it never does.
+See maths/complementarity.py for the cone. With friction the laws of impact can add energy, or have no solution where
+joints tie slips to rates of gaps: coefficients of restitution are lowered together until neither is so.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
-from .tolerances import EVENT_ERROR, LEVEL, STOPPED, WITHIN_BOUND
+from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, STOPPED, WITHIN_BOUND
 
 
 def rows_of(inertia, which):
@@ -48,22 +48,27 @@ def strike(inertia, which, qd, rates, restitution, law="newton"):
             raise NoSolution
         return p
 
+    def released(e):
+        if compressed is None:
+            b = before.copy()
+            b[normal] += e * np.minimum(rates, 0.0)
+            return solved(none, b)
+        p = compressed.copy()
+        p[normal] += e * compressed[normal]
+        return p + solved(e * compressed[normal], before + G @ p)
+
     none = np.zeros(len(which))
     compressed = solved(none, before) if law == "poisson" else None
     share = 1.0
     while True:
-        e = share * restitution
-        if compressed is None:
-            b = before.copy()
-            b[normal] += e * np.minimum(rates, 0.0)
-            p = solved(none, b)
-        else:
-            released = np.zeros(before.size)
-            released[normal] = e * compressed[normal]
-            p = compressed + released + solved(released[normal], before + G @ (compressed + released))
-        if energy_gain(G, before, p) <= LEVEL * (np.abs(before) @ np.abs(p)) or share == 0.0:
-            return Struck(p.reshape(-1, 3), response @ p, share)
-        share = share / 2.0 if share > LEVEL else 0.0
+        try:
+            p = released(share * restitution)
+            if energy_gain(G, before, p) <= LEVEL * (np.abs(before) @ np.abs(p)) or share == 0.0:
+                return Struck(p.reshape(-1, 3), response @ p, share)
+        except NoSolution:
+            if share == 0.0:
+                raise
+        share = share / 2.0 if share > LEAST_SHARE else 0.0
 
 
 class Cones:

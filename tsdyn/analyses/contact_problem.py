@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..configuration.tolerances import INITIAL_TOL
+from ..elements.bodies import turning
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
@@ -83,10 +84,15 @@ class Gaps:
         self._slips = np.zeros((self.count, 2), int)  # among the rows of `contacts`
         for i in np.flatnonzero(self.rough):
             self._slips[i] = slip_rows(self.list[i].contact, own)
-        handles = handles_of(packed)
+        handles, bodies = handles_of(packed), packed.system.bodies
+        self._places = ~turning(bodies, int(bodies[:, 1].sum()))
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
         self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
+
+    def extent(self, q):
+        """The scene's length at q (n,), m: the largest number of a point or a position."""
+        return max(self.packed.size, float(np.abs(q[self._places]).max(initial=0.0)))
 
     def lengths(self, length):
         """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound."""
@@ -206,8 +212,7 @@ def slip_rows(contact, first):
 
 def closed_gaps(gaps, q, angles, tol=INITIAL_TOL):
     """Gaps that are closed, or penetrate, at q, to the relative tolerance of starts."""
-    values = gaps.at(q, angles)
-    return np.flatnonzero(values <= tol * (1.0 + np.abs(q).max())).tolist()
+    return np.flatnonzero(gaps.at(q, angles) <= tol * gaps.lengths(gaps.extent(q))).tolist()
 
 
 class Inertia:

@@ -113,6 +113,9 @@ CONSISTENT = 1e-6
 DENSE_INSTANT = 120
 
 # --- contacts --------------------------------------------------------------------------------------------------------
+# Of coefficients of restitution: where less than that would act at an impact with friction, nothing acts. A jammed end
+# rises by no more than the tolerance of the cone at a share of 1e-10.
+LEAST_SHARE = 1e-3
 # A rate of a gap is zero up to NEGLIGIBLE of its terms: velocities after an impact are right to rounding, those of a
 # chain to some hundred roundings. Of accelerations, and of reactions as the accelerations that they cause:
 LEVEL = 1e-11

@@ -332,6 +332,23 @@ class Body(PointMass):
         return {"position": q[:3], "velocity": qd[:3], "orientation": q[3:], "angular_velocity": spin}
 
 
+def turning(bodies, n):
+    """Which of n coordinates are Euler parameters (n,); bodies (b, 2): as in a `System`."""
+    found = np.zeros(n, bool)
+    found[bodies[bodies[:, 1] == 7, :1] + np.arange(3, 7)] = True
+    return found
+
+
+def largest_of_kind(bodies, x):
+    """The largest size of numbers of its kind, in place of each coordinate of x (..., n).
+
+    Kinds are positions and Euler parameters, or their rates; bodies (b, 2): as in a `System`.
+    """
+    turns = turning(bodies, x.shape[-1])
+    largest = [np.abs(x).max(axis=-1, keepdims=True, initial=0.0, where=kind) for kind in (turns, ~turns)]
+    return np.where(turns, *largest)
+
+
 def transform_g(p: ArrayLike) -> Floats:
     """G(p) = [-e, -e~ + e0 I], shape (3, 4), or (..., 3, 4) for p of shape (..., 4)."""
     e0, e1, e2, e3 = _components(p)

@@ -92,7 +92,7 @@ def between(context, c, r, t, block):
     """q, qd, qdd at a time within the step of this block. Status. xd, the next step's, is left alone.
 
     Positions are solved for twice: Newton's method starts further away than in a run, and ends closer to rounding when
-    repeated from nearby. Accelerations of collocation methods are those of the interpolant: the right-hand side of a
+    repeated from nearby. Accelerations of implicit methods are those of the interpolant: the right-hand side of a
     stiff scene would amplify its error.
     """
     w, chart, h, data = c.work, c.chart.state, block[B_H], block[B_DATA:]
@@ -108,8 +108,10 @@ def between(context, c, r, t, block):
     chart.bare = 0
     if status == 0 and w.counters.factorizations > made + 1:
         status = _branch_status(context, w, r)
-    if status != 0 or r.kernels.second == 0:
-        return status if status != 0 else evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
+    if status != 0:
+        return status
+    if r.kernels.second == 0:
+        return evaluate(context, w, r, t, r.xs, r.ys, r.yds, r.dx)
     factored = chart.factored
     status = call_place(r.kernels.place, context, t, r.xs)
     if status == 0:
@@ -408,9 +410,10 @@ class Reader:
 
 
 class StepPieces:
-    """The trajectories of a run's parts, one after the other, as one `Trajectory`."""
+    """The trajectories of a run's parts, one after the other, as one `Trajectory`.
 
-    side = "left"  # at the end of a part: that part
+    At the end of a part that part counts, but where a step counts that begins there.
+    """
 
     def __init__(self, parts):
         self.parts, self.start, self.end = parts, parts[0].start, parts[-1].end
@@ -425,6 +428,10 @@ class StepPieces:
         for part in self.parts:
             part.begin_at(times)
 
+    def _begins(self, t):
+        """Whether a part that begins at times t (k,) counts there."""
+        return np.isin(t, np.concatenate([part.asked for part in self.parts]))
+
     def __call__(self, t):
         """As of a `Trajectory`."""
         states, memory, status = self._gathered(t, lambda part, times: part(times))
@@ -436,7 +443,8 @@ class StepPieces:
 
     def _gathered(self, t, ask):
         """What the parts say of times t, in their order; where it is no array, a list."""
-        piece = np.searchsorted([part.end for part in self.parts[:-1]], t, side=self.side)
+        ends = [part.end for part in self.parts[:-1]]
+        piece = np.where(self._begins(t), np.searchsorted(ends, t, side="right"), np.searchsorted(ends, t))
         order, found = [], []
         for i in np.unique(piece).tolist() or [0]:
             at = np.flatnonzero(piece == i)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..elements.bodies import largest_of_kind, turning
 from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
@@ -577,8 +578,8 @@ class Watch:
         try:
             # Rounding of the state, in three random directions
             state = state_at(t)
-            value, size = self._value(i, t, state), np.abs(state).max(axis=1, keepdims=True)
-            size[0] = max(size[0, 0], self.events[i].length)
+            value, size = self._value(i, t, state), largest_of_kind(self.packed.system.bodies, state)
+            np.maximum(size[0], self.events[i].length, out=size[0], where=~turning(self.packed.system.bodies, self._n))
             size *= limits.SHAKEN
             shaken = [self._value(i, t, state + size * sign) for sign in _signs(self._n)]
         except EventFailed:

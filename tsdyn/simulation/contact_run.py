@@ -65,7 +65,8 @@ def demand_apart(gaps, q, angles, tol, able=None):
     values = gaps.at(q, angles)
     if able is None:
         able = [i for i, gap in enumerate(gaps.list) if gap.contact.active]
-    deep = [i for i in able if values[i] < -tol * (1.0 + np.abs(q).max())]
+    allowed = -tol * gaps.lengths(gaps.extent(q))
+    deep = [i for i in able if values[i] < allowed[i]]
     if deep:
         found = listed([f"{gaps.names[i]} {gaps.list[i].contact.excess} by {-values[i]:.3g}" for i in deep], NAMED)
         raise InconsistentState(
@@ -125,7 +126,7 @@ class _ContactRun(Transitions):
         kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
         # Whether phases of frictions that stick and slide are packed once, with the rows of all: see `phase_of`
         self.switches = run_task is not None and free.packed.derived.redundant is None
-        self.length = max(scene.packed.size, float(np.abs(self.q).max()))
+        self.length = self.gaps.extent(self.q)
         demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol, self.able)
         self.users = prepared_events(options.events) or []
         self.rest = self.t
@@ -237,7 +238,7 @@ class _ContactRun(Transitions):
 
     def _phase(self):
         """Run the next phase: its task and outcome."""
-        phase, names, known = self._scene(), self._names(), self.known
+        phase, names, known, tol = self._scene(), self._names(), self.known, self._tol()
         run, call = self._run_of(phase)
         still = self._still(phase)
         if still.size == self.q.size and self.options.method is None:
@@ -245,7 +246,7 @@ class _ContactRun(Transitions):
         run._prepare_kernels(True)
         self._enter_archive()
         while True:
-            task = run._new_task(call, (self.q, self.qd), self.remembered)
+            task = run._new_task(call, (self.q, self.qd), self.remembered, tol)
             if known is not None:  # the checkpoint is of an event later on
                 self.t, self.q, self.qd, self.remembered = known
             other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
@@ -258,7 +259,7 @@ class _ContactRun(Transitions):
             if self.archive is not None:
                 self.archive.resting = still, resting[still]
             if not (other and self.replaced):
-                outcome = self.run_task(task, phase, self.options.initial_tol)
+                outcome = self.run_task(task, phase, tol)
                 other = self.instead(task, outcome.status)
             if other is None:
                 if outcome.status is Status.CONTACT_FAILED and outcome.end.reached == self.t and self.end is not None:
@@ -272,6 +273,12 @@ class _ContactRun(Transitions):
             run, self.replaced = run._with_method(other), True
             if self.archive is not None and self.archive.resumed is None:
                 self.archive.go_back(self.written)
+
+    def _tol(self):
+        """Of the start of a phase: velocities after an impact have the rounding of those before it."""
+        last = self.qd if self.end is None else self.end.last[1]
+        before, after = (1.0 + np.abs(qd).max() for qd in (last, self.qd))
+        return self.options.initial_tol * max(1.0, before / after)
 
     def _enter_archive(self):
         """Note how the run of a phase begins; let the archive know, and readers, and write a checkpoint that is due."""
@@ -565,7 +572,7 @@ class _ContactRun(Transitions):
         if self.lowered:
             reason += (
                 f" Restitution was lowered at {counted(len(self.lowered), 'impact')}, the first at t = "
-                f"{min(self.lowered):.9g} s: with friction they would have added energy."
+                f"{min(self.lowered):.9g} s: with friction they would have added energy, or have no solution."
             )
         return Outcome(
             status, reason.strip(),

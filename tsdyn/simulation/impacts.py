@@ -81,7 +81,7 @@ def impact(
     state : State
         At the impact, such as `solution.state`; its positions are kept.
     contacts : unilateral constraint, or name of one, or a sequence of these, optional
-        Those that are closed; by default those whose gap is zero at the state, to 1e-9.
+        Those that are closed; by default those whose gap is zero at the state, to 1e-9 of the scene.
     restitution : float, or mapping of contacts or names to floats, optional
         Coefficients in place of those of the contacts.
     law : {"newton", "poisson"}
@@ -110,7 +110,7 @@ def impact(
 
     With friction the tangential impulses of a contact are within the kinetic coefficient times p, and against its slip
     where that doesn't vanish; they are the `tangential` of the impulses. Coefficients of restitution are lowered
-    together where the energy would grow.
+    together where the energy would grow, or no impulses would do.
 
     Examples
     --------

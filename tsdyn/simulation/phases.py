@@ -378,11 +378,12 @@ class Phases:
 class PhasePieces(StepPieces):
     """Dense output of phases: where one begins, its own. kinds: of the phases of each part, as `Phases` has them."""
 
-    side = "right"
-
     def __init__(self, parts, kinds):
         super().__init__(parts)
         self.kinds = kinds
+
+    def _begins(self, t):
+        return np.ones(t.shape, bool)
 
 
 class Pinned:

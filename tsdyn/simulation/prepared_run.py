@@ -338,8 +338,11 @@ class Run:
             self._last = _Last(call.t_span, call.t_eval, start, bits, known.engines, task, is_regular)
         return task
 
-    def _new_task(self, call, start, memory=None):
-        """The same; start: q, qd as given, memory: joint angles and what forces remember, by default of the state."""
+    def _new_task(self, call, start, memory=None, tol=None):
+        """The same; start: q, qd as given, memory: joint angles and what forces remember, by default of the state.
+
+        tol: that of the start, by default that of the options.
+        """
         options, kept, method, state = self.options, self._prepared, self.method, call.state
         span = interval(call.t_span)
         times = output_times(call.t_eval, *span)
@@ -349,7 +352,8 @@ class Run:
         stops = kept.stops(*span, method.step is None)
         begins = memory is None and state is None
         memory = remembered(state, kept, span[0], start[0]) if memory is None else memory
-        q, qd = kept.start(self.scene, start, span[0], options.initial_tol, memory, options.redundancy == "drop")
+        tol = options.initial_tol if tol is None else tol
+        q, qd = kept.start(self.scene, start, span[0], tol, memory, options.redundancy == "drop")
         if not self._form.basis_free or method.implicit:
             demand_holonomic(kept.packed, q, span[0], options.formulation)
         choose = sampling = None

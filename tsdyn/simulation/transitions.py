@@ -8,6 +8,7 @@ from ..analyses.contact_friction import Cones, at_turn, solve_rough_contacts
 from ..analyses.contact_problem import Inertia, NoSolution, solve_contacts
 from ..analyses.friction_problem import Hold, NoRest, RestProblem, free_motions, gradients, values_of
 from ..analyses.tolerances import EVENT_ERROR, LEVEL, PIVOTS, RESTS, STOPPED
+from ..elements.bodies import largest_of_kind
 from ..errors import (
     SingularConfiguration,
     Status,
@@ -70,6 +71,10 @@ class Transitions:
             self.judged = self.t, 0
         return False
 
+    def _largest(self, qd):
+        """The largest size of rates of its kind, in place of each of qd (n,)."""
+        return largest_of_kind(self.scene.system.bodies, qd)
+
     def _is_now(self, t):
         """Whether a time before the present one is the same instant, to rounding."""
         return self.t - t <= 16.0 * EPS * max(abs(self.t), EPS)
@@ -100,7 +105,7 @@ class Transitions:
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
-            small, unstruck = NEGLIGIBLE * np.abs(inertia.J).sum(axis=1) * np.abs(self.qd).max(), self._is_unstruck()
+            small, unstruck = NEGLIGIBLE * inertia.sizes(self._largest(self.qd)), self._is_unstruck()
             rates[[i for i in before.closed if unstruck or abs(rates[i]) <= small[i]]] = 0.0
             # What rounding of the time leaves open is no rate: gaps close, or reach the tops of flights, at once
             none = RESTS * EPS * abs(self.t) * inertia.accelerations(self.qd)[1]
@@ -123,7 +128,7 @@ class Transitions:
             left = [i for i, (at, _, rate, _) in before.opened.items() if rate == 0.0 and self._is_now(at)]
             leaving = [*(i for i in fired if i in before.closed or i in grazing), *left]
             broken = broken if self.qd is qd else ()  # an impact has given them other velocities
-            rounding = self._rounding(before) + NEGLIGIBLE * np.abs(self.qd - qd).max()
+            rounding = self._rounding(before) + NEGLIGIBLE * self.frictions.sizes(self.q, self._largest(self.qd - qd))
             self.modes, struck = UnitModes(), self.qd
             if self.gaps.rough[resting].any():
                 self.qd, contacts = at_turn(inertia, resting, self.qd, leaving, turned, opening)

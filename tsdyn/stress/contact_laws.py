@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..constraints import PlaneContact, Rope, Stop
+from ..elements.bodies import turning
 from ..maths.tolerances import HALF_DIGITS
 from ..model.handles import index_of
 from ..observables.evaluate import constraint_arrays, mass_matrix
@@ -36,13 +37,14 @@ def impacts(solution):
     if not contacts:
         return
     system, fastest = solution.packed.system, np.abs(solution.qd).max(axis=0)
+    lever = np.where(turning(system.bodies, fastest.size), 1.0 / _size(solution), 1.0)  # momenta as of positions
     rows = [row for contact, own in contacts for row in (*own, *_slips(contact, own))]
     before, after = _events(solution)
     hit = [k for k, i in enumerate(before) if any(t == solution.t[i] for t, *_ in solution.impulses)]
     for k in np.array(hit, int)[some(len(hit), IMPACTS)] if hit else ():
         i, j = before[k], after[k]
         q, t = solution.q[i], solution.t[i]
-        M, Phi_q = mass_matrix(system, q), constraint_arrays(system, q, solution.qd[i], t)[1]
+        M, Phi_q = lever[:, None] * mass_matrix(system, q), lever * constraint_arrays(system, q, solution.qd[i], t)[1]
         change = M @ (solution.qd[j] - solution.qd[i])
         for contact, own in contacts:
             found = [p for at, name, p in solution.impulses if (at, name) == (t, contact.name)]
@@ -91,7 +93,8 @@ def _directions(packed, contact, slips):
 
 
 def _size(solution):
-    return max(extent(solution), float(np.abs(solution.q).max())) or 1.0
+    q = solution.q[:, ~turning(solution.system.bodies, solution.q.shape[1])]
+    return max(extent(solution), float(np.abs(q).max(initial=0.0))) or 1.0
 
 
 def _is_angle(contact):

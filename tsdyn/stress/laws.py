@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..configuration.tolerances import DENSE
-from ..elements.bodies import rotation_matrix
+from ..elements.bodies import rotation_matrix, turning
 from ..elements.force import Force
 from ..elements.markers import POINT
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, ROUNDING_AT_MOST, SUM_ROUNDING
@@ -19,7 +19,7 @@ from ..model.packed import member_of
 from ..observables.diagnostics import constraint_rows
 from ..observables.evaluate import constraint_arrays
 from ..observables.reactions import touching
-from ..simulation.load import resume
+from ..simulation.load import load, resume
 from ..simulation.prepared_run import Run, simulate
 from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
 from .contact_laws import energy_of_phases, impacts, unilateral
@@ -36,30 +36,43 @@ from .tolerances import (
     ROW_SHARE,
 )
 
-# A run that is stopped at its first checkpoint and goes on from there.
+# A run that is stopped at a checkpoint and goes on from there; a solution that is saved and loaded.
 
-SELDOM = 1e9  # s between checkpoints: the first, after a slice, is the only one
+SELDOM, OFTEN = 1e9, 1e-9  # s between checkpoints: the first, after a slice, is the only one; every slice and phase
 
 
 class _Stop:
-    """Ctrl-C as soon as there is a checkpoint: after the first slice, or a later one where the first ends a segment."""
+    """Ctrl-C as soon as there is a checkpoint: after the first slice, or a later one where the first ends a segment.
 
-    def __init__(self, path):
-        self.checkpoint = Path(f"{path}.checkpoint")
+    after: the fraction of the run before which there is none.
+    """
+
+    def __init__(self, path, after):
+        self.checkpoint, self.after = Path(f"{path}.checkpoint"), after
 
     def __call__(self, fraction):
-        if self.checkpoint.exists():
+        if (fraction or 0.0) >= self.after and self.checkpoint.exists():
             raise KeyboardInterrupt
 
 
-def resumed_is_same(scene, span, solution, **options):
+def resumed_is_same(scene, span, solution, after=0.0, **options):
     """Whether such a run has the bits of `solution`, which was never stopped; None without h5py."""
     if find_spec("h5py") is None:
         return None
     with TemporaryDirectory() as folder:
-        path = f"{folder}/run.h5"
-        simulate(scene, span, progress=_Stop(path), store=path, checkpoint=SELDOM, **options)
+        path, every = f"{folder}/run.h5", OFTEN if after else SELDOM
+        simulate(scene, span, progress=_Stop(path, after), store=path, checkpoint=every, **options)
         return same_bits(solution, resume(path, scene=scene))
+
+
+def saved_is_same(solution):
+    """Whether a solution with dense output has the same bits when it is saved and loaded; None without h5py."""
+    if find_spec("h5py") is None:
+        return None
+    with TemporaryDirectory() as folder:
+        solution.save(path := f"{folder}/run.h5")
+        loaded, times = load(path), np.linspace(*solution.t[[0, -1]], OUTPUTS)
+        return same_bits(solution, loaded) and same_bits(solution.at(times), loaded.at(times))
 
 
 def prepared_twice(scene, span, **options):
@@ -71,9 +84,10 @@ def prepared_twice(scene, span, **options):
 
 
 def same_bits(one, two):
-    """Whether two solutions have the same outputs to the bit."""
+    """Whether two solutions, or states, have the same numbers, phases and impulses to the bit."""
     pairs = [(getattr(one, name), getattr(two, name)) for name in ("t", "q", "qd", "qdd")]
-    return all(np.array_equal(*pair) for pair in pairs)
+    events = [[getattr(each, name, None) for name in ("phases", "impulses")] for each in (one, two)]
+    return all(np.array_equal(*pair) for pair in pairs) and events[0] == events[1]
 
 
 # The law of motors: joints follow the motions that are prescribed, which rows of sines know modulo turns alone.
@@ -202,13 +216,25 @@ def newton_euler(solution):
 def _balances(solution, bodies, around, shaken=None):
     sums = [_loads(solution, body, around[id(body)]) for body in bodies]
     largest, limit, found = max(one.size_of_force.max() for one in sums), _balance_limit(solution), []
+    left, rate = _left_by_iteration(solution)
     for one, other in zip(sums, shaken or sums, strict=True):
-        found.append(_balance("force balance", one.force, other.force, one.size_of_force, largest, limit, one.body))
+        allowed = np.linalg.norm(one.force - other.force, axis=1).max() + one.body.mass * left
+        found.append(_balance("force balance", one.force, allowed, one.size_of_force, largest, limit, one.body))
         if one.body.dimension == 7:
             floor = max(one.size_of_torque.max(), largest * extent(solution))
-            parts = one.torque, other.torque, one.size_of_torque
-            found.append(_balance("torque balance", *parts, floor, limit, one.body))
+            allowed = np.linalg.norm(one.torque - other.torque, axis=1).max() + np.trace(one.body.inertia) * rate
+            found.append(_balance("torque balance", one.torque, allowed, one.size_of_torque, floor, limit, one.body))
     return found
+
+
+def _left_by_iteration(solution):
+    """What implicit methods may leave of accelerations (k,), m/s^2 and rad/s^2: the tolerance of a step's rates."""
+    method, h = solution._method, np.diff(solution.t, prepend=solution.t[0])
+    if not solution.stats.iteration_matrices or method.atol is None:
+        return np.zeros((2, h.size))
+    turns = turning(solution.system.bodies, solution.qd.shape[1])
+    largest = np.array([[np.abs(solution.qd[:, kind]).max(initial=0.0)] for kind in (~turns, turns)])
+    return [[1.0], [2.0]] * (method.atol + method.rtol * largest) / np.where(h > 0.0, h, np.inf)
 
 
 def _shaken(solution):
@@ -293,9 +319,9 @@ def _balance_limit(solution):
     return HALF_DIGITS * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + rounding_of_places(solution)
 
 
-def _balance(law, left, shaken, sizes, largest, limit, body):
+def _balance(law, left, allowed, sizes, largest, limit, body):
     """Relative to the body's own terms; what is rounding of the largest terms in the scene doesn't count."""
-    left = np.maximum(np.linalg.norm(left, axis=1) - np.linalg.norm(left - shaken, axis=1).max(), 0.0)
+    left = np.maximum(np.linalg.norm(left, axis=1) - allowed, 0.0)
     share = left / (sizes + (NEGLIGIBLE / HALF_DIGITS * largest or 1.0))
     return Finding(law, float(share.max(initial=0.0)), limit, body.name)
 

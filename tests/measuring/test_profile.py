@@ -396,6 +396,8 @@ def test_plot_without_matplotlib(by_steps, monkeypatch):
     ("options", "words"),
     [
         ({"progress": True}, "progress"),
+        ({"store": "run.zarr"}, "leave store out"),
+        ({"store": "run.zarr", "checkpoint": 1.0}, "leave store out"),
         ({"advice": 1.0}, "advice"),
         ({"integrator": "rk4"}, "unknown integrator"),
         ({"formulation": "other"}, "unknown formulation"),

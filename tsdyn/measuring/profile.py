@@ -203,7 +203,7 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     advice : bool
         Whether to run alternatives that may be faster, such as another method or looser tolerances.
     **options
-        As for `simulate`, without progress.
+        As for `simulate`, without progress, store and checkpoint.
 
     Returns
     -------
@@ -228,8 +228,8 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     if not isinstance(scene, Scene):
         raise InvalidArgument(f"scene must be a ts.Scene, got {scene!r}.")
     for name in options:
-        if name == "progress":
-            raise InvalidArgument("profile makes many runs and has no progress; leave progress out.")
+        if name in ("progress", "store", "checkpoint"):
+            raise InvalidArgument(f"profile makes many runs, none of which has {name}; leave {name} out.")
         if name not in OPTIONS:
             raise unknown_argument("profile", name, ["scene", "t_span", "advice", *OPTIONS])
     if not isinstance(advice, (bool, np.bool_)):

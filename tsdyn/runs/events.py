@@ -490,7 +490,7 @@ class Watch:
         before = last.t - limits.SHORTLY * (last.t - step.t0)
         times = np.array([before, last.t])
         first, value = self._sample(group, times, step.levels(times))
-        falls = (value < first) & (value * (last.t - before) <= limits.TOGETHER * abs(last.t) * (first - value))
+        falls = (value < first) & (value * (last.t - before) <= limits.SAME_INSTANT * abs(last.t) * (first - value))
         for i, also in zip(group.numbers, falls.tolist(), strict=True):
             if also and i != last.index:
                 self.list[i].append(Occurrence(last.t, i, last.state))

@@ -105,7 +105,7 @@ SHAKEN, NOISE = 4.0 * EPS, 4.0
 # Share of the time since the last zero of a function, before another one, at which its sign is that before the zero.
 SHORTLY = 0.01
 # Of the time: members of a group that vanish within that of an event do so with it. Roundings of an event's time.
-TOGETHER = 100.0 * EPS
+SAME_INSTANT = 100.0 * EPS
 
 # Values of a gap or reaction in the search of one step at most, each a factorisation: seconds. Only near singular
 # states have interpolants of degree 32 on a thousandth of a step not sufficed.

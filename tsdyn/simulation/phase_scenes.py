@@ -201,29 +201,25 @@ def at_start(scene):
     return phase_of(scene, [side.gap for side in sides])
 
 
-def demand_bilateral(scene, who="this analysis"):
+def demand_bilateral(scene):
     """Raise InvalidArgument where a scene has contacts or exact friction."""
-    if has_contacts(scene):
-        demand_regular(scene, who)
+    if not has_contacts(scene):
+        return
+    exact = [force for force in scene._forces if getattr(force, "slides", ())]
+    if exact:
         raise InvalidArgument(
-            f"{who} is of one phase of a run, along which {named(contacts_of(scene._added))} may open and close. In a "
-            "copy of the scene, hold those that are closed by unilateral=False, and remove the others."
+            f"this analysis doesn't serve friction of the exact law, which sticks and slides: {named(exact)}. Give "
+            "slip_velocity (slip_rate of a torque), such as 1e-3 m/s, for the regularised law."
         )
+    raise InvalidArgument(
+        f"this analysis is of one phase of a run, along which {named(contacts_of(scene._added))} may open and close. "
+        "In a copy of the scene, hold those that are closed by unilateral=False, and remove the others."
+    )
 
 
 def named(items):
     """Names of contacts, in a message."""
     return listed(list(dict.fromkeys(item.name for item in items)), NAMED)
-
-
-def demand_regular(scene, who):
-    """Raise InvalidArgument where a scene has friction of the exact law."""
-    exact = [force for force in scene._forces if getattr(force, "slides", ())]
-    if exact:
-        raise InvalidArgument(
-            f"{who} doesn't serve friction of the exact law, which sticks and slides: {named(exact)}. Give "
-            "slip_velocity (slip_rate of a torque), such as 1e-3 m/s, for the regularised law."
-        )
 
 
 def with_closed_contacts(function):

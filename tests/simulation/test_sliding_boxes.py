@@ -1,0 +1,86 @@
+"""Boxes that slide and turn on rough corners, against their equations in minimal coordinates."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import tsdyn as ts
+from tests.helpers.rough_boxes import FLOOR, G, boxes
+
+C = ts.constraints
+BOXES = [
+    ((0.28, 0.11, 0.4, 0.26), (0.32, 0.53, 0.42), (-0.21, -1.36), 0.0),
+    ((0.21, 0.46, 0.29, 0.17), (0.25, 0.6, 0.23), (0.19, -0.13), 1.76),
+]
+
+
+def corners(size):
+    """Those that stand, body frame (4, 3)."""
+    a, b, h = np.array(size) / 2
+    return np.array([(a, b, -h), (-a, b, -h), (-a, -b, -h), (a, -b, -h)])
+
+
+def slid(mu, size, legs, v, spin, t):
+    """Centroid and angle (3,) of a box that slides on three of its corners, by its equations in x, y and the angle."""
+    m, (r, h) = 2.0, (corners(size)[legs], size[2] / 2)
+    J, mu = m * (size[0] ** 2 + size[1] ** 2) / 12, np.array(mu)[legs]
+
+    def rates(t, y):
+        c, s = np.cos(y[2]), np.sin(y[2])
+        arm = r[:, :2] @ [[c, s], [-s, c]]
+        u = y[3:5] + y[5] * np.column_stack([-arm[:, 1], arm[:, 0]])
+        f = -mu[:, None] * u / np.linalg.norm(u, axis=1)[:, None]  # for N = 1, at h below the centroid
+        N = np.linalg.solve([np.ones(3), arm[:, 1] + h * f[:, 1], -arm[:, 0] - h * f[:, 0]], [m * G, 0, 0])
+        return (*y[3:], *(N @ f / m), N @ (arm[:, 0] * f[:, 1] - arm[:, 1] * f[:, 0]) / J)
+
+    return solve_ivp(rates, (0, t), (0, 0, 0, *v, spin), "DOP853", rtol=1e-12, atol=1e-12).y[:3, -1]
+
+
+@pytest.mark.parametrize(("mu", "size", "v", "spin"), BOXES)
+def test_a_box_on_corners_of_different_friction_slides_and_turns(mu, size, v, spin):
+    """It slides on three corners, one of the distributions that the rigid box leaves open, until all of it rests."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    given = {**ts.shapes.box(size, mass=2.0), "position": (0, 0, size[2] / 2), "velocity": (*v, 0)}
+    body = scene.add_body(**given, angular_velocity=(0, 0, spin), name="box")
+    for i, corner in enumerate(corners(size)):
+        scene.add(C.PlaneContact(body, scene.ground, **FLOOR | {"point_a": corner}, kinetic=mu[i], name=str(i)))
+    solution = ts.simulate(scene, (0, 1.5), rtol=1e-10, atol=1e-10, dense_output=True).raise_if_failed()
+    assert np.abs(solution.qd[-1]).max() == 0.0
+    loads = np.stack([solution.reaction(str(i))[0] for i in range(4)], axis=1)
+    assert loads[:, :, 2].min() > -1e-9
+    slides = ~np.stack([solution.sticking(str(i)) for i in range(4)], axis=1)
+    np.testing.assert_allclose(
+        np.hypot(*np.moveaxis(loads[:, :, :2], 2, 0))[slides], (loads[:, :, 2] * mu)[slides], atol=1e-9
+    )
+    legs = np.flatnonzero(loads[0, :, 2] > 1e-9)
+    state = solution.at(0.1)
+    R = state.rotation("box")
+    found = *state.position("box")[:2], np.arctan2(R[1, 0], R[0, 0])
+    np.testing.assert_allclose(found, slid(mu, size, legs, v, spin, 0.1), atol=1e-8)
+
+
+def test_a_box_that_slides_and_turns_comes_to_rest_in_few_phases():
+    """Slips that end where they turn end at once; the box slides on three corners, by its equations."""
+    size, scene = (0.6, 0.4, 0.2), boxes(1, mu=0.3, velocity=(1, 0, 0), spin=3.0)
+    solution = ts.simulate(scene, (0, 1), rtol=1e-11, atol=1e-11, dense_output=True).raise_if_failed()
+    assert np.count_nonzero(np.diff(solution.t) == 0.0) <= 5
+    assert np.abs(solution.qd[-1]).max() == 0.0
+    contacts = scene.constraints[:4]
+    stands = [contact.point_a for contact in contacts if solution.reaction(contact)[0][0, 2] > 0]
+    legs = [np.argmin(np.linalg.norm(corners(size) - place, axis=1)) for place in stands]
+    assert len(legs) == 3
+    state = solution.at(0.05)  # other corners carry it later
+    R = state.rotation("0")
+    found = *state.position("0")[:2], np.arctan2(R[1, 0], R[0, 0])
+    np.testing.assert_allclose(found, slid([0.3] * 4, size, legs, (1, 0), 3.0, 0.05), atol=1e-9)
+
+
+def test_slips_that_turn_while_they_end_make_few_events():
+    """Of a box that slides and turns: directions turn the faster the slower it is; then it rests, exactly."""
+    scene = boxes(1, mu=0.5, size=(0.3, 0.3, 0.6), velocity=(0.3, 0.2, 0), spin=1.0)
+    solution = ts.simulate(scene, (0, 0.2), dense_output=True)
+    assert (np.diff(solution.t) == 0.0).sum() < 35
+    assert len(solution.phases) == 2
+    assert not solution.qd[-1].any()
+    energy = (0.3**2 + 0.2**2) / 2 + (0.3**2 + 0.3**2) / 12 / 2
+    np.testing.assert_allclose(solution.work[-1], -energy, rtol=1e-8)

@@ -81,3 +81,12 @@ def test_a_chain_of_rough_pins(packs):
     assert turns[sticks].max() < FINE
     assert turns[~sticks].max() > 1e3 * FINE
     assert solution.constraint_error.position.max() < 1e-12
+
+
+@pytest.mark.slow
+def test_sixty_rough_pins():
+    """Pins that are held while they still turn by what the time leaves open come to rest, and the run goes on."""
+    solution = ts.simulate(rough_chain(60), (0.0, 5e-4), dense_output=True)
+    assert solution.success, solution.message
+    np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=FINE)
+    assert solution.constraint_error.velocity.max() < FINE

@@ -598,6 +598,10 @@ class RestProblem:
             found[i] = float(rate) if rate > small[at].max() else 0.0
         return found
 
+    def slip(self, units, qd):
+        """The largest velocity or rate of some units."""
+        return np.abs(self.J[self._held(units)] @ qd).max(initial=0.0)
+
     def stopped(self, units, qd):
         """Velocities (n,) with the slips ended of units that stick, by the least change of kinetic energy."""
         rows = self._held(units)

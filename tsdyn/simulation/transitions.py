@@ -329,8 +329,11 @@ class Transitions:
         bases = {i: place.directions(i, self._hold(i, ranks[i]).numbers) for i in free}
         problem = RestProblem(place, self.gaps, phase.packed, rows, bases, self.t, self.q, self.qd, memory, cones)
         rest = problem.pivot({i: way for i, way in guess.items() if i in free}, fired)
-        # In a plane slips end where they are slow
-        self.qd = problem.stopped([i for i in rest.sticking if i in fresh and not self.frictions.signed[i]], self.qd)
+        # In a plane slips end where they are slow; elsewhere where they are more than a start may leave
+        ends = [i for i in rest.sticking if i in fresh and not self.frictions.signed[i]]
+        if problem.slip([i for i in rest.sticking if i in fresh], self.qd) > 0.5 * self.options.initial_tol:
+            ends = rest.sticking
+        self.qd = problem.stopped(ends, self.qd)
         return rest, ranks, phase.packed
 
     def _mobility(self, place, i, basis):

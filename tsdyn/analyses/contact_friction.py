@@ -129,6 +129,7 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     """
     for by_rows in False, True:
         found, pulls = _solve(inertia, resting, qd, fired, by_rows)
+        again = None
         if found.idle:
             # Idle contacts carry nothing in the phase: what the others do follows from their own normal loads
             again, pulling = _solve(inertia, found.closed, qd, fired)
@@ -136,7 +137,15 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
                 found, pulls = again._replace(idle=found.idle, grips={**found.grips, **again.grips}), pulling
         if not pulls:
             return found
-    raise NoSolution
+    if again is None or pulling:
+        raise NoSolution
+    # Some open: the idle ones open, too, or depend on the others
+    a, small = again.accelerations, LEVEL * inertia.accelerations(qd)[1] + inertia.carried()
+    idle = [i for i in found.idle if a[i] <= small[i]]
+    if any(a[i] < -small[i] or not depends(inertia, again.closed, i) for i in idle):
+        raise NoSolution
+    kept = {i: d for i, d in found.grips.items() if i in idle}
+    return again._replace(idle=sorted([*again.idle, *idle]), grips={**kept, **again.grips})
 
 
 def at_turn(inertia, resting, qd, fired, turned, opening=()):

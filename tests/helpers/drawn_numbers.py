@@ -20,9 +20,9 @@ class DrawnNumbers:
     def _many(self, one, size):
         return one() if size is None else np.array([one() for _ in range(size)])
 
-    def integers(self, low, high=None):
+    def integers(self, low, high=None, size=None):
         low, high = (0, low) if high is None else (low, high)
-        return self.data.draw(st.integers(low, high - 1))
+        return self._many(lambda: self.data.draw(st.integers(low, high - 1)), size)
 
     def random(self):
         return self.integers(WHOLE) / WHOLE

@@ -84,3 +84,26 @@ def test_slips_that_turn_while_they_end_make_few_events():
     assert not solution.qd[-1].any()
     energy = (0.3**2 + 0.2**2) / 2 + (0.3**2 + 0.3**2) / 12 / 2
     np.testing.assert_allclose(solution.work[-1], -energy, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("mu", "size", "v", "spin", "slides"),
+    [(0.3, (0.6, 0.2, 0.2), (0.9, 0.4), -1.4, 0.2), (0.43, (0.6, 0.4, 0.6), (-0.2, 0.2), 1.4, 0.02)],
+)
+def test_corners_of_a_box_that_slides_and_turns_push(mu, size, v, spin, slides):
+    """Loads of four corners that slide are independent, their rows are not: only some three of them push."""
+    scene = boxes(1, mu=mu, size=size, velocity=(*v, 0), spin=spin)
+    contacts = scene.constraints[:4]
+    solution = ts.simulate(scene, (0, 0.5), rtol=1e-10, atol=1e-10, dense_output=True).raise_if_failed()
+    loads = np.stack([solution.reaction(contact)[0] for contact in contacts], axis=1)
+    assert loads[:, :, 2].min() >= -1e-9 * G
+    np.testing.assert_allclose(loads.sum(axis=1), solution.qdd[:, :3] + [0, 0, G], atol=1e-9)
+    assert np.diff(solution.kinetic_energy).max() <= 1e-12
+    assert not solution.qd[-1].any()
+    legs = np.flatnonzero(loads[0, :, 2] > 0)
+    places = np.array([contact.point_a for contact in contacts])[legs]
+    legs = [np.argmin(np.linalg.norm(corners(size) - place, axis=1)) for place in places]
+    state = solution.at(slides)
+    R = state.rotation("0")
+    found = *state.position("0")[:2], np.arctan2(R[1, 0], R[0, 0])
+    np.testing.assert_allclose(found, slid([mu] * 4, size, legs, v, spin, slides), atol=1e-9)

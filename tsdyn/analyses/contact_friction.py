@@ -17,7 +17,7 @@ import numpy as np
 from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
-from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
+from .contact_problem import ContactState, NoSolution, depends, energy_gain, rounding_of, slack_of
 from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, STOPPED, WITHIN_BOUND
 
 
@@ -127,14 +127,25 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     NoSolution
         Where no reactions keep the contacts from penetrating, or several do: with much friction (Painleve).
     """
-    found = _solve(inertia, resting, qd, fired)
-    if not found.idle:
-        return found
-    # Idle contacts carry nothing in the phase: what the others do follows from their own normal loads
-    again = _solve(inertia, found.closed, qd, fired)
-    if again.closed != found.closed or again.idle:
-        return found
-    return again._replace(idle=found.idle, grips={**found.grips, **again.grips})
+    for by_rows in False, True:
+        found, pulls = _solve(inertia, resting, qd, fired, by_rows)
+        again = None
+        if found.idle:
+            # Idle contacts carry nothing in the phase: what the others do follows from their own normal loads
+            again, pulling = _solve(inertia, found.closed, qd, fired)
+            if again.closed == found.closed and not again.idle:
+                found, pulls = again._replace(idle=found.idle, grips={**found.grips, **again.grips}), pulling
+        if not pulls:
+            return found
+    if again is None or pulling:
+        raise NoSolution
+    # Some open: the idle ones open, too, or depend on the others
+    a, small = again.accelerations, LEVEL * inertia.accelerations(qd)[1] + inertia.carried()
+    idle = [i for i in found.idle if a[i] <= small[i]]
+    if any(a[i] < -small[i] or not depends(inertia, again.closed, i) for i in idle):
+        raise NoSolution
+    kept = {i: d for i, d in found.grips.items() if i in idle}
+    return again._replace(idle=sorted([*again.idle, *idle]), grips={**kept, **again.grips})
 
 
 def at_turn(inertia, resting, qd, fired, turned, opening=()):
@@ -174,8 +185,11 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
     return ended(which) if which else found
 
 
-def _solve(inertia, resting, qd, fired):
-    """As `solve_rough_contacts`, with the normal loads shared among all contacts."""
+def _solve(inertia, resting, qd, fired, by_rows=False):
+    """As `solve_rough_contacts`, with the normal loads shared among all contacts; and whether a closed one pulls.
+
+    by_rows: closed contacts are chosen by what holds their rows, instead of by the same accelerations.
+    """
     gaps, resting = inertia.gaps, list(resting)
     cones = Cones(inertia, resting, qd)
     response = inertia.free(cones.rows.T)
@@ -206,12 +220,19 @@ def _solve(inertia, resting, qd, fired):
                 grips[i] = None
             else:
                 grips[i] = inertia.along(i, -T[j] / length)
-    closed, idle = _carried(inertia, closed, idle, grips, N, resting)
-    pushes = _held(inertia, closed, grips, dict(zip(resting, b.reshape(-1, 3), strict=True)))
+    alone = dict(zip(resting, b.reshape(-1, 3), strict=True))
+    if by_rows:
+        idle += spare
+        closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone), []
+    else:
+        closed, idle = _carried(inertia, closed, idle, grips, N, resting)
+    pushes = _held(inertia, closed, grips, alone)
     slack = slack_of(inertia, closed, pushes, small)
     moves = (G @ p + b).reshape(-1, 3)[:, 1:]
     gains = {resting[j]: float(moves[j] @ d[j]) for j in np.flatnonzero(slides)}
-    return ContactState(closed, sorted(idle + spare), gdd, grips, _independent(inertia, closed, grips), slack, gains)
+    rows = _independent(inertia, closed, grips)
+    found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains)
+    return found, bool((pushes < -rounding_of(inertia, closed, pushes, small)).any())
 
 
 def _sharing(G, b, p, mode, cones, response):
@@ -279,15 +300,32 @@ def _carried(inertia, closed, idle, grips, N, resting):
     """closed and idle with the idle ones exchanged so that all reactions of closed ones push."""
     if not idle:
         return sorted(closed), idle
-    from scipy.optimize import nnls
-
     which = [*closed, *idle]
     columns = inertia.free(_loads(inertia, which, _ways(inertia, grips)).T)
-    size = np.linalg.norm(columns, axis=0)
     given = np.array([max(N[resting.index(i)], 0.0) for i in which])
-    shares, _ = nnls(columns / size, columns @ given)
+    return _basis(inertia, which, columns, columns @ given)
+
+
+def _pushing(inertia, which, grips, b):
+    """closed and idle of the gaps `which`, so that closed ones push where they alone hold; arguments as of `_held`.
+
+    With dependent rows loads of contacts that slide may be independent: other ones give other accelerations.
+    """
+    A, a = _holding(inertia, which, grips, b)
+    return _basis(inertia, which, np.hstack([A, -A[:, len(which) :]]), -a)
+
+
+def _basis(inertia, which, columns, load):
+    """closed and idle of the gaps `which`: closed ones independent, by their nonnegative shares of a load.
+
+    columns: of the gaps first.
+    """
+    from scipy.optimize import nnls
+
+    size = np.linalg.norm(columns, axis=0)
+    shares, _ = nnls(columns / np.where(size > 0.0, size, 1.0), load)
     closed, idle = [], []
-    for j in np.argsort(-shares):
+    for j in np.argsort(-shares[: len(which)]):
         (idle if depends(inertia, closed, which[j]) else closed).append(which[j])
     return sorted(closed), sorted(idle)
 
@@ -334,12 +372,17 @@ def _held(inertia, closed, grips, b):
 
     b: accelerations (3,) of gaps and slips where all are open, by gaps.
     """
+    A, a = _holding(inertia, closed, grips, b)
+    return -np.linalg.lstsq(A, a, rcond=RANK_TOL**2)[0][: len(closed)]
+
+
+def _holding(inertia, closed, grips, b):
+    """Accelerations of closed gaps, then of slips of those that stick, by their reactions, and where all are open."""
     sticks = [i for i in closed if inertia.gaps.rough[i] and grips[i] is None]
     slips = inertia.tangents[sticks].reshape(-1, inertia.q.size)
     loads = np.concatenate([_loads(inertia, closed, _ways(inertia, grips)), slips])
     rows = np.concatenate([inertia.J[closed], slips])
-    a = np.array([*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])])
-    return -np.linalg.lstsq(rows @ inertia.free(loads.T), a, rcond=RANK_TOL**2)[0][: len(closed)]
+    return rows @ inertia.free(loads.T), np.array([*(b[i][0] for i in closed), *(x for i in sticks for x in b[i][1:])])
 
 
 def spread(bounds, responses, T):

@@ -32,7 +32,7 @@ from .jit.compiled import DEBUG, is_declared, is_loaded, is_stored, load, signat
 from .jit.interrupts import Waiting
 from .jit.target import available, portable
 from .methods.explicit import called_for
-from .model.equations import is_of_user, second_derivatives
+from .model.equations import evaluate_constraints, is_of_user, second_derivatives
 from .model.handles import has_rates
 from .motions import program, tracing
 from .motions.signals import Signal
@@ -43,7 +43,7 @@ from .runs.stepper import advance
 from .runs.task import adaptive
 from .taylor import step_parts
 from .taylor.layout import FAR, no_series, pays, room
-from .taylor.series_engine import accelerating, expanding, leave_accelerations
+from .taylor.series_engine import accelerating, expanding
 from .taylor.stepper import advance_series
 
 # Which kernels a run needs, so that a first one can have them compiled at the same time.
@@ -130,10 +130,10 @@ def of_method(method, form, within, far=False, rough=False):
 
     far: of series that are too long for caches near by; rough: of a scene with joint friction.
     """
-    yield initial_conditions.evaluate_start
+    yield from (evaluate_constraints, initial_conditions.evaluate_start)
     if isinstance(method, Taylor):
         yield from (expanding(rough, far), step_parts.reach, advance_series)
-        yield from (accelerating(rough), leave_accelerations, step_parts.pass_singular) if within else ()
+        yield from (accelerating(rough), step_parts.pass_singular) if within else ()
         return
     kernels = form.kernels
     yield from (kernels.place, kernels.accelerate, kernels.complete)

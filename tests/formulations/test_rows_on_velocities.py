@@ -27,7 +27,7 @@ SCENES = {
 }
 WAYS = {  # options, largest error
     "dop853": ({"integrator": I.DOP853(1e-12, 1e-12)}, TIGHT),
-    "dop853, placed": ({"integrator": I.DOP853(1e-12, 1e-12), "chart_interval": 3}, TIGHT),
+    "dop853, placed": ({"integrator": I.DOP853(5e-13, 5e-13), "chart_interval": 3}, TIGHT),
     "dop853, null-space": ({"integrator": I.DOP853(1e-12, 1e-12), "formulation": "null-space"}, TIGHT),
     "dop853, maggi-kane": ({"integrator": I.DOP853(1e-12, 1e-12), "formulation": "maggi-kane"}, TIGHT),
     "nystrom4": ({"integrator": I.Nystrom4(step=1e-3)}, NEAR),

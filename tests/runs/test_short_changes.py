@@ -126,9 +126,7 @@ def test_every_force_that_takes_a_function():
     turned(lambda scene, arm, hinge: F.TorsionalSpring(scene.ground, arm, actuator=box, **frame), AREA)
     turned(lambda scene, arm, hinge: F.UserForce(arm, function=twist, parameters=(1.0,)), AREA)
     # a brake is zero at rest: w = w0 exp(-20 0.1)
-    turned(
-        lambda scene, arm, hinge: F.JointTorque(hinge, function=brake), 0.1 * math.exp(-2), angular_velocity=(0, 0, 0.1)
-    )
+    turned(lambda scene, arm, hinge: F.JointTorque(hinge, function=brake), math.exp(-2), angular_velocity=(0, 0, 1))
     scene = ts.Scene(gravity=(0, 0, 0))
     bodies = [scene.add_point_mass(1.0, position=(i, 0, 0)) for i in range(3)]
     slide = scene.add_body(1.0, (1, 1, 1))

@@ -125,8 +125,9 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     Raises
     ------
     NoSolution
-        Where no reactions keep the contacts from penetrating, or several do: with much friction (Painleve).
+        Where no reactions that push keep the contacts from penetrating, or several do: with much friction (Painleve).
     """
+    # Where some that are chosen pull, others are chosen
     for by_rows in False, True:
         found, pulls = _solve(inertia, resting, qd, fired, by_rows)
         again = None
@@ -139,7 +140,7 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
             return found
     if again is None or pulling:
         raise NoSolution
-    # Some open: the idle ones open, too, or depend on the others
+    # Some of them open then: idle ones open, too, or depend on the others
     a, small = again.accelerations, LEVEL * inertia.accelerations(qd)[1] + inertia.carried()
     idle = [i for i in found.idle if a[i] <= small[i]]
     if any(a[i] < -small[i] or not depends(inertia, again.closed, i) for i in idle):

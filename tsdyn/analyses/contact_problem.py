@@ -428,9 +428,12 @@ def slack_of(inertia, closed, pushes, small):
 
 
 def rounding_of(inertia, closed, pushes, small):
-    """What reactions (k,) of closed gaps may be below zero by rounding (k,); arguments as of `slack_of`."""
+    """By what reactions (k,) of closed gaps may begin below zero, by rounding; arguments as of `slack_of`.
+
+    They may fall twice as far: by the error of reactions at an event.
+    """
     small = (small + inertia.carried())[closed] / np.diag(inertia.G)[closed]
-    return np.maximum(small, EVENT_ERROR * np.abs(pushes).max(initial=0.0))
+    return np.maximum(small, 0.5 * EVENT_ERROR * np.abs(pushes).max(initial=0.0))
 
 
 def depends(inertia, closed, i, sticks=()):

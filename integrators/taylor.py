@@ -16,6 +16,7 @@ TIGHT = 1e-12  # mean of rtol and atol: below it rounding counts
 LOOSEST = 0.1  # rtol and atol that are looser are taken for it: fast modes would grow until they are seen
 FINE = 1e-16  # of a step, above TIGHT: less than rounding of a step makes no difference
 FINEST = 1e-20  # of a step: truncation of one sign that stays below the rounding of ten million steps
+SMALLEST = 1e-200  # unit of length, where atol is small against rtol: its floors must not underflow
 REFINED = 3  # orders of the multipliers that are refined where rounding counts
 
 
@@ -120,10 +121,11 @@ def _is_tight(rtol, atol):
 
 @lru_cache
 def _step_tolerances(rtol, atol, safety):
+    units = min(max(atol / rtol, SMALLEST), 1.0)  # rounding is relative: its floor is lower in small units
     if not _is_tight(rtol, atol):
-        return max(min(rtol, LOOSEST) / safety, FINE), max(min(atol, LOOSEST) / safety, FINE)
+        return max(min(rtol, LOOSEST) / safety, FINE), max(min(atol, LOOSEST) / safety, FINE * units)
     share = 0.5 * (rtol + atol) / TIGHT / safety
-    return max(rtol * share, FINEST), max(atol * share, FINEST)
+    return max(rtol * share, FINEST), max(atol * share, FINEST * units)
 
 
 @lru_cache

@@ -320,3 +320,18 @@ def test_rows_are_selected_anew_where_kept_ones_stop_holding_an_axis_without_ine
     scene.assemble()
     solution = ts.simulate(scene, (0.0, 3.5), integrator=I.Taylor(tol)).raise_if_failed()
     assert solution.constraint_error.acceleration.max() < FINE
+
+
+@pytest.mark.parametrize("tol", [1e-8, 1e-11])
+def test_a_pendulum_in_nanometres_is_as_accurate_as_in_metres(tol):
+    """Floors of the absolute tolerance were lengths in m: in small units steps were too long."""
+    runs = []
+    for unit in (1.0, 1e-9):
+        scene = ts.Scene(gravity=(0.0, 0.0, -9.81 * unit))
+        bob = scene.add_point_mass(mass=1.0, position=(unit, 0.0, 0.0))
+        scene.add(ts.constraints.Distance(bob, scene.ground))
+        run = ts.simulate(scene, (0.0, 5.0), integrator=I.Taylor(rtol=tol, atol=tol * unit))
+        runs.append((run.stats.steps, run.q[-1] / unit))
+    (steps, place), (others, other) = runs
+    assert abs(steps - others) <= 1
+    assert np.abs(place - other).max() < 10.0 * tol

@@ -272,6 +272,7 @@ class Watch:
             values = self._sample(group, np.array([self.t]), self.state[None])[0]
             for i, value in zip(group.numbers, values, strict=True):
                 self._finite(i, self.t, value)
+            self._demand_pushes(group, values)
             group.begin(values)
         for i in self._single:
             track = self.tracks[i]
@@ -372,6 +373,15 @@ class Watch:
             over, which = event.function.over, event.function.which
             return self._finite(i, t, float(over(self._states(np.array([t]), state[None]))[0, which]))
         return event.value(t, self._instant(t, state))
+
+    def _demand_pushes(self, group, values):
+        """Raise `EventFailed` where a reaction of the group pulls at the start of a phase."""
+        pulling = getattr(getattr(group.over, "__self__", None), "pulling", None)
+        found = None if pulling is None else pulling(values)
+        if found is not None:
+            name = self.events[group.numbers[found]].name
+            text = f"The reaction of {name} would pull at t = {self.t:.9g} s, where the friction of contacts changes."
+            raise EventFailed(text, self.t, Status.CONTACT_FAILED)
 
     def _finite(self, i, t, value):
         """The value of a member of a group; raises `EventFailed`."""

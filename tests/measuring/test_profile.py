@@ -128,7 +128,6 @@ def test_a_force_in_every_form(method, formulation):
     phases = [phase for phase in found.phases if phase.part == "force: spring"]
     assert {phase.group for phase in phases} == {"accelerations", *(["stage equations"] * (method == "sdirk54"))}
     assert sum(phase.calls for phase in phases) == found.solution.stats.evaluations
-    assert all(phase.seconds > 0.0 for phase in phases)
 
 
 @pytest.mark.slow

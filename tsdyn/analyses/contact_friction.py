@@ -168,8 +168,8 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
     def ended(which, closed=closed):
         found = halted(inertia, qd, closed, which)
         if found is not qd:
-            rates = inertia.rates(found)
-            more = [i for i in opening if rates[i] <= 0.5 * inertia.rates(qd)[i]]
+            rates, before = inertia.rates(found), inertia.rates(qd)
+            more = [i for i in opening if rates[i] <= 0.5 * before[i]]
             if rates[resting].any() or more:  # others have closed at once
                 found = halted(inertia, qd, [*resting, *more], which)
         return found, solve_rough_contacts(inertia, resting, found, fired)

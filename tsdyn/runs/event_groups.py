@@ -60,13 +60,16 @@ class Group:
     ----------
     value, noise : ndarray (members,)
         At the end of the last step; rounding error of values, once measured.
+    pulling : function
+        Of the values at the start of a phase: the member whose reaction pulls, or None. None without reactions.
     """
 
     def __init__(self, over, events, numbers):
         self.over, self.numbers, self.degree = over, numbers, 0
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
-        known = getattr(getattr(over, "__self__", None), "noise", None)
+        source = getattr(over, "__self__", None)
+        known, self.pulling = (getattr(source, name, None) for name in ("noise", "pulling"))
         self._least = np.zeros(len(own)) if known is None else known[self.which]
         # Those that survey and Newton's method serve: changes in one direction end the run
         self._exact = [event.exact for event in own]

@@ -376,8 +376,7 @@ class Watch:
 
     def _demand_pushes(self, group, values):
         """Raise `EventFailed` where a reaction of the group pulls at the start of a phase."""
-        pulling = getattr(getattr(group.over, "__self__", None), "pulling", None)
-        found = None if pulling is None else pulling(values)
+        found = None if group.pulling is None else group.pulling(values)
         if found is not None:
             name = self.events[group.numbers[found]].name
             text = f"The reaction of {name} would pull at t = {self.t:.9g} s, where the friction of contacts changes."

@@ -137,6 +137,25 @@ def test_a_hundred_thousand_impacts_leave_the_constraints_as_they_are():
 # outputs across impacts, which a run goes on from in its memory
 
 
+def test_phases_take_over_the_parameters_that_the_scene_has_checked(monkeypatch):
+    """Three balls come to rest one after the other; nothing is asked of a rod again for their phases."""
+    scene, asked, given = ts.Scene(gravity=(0, 0, -G)), [], C.Distance.parameters
+    monkeypatch.setattr(C.Distance, "parameters", lambda rod: asked.append(rod) or given(rod))
+    heights = [0.5, 1.0, 1.5]
+    for i, h in enumerate(heights):
+        ball = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(i, 0, h + 0.1))
+        scene.add(C.SphereContact(ball, scene.ground, radius_a=0.1, normal_b=(0, 0, 1), restitution=0.0))
+    bob = scene.add_point_mass(mass=1.0, position=(5, 0, 0))
+    scene.add(C.Distance(bob, scene.ground, point_b=(4, 0, 0)))
+    ts.simulate(scene, (0, 0.1))
+    assert asked
+    asked.clear()
+    solution = ts.simulate(scene, (0, 1.0))
+    falls = [begin for begin, _, _ in solution.phases][1:]
+    np.testing.assert_allclose(falls, np.sqrt(2 * np.array(heights) / G), rtol=1e-12)
+    assert not asked
+
+
 def bouncing(e=1.0, balls=1):
     scene = ts.Scene(gravity=(0, 0, -G))
     for i in range(balls):

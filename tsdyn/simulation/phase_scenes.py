@@ -74,8 +74,8 @@ def phase_of(scene, rows, holds=(), without=None, every=()):
         vars(phase).update(vars(scene))
         vars(phase).update(
             _added=[each for each in scene._added if id(each) not in gone] + [*constraints, *chain(*held)],
-            _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None, _start=None,
-            _prepared=None, _phases=None, _gaps=None, _spare={}, _waiting={}, _opens=False,
+            _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None,
+            _start=scene._initial(), _prepared=None, _phases=None, _gaps=None, _spare={}, _waiting={}, _opens=False,
             _pack=partial(_pack_phase, phase, scene, packed, held), _whole=scene,
         )  # fmt: skip
     return _with_rows_held(known[key], holds) if every else known[key]

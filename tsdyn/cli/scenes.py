@@ -34,6 +34,7 @@ def add_info_options(parser):
     add_scene(parser, "FILE", optional=True)
     parser.add_argument("--parameters", action="store_true", help="what may vary from run to run, too, with units")
     parser.add_argument("--cache", action="store_true", help="the stored kernels instead, and those that are damaged")
+    parser.add_argument("--schema", action="store_true", help="the JSON Schema of scene files instead, for editors")
     add_json(parser)
 
 
@@ -85,12 +86,20 @@ def _check(parsed):
 def _info(parsed):
     """Print what is in a file: bodies, mobility, redundant rows, the method and why; or the facts of a solution.
 
-    With --cache and no file: where compiled kernels are stored, how many, and which can't be loaded and why.
+    In place of a file, --cache: where compiled kernels are stored, how many, and which can't be loaded and why;
+    --schema: the JSON Schema by which editors complete and check scene files.
     """
-    if parsed.cache == (parsed.scene is not None):
-        raise InvalidArgument("tsdyn info takes a FILE, or --cache, and not both.")
+    if (parsed.scene is not None) + parsed.cache + parsed.schema != 1:
+        raise InvalidArgument("tsdyn info takes one of FILE, --cache and --schema.")
     if parsed.cache:
         return _cache_info(parsed)
+    if parsed.schema:
+        from ..files.schema import schema
+        from ..simulation.prepared_run import simulate
+        from ..simulation.scene import Scene
+
+        print_json(schema(Scene, simulate))
+        return 0
     if Path(parsed.scene).suffix.lower() in SOLUTIONS:
         return _solution_info(parsed)
     from ..simulation.phase_scenes import at_start

@@ -1,11 +1,11 @@
 """The commands that measure: profile, benchmark, tables and stress."""
 
-import os
 import sys
 import time
 from functools import partial
 from pathlib import Path
 
+from ..ahead import processors
 from ..errors import InvalidArgument
 from ..files.run_tables import END
 from .parser import print_json
@@ -218,7 +218,7 @@ def _counts(parsed):
     counts = {kind: usual[kind] if getattr(parsed, kind) is None else getattr(parsed, kind) for kind in usual}
     if parsed.case and parsed.scenes is None and parsed.calls is None:
         counts = dict.fromkeys(counts, 0)
-    processes = (os.cpu_count() or 1) if parsed.processes is None else parsed.processes
+    processes = processors() if parsed.processes is None else parsed.processes
     for name, value, least in (*((f"--{kind}", count, 0) for kind, count in counts.items()),
                                ("--seed", parsed.seed, 0), ("--processes", processes, 1)):  # fmt: skip
         if value < least:

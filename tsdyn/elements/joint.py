@@ -18,9 +18,7 @@ from .primitive import Primitive
 from .tolerances import PARALLEL, UNDIRECTED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-
-    from ..hints import AnyBody, ArrayLike, Floats, Random
+    from ..hints import AnyBody, ArrayLike, Floats, Iterable, Iterator, Mapping, Random
 
 
 # The interface of a joint: a constraint composed of primitives, with no kernels of its own.

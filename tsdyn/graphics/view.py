@@ -25,9 +25,7 @@ from .run_data import FULL
 from .symbols import VIOLATED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from ..hints import Floats
+    from ..hints import Floats, Iterator, Sequence
 
 
 SCRIPTS = ("poses.js", "instances.js", "stage.js", "names.js", "player.js")

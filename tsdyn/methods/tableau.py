@@ -14,9 +14,7 @@ from ..maths.tolerances import SUM_ROUNDING
 from ..validation import floats, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..hints import Floats
+    from ..hints import Floats, Sequence
 
 
 def _numbers(values, count, said):

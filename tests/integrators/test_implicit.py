@@ -55,26 +55,6 @@ def test_dense_output_is_on_the_manifold_and_changes_nothing(make, method, rng):
     np.testing.assert_array_equal(dense.steps.h, plain.steps.h)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("method", "counts"), [(ImplicitTrapezoid, (200, 400, 800)), (SDIRK54, (80, 120, 160, 240))], **by_name
-)
-def test_order_of_dense_output(method, counts, rng):
-    """Of q, qd and qdd alike, all along a run of many charts."""
-    times, parts, off = rng.uniform(0.0, 4.0, 300), ("q", "qd", "qdd"), []
-    exact = ts.simulate(load("sliding_top")[0], (0.0, 4.0), integrator=I.DOP853(1e-13, 1e-13), dense_output=True)
-    exact = exact.at(times)
-    for n in counts:
-        solution = ts.simulate(
-            load("sliding_top")[0], (0.0, 4.0), integrator=method(step=1 / n), dense_output=True, chart_interval=4
-        )
-        assert solution.stats.charts > 50
-        state = solution.at(times)
-        off.append([np.abs(getattr(state, name) - getattr(exact, name)).max() for name in parts])
-    for column in np.transpose(off):
-        assert abs(np.polyfit(-np.log(counts), np.log(column), 1)[0] - method.order) < 0.3
-
-
 # what is counted
 
 

@@ -216,12 +216,6 @@ def fails_late_by_state(t, state):
     return (1.0, 0.0, 0.0)
 
 
-def fails_late_between(t, a, b, par, out):
-    if t > 0.5:
-        raise ValueError
-    out[0] = par[10]  # beyond its end
-
-
 @pytest.mark.slow_for("<lambda>1")
 @pytest.mark.parametrize("make", [
     lambda m: F.PointForce(m, force=fails_late),

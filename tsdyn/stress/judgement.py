@@ -12,7 +12,7 @@ from ..integrators import Nystrom4
 from ..maths.tolerances import EPS
 from ..simulation.prepared_run import simulate
 from . import laws, random_scenes
-from .findings import Finding
+from .laws import Finding
 from .random_scenes import generate
 from .tolerances import FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, SHORTER, TIGHTER
 

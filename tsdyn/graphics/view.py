@@ -150,9 +150,7 @@ FLAT_FACE = 1e-9  # of a face's area, seen by the camera: below it is seen from 
 
 def _box():
     corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    return [
-        corners[[(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]],
-    ]
+    return [corners[[(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]]]
 
 
 def _ring(z, radius=1.0):

@@ -160,7 +160,6 @@ def add_ensemble_options(parser):
     run.add_output(parser)
     run.add_plot(parser, "the first channel or coordinate")
     run.add_channels(parser)
-    run.add_json(parser)
 
 
 def _ensemble(parsed):

@@ -13,25 +13,17 @@ from .parser import load_document, load_run, load_scene, print_json, robot_optio
 SCENES = (".toml",)
 
 
-def add_check_options(parser):
-    """Add the options of `tsdyn check`."""
-    run.add_scene(parser)
-    run.add_json(parser)
-
-
 def add_info_options(parser):
     """Add the options of `tsdyn info`."""
     run.add_scene(parser, "FILE", optional=True)
     parser.add_argument("--parameters", action="store_true", help="what may vary from run to run, too, with units")
     parser.add_argument("--cache", action="store_true", help="the stored kernels instead, and those that are damaged")
     parser.add_argument("--schema", action="store_true", help="the JSON Schema of scene files instead, for editors")
-    run.add_json(parser)
 
 
 def add_new_options(parser):
     """Add the options of `tsdyn new`."""
     parser.add_argument("path", nargs="?", default="scene.toml", metavar="PATH", help="default scene.toml")
-    run.add_json(parser)
 
 
 def add_convert_options(parser):
@@ -40,7 +32,6 @@ def add_convert_options(parser):
     parser.add_argument("target", metavar="TO", help="where to write; the suffix is the format")
     run.add_channels(parser)
     run.add_force(parser)
-    run.add_json(parser)
 
 
 def _check(parsed):

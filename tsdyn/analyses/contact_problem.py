@@ -90,6 +90,11 @@ class Gaps:
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
         self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
 
+    @property
+    def in_python(self):
+        """Whether Python evaluates some of the gaps: those of angles of joints."""
+        return bool(self._stops)
+
     def extent(self, q):
         """The scene's length at q (n,), m: the largest number of a point or a position."""
         return max(self.packed.size, float(np.abs(q[self._places]).max(initial=0.0)))

@@ -439,6 +439,7 @@ class ContactWorkspace:
         rows, self._graph = with_short_rows(contacts), None
         self._rows, self._all = rows._replace(reals=rows.reals.copy()), np.arange(self.m)
         self.rows_address, self._keep_rows = resident(self._rows)
+        self._impact = np.empty(self.m, int), np.empty((4, self.n)), np.empty((2, self.m)), np.empty(9)  # of `bounce`
         self._bilateral = len(free.system.segments)
         spans = rows.segments, free.system.inertia_segments
         self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in spans)
@@ -511,13 +512,15 @@ class ContactWorkspace:
 
     def bounce(self, t, q, qd, memory, i, sign, e):
         """Numbers (6,) of an impact of the gap in row i alone, as of the kernel, and velocities (n,) afterwards."""
-        place, rows, gamma = np.full(self.m, -1), np.zeros((4, self.n)), np.zeros((2, self.m))
-        numbers = np.array([i, sign, e, *[0.0] * 6])
-        place[i] = 0
+        place, rows, gamma, numbers = self._impact
+        place.fill(-1)
+        rows.fill(0.0)
+        gamma.fill(0.0)
+        place[i], numbers[0], numbers[1], numbers[2] = 0, i, sign, e
         self._enter()
         if not self._bounce(self.address, t, q, qd, memory, place, self._short, rows, gamma, numbers):
             raise SingularConfiguration(NO_INERTIA)
-        return numbers[3:].tolist(), rows[2]
+        return numbers[3:].tolist(), rows[2].copy()
 
     def gain(self, q, before, after):
         """Kinetic energy that velocities (n,) have more afterwards, J."""

@@ -156,14 +156,15 @@ def kernel_table(numbers, N):
 
 # Several functions at once: most have no zero on an interval, and need no search.
 #
-# A function is clear of zero at a point of the fine grid if its value exceeds the second difference there, by which it
-# may bend between points, and the error of the interpolant.
+# A function is clear of zero at a point of the fine grid if its value exceeds a quarter of the second difference there,
+# more than it bends between points (an eighth), and the error of the interpolant. It falls between two points that
+# differ by more than half of the second difference, by which its slope varies there.
 
 
 @kernel
 def _bend(fine, k):
     i = min(max(k, 1), fine.size - 2)
-    return abs(fine[i + 1] - 2.0 * fine[i] + fine[i - 1])
+    return 0.25 * abs(fine[i + 1] - 2.0 * fine[i] + fine[i - 1])
 
 
 @kernel
@@ -215,8 +216,8 @@ def look(values, errors, series, grid, samples, noise, a, b, scratch, out):  # t
             out[j, 0] = math.inf
             continue
         out[j, 0] = grid[max(k - 1, 0)]
-        # It falls from point to point by more than it bends
-        while 0 < k < fine.size and sign * (fine[k - 1] - fine[k]) > max(_bend(fine, k - 1), _bend(fine, k)):
+        # It falls from point to point
+        while 0 < k < fine.size and sign * (fine[k - 1] - fine[k]) > 2.0 * max(_bend(fine, k - 1), _bend(fine, k)):
             if sign * fine[k] < -_bend(fine, k) - margin:
                 out[j, 1] = grid[k]
                 break

@@ -216,8 +216,9 @@ class Watch:
             if isinstance(event.function, GroupMember):
                 groups.setdefault(event.function.over, []).append(i)
         self._groups = [Group(over, events, numbers, self._p, self._n) for over, numbers in groups.items()]
-        self._members = [i for numbers in groups.values() for i in numbers]
-        self._single = [i for i in range(len(events)) if i not in set(self._members)]
+        self._group_of = {i: group for group in self._groups for i in group.numbers}
+        self._members = list(self._group_of)
+        self._single = [i for i in range(len(events)) if i not in self._group_of]
         self.read_by(reader)
 
     def read_by(self, reader):
@@ -414,10 +415,11 @@ class Watch:
     def _at_start(self, group):
         """Values (members,) of a group where it begins."""
         if group.kernel is not None:
-            values = group.kernel.at(self.t, self.state)
+            values, finite = group.kernel.at(self.t, self.state)
         else:
             values = self._sample(group, np.array([self.t]), self.state[None])[0]
-        if not np.isfinite(values).all():
+            finite = np.isfinite(values).all()
+        if not finite:
             for i, value in zip(group.numbers, values, strict=True):
                 self._finite(i, self.t, value)
         return values
@@ -445,8 +447,9 @@ class Watch:
             first, alone = self._search_group(group, step)
             if first is not None:
                 i, t = first
-                shift = self._least_time(step, step.t0, end) + limits.ROOT * abs(t)
-                t = self._beyond(i, step, t, shift, end, self.events[i].direction)
+                if not self.events[i].exact:
+                    shift = self._least_time(step, step.t0, end) + limits.ROOT * abs(t)
+                    t = self._beyond(i, step, t, shift, end, self.events[i].direction)
                 found.append(Occurrence(t, i, step.at(t)))
                 end = min(end, t)
             for i in alone:
@@ -523,7 +526,7 @@ class Watch:
 
     def _add_members(self, step, last):
         """The same, of events of the group of the last one: by how fast their values fall."""
-        group = next((group for group in self._groups if last.index in group.numbers), None)
+        group = self._group_of.get(last.index)
         if group is None or len(group.numbers) == 1:
             return
         falls = group.beside

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..jit.kernels import Record, caller, data_of, entry, kernel, loader, matrix, resident
-from ..maths.dense_linalg import copy
+from ..maths.dense_linalg import copy, is_finite
 from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
 from .dense_output import OTHER_CHART, SAME_STEP, read_one
 from .tolerances import ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTLY, SHOWN_TURN
@@ -76,6 +76,7 @@ class SearchParts(NamedTuple):
     odd: np.ndarray  # int64 (m,)  1 where a `Track` knows more than the value
     all: np.ndarray  # values
     samples: np.ndarray  # ((LARGEST + 4) m,)
+    left: np.ndarray  # int64 (m,)  1 of those that the survey is of
     fine: np.ndarray  # (2, points of the largest grid)
     marks: np.ndarray  # (m, 4)  of a survey
     step: np.ndarray  # (3,)  of `move`
@@ -84,8 +85,8 @@ class SearchParts(NamedTuple):
 
 
 _EXAMPLE = SearchParts(
-    SearchNumbers(), np.zeros(0), *np.zeros((2, 0), int), *np.zeros((3, 0))[:2], np.zeros(0), np.zeros(0, int),
-    *np.zeros((2, 0)), *np.zeros((2, 0, 0)), np.zeros(0), np.zeros((0, 0)), np.zeros(0, int),
+    SearchNumbers(), np.zeros(0), *np.zeros((2, 0), int), *np.zeros((3, 0)), np.zeros(0, int),
+    *np.zeros((2, 0)), np.zeros(0, int), *np.zeros((2, 0, 0)), np.zeros(0), np.zeros((0, 0)), np.zeros(0, int),
 )  # fmt: skip
 load_search = loader(_EXAMPLE)
 
@@ -100,6 +101,8 @@ class StepIn(NamedTuple):
     points: np.ndarray
     first: int  # contexts of the functions
     second: int
+    t1: float  # s, its end
+    now: np.ndarray  # (3, n)  the state there
 
 
 @kernel
@@ -137,9 +140,14 @@ def _turn_rate(spins, qd):
 
 
 @kernel
-def _survey(s, step, t0, t1, now, N):
-    """The degree that resolves the functions, with the samples of it, and marks; 0 if there is no state."""
-    m, known = s.value.size, 0
+def _survey(s, step, t0, t1, turning):
+    """The degree that resolves the functions on [t0, t1], with the samples of it, and marks; 0 if there is no state.
+
+    turning: of a body, rad/s.
+    """
+    m, known, N = s.value.size, 0, LOWEST
+    while turning * (t1 - t0) > SHOWN_TURN * N and N < LARGEST:
+        N *= 2
     while True:
         table = kernel_table(s.tables, N)
         samples, last, check = matrix(data_of(s.samples), N + 2, m), known, N + 1
@@ -150,9 +158,11 @@ def _survey(s, step, t0, t1, now, N):
             if known > 0 and (i == check or (i if i < check else i - 1) % 2 == 0):
                 copy(samples[last], samples[i])
                 last -= 1
-            elif i == N + 1:
-                _evaluate(s, step.first, step.second, t1, now, samples[i])
-            elif not _evaluate_within(s, step, t0 + 0.5 * (t1 - t0) * (table.points[i] + 1.0), 0, samples[i]):
+                continue
+            t = t1 if i == N + 1 else t0 + 0.5 * (t1 - t0) * (table.points[i] + 1.0)
+            if t == step.t1:
+                _evaluate(s, step.first, step.second, t, step.now, samples[i])
+            elif not _evaluate_within(s, step, t, 0, samples[i]):
                 return 0
         copy(s.value, samples[0])
         size = table.fine.size
@@ -174,7 +184,7 @@ def _mark(s, samples):
         # Values of rounding alone have no zero
         if s.noise[j] > 0.0 and most <= s.noise[j]:
             s.marks[j, 0] = math.inf
-        is_clear = s.marks[j, 0] == math.inf
+        is_clear = s.left[j] == 0 or s.marks[j, 0] == math.inf
         clear = clear and is_clear
         if is_clear or not (s.marks[j, 1] > s.marks[j, 0] and s.falls[j] * s.value[j] < 0.0):
             s.marks[j, 3] = math.nan
@@ -200,10 +210,12 @@ def _first_root(s, step, values, width):
 @kernel
 def _find_beside(s, step, t0, t, first, value):
     """Mark the functions that vanish at t, too, by how fast they fall; False if there is no state. Two of scratch."""
-    before = t - SHORTLY * (t - t0)
-    if not (_evaluate_within(s, step, before, 0, first) and _evaluate_within(s, step, t, 1, value)):
+    before, others = t - SHORTLY * (t - t0), value.size > 1
+    if others and not _evaluate_within(s, step, before, 0, first):
         return False
-    for j in range(value.size):
+    if not _evaluate_within(s, step, t, 1, value):
+        return False
+    for j in range(value.size if others else 0):
         falls = value[j] < first[j] and value[j] * (t - before) <= SAME_INSTANT * abs(t) * (first[j] - value[j])
         s.beside[j] = 1 if falls and j != s.numbers.found else 0
     return True
@@ -216,40 +228,43 @@ def search_step(search, context, run, first, second, t0, t1, before, now, block,
     context, run: of the reader; first, second: of the functions; before, now (3, n): states at t0 and t1. Of a zero the
     function and the time are in the `SearchNumbers`, the state and those that vanish beside in the `SearchParts`.
     """
-    s, step = load_search(search), StepIn(context, run, block, charts, points, first, second)
-    numbers, m = s.numbers, s.value.size
-    numbers.place = OTHER_CHART
+    s, step = load_search(search), StepIn(context, run, block, charts, points, first, second, t1, now)
+    numbers, m, end = s.numbers, s.value.size, t1
+    turning = max(_turn_rate(s.spins, before[1]), _turn_rate(s.spins, now[1]))
+    scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
+    numbers.place, numbers.found = OTHER_CHART, -1
     for j in range(m):
+        s.left[j] = 1
         if s.odd[j] != 0:
             return UNSURE
-    turn = max(_turn_rate(s.spins, before[1]), _turn_rate(s.spins, now[1])) * (t1 - t0)
-    degree = LOWEST
-    while turn > SHOWN_TURN * degree and degree < LARGEST:
-        degree *= 2
-    degree = _survey(s, step, t0, t1, now, degree)
-    if degree == 0:
-        return UNSURE
-    samples, scratch = matrix(data_of(s.samples), degree + 2, m), matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
-    if not _mark(s, samples):
-        if _first_root(s, step, scratch[0], t1 - t0) != ARRIVED:
+    while True:
+        degree = _survey(s, step, t0, end, turning)
+        if degree == 0:
             return UNSURE
-        t = s.step[1]
+        samples = matrix(data_of(s.samples), degree + 2, m)
+        if _mark(s, samples):
+            break
+        if _first_root(s, step, scratch[0], end - t0) != ARRIVED:
+            return UNSURE
+        # What was unclear may be clear up to there
+        numbers.found, end, unclear = int(s.step[0]), s.step[1], False
         for j in range(m):
-            if s.marks[j, 0] < t and s.marks[j, 3] != s.marks[j, 3]:
-                return UNSURE
-        numbers.found, numbers.t = int(s.step[0]), t
-        if not _find_beside(s, step, t0, t, scratch[0], scratch[1]):
-            return UNSURE
-    else:
-        numbers.found = -1
-    copy(samples[degree + 1], s.value)
-    return FOUND if numbers.found >= 0 else CLEAR
+            s.left[j] = 1 if s.left[j] == 1 and s.marks[j, 0] < end and s.marks[j, 3] != s.marks[j, 3] else 0
+            unclear = unclear or s.left[j] == 1
+        if not unclear:
+            break
+    if numbers.found < 0:
+        copy(samples[degree + 1], s.value)
+        return CLEAR
+    numbers.t = end
+    return FOUND if _find_beside(s, step, t0, end, scratch[0], scratch[1]) else UNSURE
 
 
 @entry("pppdmv")
 def evaluate_functions(search, first, second, t, now, out):
-    """out (m,): values at t and a state (3, n)."""
+    """out (m,): values at t and a state (3, n); 0 if one is not finite, else 1."""
     _evaluate(load_search(search), first, second, t, now, out)
+    return 1 if is_finite(out) else 0
 
 
 SEARCHING = (move, search_step, evaluate_functions)
@@ -278,16 +293,15 @@ class GroupSearch:
         self.numbers = SearchNumbers(values=called.address)
         self.parts = SearchParts(
             self.numbers, kernel_tables(), spins.ravel(), np.array(which, int), falls, *known, np.zeros(count),
-            np.zeros((LARGEST + 4) * m), np.zeros((2, FINE * LARGEST + 1)), np.zeros((m, 4)), np.zeros(3),
-            np.zeros((3, n)), np.zeros(m, int),
+            np.zeros((LARGEST + 4) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)), np.zeros((m, 4)),
+            np.zeros(3), np.zeros((3, n)), np.zeros(m, int),
         )  # fmt: skip
         self._search, self._keep = resident(self.parts)
 
     def at(self, t, now):
-        """Values (m,) at t and a state (3, n)."""
+        """Values (m,) at t and a state (3, n), and whether they are finite."""
         out = np.empty(self.parts.value.size)
-        evaluate_functions(self._search, self._first, self._second, t, now, out)
-        return out
+        return out, evaluate_functions(self._search, self._first, self._second, t, now, out) == 1
 
     def find(self, reader, steps, t0, t1, before, now):
         """The number of the function that is zero first, -1 for none; None where that is unsure.

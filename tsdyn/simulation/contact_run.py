@@ -256,6 +256,7 @@ class _ContactRun(Transitions):
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
             self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
+            self.kind = None  # of the phase, as `Phases` has it
             if self.archive is not None:
                 self.archive.resting = still, resting[still]
             if not (other and self.replaced):
@@ -306,8 +307,9 @@ class _ContactRun(Transitions):
         return self.run_of(phase, replace(self.options, events=None), call), call
 
     def _end_phase(self, t):
-        kind = self.phases.kind(self.packed, self._record, self.scene.packed, self.gaps)
-        self.phases.add(kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
+        if self.kind is None:
+            self.kind = self.phases.kind(self.packed, self._record, self.scene.packed, self.gaps)
+        self.phases.add(self.kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
 
     def _record(self):
         """What the scene of the present phase is made of, for files."""
@@ -333,8 +335,8 @@ class _ContactRun(Transitions):
         self.ended = self.qd
         remembered = self.remembered
         self.decided = (self._transit([self.watched[i] for i in numbers]),)
-        changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
-        if self.decided[0] is not None or changed:
+        remembers = self.remembered is remembered or np.array_equal(self.remembered, remembered)
+        if self.decided[0] is not None or not (remembers and self.modes.same(before)):
             return False
         run.now[1], self.decided = self.qd, None
         self.closing.open(self.modes.opened)

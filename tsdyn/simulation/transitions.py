@@ -85,7 +85,7 @@ class Transitions:
         memory, held = self.remembered[self.count :], self.frictions.held
         ranks = [self.modes.sticking.get(i, 0) for i in range(self.frictions.count)]
         left = [slot for rank, slots in zip(ranks, held, strict=True) for slot in slots[rank:].ravel().tolist()]
-        if memory[left].any():
+        if left and memory[left].any():
             self.remembered = self.remembered.copy()
             self.remembered[self.count :][left] = 0.0
         return status

@@ -116,7 +116,7 @@ def _refined(degree, a, b, samples, sample):
     return times, finer
 
 
-LOWEST = 4  # degree
+LOWEST = 2  # degree, of kernels
 
 
 class KernelTable(NamedTuple):

@@ -37,6 +37,7 @@ from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome, interval, output_times, state_arrays
+from ..runs.tolerances import START_ZERO
 from ..validation import counted, damaged, demand, listed
 from . import hybrid
 from .grips import Halting, Reactions, items_of
@@ -522,12 +523,10 @@ class _ContactRun(Transitions):
         return Status.SUCCESS
 
     def _is_deep(self):
-        """Whether contacts penetrate; says so."""
-        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        allowed = -PENETRATION * self.gaps.lengths(self.length)
-        if not (self.gap < allowed).any():
-            return False
-        deep = [i for i in (self.gap < allowed).nonzero()[0].tolist() if i in self.able]
+        """Whether contacts penetrate; says so. Notes the gaps, and which are zero within rounding, or below."""
+        self.gap, lengths = self.gaps.at(self.q, self.remembered[: self.count]), self.gaps.lengths(self.length)
+        self.near = (self.gap <= START_ZERO * lengths).nonzero()[0].tolist()
+        deep = [i for i in self.near if self.gap[i] < -PENETRATION * lengths[i] and i in self.able]
         if deep:
             found = listed([self.gaps.names[i] for i in deep], NAMED)
             self.reason = f"Penetration was not noticed: {found}. Give a max_step."

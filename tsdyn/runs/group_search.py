@@ -10,7 +10,7 @@ from ..maths.dense_linalg import copy, is_finite
 from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
 from ..maths.tolerances import SHORTEST_INTERVAL
 from .dense_output import OTHER_CHART, SAME_STEP, read_one
-from .tolerances import MOST_SURVEYS, ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTENED, SHORTLY, SHOWN_TURN
+from .tolerances import ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTENED, SHORTLY, SHOWN_TURN
 
 # Newton's method for the function of a survey that crosses zero first.
 
@@ -76,7 +76,6 @@ class SearchParts(NamedTuple):
     noise: np.ndarray  # (m,)  rounding of values
     odd: np.ndarray  # int64 (m,)  1 where a `Track` knows more than the value
     all: np.ndarray  # values
-    start: np.ndarray  # (m,)  at the start of the present survey
     samples: np.ndarray  # ((LARGEST + 4) m,)
     left: np.ndarray  # int64 (m,)  1 of those that the survey is of
     fine: np.ndarray  # (2, points of the largest grid)
@@ -88,7 +87,7 @@ class SearchParts(NamedTuple):
 
 _EXAMPLE = SearchParts(
     SearchNumbers(), np.zeros(0), *np.zeros((2, 0), int), *np.zeros((3, 0)), np.zeros(0, int),
-    *np.zeros((3, 0)), np.zeros(0, int), *np.zeros((2, 0, 0)), np.zeros(0), np.zeros((0, 0)), np.zeros(0, int),
+    *np.zeros((2, 0)), np.zeros(0, int), *np.zeros((2, 0, 0)), np.zeros(0), np.zeros((0, 0)), np.zeros(0, int),
 )  # fmt: skip
 load_search = loader(_EXAMPLE)
 
@@ -166,7 +165,7 @@ def _survey(s, step, t0, t1, turning):
                 _evaluate(s, step.first, step.second, t, step.now, samples[i])
             elif not _evaluate_within(s, step, t, 0, samples[i]):
                 return 0
-        copy(s.start, samples[0])
+        copy(s.value, samples[0])
         size = table.fine.size
         fine = matrix(data_of(s.fine), 2, size)
         grid = table.values, table.errors, table.widened, table.fine
@@ -188,7 +187,7 @@ def _mark(s, samples):
             s.marks[j, 0] = math.inf
         is_clear = s.left[j] == 0 or s.marks[j, 0] == math.inf
         clear = clear and is_clear
-        if is_clear or not (s.marks[j, 1] > s.marks[j, 0] and s.falls[j] * s.start[j] < 0.0):
+        if is_clear or not (s.marks[j, 1] > s.marks[j, 0] and s.falls[j] * s.value[j] < 0.0):
             s.marks[j, 3] = math.nan
     return clear
 
@@ -231,32 +230,26 @@ def search_step(search, context, run, first, second, t0, t1, before, now, block,
     function and the time are in the `SearchNumbers`, the state and those that vanish beside in the `SearchParts`.
     """
     s, step = load_search(search), StepIn(context, run, block, charts, points, first, second, t1, now)
-    numbers, m, begin, until, end = s.numbers, s.value.size, t0, t1, t1
+    numbers, m, end, until = s.numbers, s.value.size, t1, t1
     turning = max(_turn_rate(s.spins, before[1]), _turn_rate(s.spins, now[1]))
     scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
-    numbers.place, numbers.found, unclear = OTHER_CHART, -1, True
+    numbers.place, numbers.found = OTHER_CHART, -1
     for j in range(m):
         s.left[j] = 1
         if s.odd[j] != 0:
             return UNSURE
-    copy(s.value, s.start)
-    for _ in range(MOST_SURVEYS):
-        degree = _survey(s, step, begin, until, turning)
+    while True:
+        degree = _survey(s, step, t0, until, turning)
         if degree == 0:
             return UNSURE
-        samples, length = matrix(data_of(s.samples), degree + 2, m), until - begin
-        if _mark(s, samples):
-            # On to the rest
-            copy(samples[degree + 1], s.start)
-            if until == end:
-                unclear = False
-                break
-            begin, until = until, min(end, until + length / SHORTENED)
-            continue
-        if _first_root(s, step, scratch[0], length) != ARRIVED:
-            # What is near zero, or crosses soon, is clear on a shorter interval
-            until = begin + SHORTENED * length
-            if not until - begin > SHORTEST_INTERVAL * max(abs(begin), t1 - t0):
+        samples = matrix(data_of(s.samples), degree + 2, m)
+        clear = _mark(s, samples)
+        if clear and until == end:
+            break
+        if clear or _first_root(s, step, scratch[0], until - t0) != ARRIVED:
+            # A zero soon after the start is found on a short interval
+            until = t0 + SHORTENED * (until - t0)
+            if clear or not until - t0 > SHORTEST_INTERVAL * max(abs(t0), t1 - t0):
                 return UNSURE
             continue
         # What was unclear may be clear up to there
@@ -266,10 +259,8 @@ def search_step(search, context, run, first, second, t0, t1, before, now, block,
             unclear = unclear or s.left[j] == 1
         if not unclear:
             break
-    if unclear:
-        return UNSURE
     if numbers.found < 0:
-        copy(s.start, s.value)
+        copy(samples[degree + 1], s.value)
         return CLEAR
     numbers.t = end
     return FOUND if _find_beside(s, step, t0, end, scratch[0], scratch[1]) else UNSURE
@@ -307,7 +298,7 @@ class GroupSearch:
         (called, self._first, self._second, count), m = kernel, len(which)
         self.numbers = SearchNumbers(values=called.address)
         self.parts = SearchParts(
-            self.numbers, kernel_tables(), spins.ravel(), np.array(which, int), falls, *known, np.zeros(count), np.zeros(m),
+            self.numbers, kernel_tables(), spins.ravel(), np.array(which, int), falls, *known, np.zeros(count),
             np.zeros((LARGEST + 4) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)), np.zeros((m, 4)),
             np.zeros(3), np.zeros((3, n)), np.zeros(m, int),
         )  # fmt: skip

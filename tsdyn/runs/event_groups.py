@@ -130,7 +130,7 @@ class Group:
 
     def search_by_kernel(self, step):
         """As `search`; None where the kernel is unsure, or there is none."""
-        found = None if self.kernel is None else step.find(self.kernel)
+        found = None if self.kernel is None else self.kernel.find(step)
         if found is None:
             return None
         self._is_new, self.beside = False, self.kernel.parts.beside

@@ -93,29 +93,20 @@ class Inside:
     """States within the step that a run has just made."""
 
     def __init__(self, reader, run, log, t0, before, spins):
-        self.t0, self.t1, self._spins = t0, float(run.clock.t), spins
-        self._reader, self._log, self._block = reader, log, run.block
-        self._known = {t0: before, self.t1: run.now.copy()}
+        self.t0, self.t1, self._spins = t0, run.clock.t, spins
+        self.reader, self.steps = reader, (run.block, log.charts, log.points)
+        self.known = {t0: before, self.t1: run.now.copy()}
 
     @cached_property
     def turning(self):
         """The fastest turn of a body, rad/s, at both ends."""
-        rates = np.array([self._known[t][1] for t in (self.t0, self.t1)]).take(self._spins, axis=1)
+        rates = np.array([self.known[t][1] for t in (self.t0, self.t1)]).take(self._spins, axis=1)
         rates *= rates
         return 2.0 * math.sqrt(rates.sum(axis=2).max(initial=0.0))
 
-    def find(self, search):
-        """As `GroupSearch.find`."""
-        known, (t0, t1) = self._known, (self.t0, self.t1)
-        steps = self._block, self._log.charts, self._log.points
-        found = search.find(self._reader, steps, t0, t1, known[t0], known[t1])
-        if found is not None and found >= 0:
-            known[search.numbers.t] = search.parts.state.copy()
-        return found
-
     def states(self, times):
         """States (3, n) at times (k,), None where there is none."""
-        times, known = times.tolist(), self._known
+        times, known = times.tolist(), self.known
         # States that are known already are not read again
         missing = [t for t in times if t not in known]
         if missing:
@@ -128,24 +119,24 @@ class Inside:
     def levels(self, times):
         """The same (k, 3, n), NaN where there is none; accelerations may be missing; not kept."""
         rows = np.zeros(times.size, int)
-        found, status = self._reader(times, rows, self._block[None], self._log.charts, self._log.points, False)
+        found, status = self.reader(times, rows, self.steps[0][None], *self.steps[1:], False)
         if status != Status.SUCCESS:
-            none = np.full_like(self._known[self.t0], np.nan)
+            none = np.full_like(self.known[self.t0], np.nan)
             return np.reshape([none if state is None else state for state in self.states(times)], (-1, *none.shape))
         if times.size and times[-1] == self.t1:
-            found[-1] = self._known[self.t1]
+            found[-1] = self.known[self.t1]
         return found
 
     def _read(self, times):
         rows = np.zeros(times.size, int)
-        states, status = self._reader(times, rows, self._block[None], self._log.charts, self._log.points)
+        states, status = self.reader(times, rows, self.steps[0][None], *self.steps[1:])
         if status == Status.SUCCESS:
             return states
         return [self._read(times[i : i + 1])[0] for i in range(times.size)] if times.size > 1 else [None]
 
     def at(self, t, whole=True):
         """The state (3, n) at t; unless it is to be whole, accelerations may be missing."""
-        state = self._known.get(t)
+        state = self.known.get(t)
         if state is None:
             (state,) = (self.states if whole else self.levels)(np.array([t]))
         if state is None:
@@ -444,7 +435,7 @@ class Watch:
         found, failure, end = [], None, step.t1
         members = {}
         for group in self._groups:
-            first, alone = self._search_group(group, step)
+            first, alone = group.search_by_kernel(step) or self._search_group(group, step)
             if first is not None:
                 i, t = first
                 if not self.events[i].exact:
@@ -494,10 +485,7 @@ class Watch:
         return None
 
     def _search_group(self, group, step):
-        """As `Group.search`: by the kernel, or where that is unsure."""
-        first = group.search_by_kernel(step)
-        if first is not None:
-            return first
+        """As `Group.search`."""
         sample = lambda times: self._sample(group, times, step.levels(times))  # noqa: E731
         degree = lambda time: self._degree(step.turning * time, limits.SLOW_SMOOTH_TURN, limits.FAST_SMOOTH_TURN)  # noqa: E731
         return group.search(step, sample, degree)

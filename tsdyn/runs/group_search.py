@@ -309,12 +309,12 @@ class GroupSearch:
         out = np.empty(self.parts.value.size)
         return out, evaluate_functions(self._search, self._first, self._second, t, now, out) == 1
 
-    def find(self, reader, steps, t0, t1, before, now):
-        """The number of the function that is zero first, -1 for none; None where that is unsure.
-
-        steps: block, charts and points as of `dense_output.read_one`; before, now: states (3, n) at t0 and t1.
-        """
-        numbers, (numbers.reader, context, run) = self.numbers, reader.where
+    def find(self, step):
+        """The number of the function that is zero first in a step, `Inside`, -1 for none; None where that is unsure."""
+        numbers, reader, (t0, t1), known = self.numbers, step.reader, (step.t0, step.t1), step.known
+        numbers.reader, context, run = reader.where
         contexts = self._search, context, run, self._first, self._second
-        found = reader.call(search_step, *contexts, t0, t1, before, now, *steps)
+        found = reader.call(search_step, *contexts, t0, t1, known[t0], known[t1], *step.steps)
+        if found == FOUND:
+            known[numbers.t] = self.parts.state.copy()
         return None if found == UNSURE else numbers.found

@@ -89,14 +89,27 @@ class Gaps:
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
         self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
+        self._lengths = None, None  # a length, and `lengths` of it
+
+    @property
+    def in_python(self):
+        """Whether Python evaluates some of the gaps: those of angles of joints."""
+        return bool(self._stops)
 
     def extent(self, q):
         """The scene's length at q (n,), m: the largest number of a point or a position."""
         return max(self.packed.size, float(np.abs(q[self._places]).max(initial=0.0)))
 
     def lengths(self, length):
-        """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound."""
-        return np.where(self._angles > 0.0, self._angles, length)
+        """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound.
+
+        The same array for the same length.
+        """
+        known, lengths = self._lengths
+        if length != known:
+            lengths = np.where(self._angles > 0.0, self._angles, length)
+            self._lengths = length, lengths
+        return lengths
 
     def __reduce__(self):
         """Made again in another process: the memory of kernels belongs to this one."""
@@ -202,7 +215,9 @@ class Gaps:
 
     def at(self, q, angles, t=0.0):
         """Gaps (count,) at one state."""
-        return self.values(np.array([t]), q[None], lambda: angles[None])[0]
+        if self._stops:
+            return self.values(np.array([t]), q[None], lambda: angles[None])[0]
+        return self.workspace.gaps(np.array([t]), q[None], self.sign)[0, : self.count]
 
 
 def slip_rows(contact, first):

@@ -37,6 +37,7 @@ from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome, interval, output_times, state_arrays
+from ..runs.tolerances import START_ZERO
 from ..validation import counted, damaged, demand, listed
 from . import hybrid
 from .grips import Halting, Reactions, items_of
@@ -256,6 +257,7 @@ class _ContactRun(Transitions):
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
             self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
+            self.kind = None  # of the phase, as `Phases` has it
             if self.archive is not None:
                 self.archive.resting = still, resting[still]
             if not (other and self.replaced):
@@ -306,8 +308,9 @@ class _ContactRun(Transitions):
         return self.run_of(phase, replace(self.options, events=None), call), call
 
     def _end_phase(self, t):
-        kind = self.phases.kind(self.packed, self._record, self.scene.packed, self.gaps)
-        self.phases.add(kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
+        if self.kind is None:
+            self.kind = self.phases.kind(self.packed, self._record, self.scene.packed, self.gaps)
+        self.phases.add(self.kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
 
     def _record(self):
         """What the scene of the present phase is made of, for files."""
@@ -333,8 +336,8 @@ class _ContactRun(Transitions):
         self.ended = self.qd
         remembered = self.remembered
         self.decided = (self._transit([self.watched[i] for i in numbers]),)
-        changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
-        if self.decided[0] is not None or changed:
+        remembers = self.remembered is remembered or np.array_equal(self.remembered, remembered)
+        if self.decided[0] is not None or not (remembers and self.modes.same(before)):
             return False
         run.now[1], self.decided = self.qd, None
         self.closing.open(self.modes.opened)
@@ -520,12 +523,10 @@ class _ContactRun(Transitions):
         return Status.SUCCESS
 
     def _is_deep(self):
-        """Whether contacts penetrate; says so."""
-        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        allowed = -PENETRATION * self.gaps.lengths(self.length)
-        if not (self.gap < allowed).any():
-            return False
-        deep = [i for i in (self.gap < allowed).nonzero()[0].tolist() if i in self.able]
+        """Whether contacts penetrate; says so. Notes the gaps, and which are zero within rounding, or below."""
+        self.gap, lengths = self.gaps.at(self.q, self.remembered[: self.count]), self.gaps.lengths(self.length)
+        self.near = (self.gap <= START_ZERO * lengths).nonzero()[0].tolist()
+        deep = [i for i in self.near if self.gap[i] < -PENETRATION * lengths[i] and i in self.able]
         if deep:
             found = listed([self.gaps.names[i] for i in deep], NAMED)
             self.reason = f"Penetration was not noticed: {found}. Give a max_step."

@@ -44,11 +44,10 @@ class Transitions:
         self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        (near,) = (self.gap <= START_ZERO * self.gaps.lengths(self.length)).nonzero()
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         # What was to rise by less than rounding, and has risen by more, is open
-        hit = [i for i in fired if i < count and (i not in before.lifted or i in near)]
-        touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
+        hit = [i for i in fired if i < count and (i not in before.lifted or i in self.near)]
+        touching = {*self.near, *hit, *before.closed, *before.idle}.intersection(self.able)
         turned = [i - count - own for i in fired if i >= count + own and before.slides(i - count - own)]
         broken = [i - count for i in fired if count <= i < count + own]
         status = self._settle(sorted(touching), hit, broken, turned)
@@ -82,6 +81,8 @@ class Transitions:
     def _settle(self, *which):
         """As `_decide_modes`; rows of frictions that don't hold remember zeros."""
         status = self._decide_modes(*which)
+        if not self.frictions.count:
+            return status
         memory, held = self.remembered[self.count :], self.frictions.held
         ranks = [self.modes.sticking.get(i, 0) for i in range(self.frictions.count)]
         left = [slot for rank, slots in zip(ranks, held, strict=True) for slot in slots[rank:].ravel().tolist()]

@@ -224,9 +224,9 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     alone = dict(zip(resting, b.reshape(-1, 3), strict=True))
     if by_rows:
         idle += spare
-        closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone), []
+        closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone, fired), []
     else:
-        closed, idle = _carried(inertia, closed, idle, grips, N, resting)
+        closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
     pushes = _held(inertia, closed, grips, alone)
     slack = slack_of(inertia, closed, pushes, small)
     moves = (G @ p + b).reshape(-1, 3)[:, 1:]
@@ -297,36 +297,37 @@ def _demand_unique(G, d, mu, mode):
         raise NoSolution
 
 
-def _carried(inertia, closed, idle, grips, N, resting):
+def _carried(inertia, closed, idle, grips, N, resting, fired):
     """closed and idle with the idle ones exchanged so that all reactions of closed ones push."""
     if not idle:
         return sorted(closed), idle
     which = [*closed, *idle]
     columns = inertia.free(_loads(inertia, which, _ways(inertia, grips)).T)
     given = np.array([max(N[resting.index(i)], 0.0) for i in which])
-    return _basis(inertia, which, columns, columns @ given)
+    return _basis(inertia, which, columns, columns @ given, fired)
 
 
-def _pushing(inertia, which, grips, b):
+def _pushing(inertia, which, grips, b, fired):
     """closed and idle of the gaps `which`, so that closed ones push where they alone hold; arguments as of `_held`.
 
     With dependent rows loads of contacts that slide may be independent: other ones give other accelerations.
     """
     A, a = _holding(inertia, which, grips, b)
-    return _basis(inertia, which, np.hstack([A, -A[:, len(which) :]]), -a)
+    return _basis(inertia, which, np.hstack([A, -A[:, len(which) :]]), -a, fired)
 
 
-def _basis(inertia, which, columns, load):
+def _basis(inertia, which, columns, load, fired):
     """closed and idle of the gaps `which`: closed ones independent, by their nonnegative shares of a load.
 
-    columns: of the gaps first.
+    columns: of the gaps first. fired: those whose reactions have vanished, and fall: others carry in their place.
     """
     from scipy.optimize import nnls
 
     size = np.linalg.norm(columns, axis=0)
     shares, _ = nnls(columns / np.where(size > 0.0, size, 1.0), load)
-    closed, idle = [], []
-    for j in np.argsort(-shares[: len(which)]):
+    shares, closed, idle = shares[: len(which)], [], []
+    shares[np.isin(which, fired) & (shares <= EVENT_ERROR * shares.max())] = -1.0
+    for j in np.argsort(-shares):
         (idle if depends(inertia, closed, which[j]) else closed).append(which[j])
     return sorted(closed), sorted(idle)
 

@@ -127,26 +127,38 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     NoSolution
         Where no reactions that push keep the contacts from penetrating, or several do: with much friction (Painleve).
     """
-    # Where some that are chosen pull, others are chosen
+    kept = None
     for by_rows in False, True:
         found, pulls = _solve(inertia, resting, qd, fired, by_rows)
-        again = None
-        if found.idle:
-            # Idle contacts carry nothing in the phase: what the others do follows from their own normal loads
-            again, pulling = _solve(inertia, found.closed, qd, fired)
-            if again.closed == found.closed and not again.idle:
-                found, pulls = again._replace(idle=found.idle, grips={**found.grips, **again.grips}), pulling
+        if found.idle and (alone := _alone(inertia, found, qd, fired)):
+            return alone
         if not pulls:
-            return found
-    if again is None or pulling:
+            kept = kept or found
+            if not found.idle:
+                break
+    if kept is None:
         raise NoSolution
-    # Some of them open then: idle ones open, too, or depend on the others
-    a, small = again.accelerations, LEVEL * inertia.accelerations(qd)[1] + inertia.carried()
-    idle = [i for i in found.idle if a[i] <= small[i]]
-    if any(a[i] < -small[i] or not depends(inertia, again.closed, i) for i in idle):
-        raise NoSolution
-    kept = {i: d for i, d in found.grips.items() if i in idle}
-    return again._replace(idle=sorted([*again.idle, *idle]), grips={**kept, **again.grips})
+    return kept
+
+
+def _alone(inertia, found, qd, fired):
+    """The `ContactState` in which idle contacts carry nothing, as in the phase, or None.
+
+    What the others do follows from their own normal loads; some of them may open then, and idle ones close for them.
+    """
+    which, seen, small = found.closed, [], LEVEL * inertia.accelerations(qd)[1] + inertia.carried()
+    while which not in seen:
+        seen.append(which)
+        again, pulls = _solve(inertia, which, qd, fired)
+        left = {*found.closed, *found.idle}.difference(again.closed, again.idle)
+        low = sorted(i for i in left if again.accelerations[i] <= small[i])
+        idle = [i for i in low if depends(inertia, again.closed, i)]
+        missing = [i for i in low if again.accelerations[i] < -small[i] or (i not in idle and i not in fired)]
+        if not missing:
+            grips = {**{i: d for i, d in found.grips.items() if i in idle}, **again.grips}
+            return None if pulls else again._replace(idle=sorted([*again.idle, *idle]), grips=grips)
+        which = sorted([*again.closed, *again.idle, min(missing, key=again.accelerations.item)])
+    return None
 
 
 def at_turn(inertia, resting, qd, fired, turned, opening=()):

@@ -17,7 +17,7 @@ import numpy as np
 from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, TINY
-from .contact_problem import ContactState, NoSolution, depends, energy_gain, rounding_of, slack_of
+from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, STOPPED, WITHIN_BOUND
 
 
@@ -239,13 +239,13 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
         closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone, fired), []
     else:
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
-    pushes = _held(inertia, closed, grips, alone)
+    pushes, rounding = _held(inertia, closed, grips, alone, small + carried)
     slack = slack_of(inertia, closed, pushes, small)
     moves = (G @ p + b).reshape(-1, 3)[:, 1:]
     gains = {resting[j]: float(moves[j] @ d[j]) for j in np.flatnonzero(slides)}
     rows = _independent(inertia, closed, grips)
     found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains)
-    return found, bool((pushes < -rounding_of(inertia, closed, pushes, small)).any())
+    return found, bool((pushes < -rounding).any())
 
 
 def _sharing(G, b, p, mode, cones, response):
@@ -381,13 +381,16 @@ def _loads(inertia, which, ways):
     return loads
 
 
-def _held(inertia, closed, grips, b):
-    """Reactions (k,) of closed gaps where they and the slips of those that stick have no accelerations.
+def _held(inertia, closed, grips, b, small):
+    """Reactions (k,) of closed gaps where they and the slips of those that stick have no accelerations; their rounding.
 
-    b: accelerations (3,) of gaps and slips where all are open, by gaps.
+    b: accelerations (3,) of gaps and slips where all are open, by gaps; small (count,): rounding of accelerations of
+    gaps. Reactions may fall below zero by twice their rounding: by the error of reactions at an event.
     """
-    A, a = _holding(inertia, closed, grips, b)
-    return -np.linalg.lstsq(A, a, rcond=RANK_TOL**2)[0][: len(closed)]
+    (A, a), k = _holding(inertia, closed, grips, b), len(closed)
+    by = np.linalg.pinv(A, rcond=RANK_TOL**2)[:k]
+    pushes = -by @ a
+    return pushes, np.maximum(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * np.abs(pushes).max(initial=0.0))
 
 
 def _holding(inertia, closed, grips, b):

@@ -163,13 +163,23 @@ def act_series(s, f, k, out):
 
 
 @kernel
+def size(square):
+    """sqrt(square), exact to first order in an imaginary part; where it is zero, so is its derivative."""
+    if not square.real > 0.0:
+        return 0.0 * square
+    root = np.sqrt(square.real)
+    return root + (square - square.real) * (0.5 / root)
+
+
+@kernel
 def along_and_across(x, f):
-    """Of a force f[0:3] and a torque f[3:6] the parts along the axis x[12:15], and the sizes of those across it."""
+    """Sizes of the parts of a force f[0:3] and of a torque f[3:6] along the axis x[12:15], then of those across it."""
     n0, n1, n2 = x[12], x[13], x[14]
     along, turn = n0 * f[0] + n1 * f[1] + n2 * f[2], n0 * f[3] + n1 * f[4] + n2 * f[5]
     f0, f1, f2 = f[0] - along * n0, f[1] - along * n1, f[2] - along * n2
     t0, t1, t2 = f[3] - turn * n0, f[4] - turn * n1, f[5] - turn * n2
-    return along, turn, np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+    across, tilt = size(f0 * f0 + f1 * f1 + f2 * f2), size(t0 * t0 + t1 * t1 + t2 * t2)
+    return size(along * along), size(turn * turn), across, tilt
 
 
 def slip_velocity(value, what, error):
@@ -309,7 +319,7 @@ def magnitude(s, a, k, counts):
 @kernel
 def _length(s, v, squares, r, k, counts):
     """Write coefficient k of |v| into row r of s, v in rows v to v + 2."""
-    s[squares, k] = square(s[v], k) + square(s[v + 1], k) + square(s[v + 2], k)
+    s[squares, k] = dot(s, v, v, k)
     s[r, k] = root(s[squares], s[r], k) if k == 0 or counts else 0.0
 
 
@@ -331,8 +341,9 @@ def _part_along(f, k, s, n, v, along):
 def _split(f, k, s, n, v, along, across):
     """The same, and f - n n.f in rows `across` to across + 2."""
     _part_along(f, k, s, n, v, along)
+    off = scaled(s, n, along, k)
     for i in range(3):
-        s[across + i, k] = f[i] - product(s[n + i], s[along], k)
+        s[across + i, k] = f[i] - off[i]
 
 
 @kernel

@@ -108,7 +108,7 @@ def work(solution, trajectory, item=None):
 
 
 def _integrals(power, a, b, floor, depth, known=None):
-    """Return the work from each a to its b, by bisection until halves agree, or to a floor, J: steps of series are long.
+    """Return the work from each a to its b, by bisection until halves agree, or to a floor, J: steps are long.
 
     known: what `_quadrature` gives for them, if it has been asked already.
     """

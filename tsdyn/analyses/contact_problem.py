@@ -24,7 +24,7 @@ from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
 from ..model.handles import angle as angle_of
 from ..model.handles import counted, displacement, first_rows, handles_of, index_of
 from .contact_rows import ContactWorkspace
-from .tolerances import EVENT_ERROR, LEVEL
+from .tolerances import LEVEL
 
 
 class Gap(NamedTuple):
@@ -425,15 +425,6 @@ def slack_of(inertia, closed, pushes, small):
     """
     small, G, found = small + inertia.carried(), np.diag(inertia.G), zip(closed, pushes, strict=True)
     return {i: float(max(small[i] / G[i], -2.0 * p)) for i, p in found if p * G[i] <= small[i]}
-
-
-def rounding_of(inertia, closed, pushes, small):
-    """By what reactions (k,) of closed gaps may begin below zero, by rounding; arguments as of `slack_of`.
-
-    They may fall twice as far: by the error of reactions at an event.
-    """
-    small = (small + inertia.carried())[closed] / np.diag(inertia.G)[closed]
-    return np.maximum(small, 0.5 * EVENT_ERROR * np.abs(pushes).max(initial=0.0))
 
 
 def depends(inertia, closed, i, sticks=()):

@@ -137,6 +137,7 @@ class _ContactRun(Transitions):
         self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
         self.lowered = set()  # times of impacts at which less than the coefficients of restitution acts
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
+        self.fast = {}  # see `Halting`
 
     def _take_scene(self, scene, inactive=None, values=None):
         """What follows from the scene alone, and makes the scenes of its phases.
@@ -447,7 +448,8 @@ class _ContactRun(Transitions):
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.slides(i)]
-        halting = Halting(gaps, slides, NEGLIGIBLE * self._slip_terms(slides))
+        self.fast = {} if self.known is None else self.fast
+        halting = Halting(gaps, slides, NEGLIGIBLE * self._slip_terms(slides), self.fast)
         for k, i in enumerate(slides):
             yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 
@@ -593,6 +595,7 @@ class _ContactRun(Transitions):
         phases, arrays = self.phases.saved()
         numbers = {name: getattr(self, name) for name in KEPT} | {"modes": self.modes.saved(), "phases": phases}
         numbers |= {"changes": plain((self.inactive, self.values)), "switched": sorted(self.switched)}
+        numbers["fast"] = plain(self.fast)
         starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
         for where, (_, *parts) in starts.items():
             arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
@@ -615,7 +618,7 @@ class _ContactRun(Transitions):
             inactive, values = known["changes"]
             self.change(tuple(inactive), dict(values))
             self.switched |= set(known["switched"])
-            self.modes = UnitModes.of(known["modes"])
+            self.modes, self.fast = UnitModes.of(known["modes"]), dict(known["fast"])
             if known["sampling"] is not None:
                 self.sampling = Sampling(prepared(phase_of(self.scene, [])), True)
                 self.sampling.restore(known["sampling"])

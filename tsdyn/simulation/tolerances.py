@@ -71,8 +71,11 @@ MOST_AT_AN_INSTANT = 100
 # Events after which progress is judged: a run that would need CREEPING times as many more is ended.
 EVENTS_JUDGED, CREEPING = 1000, 1e3
 # Cosine of the turn of a slip since its phase began, above which the next one keeps its direction; m/s: V, the velocity
-# from which on a slip that slows down may turn less and less.
+# from which on a slip that slows down may turn less and less: ten times that below which friction has one direction.
 SAME_WAY, SLOW = 1.0 - 1e-12, 1e-5
+# rad: a slip that has turned by more takes its direction anew before it ends; reactions change by as much, of their
+# size. Velocity over V that tells it from one that begins.
+TURNED, FASTER = 1e-7, 4.0
 
 # Of the largest reaction of the contacts: one that pulls by more at the start of a phase has another cause than the
 # error of an event's time.

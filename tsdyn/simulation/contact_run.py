@@ -240,15 +240,15 @@ class _ContactRun(Transitions):
 
     def _phase(self):
         """Run the next phase: its task and outcome."""
-        phase, names, known, tol = self._scene(), self._names(), self.known, self._tol()
-        run, call = self._run_of(phase)
-        still = self._still(phase)
+        known, tol = self.known, self._tol()
+        phase, run, call, task = self._begin_phase(tol)
+        names, still = self._names(), self._still(phase)
         if still.size == self.q.size and self.options.method is None:
             run = run._with_method(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
+            task = run._new_task(call, (self.q, self.qd), self.remembered, tol)
         run._prepare_kernels(True)
         self._enter_archive()
         while True:
-            task = run._new_task(call, (self.q, self.qd), self.remembered, tol)
             if known is not None:  # the checkpoint is of an event later on
                 self.t, self.q, self.qd, self.remembered = known
             other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
@@ -274,8 +274,37 @@ class _ContactRun(Transitions):
                 self.methods += [method for method in said if method not in self.methods]
                 return task, outcome
             run, self.replaced = run._with_method(other), True
+            task = run._new_task(call, (self.q, self.qd), self.remembered, tol)
             if self.archive is not None and self.archive.resumed is None:
                 self.archive.go_back(self.written)
+
+    def _begin_phase(self, tol):
+        """The scene of the next phase, its `Run`, the call of it, and its task, which has the start on its rows.
+
+        Where that takes open gaps below zero, as rounding can, these close first.
+        """
+        for _ in range(self.gaps.count + 1):
+            phase = self._scene()
+            run, call = self._run_of(phase)
+            task = run._new_task(call, (self.q, self.qd), self.remembered, tol)
+            sunk = [] if self.known is not None else self._sunk(task.q)
+            if not sunk:
+                break
+            self.q, self.qd = task.q, task.qd
+            self.ended = self.qd
+            if self._transit(sunk) is not None:
+                raise InconsistentState(self.reason)
+        return phase, run, call, task
+
+    def _sunk(self, q):
+        """Open gaps that are below zero at q, but those that have just opened with a rate."""
+        values, modes = self.gaps.at(q, self.remembered[: self.count]), self.modes
+        for i, (_, first, rate, rounding) in modes.opened.items():
+            values[i] = rate or values[i] - first + rounding
+        if not (values < 0.0).any():
+            return []
+        held = {*modes.closed, *modes.idle, *modes.lifted, *self.gaps.following}
+        return [i for i in self.able if values[i] < 0.0 and i not in held]
 
     def _tol(self):
         """Of the start of a phase: velocities after an impact have the rounding of those before it."""

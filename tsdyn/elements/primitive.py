@@ -48,9 +48,7 @@ from .loops import constraint_hessians, constraint_rows, constraint_series, coor
 from .markers import PARAMETERS, POINT, TURN, VECTOR, Marker
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from ..hints import AnyBody, Random
+    from ..hints import AnyBody, Mapping, Random
 
 _registry = {}
 _KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of arguments

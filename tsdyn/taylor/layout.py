@@ -532,7 +532,7 @@ def _motions(graph, packed, orders, places, constraints):
 
 
 PATTERNS = 1024  # that are kept, of classes with their numbers
-NO_MASK = (None,) * 4
+NO_MASK = (None,) * 5
 
 
 def masks(graph, packed):
@@ -548,10 +548,10 @@ def masks(graph, packed):
         for i, (constraint, par) in enumerate(members):
             ends = constraint.a, constraint.b, *constraint.others
             sizes = tuple([lengths.get(id(body), 0) for body in ends])
-            which, turned, mask, still = known.get(id(constraint), NO_MASK)
-            if which is not constraint or turned != sizes:
+            which, given, before, mask, still = known.get(id(constraint), NO_MASK)
+            if which is not constraint or given is not par or before != sizes:
                 mask, still = _mask_of(constraint, (*Motion.numbers(par), *[0.0] * kind.memory), sizes)
-                known[id(constraint)] = constraint, sizes, mask, still
+                known[id(constraint)] = constraint, par, sizes, mask, still
             graph.table[row.table + i * INTS + MASK] = mask
             constant += still
     return constant

@@ -5,6 +5,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.tolerances import EPS
+from tsdyn.simulation import phase_scenes
 
 C = ts.constraints
 G = 9.81
@@ -161,6 +162,22 @@ def test_phases_take_over_the_parameters_that_the_scene_has_checked(monkeypatch)
     falls = [begin for begin, _, _ in solution.phases][1:]
     np.testing.assert_allclose(falls, np.sqrt(2 * np.array(heights) / G), rtol=1e-12)
     assert not asked
+
+
+def test_memory_of_many_phases_is_let_go_of(monkeypatch):
+    """Three boxes come to rest by way of more sets of contacts than are kept; the run has the same bits."""
+    solutions, kept = [], []
+    for coordinates in (phase_scenes.KEPT_COORDINATES, 0):
+        monkeypatch.setattr(phase_scenes, "KEPT_COORDINATES", coordinates)
+        scene = stack(3)
+        solutions.append(ts.simulate(scene, (0, 1.0), rtol=1e-10, atol=1e-10))
+        kept.append(len(scene._phases))
+    assert kept[1] <= phase_scenes.LEAST_PHASES < kept[0]
+    one, other = solutions
+    assert one.success
+    assert other.success
+    np.testing.assert_array_equal(one.q, other.q)
+    np.testing.assert_array_equal(one.energy, other.energy)
 
 
 def bouncing(e=1.0, balls=1):

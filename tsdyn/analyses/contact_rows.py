@@ -481,7 +481,7 @@ class ContactWorkspace:
         place[which], out = np.arange(which.size), np.empty((t.size, which.size))
         rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
         find_slips(self.address, t, rows, place, at, ways, self._short, J, drift, out)
-        return np.hsplit(out, 2)
+        return out[:, : at.size], out[:, at.size :]
 
     def respond(self, t, q, memory, loads):
         """Accelerations (k, n) by loads (k, n), which must be contiguous."""

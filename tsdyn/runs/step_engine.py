@@ -79,11 +79,6 @@ class StepMemory(Memory):
         """As of `Memory`."""
         return self.run.kernels, self.context.linear.kernels
 
-    def begin_again(self, log):
-        """As of `Memory`."""
-        self.context.chart.state.placement = 0  # the poses are those of the step's end
-        return super().begin_again(log)
-
     def take_system(self, system):
         """Take the numbers of a system, which may be another one of the same shape."""
         self.reals = system.reals

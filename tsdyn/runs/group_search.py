@@ -94,7 +94,7 @@ _EXAMPLE = SearchParts(
 load_search = loader(_EXAMPLE)
 
 
-class StepIn(NamedTuple):
+class SearchedStep(NamedTuple):
     """Where the states of a step are read, and what functions are evaluated by."""
 
     context: int  # of the reader
@@ -231,7 +231,7 @@ def search_step(search, context, run, first, second, before, now, block, charts,
     """
     s = load_search(search)
     t0, t1 = s.numbers.t0, s.numbers.t1
-    step = StepIn(context, run, block, charts, points, first, second, t1, now)
+    step = SearchedStep(context, run, block, charts, points, first, second, t1, now)
     numbers, m, end, until = s.numbers, s.value.size, t1, t1
     turning = max(_turn_rate(s.spins, before[1]), _turn_rate(s.spins, now[1]))
     scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)

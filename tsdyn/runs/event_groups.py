@@ -9,10 +9,10 @@ from ..maths.root_isolation import survey
 from .group_search import ARRIVED, GO_ON, GroupSearch, move
 from .tolerances import FALLEN, FROM_REST, ROOT_STEPS
 
-# Where a kernel evaluates the functions of a group, one call of it searches a step (group_search.py). What that leaves
-# unclear, and other groups: a group is surveyed on a step at once (root_isolation.survey). Of the members that cross zero the earliest is located,
-# by the interpolant and Newton's method; the others are surveyed again up to there. Only members whose zeros are
-# unclear are searched one by one, as events of users are.
+# A group is surveyed on a step at once (root_isolation.survey). Of the members that cross zero the earliest is located,
+# by the interpolant and Newton's method; the others are surveyed again up to there. Where a kernel evaluates the
+# functions, one call does so (group_search.py). Only members whose zeros are unclear are searched one by one, as events
+# of users are.
 
 
 class States(NamedTuple):

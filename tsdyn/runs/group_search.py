@@ -8,9 +8,8 @@ import numpy as np
 from ..jit.kernels import Record, caller, data_of, entry, kernel, loader, matrix, resident
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
-from ..maths.tolerances import SHORTEST_INTERVAL
 from .dense_output import OTHER_CHART, SAME_STEP, WHOLE, read_one
-from .tolerances import ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTENED, SHORTLY, SHOWN_TURN
+from .tolerances import ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTLY, SHOWN_TURN
 
 # Newton's method for the function of a survey that crosses zero first.
 
@@ -232,7 +231,7 @@ def search_step(search, context, run, first, second, before, now, block, charts,
     s = load_search(search)
     t0, t1 = s.numbers.t0, s.numbers.t1
     step = SearchedStep(context, run, block, charts, points, first, second, t1, now)
-    numbers, m, end, until = s.numbers, s.value.size, t1, t1
+    numbers, m, end = s.numbers, s.value.size, t1
     turning = max(_turn_rate(s.spins, before[1]), _turn_rate(s.spins, now[1]))
     scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
     numbers.place, numbers.found = OTHER_CHART, -1
@@ -241,21 +240,16 @@ def search_step(search, context, run, first, second, before, now, block, charts,
         if s.odd[j] != 0:
             return UNSURE
     while True:
-        degree = _survey(s, step, t0, until, turning)
+        degree = _survey(s, step, t0, end, turning)
         if degree == 0:
             return UNSURE
         samples = matrix(data_of(s.samples), degree + 2, m)
-        clear = _mark(s, samples)
-        if clear and until == end:
+        if _mark(s, samples):
             break
-        if clear or _first_root(s, step, scratch[0], until - t0) != ARRIVED:
-            # A zero soon after the start is found on a short interval
-            until = t0 + SHORTENED * (until - t0)
-            if clear or not until - t0 > SHORTEST_INTERVAL * max(abs(t0), t1 - t0):
-                return UNSURE
-            continue
+        if _first_root(s, step, scratch[0], end - t0) != ARRIVED:
+            return UNSURE
         # What was unclear may be clear up to there
-        numbers.found, end, until, unclear = int(s.step[0]), s.step[1], s.step[1], False
+        numbers.found, end, unclear = int(s.step[0]), s.step[1], False
         for j in range(m):
             s.left[j] = 1 if s.left[j] == 1 and s.marks[j, 0] < end and s.marks[j, 3] != s.marks[j, 3] else 0
             unclear = unclear or s.left[j] == 1

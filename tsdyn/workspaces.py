@@ -424,7 +424,7 @@ class Counters(Record):
     iteration_matrices: int
     stage_iterations: int
     at_rounding: int  # position solves that started at rounding
-    unverified: int  # position solves whose last correction needed no check of its own
+    unverified: int  # corrections that were known to suffice
     kept: int  # factorisations whose older factors served
 
 

@@ -4,7 +4,7 @@ import math
 
 from ..elements.loops.constraint_rows import largest_coordinate, write_accelerations, write_positions, write_velocities
 from ..errors import Status
-from ..jit.kernels import callback, kernel, vector
+from ..jit.kernels import callback, kernel, long_kernel, vector
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.tolerances import ROUNDING, ROUNDING_AT_MOST
 from ..methods.explicit import ACCELERATE, NORM, PLACE
@@ -16,6 +16,7 @@ from ..rows.interface import (
     clear_rates,
     evaluate_bias,
     evaluate_drift,
+    evaluate_residuals,
     evaluate_rows,
     factorise_selected_rows,
     form_selected_rows,
@@ -242,27 +243,34 @@ def _singular(graph, f, failed):
 def _solve_positions(graph, system, w, f, l, t, x, renewals):  # eight: as of `place`, its coordinates and a limit
     """Newton's method for u with N of the start, factorised again `renewals` times at most; poses and H there. Status.
 
-    Stops when |Phi| is below u_tol^(3/2) or rounding.
+    Stops when |Phi|, measured or extrapolated from the convergence rate, is below u_tol^(3/2) or rounding. H is
+    evaluated with Phi in a sweep that is expected to be the last one.
     """
     floor = w.control.floor
     tol = max(w.control.u_tol, floor)
     goal = max(tol * math.sqrt(tol), floor)
-    before, fresh = math.inf, False  # |Phi| of the last sweep, and whether N was factorised there
+    # |Phi| of the last sweep; contraction by the present factors of N, zero until it is measured
+    before, rate, with_H = math.inf, 0.0, True
     l.state.factored = 0
     for sweep in range(SWEEPS):
         if not displace(graph, l, f.poses):
             return CHART_LOST
         if f.b.size == 0:
             return OK
-        evaluate_rows(graph, system, f, f.rows, t)
+        if with_H:
+            evaluate_rows(graph, system, f, f.rows, t)
+        else:
+            evaluate_residuals(graph, system, f, t)
         add_rate_residuals(graph, f, l, x)
-        worst = largest_residual(graph, f, floor)
+        worst = largest_residual(graph, f, w.control.floor)
         if not worst < math.inf:
             return NOT_FINITE
         slow = worst > SLOW * before
         # Solved, or as close as rounding allows
         if worst <= goal or (slow and worst <= ROUNDING_AT_MOST * floor):
-            if sweep == 0:
+            if not with_H:
+                _add_rows(graph, system, f, l, t, x)
+            elif sweep == 0:
                 w.counters.at_rounding += 1
             else:
                 w.counters.unverified += 1
@@ -272,23 +280,35 @@ def _solve_positions(graph, system, w, f, l, t, x, renewals):  # eight: as of `p
             renewals -= 1
             if renewals < 0:
                 return NEWTON_FAILED
+            if not with_H:
+                _add_rows(graph, system, f, l, t, x)
             l.state.factored = 0
-        elif fresh and worst > ROUNDING_AT_MOST * floor:
-            # The first sweep with new factors measures the curvature |Phi| / |Phi before|^2
-            w.control.rate = worst / (before * before)
-        fresh = l.state.factored == 0
-        if fresh:
+        elif before < math.inf:
+            # The first sweep with new factors measures the curvature |Phi| / |Phi before|^2, later sweeps measure the
+            # rate
+            if worst > ROUNDING_AT_MOST * floor and rate == 0.0:
+                w.control.rate = worst / (before * before)
+            rate = worst / before
+        if l.state.factored == 0:
             if not factorise_normal(graph, w, f, l):
                 return SINGULAR
-            l.state.factored, l.state.off = 1, w.control.rate * worst
+            l.state.factored, l.state.off, rate = 1, w.control.rate * worst, 0.0
         # u <- u + N^-1 Phi,  x <- x - Y0 N^-1 Phi
         solve_product(graph, l.lower, l.upper, f.b)
         w.counters.newton += 1
         apply_multipliers(graph, l.rows0, f.b, l.x)
         for e in range(f.b.size):
             w.u[e] += f.b[e]
-        before = worst
+        expected = worst * (rate if rate > 0.0 else w.control.rate * worst)
+        with_H, before = expected <= goal, worst
     return NEWTON_FAILED
+
+
+@long_kernel
+def _add_rows(graph, system, f, l, t, x):
+    """H where only Phi was evaluated: seldom needed, so not inlined."""
+    evaluate_rows(graph, system, f, f.rows, t)
+    add_rate_residuals(graph, f, l, x)
 
 
 @kernel

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 SKIPPED = {
     "solves_skipped": "position solves, on the constraints to rounding already",
-    "checks_skipped": "checks of a correction: Phi comes with the rows that are needed there",
+    "checks_skipped": "checks of a correction that was known to suffice",
     "factorizations_skipped": "factorisations, older factors serving or still contracting",
     "gyroscopic_skipped": "gyroscopic torques of spheres",
     "rotations_skipped": "rotations of bodies that never turn",

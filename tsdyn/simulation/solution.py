@@ -220,8 +220,8 @@ class Solution(RunOutputs, Balances, Records, Showing, Kinematics["Floats"]):
         steps, rejected, evaluations, placements, newton_iterations, b_iterations, charts, factorizations, seconds; for
         implicit methods also jacobians, iteration_matrices, stage_iterations; stiff: whether an explicit adaptive
         method was limited by stability. Skipped work: solves_skipped, position solves that start at rounding;
-        checks_skipped, checks of a correction: Phi comes with the rows there; factorizations_skipped, where older
-        factors still serve; gyroscopic_skipped, gyroscopic torques of bodies with spherical inertia, rotations_skipped, rotations of
+        checks_skipped, checks after a correction known to suffice; factorizations_skipped, where older factors still
+        serve; gyroscopic_skipped, gyroscopic torques of bodies with spherical inertia, rotations_skipped, rotations of
         bodies with locked orientation, and forces_skipped, forces of scenes without any, each counted once an
         evaluation; columns_skipped, series of constant columns, counted once an order. For Taylor runs near singular
         configurations: steps_near_singular; largest_landing, the largest displacement (m, rad) of a body by the

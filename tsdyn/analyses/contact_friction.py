@@ -16,8 +16,8 @@ import numpy as np
 
 from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
-from ..maths.tolerances import RANK_TOL, TINY
-from .contact_problem import ContactState, NoSolution, depends, energy_gain, rounding_of, slack_of
+from ..maths.tolerances import RANK_TOL, SUM_ROUNDING, TINY
+from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, STOPPED, WITHIN_BOUND
 
 
@@ -38,12 +38,12 @@ def strike(inertia, which, qd, rates, restitution, law="newton"):
     """The `Struck` of an impact of the gaps `which`; rates (k,) before, restitution (k,). Raises NoSolution."""
     rows = rows_of(inertia, which)
     response = inertia.free(rows.T)
-    G, mu = rows @ response, inertia.gaps.kinetic[which]
+    G, mu, rounding = rows @ response, inertia.gaps.kinetic[which], SUM_ROUNDING * inertia.sizes(qd).max()
     before = np.column_stack([rates, inertia.slips(qd)[which]]).ravel()
     normal = np.arange(0, before.size, 3)
 
     def solved(given, b):
-        p = solve_cone(G, b, mu, given=given)[0]
+        p = solve_cone(G, b, mu, given=given, rounding=rounding)[0]
         if p is None:
             raise NoSolution
         return p
@@ -80,10 +80,14 @@ class Cones:
         Of gaps and slips.
     bias : ndarray (3 k,)
         Accelerations of these where the bodies have none.
+    open, terms : ndarray (count,)
+        Accelerations of all gaps where all are open, and the sizes of their terms.
     """
 
     def __init__(self, inertia, resting, qd):
         gaps, slips = inertia.gaps, inertia.slips(qd)[resting]
+        self.open, self.terms = inertia.accelerations(qd)
+        self.rounding = SUM_ROUNDING * self.terms.max(initial=0.0)
         self.rows, self.bias = rows_of(inertia, resting), inertia.biases(qd)[resting].ravel()
         speeds = np.hypot(*slips.T)
         self.slides = speeds > LEAST_SLIP
@@ -99,7 +103,7 @@ class Cones:
         mu = np.where(self.slides, self.kinetic, self.static)
         # Contacts at rest whose friction reaches the bound slide by the kinetic coefficient
         for _ in range(mu.size + 1):
-            p, mode = solve_cone(G, b, mu, self.d, bounds=bounds)
+            p, mode = solve_cone(G, b, mu, self.d, None, bounds, self.rounding)
             if p is None:
                 raise NoSolution
             N, *T = p.reshape(-1, 3)[: mu.size].T
@@ -127,26 +131,38 @@ def solve_rough_contacts(inertia, resting, qd, fired=()):
     NoSolution
         Where no reactions that push keep the contacts from penetrating, or several do: with much friction (Painleve).
     """
-    # Where some that are chosen pull, others are chosen
+    kept = None
     for by_rows in False, True:
         found, pulls = _solve(inertia, resting, qd, fired, by_rows)
-        again = None
-        if found.idle:
-            # Idle contacts carry nothing in the phase: what the others do follows from their own normal loads
-            again, pulling = _solve(inertia, found.closed, qd, fired)
-            if again.closed == found.closed and not again.idle:
-                found, pulls = again._replace(idle=found.idle, grips={**found.grips, **again.grips}), pulling
+        if found.idle and (alone := _alone(inertia, found, qd, fired)):
+            return alone
         if not pulls:
-            return found
-    if again is None or pulling:
+            kept = kept or found
+            if not found.idle:
+                break
+    if kept is None:
         raise NoSolution
-    # Some of them open then: idle ones open, too, or depend on the others
-    a, small = again.accelerations, LEVEL * inertia.accelerations(qd)[1] + inertia.carried()
-    idle = [i for i in found.idle if a[i] <= small[i]]
-    if any(a[i] < -small[i] or not depends(inertia, again.closed, i) for i in idle):
-        raise NoSolution
-    kept = {i: d for i, d in found.grips.items() if i in idle}
-    return again._replace(idle=sorted([*again.idle, *idle]), grips={**kept, **again.grips})
+    return kept
+
+
+def _alone(inertia, found, qd, fired):
+    """The `ContactState` in which idle contacts carry nothing, as in the phase, or None.
+
+    What the others do follows from their own normal loads; some of them may open then, and idle ones close for them.
+    """
+    which, seen, small = found.closed, [], LEVEL * inertia.accelerations(qd)[1] + inertia.carried()
+    while which not in seen:
+        seen.append(which)
+        again, pulls = _solve(inertia, which, qd, fired)
+        left = {*found.closed, *found.idle}.difference(again.closed, again.idle)
+        low = sorted(i for i in left if again.accelerations[i] <= small[i])
+        idle = [i for i in low if depends(inertia, again.closed, i)]
+        missing = [i for i in low if again.accelerations[i] < -small[i] or (i not in idle and i not in fired)]
+        if not missing:
+            grips = {**{i: d for i, d in found.grips.items() if i in idle}, **again.grips}
+            return None if pulls else again._replace(idle=sorted([*again.idle, *idle]), grips=grips)
+        which = sorted([*again.closed, *again.idle, min(missing, key=again.accelerations.item)])
+    return None
 
 
 def at_turn(inertia, resting, qd, fired, turned, opening=()):
@@ -194,7 +210,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     gaps, resting = inertia.gaps, list(resting)
     cones = Cones(inertia, resting, qd)
     response = inertia.free(cones.rows.T)
-    G, (c, terms) = cones.rows @ response, inertia.accelerations(qd)
+    G, c, terms = cones.rows @ response, cones.open, cones.terms
     b = np.column_stack([c[resting], inertia.slip_accelerations(qd)[resting]]).ravel()
     p, mode, mu = cones.solve(G, b)
     N, T, d, slides = p[::3], p.reshape(-1, 3)[:, 1:], cones.d, cones.slides
@@ -224,16 +240,16 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     alone = dict(zip(resting, b.reshape(-1, 3), strict=True))
     if by_rows:
         idle += spare
-        closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone), []
+        closed, idle, spare = *_pushing(inertia, [*closed, *idle], grips, alone, fired), []
     else:
-        closed, idle = _carried(inertia, closed, idle, grips, N, resting)
-    pushes = _held(inertia, closed, grips, alone)
+        closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
+    pushes, rounding = _held(inertia, closed, grips, alone, small + carried)
     slack = slack_of(inertia, closed, pushes, small)
     moves = (G @ p + b).reshape(-1, 3)[:, 1:]
     gains = {resting[j]: float(moves[j] @ d[j]) for j in np.flatnonzero(slides)}
     rows = _independent(inertia, closed, grips)
     found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains)
-    return found, bool((pushes < -rounding_of(inertia, closed, pushes, small)).any())
+    return found, bool((pushes < -rounding).any())
 
 
 def _sharing(G, b, p, mode, cones, response):
@@ -297,36 +313,37 @@ def _demand_unique(G, d, mu, mode):
         raise NoSolution
 
 
-def _carried(inertia, closed, idle, grips, N, resting):
+def _carried(inertia, closed, idle, grips, N, resting, fired):
     """closed and idle with the idle ones exchanged so that all reactions of closed ones push."""
     if not idle:
         return sorted(closed), idle
     which = [*closed, *idle]
     columns = inertia.free(_loads(inertia, which, _ways(inertia, grips)).T)
     given = np.array([max(N[resting.index(i)], 0.0) for i in which])
-    return _basis(inertia, which, columns, columns @ given)
+    return _basis(inertia, which, columns, columns @ given, fired)
 
 
-def _pushing(inertia, which, grips, b):
+def _pushing(inertia, which, grips, b, fired):
     """closed and idle of the gaps `which`, so that closed ones push where they alone hold; arguments as of `_held`.
 
     With dependent rows loads of contacts that slide may be independent: other ones give other accelerations.
     """
     A, a = _holding(inertia, which, grips, b)
-    return _basis(inertia, which, np.hstack([A, -A[:, len(which) :]]), -a)
+    return _basis(inertia, which, np.hstack([A, -A[:, len(which) :]]), -a, fired)
 
 
-def _basis(inertia, which, columns, load):
+def _basis(inertia, which, columns, load, fired):
     """closed and idle of the gaps `which`: closed ones independent, by their nonnegative shares of a load.
 
-    columns: of the gaps first.
+    columns: of the gaps first. fired: those whose reactions have vanished, and fall: others carry in their place.
     """
     from scipy.optimize import nnls
 
     size = np.linalg.norm(columns, axis=0)
     shares, _ = nnls(columns / np.where(size > 0.0, size, 1.0), load)
-    closed, idle = [], []
-    for j in np.argsort(-shares[: len(which)]):
+    shares, closed, idle = shares[: len(which)], [], []
+    shares[np.isin(which, fired) & (shares <= EVENT_ERROR * shares.max())] = -1.0
+    for j in np.argsort(-shares):
         (idle if depends(inertia, closed, which[j]) else closed).append(which[j])
     return sorted(closed), sorted(idle)
 
@@ -368,13 +385,16 @@ def _loads(inertia, which, ways):
     return loads
 
 
-def _held(inertia, closed, grips, b):
-    """Reactions (k,) of closed gaps where they and the slips of those that stick have no accelerations.
+def _held(inertia, closed, grips, b, small):
+    """Reactions (k,) of closed gaps where they and the slips of those that stick have no accelerations; their rounding.
 
-    b: accelerations (3,) of gaps and slips where all are open, by gaps.
+    b: accelerations (3,) of gaps and slips where all are open, by gaps; small (count,): rounding of accelerations of
+    gaps. Reactions may fall below zero by twice their rounding: by the error of reactions at an event.
     """
-    A, a = _holding(inertia, closed, grips, b)
-    return -np.linalg.lstsq(A, a, rcond=RANK_TOL**2)[0][: len(closed)]
+    (A, a), k = _holding(inertia, closed, grips, b), len(closed)
+    by = np.linalg.pinv(A, rcond=RANK_TOL**2)[:k]
+    pushes = -by @ a
+    return pushes, np.maximum(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * np.abs(pushes).max(initial=0.0))
 
 
 def _holding(inertia, closed, grips, b):

@@ -36,9 +36,7 @@ from .loops.coordinate_rows import SIGNATURE
 from .markers import PARAMETERS, TURN, Marker, Point
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from ..hints import AnyBody, Random
+    from ..hints import AnyBody, Callable, Mapping, Random
 
 _registry = {}
 _KERNELS = {"law": 5}  # and their numbers of arguments

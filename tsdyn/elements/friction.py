@@ -18,9 +18,7 @@ from .markers import TURN, Marker, Point, Turn, Vector
 from .tolerances import LEAST_SLIP, LEAST_SQUARE, SLIP
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from ..hints import AnyBody, ArrayLike, Attachment, BodyLike, Floats, Random
+    from ..hints import AnyBody, ArrayLike, Attachment, BodyLike, Callable, Floats, Mapping, Random
 
 
 # Common parts of friction laws: slip velocity of a's point over b, reaction on both bodies, friction coefficient.

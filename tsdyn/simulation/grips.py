@@ -12,10 +12,11 @@ from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
 from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
+from ..maths.tolerances import TINY
 from ..model.handles import index_of
 from ..observables.reactions import balancing
 from .phase_scenes import first_row_of
-from .tolerances import PULLS, SAME_WAY, SLOW
+from .tolerances import FASTER, PULLS, SAME_WAY, SLOW, TURNED
 
 # A closed contact with friction sticks or slides. Where it sticks, all its rows hold; those of the slip of a point are
 # rows on positions, which hold it where it came to rest. Where it slides, the row of the gap holds, and a force in
@@ -134,9 +135,13 @@ def carried(gaps, which, t, q, memory, N, T):
 
 
 class Halting:
-    """Slips of contacts, as event functions: d.v - c v, c = (v + 1.98 V) / 2 (v + V), zero where one ends or turns.
+    """Slips of contacts, as event functions: d.v - c v, zero where one ends or turns.
 
-    It turns by 60 degrees at v >> V, and by 8 degrees at v << V, so that it ends in a direction near d.
+        c = 1/2 + w h,  w = V / (v + V),  h = u^2 / (u^2 + (TURNED v)^2 + noise^2),  u^2 = v^2 - (d.v)^2
+
+    A slip turns by 60 degrees at v >> V; where it has turned at all when it is as slow as V, it takes its direction
+    there: below AHEAD friction has the direction d, so that it ends with its own. One that hasn't been FASTER V since
+    its phase began has h = 0.49, and turns by 8 degrees at v << V: it begins, or has its direction from there.
 
     Parameters
     ----------
@@ -145,16 +150,24 @@ class Halting:
         Those that slide.
     noise : ndarray (slides,), m/s
         Rounding of the slips: of one that others hold, nothing else is left.
+    since : dict of int to float
+        Times, s, since when slips have been faster, by the numbers of gaps: found with the values.
     """
 
-    def __init__(self, gaps, slides, noise):
-        self.gaps, self.slides, self.noise = gaps, slides, noise
+    def __init__(self, gaps, slides, noise, since):
+        self.gaps, self.slides, self.noise, self.since = gaps, slides, noise, since
         self.ways = gaps.slots[slides][:, None] + np.arange(3)
 
     def over(self, states):
         """Values (k, slides) of states at k times."""
         along, speed = self.gaps.slips(states.t, states.levels, self.slides, states.memory[self.ways])
-        return along - 0.5 * (speed + 1.98 * SLOW) / (speed + SLOW) * speed
+        for i, fast in zip(self.slides, (speed > FASTER * SLOW).T, strict=True):
+            if fast.any():
+                self.since.setdefault(i, float(states.t[fast.argmax()]))
+        late = states.t[:, None] > [self.since.get(i, np.inf) for i in self.slides]
+        turned = (speed - along) * (speed + along)
+        h = np.where(late, turned / (turned + (TURNED * speed) ** 2 + self.noise**2 + TINY), 0.49)
+        return along - (0.5 + h * SLOW / (speed + SLOW)) * speed
 
 
 def losses(gaps, which, lam, t, q, qd):
@@ -189,7 +202,7 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
             change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
             # Near singular states that would take other normal loads: rows that hold carry the friction alone
             pushing = [first[id(_gap_row(gaps, modes, i))] for i in frictional]
-            moves = (np.abs(change[:, pushing]) > EVENT_ERROR * np.abs(N)).any(axis=1)
+            moves = np.abs(change[:, pushing]).max(axis=1) > EVENT_ERROR * np.abs(N).max(axis=1)
             change[moves], T[moves] = 0.0, alone[moves]
             out[:, shared[0]] += change[:, shared[1]]
         out[:, rows[sticks]] = -T

@@ -107,3 +107,33 @@ def test_corners_of_a_box_that_slides_and_turns_push(mu, size, v, spin, slides):
     R = state.rotation("0")
     found = *state.position("0")[:2], np.arctan2(R[1, 0], R[0, 0])
     np.testing.assert_allclose(found, slid([mu] * 4, size, legs, v, spin, slides), atol=1e-9)
+
+
+def test_friction_is_against_a_slip_that_turns_until_it_ends():
+    """A stack that tips on one foot: in the last 1e-5 s the slip turns by 2e-4 rad, loads change by 1e-3 N."""
+    scene = boxes(2, mu=0.55, size=(0.3, 0.5, 0.7), velocity=(-0.8, 0.7, 0), spin=-0.6)
+    solution = ts.simulate(scene, (0, 0.1), dense_output=True).raise_if_failed()
+    end, foot, contacts = solution.phases[0][1], scene.constraints[2], scene.constraints[:8]
+    before, last = solution.at(end - 1e-5), solution.at(end - 1e-10)
+    (vx, vy, _), (fx, fy, _) = before.velocity(foot.a, point=foot.point_a), last.reaction(foot)[0]
+    np.testing.assert_allclose(np.arctan2(-fy, -fx), np.arctan2(vy, vx), atol=1e-3)
+    loads = np.array([[state.reaction(contact)[0][2] for contact in contacts] for state in (before, last)])
+    assert loads[0, 7] > 0.06
+    np.testing.assert_allclose(*loads, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("mu", "size", "v", "spin", "angle"),
+    [
+        (0.52, (0.2, 0.7, 0.5), (-0.7, 0.6), -0.7, 0.1),  # one of two loads that may carry falls from zero
+        (0.23, (0.7, 0.5, 0.5), (-0.1, 0.4), -2.8, 0.0),  # three corners hold where four that share would slide
+        (0.3, (0.3, 0.7, 0.2), (0.3, -0.1), 2.9, 0.0),
+    ],
+)
+def test_corners_of_two_boxes_push_by_their_own_loads(mu, size, v, spin, angle):
+    scene = boxes(2, mu=mu, size=size, velocity=(*v, 0), spin=spin, angle=angle)
+    solution = ts.simulate(scene, (0, 0.15), dense_output=True).raise_if_failed()
+    rows = [member.rows.start for member in solution.packed.members if hasattr(member.constraint, "sides")]
+    pushes = -solution.multipliers[:, rows]
+    assert pushes.min() > -1e-8 * pushes.max()
+    assert np.diff(solution.energy).max() < 1e-9

@@ -231,9 +231,7 @@ def within_rounding(method, packed, q):
         return method, ""
     if packed.derived.near is q:
         return method, ""
-    if packed.derived.levers is None:
-        packed.derived.levers = levers(packed)
-    arms = packed.derived.levers
+    arms = levers(packed)
     if np.abs(q).max() < FAR_LEVER * arms.min(where=arms > 0.0, initial=np.inf):
         packed.derived.near = q
         return method, ""

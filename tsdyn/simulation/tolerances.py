@@ -64,15 +64,20 @@ PASSES, GOT_ON = 16, 1e-9
 # --- contacts --------------------------------------------------------------------------------------------------------
 # Of the scene's length, of angles in rad: a depth that no event leaves, which shows that an event was missed.
 PENETRATION = 1e-9
-# Roundings in a gap, of the sizes of its terms: lower flights than these are none.
+# Of the scene's length, of angles in rad: an impact that is followed by a lower flight is the last one. Contacts of a
+# tower lower each other's flights in turn, and impacts accumulate in them again and again: so each time ends early.
+FLIGHT = 1e-12
+# Roundings in a gap, of the sizes of its terms: gaps that are lifted by less have not opened.
 ROUNDED = 16.0
 # Events in a row without progress in time, beside one for each gap: a chain of openings that follow from each other.
 MOST_AT_AN_INSTANT = 100
-# Events after which progress is judged: a run that would need CREEPING times as many more is ended.
+# Events for each unit, and one more, after which progress is judged: a run that would need CREEPING times as many more
+# is ended. Towers with friction take some 300 for each contact until they rest.
 EVENTS_JUDGED, CREEPING = 1000, 1e3
 # Cosine of the turn of a slip since its phase began, above which the next one keeps its direction; m/s: V, the velocity
-# from which on a slip that slows down may turn less and less: ten times that below which friction has one direction.
-SAME_WAY, SLOW = 1.0 - 1e-12, 1e-5
+# from which on a slip that slows down may turn less and less: the force is off by 1e-4 of its turn there, as friction
+# has one direction below a hundredth of V.
+SAME_WAY, SLOW = 1.0 - 1e-12, 1e-4
 # rad: a slip that has turned by more takes its direction anew before it ends; reactions change by as much, of their
 # size. Velocity over V that tells it from one that begins.
 TURNED, FASTER = 1e-7, 4.0
@@ -85,3 +90,7 @@ PULLS = 1e-6
 LOADED = 4.0
 # Of the load that counts as none: rounding of reactions, along chains too.
 REACTION_NOISE = 1e-3
+
+# Coordinates of all phases of a scene that are kept, at most, and phases at least: memory of runs takes 10 kB for each
+# coordinate, 0.7 GB in all.
+KEPT_COORDINATES, LEAST_PHASES = 1 << 16, 8

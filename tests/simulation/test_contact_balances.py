@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tsdyn as ts
+from tsdyn.observables import diagnostics
 
 C = ts.constraints
 G, UP, TIGHT = 9.81, (0, 0, 1), {"rtol": 1e-12, "atol": 1e-12}
@@ -145,3 +146,22 @@ def test_an_oblique_impact_of_two_bodies_keeps_momenta(kinetic):
     assert np.ptp(solution.linear_momentum, axis=0).max() < 1e-14
     assert np.ptp(solution.angular_momentum, axis=0).max() < 1e-14
     assert (np.ptp(solution.angular_velocity(one)[:, 0]) > 0.1) == (kinetic > 0.0)  # it turns the bodies
+
+
+def test_work_of_a_motor_that_turns_without_load_is_integrated_at_once(monkeypatch):
+    """Its power is rounding after the ball has left the globe: no halving of pieces, each with calls of its own."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    globe = scene.add_body(5.0, (1, 1, 1), angular_velocity=(0, 0, 2.0), name="globe")
+    axle = scene.add(C.Revolute.at(scene.ground, globe, point=(0, 0, 0), axis=UP))
+    scene.add(C.RotationMotor.of(axle, angle=2.0 * ts.motions.time))
+    start = {"position": (0, 0.01, np.sqrt(0.55**2 - 0.01**2)), "name": "ball"}
+    ball = scene.add_body(**ts.shapes.sphere(0.05, mass=0.1), **start)
+    scene.add(C.SphereContact(ball, globe, radius_a=0.05, radius_b=0.5, kinetic=0.4, static=0.6))
+    scene.assemble()
+    solution = ts.simulate(scene, (0, 2.0), dense_output=True, **TIGHT)
+    assert not solution.phases[-1][2]  # it has left
+    asked, powers = [], diagnostics.force_powers
+    monkeypatch.setattr(diagnostics, "force_powers", lambda at: asked.append(len(at.t)) or powers(at))
+    work = solution.work
+    assert len(asked) < 50
+    assert np.ptp(solution.energy - work) < 3e-12 * solution.kinetic_energy.max()

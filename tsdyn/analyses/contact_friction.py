@@ -214,7 +214,8 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     gdd = c + inertia.J @ (response @ p)
     small, carried = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p)), inertia.carried()
     mode = _sharing(G, b, p, mode, cones, response)
-    closed, idle, spare, grips = [], [], [], {}
+    moves, sizes = ((A @ x + y).reshape(-1, 3)[:, 1:] for A, x, y in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
+    closed, idle, spare, grips, begun = [], [], [], {}, {}
     for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
         i = resting[j]
         pushes = N[j] * G[3 * j, 3 * j] > small[i] + carried[i] * (i in fired)
@@ -233,6 +234,8 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
                 grips[i] = None
             else:
                 grips[i] = inertia.along(i, -T[j] / length)
+                gain = -moves[j] @ T[j] / length
+                begun |= {i: float(gain)} if gain > EVENT_ERROR * sizes[j].max() else {}
     alone = dict(zip(resting, b.reshape(-1, 3), strict=True))
     if by_rows:
         idle += spare
@@ -241,10 +244,9 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
     pushes, rounding = _held(inertia, closed, grips, alone, small + carried)
     slack = slack_of(inertia, closed, pushes, small)
-    moves = (G @ p + b).reshape(-1, 3)[:, 1:]
     gains = {resting[j]: float(moves[j] @ d[j]) for j in np.flatnonzero(slides)}
     rows = _independent(inertia, closed, grips)
-    found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains)
+    found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains, begun)
     return found, bool((pushes < -rounding).any())
 
 

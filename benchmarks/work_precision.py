@@ -11,7 +11,6 @@ import numpy as np
 from benchmarks import ours, peers, provenance
 from benchmarks.by_hand import contenders as by_hand
 from benchmarks.measure import Measured, Row, measure
-from benchmarks.peers import scaled
 from benchmarks.scenes import FULL, SCENES
 
 QUICK = ("sliding top", "chain of 4")
@@ -55,10 +54,6 @@ def write(results, found, path):
     data["scenes"] = [one._asdict() | {"rows": [row._asdict() for row in one.rows]} for one in results]
     text = json.dumps(data, indent=1, default=float).replace("Infinity", "null").replace("NaN", "null")
     path.write_text(text + "\n")
-    ratios = scaled.ratios(results)
-    if ratios:
-        stamp = {key: data[key] for key in ("date", "machine", "contenders")}
-        (path.parent / scaled.RATIOS.name).write_text(json.dumps(stamp | {"ratios": ratios}, indent=1) + "\n")
 
 
 def read(path):

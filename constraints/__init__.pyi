@@ -1,4 +1,5 @@
 # Written by tools/stubs.py: do not edit.
+from collections.abc import Iterator
 from typing import Any, Self
 
 from ..hints import AnyBody, ArrayLike, Attribute, Axes, Body, BodyLike, Floats, Function, Joint, JointCoordinate, Orientation, Path, Points, Prescribed, Primitive, References, RopePoints

@@ -71,10 +71,7 @@ class PointDriver(Joint):
     def compose(self):
         """Eq. (1)."""
         for axis, value in zip(np.eye(3), self.path, strict=True):
-            yield (
-                "path",
-                Dot2(self.a, self.b, axis_a=axis, point_a=self.point_a, point_b=self.point_b, value=value),
-            )
+            yield ("path", Dot2(self.a, self.b, axis_a=axis, point_a=self.point_a, point_b=self.point_b, value=value))
 
     @classmethod
     def example(cls, rng, a, b):

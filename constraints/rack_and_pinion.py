@@ -68,14 +68,7 @@ class RackAndPinion(Joint):
     -0.2000 m
     """
 
-    markers = (
-        Point("a"),
-        Point("b"),
-        Vector("a"),
-        Vector("b"),
-        Vector("a", "direction_a"),
-        Vector("b", "reference_b"),
-    )
+    markers = (Point("a"), Point("b"), Vector("a"), Vector("b"), Vector("a", "direction_a"), Vector("b", "reference_b"))
     joint_coordinates = (Angle(reference="direction_a", direction="reference_b"), Displacement("direction_a"))
 
     def __init__(self, a: BodyLike, b: BodyLike, *, radius: float | None = None, **places: Any) -> None:

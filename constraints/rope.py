@@ -14,17 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    InvalidConstraint,
-    Side,
-    SumRow,
-    Unilateral,
-    fitting,
-    ground_point,
-    label,
-    positive,
-    rope_points,
-)
+from ..plugins import InvalidConstraint, Side, SumRow, Unilateral, fitting, ground_point, label, positive, rope_points
 from .span import Span
 
 VANISHING = 1e-9  # share of the rope's length below which a span has no direction; its square is below rounding

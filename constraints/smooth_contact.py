@@ -19,19 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    UNDIRECTED,
-    Point,
-    Primitive,
-    Vector,
-    dot,
-    floats,
-    kernel,
-    not_negative,
-    scaled,
-    shown,
-    some,
-)
+from ..plugins import UNDIRECTED, Point, Primitive, Vector, dot, floats, kernel, not_negative, scaled, shown, some
 
 if TYPE_CHECKING:
     from ..hints import ArrayLike, BodyLike
@@ -82,13 +70,7 @@ class SmoothContact(Primitive):
     normal = "normal_b"
 
     def __init__(
-        self,
-        a: BodyLike,
-        b: BodyLike,
-        *,
-        semi_axes: ArrayLike | None = None,
-        tyre_radius: float = 0.0,
-        **places: Any,
+        self, a: BodyLike, b: BodyLike, *, semi_axes: ArrayLike | None = None, tyre_radius: float = 0.0, **places: Any
     ) -> None:
         super().__init__(a, b, **places)
         self.semi_axes = semi_axes

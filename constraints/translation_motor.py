@@ -73,11 +73,6 @@ class TranslationMotor(Joint):
         yield (
             "travel",
             Dot2(
-                self.a,
-                self.b,
-                axis_a=self.axis_a,
-                point_a=self.point_a,
-                point_b=self.point_b,
-                value=self.displacement,
+                self.a, self.b, axis_a=self.axis_a, point_a=self.point_a, point_b=self.point_b, value=self.displacement
             ),
         )

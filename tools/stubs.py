@@ -135,7 +135,7 @@ def _imports(body: str, own: set[str]) -> str:
     """The imports of all that the body names."""
     words = {*re.findall(r"\w+", body)} - own
     classes = {name for name in ts.constraints.__all__ if name[0].isupper()}
-    abstract, typed = {"Callable", "Mapping", "Sequence"}, {"Any", "Self"}
+    abstract, typed = {"Callable", "Iterable", "Iterator", "Mapping", "Sequence"}, {"Any", "Self"}
     modules = (
         ("collections.abc", abstract),
         ("typing", typed),

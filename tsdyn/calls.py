@@ -21,9 +21,7 @@ from .errors import InvalidArgument, InvalidCall, TsdynError, UnknownAttribute
 from .validation import close, floats, nearest, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from .hints import Class, Function
+    from .hints import Callable, Class, Function, Iterable
 
 
 # Names that other programs have for what tsdyn has under another name: hints of error messages.
@@ -477,9 +475,6 @@ class Placing:
 #
 # A class describes the arguments that are its own. Descriptions of the others, and of the errors raised, come from the
 # docstrings of its bases; arguments that place markers are described by their markers.
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 SECTION = re.compile(r"^(\w+)\n-+\n", flags=re.MULTILINE)
 

@@ -16,9 +16,7 @@ from .calls import fitting
 from .errors import InvalidArgument, MissingDependency
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
-
-    from .hints import Function
+    from .hints import Callable, Function, Iterable, Iterator, Sequence
 
 # from the palette of Okabe and Ito, distinct for every colour vision
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"

@@ -3,7 +3,7 @@
 Imported by type checkers alone, so that annotations cost nothing at run time.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from os import PathLike
 from typing import Any, Literal, Protocol, TypeAlias, TypeVar
 

@@ -24,9 +24,7 @@ from .maths.tolerances import NEGLIGIBLE
 from .validation import floats, number, positive, vector3
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from .hints import ArrayLike, Axis, Floats, Place, Rotation
+    from .hints import ArrayLike, Axis, Floats, Place, Rotation, Sequence
 
 __all__ = [
     "Box", "Capsule", "Cylinder", "Mesh", "Shape", "Sphere", "box", "capsule", "cylinder", "from_mesh", "rod", "sphere",

@@ -69,7 +69,6 @@ class ChartState(Record):
     made: int  # 1 if lower and upper hold factors of N at any configuration of this chart
     formed: int  # 1 if S is that of a stage, not factored yet
     bare: int  # 1 if a position is asked for without factors of S, velocities without forces; tangent form
-    placement: int  # number of the position solve at the end of the last step; 0 if the chart is of no use
     turn_limit: float  # |d| of a body beyond which the chart is left
     free: int  # 1 at a stage off the manifold, where S isn't factorised if there is joint friction
     loads_left: float  # relative error of the multipliers that such a stage may leave with joint friction

@@ -8,7 +8,6 @@ from importlib import import_module
 PEERS = (
     "index1.Index1",
     "pinocchio.Pinocchio",
-    "scaled.Scaled",
     "mujoco.MuJoCoTree",
     "mujoco.MuJoCoConstraints",
     "exudyn.ExudynTree",

@@ -1,9 +1,6 @@
 """`scene.kinematics`: closed forms, runs of the same scene, branches, turns, and what stops it."""
 
 import pickle
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +10,6 @@ from tests.helpers.closed_loops import bricard, four_bar, parallelogram
 from tests.helpers.driven import everything
 from tests.helpers.tolerances import ALGEBRA, CLOSE, FINE, HELD, TIGHT
 
-ROOT = Path(__file__).parents[2]
 C, M = ts.constraints, ts.motions
 X, Y, Z = np.eye(3)
 R, L, RATE = 0.2, 0.5, 3.0
@@ -288,12 +284,3 @@ def chain_of_motors(count):
         scene.add(C.RotationMotor.of(pin, angle=M.Sine(0.01, 2.0)))
         before = rod
     return scene
-
-
-def test_plain_runs_load_nothing_of_it():
-    code = (
-        "import sys, tsdyn as ts; s = ts.Scene(); s.add_point_mass(1.0); ts.simulate(s, (0, 1)); "
-        "print([m for m in sys.modules if m.startswith(('tsdyn.inverse', 'tsdyn.statics'))])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"

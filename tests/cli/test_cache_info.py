@@ -5,10 +5,10 @@ import pytest
 from tsdyn.cli import main
 
 
-@pytest.mark.parametrize("given", [["info"], ["info", "--cache", "top"]])
-def test_info_takes_a_file_or_the_cache(given, capsys):
-    assert main(given) == 1
-    assert "takes a FILE, or --cache, and not both" in capsys.readouterr().err
+@pytest.mark.parametrize("given", [[], ["--cache", "top"], ["--schema", "top"], ["--schema", "--cache"]])
+def test_info_takes_one_thing(given, capsys):
+    assert main(["info", *given]) == 1
+    assert "takes one of FILE, --cache and --schema" in capsys.readouterr().err
 
 
 def test_the_folder_and_the_way_of_compilation_are_shown(capsys):

@@ -1,12 +1,9 @@
 """The command `tsdyn stress`."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
-from tests.helpers.processes import ROOT
 from tsdyn.cli import main
 from tsdyn.stress import campaign
 from tsdyn.stress.judgement import Judgement
@@ -92,9 +89,3 @@ def test_jobs_are_seeds_in_turn():
         ("scenes", 10, 1), ("calls", 10, 40), ("scenes", 11, 1), ("calls", 11, 10), ("scenes", 12, 1),
     ]  # fmt: skip
     assert campaign.tally_text(campaign.Tally(), 0).startswith("0 faults; done")
-
-
-def test_a_run_loads_nothing_of_it():
-    code = "import sys, tsdyn; print([m for m in sys.modules if m.startswith('tsdyn.stress')])"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert result.stdout.strip() == "[]"

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 import tsdyn as ts
 from tests.helpers import built_in
-from tests.helpers.constraint_levels import BOUNDS, LEVELS, between_steps, chains, check, run, scales, wide
+from tests.helpers.constraint_levels import BOUNDS, LEVELS, between_steps, chains, check, run, scales
+from tests.helpers.fixed_steps import assembled
 from tests.helpers.minimal_coordinates import balance
 from tests.helpers.reference import NAMES, load
 from tests.helpers.scenes import (
@@ -49,7 +50,7 @@ def example(kind, rng, tries=20):
 @pytest.mark.parametrize("name", PRIMITIVES)
 @pytest.mark.parametrize("between", BETWEEN)
 def test_every_primitive(name, between, options, rng):
-    scene = wide(random_pair(rng, name, between))
+    scene = assembled(random_pair(rng, name, between))
     check(run(scene, 1.0, t_eval=between_steps(rng, 1.0), **options))
 
 
@@ -112,7 +113,7 @@ def everything(rng):
 
 @TOLERANCES
 def test_all_primitives_in_one_scene(options, rng):
-    scene = wide(everything(rng))
+    scene = assembled(everything(rng))
     check(run(scene, 0.5, t_eval=between_steps(rng, 0.5), **options))
 
 
@@ -135,7 +136,7 @@ def test_rigid_bodies_and_point_masses(rng):
 def test_the_errors_reported_are_the_errors(name, rng):
     """constraint_error against formulas of the tests' own, off the constraints as well as on them."""
     definition = random_pair(rng, name, "body to body")
-    scene = wide(definition)
+    scene = assembled(definition)
     for options in ({"constraint_tol": EPS}, {"formulation": "maggi-kane", "constraint_tol": 1e-4}):
         solution = run(scene, 0.5, 0.02, t_eval=between_steps(rng, 0.5), **options)
         own = [
@@ -177,6 +178,6 @@ def test_maggi_kane_drifts_in_position_only(name):
 @settings(max_examples=100)
 @given(definition=chains(), seed=st.integers(0, 100))
 def test_random_chains_of_mixed_joints(definition, seed):
-    scene = wide(definition)
+    scene = assembled(definition)
     rng = np.random.default_rng(seed)
     check(run(scene, 0.2, t_eval=between_steps(rng, 0.2, 10), constraint_tol=EPS))

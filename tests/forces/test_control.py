@@ -12,7 +12,7 @@ from scipy.integrate import trapezoid
 from scipy.linalg import solve_continuous_are
 
 import tsdyn as ts
-from examples import active_suspension, computed_torque, swing_up
+from examples import active_suspension, swing_up
 from tests.helpers.methods import one_of_each
 from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, HELD, LOOSE, NEAR, ROUGH, ROUNDING, TIGHT
 
@@ -80,16 +80,6 @@ def test_cost_of_the_regulator_is_that_of_the_riccati_equation():
     rates = np.einsum("ki,ij,kj->k", x, Q, x) + np.einsum("ki,ij,kj->k", u, R, u)
     cost = trapezoid(rates, t)
     assert abs(cost / (x[0] @ P @ x[0]) - 1.0) < LOOSE
-
-
-EXAMPLES = swing_up, computed_torque, active_suspension
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda each: each.__name__)
-def test_examples(example, capsys):
-    example.main()
-    assert capsys.readouterr().out
 
 
 def test_a_suspension_with_another_law_fails_the_check():

@@ -204,38 +204,6 @@ def test_a_spring_that_starts_at_nothing_is_refused():
         ts.simulate(scene, (0, 1))
 
 
-def fails_late(t):
-    if t > 0.5:
-        raise ValueError
-    return (1.0, 0.0, 0.0)
-
-
-def fails_late_by_state(t, state):
-    if t > 0.5:
-        raise ValueError
-    return (1.0, 0.0, 0.0)
-
-
-def fails_late_between(t, a, b, par, out):
-    if t > 0.5:
-        raise ValueError
-    out[0] = par[10]  # beyond its end
-
-
-@pytest.mark.slow_for("<lambda>1")
-@pytest.mark.parametrize("make", [
-    lambda m: F.PointForce(m, force=fails_late),
-    lambda m: F.PointForce(m, force=fails_late_by_state),
-])  # fmt: skip
-def test_a_function_that_raises_ends_the_run(make):
-    scene = ts.Scene()
-    scene.add(make(scene.add_point_mass(1.0)))
-    solution = ts.simulate(scene, (0, 1))
-    assert solution.status == ts.Status.NOT_FINITE
-    assert solution.t[-1] == pytest.approx(0.5, abs=2e-3)
-    assert np.isfinite(solution.qdd).all()
-
-
 def test_a_table_must_cover_the_run():
     scene = ts.Scene()
     mass = scene.add_point_mass(1.0)

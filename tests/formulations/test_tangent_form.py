@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 import tsdyn as ts
 from examples import pendulum_chain
 from tests.helpers.constraint_levels import chains, check
+from tests.helpers.fixed_steps import assembled
 from tests.helpers.reference import NAMES, load
 from tests.helpers.scenes import BETWEEN, MOTION, PRIMITIVES, build, random_body, random_chain, random_pair
 from tests.helpers.tolerances import CLOSE, COARSE, EPS, FINE, HELD, ROUGH, TIGHT
@@ -28,12 +29,6 @@ def both(make, end, integrator, chart_interval=NEVER, **options):
         ts.simulate(make(), (0.0, end), integrator=integrator, formulation=form, **options).raise_if_failed()
         for form in FORMS
     ]
-
-
-def assembled(definition):
-    scene = build(definition)
-    scene.assemble()
-    return scene
 
 
 def demand_same(one, two, growth):

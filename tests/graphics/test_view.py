@@ -20,7 +20,6 @@ from tsdyn.graphics.run_data import FLASH, FRAMES, HIT, HOLDS_BACK, OPEN, PUSHES
 from tsdyn.graphics.view import Painter
 
 C, S = ts.constraints, ts.shapes
-ROOT = Path(__file__).parents[2]
 SEEN = 2e-4  # of a length or a unit vector: less than a pixel
 
 
@@ -533,14 +532,6 @@ def test_wrong_shapes_and_paths_are_refused(run, tmp_path):
     with pytest.raises(ts.InvalidCall, match="did you mean shapes"):
         run.view(shape={})
     assert not list(tmp_path.iterdir())
-
-
-def test_a_run_loads_nothing_that_draws():
-    code = "import sys; from examples import top; top.ts.simulate(top.build(), (0.0, 0.1)); print(*sys.modules)"
-    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    modules = result.stdout.split()
-    assert "tsdyn.simulation.prepared_run" in modules
-    assert not [name for name in modules if name.startswith(("tsdyn.graphics", "matplotlib", "webbrowser"))]
 
 
 @pytest.mark.parametrize("display", [True, False])

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 import tsdyn as ts
-from tests.helpers.scenes import build, random_body, random_primitive
+from tests.helpers.scenes import random_body, random_primitive
 from tests.helpers.tolerances import EPS
 
 # times 1 + the largest |r|, |qd|, |qdd| of the output
@@ -41,13 +41,6 @@ def between_steps(rng, end, count=40):
     """Output times: both ends, some ends of steps, and random ones."""
     on = STEP * rng.integers(1, int(end / STEP), size=5)
     return np.unique(np.concatenate(([0.0, end], on, rng.uniform(0.0, end, size=count))))
-
-
-def wide(definition):
-    """The definition, moved by scene.assemble() to where it is consistent, and its scene."""
-    scene = build(definition)
-    scene.assemble()
-    return scene
 
 
 JOINTS = {

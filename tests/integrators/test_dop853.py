@@ -37,26 +37,6 @@ def test_tableau_meets_its_order_conditions():
         RungeKuttaTableau(tableau.a, tableau.b, tableau.c, 8, error=(1.0, -1.0))
 
 
-@pytest.mark.slow_for("*maggi-kane")
-@pytest.mark.parametrize("formulation", FORMS)
-@pytest.mark.parametrize("name", SCENES[1:])
-def test_order_with_a_chart_every_step(name, formulation):
-    steps, off = 1.0 / np.array([150, 165, 180, 200, 220]), []
-    for h in steps:
-        solution, worst = run(name, DOP853(step=h), formulation=formulation, chart_interval=1)
-        assert solution.stats.charts > 1000
-        off.append(worst)
-    assert abs(np.polyfit(np.log(steps), np.log(off), 1)[0] - 8.0) < 0.2
-
-
-@pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
-@pytest.mark.parametrize("name", SCENES)
-def test_error_follows_the_tolerance(name, tol):
-    solution, off = run(name, DOP853(rtol=tol, atol=tol))
-    assert off < max(30.0 * tol, 3e-11)
-    demand_every_level(solution)
-
-
 @pytest.mark.parametrize("name", SCENES[1:])
 def test_the_estimate_vanishes_nowhere(name):
     """That of the tangent part did now and then: steps were too long, and errors 0.03 to 0.06 of the tolerance."""
@@ -160,19 +140,6 @@ def test_a_new_chart_does_not_make_the_control_forget(method):
     times = np.linspace(0.5, 4.5, 50)
     h = [np.interp(times, s.steps.t[s.steps.accepted], s.steps.h[s.steps.accepted]) for s in (often, seldom)]
     assert 0.97 < np.median(h[0] / h[1]) < 1.08
-
-
-def test_by_its_name_and_with_settings():
-    scene, _ = load("sliding_top")
-    one = ts.simulate(scene, (0.0, 1.0), integrator="dop853", rtol=1e-9, atol=1e-9)
-    two = ts.simulate(scene, (0.0, 1.0), integrator=DOP853(1e-9, 1e-9))
-    np.testing.assert_array_equal(one.q, two.q)
-    assert "DOP853" in str(one)
-    bounded = ts.simulate(scene, (0.0, 1.0), integrator=DOP853(1e-3, 1e-3, max_step=0.01, first_step=1e-3))
-    assert bounded.steps.h[0] == 1e-3
-    assert bounded.steps.h.max() <= 0.01 * (1 + HELD)
-    with pytest.raises(ts.InvalidArgument, match="rtol"):
-        DOP853(rtol=-1.0)
 
 
 @pytest.mark.slow

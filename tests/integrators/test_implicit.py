@@ -22,75 +22,6 @@ by_name = {"ids": lambda x: getattr(x, "__name__", str(x))}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("method", "counts", "interval"),
-    [(ImplicitTrapezoid, (200, 400, 800, 1600), None), (SDIRK54, (160, 240, 320, 480), 1)],
-    **by_name,
-)
-@pytest.mark.parametrize("name", SCENES)
-def test_order(name, method, counts, interval):
-    """SDIRK54 with a chart every step, so its own error is seen alone and not charts of many steps cancelling it."""
-    found = [run(name, method(step=1 / n), chart_interval=interval) for n in counts]
-    assert min(solution.stats.charts for solution, _ in found) > 50
-    slope = np.polyfit(-np.log(counts), np.log([off for _, off in found]), 1)[0]
-    assert abs(slope - method.order) < 0.2
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SCENES)
-def test_order_of_sdirk54_with_charts_by_the_criteria(name):
-    counts = (120, 160, 240, 320)
-    found = [run(name, SDIRK54(step=1 / n)) for n in counts]
-    assert min(solution.stats.charts for solution, _ in found) > 50
-    assert abs(np.polyfit(-np.log(counts), np.log([off for _, off in found]), 1)[0] - 5.0) < 0.2
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("method", "tol"),
-    [(SDIRK54, tol) for tol in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)] + [(ImplicitTrapezoid, tol) for tol in (1e-3, 1e-5)],
-    **by_name,
-)
-@pytest.mark.parametrize("name", SCENES)
-def test_error_follows_the_tolerance(name, method, tol):
-    """And constraints hold at every output, and one Jacobian serves the whole run."""
-    solution, off = run(name, method(tol, tol))
-    assert off < max(100.0 * tol, 3e-11)
-    demand_on_the_manifold(solution, solution)
-    assert solution.stats.jacobians == 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "method", "tol", "end"),
-    [
-        ("chain_4", SDIRK54, 1e-9, 1.0),
-        ("chain_4", ImplicitTrapezoid, 1e-4, 1.0),
-        ("chain_16", SDIRK54, 1e-6, 0.4),
-        ("chain_16", ImplicitTrapezoid, 1e-3, 0.4),
-    ],
-    **by_name,
-)
-def test_chains_with_a_force_on_the_last_body(name, method, tol, end):
-    solution, off = run(name, method(tol, tol), end)
-    assert off < 10.0 * tol
-    assert solution.stats.jacobians == 1
-
-
-@pytest.mark.parametrize("method", METHODS, **by_name)
-def test_driven_scene(method):
-    """The rod's length is what it is told to be, and the motion is RK45's."""
-    tol = {ImplicitTrapezoid: 1e-5, SDIRK54: 1e-8}[method]
-    times = np.linspace(0.0, 4.0, 41)
-    solution, fine = (
-        ts.simulate(driven(), (0.0, 4.0), integrator=m, t_eval=times).raise_if_failed()
-        for m in (method(tol, tol), RK45(1e-11, 1e-11))
-    )
-    np.testing.assert_allclose(solution.q, fine.q, rtol=0, atol=100.0 * tol)
-    demand_on_the_manifold(solution, solution)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("first", [3.0, 1.0, 1e-5])
 @pytest.mark.parametrize("method", METHODS, **by_name)
 def test_a_first_step_of_any_length(method, first):
@@ -122,26 +53,6 @@ def test_dense_output_is_on_the_manifold_and_changes_nothing(make, method, rng):
     for name in ("t", "q", "qd", "qdd"):
         np.testing.assert_array_equal(getattr(dense, name), getattr(plain, name))
     np.testing.assert_array_equal(dense.steps.h, plain.steps.h)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("method", "counts"), [(ImplicitTrapezoid, (200, 400, 800)), (SDIRK54, (80, 120, 160, 240))], **by_name
-)
-def test_order_of_dense_output(method, counts, rng):
-    """Of q, qd and qdd alike, all along a run of many charts."""
-    times, parts, off = rng.uniform(0.0, 4.0, 300), ("q", "qd", "qdd"), []
-    exact = ts.simulate(load("sliding_top")[0], (0.0, 4.0), integrator=I.DOP853(1e-13, 1e-13), dense_output=True)
-    exact = exact.at(times)
-    for n in counts:
-        solution = ts.simulate(
-            load("sliding_top")[0], (0.0, 4.0), integrator=method(step=1 / n), dense_output=True, chart_interval=4
-        )
-        assert solution.stats.charts > 50
-        state = solution.at(times)
-        off.append([np.abs(getattr(state, name) - getattr(exact, name)).max() for name in parts])
-    for column in np.transpose(off):
-        assert abs(np.polyfit(-np.log(counts), np.log(column), 1)[0] - method.order) < 0.3
 
 
 # what is counted
@@ -212,35 +123,6 @@ def test_maggi_kane_is_refused(method):
         with pytest.raises(ts.InvalidArgument, match=r"null-space.*'dop853', 'nystrom4', 'rk45'") as caught:
             ts.simulate(load("sliding_top")[0], (0.0, 1.0), integrator=integrator, formulation="maggi-kane")
         assert "'sdirk54'" not in str(caught.value)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", METHODS, **by_name)
-def test_by_its_name_and_with_settings(method):
-    scene, _ = load("sliding_top")
-    name = method.__name__.lower()
-    one = ts.simulate(scene, (0.0, 1.0), integrator=name, rtol=1e-5, atol=1e-5)
-    two = ts.simulate(scene, (0.0, 1.0), integrator=method(1e-5, 1e-5))
-    np.testing.assert_array_equal(one.q, two.q)
-    assert method.__name__ in str(one)
-    bounded = ts.simulate(scene, (0.0, 1.0), integrator=method(1e-2, 1e-2, max_step=0.01, first_step=1e-3))
-    assert bounded.steps.h[0] == 1e-3
-    assert bounded.steps.h.max() <= 0.01 * (1 + HELD)
-    fixed = ts.simulate(scene, (0.0, 1.0), integrator=method(step=0.03))
-    np.testing.assert_allclose(fixed.steps.h, [*[0.03] * 33, 0.01], rtol=HELD)
-    assert repr(method(step=0.03)) == f"{method.__name__}(step=0.03)"
-    with pytest.raises(ts.InvalidArgument, match="rtol"):
-        ts.simulate(scene, (0.0, 1.0), integrator=method(), rtol=1e-5)
-
-
-@pytest.mark.parametrize("method", METHODS, **by_name)
-@pytest.mark.parametrize(
-    ("setting", "value"),
-    [("rtol", 0.0), ("atol", np.nan), ("step", -1.0), ("max_step", "1"), ("first_step", 0.0), ("rtol", np.inf)],
-)
-def test_bad_arguments(method, setting, value):
-    with pytest.raises(ts.InvalidArgument, match=f"{method.__name__}: {setting}"):
-        method(**{setting: value})
 
 
 @pytest.mark.slow

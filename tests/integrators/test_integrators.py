@@ -250,11 +250,6 @@ def test_bad_input(method, words):
         ts.testing.check_integrator(method)
 
 
-def test_methods_that_ignore_the_velocity_are_refused():
-    with pytest.raises(ts.InvalidArgument, match="ignores the velocity"):
-        ts.NystromTableau(a=((), (0,)), abar=((), (1 / 8,)), b=(0, 1), bbar=(0, 1 / 2), c=(0, 1 / 2), order=2)
-
-
 # orders that show late
 
 

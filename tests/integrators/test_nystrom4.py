@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import tsdyn as ts
 from tests.helpers.reference import error, load
-from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FINE, LOOSE
+from tests.helpers.tolerances import ALGEBRA, EPS, FINE, LOOSE
 from tsdyn.methods.tableau import NystromTableau, RungeKuttaTableau
 
 SCENES = ("sliding_top", "two_body_pendulum", "two_body_pendulum_spatial")
@@ -30,12 +30,9 @@ def run(name, step, end=END, **options):
 
 
 @cache
-def study(name, steps=STEPS, intervals=NO_INTERVALS, formulation="tangent"):
+def study(name, steps=STEPS, intervals=NO_INTERVALS):
     """Runs with these steps and chart intervals: solutions, errors, errors at the end."""
-    runs = [
-        run(name, h, chart_interval=interval, formulation=formulation)
-        for h, interval in zip(steps, intervals, strict=True)
-    ]
+    runs = [run(name, h, chart_interval=interval) for h, interval in zip(steps, intervals, strict=True)]
     return (
         [solution for solution, _ in runs],
         np.array([error(*pair) for pair in runs]),
@@ -113,18 +110,6 @@ def test_below_truncation_a_chart_changes_rounding_only(name, interval):
     forced, _ = run(name, step, end, chart_interval=interval)
     angle = sum(np.linalg.norm(w) for w in reference.w_body[0]) * end
     assert change(free, forced) < 2 * EPS * np.sqrt(forced.stats.charts) * (1 + angle)
-
-
-@pytest.mark.slow_but("sliding_top")
-@pytest.mark.parametrize("name", SCENES)
-def test_order_of_maggi_kane(name):
-    """The first-order equivalent, the classical Runge-Kutta method, on Eqs. 17-18; a new V every 1/32 s."""
-    factor = 2 if name == "sliding_top" else 1  # its errors are a tenth of the others
-    steps = tuple(factor * h for h in STEPS)
-    intervals = tuple(5 * 2**j // factor or 1 for j in range(len(STEPS)))
-    _, errors, _ = study(name, steps=steps, intervals=intervals, formulation="maggi-kane")
-    assert errors[-1] < CLOSE
-    assert abs(slope(errors, steps) - 4.0) < ORDER_TOL
 
 
 # the tableau itself

@@ -50,3 +50,16 @@ def test_no_solution_is_none():
     G = np.array([[1.0, 0.8, 0.0], [0.8, 1.0, 0.0], [0.0, 0.0, 1.0]])
     p, _ = solve_cone(G, np.array([-1.0, 5.0, 0.0]), np.array([2.0]), np.array([[1.0, 0.0]]))
     assert p is None
+
+
+def test_dependent_rows_that_disagree_by_rounding():
+    """A box in free fall that slides on four corners: its accelerations are small differences of large terms."""
+    arms = np.array([(x, y, -1) for x in (-1, 1) for y in (-1, 1)]) * 0.5
+    rows = np.array([(*e, *np.cross(arm, e)) for arm in arms for e in np.eye(3)[[2, 0, 1]]])
+    b = rows @ [1e-6, 2e-6, -2e-8, 1e-9, 2e-9, 0.0]
+    b[0] += 3e-15  # rounding of terms of 10
+    slip = np.array([(1.0, 0.0), (0.6, 0.8), (0.8, -0.6), (0.0, 1.0)])
+    p, mode = solve_cone(rows @ rows.T, b, np.full(4, 0.4), slip, rounding=1e-13)
+    assert (mode == SLIDES).all()
+    np.testing.assert_allclose((rows @ (rows.T @ p) + b)[::3], 0.0, atol=1e-14)
+    np.testing.assert_allclose(p.reshape(-1, 3)[:, 1:], -0.4 * p[::3, None] * slip, rtol=1e-12)

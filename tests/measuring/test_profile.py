@@ -195,20 +195,6 @@ def test_timers_change_no_number_and_stay_in_no_memory():
 
 
 @pytest.mark.slow
-def test_a_run_loads_no_timer():
-    code = (
-        REPORT
-        + """
-import sys
-from examples import top
-tsdyn.simulate(top.build(), (0.0, 0.01), integrator="dop853")
-report(timers="tsdyn.measuring.phase_times" in sys.modules)
-"""
-    )
-    assert run(code, {})[0]["timers"] is False
-
-
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="its clock doesn't count nanoseconds")
 def test_the_unit_of_the_clock_in_a_process_that_has_loaded_nothing():
     code = (

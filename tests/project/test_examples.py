@@ -99,33 +99,6 @@ def test_stick_slip():
     )
 
 
-@pytest.mark.slow_but("examples.top", "examples.slider_crank")
-@pytest.mark.parametrize(
-    "module",
-    [
-        top,
-        two_body_pendulum,
-        pendulum_chain,
-        bead_on_surface,
-        driven_pivot,
-        drive_train,
-        plug_in_integrator,
-        slider_crank,
-        hooke_joint,
-        four_bar,
-        door,
-        sarrus,
-        screw_press,
-        geared_pair,
-        stick_slip,
-    ],
-)
-def test_main_reports(module, capsys, monkeypatch):
-    monkeypatch.setattr("sys.argv", ["example"])
-    module.main()
-    assert "Solution" in capsys.readouterr().out
-
-
 @pytest.mark.slow_for("driven_pivot")
 @pytest.mark.parametrize(
     ("build", "end"),

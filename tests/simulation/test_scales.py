@@ -217,3 +217,23 @@ def test_a_stop_ends_a_fast_motion_in_large_units(seed):
     assert solution.success
     np.testing.assert_allclose(solution.impulses[0][0], 0.3 / rate, rtol=1e-9)
     assert np.abs(solution.qd[-1]).max() <= 1e-12 * L * rate
+
+
+@pytest.mark.parametrize("place", [np.zeros(3), np.array([2e4, -3e4, 1e4])])
+def test_a_box_comes_to_rest_where_it_does_at_the_origin(place):
+    """Corners stick at points of the ground; v^2 / (2 mu g) from the start."""
+    scene, mu, v, corner = ts.Scene(), 0.3, 0.7, np.array([0.2, 0.15, 0.1])
+    box = scene.add_body(2.0, (0.02, 0.04, 0.05), place + 0.1 * Z, velocity=(v, 0, 0), name="box")
+    for i in range(4):
+        point = corner * (1 - 2 * (i & 1), 1 - (i & 2), -1)
+        law = {"unilateral": True, "kinetic": mu, "name": f"corner {i}"}
+        scene.add(C.PlaneContact(box, scene.ground, point_a=point, point_b=place, normal_b=(0, 0, 1), **law))
+    run = ts.simulate(scene, (0, 100), dense_output=True)
+    stops = v / (mu * 9.81)
+    assert run.success
+    assert run.sticking("corner 0")[-1]
+    assert run.phases[-1][0] == pytest.approx(stops, abs=1e-12)
+    rest = place + v**2 / (2 * mu * 9.81) * X + 0.1 * Z
+    np.testing.assert_allclose(run.position(box)[-1], rest, rtol=ROUNDING, atol=1e-14)
+    np.testing.assert_allclose(run.at(50.0).position(box), rest, rtol=ROUNDING, atol=1e-14)
+    assert run.constraint_error.position.max() <= 1e-15 + ROUNDING * np.abs(place).max()

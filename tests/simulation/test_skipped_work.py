@@ -76,13 +76,13 @@ def test_constant_columns_of_series():
 
 @pytest.mark.parametrize("name", ["sliding_top", "two_body_pendulum_spatial", "chain_4"])
 def test_factors_that_still_serve(name):
-    """The last placement's factors tell the contraction, and are the next chart's own."""
+    """The last placement's factors tell the contraction."""
     scene = load(name)[0]
     solution = ts.simulate(scene, (0.0, 1.0), integrator=I.Nystrom4(step=1e-3), chart_interval=10)
     stats = solution.stats
     looks, charts = stats.steps + 1, stats.charts - 1
-    assert looks + charts - 5 <= stats.factorizations_skipped <= looks + charts + 5
-    assert 2 * stats.placements <= stats.factorizations <= 2 * stats.placements + 8
+    assert looks - 5 <= stats.factorizations_skipped <= looks + 5
+    assert 2 * stats.placements <= stats.factorizations <= 2 * stats.placements + charts + 8
     other = ts.simulate(
         scene, (0.0, 1.0), integrator=I.Nystrom4(step=1e-3), chart_interval=10, formulation="null-space"
     )  # which always looks anew
@@ -93,7 +93,7 @@ def test_factors_far_from_the_place_are_not_taken():
     """Steps so long that the correction changes Phi_q U: it is factorised again to look at the chart."""
     scene = pendulum_chain.build()
     stats = ts.simulate(scene, (0.0, 1.0), integrator=I.Nystrom4(step=0.04), chart_interval=1).stats
-    assert stats.factorizations_skipped - (stats.charts - 1) < 0.2 * stats.steps
+    assert stats.factorizations_skipped < 0.2 * stats.steps
 
 
 @pytest.mark.slow

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
-from ..maths.tolerances import RANK_TOL, TINY
-from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
+from ..maths.tolerances import RANK_TOL, SUM_ROUNDING, TINY
+from .contact_problem import ContactState, NoSolution, depends, energy_gain, rounding_of, slack_of
 from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, STOPPED, WITHIN_BOUND
 
 
@@ -38,12 +38,12 @@ def strike(inertia, which, qd, rates, restitution, law="newton"):
     """The `Struck` of an impact of the gaps `which`; rates (k,) before, restitution (k,). Raises NoSolution."""
     rows = rows_of(inertia, which)
     response = inertia.free(rows.T)
-    G, mu = rows @ response, inertia.gaps.kinetic[which]
+    G, mu, rounding = rows @ response, inertia.gaps.kinetic[which], SUM_ROUNDING * inertia.sizes(qd).max()
     before = np.column_stack([rates, inertia.slips(qd)[which]]).ravel()
     normal = np.arange(0, before.size, 3)
 
     def solved(given, b):
-        p = solve_cone(G, b, mu, given=given)[0]
+        p = solve_cone(G, b, mu, given=given, rounding=rounding)[0]
         if p is None:
             raise NoSolution
         return p
@@ -80,10 +80,14 @@ class Cones:
         Of gaps and slips.
     bias : ndarray (3 k,)
         Accelerations of these where the bodies have none.
+    open, terms : ndarray (count,)
+        Accelerations of all gaps where all are open, and the sizes of their terms.
     """
 
     def __init__(self, inertia, resting, qd):
         gaps, slips = inertia.gaps, inertia.slips(qd)[resting]
+        self.open, self.terms = inertia.accelerations(qd)
+        self.rounding = SUM_ROUNDING * self.terms.max(initial=0.0)
         self.rows, self.bias = rows_of(inertia, resting), inertia.biases(qd)[resting].ravel()
         speeds = np.hypot(*slips.T)
         self.slides = speeds > LEAST_SLIP
@@ -99,7 +103,7 @@ class Cones:
         mu = np.where(self.slides, self.kinetic, self.static)
         # Contacts at rest whose friction reaches the bound slide by the kinetic coefficient
         for _ in range(mu.size + 1):
-            p, mode = solve_cone(G, b, mu, self.d, bounds=bounds)
+            p, mode = solve_cone(G, b, mu, self.d, None, bounds, self.rounding)
             if p is None:
                 raise NoSolution
             N, *T = p.reshape(-1, 3)[: mu.size].T
@@ -206,7 +210,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     gaps, resting = inertia.gaps, list(resting)
     cones = Cones(inertia, resting, qd)
     response = inertia.free(cones.rows.T)
-    G, (c, terms) = cones.rows @ response, inertia.accelerations(qd)
+    G, c, terms = cones.rows @ response, cones.open, cones.terms
     b = np.column_stack([c[resting], inertia.slip_accelerations(qd)[resting]]).ravel()
     p, mode, mu = cones.solve(G, b)
     N, T, d, slides = p[::3], p.reshape(-1, 3)[:, 1:], cones.d, cones.slides

@@ -82,21 +82,38 @@ class Gaps:
         self.slip_rows = np.where(self.rough, self.rows, 0)[:, None] + [1, 2]
         own = {id(part): first for part, first in first_rows(contacts.constraints)}
         self._slips = np.zeros((self.count, 2), int)  # among the rows of `contacts`
+        # Where the directions of slips are in their rows, at the point of one of the bodies; their sign there
+        self._ways, self._ways_sign = np.zeros(self.count, int), np.ones(self.count)
         for i in np.flatnonzero(self.rough):
-            self._slips[i] = slip_rows(self.list[i].contact, own)
+            self._slips[i], part = slip_rows(self.list[i].contact, own), self.list[i].side.row
+            body, self._ways_sign[i] = (part.a, 1.0) if part.a.dimension else (part.b, -1.0)
+            self._ways[i] = packed.system.bodies[index_of(packed, body), 0]
         handles, bodies = handles_of(packed), packed.system.bodies
         self._places = ~turning(bodies, int(bodies[:, 1].sum()))
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
         self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
         self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
+        self._lengths = None, None  # a length, and `lengths` of it
+
+    @property
+    def in_python(self):
+        """Whether Python evaluates some of the gaps: those of angles of joints."""
+        return bool(self._stops)
 
     def extent(self, q):
         """The scene's length at q (n,), m: the largest number of a point or a position."""
         return max(self.packed.size, float(np.abs(q[self._places]).max(initial=0.0)))
 
     def lengths(self, length):
-        """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound."""
-        return np.where(self._angles > 0.0, self._angles, length)
+        """What rounding of gaps is a part of (count,): the scene's length, m; of an angle one rad, or its bound.
+
+        The same array for the same length.
+        """
+        known, lengths = self._lengths
+        if length != known:
+            lengths = np.where(self._angles > 0.0, self._angles, length)
+            self._lengths = length, lengths
+        return lengths
 
     def __reduce__(self):
         """Made again in another process: the memory of kernels belongs to this one."""
@@ -182,27 +199,22 @@ class Gaps:
 
     def _along(self, i, tangents):
         """Directions (..., 2, 3) of the slips of a gap."""
-        at, sign = self._place(i)
-        return sign * tangents[..., at : at + 3]
-
-    def _place(self, i):
-        """Where the directions of slips are in their rows, at the point of one of the bodies; their sign there."""
-        part = self.list[i].side.row
-        body, sign = (part.a, 1.0) if part.a.dimension else (part.b, -1.0)
-        return self.packed.system.bodies[index_of(self.packed, body), 0], sign
+        at = self._ways[i]
+        return self._ways_sign[i] * tangents[..., at : at + 3]
 
     def slips(self, t, levels, which, ways):
         """Components (k, c) of the slips of gaps along directions (c, 3), ground frame, and their sizes (k, c).
 
         levels (k, ...) begin with q and qd (n,).
         """
-        at, sign = zip(*map(self._place, which), strict=True)
-        ways = np.array(sign)[:, None] * ways
-        return self.workspace.slips(t, levels, self._slips[which].ravel(), np.array(at), ways)
+        ways = self._ways_sign[which, None] * ways
+        return self.workspace.slips(t, levels, self._slips[which].ravel(), self._ways[which], ways)
 
     def at(self, q, angles, t=0.0):
         """Gaps (count,) at one state."""
-        return self.values(np.array([t]), q[None], lambda: angles[None])[0]
+        if self._stops:
+            return self.values(np.array([t]), q[None], lambda: angles[None])[0]
+        return self.workspace.gaps(np.array([t]), q[None], self.sign)[0, : self.count]
 
 
 def slip_rows(contact, first):

@@ -4,8 +4,6 @@ J, gd = J qd + Phi_t, gdd = J qdd + gamma       rows of Phi that are gaps, times
 H W H^T lam = H W f,  a = W (f - H^T lam)       H: bilateral rows                                           (1)
 """
 
-from __future__ import annotations
-
 import math
 import threading
 from functools import partial
@@ -17,7 +15,7 @@ from ..elements.loops.constraint_rows import move_bodies, place_bodies, take_loa
 from ..errors import SingularConfiguration
 from ..formulations.accelerations import accelerate_with_friction, refine_accelerations, solve_accelerations
 from ..formulations.tolerances import EXACT, REFINEMENTS
-from ..jit.kernels import entry, kernel, loader, resident
+from ..jit.kernels import ANY, Record, callback, entry, kernel, loader, resident, vector
 from ..maths.complementarity import CONES
 from ..maths.dense_linalg import copy, largest
 from ..maths.root_isolation import SURVEYING
@@ -51,6 +49,7 @@ from ..rows.interface import (
     weigh_bodies,
     with_all_rows,
 )
+from ..runs.group_search import SEARCHING, VALUES
 from ..workspaces import Parts, load_parts, no_parts, parts
 from .tolerances import JUST_OPENED
 
@@ -73,10 +72,15 @@ def find_gaps(context, t, q, sign, out):
     """
     s = load_contacts(context).rows
     for k in range(t.size):
-        set_time(s, t[k])
-        constraints(s, q[k], t[k], out[k])
-        for i in range(sign.size):
-            out[k, i] *= sign[i]
+        _find_gaps(s, t[k], q[k], sign, out[k])
+
+
+@kernel
+def _find_gaps(s, t, q, sign, out):
+    set_time(s, t)
+    constraints(s, q, t, out)
+    for i in range(sign.size):
+        out[i] *= sign[i]
 
 
 @entry("vwmm")
@@ -86,19 +90,54 @@ def measure_opened(t, which, start, values):
     start (4, opened): time, gap, rate and rounding where those of the numbers `which` have opened; without a rate the
     second. The first have the rounding, r, too, times (r / (rate time))^6: above noise at once, none where they close.
     """
+    for k in range(t.size):
+        _measure_opened(t[k], which, start, values[k])
+
+
+@kernel
+def _measure_opened(t, which, start, values):
     for j in range(which.size):
         begun, first, rate, rounding = start[0, j], start[1, j], start[2, j], start[3, j]
-        for k in range(t.size):
-            grown, since = values[k, which[j]] - first, t[k] - begun
-            if not rate > 0.0:
-                values[k, which[j]] = grown + rounding
-            elif since > 0.0:
-                share = (rounding / (rate * since)) ** 2
-                if share > JUST_OPENED**2:  # else it would be the sign of gaps that are zero to the last digit
-                    grown += rounding * share * share * share
-                values[k, which[j]] = grown / since
-            else:
-                values[k, which[j]] = rate
+        grown, since = values[which[j]] - first, t - begun
+        if not rate > 0.0:
+            values[which[j]] = grown + rounding
+        elif since > 0.0:
+            share = (rounding / (rate * since)) ** 2
+            if share > JUST_OPENED**2:  # else it would be the sign of gaps that are zero to the last digit
+                grown += rounding * share * share * share
+            values[which[j]] = grown / since
+        else:
+            values[which[j]] = rate
+
+
+class GapCounts(Record):
+    """Numbers of rows of contacts, and of gaps that have just opened."""
+
+    rows: int
+    opened: int
+
+
+class OpenGaps(NamedTuple):
+    """What is known of open gaps."""
+
+    counts: GapCounts
+    sign: np.ndarray  # (gaps,)  of a gap over Phi
+    which: np.ndarray  # int64 (gaps,)  those that have just opened come first
+    start: np.ndarray  # (4, gaps)  as of `measure_opened`
+
+
+load_rows = loader(no_system())
+load_open_gaps = loader(OpenGaps(GapCounts(), np.zeros(0), np.zeros(0, int), np.zeros((4, 0))))
+
+
+@callback(VALUES)
+def find_open_gaps(contacts, own, t, state, out):
+    """out (rows,) = the gaps first, at t and a state (3, n), as `find_gaps` and `measure_opened` have them."""
+    gaps = load_open_gaps(own)
+    values = vector(out, gaps.counts.rows)
+    _find_gaps(load_rows(contacts), t, vector(state, ANY), gaps.sign, values)
+    _measure_opened(t, gaps.which[: gaps.counts.opened], gaps.start, values)
+    return 0
 
 
 @kernel
@@ -337,8 +376,8 @@ def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # te
 
 
 KERNELS = (
-    find_gaps, measure_opened, find_rows, find_slips, respond, accelerate, bounce, gain, find_multipliers, *SURVEYING,
-    *CONES,
+    find_gaps, measure_opened, find_open_gaps, find_rows, find_slips, respond, accelerate, bounce, gain,
+    find_multipliers, *SURVEYING, *SEARCHING, *CONES,
 )  # fmt: skip
 
 
@@ -399,6 +438,8 @@ class ContactWorkspace:
         self.n, self.m, self._free = int(contacts.system.bodies[:, 1].sum()), len(contacts.system.segments), free
         rows, self._graph = with_short_rows(contacts), None
         self._rows, self._all = rows._replace(reals=rows.reals.copy()), np.arange(self.m)
+        self.rows_address, self._keep_rows = resident(self._rows)
+        self._impact = np.empty(self.m, int), np.empty((4, self.n)), np.empty((2, self.m)), np.empty(9)  # of `bounce`
         self._bilateral = len(free.system.segments)
         spans = rows.segments, free.system.inertia_segments
         self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in spans)
@@ -440,7 +481,7 @@ class ContactWorkspace:
         place[which], out = np.arange(which.size), np.empty((t.size, which.size))
         rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
         find_slips(self.address, t, rows, place, at, ways, self._short, J, drift, out)
-        return np.hsplit(out, 2)
+        return out[:, : at.size], out[:, at.size :]
 
     def respond(self, t, q, memory, loads):
         """Accelerations (k, n) by loads (k, n), which must be contiguous."""
@@ -471,13 +512,15 @@ class ContactWorkspace:
 
     def bounce(self, t, q, qd, memory, i, sign, e):
         """Numbers (6,) of an impact of the gap in row i alone, as of the kernel, and velocities (n,) afterwards."""
-        place, rows, gamma = np.full(self.m, -1), np.zeros((4, self.n)), np.zeros((2, self.m))
-        numbers = np.array([i, sign, e, *[0.0] * 6])
-        place[i] = 0
+        place, rows, gamma, numbers = self._impact
+        place.fill(-1)
+        rows.fill(0.0)
+        gamma.fill(0.0)
+        place[i], numbers[0], numbers[1], numbers[2] = 0, i, sign, e
         self._enter()
         if not self._bounce(self.address, t, q, qd, memory, place, self._short, rows, gamma, numbers):
             raise SingularConfiguration(NO_INERTIA)
-        return numbers[3:].tolist(), rows[2]
+        return numbers[3:].tolist(), rows[2].copy()
 
     def gain(self, q, before, after):
         """Kinetic energy that velocities (n,) have more afterwards, J."""

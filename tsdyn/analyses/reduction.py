@@ -296,10 +296,7 @@ def _solvers(H, Z):
         ) from error
     weights = weights[:, None]
     solve = interruptible_solver(factors)
-    return (
-        lambda a, b: solve(weights * np.concatenate((a, b))),
-        lambda X: weights[m:] * solve(X, "T")[m:],
-    )
+    return (lambda a, b: solve(weights * np.concatenate((a, b))), lambda X: weights[m:] * solve(X, "T")[m:])
 
 
 def inertia_derivatives(motion):

@@ -86,18 +86,19 @@ def parser_of_all():
     run.add_run_options(_command(commands, run._run))
     ensemble.add_ensemble_options(_command(commands, ensemble._ensemble))
     view.add_view_options(_command(commands, view._view))
-    scenes.add_check_options(_command(commands, scenes._check))
+    run.add_scene(_command(commands, scenes._check))
     scenes.add_info_options(_command(commands, scenes._info))
     scenes.add_new_options(_command(commands, scenes._new))
     scenes.add_convert_options(_command(commands, scenes._convert))
     measure.add_profile_options(_command(commands, measure._profile))
     measure.add_benchmark_options(_command(commands, measure._benchmark))
-    measure.add_tables_options(_command(commands, measure._tables))
+    run.add_plot(_command(commands, measure._tables), "constraint errors over time")
     kernels = _command(commands, _compile)
     kernels.add_argument("--all", action="store_true", help="of every method, formulation and result, too")
-    run.add_json(kernels)
     add_stress_options(_command(commands, _stress))
     add_completion_options(_command(commands, _completion))
+    for each in commands.choices.values():
+        run.add_json(each)
     return parser
 
 

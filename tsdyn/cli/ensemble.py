@@ -13,19 +13,8 @@ import numpy as np
 from .. import validation
 from ..errors import InvalidArgument, Status
 from ..validation import counted, text_cell, unknown_parameter
+from . import run
 from .parser import load_document, print_json, robot_options
-from .run import (
-    add_channels,
-    add_json,
-    add_method,
-    add_output,
-    add_plot,
-    add_scene,
-    channels_asked,
-    destinations,
-    options_of,
-    progress_of,
-)
 
 # The table of `tsdyn ensemble --parameters`: a CSV file with a row for each case, a column for each number.
 
@@ -158,8 +147,8 @@ REASONS = 10  # failed cases that are listed
 
 def add_ensemble_options(parser):
     """Add the options of `tsdyn ensemble` to its parser."""
-    add_scene(parser)
-    add_method(parser)
+    run.add_scene(parser)
+    run.add_method(parser)
     parser.add_argument("--parameters", metavar="CSV", help="a table: a row a case, a column a parameter, "
                         'such as bob.mass or bob.velocity[2]; in place of [ensemble.parameters]')  # fmt: skip
     parser.add_argument("--cases", type=int, metavar="N", help="number of cases (default: that of the file)")
@@ -168,10 +157,9 @@ def add_ensemble_options(parser):
     parser.add_argument("--threads", type=int, metavar="N", help="threads (default: one a processor)")
     parser.add_argument("--store", metavar="PATH", help="stream results to .zarr or .h5, in constant memory")
     parser.add_argument("--resume", action="store_true", help="go on with the cases that are missing in the store")
-    add_output(parser)
-    add_plot(parser, "the first channel or coordinate")
-    add_channels(parser)
-    add_json(parser)
+    run.add_output(parser)
+    run.add_plot(parser, "the first channel or coordinate")
+    run.add_channels(parser)
 
 
 def _ensemble(parsed):
@@ -194,15 +182,15 @@ def _ensemble(parsed):
             f"{parsed.scene} has no table [ensemble], which says what differs from case to case; write one "
             "(tsdyn new shows how), or give --parameters cases.csv."
         )
-    span, options = options_of(parsed, document.run)
-    outputs, plot = destinations(parsed, document)
-    if channels_asked(parsed):
-        study["keep"] = channels_asked(parsed)
+    span, options = run.options_of(parsed, document.run)
+    outputs, plot = run.destinations(parsed, document)
+    if run.channels_asked(parsed):
+        study["keep"] = run.channels_asked(parsed)
     if parsed.assemble:
         study["assemble"] = True
     began = time.perf_counter()
     found = ensemble(document.scene, study.pop("parameters"), span, threads=parsed.threads, store=parsed.store,
-                     resume=parsed.resume, progress=progress_of(parsed), **study, **options)  # fmt: skip
+                     resume=parsed.resume, progress=run.progress_of(parsed), **study, **options)  # fmt: skip
     seconds = time.perf_counter() - began
     written = [str(write(found, path)) for path in outputs] + ([str(_draw(found, plot))] if plot else [])
     if parsed.json:

@@ -1,15 +1,15 @@
 """The commands that measure: profile, benchmark, tables and stress."""
 
-import os
 import sys
 import time
 from functools import partial
 from pathlib import Path
 
+from ..ahead import processors
 from ..errors import InvalidArgument
 from ..files.run_tables import END
 from .parser import print_json
-from .run import add_end, add_json, add_method, add_plot, add_scene, demand_folder, options_of, plotted
+from .run import add_end, add_method, add_plot, add_scene, demand_folder, options_of, plotted
 
 TOLERANCES = "1e-4,1e-6,1e-8,1e-10"
 
@@ -20,7 +20,6 @@ def add_profile_options(parser):
     add_method(parser)
     parser.add_argument("--no-advice", action="store_true", help="don't try other methods and tolerances")
     add_plot(parser, "the shares of the phases")
-    add_json(parser)
 
 
 def add_benchmark_options(parser):
@@ -33,13 +32,6 @@ def add_benchmark_options(parser):
     parser.add_argument("--repeats", type=int, default=3, metavar="N", help="timed runs of each (default 3)")
     parser.add_argument("--formulation", default="tangent", metavar="NAME", help="tangent, null-space or maggi-kane")
     add_plot(parser, "run time against error")
-    add_json(parser)
-
-
-def add_tables_options(parser):
-    """Add the options of `tsdyn tables`."""
-    add_plot(parser, "constraint errors over time")
-    add_json(parser)
 
 
 def _profile(parsed):
@@ -154,7 +146,6 @@ def add_stress_options(parser):
         "--seed", type=int, default=0, metavar="N", help="of the first random scene and calls (default 0)"
     )
     parser.add_argument("--processes", type=int, metavar="N", help="worker processes (default: one a processor)")
-    add_json(parser)
     add_plot(parser, "the gallery")
     parser.add_argument(
         "--markdown", metavar="PATH", help="where to write the table as Markdown; in a page with marks, between them"
@@ -218,7 +209,7 @@ def _counts(parsed):
     counts = {kind: usual[kind] if getattr(parsed, kind) is None else getattr(parsed, kind) for kind in usual}
     if parsed.case and parsed.scenes is None and parsed.calls is None:
         counts = dict.fromkeys(counts, 0)
-    processes = (os.cpu_count() or 1) if parsed.processes is None else parsed.processes
+    processes = processors() if parsed.processes is None else parsed.processes
     for name, value, least in (*((f"--{kind}", count, 0) for kind, count in counts.items()),
                                ("--seed", parsed.seed, 0), ("--processes", processes, 1)):  # fmt: skip
         if value < least:

@@ -25,7 +25,6 @@ def add_run_options(parser):
     add_output(parser)
     add_plot(parser, "the constraint errors, or the channels")
     add_channels(parser)
-    add_json(parser)
 
 
 def add_method(parser):
@@ -281,7 +280,6 @@ def add_view_options(parser):
         "--output", metavar="PATH", help="where to write the page, or a .gif (default: the browser opens the page)"
     )
     add_force(parser)
-    add_json(parser)
 
 
 def _view(parsed):

@@ -7,49 +7,31 @@ from pathlib import Path
 from ..drawing import aligned
 from ..errors import InvalidArgument, TsdynError
 from ..validation import counted
+from . import run
 from .parser import load_document, load_run, load_scene, print_json, robot_options
-from .run import (
-    SOLUTIONS,
-    add_channels,
-    add_force,
-    add_json,
-    add_scene,
-    channels_asked,
-    demand_format,
-    demand_new,
-    write,
-)
 
 SCENES = (".toml",)
 
 
-def add_check_options(parser):
-    """Add the options of `tsdyn check`."""
-    add_scene(parser)
-    add_json(parser)
-
-
 def add_info_options(parser):
     """Add the options of `tsdyn info`."""
-    add_scene(parser, "FILE", optional=True)
+    run.add_scene(parser, "FILE", optional=True)
     parser.add_argument("--parameters", action="store_true", help="what may vary from run to run, too, with units")
     parser.add_argument("--cache", action="store_true", help="the stored kernels instead, and those that are damaged")
-    add_json(parser)
+    parser.add_argument("--schema", action="store_true", help="the JSON Schema of scene files instead, for editors")
 
 
 def add_new_options(parser):
     """Add the options of `tsdyn new`."""
     parser.add_argument("path", nargs="?", default="scene.toml", metavar="PATH", help="default scene.toml")
-    add_json(parser)
 
 
 def add_convert_options(parser):
     """Add the options of `tsdyn convert`."""
-    add_scene(parser, "FROM")
+    run.add_scene(parser, "FROM")
     parser.add_argument("target", metavar="TO", help="where to write; the suffix is the format")
-    add_channels(parser)
-    add_force(parser)
-    add_json(parser)
+    run.add_channels(parser)
+    run.add_force(parser)
 
 
 def _check(parsed):
@@ -85,13 +67,21 @@ def _check(parsed):
 def _info(parsed):
     """Print what is in a file: bodies, mobility, redundant rows, the method and why; or the facts of a solution.
 
-    With --cache and no file: where compiled kernels are stored, how many, and which can't be loaded and why.
+    In place of a file, --cache: where compiled kernels are stored, how many, and which can't be loaded and why;
+    --schema: the JSON Schema by which editors complete and check scene files.
     """
-    if parsed.cache == (parsed.scene is not None):
-        raise InvalidArgument("tsdyn info takes a FILE, or --cache, and not both.")
+    if (parsed.scene is not None) + parsed.cache + parsed.schema != 1:
+        raise InvalidArgument("tsdyn info takes one of FILE, --cache and --schema.")
     if parsed.cache:
         return _cache_info(parsed)
-    if Path(parsed.scene).suffix.lower() in SOLUTIONS:
+    if parsed.schema:
+        from ..files.schema import schema
+        from ..simulation.prepared_run import simulate
+        from ..simulation.scene import Scene
+
+        print_json(schema(Scene, simulate))
+        return 0
+    if Path(parsed.scene).suffix.lower() in run.SOLUTIONS:
         return _solution_info(parsed)
     from ..simulation.phase_scenes import at_start
     from ..simulation.prepared_run import first_method, reason
@@ -231,19 +221,19 @@ def _convert(parsed):
     What exists is overwritten with --force only.
     """
     source, target = Path(parsed.scene).suffix.lower(), Path(parsed.target).suffix.lower()
-    demand_new(parsed.target, parsed.force)
-    if source in SOLUTIONS:
+    run.demand_new(parsed.target, parsed.force)
+    if source in run.SOLUTIONS:
         from ..ensembles.results import Ensemble
         from ..simulation.load import load
         from .ensemble import write as write_ensemble
 
-        demand_format(parsed.target)
+        run.demand_format(parsed.target)
         found = load(parsed.scene)
         _say_what_lacks(found)
         if isinstance(found, Ensemble):
             written = write_ensemble(found, parsed.target)
         else:
-            written = write(found, parsed.target, channels_asked(parsed) or None)
+            written = run.write(found, parsed.target, run.channels_asked(parsed) or None)
     elif source in SCENES and target in SCENES:
         from ..simulation.load import text_of
         from ..simulation.scene import write_text

@@ -18,29 +18,14 @@ from ..maths.dense_linalg import row_lengths
 from ..maths.tolerances import LAST_PLACE, NEGLIGIBLE, TYPED
 from ..model.handles import handles_of
 from ..validation import floats, number, one_of, positive, sequence
-from .continuation import (
-    ContinuationEnd,
-    Kept,
-    Metric,
-    approach_sketch,
-    approached,
-    close,
-    least_energy,
-    least_step,
-    nearest,
-    relax,
-    rotation_vectors,
-    stuck,
-)
+from . import continuation
 from .joint_space import Loops, coordinate_from
 from .mobility import proved, refuse
 from .motor_starts import approach, are_aligned, demand_aligned, demand_finite, has_motors, refuse_vanished
 from .tolerances import CLEAR_FOLD, FLAT_FOLD, INITIAL_TOL, SHOWN, STAGES, STIFFER
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..hints import ArrayLike, ItemLike, PointMass, Scene
+    from ..hints import ArrayLike, ItemLike, PointMass, Scene, Sequence
 
 
 # Assembly modes of closed loops: the folds of the links in a sketch, which an assembly has to keep.
@@ -415,7 +400,7 @@ def _cut(scene, loops):
 def _set_out(scene, fixed, t, tol, values, cut):
     """Place the scene with values of joints, its loops closed if they close; from these values on, if not with them."""
     (q, qd), limits = scene.start, _limits(scene)
-    metric = Metric(scene.packed, _held(scene.packed, fixed) if fixed else None, t)
+    metric = continuation.Metric(scene.packed, _held(scene.packed, fixed) if fixed else None, t)
     demand_finite(scene, *metric.arrays(q))
     loops = Loops(metric, q, values, limits, cut)
     closed = loops.close(tol)
@@ -445,7 +430,8 @@ def _released(scene, values):
 def assembled_nearby(scene, fixed, t, tol=NEGLIGIBLE, folds="free", cut=(), far=False):
     """Assemble without a way to the angles of motors, from a near or a far sketch; return the `AssemblyReport`."""
     packed, (sketch, qd) = scene.packed, scene.start
-    metric, whole = Metric(packed, _held(packed, fixed) if fixed else None, t), Metric(packed, None, t, rates=True)
+    metric = continuation.Metric(packed, _held(packed, fixed) if fixed else None, t)
+    whole = continuation.Metric(packed, None, t, rates=True)
     demand_finite(scene, *metric.arrays(sketch))
     found, near = _search(scene, metric, sketch, tol, fixed, cut, far)
     links = Folds(packed) if _largest_turn(metric, sketch, found.q) > SHOWN / 4.0 else None
@@ -504,7 +490,7 @@ def _held(packed, fixed):
 
 def _largest_turn(metric, sketch, q):
     """Return the largest rotation of a body between two configurations, rad."""
-    return np.linalg.norm(rotation_vectors(sketch[metric.p], q[metric.p]), axis=1).max(initial=0.0)
+    return np.linalg.norm(continuation.rotation_vectors(sketch[metric.p], q[metric.p]), axis=1).max(initial=0.0)
 
 
 def _unfolded(metric, sketch, found, links, tol, cut):
@@ -521,25 +507,25 @@ def _unfolded(metric, sketch, found, links, tol, cut):
             return found
         kept |= set(turned.tolist())
         pairs = np.array(list(dict.fromkeys(tuple(sorted(links.folds[k].bodies)) for k in sorted(kept))))
-        q, steps = relax(metric, sketch, sketch, kept=Kept(pairs, softness), stages=STAGES)
-        q, Phi, more = close(metric, q)
+        q, steps = continuation.relax(metric, sketch, sketch, kept=continuation.Kept(pairs, softness), stages=STAGES)
+        q, Phi, more = continuation.close(metric, q)
         total += steps + more
         met = bool(np.abs(Phi).max(initial=0.0) <= tol * (1.0 + np.abs(q).max()))
         turned = links.turned(metric, q, drawn)
         if not met:
             turned = first
         elif not turned.size:
-            freed, Phi_freed, more = approach_sketch(metric, sketch, q)
+            freed, Phi_freed, more = continuation.approach_sketch(metric, sketch, q)
             total += more
             fits = np.abs(Phi_freed).max() <= tol * (1.0 + np.abs(freed).max())
             if fits and not links.turned(metric, freed, drawn).size:
                 q, Phi = freed, Phi_freed
-            return ContinuationEnd(q, Phi, total, True)
+            return continuation.ContinuationEnd(q, Phi, total, True)
     loops = None if cut is None else Loops(metric, sketch, cut=cut)
     if loops and loops.tree.holds(sketch) and not links.closed(metric, sketch, first):
         closed = loops.close(tol, lambda q: links.turned(metric, q, drawn).size)
         fewer = closed.met and links.turned(metric, closed.q, drawn).size < first.size
-        return ContinuationEnd(closed.q, closed.Phi, total + closed.steps, True) if fewer else found
+        return continuation.ContinuationEnd(closed.q, closed.Phi, total + closed.steps, True) if fewer else found
     stories = [
         f"  {links.folds[k].title}: {np.degrees(links.angle(metric, sketch, k)):.0f} degrees from straight in the "
         f"sketch, {np.degrees(links.angle(metric, found.q, k)):.0f} when assembled"
@@ -561,14 +547,14 @@ def _velocities(metric, q, sketch, A, Phi_q, Phi_t):
     given[metric.p] = metric.rates(q, x)[metric.p]
     exact = metric.is_bounded and not metric.sparse
     if exact:
-        metric = Metric(metric.packed, None, metric.t, lengths=True, rates=True)
+        metric = continuation.Metric(metric.packed, None, metric.t, lengths=True, rates=True)
         A, x = metric.reduced(q, Phi_q[metric.own]), metric.speeds(qd[metric.r], metric.spins(*sketch))
     fitted = given
     for _ in range(3):
         residual = A @ x + Phi_t
         if np.abs(residual).max(initial=0.0) <= LAST_PLACE * (1.0 + np.abs(fitted).max()):
             break
-        x = least_energy(metric, q, A, x, Phi_t) if exact else x + least_step(A, residual)
+        x = continuation.least_energy(metric, q, A, x, Phi_t) if exact else x + continuation.least_step(A, residual)
         fitted = metric.rates(q, x)
     return given, fitted
 
@@ -583,7 +569,7 @@ def _search(scene, metric, sketch, tol, fixed, cut, far):
         loops = Loops(metric, sketch, limits=limits, cut=cut)
         closed = loops.close(tol) if loops.beyond(sketch).any() else None
     if closed is None or not closed.met:
-        found = nearest(metric, sketch, tol)
+        found = continuation.nearest(metric, sketch, tol)
         if found.met and (are_aligned(metric.packed, found.q, metric.t) or not far):
             return found, True
         if not found.met:
@@ -593,8 +579,8 @@ def _search(scene, metric, sketch, tol, fixed, cut, far):
             loops = loops or Loops(metric, sketch, limits=limits, cut=cut)
             closed = loops.close(tol)
     if closed and closed.met:
-        start = ContinuationEnd(closed.q, closed.Phi, closed.steps, True)
-        near = start if found is None else approached(metric, sketch, start, tol)
+        start = continuation.ContinuationEnd(closed.q, closed.Phi, closed.steps, True)
+        near = start if found is None else continuation.approached(metric, sketch, start, tol)
         return start if loops.beyond(near.q).any() else near, False
     if found.met:
         return found, True
@@ -615,7 +601,7 @@ def _demand_direction(scene, metric, found):
 
     Joint coordinates know it where the constraint aligns directions.
     """
-    still = stuck(metric, found.q, found.Phi)
+    still = continuation.stuck(metric, found.q, found.Phi)
     aligned = np.zeros(len(metric.packed.system.segments), bool)
     for member in metric.packed.members:
         aligned[member.rows] = bool(getattr(member.constraint, "opposed", ()))

@@ -27,9 +27,7 @@ from .motor_starts import RigidShift, approach, prescribed
 from .tolerances import DRIVE_LEAST, DRIVE_SHARE, DRIVE_TURN, INITIAL_TOL
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..hints import ArrayLike, AssemblyReport, ItemLike, Scene
+    from ..hints import ArrayLike, AssemblyReport, ItemLike, Scene, Sequence
 
 
 class Goal:

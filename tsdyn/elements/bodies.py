@@ -14,9 +14,7 @@ from ..validation import close, demand_known, floats, listed, positive, shown, v
 from .tolerances import SQUARABLE, UNIT_LENGTH
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..hints import ArrayLike, Floats, Orientation, Scene
+    from ..hints import ArrayLike, Callable, Floats, Orientation, Scene
 
 
 # Lookup of bodies, constraints and forces by name or handle.

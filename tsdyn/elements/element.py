@@ -25,9 +25,7 @@ from .markers import PARAMETERS, POINT, TURN, Marker, entries
 from .tolerances import UNDIRECTED
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..hints import AnyBody, ArrayLike, BodyLike, Floats, Function, Scene, TsdynError
+    from ..hints import AnyBody, ArrayLike, BodyLike, Floats, Function, Scene, Sequence, TsdynError
 
 
 # Bookkeeping of the constraints and forces made for a scene: which were added, and under which names.

@@ -36,9 +36,7 @@ from .loops.coordinate_rows import SIGNATURE
 from .markers import PARAMETERS, TURN, Marker, Point
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from ..hints import AnyBody, Random
+    from ..hints import AnyBody, Callable, Mapping, Random
 
 _registry = {}
 _KERNELS = {"law": 5}  # and their numbers of arguments
@@ -217,7 +215,7 @@ def callbacks(cls, functions, owner=None):
     make = (lambda f: kernel(f, allocates=True)) if owner else inlined
     home = owner or getattr(functions["law"], "py_func", functions["law"])
     label = f"{owner.__qualname__}.{cls.__name__}" if owner else cls.__qualname__
-    names = {**constants, "kernel_law": make(functions["law"])}
+    names = {**constants, "kernel_law": make(functions["law"]), "FRICTIONAL": "normal_load" in functions}
     steps = loops.complex_steps if cls.analytic else loops.central_differences
     names["kernel_derivatives"] = make(specialised(steps, f"{label}.derivatives", home, make, **names))
     names["KEPT"] = loops.kept_size(cls.markers)
@@ -264,8 +262,7 @@ def _series_callbacks(cls, label, names, functions):
         function = functions[before + "series"]
         sharp = cls.sharp or driven
         own = {**names, "kernel_series": inlined(function), "SLOTS": cls.slots, "SHARP": sharp}
-        own |= {"DRIVEN": driven, "TRACED": traced, "FRICTIONAL": "normal_series" in functions}
-        own |= {"POSITIVE": cls.positive or ()}
+        own |= {"DRIVEN": driven, "TRACED": traced, "POSITIVE": cls.positive or ()}
         home = getattr(function, "py_func", function)
         copy = specialised(force_series.series, f"{label}.{before}series_loop", home, **own)
         result[before + "series"] = Callback(copy, constraint_series.SIGNATURE)

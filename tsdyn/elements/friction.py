@@ -10,16 +10,15 @@ import numpy as np
 from ..calls import fitting, unknown_argument
 from ..errors import InvalidForce
 from ..jit.kernels import kernel
+from ..jit.predicates import some
 from ..maths.recurrences import cross, dot, exponential, inverse_root, product, quotient, root, scaled, square
 from ..maths.tolerances import PIVOT_ROUNDING, TINY
 from ..validation import label, not_negative, positive, shown_for_handle
 from .markers import TURN, Marker, Point, Turn, Vector
-from .tolerances import LEAST_SLIP, SLIP
+from .tolerances import LEAST_SLIP, LEAST_SQUARE, SLIP
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from ..hints import AnyBody, ArrayLike, Attachment, BodyLike, Floats, Random
+    from ..hints import AnyBody, ArrayLike, Attachment, BodyLike, Callable, Floats, Mapping, Random
 
 
 # Common parts of friction laws: slip velocity of a's point over b, reaction on both bodies, friction coefficient.
@@ -163,13 +162,21 @@ def act_series(s, f, k, out):
 
 
 @kernel
+def size(square):
+    """sqrt(square), exact to first order in an imaginary part; where it is zero, so is its derivative."""
+    root = np.sqrt(square.real + LEAST_SQUARE)
+    return root + (square - square.real) * (0.5 / root)
+
+
+@kernel
 def along_and_across(x, f):
-    """Of a force f[0:3] and a torque f[3:6] the parts along the axis x[12:15], and the sizes of those across it."""
+    """Sizes of the parts of a force f[0:3] and of a torque f[3:6] along the axis x[12:15], then of those across it."""
     n0, n1, n2 = x[12], x[13], x[14]
     along, turn = n0 * f[0] + n1 * f[1] + n2 * f[2], n0 * f[3] + n1 * f[4] + n2 * f[5]
     f0, f1, f2 = f[0] - along * n0, f[1] - along * n1, f[2] - along * n2
     t0, t1, t2 = f[3] - turn * n0, f[4] - turn * n1, f[5] - turn * n2
-    return along, turn, np.sqrt(f0 * f0 + f1 * f1 + f2 * f2), np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+    across, tilt = size(f0 * f0 + f1 * f1 + f2 * f2), size(t0 * t0 + t1 * t1 + t2 * t2)
+    return size(along * along), size(turn * turn), across, tilt
 
 
 def slip_velocity(value, what, error):
@@ -273,8 +280,8 @@ class BodyFriction:
 # A part of N that is negligible at order zero has no series: its coefficients are rounding. Where it is not negligible
 # later, the series are not those of the law, and the step ends before (loops/law_check.py).
 
-COEFFICIENT_ROWS, BEARING_ROWS = 5, 20
-F, T, ALONG, TURNING, F_ACROSS, T_ACROSS, SQUARES, ROOTS, PART, LOAD = 0, 3, 6, 7, 8, 11, 14, 16, 18, 19
+COEFFICIENT_ROWS, BEARING_ROWS = 5, 21
+F, T, ALONG, TURNING, F_ACROSS, T_ACROSS, SQUARES, ROOTS, PART, LOAD, LAST = 0, 3, 6, 7, 8, 11, 14, 16, 18, 19, 20
 
 
 @kernel
@@ -309,7 +316,7 @@ def magnitude(s, a, k, counts):
 @kernel
 def _length(s, v, squares, r, k, counts):
     """Write coefficient k of |v| into row r of s, v in rows v to v + 2."""
-    s[squares, k] = square(s[v], k) + square(s[v + 1], k) + square(s[v + 2], k)
+    s[squares, k] = dot(s, v, v, k)
     s[r, k] = root(s[squares], s[r], k) if k == 0 or counts else 0.0
 
 
@@ -331,8 +338,24 @@ def _part_along(f, k, s, n, v, along):
 def _split(f, k, s, n, v, along, across):
     """The same, and f - n n.f in rows `across` to across + 2."""
     _part_along(f, k, s, n, v, along)
+    off = scaled(s, n, along, k)
     for i in range(3):
-        s[across + i, k] = f[i] - product(s[n + i], s[along], k)
+        s[across + i, k] = f[i] - off[i]
+
+
+@kernel
+def _move(f, k, s, n, v, along, across, squares, r, counts):  # ten: as of `_split` and `_length`
+    """`_split` and `_length` for another f of order k: each row changes in proportion to f."""
+    d0, d1, d2 = f[0] - s[v, k], f[1] - s[v + 1, k], f[2] - s[v + 2, k]
+    a = s[n, 0] * d0 + s[n + 1, 0] * d1 + s[n + 2, 0] * d2
+    s[v, k], s[v + 1, k], s[v + 2, k] = f[0], f[1], f[2]
+    s[along, k] += a
+    d0, d1, d2 = d0 - a * s[n, 0], d1 - a * s[n + 1, 0], d2 - a * s[n + 2, 0]
+    s[across, k], s[across + 1, k], s[across + 2, k] = s[across, k] + d0, s[across + 1, k] + d1, s[across + 2, k] + d2
+    change = s[across, 0] * d0 + s[across + 1, 0] * d1 + s[across + 2, 0] * d2
+    s[squares, k] += 2.0 * change
+    if counts:
+        s[r, k] += change / s[r, 0]
 
 
 @kernel
@@ -343,14 +366,21 @@ def bearing_series(f, k, s, n, first, preload, turns, weight, tilt):  # nine: th
     """
     along, turn, load = first + ALONG, first + TURNING, first + LOAD
     across, tilted, part, axial = first + ROOTS, first + ROOTS + 1, first + PART, turn if turns else along
-    _split(f, k, s, n, first + F, along, first + F_ACROSS)
-    _length(s, first + F_ACROSS, first + SQUARES, across, k, _counts(s, across, 1.0, load, k))
-    s[tilted, k] = 0.0
-    if tilt != 0.0:
-        _split(f[3:], k, s, n, first + T, turn, first + T_ACROSS)
-        _length(s, first + T_ACROSS, first + SQUARES + 1, tilted, k, _counts(s, tilted, tilt, load, k))
-    elif turns:
-        _part_along(f[3:], k, s, n, first + T, turn)
+    pushed, tilts = _counts(s, across, 1.0, load, k), _counts(s, tilted, tilt, load, k)
+    if k > 0 and not some(s[first + LAST, 0] - k):  # once more for this order
+        _move(f, k, s, n, first + F, along, first + F_ACROSS, first + SQUARES, across, pushed)
+        if turns or tilt != 0.0:
+            _move(f[3:], k, s, n, first + T, turn, first + T_ACROSS, first + SQUARES + 1, tilted, tilts)
+    else:
+        s[first + LAST, 0] = float(k)
+        _split(f, k, s, n, first + F, along, first + F_ACROSS)
+        _length(s, first + F_ACROSS, first + SQUARES, across, k, pushed)
+        s[tilted, k] = 0.0
+        if tilt != 0.0:
+            _split(f[3:], k, s, n, first + T, turn, first + T_ACROSS)
+            _length(s, first + T_ACROSS, first + SQUARES + 1, tilted, k, tilts)
+        elif turns:
+            _part_along(f[3:], k, s, n, first + T, turn)
     s[part, k] = magnitude(s, axial, k, _counts(s, axial, weight, load, k))
     s[load, k] = s[across, k] + weight * s[part, k] + tilt * s[tilted, k] + (preload if k == 0 else 0.0)
     return s[load, k]

@@ -18,9 +18,7 @@ from .primitive import Primitive
 from .tolerances import PARALLEL, UNDIRECTED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-
-    from ..hints import AnyBody, ArrayLike, Floats, Random
+    from ..hints import AnyBody, ArrayLike, Floats, Iterable, Iterator, Mapping, Random
 
 
 # The interface of a joint: a constraint composed of primitives, with no kernels of its own.
@@ -232,14 +230,7 @@ class FramedJoint(Joint):
     References that are not given follow from the bodies as they stand: the angle about the axis that they have is kept.
     """
 
-    markers = (
-        Point("a"),
-        Point("b"),
-        Vector("a"),
-        Vector("b"),
-        Vector("a", "reference_a"),
-        Vector("b", "reference_b"),
-    )
+    markers = (Point("a"), Point("b"), Vector("a"), Vector("b"), Vector("a", "reference_a"), Vector("b", "reference_b"))
 
     def _places(self, given):
         """Fill in the references that were left out."""

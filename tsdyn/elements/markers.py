@@ -25,9 +25,7 @@ from ..validation import vector3
 from .tolerances import SQUARABLE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from ..hints import AnyBody, ArrayLike, Floats, TsdynError
+    from ..hints import AnyBody, ArrayLike, Floats, Iterator, Sequence, TsdynError
 
 POINT, VECTOR, PARAMETERS, TURN = 0, 1, 2, 3  # codes in kernels
 

@@ -48,9 +48,7 @@ from .loops import constraint_hessians, constraint_rows, constraint_series, coor
 from .markers import PARAMETERS, POINT, TURN, VECTOR, Marker
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from ..hints import AnyBody, Random
+    from ..hints import AnyBody, Mapping, Random
 
 _registry = {}
 _KERNELS = {"phi": 4, "jacobian": 4, "gamma": 5}  # and their numbers of arguments
@@ -198,11 +196,14 @@ class Primitive(Attachment):
     @property
     def rheonomic(self) -> bool:
         """True if the constraint depends on time."""
-        names = self.quantities()
-        moves = not names or any(isinstance(getattr(self, name), Motion) for name in names)
         if self.rate_rows:
-            return self._drifts() or (moves and self.rows > 0 and getattr(self, "phi_t", None) is not None)
-        return moves and "phi_t" in self.kernels
+            return self._drifts() or (self.rows > 0 and getattr(self, "phi_t", None) is not None and self._moves())
+        return "phi_t" in self.kernels and self._moves()
+
+    def _moves(self):
+        """Whether what is prescribed is a function of time; true where nothing is."""
+        names = self.quantities()
+        return not names or any([isinstance(getattr(self, name), Motion) for name in names])
 
     def _drifts(self):
         """Whether b, the rate at xd = 0, may be other than zero, with these or other numbers: asked at random ones."""

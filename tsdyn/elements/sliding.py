@@ -48,13 +48,7 @@ class _Sliding(Force):
         s of two balls, 0 for a plane.
     """
 
-    markers = (
-        Point("a"),
-        Turn("a"),
-        Point("b"),
-        Turn("b"),
-        Vector("b", "normal_b"),
-    )
+    markers = (Point("a"), Turn("a"), Point("b"), Turn("b"), Vector("b", "normal_b"))
     particles = True
     taken = 3
     slots = 63 + TANGENTIAL_ROWS

@@ -25,9 +25,7 @@ from .runner import CaseWorkspace, Study
 from .tolerances import LANES
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..hints import CaseTable, Keep, Place, Progress, Span
+    from ..hints import CaseTable, Keep, Place, Progress, Sequence, Span
 
 # `ts.ensemble`: many runs of a scene with other parameters.
 # Progress of an ensemble: a bar with rate and remaining time, or a user's function.

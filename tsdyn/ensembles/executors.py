@@ -2,7 +2,6 @@
 
 import contextlib
 import hashlib
-import os
 import pickle
 import threading
 import time
@@ -11,6 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, 
 
 import numpy as np
 
+from ..ahead import processors
 from ..calls import line_of_user
 from ..errors import InvalidArgument, MissingDependency, Status
 from ..runs.tolerances import SLICE_SECONDS
@@ -145,11 +145,6 @@ class Queue:
         wanted = count * self.seconds / max(seconds, 1e-9)
         wanted = min(int(wanted), GROWTH * count, MOST_CASES)
         self.size = max(wanted // self.least, 1) * self.least
-
-
-def processors():
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def run_threads(study, sink, threads, report):

@@ -1,7 +1,6 @@
-"""The JSON Schema of scene files, from the signatures that files are read by. `python -m tools.schema` writes it."""
+"""The JSON Schema of scene files, from the signatures that files are read by. `tsdyn info --schema` prints it."""
 
 import inspect
-import json
 
 from ..motions.tables import MAKERS
 from . import run_tables, types
@@ -166,8 +165,3 @@ def _start(scene):
     coordinates = {name: _property(argument) for name, argument in types.of_body(scene.set).items()}
     each = _closed(coordinates, ["joint"])
     return _closed({"assemble": {"type": "boolean"}, "set": {"type": "array", "items": each}, **known})
-
-
-def text(scene, simulate):
-    """The schema as JSON text."""
-    return json.dumps(schema(scene, simulate), indent=1) + "\n"

@@ -17,18 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plugins import (
-    Action,
-    Force,
-    InvalidForce,
-    SceneLaw,
-    Turn,
-    gate,
-    ground_point,
-    label,
-    not_negative,
-    rope_points,
-)
+from ..plugins import Action, Force, InvalidForce, SceneLaw, Turn, gate, ground_point, label, not_negative, rope_points
 from .spring import BEYOND
 
 if TYPE_CHECKING:

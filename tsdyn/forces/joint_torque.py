@@ -10,19 +10,7 @@ The power of (1) is T times the rate of the angle if the joint holds the axis.
 import numpy as np
 
 from ..constraints.revolute import Revolute
-from ..plugins import (
-    ByState,
-    Force,
-    JointLoad,
-    Turn,
-    Vector,
-    angle_about,
-    angle_series,
-    angles,
-    dot,
-    load_at,
-    scaled,
-)
+from ..plugins import ByState, Force, JointLoad, Turn, Vector, angle_about, angle_series, angles, dot, load_at, scaled
 
 
 class JointTorque(JointLoad, Force):

@@ -15,8 +15,6 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from ..constraints.revolute import Revolute
 from ..plugins import (
     AXIS,
@@ -114,7 +112,7 @@ class RevoluteFriction(JointFriction, Force):
     def normal_load(x, f, par):
         """Eq. (1)."""
         along, _, across, tilt = along_and_across(x, f)
-        return par[4] + across + par[6] * np.sqrt(along * along) + par[7] * tilt
+        return par[4] + across + par[6] * along + par[7] * tilt
 
     @staticmethod
     def series(x, xd, par, k, s, out):

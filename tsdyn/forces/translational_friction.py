@@ -16,8 +16,6 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from ..constraints.translational import Translational
 from ..plugins import (
     AXIS,
@@ -108,7 +106,7 @@ class TranslationalFriction(JointFriction, Force):
     def normal_load(x, f, par):
         """Eq. (1)."""
         _, turn, across, tilt = along_and_across(x, f)
-        return par[4] + across + par[5] * np.sqrt(turn * turn) + par[6] * tilt
+        return par[4] + across + par[5] * turn + par[6] * tilt
 
     @staticmethod
     def series(x, xd, par, k, s, out):

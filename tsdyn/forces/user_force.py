@@ -36,9 +36,7 @@ from ..plugins import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ..hints import ArrayLike, BodyLike, PointMass
+    from ..hints import ArrayLike, BodyLike, Callable, PointMass
 
 
 def _numbers(value, what, error):

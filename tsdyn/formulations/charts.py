@@ -15,12 +15,10 @@ from ..rows.interface import (
     factorise_chart_matrix,
     factorise_rows,
     has_redundant_rows,
-    is_raised,
     pivot_loss,
     rates_hold,
     redundant_rows_hold,
     rotate_rate,
-    selection_serves,
 )
 from .tolerances import CONTRACTION_LIMIT, FARTHEST, NO_SIZE, SAME, TURN_SHARE
 
@@ -303,20 +301,12 @@ def set_base_point(graph, system, w, f, l, t, largest):
     largest is the largest coordinate that enters Phi, m, as the form has it.
     """
     regular = True
-    # H, Y and S of the last position solve serve, unless S is of another metric
-    same = l.state.placement > 0 and l.state.placement == w.counters.placements
-    if same and not is_raised(graph) and selection_serves(graph, f, f.rows):
-        copy(f.rows.H, l.rows0.H)
-        copy(f.rows.Y, l.rows0.Y)
-        copy(f.rows.S, l.rows0.S)
-        w.counters.kept += 1 if f.b.size > 0 else 0
-    else:
-        # H0, Y0 = W0 H0^T and S0 = H0 W0 H0^T
-        place_bodies(graph.bodies, w.q, f.poses)
-        evaluate_rows(graph, system, f, l.rows0, t)
-        if f.b.size > 0:
-            w.counters.factorizations += 1
-            regular = factorise_rows(graph, system, f, l.rows0, t, METRIC)
+    # H0, Y0 = W0 H0^T and S0 = H0 W0 H0^T
+    place_bodies(graph.bodies, w.q, f.poses)
+    evaluate_rows(graph, system, f, l.rows0, t)
+    if f.b.size > 0:
+        w.counters.factorizations += 1
+        regular = factorise_rows(graph, system, f, l.rows0, t, METRIC)
     # Base point (r0, p0), where d = 0
     for b in range(graph.bodies.shape[0]):
         at, o = b * POSE, 8 * b
@@ -329,7 +319,7 @@ def set_base_point(graph, system, w, f, l, t, largest):
     w.counters.charts += 1
     w.control.floor = ROUNDING * (w.control.size + largest)
     w.control.contraction, w.control.condition = 0.0, 1.0
-    l.state.time, l.state.factored, l.state.placement, l.state.made = t, 0, 0, 0
+    l.state.time, l.state.factored, l.state.made = t, 0, 0
     return regular
 
 

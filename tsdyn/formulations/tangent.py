@@ -44,7 +44,7 @@ from .charts import (
     write_back,
 )
 from .projection import largest_residual, velocity_floor
-from .tolerances import CONTRACTION_LOST, CURVATURE, RENEWALS, ROUNDED, SLOW, SLOW_FACTORS, STALLED, SWEEPS
+from .tolerances import CURVATURE, RENEWALS, ROUNDED, SLOW, SLOW_FACTORS, STALLED, SWEEPS
 
 # Error norms of the tangent form: errors ex, ey of chart coordinates as errors of q and qd, their root mean square over
 # atol + rtol times the larger end of the step.
@@ -445,7 +445,6 @@ def check_chart(c):
     """As `check`."""
     w, f, l = c.work, c.tangent, c.chart
     reason = reason_to_leave(c.graph, w, f, l)
-    l.state.placement = w.counters.placements if w.control.contraction < CONTRACTION_LOST else 0
     return reason if every_level_holds(c) else -UNHELD
 
 

@@ -19,9 +19,7 @@ from .run_data import intervals, quintic, ranges
 from .symbols import attached, joint_points
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..hints import ArrayLike, ItemLike, Solution
+    from ..hints import ArrayLike, ItemLike, Linearisation, Sequence, Solution
 
 # Quantities over time: energies, reactions, lengths of steps, condition of charts.
 
@@ -486,9 +484,6 @@ def _labelled(ax, solution, joint, kind):
 
 
 # Mode shapes: bodies and joints at rest, and displaced by each mode.
-
-if TYPE_CHECKING:
-    from ..hints import Linearisation
 
 SHOWN = 0.25  # largest displacement, per extent of the scene
 NO_EXTENT = 1.0  # m, of a scene that is a point

@@ -40,9 +40,7 @@ from .symbols import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..hints import Floats, Scene, Solution
+    from ..hints import Floats, Scene, Sequence, Solution
 
 # Frames of an animation: a run resampled at equal intervals of time.
 #

@@ -449,10 +449,7 @@ def _rolling_disc(each, r):
     tyre, whole = each.item.tyre_radius, each.item.radius + each.item.tyre_radius
     thick = max(2.0 * tyre, THIN * whole)
     spoke = ("box", np.array([0.5 * whole, 0, 0]), (whole, MARK * whole, 1.5 * thick))
-    return [
-        *_floor(each, r),
-        *_surface(each, "cylinder", along(each.places["axis_a"]), (whole, whole, thick), [spoke]),
-    ]
+    return [*_floor(each, r), *_surface(each, "cylinder", along(each.places["axis_a"]), (whole, whole, thick), [spoke])]
 
 
 def _rolling_ball(each, r):

@@ -25,9 +25,7 @@ from .run_data import FULL
 from .symbols import VIOLATED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from ..hints import Floats
+    from ..hints import Floats, Iterator, Sequence
 
 
 SCRIPTS = ("poses.js", "instances.js", "stage.js", "names.js", "player.js")
@@ -152,9 +150,7 @@ FLAT_FACE = 1e-9  # of a face's area, seen by the camera: below it is seen from 
 
 def _box():
     corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    return [
-        corners[[(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]],
-    ]
+    return [corners[[(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]]]
 
 
 def _ring(z, radius=1.0):

@@ -8,21 +8,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from ..errors import MissingDependency
-from . import drawn_shapes
-from .description import (
-    GROUND,
-    Coupling,
-    Description,
-    JointItem,
-    Link,
-    Servo,
-    TendonItem,
-    fresh,
-    of_body,
-    of_quaternion,
-    posed,
-    shifted,
-)
+from . import description, drawn_shapes
 from .xml_file import Node, Sources
 
 # Actuators and tendons of MJCF: servos with the control that MuJoCo starts with; springs, cables, ropes through sites.
@@ -74,7 +60,7 @@ def _add_actuator(mujoco, model, i, joints, names, report):
     if stiffness > 0.0:
         free, load = load / stiffness, 0.0
     joint.servos.append(
-        Servo(
+        description.Servo(
             f"{name} actuator" if name in joints else name, float(stiffness), float(damping), float(free), float(load)
         )
     )
@@ -113,7 +99,7 @@ def _add_tendon(mujoco, model, data, i, found, names, report):
     if acts and points and (pulls or low == high):
         kind = "cable" if pulls or len(points) > 2 else "spring"
         if len({link for link, _ in points}) > 1:
-            found.tendons.append(TendonItem(name, kind, points, high, stiffness, damping))
+            found.tendons.append(description.TendonItem(name, kind, points, high, stiffness, damping))
         if kind == "cable" and (damping or not pulls):
             report.note(f"{name}: a cable, which pulls only; MuJoCo's tendon damps and pushes where it would be slack")
     elif acts:
@@ -122,7 +108,7 @@ def _add_tendon(mujoco, model, data, i, found, names, report):
         low, high = map(float, model.tendon_range[i])
         report.leave("limits of a tendon", name, f"[{low:g}, {high:g}]")
         if len({link for link, _ in points}) > 1 and low <= 0.0 < high:
-            found.tendons.append(TendonItem(name, "limit", points, high))
+            found.tendons.append(description.TendonItem(name, "limit", points, high))
     if model.tendon_frictionloss[i]:
         report.leave("friction of a tendon", name)
     if getattr(model, "tendon_armature", np.zeros(i + 1))[i]:
@@ -148,7 +134,7 @@ def _sites(mujoco, model, data, i, names):
 
 def _place(model, data, site):
     """A site in the ground frame."""
-    return of_body(data, int(model.site_bodyid[site])).point(model.site_pos[site])
+    return description.of_body(data, int(model.site_bodyid[site])).point(model.site_pos[site])
 
 
 # Joints of MJCF: of a body with several, all but the last one carry a link without mass.
@@ -165,12 +151,14 @@ def add_joints(mujoco, model, data, found, names, report):
         if model.body_mocapid[i] >= 0:
             report.leave("body that is moved by hand (mocap), held", name)
         if not count:
-            found.joints.append(JointItem(f"{name} weld", "fixed", last, name))
+            found.joints.append(description.JointItem(f"{name} weld", "fixed", last, name))
         for j in range(first, first + count):
-            follower = name if j == first + count - 1 else fresh(f"{name}/{names.of('joint', j)}", found.links)
+            follower = (
+                name if j == first + count - 1 else description.fresh(f"{name}/{names.of('joint', j)}", found.links)
+            )
             if follower != name:
-                found.links[follower] = Link(follower, found.links[name].frame)
-            joint = JointItem(
+                found.links[follower] = description.Link(follower, found.links[name].frame)
+            joint = description.JointItem(
                 names.of("joint", j), kinds[int(model.jnt_type[j])], last, follower, data.xanchor[j].copy(),
                 data.xaxis[j].copy(),
             )  # fmt: skip
@@ -243,23 +231,23 @@ def _add_loop(mujoco, model, data, i, found, names, report):
     if int(model.eq_objtype[i]) == int(mujoco.mjtObj.mjOBJ_SITE):
         bodies = [int(model.site_bodyid[s]) for s in pair]
         frames = [
-            of_body(data, body) @ posed(model.site_pos[s], model.site_quat[s])
+            description.of_body(data, body) @ description.posed(model.site_pos[s], model.site_quat[s])
             for body, s in zip(bodies, pair, strict=True)
         ]
     else:
         bodies, numbers = pair, model.eq_data[i]
-        one, other = (of_body(data, body) for body in bodies)
+        one, other = (description.of_body(data, body) for body in bodies)
         if kind == int(mujoco.mjtEq.mjEQ_WELD):
-            frames = [one @ posed(numbers[3:6], numbers[6:10]), other @ shifted(numbers[0:3])]
+            frames = [one @ description.posed(numbers[3:6], numbers[6:10]), other @ description.shifted(numbers[0:3])]
         else:
-            frames = [frame @ shifted(numbers[k : k + 3]) for k, frame in ((0, one), (3, other))]
+            frames = [frame @ description.shifted(numbers[k : k + 3]) for k, frame in ((0, one), (3, other))]
     weld = kind == int(mujoco.mjtEq.mjEQ_WELD)
     if weld and not model.eq_data[i, 10]:
         weld = False
         report.note(f"{name}: a weld without torque holds a point")
     links = [names.body(body) for body in bodies]
     found.joints.append(
-        JointItem(
+        description.JointItem(
             name, "fixed" if weld else "spherical", *links, loop=True, frame_a=frames[0], frame_b=frames[1]
         )
     )  # fmt: skip
@@ -279,7 +267,7 @@ def _add_coupling(model, i, found, names, report):
 def _hold(found, name, held, at, report):
     """A joint that is held at its start becomes fixed; elsewhere it depends on nothing."""
     if at:
-        found.couplings.append(Coupling(name, (held, 0), (), (), at))
+        found.couplings.append(description.Coupling(name, (held, 0), (), (), at))
     else:
         next(joint for joint in found.joints if joint.name == held).kind = "fixed"
         report.note(f"{name}: the joint {held} is held")
@@ -290,7 +278,7 @@ def _follow(found, name, follower, driver, a, report):
     """A joint that follows the polynomial a_0 + a_1 q + ... of another one."""
     polynomial = np.trim_zeros(a, "b").tolist() if a[2:].any() else ()
     found.couplings.append(
-        Coupling(name, (follower, 0), ((driver, 0),), (float(a[1]),), float(a[0]), tuple(polynomial))
+        description.Coupling(name, (follower, 0), ((driver, 0),), (float(a[1]),), float(a[0]), tuple(polynomial))
     )
     _note_offset(name, float(a[0]), report)
 
@@ -307,7 +295,7 @@ def _add_tendon_coupling(mujoco, model, data, i, found, names, report):
     points = _sites(mujoco, model, data, tendon, names)
     if points and int(model.eq_obj2id[i]) < 0:
         length = float(model.tendon_length0[tendon] + a[0])
-        found.tendons.append(TendonItem(name, "rope", points, length))
+        found.tendons.append(description.TendonItem(name, "rope", points, length))
         _note_offset(name, float(a[0]), report)
         return
     one, other = (_coefficients(mujoco, model, int(t[i]), names) for t in (model.eq_obj1id, model.eq_obj2id))
@@ -334,7 +322,7 @@ def _add_tendon_coupling(mujoco, model, data, i, found, names, report):
         _hold(found, name, follower, offset, report)
         return
     drivers, ratios = tuple((joint, 0) for joint in drivers), tuple(float(c) for c in drivers.values())
-    found.couplings.append(Coupling(name, (follower, 0), drivers, ratios, offset))
+    found.couplings.append(description.Coupling(name, (follower, 0), drivers, ratios, offset))
     _note_offset(name, offset, report)
 
 
@@ -429,12 +417,12 @@ def describe(root, path, report, outside):
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
     names = Names(mujoco, model)
-    found = Description(root.get("model") or "mujoco", gravity=_gravity(mujoco, model))
+    found = description.Description(root.get("model") or "mujoco", gravity=_gravity(mujoco, model))
     for i in range(1, model.nbody):
         found.links[names.body(i)] = _link(model, data, i, names)
     add_joints(mujoco, model, data, found, names, report)
     for i in range(model.nsite):
-        at = posed(model.site_pos[i], model.site_quat[i])
+        at = description.posed(model.site_pos[i], model.site_quat[i])
         found.frames[names.of("site", i)] = names.body(int(model.site_bodyid[i])), at
     add_forces(mujoco, model, data, found, names, report)
     add_loops(mujoco, model, data, found, names, report)
@@ -470,12 +458,12 @@ class Names:
             code = getattr(self._kinds, f"mjOBJ_{kind.upper()}")
             given = [self._find(self.model, code, i) for i in range(getattr(self.model, COUNTS[kind]))]
             taken = set(given)
-            self._made[kind] = [name or fresh(f"{kind}{i}", taken) for i, name in enumerate(given)]
+            self._made[kind] = [name or description.fresh(f"{kind}{i}", taken) for i, name in enumerate(given)]
         return self._made[kind][i]
 
     def body(self, i):
         """The name of a body, empty for the world."""
-        return self.of("body", i) if i > 0 else GROUND
+        return self.of("body", i) if i > 0 else description.GROUND
 
 
 @contextmanager
@@ -512,10 +500,12 @@ def _gravity(mujoco, model):
 
 def _link(model, data, i, names):
     """A body at qpos0; its inertia is given about principal axes."""
-    R = of_quaternion(model.body_iquat[i])
+    R = description.of_quaternion(model.body_iquat[i])
     inertia = R @ np.diag(model.body_inertia[i]) @ R.T
     inertia = (inertia + inertia.T) / 2.0
-    return Link(names.body(i), of_body(data, i), float(model.body_mass[i]), model.body_ipos[i].copy(), inertia)
+    return description.Link(
+        names.body(i), description.of_body(data, i), float(model.body_mass[i]), model.body_ipos[i].copy(), inertia
+    )
 
 
 # Elements and attributes of MJCF that are carried over, or listed by name; all others are listed by their lines.

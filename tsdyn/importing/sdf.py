@@ -3,18 +3,7 @@
 import numpy as np
 
 from ..maths.tolerances import TYPED
-from .description import (
-    GROUND,
-    HERE,
-    Coupling,
-    Description,
-    Frame,
-    JointItem,
-    Link,
-    fresh,
-    of_quaternion,
-    roll_pitch_yaw,
-)
+from . import description
 from .drawn_shapes import add_sdf_shapes
 from .reduction import read_loops
 
@@ -61,14 +50,14 @@ class Frames:
         if child is None or not child.text:
             if child is not None:
                 _ = child.get("frame"), child.get("relative_to")
-            return HERE
+            return description.HERE
         _ = child.get("frame"), child.get("relative_to")
         degrees = (child.get("degrees") or "").lower() in ("1", "true")
         if child.get("rotation_format") == "quat_xyzw":
             values = child.numbers(child.text, 7, [0, 0, 0, 0, 0, 0, 1], "<pose>")
-            return Frame(values[:3], of_quaternion(np.roll(values[3:], 1)))
+            return description.Frame(values[:3], description.of_quaternion(np.roll(values[3:], 1)))
         values = child.numbers(child.text, 6, np.zeros(6), "<pose>")
-        return Frame(values[:3], roll_pitch_yaw(values[3:], degrees=degrees))
+        return description.Frame(values[:3], description.roll_pitch_yaw(values[3:], degrees=degrees))
 
     def resolve(self, name, node=None):
         """A frame, by name, in the ground frame."""
@@ -76,13 +65,13 @@ class Frames:
         waiting, at = {}, None
         while at is None and (at := self._at.get(name)) is None:
             if name in ("world", ""):
-                at = HERE
+                at = description.HERE
             elif name not in self._known and "::" in name:
                 at = self._inner(name, node)
             elif name not in self._known or name in waiting:
                 what = "there is no frame" if name not in self._known else "poses form a circle at"
                 (node or self.node).wrong(f"{what} {name!r}.")
-                at = HERE
+                at = description.HERE
             else:
                 node = waiting[name] = self._known[name]
                 child = node.one("pose")
@@ -94,7 +83,7 @@ class Frames:
 
     def _inner(self, name, node):
         (node or self.node).wrong(f"the frame {name!r} of an inner model can't be referred to; give the pose itself.")
-        return HERE
+        return description.HERE
 
     def link_of(self, name):
         """The link that a frame is attached to; the name itself where it is none."""
@@ -144,7 +133,7 @@ def add_joints(found, model, frames, names, prefix, report):
         if ends[0] == ends[1]:
             node.wrong(f"joint {name!r} joins {ends[0]!r} to itself.")
             continue
-        _add(found, node, JointItem(name, KINDS[kind], *ends), frames, report)
+        _add(found, node, description.JointItem(name, KINDS[kind], *ends), frames, report)
 
 
 def _end(node, tag, frames, names):
@@ -152,7 +141,7 @@ def _end(node, tag, frames, names):
     child = node.one(tag)
     name = "" if child is None else frames.link_of(child.text)
     if name == "world":
-        return GROUND
+        return description.GROUND
     if name not in names:
         (child or node).wrong(f"joint {node.get('name')!r}: there is no link {name!r} for <{tag}>.")
         return None
@@ -183,12 +172,12 @@ def _add(found, node, joint, frames, report):
 
 def _two_hinges(found, joint):
     """Axes that aren't perpendicular: two hinges, with a link without mass between them."""
-    between = fresh(f"{joint.name}/1", found.links)
+    between = description.fresh(f"{joint.name}/1", found.links)
     frame = found.frame_of(joint.b)
-    found.links[between] = Link(between, frame)
+    found.links[between] = description.Link(between, frame)
     found.joints += [
-        JointItem(joint.name, "revolute", joint.a, between, joint.point, joint.axis),
-        JointItem(f"{joint.name} 2", "revolute", between, joint.b, joint.point, joint.axis_b),
+        description.JointItem(joint.name, "revolute", joint.a, between, joint.point, joint.axis),
+        description.JointItem(f"{joint.name} 2", "revolute", between, joint.b, joint.point, joint.axis_b),
     ]
 
 
@@ -245,7 +234,7 @@ def _mimic(found, axis, joint, tag, report):
     prefix = joint.name[: joint.name.rfind("::") + 2] if "::" in joint.name else ""
     name, offset = f"{joint.name} mimics {leader}", offset - ratio * reference
     follower = (joint.name, int(tag == "axis2"))
-    found.couplings.append(Coupling(name, follower, ((prefix + leader, index),), (ratio,), offset))
+    found.couplings.append(description.Coupling(name, follower, ((prefix + leader, index),), (ratio,), offset))
     if offset:
         report.note(f"{name}: it starts {offset:g} off; scene.assemble() takes it there")
 
@@ -270,7 +259,7 @@ def describe(root, outside, report):
     root.get("version")
     worlds = root.all("world")
     models = [*root.all("model"), *(model for world in worlds for model in world.all("model"))]
-    found = Description(models[0].get("name") or "model" if models else "model")
+    found = description.Description(models[0].get("name") or "model" if models else "model")
     for world in worlds[:1]:
         world.get("name")
         physics = world.one("physics")
@@ -282,7 +271,7 @@ def describe(root, outside, report):
         root.wrong("<sdf> has no <model>.")
     for model in models:
         prefix = f"{model.get('name')}::" if len(models) > 1 else ""
-        _add_model(found, model, HERE, prefix, outside, report)
+        _add_model(found, model, description.HERE, prefix, outside, report)
     report.leave_unread(root)
     return found
 
@@ -309,13 +298,15 @@ def _add_model(found, model, outer, prefix, outside, report):
     add_joints(found, model, frames, names, prefix, report)
     read_loops(found, model, names)
     if static:
-        found.joints += [JointItem(f"{name} static", "fixed", GROUND, name) for name in names.values()]
+        found.joints += [
+            description.JointItem(f"{name} static", "fixed", description.GROUND, name) for name in names.values()
+        ]
     return names
 
 
 def _link(node, name, frames, outside, report):
     """A link at the start."""
-    link = Link(name, frames.resolve(node.get("name")), line=node.line)
+    link = description.Link(name, frames.resolve(node.get("name")), line=node.line)
     inertial = node.one("inertial")
     if inertial is None:
         link.mass, link.inertia = 1.0, np.eye(3)  # what the specification says

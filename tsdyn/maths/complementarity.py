@@ -138,7 +138,7 @@ class _Rows:
 OPEN, STICKS, SLIDES = 0, 1, 2
 
 
-def solve_cone(G, b, mu, slip=None, given=None, bounds=()):
+def solve_cone(G, b, mu, slip=None, given=None, bounds=(), rounding=0.0):
     """Solve for contacts with Coulomb friction.
 
     Parameters
@@ -153,6 +153,8 @@ def solve_cone(G, b, mu, slip=None, given=None, bounds=()):
         Normal parts beside N, of which b has the effect already: |T| <= mu (N + given).
     bounds : sequence of float
         Of forces (3,) that follow those of the contacts, of friction alone: |p| <= bound.
+    rounding : float
+        Of b, where it is a difference of larger numbers: dependent rows may disagree by it.
 
     Returns
     -------
@@ -171,7 +173,8 @@ def solve_cone(G, b, mu, slip=None, given=None, bounds=()):
     if size == 0.0:
         return np.zeros(3 * k), np.full(k, OPEN)
     given = np.append(np.zeros(k - others) if given is None else given, bounds) / (scale[::3] * size)
-    problem = _Problem(G * scale[:, None] * scale, b * scale / size, mu, slip, given, others)
+    rounding *= scale.max() / size
+    problem = _Problem(G * scale[:, None] * scale, b * scale / size, mu, slip, given, others, rounding)
     p = np.zeros(3 * k)
     with np.errstate(over="ignore", invalid="ignore"):  # where there is no solution
         for left, counts in ((0.0, CONE_SWEEPS), (CONE_LEFT, CONE_SWEEPS[:1]), (CONE_SLIP, CONE_SWEEPS[:1])):
@@ -254,8 +257,8 @@ CONES = _images, _sweep, _slope
 class _Problem:
     """One problem in scaled units; arguments as of `solve_cone`."""
 
-    def __init__(self, G, b, mu, slip, given, others):
-        self.G, self.b, self.mu, self.given = G, b, mu, given
+    def __init__(self, G, b, mu, slip, given, others, rounding):
+        self.G, self.b, self.mu, self.given, self.rounding = G, b, mu, given, rounding
         known, self.balls = np.zeros(mu.size, bool), np.arange(mu.size) >= mu.size - others
         if slip is not None:
             known[: len(slip)] = np.isfinite(slip).all(axis=1)
@@ -286,7 +289,7 @@ class _Problem:
     def newton(self, p, factor, left):
         """A solution from a start; None where the method stalls with more than `left` of its terms.
 
-        In normal directions CONE_LEFT is left at most.
+        In normal directions CONE_LEFT is left at most, beside rounding.
         """
         F, y = self.residual(p, factor)
         eye, best, stalled = np.eye(p.size), np.inf, 0
@@ -301,7 +304,8 @@ class _Problem:
             if size <= best:
                 best, normal, nearest = size, np.abs(F[::3]).max(), self.image(y).ravel()
             if stalled > CONE_STALLED:  # b of rows that depend on each other may disagree by rounding
-                return nearest if best <= left * terms and normal <= CONE_LEFT * terms else None
+                most = (max(share * terms, self.rounding) for share in (left, CONE_LEFT))
+                return nearest if all(x <= y for x, y in zip((best, normal), most, strict=True)) else None
             step = np.linalg.lstsq(eye - self.slope(y) @ (eye - factor * self.G), -F, rcond=RANK_TOL**2)[0]
             share = 1.0
             while True:

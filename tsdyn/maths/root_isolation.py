@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from ..jit.kernels import entry, kernel
+from ..jit.kernels import data_of, entry, kernel, matrix
 from . import tolerances as limits
 from .tolerances import CLEAR, EPS, MOST_BISECTIONS, TIGHT, UNDERFLOWING
 
@@ -116,16 +116,55 @@ def _refined(degree, a, b, samples, sample):
     return times, finer
 
 
+LOWEST = 2  # degree, of kernels
+
+
+class KernelTable(NamedTuple):
+    """What kernels take of a `ChebyshevTable`."""
+
+    values: np.ndarray
+    errors: np.ndarray
+    widened: np.ndarray
+    fine: np.ndarray
+    points: np.ndarray
+
+
+@cache
+def kernel_tables():
+    """The numbers of the `KernelTable` of every degree that is a power of two, from LOWEST to LARGEST."""
+    degrees = [LOWEST << i for i in range((LARGEST // LOWEST).bit_length())]
+    parts = [getattr(table(N), name) for N in degrees for name in KernelTable._fields]
+    return np.concatenate([part.ravel() for part in parts])
+
+
+@kernel
+def kernel_table(numbers, N):
+    """The `KernelTable` of degree N."""
+    at, n = 0, LOWEST
+    while n < N:
+        at += (n + 2) * (FINE * n + 1 + n // 2 + 1 + n + 1 + 1) + FINE * n + 1
+        n *= 2
+    fine, width = FINE * N + 1, N + 2
+    values = matrix(data_of(numbers[at:]), fine, width)
+    at += fine * width
+    errors = matrix(data_of(numbers[at:]), N // 2 + 1, width)
+    at += (N // 2 + 1) * width
+    widened = matrix(data_of(numbers[at:]), N + 1, width)
+    at += (N + 1) * width
+    return KernelTable(values, errors, widened, numbers[at : at + fine], numbers[at + fine : at + fine + width])
+
+
 # Several functions at once: most have no zero on an interval, and need no search.
 #
-# A function is clear of zero at a point of the fine grid if its value exceeds the second difference there, by which it
-# may bend between points, and the error of the interpolant.
+# A function is clear of zero at a point of the fine grid if its value exceeds a quarter of the second difference there,
+# more than it bends between points (an eighth), and the error of the interpolant. It falls between two points that
+# differ by more than half of the second difference, by which its slope varies there.
 
 
 @kernel
 def _bend(fine, k):
     i = min(max(k, 1), fine.size - 2)
-    return abs(fine[i + 1] - 2.0 * fine[i] + fine[i - 1])
+    return 0.25 * abs(fine[i + 1] - 2.0 * fine[i] + fine[i - 1])
 
 
 @kernel
@@ -157,9 +196,9 @@ def _look_at(values, errors, samples, j, noise, fine):
     return max(CLEAR * off, noise) if resolved and scale >= UNDERFLOWING else math.inf
 
 
-@entry("mmmvmvmm")
-def _look(values, errors, series, grid, samples, noise, scratch, out):  # eight: a table, and what is looked at
-    """out (m, 4): since, until, roots and slopes of a `Survey`, on [-1, 1].
+@kernel
+def look(values, errors, series, grid, samples, noise, a, b, scratch, out):  # ten: a table, and what is looked at
+    """out (m, 4): since, until, roots and slopes of a `Survey` on [a, b]; scratch (2, points of the grid).
 
     Return 1 if all are resolved, 0 if not, -1 where one is no number.
     """
@@ -177,8 +216,8 @@ def _look(values, errors, series, grid, samples, noise, scratch, out):  # eight:
             out[j, 0] = math.inf
             continue
         out[j, 0] = grid[max(k - 1, 0)]
-        # It falls from point to point by more than it bends
-        while 0 < k < fine.size and sign * (fine[k - 1] - fine[k]) > max(_bend(fine, k - 1), _bend(fine, k)):
+        # It falls from point to point
+        while 0 < k < fine.size and sign * (fine[k - 1] - fine[k]) > 2.0 * max(_bend(fine, k - 1), _bend(fine, k)):
             if sign * fine[k] < -_bend(fine, k) - margin:
                 out[j, 1] = grid[k]
                 break
@@ -189,7 +228,19 @@ def _look(values, errors, series, grid, samples, noise, scratch, out):  # eight:
                 for i in range(samples.shape[0]):
                     c[n] += series[n, i] * samples[i, j]
             out[j, 2], out[j, 3] = _cross(c, out[j, 0], out[j, 1])
+    # Times within [a, b], slopes by them
+    half = 0.5 * (b - a)
+    for j in range(samples.shape[1]):
+        for i in range(3):
+            out[j, i] = a + half * (out[j, i] + 1.0)
+        out[j, 3] /= half
     return found
+
+
+@entry("mmmvmvddmm")
+def _look(values, errors, series, grid, samples, noise, a, b, scratch, out):  # ten: as of `look`
+    """As `look`."""
+    return look(values, errors, series, grid, samples, noise, a, b, scratch, out)
 
 
 @kernel
@@ -263,13 +314,10 @@ def survey(sample, a, first, b, degree, noise):
         grid, out = table(degree), np.zeros((first.size, 4))
         scratch = np.empty((2, grid.fine.size))
         known = grid.values, grid.errors, grid.widened, grid.fine
-        if _look(*known, samples, noise, scratch, out) != 0 or degree == LARGEST:
+        if _look(*known, samples, noise, a, b, scratch, out) != 0 or degree == LARGEST:
             break
         degree *= 2
         _, samples = _refined(degree, a, b, samples, sample)
-    half = 0.5 * (b - a)
-    out[:, :3] = a + half * (out[:, :3] + 1.0)
-    out[:, 3] /= half
     return Survey(a, b, degree, samples, *out.T.tolist())
 
 

@@ -28,9 +28,7 @@ from ..validation import floats, positive, shown, unknown_name, whole
 from .tolerances import ENOUGH, REFERENCE_TOLERANCES, ROOM
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ..hints import ArrayLike, Formulation, Methods, Solution, Span
+    from ..hints import ArrayLike, Callable, Formulation, Methods, Sequence, Solution, Span
 
 # Reference solution of a scene: two unrelated methods, refined until they agree as far as they can.
 

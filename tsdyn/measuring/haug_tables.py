@@ -174,11 +174,7 @@ def _row(experiment, build, formulation, tolerance):
 
 def _simulate(scene, formulation, step, tolerance, duration):
     return simulate(
-        scene,
-        (0.0, duration),
-        integrator=Nystrom4(step=step),
-        formulation=formulation,
-        constraint_tol=tolerance,
+        scene, (0.0, duration), integrator=Nystrom4(step=step), formulation=formulation, constraint_tol=tolerance
     ).raise_if_failed()
 
 

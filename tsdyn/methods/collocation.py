@@ -18,9 +18,7 @@ from .interpolants import FILL, VALUE, Interpolant
 from .tableau import demand, quadrature
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..hints import Floats
+    from ..hints import Floats, Sequence
 
 
 # Collocation methods for stiff scenes: their nodes, and the numbers that the step kernel reads.

@@ -19,9 +19,7 @@ from .interpolants import HERMITE, HERMITE_FIRST_ORDER, hermite_second
 from .tableau import ImplicitTableau, NystromTableau, RungeKuttaTableau
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from ..hints import StepKernel
+    from ..hints import Mapping, StepKernel
 
 _registry = {}
 

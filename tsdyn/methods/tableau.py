@@ -14,9 +14,7 @@ from ..maths.tolerances import SUM_ROUNDING
 from ..validation import floats, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..hints import Floats
+    from ..hints import Floats, Sequence
 
 
 def _numbers(values, count, said):
@@ -209,10 +207,7 @@ class NystromTableau:
         demand(what, **{"sum a = c": a @ ones - c, **quadrature(b, c, self.order)})
         demand(what, **{"bbar 1 = 1/2": bbar @ ones - 1 / 2}, **_trees(a, b, c, min(self.order, 4)))
         if self.order >= 3:
-            demand(
-                what,
-                **{"b abar 1 = 1/6": b @ abar @ ones - 1 / 6, "bbar c = 1/6": bbar @ c - 1 / 6},
-            )
+            demand(what, **{"b abar 1 = 1/6": b @ abar @ ones - 1 / 6, "bbar c = 1/6": bbar @ c - 1 / 6})
         if self.order >= 4:
             demand(
                 what,

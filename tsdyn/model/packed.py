@@ -111,11 +111,12 @@ class Derived:
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts
     engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine
-    levers: object = None  # (bodies,), m: local_origin.within_rounding, and the start last found near the origin:
-    near: object = None
+    levers: object = None  # (bodies,), m: inertia_rows.levers
+    near: object = None  # the start last found near the origin: local_origin.within_rounding
     grounded: tuple = None  # local_origin.origin_of, and for the start last seen:
     origin: tuple = (None, None)
     local: tuple = None  # the scene from an origin of its own: local_origin
+    masks: dict = field(default_factory=dict)  # of primitives, by id, also of the scene of a phase: taylor.layout.masks
     family: object = None  # a parameters.family.Family: variants.family_of
     shared: dict = None  # of a family: what numbers don't change, by the functions that find it; None for one scene
 
@@ -165,7 +166,9 @@ def has_lengths(primitive):
 
 def size_of(primitives, coordinates):
     """Size of a scene: the largest number among the coordinates of markers; of a small one, the largest length, m."""
-    return size_of_reaches([reaches_of(*pair) for pair in zip(primitives, coordinates, strict=True)])
+    largest = np.abs(np.array([s for places in coordinates for s in places]).reshape(-1, 3)).max(axis=1)
+    codes = np.array([marker.code for primitive in primitives for marker in primitive.markers], int)
+    return _size(float(largest[codes == POINT].max(initial=0.0)), float(largest.max(initial=0.0)))
 
 
 def reaches_of(primitive, places):
@@ -177,7 +180,11 @@ def reaches_of(primitive, places):
 def size_of_reaches(reaches):
     """The same as `size_of`, from those of each primitive."""
     length = max((each[0] for each in reaches), default=0.0)
-    return length if is_small(length) else max((each[1] for each in reaches), default=0.0)
+    return _size(length, max((each[1] for each in reaches), default=0.0))
+
+
+def _size(length, whole):
+    return length if is_small(length) else whole
 
 
 # Forces packed for the kernels: one row a kind; indices and parameters of each instance in shared arrays.
@@ -483,10 +490,11 @@ def _found_again(process, *parts):
 
 
 @CollectionsDeferred()
-def pack(scene, handles=None):
+def pack(scene, handles=None, whole=None):
     """Pack a scene; loads (at the very first use compiles) the kernels of the kinds it uses.
 
-    handles: `Handles` to look its parts up by, where they are not its own.
+    handles: `Handles` to look its parts up by, where they are not its own. whole: a `Packed` that has some of its
+    primitives as they are now.
 
     Raises
     ------
@@ -496,7 +504,8 @@ def pack(scene, handles=None):
     starts = np.cumsum([0, *(body.dimension for body in scene.bodies)])
     where = {id(body): (int(at), body.dimension) for at, body in zip(starts, scene.bodies, strict=False)}
     primitives = scene.primitives
-    parameters = {constraint: checked_motions(constraint) for constraint in primitives}
+    known = {} if whole is None else dict(zip(map(id, whole.constraints), whole.parameters, strict=True))
+    parameters = {each: known[id(each)] if id(each) in known else checked_motions(each) for each in primitives}
     table, reals = [], []
     kinds, motions, kept, functions = _pack_constraints(parameters, int(starts[-1]), where, table, reals)
     members, derived = tuple(_members(scene.constraints)), Derived(handles=handles)
@@ -507,7 +516,7 @@ def pack(scene, handles=None):
     forces, signals, memory, normals, loads = pack_forces(scene.forces, where, table, reals, derived.handles)
     added = [force.inertia_row for force in scene.forces if force.adds_inertia]
     inertia_kinds, *_ = _pack_constraints({row: row.parameters() for row in added}, 0, where, table, reals)
-    inertias = records(ConstraintKind, inertia_kinds)
+    kinds, inertias = records(ConstraintKind, kinds), records(ConstraintKind, inertia_kinds)
     for kind in inertias:
         _shorten(table, kind)
     _append_programs(motions, reals)
@@ -524,11 +533,11 @@ def pack(scene, handles=None):
         mass=np.array([body.values["mass"] for body in scene.bodies]),
         inertia=np.array(moments).reshape(-1, 9),
         gravity=np.array(scene.gravity),  # writable, as all arrays here: what is read-only is another type to a kernel
-        kinds=records(ConstraintKind, kinds),
+        kinds=kinds,
         table=np.array(table, np.int64),
         reals=np.array(reals),
         motions=records(MotionPlace, [row for row, _ in motions]),
-        rheonomic=np.array([any(constraint.rheonomic for constraint in primitives)], np.int64),
+        rheonomic=np.array([(kinds["phi_t"] != 0).any()], np.int64),
         segments=np.array(_segments(primitives, where), np.int64).reshape(-1, 4),
         sums=np.array([row for part, row in first_rows(primitives) if part.summed and part.all_rows], np.int64),
         tails=np.array([row for part, row in first_rows(primitives) if not part.all_rows], np.int64),
@@ -617,7 +626,8 @@ def _pack_constraints(parameters, n, where, table, reals):
 
 def _append_reals(constraint, parameters, reals, motions, functions):
     """Append where the markers are, then the parameters; three places for a Motion, whose row joins `motions`."""
-    reals += np.concatenate(constraint.coordinates).tolist()
+    for place in constraint.coordinates:
+        reals += place.tolist()
     begin = len(reals)
     for value in parameters:
         if isinstance(value, CoordinateFunction):
@@ -686,10 +696,10 @@ def _address(kind, name):
 
 
 def _places(constraint, row, n, where):
-    """Fill the table entry of one instance; the ground has dimension 0 and no place."""
-    entry = np.zeros(INTS, np.int64)
+    """The table entry of one instance; the ground has dimension 0 and no place."""
+    entry = [0] * INTS
     for i, body in enumerate((constraint.a, constraint.b)):
         at, dimension = where.get(id(body), (0, 0))
         entry[AT + i], entry[DIMENSION + i], entry[BLOCK + i] = at, dimension, row * n + at
     entry[ROW], entry[STRIDE] = row, n
-    return entry.tolist()
+    return entry

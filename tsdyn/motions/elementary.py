@@ -25,10 +25,9 @@ from .tables import Table, is_data, pieces_of
 # run, independently.
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from typing import TypeAlias
 
-    from ..hints import ArrayLike, Floats, Value
+    from ..hints import ArrayLike, Callable, Data, Floats, Value
 
     Operator: TypeAlias = Callable[["Smooth", "Smooth | float"], "Smooth"]
 
@@ -279,10 +278,6 @@ FUNCTIONS = {
     "negative": lambda x: -x,
     "positive": lambda x: x,
 }
-
-
-if TYPE_CHECKING:
-    from ..hints import ArrayLike, Data
 
 
 class Polynomial(Smooth):

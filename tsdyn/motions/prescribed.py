@@ -22,9 +22,7 @@ from .tolerances import QUOTIENT_ERROR, QUOTIENT_STEPS, SAME_VALUE, TIMES
 from .tracing import Untraceable, of_time, retold
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from ..hints import Data, Floats, Prescribed, TimeFunction
+    from ..hints import Callable, Data, Floats, Iterable, Prescribed, TimeFunction
 
 SIGNATURE = "d"
 UNNAMED = "motion"

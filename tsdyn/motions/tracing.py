@@ -241,13 +241,7 @@ class _Module:
         return getattr(self._module, name)
 
 
-_NUMPY = _Module(
-    np,
-    zeros=_filled(0.0),
-    empty=_filled(0.0),
-    ones=_filled(1.0),
-    linalg=_Module(np.linalg, norm=_norm),
-)
+_NUMPY = _Module(np, zeros=_filled(0.0), empty=_filled(0.0), ones=_filled(1.0), linalg=_Module(np.linalg, norm=_norm))
 _SAME = ("sin", "cos", "tan", "exp", "log", "log10", "sqrt", "sinh", "cosh", "tanh", "hypot", "pi", "e", "tau")
 _MATH = SimpleNamespace(
     **{name: getattr(np if hasattr(np, name) else math, name) for name in _SAME},

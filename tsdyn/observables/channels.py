@@ -25,9 +25,7 @@ from .reactions import loads_of, member
 from .state import State
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from ..hints import Floats, Packed
+    from ..hints import Callable, Floats, Packed, Sequence
 
 AXES = (".x", ".y", ".z")
 PARAMETERS = (".e0", ".e1", ".e2", ".e3")

@@ -1,5 +1,7 @@
 """The constraint graph of a scene and its construction: rows, bodies, products, split hubs; the metric of lengths."""
 
+from functools import cache
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -352,7 +354,8 @@ class _GraphBuilder:
         self._find_nodes()
         self._cut_hubs()
         self._find_lean_bodies()
-        self.starts, self.pattern, self.where = analyse(self.sizes, self.cliques, len(self.held))
+        self.starts, self.pattern, where = analyse(self.sizes, self.cliques, len(self.held))
+        self.where = cache(where)
         self._place_rows()
 
     def _find_joints(self, omitted):
@@ -437,15 +440,15 @@ class _GraphBuilder:
         """Columns of ConstraintGraph.products, as far as two lists of joints and their sides say them."""
         (i, side), (j, other) = rows[0], columns[0]
         (node, r), (other_node, c) = self.inside[i], self.inside[j]
-        rows, columns = (sum(self.counts[one] for one, _ in run) for run in (rows, columns))
+        rows, columns = (sum([self.counts[one] for one, _ in run]) for run in (rows, columns))
         target, stride, _ = self.where(node, other_node)
         left, right = 16 * self.pairs[i] + 8 * side, 16 * self.pairs[j] + 8 * other
         return left, rows, right, columns, target + r * stride + c, stride
 
     def _products(self):
-        heads = [i for i, joint in enumerate(self.joints) if joint.constraint.all_rows]
-        products = [(*self._product([(i, 0)], [(i, 0)]), 1) for i in heads]
-        products += [(*self._product([(i, 0)], [(i, 0)]), 2) for i in range(len(self.joints)) if i not in heads]
+        kinds = [1 if joint.constraint.all_rows else 2 for joint in self.joints]
+        products = [(*self._product([(i, 0)], [(i, 0)]), kind) for i, kind in enumerate(kinds)]
+        products.sort(key=itemgetter(-1))  # later terms of sums add to what is there
         for found in self.at_body:
             runs = self._runs(found)
             # Of each joint with the rest of its run

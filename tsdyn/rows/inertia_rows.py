@@ -103,7 +103,13 @@ def _carriers(packed, light):
 
 
 def levers(packed):
-    """The largest distance of a constraint's point from each body's centroid."""
+    """The largest distance of a constraint's point from each body's centroid, (bodies,), m; found once."""
+    if packed.derived.levers is None:
+        packed.derived.levers = _levers(packed)
+    return packed.derived.levers
+
+
+def _levers(packed):
     bodies, far = {id(body): i for i, body in enumerate(packed.bodies)}, np.zeros(len(packed.bodies))
     for constraint, coordinates in zip(packed.constraints, packed.coordinates, strict=True):
         for marker, s in zip(constraint.markers, coordinates, strict=True):

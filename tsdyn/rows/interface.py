@@ -56,7 +56,6 @@ from .row_selection import (
     redundant_rows_hold,
     refinements,
     select_rows,
-    selection_serves,
     self_stress,
     singularity_indicator,
     with_reselection,

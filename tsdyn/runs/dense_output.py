@@ -6,11 +6,12 @@ import numpy as np
 
 from ..errors import Status
 from ..formulations.tolerances import CONTRACTION_LOST
-from ..jit.kernels import caller, entry, kernel, long_kernel, resident
+from ..jit.kernels import callback, caller, entry, kernel, long_kernel, matrix, resident, vector
 from ..maths.dense_linalg import copy, is_finite
 from ..methods.explicit import call_accelerate, call_normal, call_place
 from ..methods.interpolants import call_fill, call_value, cubic
 from ..model.joint_turns import angle_after
+from ..model.laws import interrupts_answered
 from ..observables.tolerances import KEPT_FLOATS
 from ..rows.interface import take_noted_selection
 from ..workspaces import B_CHART, B_DATA, B_END, B_H, B_START, MIXED, STORED, arrays_of, load, load_run
@@ -213,39 +214,65 @@ def put_state(w, out):
     copy(w.qdd, out[2])
 
 
-READ = "ppvwmmm", np.zeros((0, 0, 0))  # types of the arguments of readers
+READ = "ppipdipdiip"  # types of the arguments of readers
+SAME_STEP, SAME_CHART, OTHER_CHART = 0, 1, 2  # where a time is, beside the one before
+call_read = caller(READ)
 
 
-@entry(*READ)
-def read(context, run, t, rows, blocks, charts, points, out):
-    """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows]. Status.
+@callback(READ)
+def read(context, run, size, block, begun, width, point, t, place, whole, out):  # eleven: a step, what is asked of it
+    """out (3, n): q, qd, qdd at t within the step of a block of this size. Status.
+
+    begun, point: the time of its chart, and what `RunLog.points` has of it, of this width. place: where t is, beside
+    the time before. whole: whether accelerations are asked for; else they may be missing.
 
     Every time starts from its chart's q0, so that it gives the same numbers whatever was asked for before it.
     """
     c, r = load(context), load_run(run)
-    w, chart = c.work, -1
-    for i in range(t.size):
-        # Every time begins at the same state of its chart
-        block = blocks[rows[i]]
-        recall(c.system, block)  # rows that hold frictions depend on it
-        if int(block[B_CHART]) == chart:
-            bring_back(c, r.warm)
-        else:
-            # A new chart: rebuilt at q0 with its selection of rows
-            chart = int(block[B_CHART])
-            copy(points[chart, : w.q.size], w.q)
-            take_noted_selection(c.tangent, points[chart, w.q.size :])
-            c.tangent.friction.lam[:] = 0.0
-            c.tangent.friction.load[:] = 0.0
-            status = call_chart(r.kernels.start_chart, context, charts[chart, 0], r.xs, r.ys, r.yds, r.dx)
-            if status != 0:
-                return status
-            keep(c, r.warm)
-        # The state at t
-        status = between(context, c, r, t[i], block)
+    w, n, step = c.work, c.work.q.size, vector(block, size)
+    recall(c.system, step)  # rows that hold frictions depend on it
+    # Every time begins at the same state of its chart
+    if place != OTHER_CHART:
+        bring_back(c, r.warm)
+    else:
+        # A new chart: rebuilt at q0 with its selection of rows
+        noted = vector(point, width)
+        copy(noted[:n], w.q)
+        take_noted_selection(c.tangent, noted[n:])
+        c.tangent.friction.lam[:] = 0.0
+        c.tangent.friction.load[:] = 0.0
+        status = call_chart(r.kernels.start_chart, context, begun, r.xs, r.ys, r.yds, r.dx)
         if status != 0:
             return status
-        put_state(w, out[i])
+        keep(c, r.warm)
+    # The state at t
+    status = between(context, c, r, t, step)
+    if status == 0:
+        put_state(w, matrix(out, 3, n))
+    return status
+
+
+@kernel
+def read_one(reader, context, run, block, charts, points, t, place, whole, out):  # ten: as of `read`
+    """As `read`, of a block of these charts and their points."""
+    chart = int(block[B_CHART])
+    begun, width, point = charts[chart, 0], points.shape[1], points[chart]
+    return call_read(reader, context, run, block.size, block, begun, width, point, t, place, whole, out)
+
+
+@entry("ippvwmmmi", np.zeros((0, 0, 0)))
+def read_states(reader, context, run, t, rows, blocks, charts, points, whole, out):  # ten: as of `read`
+    """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows], by a reader's kernel. Status."""
+    place = OTHER_CHART
+    for i in range(t.size):
+        block = blocks[rows[i]]
+        if i > 0:
+            before = blocks[rows[i - 1]]
+            place = SAME_CHART if block[B_CHART] == before[B_CHART] else OTHER_CHART
+            place = SAME_STEP if rows[i] == rows[i - 1] else place
+        status = read_one(reader, context, run, block, charts, points, t[i], place, whole, out[i])
+        if status != 0:
+            return status
     return 0
 
 
@@ -340,12 +367,12 @@ def record_step(context, run, c, r, log, t0, t1):
 class TrajectoryReading:
     """How the steps of runs are read: what a `Reader` is made of, in the process of the run."""
 
-    read: object  # the kernel; arguments as of dense_output.read
+    read: object  # the kernel, a callback as dense_output.read
     workspace: object  # a function without arguments: (context, run), the reader's own
     system: object  # the `System` as it was run
     shift: int  # from a step to the block that ends with the angles at its start
     degree: int  # power of two, of a polynomial that can be expected to follow a function of the states in a step
-    leave: object = None  # a kernel in place of `accelerate_here`, which leaves accelerations out
+    calls_laws: bool = False  # whether the kernel calls laws of a scene in Python
     begin: object = None  # what a context of the workspace begins with, a function, where phases share their readers
     idle: list = field(default_factory=list)  # a `Reader` that is not in use
 
@@ -372,9 +399,10 @@ class Reader:
 
     def __init__(self, reading):
         context, run = reading.workspace()
-        self._read, self.degree, self.n = reading.read, reading.degree, run.now.shape[1]
-        self._leave = reading.leave
+        self.read, self.degree, self.n = reading.read.address, reading.degree, run.now.shape[1]
+        self._calls_laws = reading.calls_laws
         (self._context, *kept), (self._run, *more) = resident(context), resident(run)
+        self.where = self.read, self._context, self._run
         self.context = context
         self._kept, self._kernels, self._reals = (kept, more), run.kernels, context.system.reals
         own = [part for name, part in context._asdict().items() if name not in ("system", "graph")]
@@ -388,22 +416,18 @@ class Reader:
             array[...] = image
         self._reals[...] = system.reals
 
-    def rates(self, *steps):
-        """As a call; accelerations may be missing."""
-        if self._leave is None:
-            return self(*steps)
-        known, self._kernels.accelerate_here = self._kernels.accelerate_here, self._leave.address
-        try:
-            return self(*steps)
-        finally:
-            self._kernels.accelerate_here = known
+    def __call__(self, t, rows, blocks, charts, points, whole=True):
+        """States (k, 3, n) at times t (k,), in the steps blocks[rows]; and the Status.
 
-    def __call__(self, t, rows, blocks, charts, points):
-        """States (k, 3, n) at times t (k,), in the steps blocks[rows]; and the Status."""
+        whole: whether accelerations are asked for; else they may be missing.
+        """
         out = np.zeros((t.size, 3, self.n))
-        arguments = self._context, self._run, t, rows, blocks, charts, points, out
-        long = self.n >= LONG_STEPS
-        return out, STATUSES[call(self._read, arguments, (self._kernels,)) if long else self._read(*arguments)]
+        return out, STATUSES[self.call(read_states, *self.where, t, rows, blocks, charts, points, int(whole), out)]
+
+    def call(self, kernel, *arguments):
+        """Call a kernel that reads states."""
+        kernel = interrupts_answered()(kernel) if self._calls_laws else kernel
+        return call(kernel, arguments, (self._kernels,)) if self.n >= LONG_STEPS else kernel(*arguments)
 
 
 # What a run with dense output leaves to its solution: the blocks of its steps, read at any time.

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..maths.root_isolation import survey
-from .tolerances import FALLEN, FROM_REST, ROOT, ROOT_STEPS, ROUGH_ROOT
+from .group_search import ARRIVED, GO_ON, GroupSearch, move
+from .tolerances import FALLEN, FROM_REST, ROOT_STEPS
 
 # A group is surveyed on a step at once (root_isolation.survey). Of the members that cross zero the earliest is located,
 # by the interpolant and Newton's method; the others are surveyed again up to there. Only members whose zeros are
@@ -55,32 +56,43 @@ class Group:
         All of the run.
     numbers : list of int
         Of its own.
+    spins, n
+        As of `GroupSearch`.
 
     Attributes
     ----------
+    kernel : GroupSearch
+        None where no kernel evaluates the functions.
+    beside : ndarray (members,)
+        Which members vanish with the first event that was found; None where that is unknown.
     value, noise : ndarray (members,)
         At the end of the last step; rounding error of values, once measured.
     pulling : function
         Of the values at the start of a phase: the member whose reaction pulls, or None. None without reactions.
     """
 
-    def __init__(self, over, events, numbers):
+    def __init__(self, over, events, numbers, spins, n):
         self.over, self.numbers, self.degree = over, numbers, 0
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
         source = getattr(over, "__self__", None)
-        known, self.pulling = (getattr(source, name, None) for name in ("noise", "pulling"))
+        known, self.pulling, kernel = (getattr(source, name, None) for name in ("noise", "pulling", "kernel"))
         self._least = np.zeros(len(own)) if known is None else known[self.which]
+        # The last: 1 where the `Track` knows more than the value
+        self.value, self.noise, self._odd = np.zeros(len(own)), np.zeros(len(own)), np.zeros(len(own), int)
         # Those that survey and Newton's method serve: changes in one direction end the run
         self._exact = [event.exact for event in own]
         self._may_fall = np.array([event.falls for event in own])
         self._some_may_fall = self._may_fall.any()
         self._falls = np.array([event.direction if event.limit == 1.0 else 0.0 for event in own])
+        self.kernel = self.beside = None
+        if kernel is not None and all(self._exact) and not self._some_may_fall:
+            known = self.value, self.noise, self._odd
+            self.kernel = GroupSearch(kernel, self.which, self._falls, known, spins, n)
 
     def begin(self, values):
         """Take the values (members,) at the start of a run."""
-        self.value, self.noise, self._is_new = values, self._least.copy(), True
-        self._odd = np.zeros(len(values), bool)  # whether the `Track` knows more than the value
+        self.value[:], self.noise[:], self._odd[:], self._is_new = values, self._least, 0, True
 
     def lend(self, track, i, t):
         """Let the `Track` of member i know what is known at t, the start of the step that has been searched."""
@@ -98,7 +110,7 @@ class Group:
 
     def lend_all(self, tracks, t):
         """Let all tracks know what is known at t, the end of a step."""
-        self._first, self._was_new = self.value, self._is_new
+        self._first, self._was_new = self.value.copy(), self._is_new
         for i, number in enumerate(self.numbers):
             self.lend(tracks[number], i, t)
 
@@ -116,6 +128,14 @@ class Group:
         falls = zero & (samples.max(axis=0) <= FROM_REST * scale) & (samples[-1] < -FALLEN * scale)
         return int(left[falls.argmax()]) if falls.any() else None
 
+    def search_by_kernel(self, step):
+        """As `search`; None where the kernel is unsure, or there is none."""
+        found = None if self.kernel is None else self.kernel.find(step)
+        if found is None:
+            return None
+        self._is_new, self.beside = False, self.kernel.parts.beside
+        return (None if found < 0 else (self.numbers[found], self.kernel.numbers.t)), []
+
     def search(self, step, sample, degree):
         """The first event that ends the run, (number, t) or None; members to be searched one by one, up to there.
 
@@ -127,8 +147,8 @@ class Group:
         degree : function
             The least degree of interpolants on a time, s.
         """
-        self._first, self._was_new, self._is_new = self.value, self._is_new, False
-        found, last, least = None, self.value.copy(), degree(step.t1 - step.t0)
+        self._first, self._was_new, self._is_new = self.value.copy(), self._is_new, False
+        found, last, least, self.beside = None, self.value.copy(), degree(step.t1 - step.t0), None
         alone, left, end = {}, np.arange(len(last)), step.t1
         while left.size:
             whole = left.size == len(last)
@@ -142,7 +162,7 @@ class Group:
             if not unclear:
                 alone = {}
                 break
-            falls = (self._falls[left] * values < 0.0) & ~self._odd[left]
+            falls = (self._falls[left] * values < 0.0) & (self._odd[left] == 0)
             roots = {j: seen.root(j) for j, since in unclear.items() if seen.until[j] > since and falls[j]}
             first = roots and _earliest(own, seen, roots)
             alone = {int(left[j]): since for j, since in unclear.items() if j not in roots or first is None}
@@ -152,7 +172,7 @@ class Group:
             j, end = first
             found = self.numbers[left[j]], end
             left = np.array([i for i, since in alone.items() if since < end], int)
-        self.value = last
+        self.value[:] = last
         return found, [i for i, since in alone.items() if since < end]
 
     def _unclear(self, seen, left, noise):
@@ -163,7 +183,7 @@ class Group:
             if j in unclear or not self._falls[left[j]] * seen.samples[-1, j] < 0.0:
                 unclear.setdefault(j, seen.a)
             else:
-                self._odd[left[j]] = False
+                self._odd[left[j]] = 0
         # Values of rounding alone have no zero
         if unclear and noise.any():
             quiet = (np.abs(seen.samples).max(axis=0) <= noise).tolist()
@@ -172,25 +192,13 @@ class Group:
 
 
 def _earliest(sample, seen, roots):
-    """Which function of a `Survey` crosses zero first, and when; None if unsure.
-
-    By Newton's method from the earliest of the roots (t, slope) of interpolants. Where that leaves another function
-    beyond zero, it goes on with that one.
-    """
-    j, before = min(roots, key=roots.__getitem__), math.inf
-    t = roots[j][0]
+    """Which function of a `Survey` crosses zero first, and when; None if unsure. roots: (t, slope) by their numbers."""
+    j, marks = min(roots, key=roots.__getitem__), np.full((len(seen.since), 4), math.nan)
+    for k, root in roots.items():
+        marks[k] = seen.since[k], seen.until[k], *root
+    step = np.array([j, roots[j][0], math.inf])
     for _ in range(ROOT_STEPS):
-        found = sample(np.array([t]))[0].tolist()
-        moves = {k: found[k] / slope for k, (_, slope) in roots.items()}
-        k = max(moves, key=moves.__getitem__)  # the furthest back
-        if k != j:
-            j, before = k, math.inf
-        move = moves[j]
-        # The last digit, or rounding of the values: no step is shorter
-        done = abs(move) <= ROOT * abs(t) or (abs(move) >= 0.5 * before and abs(move) < ROUGH_ROOT * (seen.b - seen.a))
-        before, t = abs(move), t - move
-        if not seen.since[j] <= t <= seen.until[j]:
-            return None
-        if done:
-            return j, t
+        found = move(sample(step[1:2])[0], marks, seen.b - seen.a, step)
+        if found != GO_ON:
+            return (int(step[0]), float(step[1])) if found == ARRIVED else None
     return None

@@ -1,7 +1,7 @@
 """Events: users' functions of time and state, and their zeros inside every step, on states of the manifold."""
 
 import math
-from functools import cache
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -92,14 +92,21 @@ ROOM = 64  # states that are kept
 class Inside:
     """States within the step that a run has just made."""
 
-    def __init__(self, reader, run, log, t0, before):
-        self.t0, self.t1 = t0, float(run.clock.t)
-        self._reader, self._log, self._block = reader, log, run.block[None]
-        self._known = {t0: before, self.t1: run.now.copy()}
+    def __init__(self, reader, run, log, t0, before, spins):
+        self.t0, self.t1, self._spins = t0, run.clock.t, spins
+        self.reader, self.steps = reader, (run.block, log.charts, log.points)
+        self.known = {t0: before, self.t1: run.now.copy()}
+
+    @cached_property
+    def turning(self):
+        """The fastest turn of a body, rad/s, at both ends."""
+        rates = np.array([self.known[t][1] for t in (self.t0, self.t1)]).take(self._spins, axis=1)
+        rates *= rates
+        return 2.0 * math.sqrt(rates.sum(axis=2).max(initial=0.0))
 
     def states(self, times):
         """States (3, n) at times (k,), None where there is none."""
-        times, known = times.tolist(), self._known
+        times, known = times.tolist(), self.known
         # States that are known already are not read again
         missing = [t for t in times if t not in known]
         if missing:
@@ -112,24 +119,24 @@ class Inside:
     def levels(self, times):
         """The same (k, 3, n), NaN where there is none; accelerations may be missing; not kept."""
         rows = np.zeros(times.size, int)
-        found, status = self._reader.rates(times, rows, self._block, self._log.charts, self._log.points)
+        found, status = self.reader(times, rows, self.steps[0][None], *self.steps[1:], False)
         if status != Status.SUCCESS:
-            none = np.full_like(self._known[self.t0], np.nan)
+            none = np.full_like(self.known[self.t0], np.nan)
             return np.reshape([none if state is None else state for state in self.states(times)], (-1, *none.shape))
         if times.size and times[-1] == self.t1:
-            found[-1] = self._known[self.t1]
+            found[-1] = self.known[self.t1]
         return found
 
     def _read(self, times):
         rows = np.zeros(times.size, int)
-        states, status = self._reader(times, rows, self._block, self._log.charts, self._log.points)
+        states, status = self.reader(times, rows, self.steps[0][None], *self.steps[1:])
         if status == Status.SUCCESS:
             return states
         return [self._read(times[i : i + 1])[0] for i in range(times.size)] if times.size > 1 else [None]
 
     def at(self, t, whole=True):
         """The state (3, n) at t; unless it is to be whole, accelerations may be missing."""
-        state = self._known.get(t)
+        state = self.known.get(t)
         if state is None:
             (state,) = (self.states if whole else self.levels)(np.array([t]))
         if state is None:
@@ -199,9 +206,10 @@ class Watch:
         for i, event in enumerate(events):
             if isinstance(event.function, GroupMember):
                 groups.setdefault(event.function.over, []).append(i)
-        self._groups = [Group(over, events, numbers) for over, numbers in groups.items()]
-        self._members = [i for numbers in groups.values() for i in numbers]
-        self._single = [i for i in range(len(events)) if i not in set(self._members)]
+        self._groups = [Group(over, events, numbers, self._p, self._n) for over, numbers in groups.items()]
+        self._group_of = {i: group for group in self._groups for i in group.numbers}
+        self._members = list(self._group_of)
+        self._single = [i for i in range(len(events)) if i not in self._group_of]
         self.read_by(reader)
 
     def read_by(self, reader):
@@ -269,9 +277,7 @@ class Watch:
         again = self.tracks is not None
         self.tracks = self.tracks or [Track() for _ in self.events]
         for group in self._groups:
-            values = self._sample(group, np.array([self.t]), self.state[None])[0]
-            for i, value in zip(group.numbers, values, strict=True):
-                self._finite(i, self.t, value)
+            values = self._at_start(group)
             self._demand_pushes(group, values)
             group.begin(values)
         for i in self._single:
@@ -397,13 +403,25 @@ class Watch:
         """Values (k, members) of a group."""
         return group.over(self._states(times, levels))[:, group.which]
 
+    def _at_start(self, group):
+        """Values (members,) of a group where it begins."""
+        if group.kernel is not None:
+            values, finite = group.kernel.at(self.t, self.state)
+        else:
+            values = self._sample(group, np.array([self.t]), self.state[None])[0]
+            finite = np.isfinite(values).all()
+        if not finite:
+            for i, value in zip(group.numbers, values, strict=True):
+                self._finite(i, self.t, value)
+        return values
+
     def _search_step(self, run, log):
         """Look at the step just made; the `Occurrence` that ends the run, or None."""
         self._note_start()
         known = self.t, self.state, self.memory
         self.memory = run.remembered.copy()
         try:
-            return self._locate(run, log, Inside(self.reader, run, log, self.t, self.state))
+            return self._locate(run, log, Inside(self.reader, run, log, self.t, self.state, self._p))
         except KeyboardInterrupt:
             self.memory = known[2]
             raise
@@ -415,17 +433,14 @@ class Watch:
 
     def _locate(self, run, log, step):
         found, failure, end = [], None, step.t1
-        turning = self._turn_rate(step.at(step.t0), step.at(step.t1))
-        step.degree = self._degree(turning * (step.t1 - step.t0))
         members = {}
         for group in self._groups:
-            sample = lambda times, group=group: self._sample(group, times, step.levels(times))  # noqa: E731
-            degree = lambda time: self._degree(turning * time, limits.SLOW_SMOOTH_TURN, limits.FAST_SMOOTH_TURN)  # noqa: E731
-            first, alone = group.search(step, sample, degree)
+            first, alone = group.search_by_kernel(step) or self._search_group(group, step)
             if first is not None:
                 i, t = first
-                shift = self._least_time(step, step.t0, end) + limits.ROOT * abs(t)
-                t = self._beyond(i, step, t, shift, end, self.events[i].direction)
+                if not self.events[i].exact:
+                    shift = self._least_time(step, step.t0, end) + limits.ROOT * abs(t)
+                    t = self._beyond(i, step, t, shift, end, self.events[i].direction)
                 found.append(Occurrence(t, i, step.at(t)))
                 end = min(end, t)
             for i in alone:
@@ -469,6 +484,12 @@ class Watch:
             raise failure
         return None
 
+    def _search_group(self, group, step):
+        """As `Group.search`."""
+        sample = lambda times: self._sample(group, times, step.levels(times))  # noqa: E731
+        degree = lambda time: self._degree(step.turning * time, limits.SLOW_SMOOTH_TURN, limits.FAST_SMOOTH_TURN)  # noqa: E731
+        return group.search(step, sample, degree)
+
     def _add_beside(self, step, last):
         """Add the events that occur at the instant of the last one, to rounding of value and time.
 
@@ -493,13 +514,15 @@ class Watch:
 
     def _add_members(self, step, last):
         """The same, of events of the group of the last one: by how fast their values fall."""
-        group = next((group for group in self._groups if last.index in group.numbers), None)
+        group = self._group_of.get(last.index)
         if group is None or len(group.numbers) == 1:
             return
-        before = last.t - limits.SHORTLY * (last.t - step.t0)
-        times = np.array([before, last.t])
-        first, value = self._sample(group, times, step.levels(times))
-        falls = (value < first) & (value * (last.t - before) <= limits.SAME_INSTANT * abs(last.t) * (first - value))
+        falls = group.beside
+        if falls is None:
+            before = last.t - limits.SHORTLY * (last.t - step.t0)
+            times = np.array([before, last.t])
+            first, value = self._sample(group, times, step.levels(times))
+            falls = (value < first) & (value * (last.t - before) <= limits.SAME_INSTANT * abs(last.t) * (first - value))
         for i, also in zip(group.numbers, falls.tolist(), strict=True):
             if also and i != last.index:
                 self.list[i].append(Occurrence(last.t, i, last.state))
@@ -525,7 +548,7 @@ class Watch:
         while end > step.t0:
             search = Search(sample, lambda t: self._shaken(i, t, step.at), track.noise, most)
             try:
-                degree = max(step.degree, track.degree // 2)
+                degree = max(self._degree(step.turning * (step.t1 - step.t0)), track.degree // 2)
                 track.degree, track.end = search.run(step.t0, track.value, end, degree)
                 track.noise = search.noise
                 return search.points, failure
@@ -542,12 +565,6 @@ class Watch:
     def _degree(self, turn, slow=limits.SLOW_TURN, fast=limits.FAST_TURN):
         """The degree that the interpolant and the turn of a body, rad, ask for."""
         return LARGEST if turn > fast else self.reader.degree if turn > slow else self.reader.degree // 2
-
-    def _turn_rate(self, *states):
-        """The fastest turn of a body, rad/s, at some states (3, n)."""
-        rates = np.array([state[1] for state in states]).take(self._p, axis=1)
-        rates *= rates
-        return 2.0 * math.sqrt(rates.sum(axis=2).max(initial=0.0))
 
     def _walk(self, i, step, points):
         """The occurrences of event i among these points."""

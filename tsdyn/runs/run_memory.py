@@ -260,8 +260,10 @@ class Memory:
         # Outputs and stops from here on are still to come
         while numbers.rows > 0 and log.t_eval.size and log.out[numbers.rows - 1, 0] >= t:
             numbers.rows -= 1
-        numbers.next_eval = int(log.t_eval.searchsorted(t))
-        numbers.next_stop = int(log.stops[:, 0].searchsorted(t, "right"))
+        if log.t_eval.size:
+            numbers.next_eval = int(log.t_eval.searchsorted(t))
+        if log.stops.size:
+            numbers.next_stop = int(log.stops[:, 0].searchsorted(t, "right"))
         if numbers.in_chart > 0:
             with_end(log.charts[: numbers.chart_rows + 1], numbers, control.condition, control.contraction)
             numbers.chart_rows += 1

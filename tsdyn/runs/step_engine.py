@@ -9,7 +9,7 @@ from ..methods.diagonally_implicit import prepare_implicit
 from ..methods.explicit import called_for
 from ..methods.interpolants import cubic_rate
 from ..model.handles import has_rates
-from ..model.laws import calls_laws, interrupts_answered
+from ..model.laws import calls_laws
 from ..model.packed import System
 from ..rows.interface import redundancy
 from ..rows.saddle_matrix import saddle_of
@@ -78,11 +78,6 @@ class StepMemory(Memory):
     def called(self):
         """As of `Memory`."""
         return self.run.kernels, self.context.linear.kernels
-
-    def begin_again(self, log):
-        """As of `Memory`."""
-        self.context.chart.state.placement = 0  # the poses are those of the step's end
-        return super().begin_again(log)
 
     def take_system(self, system):
         """Take the numbers of a system, which may be another one of the same shape."""
@@ -202,8 +197,7 @@ def _reading(packed, form, interpolant, constraint_tol, kernels):
         context = Context(own, work, allocate_linear(own, n, m, False), *parts)
         return form.context(packed, context, redundancy(graph)), run
 
-    kernel = interrupts_answered()(read) if calls_laws(packed) else read
-    return TrajectoryReading(kernel, workspace, system, shift=1, degree=8)
+    return TrajectoryReading(read, workspace, system, shift=1, degree=8, calls_laws=calls_laws(packed))
 
 
 def second_derivative(method, form):

@@ -456,7 +456,6 @@ def _change_chart(context, c, r, log, shorter, status, driven):
     """
     # q, qd, qdd of the step's start
     restore_now(c.work, r)
-    c.chart.state.placement = 0  # the poses are not those that the next chart begins at
     if c.saddle.K.size > 0:  # factors with which stages begin
         bring_back(c, r.warm)
     r.numbers.rejected += 1

@@ -94,6 +94,9 @@ SLOW_TURN, FAST_TURN = 0.1, 2.0
 # of the cosine of a turn by 1 rad is in error by 1e-11, and one of degree 16 shows that more than 8 rad need another.
 SLOW_SMOOTH_TURN, FAST_SMOOTH_TURN = 1.0, 8.0
 
+# rad, times the degree: turns of more are shown to need another by an interpolant of that degree, as above.
+SHOWN_TURN = 0.5
+
 # A value or time below this fraction of the others counts as zero at the start of a run: rounding of some dozen
 # operations of an event function. So does a gap of a contact, of the scene's length, at an event of another.
 START_ZERO = 64.0 * EPS
@@ -119,6 +122,8 @@ FROM_REST, FALLEN = 1e-11, 1e-6
 # shorter is rounding.
 ROOT_STEPS, ROUGH_ROOT = 6, 1e-8
 ROOT, LEAST_TIME = 4.0 * EPS, 2.0**-1022
+# Share of an interval on which zeros near its start are looked for again.
+SHORTENED = 2.0**-6
 
 # --- slices ----------------------------------------------------------------------------------------------------------
 # s between returns to Python: progress bars and Ctrl-C answer at once, at a cost of 0.1 ms a slice.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, wraps
+from functools import cached_property, partial, wraps
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ..calls import fitting_methods
 from ..errors import InvalidArgument
+from ..maths.tolerances import ROUNDING
 from ..model.handles import handles_of
 from ..observables import diagnostics, reactions
 from ..observables.reactions import member, with_normal_loads
@@ -95,43 +96,41 @@ def work(solution, trajectory, item=None):
     item restricts it to one constraint or force, as in `diagnostics.power_of`.
     """
     edges = np.unique(np.concatenate([[trajectory.start], trajectory.edges, solution.t]))
+    power, floor = partial(_power, solution, trajectory, item), ROUNDING * solution.kinetic_energy.max(initial=0.0)
     pieces = np.zeros(0)
     for first in range(0, edges.size - 1, AT_ONCE):
         some = edges[first : first + AT_ONCE + 1]
-        pieces = np.append(pieces, _integrals(solution, trajectory, item, some[:-1], some[1:], 0))
+        pieces = np.append(pieces, _integrals(power, some[:-1], some[1:], floor, 0))
     done = np.append(0.0, np.cumsum(pieces))[np.searchsorted(edges, solution.t)]
     if item is None and solution._phases is not None:  # impacts
         done += solution._phases.gained()[solution._phase_of_rows]
     return done
 
 
-def _integrals(solution, trajectory, item, a, b, depth, known=None):
-    """Return the work from each a to its b, by bisection until halves agree: steps of series are long.
+def _integrals(power, a, b, floor, depth, known=None):
+    """Return the work from each a to its b, by bisection until halves agree, or to a floor, J: steps are long.
 
     known: what `_quadrature` gives for them, if it has been asked already.
     """
-    done, size = known or _quadrature(solution, trajectory, item, a, b)
+    done, size = known or _quadrature(power, a, b)
     if depth == DEEPEST or not a.size:
         return done
-    middle = 0.5 * (a + b)
-    halves = [(ends, _quadrature(solution, trajectory, item, *ends)) for ends in ((a, middle), (middle, b))]
-    found = sum(part for _, (part, _) in halves)
-    off = np.flatnonzero(np.abs(found - done) > AGREE * size)
-    found[off] = sum(
-        _integrals(solution, trajectory, item, first[off], last[off], depth + 1, (part[off], size[off]))
-        for (first, last), (part, size) in halves
-    )
+    middle, count = 0.5 * (a + b), a.size
+    a, b = np.append(a, middle), np.append(middle, b)
+    parts, sizes = _quadrature(power, a, b)
+    found = parts[:count] + parts[count:]
+    off = np.flatnonzero(np.abs(found - done) > np.maximum(AGREE * size, floor))
+    both = np.append(off, off + count)
+    finer = _integrals(power, a[both], b[both], floor, depth + 1, (parts[both], sizes[both]))
+    found[off] = finer[: off.size] + finer[off.size :]
     return found
 
 
-def _quadrature(solution, trajectory, item, a, b):
+def _quadrature(power, a, b):
     """Integrals (k,) of the power and of its size, five nodes each."""
-    if not a.size:
-        return np.zeros(0), np.zeros(0)
     middle, half = 0.5 * (b + a), 0.5 * (b - a)
-    t = (middle[:, None] + half[:, None] * NODES).ravel()
-    power = _power(solution, trajectory, item, t).reshape(-1, NODES.size)
-    return half * (power @ WEIGHTS), half * (np.abs(power) @ WEIGHTS)
+    values = power((middle[:, None] + half[:, None] * NODES).ravel()).reshape(-1, NODES.size)
+    return half * (values @ WEIGHTS), half * (np.abs(values) @ WEIGHTS)
 
 
 def _power(solution, trajectory, item, t):

@@ -37,6 +37,7 @@ from ..runs.events import Event
 from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome, interval, output_times, state_arrays
+from ..runs.tolerances import START_ZERO
 from ..validation import counted, damaged, demand, listed
 from . import hybrid
 from .grips import Halting, Reactions, items_of
@@ -239,15 +240,15 @@ class _ContactRun(Transitions):
 
     def _phase(self):
         """Run the next phase: its task and outcome."""
-        phase, names, known, tol = self._scene(), self._names(), self.known, self._tol()
-        run, call = self._run_of(phase)
-        still = self._still(phase)
+        known, tol = self.known, self._tol()
+        phase, run, call, task = self._begin_phase(tol)
+        names, still = self._names(), self._still(phase)
         if still.size == self.q.size and self.options.method is None:
             run = run._with_method(DOP853(run.method.rtol, run.method.atol, max_step=self.options.max_step))
+            task = run._new_task(call, (self.q, self.qd), self.remembered, tol)
         run._prepare_kernels(True)
         self._enter_archive()
         while True:
-            task = run._new_task(call, (self.q, self.qd), self.remembered, tol)
             if known is not None:  # the checkpoint is of an event later on
                 self.t, self.q, self.qd, self.remembered = known
             other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
@@ -257,6 +258,7 @@ class _ContactRun(Transitions):
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
             self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
+            self.kind = None  # of the phase, as `Phases` has it
             if self.archive is not None:
                 self.archive.resting = still, resting[still]
             if not (other and self.replaced):
@@ -272,8 +274,37 @@ class _ContactRun(Transitions):
                 self.methods += [method for method in said if method not in self.methods]
                 return task, outcome
             run, self.replaced = run._with_method(other), True
+            task = run._new_task(call, (self.q, self.qd), self.remembered, tol)
             if self.archive is not None and self.archive.resumed is None:
                 self.archive.go_back(self.written)
+
+    def _begin_phase(self, tol):
+        """The scene of the next phase, its `Run`, the call of it, and its task, which has the start on its rows.
+
+        Where that takes open gaps below zero, as rounding can, these close first.
+        """
+        for _ in range(self.gaps.count + 1):
+            phase = self._scene()
+            run, call = self._run_of(phase)
+            task = run._new_task(call, (self.q, self.qd), self.remembered, tol)
+            sunk = [] if self.known is not None else self._sunk(task.q)
+            if not sunk:
+                break
+            self.q, self.qd = task.q, task.qd
+            self.ended = self.qd
+            if self._transit(sunk) is not None:
+                raise InconsistentState(self.reason)
+        return phase, run, call, task
+
+    def _sunk(self, q):
+        """Open gaps that are below zero at q, but those that have just opened with a rate."""
+        values, modes = self.gaps.at(q, self.remembered[: self.count]), self.modes
+        for i, (_, first, rate, rounding) in modes.opened.items():
+            values[i] = rate or values[i] - first + rounding
+        if not (values < 0.0).any():
+            return []
+        held = {*modes.closed, *modes.idle, *modes.lifted, *self.gaps.following}
+        return [i for i in self.able if values[i] < 0.0 and i not in held]
 
     def _tol(self):
         """Of the start of a phase: velocities after an impact have the rounding of those before it."""
@@ -307,8 +338,9 @@ class _ContactRun(Transitions):
         return self.run_of(phase, replace(self.options, events=None), call), call
 
     def _end_phase(self, t):
-        kind = self.phases.kind(self.packed, self._record, self.scene.packed, self.gaps)
-        self.phases.add(kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
+        if self.kind is None:
+            self.kind = self.phases.kind(self.packed, self._record, self.scene.packed, self.gaps)
+        self.phases.add(self.kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
 
     def _record(self):
         """What the scene of the present phase is made of, for files."""
@@ -334,8 +366,8 @@ class _ContactRun(Transitions):
         self.ended = self.qd
         remembered = self.remembered
         self.decided = (self._transit([self.watched[i] for i in numbers]),)
-        changed = not (self.modes.same(before) and np.array_equal(self.remembered, remembered))
-        if self.decided[0] is not None or changed:
+        remembers = self.remembered is remembered or np.array_equal(self.remembered, remembered)
+        if self.decided[0] is not None or not (remembers and self.modes.same(before)):
             return False
         run.now[1], self.decided = self.qd, None
         self.closing.open(self.modes.opened)
@@ -522,12 +554,10 @@ class _ContactRun(Transitions):
         return Status.SUCCESS
 
     def _is_deep(self):
-        """Whether contacts penetrate; says so."""
-        self.gap = self.gaps.at(self.q, self.remembered[: self.count])
-        allowed = -PENETRATION * self.gaps.lengths(self.length)
-        if not (self.gap < allowed).any():
-            return False
-        deep = [i for i in (self.gap < allowed).nonzero()[0].tolist() if i in self.able]
+        """Whether contacts penetrate; says so. Notes the gaps, and which are zero within rounding, or below."""
+        self.gap, lengths = self.gaps.at(self.q, self.remembered[: self.count]), self.gaps.lengths(self.length)
+        self.near = (self.gap <= START_ZERO * lengths).nonzero()[0].tolist()
+        deep = [i for i in self.near if self.gap[i] < -PENETRATION * lengths[i] and i in self.able]
         if deep:
             found = listed([self.gaps.names[i] for i in deep], NAMED)
             self.reason = f"Penetration was not noticed: {found}. Give a max_step."

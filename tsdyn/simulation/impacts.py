@@ -21,9 +21,7 @@ from .run_options import LAWS
 from .scene_cache import prepared
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from ..hints import ItemLike, Scene
+    from ..hints import ItemLike, Mapping, Scene, Sequence
 
 
 def impulse_of(inertia, i, p):

@@ -19,9 +19,7 @@ from .solution import Solution
 from .stored_runs import Lacking, arguments_of, demand_path, demand_same_place, demand_same_scene
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from ..hints import Place
+    from ..hints import Event, Floats, Mapping, Place, Progress, Sequence
 
 SCENES = (".toml", ".urdf", ".xml", ".mjcf", ".sdf", ".world")
 READS = f"{', '.join(SCENES)} (a scene), .h5, .hdf5, .nc or .zarr (a solution or an ensemble)"
@@ -97,14 +95,10 @@ def load(
     <Scene of 1 point mass: 3 coordinates, 1 constraint row>
     """
     demand_path(path, "path")
-    if not isinstance(allow_code, bool):
-        raise InvalidArgument(f"allow_code must be True or False, got {allow_code!r}.")
-    if not isinstance(free_base, bool):
-        raise InvalidArgument(f"free_base must be True or False, got {free_base!r}.")
-    if not isinstance(outside, bool):
-        raise InvalidArgument(f"outside must be True or False, got {outside!r}.")
-    if not isinstance(limits, bool):
-        raise InvalidArgument(f"limits must be True or False, got {limits!r}.")
+    flags = {"allow_code": allow_code, "free_base": free_base, "outside": outside, "limits": limits}
+    for name, value in flags.items():
+        if not isinstance(value, bool):
+            raise InvalidArgument(f"{name} must be True or False, got {value!r}.")
     loops = validation.sequence(
         loops, 'loops must be a sequence such as [("link_a", "link_b", "weld")]', InvalidArgument
     )
@@ -181,12 +175,6 @@ def text_of(path: Place) -> str:
 
 
 # `resume`: go on with a run from its checkpoint.
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..hints import ConstraintError as Errors
-    from ..hints import Event, Floats, Place, Progress
 
 NEEDED = ("scene", "functions"), ("events", "events")  # arguments that are passed again, and what says that they are
 
@@ -344,7 +332,7 @@ class Outline(Solution):
         return self._of_run("potential_energy")
 
     @property
-    def constraint_error(self) -> Errors:  # type: ignore[override]
+    def constraint_error(self) -> ConstraintError:  # type: ignore[override]
         """Constraint errors of the run, (k,) each."""
         return ConstraintError(*(self._of_run(f"{level}_error") for level in ConstraintError._fields))
 

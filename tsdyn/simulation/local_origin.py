@@ -106,7 +106,7 @@ def _sees_differences(packed):
 def run_near(driver, task, scene, origin, tol):
     """Return the `Outcome` of a task run relative to a local origin; tol as for `Prepared.start`."""
     packed = task.prepared.packed
-    local, shift = _local(task.prepared, scene, origin), np.zeros(task.q.size)
+    local, shift = _local(task, scene, origin), np.zeros(task.q.size)
     shift[packed.system.bodies[:, :1] + np.arange(3)] = origin
     q = task.q - shift
     tol *= (1.0 + np.abs(task.q).max()) / (1.0 + np.abs(q).max())
@@ -133,24 +133,32 @@ def run_near(driver, task, scene, origin, tol):
     return outcome._replace(rows=rows, end=end, events=events, trajectory=trajectory)
 
 
-def _local(prepared, scene, origin):
+def _local(task, scene, origin):
     """Return the `Prepared` of the scene relative to that origin; kept for the next run."""
-    kept = prepared.packed.derived.local
-    if kept is None or (kept[0] != origin).any():
-        kept = prepared.packed.derived.local = origin, Prepared(scene, _moved(prepared.packed, origin))
-    return kept[1]
+    packed, slots = task.prepared.packed, task.remembered[len(task.angles) :]
+    kept = packed.derived.local
+    if kept is None or (kept[0] != origin).any() or (kept[1] != slots[kept[2]]).any():
+        moved, held = _moved(packed, origin, slots)
+        kept = packed.derived.local = origin, slots[held], held, Prepared(scene, moved)
+    return kept[-1]
 
 
-def _moved(packed, origin):
-    """The packed scene with the points of the ground relative to an origin."""
-    reals, known = packed.system.reals.copy(), packed.derived
+def _moved(packed, origin, slots):
+    """The packed scene with the points of the ground relative to an origin; which of the slots were among these points.
+
+    slots: what is remembered, in the scene's own coordinates, as it is in the moved scene, too: of numbers of points
+    the run remembers copies that nothing reads.
+    """
+    reals, known, places = packed.system.reals.copy(), packed.derived, []
 
     def move(item, coordinates, begin):
         found = []
         for j, (marker, s) in enumerate(zip(item.markers, coordinates, strict=True)):
             if marker.code == POINT and isinstance(item.body_of(marker), Ground):
                 s = s - origin
-                reals[begin + 3 * j : begin + 3 * j + 3] = s
+                place = slice(begin + 3 * j, begin + 3 * j + 3)
+                reals[place] = s
+                places.append(place)
             found.append(s)
         return tuple(found)
 
@@ -164,13 +172,20 @@ def _moved(packed, origin):
     loads = tuple(
         load._replace(coordinates=move(load.force, load.coordinates, load.alone[0].reals)) for load in packed.loads
     )
-    return packed._replace(
-        system=packed.system._replace(reals=reals),
+    memory, by = packed.system.memory.copy(), np.zeros(reals.size)
+    for place in places:
+        by[place] = origin
+    held = np.flatnonzero(by[memory])
+    reals[memory[held]] = slots[held] - by[memory[held]]
+    memory[held] = reals.size + np.arange(held.size)
+    moved = packed._replace(
+        system=packed.system._replace(reals=np.append(reals, slots[held]), memory=memory),
         coordinates=coordinates,
         size=size_of(packed.constraints, coordinates),
         loads=loads,
         derived=Derived() if known.switched is None else Derived(known.redundant, known.switched),
     )
+    return moved, held
 
 
 def _away(function, packed, shift):
@@ -216,9 +231,7 @@ def within_rounding(method, packed, q):
         return method, ""
     if packed.derived.near is q:
         return method, ""
-    if packed.derived.levers is None:
-        packed.derived.levers = levers(packed)
-    arms = packed.derived.levers
+    arms = levers(packed)
     if np.abs(q).max() < FAR_LEVER * arms.min(where=arms > 0.0, initial=np.inf):
         packed.derived.near = q
         return method, ""

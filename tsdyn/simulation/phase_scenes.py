@@ -109,7 +109,8 @@ def _with_rows_held(base, holds):
 def _pack_phase(phase, scene, holds, held):
     """Pack a phase of a scene: it remembers what the scene does, in the same order."""
     whole = scene.packed
-    packed = pack(phase, handles_of(whole).where_some_act((*phase._added, *phase._forces)))
+    packed = pack(phase, handles_of(whole).where_some_act((*phase._added, *phase._forces)), whole)
+    packed.derived.masks = whole.derived.masks
     if whole.system.memory.size:
         packed = _remembering(packed, whole)
     return _holding(packed, holds, held) if holds or packed.contacts else packed

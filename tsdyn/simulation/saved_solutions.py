@@ -24,23 +24,9 @@ from ..taylor import series_engine
 from ..taylor.layout import series_width
 from ..validation import damaged, demand, demand_numbers, demand_record, is_count, text_cell
 from ..workspaces import B_CHART, B_DATA, B_END
-from . import local_origin
+from . import local_origin, stored_runs
 from .phases import PhasePieces, Phases, Pinned, derived_record, take_derived
 from .scene_cache import prepared
-from .stored_runs import (
-    Lacking,
-    complete,
-    demand_path,
-    demand_same_scene,
-    hash_of,
-    method_of,
-    outline_of,
-    own_record,
-    provenance_of,
-    row_labels,
-    scene_of,
-    width_of,
-)
 
 if TYPE_CHECKING:
     from ..hints import Place, Scene, Solution
@@ -71,7 +57,8 @@ def record_of(trajectory):
         found = {"kind": "series", "highest": int(rest[0])}
     else:
         method, form, constraint_tol = rest
-        found = {"kind": "steps", "method": own_record(method), "form": form, "constraint_tol": constraint_tol}
+        found = {"kind": "steps", "form": form, "constraint_tol": constraint_tol}
+        found["method"] = stored_runs.own_record(method)
     arrays = {name: np.asarray(getattr(trajectory, name)) for name in ARRAYS}
     return {**found, "start": float(trajectory.start), "derived": derived_record(packed)}, arrays
 
@@ -118,7 +105,7 @@ def trajectory_of(numbers, arrays, scenes):
         demand(type(highest) is int and 0 < highest <= max(blocks.shape[1], HIGHEST), "the order")
         width, graph = series_width(packed, highest), None
     else:
-        method, form = method_of(numbers["method"]), formulation(numbers["form"])
+        method, form = stored_runs.method_of(numbers["method"]), formulation(numbers["form"])
         again = step_engine.read_again, packed, method, form.name, float(numbers["constraint_tol"])
         form = form.serving(method, has_rates(packed))
         graph = form.graph(packed)
@@ -163,7 +150,7 @@ def provenance(solution: Solution) -> dict[str, Any]:
     if known is not None:
         return dict(known)
     run = solution._method, solution.method, solution.formulation, solution.span
-    return provenance_of(hash_of(solution.packed), *run, solution._made)
+    return stored_runs.provenance_of(stored_runs.hash_of(solution.packed), *run, solution._made)
 
 
 def save(solution: Solution, path: Place) -> Path:
@@ -171,14 +158,14 @@ def save(solution: Solution, path: Place) -> Path:
     from ..files import saved_file
     from ..files.archive import tables_of
 
-    demand_path(path, "path")
+    stored_runs.demand_path(path, "path")
     path = Path(path).absolute()
     saved_file.format_at(path)
     if solution._lacks:
         remembered = solution._width
         content = solution._content
     else:
-        remembered, content = width_of(solution.packed), _content(solution)
+        remembered, content = stored_runs.width_of(solution.packed), _content(solution)
     tables = tables_of(solution.packed.bodies, remembered, solution._step_log is not None)
     logs = {name: _columns_of(getattr(solution, log)) for name, log in LOGS.items() if name in tables}
     counts = {"outputs": solution._length(), **{name: len(log[0]) for name, log in logs.items()}}
@@ -250,7 +237,7 @@ def _content(solution):
 
 def labelled_rows(solution):
     """Title and label of each row of Phi as they were run."""
-    return solution._row_labels if solution._lacks else row_labels(solution.packed)
+    return solution._row_labels if solution._lacks else stored_runs.row_labels(solution.packed)
 
 
 def _held(solution, width):
@@ -264,16 +251,16 @@ def _held(solution, width):
 
 def _outline(solution, numbers):
     """The arrays of an `Outline`, and its numbers entered, of a scene with parts that only their owner has."""
-    if hash_of(solution.scene.packed) != provenance(solution)["scene"]:
+    if stored_runs.hash_of(solution.scene.packed) != provenance(solution)["scene"]:
         return {}
-    found, arrays = outline_of(solution.scene, solution.packed)
+    found, arrays = stored_runs.outline_of(solution.scene, solution.packed)
     numbers |= found
     return arrays | _held(solution, len(found["outline"]["rows"])) if found else {}
 
 
 def _scene_as_run(solution):
     """The scene of a solution, if it is still as it was run."""
-    if hash_of(solution.scene.packed) != provenance(solution)["scene"]:
+    if stored_runs.hash_of(solution.scene.packed) != provenance(solution)["scene"]:
         raise InvalidArgument("the scene has been changed since the run")
     return solution.scene
 
@@ -294,12 +281,12 @@ def load(path: Place, scene: Scene | None, allow_code: bool, kinds: tuple[type[A
         demand_record(record, RECORD)
         try:
             scene = _scene(path, record, arrays, scene, allow_code, kinds[0])
-        except Lacking as lacking:
+        except stored_runs.Lacking as lacking:
             if "outline" not in arrays:
                 raise
             return _outlined(path, record, arrays, str(lacking), (kinds[0], kinds[2]))
         packed = scene.packed
-        demand_same_scene(path, packed, record["provenance"]["scene"])
+        stored_runs.demand_same_scene(path, packed, record["provenance"]["scene"])
         take_derived(packed, record["derived"])
         return _solution(path, record, arrays, scene, kinds[1])
 
@@ -311,14 +298,14 @@ def _scene(path, record, arrays, scene, allow_code, kind):
     if scene is not None:
         return scene
     if "scene" not in arrays:
-        raise Lacking(
+        raise stored_runs.Lacking(
             f"{path} holds no scene, as a file holds no code: {record['lacks']}. Pass the scene: "
             f"ts.load({str(path)!r}, scene=scene)."
         )
     try:
         return scene_text.read(arrays["scene"].tobytes().decode(), "its scene", kind, None, allow_code)[0]
     except InvalidFile as error:
-        raise Lacking(
+        raise stored_runs.Lacking(
             f"{path}: {error}\nImport the modules of its classes before, or pass the scene: ts.load(path, scene=scene)."
         ) from error
 
@@ -326,13 +313,13 @@ def _scene(path, record, arrays, scene, allow_code, kind):
 def _outlined(path, record, arrays, why, kinds):
     """The `Outline` of a file."""
     known = record["outline"]
-    scene = scene_of(known, arrays["outline"], why, kinds[0])
+    scene = stored_runs.scene_of(known, arrays["outline"], why, kinds[0])
     found = _solution(path, {**record, "trajectory": None}, arrays, scene, kinds[1], known["width"])
     held_arrays = {f"held_{name}": arrays[f"held_{name}"].astype(float) for name in HELD}
     count = found._length()
     for name, array in held_arrays.items():
         demand(array.shape == (count, *([len(known["rows"])] if name == "held_multipliers" else [])), name)
-    complete(found, known)
+    stored_runs.complete(found, known)
     found._held, found._content = held_arrays, (_again(record), arrays)
     return found
 
@@ -343,7 +330,7 @@ def outlined_run(path, numbers, arrays, why, kinds):
     from ..files.formats import format_of
 
     known, origin = numbers["arguments"]["outline"], numbers["provenance"]
-    scene = scene_of(known, arrays["outline"], why, kinds[0])
+    scene = stored_runs.scene_of(known, arrays["outline"], why, kinds[0])
     demand_record(origin, {"method": str, "formulation": str, "t_start": (int, float), "t_end": (int, float)})
     demand_record(numbers, {"reason": str, "seconds": (int, float)})
     format_of(path).demand_plain(path)
@@ -365,7 +352,7 @@ def outlined_run(path, numbers, arrays, why, kinds):
         record["phases"] = numbers["phases"]["phases"]
         held |= {f"phase_{name}": arrays[f"phase {name}"] for name in Phases.ARRAYS}
     found = _solution(path, record, held, scene, kinds[1], known["width"])
-    complete(found, known)
+    stored_runs.complete(found, known)
     count, rows = found._length(), len(known["rows"])
     shapes = {name: (count, rows) if name == "multipliers" else (count,) for name in HELD}
     found._held = {f"held_{name}": np.broadcast_to(np.nan, shape) for name, shape in shapes.items()}  # takes no memory
@@ -385,7 +372,7 @@ def _solution(path, record, arrays, scene, kind, width=None):
 
     found, packed = kind.__new__(kind), scene.packed
     outputs = StoredOutputs(path, record["tables"])
-    width = width_of(packed) if width is None else width
+    width = stored_runs.width_of(packed) if width is None else width
     tables = tables_of(packed.bodies, width, "steps" in record["tables"])
     demand(record["tables"] == {name: [c.name for c in table.columns] for name, table in tables.items()}, "its tables")
     demand_shapes(path, tables)
@@ -528,7 +515,7 @@ def to_dataframe(solution, channels):
 
 def to_csv(solution, path, channels):
     """What `Records.to_csv` does, and raises."""
-    demand_path(path, "path")
+    stored_runs.demand_path(path, "path")
     if channels is not None:
         some = channels_of(solution.packed, channels, solution._lacks)
         head, array = [one.title for one in some], values_of(solution, some)

@@ -1,7 +1,6 @@
 """Reports of a run: progress while it lasts; at its end what happened, where, what kept steps short, what to try."""
 
 import sys
-import threading
 import time
 from itertools import pairwise
 from typing import NamedTuple
@@ -340,16 +339,13 @@ class StageProgress:
     """
 
     def __init__(self, progress, what):
-        self.what, self.fraction, self.said = what, 0.0, "nothing is done yet"
+        self.what, self.fraction, self.said, self._bar = what, 0.0, "nothing is done yet", None
         self._tell = progress if callable(progress) else None
-        self._class = None if callable(progress) or progress in (None, False) else bar_class(progress)
-        self._bar, self._lock, self._timer = None, threading.Lock(), None
+        if self._tell is None and progress not in (None, False):
+            shown = {"file": sys.stderr, "bar_format": FORM, "delay": BAR_AFTER, "miniters": 0}
+            self._bar = bar_class(progress)(total=100, unit="%", **shown)
 
     def __enter__(self):
-        if self._class is not None:
-            self._timer = threading.Timer(BAR_AFTER, self._open)
-            self._timer.daemon = True
-            self._timer.start()
         return self
 
     def __call__(self, fraction, said):
@@ -357,34 +353,16 @@ class StageProgress:
         self.fraction, self.said = min(max(self.fraction, float(fraction)), 1.0), said
         if self._tell is not None:
             self._tell(self.fraction)
-        with self._lock:
-            self._show()
+        if self._bar is not None:
+            self._bar.set_postfix_str(said, refresh=False)
+            self._bar.update(100.0 * self.fraction - self._bar.n)
 
     def __exit__(self, kind, error, trace):
         try:
             if kind is None:
                 self(1.0, "done")
         finally:
-            self._close()
-        if kind is KeyboardInterrupt and not error.args:
-            raise KeyboardInterrupt(f"{self.what} was interrupted at {self.fraction:.0%}: {self.said}.") from error
-
-    def _open(self):
-        with self._lock:
-            if self._timer is not None:
-                self._bar = self._class(total=100, unit="%", file=sys.stderr, bar_format=FORM)
-                self._show()
-
-    def _show(self):
-        if self._bar is not None:
-            self._bar.set_postfix_str(self.said, refresh=False)
-            self._bar.update(100.0 * self.fraction - self._bar.n)
-            self._bar.refresh()
-
-    def _close(self):
-        with self._lock:
-            if self._timer is not None:
-                self._timer.cancel()
-                self._timer = None
             if self._bar is not None:
                 self._bar.close()
+        if kind is KeyboardInterrupt and not error.args:
+            raise KeyboardInterrupt(f"{self.what} was interrupted at {self.fraction:.0%}: {self.said}.") from error

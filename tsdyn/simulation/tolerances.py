@@ -64,11 +64,15 @@ PASSES, GOT_ON = 16, 1e-9
 # --- contacts --------------------------------------------------------------------------------------------------------
 # Of the scene's length, of angles in rad: a depth that no event leaves, which shows that an event was missed.
 PENETRATION = 1e-9
-# Roundings in a gap, of the sizes of its terms: lower flights than these are none.
+# Of the scene's length, of angles in rad: an impact that is followed by a lower flight is the last one. Contacts of a
+# tower lower each other's flights in turn, and impacts accumulate in them again and again: so each time ends early.
+FLIGHT = 1e-12
+# Roundings in a gap, of the sizes of its terms: gaps that are lifted by less have not opened.
 ROUNDED = 16.0
 # Events in a row without progress in time, beside one for each gap: a chain of openings that follow from each other.
 MOST_AT_AN_INSTANT = 100
-# Events after which progress is judged: a run that would need CREEPING times as many more is ended.
+# Events for each unit, and one more, after which progress is judged: a run that would need CREEPING times as many more
+# is ended. Towers with friction take some 300 for each contact until they rest.
 EVENTS_JUDGED, CREEPING = 1000, 1e3
 # Cosine of the turn of a slip since its phase began, above which the next one keeps its direction; m/s: V, the velocity
 # from which on a slip that slows down may turn less and less: the force is off by 1e-4 of its turn there, since friction

@@ -24,7 +24,7 @@ from .impacts import along_normals, held, impact_of, impulse_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import Impulse, UnitModes
 from .scene_cache import prepared
-from .tolerances import CREEPING, EVENTS_JUDGED, MOST_AT_AN_INSTANT, ROUNDED
+from .tolerances import CREEPING, EVENTS_JUDGED, FLIGHT, MOST_AT_AN_INSTANT, ROUNDED
 
 
 def contact_state(inertia, resting, qd, fired=()):
@@ -44,11 +44,10 @@ class Transitions:
         self.reason, qd = "", self.qd
         if self._is_deep() or self._is_stuck():
             return Status.CONTACT_FAILED
-        (near,) = (self.gap <= START_ZERO * self.gaps.lengths(self.length)).nonzero()
         count, own, before = self.gaps.count, self.frictions.count, self.modes
         # What was to rise by less than rounding, and has risen by more, is open
-        hit = [i for i in fired if i < count and (i not in before.lifted or i in near)]
-        touching = {*near.tolist(), *hit, *before.closed, *before.idle}.intersection(self.able)
+        hit = [i for i in fired if i < count and (i not in before.lifted or i in self.near)]
+        touching = {*self.near, *hit, *before.closed, *before.idle}.intersection(self.able)
         turned = [i - count - own for i in fired if i >= count + own and before.slides(i - count - own)]
         broken = [i - count for i in fired if count <= i < count + own]
         status = self._settle(sorted(touching), hit, broken, turned)
@@ -59,12 +58,12 @@ class Transitions:
     def _is_stuck(self):
         """Whether events no longer let time go on; says so."""
         since, count = self.judged
-        self.at_once = self.at_once + 1 if self._is_now(self.phases.starts[-1]) else 0
+        self.at_once = self.at_once + 1 if any(map(self._is_now, self.phases.starts[-1:])) else 0
         self.judged = since, count + 1
         if self.at_once > MOST_AT_AN_INSTANT + self.gaps.count + self.frictions.count:
             self.reason = f"There are {self.at_once} events at t = {self.t:.9g} s."
             return True
-        if count + 1 >= EVENTS_JUDGED:
+        if count + 1 >= EVENTS_JUDGED * (1 + self.gaps.count + self.frictions.count):
             if (self.span[1] - self.t) > CREEPING * (self.t - since):
                 self.reason = f"The last {count + 1} events took {self.t - since:.3g} s: they accumulate."
                 return True
@@ -82,6 +81,8 @@ class Transitions:
     def _settle(self, *which):
         """As `_decide_modes`; rows of frictions that don't hold remember zeros."""
         status = self._decide_modes(*which)
+        if not self.frictions.count:
+            return status
         memory, held = self.remembered[self.count :], self.frictions.held
         ranks = [self.modes.sticking.get(i, 0) for i in range(self.frictions.count)]
         left = [slot for rank, slots in zip(ranks, held, strict=True) for slot in slots[rank:].ravel().tolist()]
@@ -368,10 +369,9 @@ class Transitions:
         (rate, size, G, p, acceleration, length), qd = found
         if not (G > 0.0 and rate < -NEGLIGIBLE * size):
             return False
-        rounding = EPS * max(self.length, ROUNDED * length)
-        height = NEGLIGIBLE * self.length if e == 1.0 else rounding
-        if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * height:
+        if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * FLIGHT * self.length:
             return False
+        rounding = EPS * max(self.length, ROUNDED * length)
         self.phases.impulses.append((self.t, gaps.names[i], Impulse(p)))
         self.qd, self.modes = qd, UnitModes(opened={i: self._opened(i, -e * rate, 0.25 * rounding)})
         return True
@@ -380,7 +380,7 @@ class Transitions:
         """Jump of velocities at an impact; the rates (count,) afterwards."""
         e, before = self.gaps.restitution[touching].copy(), rates[touching]
         p, qd, after = self._jump(inertia, touching, before, e)
-        # Impacts that are followed by flights below rounding are the last ones
+        # Impacts that are followed by flights that are none are the last ones
         a = self._lowering(inertia, touching, qd, after)
         last = [k for k, i in enumerate(touching) if a[i] > 0.0 and before[k] < 0.0 and e[k] > 0.0]
         if last:
@@ -418,13 +418,12 @@ class Transitions:
         return p, *jumped(inertia, qd, change, touching, before, share * e, p, law)
 
     def _lowering(self, inertia, touching, qd, rates):
-        """Decelerations (count,) of the gaps that open and close again within rounding of the gap; zero of others."""
+        """Decelerations (count,) of the gaps that open to flights that are none and close again; zero of others."""
         opening = np.zeros(self.gaps.count, bool)
         opening[touching] = rates[touching] > 0.0
         if not opening.any():
             return np.zeros(self.gaps.count)
         resting = [i for i in touching if rates[i] == 0.0]
         a = -contact_state(inertia, resting, qd).accelerations
-        rounding, elastic = self._heights(inertia), self.gaps.restitution == 1.0
-        rounding[elastic] = NEGLIGIBLE * self.gaps.lengths(self.length)[elastic]  # flights that would never get lower
-        return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * rounding), a, 0.0)
+        height = FLIGHT * self.gaps.lengths(self.length)
+        return np.where(opening & (a > 0.0) & (rates * rates < 2.0 * a * height), a, 0.0)

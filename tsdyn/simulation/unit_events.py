@@ -4,8 +4,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..analyses.contact_rows import measure_opened, reaction_workspace
+from ..analyses.contact_rows import GapCounts, OpenGaps, find_open_gaps, measure_opened, reaction_workspace
 from ..analyses.tolerances import LEVEL
+from ..jit.kernels import resident
 from ..maths.tolerances import TINY
 from .tolerances import LOADED, REACTION_NOISE
 
@@ -26,22 +27,33 @@ class Closing:
     """
 
     def __init__(self, gaps, opened, lifted):
-        self.gaps, self.lifted = gaps, lifted
+        self.gaps, self.lifted, count = gaps, lifted, gaps.count
+        self.counts = GapCounts(rows=gaps.workspace.m)
+        self.which, self.start = np.zeros(count, int), np.zeros((4, count))
+        self._own, self._keep = resident(OpenGaps(self.counts, gaps.sign, self.which, self.start))
         self.open(opened)
+
+    @property
+    def kernel(self):
+        """The `GroupSearch.kernel` of the gaps; None where Python evaluates some of them."""
+        if self.gaps.following or self.gaps.in_python or self.lifted:
+            return None
+        return find_open_gaps, self.gaps.workspace.rows_address, self._own, self.counts.rows
 
     def open(self, opened):
         """Take other contacts that have just opened."""
-        which = [i for i in opened if i not in self.gaps.following]
-        self.which = np.array(which, int)
-        self.start = np.array([opened[i] for i in which]).reshape(-1, 4).T.copy()
+        self.counts.opened = 0
+        for i, known in opened.items():
+            if i not in self.gaps.following:
+                k = self.counts.opened
+                self.which[k], self.start[:, k], self.counts.opened = i, known, k + 1
 
     def over(self, states):
         """Values (k, count) of `States`."""
         values = self.gaps.values(states.t, states.levels, states.counted)
         for i, rate in self.gaps.following.items():
             values[:, i] = rate(states.q, states.qd)
-        if self.which.size:
-            measure_opened(states.t, self.which, self.start, values)
+        measure_opened(states.t, self.which[: self.counts.opened], self.start, values)
         if self.lifted:
             values[:, self.lifted] = self.gaps.rates(states.t, states.q, states.qd, self.lifted)
         return values

@@ -62,16 +62,7 @@ def pin(scene, a, b, place, planar=False, kind=None):
 
 
 def parallelogram(  # many arguments, by name: each makes another mechanism
-    angle=1.0,
-    rate=6.0,
-    base=2.0,
-    crank=1.0,
-    loops=1,
-    planar=False,
-    gravity=GRAVITY,
-    thin=0.01,
-    last=None,
-    heavy=2.0,
+    angle=1.0, rate=6.0, base=2.0, crank=1.0, loops=1, planar=False, gravity=GRAVITY, thin=0.01, last=None, heavy=2.0
 ):
     """Cranks side by side, turning at a rate, and couplers between them: flat, and singular, twice a turn.
 

@@ -11,20 +11,8 @@ from ..errors import InvalidArgument, TsdynError
 from ..integrators import Nystrom4
 from ..maths.tolerances import EPS
 from ..simulation.prepared_run import simulate
-from . import random_scenes
-from .findings import Finding
-from .laws import (
-    bodies_of,
-    energy_left,
-    findings,
-    is_near_singular,
-    momentum_left,
-    off_steps,
-    prepared_twice,
-    resumed_is_same,
-    same_bits,
-    saved_is_same,
-)
+from . import laws, random_scenes
+from .laws import Finding
 from .random_scenes import generate
 from .tolerances import FALL, MULTIPLE, NEAR_SINGULAR_ENDS, ROUNDED, ROUNDINGS, SHORTER, TIGHTER
 
@@ -44,7 +32,7 @@ def energy(case, solution, run):
     roundings = ROUNDINGS * EPS * np.abs(solution.potential_energy).max(initial=0.0)
 
     def left(one):
-        change, size = energy_left(one)
+        change, size = laws.energy_left(one)
         return max(change - roundings, 0.0) / (size or 1.0)
 
     return _converging("energy less work", left, case, solution, run)
@@ -53,14 +41,14 @@ def energy(case, solution, run):
 def momenta(case, solution, run):
     """Linear momentum, and angular momentum about the centroid, of a scene that nothing outside it holds or loads."""
     scene = solution.scene
-    ends = {id(body) for item in (*scene.constraints, *scene.forces) for body in bodies_of(item)}
+    ends = {id(body) for item in (*scene.constraints, *scene.forces) for body in laws.bodies_of(item)}
     if id(scene.ground) in ends or any(force.b is None for force in scene.forces):
         return []
     parts = enumerate(("linear momentum", "angular momentum"))
     return [
         found
         for i, law in parts
-        for found in _converging(law, lambda one, i=i: momentum_left(one)[i], case, solution, run)
+        for found in _converging(law, lambda one, i=i: laws.momentum_left(one)[i], case, solution, run)
     ]
 
 
@@ -92,20 +80,20 @@ def another_form(case, solution, run):
 
 def once_more(case, solution, run):
     """The same run gives the same bits; so does a prepared one, after another run of it."""
-    again = run(case), run(case, by=prepared_twice)
-    return [Finding("same bits of the same run", float(sum(not same_bits(solution, one) for one in again)), 0.0)]
+    again = run(case), run(case, by=laws.prepared_twice)
+    return [Finding("same bits of the same run", float(sum(not laws.same_bits(solution, one) for one in again)), 0.0)]
 
 
 def stopped(case, solution, run):
     """A run that is stopped, and goes on from its checkpoint, gives the same bits."""
     after = np.random.default_rng(solution.t.size).random() if contacts_of(case.scene.constraints) else 0.0
-    same = resumed_is_same(case.scene, case.span, solution, after, **case.options)
+    same = laws.resumed_is_same(case.scene, case.span, solution, after, **case.options)
     return [] if same is None else [Finding("same bits after a stop", 0.0 if same else 1.0, 0.0)]
 
 
 def saved(case, solution, run):
     """A solution that is saved and loaded has the same bits."""
-    same = saved_is_same(solution)
+    same = laws.saved_is_same(solution)
     return [] if same is None else [Finding("same bits of a file", 0.0 if same else 1.0, 0.0)]
 
 
@@ -118,7 +106,7 @@ def output_times(case, solution, run):
     off = np.abs(other.q - solution.at(t).q).max(initial=0.0) / size if other.success else np.inf
     return [
         Finding("steps with output times", float(steps), 0.0),
-        Finding("outputs within steps", float(off), off_steps(solution)),
+        Finding("outputs within steps", float(off), laws.off_steps(solution)),
     ]
 
 
@@ -186,7 +174,7 @@ def _agreeing(law, case, solution, run, options):
         one, two = run(case, **tighter), run(case, **tighter | options | _tolerances(case, options, TIGHTER))
         return _distance(case, one, two) if one.success and two.success else np.nan
 
-    rounded = NEAR_SINGULAR_ENDS if is_near_singular(solution) else ROUNDED
+    rounded = NEAR_SINGULAR_ENDS if laws.is_near_singular(solution) else ROUNDED
     return _falling(law, apart, _distance(case, solution, other), case, run, rounded)
 
 
@@ -284,7 +272,7 @@ def judge(case, others):
     solution = run_case(case)
     if not solution.success and not solution.message.strip():
         return f"{FAULT} no message", str(solution.status)
-    found = findings(solution)
+    found = laws.findings(solution)
     if solution.success:
         found += energy(case, solution, run_case) + momenta(case, solution, run_case)
         found += [one for other in others for one in other(case, solution, run_case)]

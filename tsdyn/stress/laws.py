@@ -2,6 +2,7 @@
 
 from copy import copy
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -10,31 +11,60 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..configuration.tolerances import DENSE
+from ..constraints import PlaneContact, Rope, Stop
 from ..elements.bodies import rotation_matrix, turning
 from ..elements.force import Force
 from ..elements.markers import POINT
 from ..maths.tolerances import EPS, HALF_DIGITS, NEGLIGIBLE, ROUNDING_AT_MOST, SUM_ROUNDING
 from ..model.equations import WIDTH, places, with_short_rows
+from ..model.handles import index_of
 from ..model.packed import member_of
 from ..observables.diagnostics import constraint_rows
-from ..observables.evaluate import constraint_arrays
+from ..observables.evaluate import constraint_arrays, mass_matrix
 from ..observables.reactions import touching
 from ..simulation.load import load, resume
 from ..simulation.prepared_run import Run, simulate
 from ..simulation.run_options import OF_CALL, OF_RUN, RunOptions
-from .contact_laws import energy_of_phases, impacts, unilateral
-from .findings import Finding, extent, radius_of_gyration, some
-from .tolerances import (
-    BODIES,
-    ILL_CONDITIONED,
-    NEAR_SINGULAR,
-    NEAR_SINGULAR_ENDS,
-    OUTPUTS,
-    ROUNDED,
-    ROUNDED_ROWS,
-    ROUNDINGS,
-    ROW_SHARE,
-)
+from . import tolerances as limits
+
+# What laws find, and sizes of scenes that they refer to.
+
+
+class Finding(NamedTuple):
+    """What a law found."""
+
+    law: str
+    size: float
+    limit: float
+    where: str = ""
+
+    @property
+    def broken(self):
+        """True if the size exceeds the limit, or is no number."""
+        return not self.size <= self.limit
+
+    def __str__(self):
+        where = f" ({self.where})" if self.where else ""
+        return f"{self.law}: {self.size:.2e}, at most {self.limit:.2e}{where}"
+
+
+def some(count, most):
+    """Return indices of the first, the last, and some between, `most` at most."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
+
+
+def extent(solution):
+    """Size of a scene, m: distances of the bodies from their middle at the start, and their radii of gyration."""
+    bodies = solution.scene.bodies
+    places = np.array([solution.position(body)[0] for body in bodies])
+    radii = [radius_of_gyration(body) for body in bodies]
+    return float(np.linalg.norm(places - places.mean(axis=0), axis=1).max() + max(radii, default=0.0))
+
+
+def radius_of_gyration(body):
+    """About an axis of mean inertia, times the square root of 3, m; zero of a point mass."""
+    return np.sqrt(np.trace(np.asarray(body.inertia)) / body.mass) if body.dimension == 7 else 0.0
+
 
 # A run that is stopped at a checkpoint and goes on from there; a solution that is saved and loaded.
 
@@ -71,7 +101,7 @@ def saved_is_same(solution):
         return None
     with TemporaryDirectory() as folder:
         solution.save(path := f"{folder}/run.h5")
-        loaded, times = load(path), np.linspace(*solution.t[[0, -1]], OUTPUTS)
+        loaded, times = load(path), np.linspace(*solution.t[[0, -1]], limits.OUTPUTS)
         return same_bits(solution, loaded) and same_bits(solution.at(times), loaded.at(times))
 
 
@@ -95,7 +125,7 @@ def same_bits(one, two):
 
 def motors(solution):
     """The angle of a motor, and of the joint that it drives, is the one prescribed, turns included."""
-    handles, at = solution.handles, some(solution.t.size, OUTPUTS)
+    handles, at = solution.handles, some(solution.t.size, limits.OUTPUTS)
     driven = [(one.motor.item, one.joint.item, one.place - one.joint.first) for one in handles.driven]
     driven += [(row.item, row.item, 0) for row in handles.rows]
     for motor, item, i in driven if solution.success else ():
@@ -103,7 +133,7 @@ def motors(solution):
             angle = solution.angle(item)[at].reshape(len(at), -1)[:, i]
             wanted = np.array([motor.angle.value(t)[0] for t in solution.t[at]])
             size = float((np.abs(angle - wanted) / (1.0 + np.abs(wanted))).max())
-            yield Finding("angles of motors", size, ROW_SHARE, item.title)
+            yield Finding("angles of motors", size, limits.ROW_SHARE, item.title)
 
 
 # Laws that hold of every run, whatever its scene: no reference solution is needed.
@@ -137,9 +167,9 @@ def constraints(solution):
     """
     if not solution.success:  # its message says what broke
         return
-    at = some(solution.t.size, OUTPUTS)
+    at = some(solution.t.size, limits.OUTPUTS)
     arrays = [array[at] for array in (solution.t, solution.q, solution.qd, solution.qdd, solution._memory)]
-    floors, limit = NEGLIGIBLE / ROW_SHARE * _scales(solution), ROW_SHARE + rounding_of_places(solution)
+    floors, limit = NEGLIGIBLE / limits.ROW_SHARE * _scales(solution), limits.ROW_SHARE + rounding_of_places(solution)
     parts = [(solution.packed, arrays)]
     phases = solution._phases
     if phases is not None:  # the rows that hold
@@ -205,7 +235,7 @@ def newton_euler(solution):
     bodies = solution.scene.bodies
     if not solution.success or not bodies:
         return
-    around, picked = _neighbours(solution.scene), [bodies[i] for i in some(len(bodies), BODIES)]
+    around, picked = _neighbours(solution.scene), [bodies[i] for i in some(len(bodies), limits.BODIES)]
     found = _balances(solution, picked, around)
     if any(one.broken for one in found):
         shaken = _shaken(solution)
@@ -306,7 +336,7 @@ def rounding_of_places(solution):
     places = np.array([solution.position(body)[0] for body in bodies])
     radii = np.array([radius_of_gyration(body) for body in bodies])
     nearest = cKDTree(places).query(places, k=[min(2, len(bodies))])[0][:, 0]
-    return ROUNDINGS * EPS * float(_farthest(solution) / (np.median(np.maximum(nearest, radii)) or 1.0))
+    return limits.ROUNDINGS * EPS * float(_farthest(solution) / (np.median(np.maximum(nearest, radii)) or 1.0))
 
 
 def _farthest(solution):
@@ -316,7 +346,7 @@ def _farthest(solution):
 
 def _balance_limit(solution):
     """Share of the terms of a balance that may be left."""
-    return HALF_DIGITS * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + rounding_of_places(solution)
+    return HALF_DIGITS * (limits.NEAR_SINGULAR if is_near_singular(solution) else 1.0) + rounding_of_places(solution)
 
 
 def _balance(law, left, allowed, sizes, largest, limit, body):
@@ -347,10 +377,10 @@ def dense_output(solution):
     if solution._trajectory is None or not solution.success:
         return
     once = np.flatnonzero(np.append(np.diff(solution.t) > 0.0, True))  # at an event the later side
-    at = once[some(once.size, OUTPUTS)]
+    at = once[some(once.size, limits.OUTPUTS)]
     state = solution.at(solution.t[at])
     limit = off_steps(solution)
-    amplified = np.minimum(ROUNDED_ROWS * EPS / weakest_rows(solution, at) ** 2, NEAR_SINGULAR_ENDS)
+    amplified = np.minimum(limits.ROUNDED_ROWS * EPS / weakest_rows(solution, at) ** 2, limits.NEAR_SINGULAR_ENDS)
     rounding = ROUNDING_AT_MOST * EPS * np.abs(solution.t).max()  # of an instant
     for name, rate in (("q", "qd"), ("qd", "qdd")):
         given, change = getattr(solution, name)[at], rounding * np.abs(getattr(solution, rate)[at])
@@ -376,13 +406,137 @@ def weakest_rows(solution, at):
 def off_steps(solution):
     """How far dense output may be off the ends of steps, relative to the coordinates."""
     near = SUM_ROUNDING * _farthest(solution) / (extent(solution) or 1.0)
-    return ROUNDED * (NEAR_SINGULAR if is_near_singular(solution) else 1.0) + near
+    return limits.ROUNDED * (limits.NEAR_SINGULAR if is_near_singular(solution) else 1.0) + near
 
 
 def is_near_singular(solution):
     """Whether a run passes, or begins at, a singular configuration."""
     condition = solution.charts.condition
-    return solution.stats.steps_near_singular > 0 or not np.nanmax(condition, initial=0.0) < ILL_CONDITIONED
+    return solution.stats.steps_near_singular > 0 or not np.nanmax(condition, initial=0.0) < limits.ILL_CONDITIONED
+
+
+# Contacts, stops and ropes: what holds between events, and across them.
+
+
+def unilateral(solution):
+    """No contact penetrates or pulls, and an open one has no reaction: at outputs and between them."""
+    if solution._phases is None or solution._trajectory is None:
+        return
+    lam = solution.multipliers
+    times = np.unique(
+        np.append(solution.t[some(solution.t.size, limits.OUTPUTS)], np.linspace(*solution.t[[0, -1]], limits.OUTPUTS))
+    )
+    states, size = solution.at(times), _size(solution)
+    loads = (body.mass * np.linalg.norm(solution.acceleration(body), axis=1) for body in solution.scene.bodies)
+    largest = max(np.abs(lam).max(initial=0.0), *(load.max(initial=0.0) for load in loads)) or 1.0
+    for contact, rows in _contacts(solution.packed):
+        limit = limits.PENETRATED * (1.0 if _is_angle(contact) else size)
+        push = np.stack([-side.sign * lam[:, row] for side, row in zip(contact.sides, rows, strict=True)])
+        is_open = _gap(contact, solution) > limit
+        yield Finding("penetration", float(-_gap(contact, states).min()), limit, contact.name)
+        yield Finding("reactions that pull", float(-push.min() / largest), HALF_DIGITS, contact.name)
+        yield Finding("reactions of open contacts", float(np.abs(push[:, is_open]).max(initial=0.0)), 0.0, contact.name)
+
+
+def impacts(solution):
+    """What an impact changes are the momenta of its impulses, and of those of the bilateral constraints."""
+    contacts = [] if solution._phases is None else list(_contacts(solution.packed))
+    if not contacts:
+        return
+    system, fastest = solution.packed.system, np.abs(solution.qd).max(axis=0)
+    lever = np.where(turning(system.bodies, fastest.size), 1.0 / _size(solution), 1.0)  # momenta as of positions
+    rows = [row for contact, own in contacts for row in (*own, *_slips(contact, own))]
+    before, after = _events(solution)
+    hit = [k for k, i in enumerate(before) if any(t == solution.t[i] for t, *_ in solution.impulses)]
+    for k in np.array(hit, int)[some(len(hit), limits.IMPACTS)] if hit else ():
+        i, j = before[k], after[k]
+        q, t = solution.q[i], solution.t[i]
+        M, Phi_q = lever[:, None] * mass_matrix(system, q), lever * constraint_arrays(system, q, solution.qd[i], t)[1]
+        change = M @ (solution.qd[j] - solution.qd[i])
+        for contact, own in contacts:
+            found = [p for at, name, p in solution.impulses if (at, name) == (t, contact.name)]
+            nearest = int(np.argmin([abs(gap[i]) for gap in _gaps(contact, solution)]))
+            change = change - contact.sides[nearest].sign * Phi_q[own[nearest]] * sum(found)
+            if found and _slips(contact, own):
+                slips, P = Phi_q[_slips(contact, own)], sum(p.tangential for p in found)
+                change = change - slips.T @ (_directions(solution.packed, contact, slips) @ P)
+        B = np.delete(Phi_q, rows, axis=0)
+        left = change - B.T @ np.linalg.lstsq(B.T, change, rcond=None)[0]
+        share = np.abs(left).max() / ((np.abs(M) @ fastest).max() or 1.0)
+        yield Finding("momenta at an impact", float(share), limits.IMPACTED, f"t = {t:.9g} s")
+
+
+def energy_of_phases(left, solution):
+    """The largest change of energy less work `left` (k,) within a phase, and its largest gain at an event; J."""
+    numbers, (before, after) = solution._phase_of_rows, _events(solution)
+    within = max((np.ptp(left[numbers == number]) for number in np.unique(numbers)), default=0.0)
+    return float(max(within, (left[after] - left[before]).max(initial=0.0)))
+
+
+def _events(solution):
+    """First and last outputs of each instant that outputs have more than once."""
+    _, first, count = np.unique(solution.t, return_index=True, return_counts=True)
+    twice = count > 1
+    return first[twice], first[twice] + count[twice] - 1
+
+
+def _contacts(packed):
+    """Yield the contacts of a packed scene, and the rows of their gaps."""
+    for member in packed.members:
+        if getattr(member.constraint, "unilateral", False):
+            yield member.constraint, [member.rows.start + i for i in range(len(member.constraint.sides))]
+
+
+def _slips(contact, own):
+    """The rows of the slips of a contact with friction, which follow that of its gap."""
+    return [own[0] + 1, own[0] + 2] if getattr(contact, "has_friction", False) else []
+
+
+def _directions(packed, contact, slips):
+    """Directions (2, 3) of slips, ground frame, from their rows (2, n) of Phi_q."""
+    body, sign = (contact.a, 1.0) if contact.a.dimension else (contact.b, -1.0)
+    at = packed.system.bodies[index_of(packed, body), 0]
+    return sign * slips[:, at : at + 3]
+
+
+def _size(solution):
+    q = solution.q[:, ~turning(solution.system.bodies, solution.q.shape[1])]
+    return max(extent(solution), float(np.abs(q).max(initial=0.0))) or 1.0
+
+
+def _is_angle(contact):
+    return isinstance(contact, Stop) and contact.sides[0].joint is not None
+
+
+def _gap(contact, states):
+    """The least gap (k,) of a contact."""
+    return np.min(_gaps(contact, states), axis=0)
+
+
+def _gaps(contact, states):
+    """Gaps (sides, k) of a contact, m or rad, from what a user measures."""
+    if isinstance(contact, Stop):
+        x = (states.angle if _is_angle(contact) else states.displacement)(contact.joint)
+        bounds = (contact.lower, 1.0), (contact.upper, -1.0)
+        return [sign * (x - bound) for bound, sign in bounds if bound is not None]
+    if isinstance(contact, Rope):
+        ends = [_place(states, body, s) for body, s in contact.points]
+        return [contact.length - sum(np.linalg.norm(b - a, axis=-1) for a, b in pairwise(ends))]
+    kind = "point" if isinstance(contact, PlaneContact) else "center"
+    s_a, s_b = (getattr(contact, f"{kind}_{x}") for x in "ab")
+    d, radius = _place(states, contact.a, s_a) - _place(states, contact.b, s_b), getattr(contact, "radius_a", 0.0)
+    if contact.normal_b is not None:
+        return [(d * _turned(states, contact.b, contact.normal_b)).sum(axis=-1) - radius]
+    away = np.linalg.norm(d, axis=-1)
+    return [contact.radius_b - radius - away if contact.inside else away - radius - contact.radius_b]
+
+
+def _place(states, body, s):
+    return np.asarray(s, float) if body.dimension == 0 else states.position(body, point=s)
+
+
+def _turned(states, body, s):
+    return np.asarray(s, float) if body.dimension == 0 else states.rotation(body) @ np.asarray(s, float)
 
 
 LAWS = (finite, constraints, newton_euler, dense_output, motors, unilateral, impacts)
@@ -423,6 +577,6 @@ def momentum_left(solution):
     size = (masses @ speeds).max()
     spread = np.linalg.norm(places - centre, axis=2)
     turning = (masses @ (spread * speeds)).max() + np.abs(L).max()
-    rounding = ROUNDINGS * EPS * size * np.abs(places).max()  # of moments about the origin
+    rounding = limits.ROUNDINGS * EPS * size * np.abs(places).max()  # of moments about the origin
     turned = max(np.abs(L - L[0]).max() - rounding, 0.0)
     return float(np.abs(drift).max() / (size or 1.0)), float(turned / (turning or 1.0))

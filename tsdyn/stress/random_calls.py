@@ -89,22 +89,7 @@ def world():
 def junk(rng, w):
     """Anything."""
     numbers = (0, -1, 3, 10**400, -2.5, 1e-320, 1e308, -1e308, np.nan, np.inf, -np.inf, 1j, np.float32(2), np.int8(3))
-    others = (
-        None,
-        True,
-        False,
-        "text",
-        "",
-        b"x",
-        object(),
-        int,
-        ...,
-        slice(3),
-        Scene,
-        Status.SUCCESS,
-        print,
-        len,
-    )
+    others = (None, True, False, "text", "", b"x", object(), int, ..., slice(3), Scene, Status.SUCCESS, print, len)
     groups = ((), [], {}, set(), {"a": 1}, (1, 2), (1, 2, 3), (0, 0, 0), (np.nan, 0, 1), (1e308, 1e308, 1e308))
     ragged = ([1, [2, 3]], ["a", "b", "c"], (None, 1, 2), range(3), iter([1, 2, 3]), types.SimpleNamespace())
     arrays = (np.zeros(3), np.ones(7), np.zeros((3, 3)), np.eye(3), np.full((3, 3), np.nan), np.ones((2, 3, 4)))

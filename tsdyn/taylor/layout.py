@@ -1,5 +1,6 @@
 """The Taylor workspace: its memory layout, that of forces and friction; parts of a scene without series."""
 
+from functools import lru_cache
 from itertools import groupby
 from typing import NamedTuple
 
@@ -532,6 +533,10 @@ def _motions(graph, packed, orders, places, constraints):
     return records(MotionSeries, rows)
 
 
+PATTERNS = 1024  # that are kept, of classes with their numbers
+NO_MASK = (None,) * 4
+
+
 def masks(graph, packed):
     """Write into the graph's table which markers' columns vary along a motion, and which are on the ground.
 
@@ -539,32 +544,30 @@ def masks(graph, packed):
     constant. So do columns that the primitive's own series leaves constant in a random motion. Returns how many markers
     have constant columns.
     """
-    constant, lengths = 0, graph.bodies[:, 1]
+    constant, lengths, known = 0, graph.bodies[:, 1].tolist(), packed.derived.masks
     for row, (kind, members) in zip(graph.kinds, instances(packed, graph), strict=True):
-        motions, patterns, series = {}, {}, twin(kind.series)
         for i, (constraint, par) in enumerate(members):
-            entry = graph.table[row.table + i * INTS :][:INTS]
-            # Directions of bodies that never turn are like those of the ground
-            bodies = [constraint.body_of(marker) for marker in kind.markers]
-            length = [0 if isinstance(body, Ground) else lengths[index_of(packed, body)] for body in bodies]
-            grounded = tuple(
-                isinstance(body, Ground) or (size == STILL and marker.code != POINT)
-                for marker, body, size in zip(kind.markers, bodies, length, strict=True)
-            )
-            key = grounded, (*Motion.numbers(par), *[0.0] * kind.memory)
-            if key not in patterns:
-                if grounded not in motions:
-                    # The first coefficients of x, those of the ground constant
-                    x = np.random.default_rng(0).normal(size=(4, len(grounded), 3))
-                    x[1:, np.array(grounded)] = 0.0
-                    motions[grounded] = x.reshape(4, -1).tolist()
-                patterns[key] = _mask(kind, series, key[1], grounded, motions[grounded])
-            # Instances with the same numbers have the same pattern
-            mask = patterns[key]
-            mask |= sum(1 << (GROUND + j) for j, marker in enumerate(kind.markers) if marker.body not in ("a", "b"))
-            entry[MASK] = mask | sum(int(size != 7) << (UNTURNED + j) for j, size in enumerate(length))
-            constant += len(kind.markers) - (mask & ((1 << GROUND) - 1)).bit_count()
+            ends = constraint.a, constraint.b, *constraint.others
+            sizes = tuple([0 if isinstance(body, Ground) else lengths[index_of(packed, body)] for body in ends])
+            which, turned, mask, still = known.get(id(constraint), NO_MASK)
+            if which is not constraint or turned != sizes:
+                mask, still = _mask_of(constraint, (*Motion.numbers(par), *[0.0] * kind.memory), sizes)
+                known[id(constraint)] = constraint, sizes, mask, still
+            graph.table[row.table + i * INTS + MASK] = mask
+            constant += still
     return constant
+
+
+def _mask_of(constraint, par, sizes):
+    """The mask of an instance, and how many markers have constant columns; sizes: of its bodies, 0 of the ground."""
+    kind = type(constraint)
+    sizes = [sizes["ab".index(where) if where in ("a", "b") else where] for where in (m.body for m in kind.markers)]
+    # Directions of bodies that never turn are like those of the ground
+    pairs = zip(kind.markers, sizes, strict=True)
+    mask = _pattern(kind, par, tuple([size == 0 or (size == STILL and m.code != POINT) for m, size in pairs]))
+    still = len(kind.markers) - (mask & ((1 << GROUND) - 1)).bit_count()
+    mask |= sum(1 << (GROUND + j) for j, marker in enumerate(kind.markers) if marker.body not in ("a", "b"))
+    return mask | sum(int(size != 7) << (UNTURNED + j) for j, size in enumerate(sizes)), still
 
 
 def masks_of(graph, i):
@@ -586,7 +589,13 @@ def with_ground_contacts(graph, kinds):
     return graph
 
 
-def _mask(kind, series, par, grounded, motion):
+@lru_cache(PATTERNS)
+def _pattern(kind, par, grounded):
+    """The mask of instances of a class with the same numbers; grounded: which of their markers never move."""
+    # The first coefficients of x, those of the ground constant
+    x = np.random.default_rng(0).normal(size=(4, len(grounded), 3))
+    x[1:, np.array(grounded)] = 0.0
+    motion, series = x.reshape(4, -1).tolist(), twin(kind.series)
     prescribed = np.random.default_rng(1).normal(size=(len(kind.quantities()), len(motion)))
     scratch = np.concatenate((np.zeros((kind.slots, len(motion))), prescribed))
     varies = np.zeros(len(motion[0]), bool)

@@ -14,7 +14,7 @@ from ..formulations.accelerations import (
     refine_accelerations,
 )
 from ..formulations.locked_orientations import moving_parts
-from ..jit.kernels import callback, entry, kernel, stack
+from ..jit.kernels import callback, kernel, matrix, stack, vector
 from ..jit.simd import add, cross, first, four, put, second, splat, third
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import LAST_PLACE
@@ -30,7 +30,7 @@ from ..rows.interface import (
     weigh_bodies,
     with_all_rows,
 )
-from ..runs.dense_output import READ, TrajectoryReading, put_state, recall
+from ..runs.dense_output import READ, SAME_STEP, TrajectoryReading, put_state, recall
 from ..runs.run_memory import Memory
 from ..workspaces import B_DATA, B_START, lay_out, load_run, plain_work, words
 from .coefficients import change, exact_product, inverses, put_product, run_forces, run_loops, spin, turn, turn_ahead
@@ -235,38 +235,28 @@ def accelerate_with_friction_here(context, t, h):
     return 0 if found else JAMMED
 
 
-@callback("pdd")
-def leave_accelerations(context, t, h):
-    """In place of `accelerate_here`, where nobody asks for qdd."""
-    return 0
-
-
 # Dense output of a Taylor run: the series of a step, evaluated and projected onto the manifold.
 
 
-@entry(*READ)
-def read_series(context, run, t, rows, blocks, charts, points, out):
-    """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows]; as runs.dense_output.read. Status."""
-    c, r = load_series(context), load_run(run)
-    w, x = c.work, c.expansion
-    for i in range(t.size):
-        # A block is the whole series of a step, which serves for all times in the step
-        block = blocks[rows[i]]
-        data = block[B_DATA:]
+@callback(READ)
+def read_series(context, run, size, block, begun, width, point, t, place, whole, out):  # eleven: as of the type
+    """out (3, n): q, qd, qdd at t within the step of a block; as runs.dense_output.read. Status."""
+    c, r, step = load_series(context), load_run(run), vector(block, size)
+    w, x, data = c.work, c.expansion, step[B_DATA:]
+    # A block is the whole series of a step, which serves for all times in the step
+    if place != SAME_STEP:
         x.order.top = int(data[0])
-        copy(data[1:][: w.q.size], w.q)
-        if i == 0 or rows[i] != rows[i - 1]:
-            copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
-        # Poses of the start are where Euler parameters are followed from
-        recall(c.system, block)
-        set_floor(c, w.q)
-        place_bodies(c.graph.bodies, w.q, c.tangent.poses)
-        keep_start(c.graph, c.tangent.poses, x.start)
-        status = state_within(context, c, r.kernels, t[i], t[i] - block[B_START])
-        if status != 0:
-            return status
-        put_state(w, out[i])
-    return 0
+        copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
+    # Poses of the start are where Euler parameters are followed from
+    copy(data[1:][: w.q.size], w.q)
+    recall(c.system, step)
+    set_floor(c, w.q)
+    place_bodies(c.graph.bodies, w.q, c.tangent.poses)
+    keep_start(c.graph, c.tangent.poses, x.start)
+    status = state_within(context, c, r.kernels, t, t - step[B_START], whole == 1)
+    if status == 0:
+        put_state(w, matrix(out, 3, w.q.size))
+    return status
 
 
 def reading_workspace(system, graph, orders, size):
@@ -420,9 +410,9 @@ def _reading(packed, series, highest):
 
     system, graph = packed.system, series.graph
     if packed.derived.switched is None:
-        return TrajectoryReading(read_series, workspace, system, 0, 16, leave_accelerations)
+        return TrajectoryReading(read_series, workspace, system, 0, 16)
     off, idle = np.flatnonzero(np.isin(graph.row, redundant_rows(packed))), series.idle.setdefault(highest, [])
-    return TrajectoryReading(read_series, workspace, system, 0, 16, leave_accelerations, begin, idle)
+    return TrajectoryReading(read_series, workspace, system, 0, 16, begin=begin, idle=idle)
 
 
 def expanding(rough, far):

@@ -511,8 +511,11 @@ def is_singular(c, status):
 
 
 @kernel
-def state_within(context, c, kernels, t, h):
-    """q, qd, qdd at t, h after the series' origin, which leaves the selection of rows as it is. Status."""
+def state_within(context, c, kernels, t, h, whole):
+    """q, qd, qdd at t, h after the series' origin, which leaves the selection of rows as it is. Status.
+
+    whole: whether accelerations are asked for; else they are those of another state.
+    """
     f = c.tangent
     save_selection(f)
     # Next to a singular configuration accelerations are those of the series
@@ -520,7 +523,7 @@ def state_within(context, c, kernels, t, h):
     if is_singular(c, status):
         return_to_selection(f)
         status = call_reach(kernels.pass_singular, context, t, h)
-    elif status == 0:
+    elif status == 0 and whole:
         status = call_reach(kernels.accelerate_here, context, t, h)
     return_to_selection(f)
     return status

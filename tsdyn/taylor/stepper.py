@@ -440,7 +440,7 @@ def _record_within(context, c, r, log, t0, t1):
     w = c.work
     while is_wanted_before(r, log, t1):
         t = log.t_eval[r.numbers.next_eval]
-        status = state_within(context, c, r.kernels, t, t - t0)
+        status = state_within(context, c, r.kernels, t, t - t0, True)
         if status != 0:
             return status
         record(r, log, t, w.q, w.qd, w.qdd)

@@ -55,11 +55,7 @@ def driven_pendulum():
     body = scene.add_body(
         1.0, (0.02, 0.03, 0.04), position=(0.5, 0.0, 0.1), velocity=(0.4, 0.6, 0.0), angular_velocity=(1.0, 2.0, -1.0)
     )
-    length = (
-        lambda t: 0.5 + 0.1 * np.sin(4.0 * t),
-        lambda t: 0.4 * np.cos(4.0 * t),
-        lambda t: -1.6 * np.sin(4.0 * t),
-    )
+    length = (lambda t: 0.5 + 0.1 * np.sin(4.0 * t), lambda t: 0.4 * np.cos(4.0 * t), lambda t: -1.6 * np.sin(4.0 * t))
     scene.add(Distance(body, scene.ground, point_a=(0.0, 0.0, -0.1), length=length))
     scene.assemble()
     return scene

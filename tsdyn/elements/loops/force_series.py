@@ -23,7 +23,7 @@ Of friction in proportion to a normal load, see friction.py.
 
 from ...jit.kernels import ANY, data_of, integers, kernel, matrix, part, stack, vector
 from ...jit.predicates import some, whole
-from ...jit.simd import add, cross, fma, four, lanes, put, splat, times
+from ...jit.simd import add, cross, fma, four, get, lanes, put, splat, times
 from ...motions.tracing import LENGTH, ROWS, T, call_order
 from ..markers import PARAMETERS, POINT, TURN
 from .constraint_rows import POSE, P, turned
@@ -60,9 +60,9 @@ def _turning(bodies, at, orders, k):
     f = splat(0.0)
     for j in range(k + 1):
         c, o = at + 12 * j, at + S_OMEGA * orders + 4 * (k - j)
-        f = fma(four(bodies, c), splat(bodies[o]), f)
-        f = fma(four(bodies, c + 4), splat(bodies[o + 1]), f)
-        f = fma(four(bodies, c + 8), splat(bodies[o + 2]), f)
+        f = fma(four(bodies, c), splat(get(bodies, o)), f)
+        f = fma(four(bodies, c + 4), splat(get(bodies, o + 1)), f)
+        f = fma(four(bodies, c + 8), splat(get(bodies, o + 2)), f)
     return f
 
 

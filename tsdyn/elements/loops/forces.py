@@ -12,6 +12,7 @@ from .template import (
     AT,
     CODES,
     DIMENSION,
+    FRICTIONAL,
     KEPT,
     MARKERS,
     OWNERS,
@@ -125,6 +126,8 @@ def forces(count, stride, table, reals, q, qd, t, out):
     x, xd, f = stack(SIZE), stack(SIZE), stack(SIZE)
     for i in range(count):
         own, real = table[i * FORCE_INTS : (i + 1) * FORCE_INTS], reals[i * stride : (i + 1) * stride]
+        if FRICTIONAL and real[stride - 1] == 0.0:
+            continue  # without a normal load
         # f = law(x, xd), pulled back: Q += W^T f
         force_markers(q, qd, own, real, x, xd)
         for c in range(SIZE):

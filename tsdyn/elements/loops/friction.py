@@ -1,7 +1,7 @@
 """Kernels of one friction for the solver: force for unit normal load, normal load, their Taylor series."""
 
 from ...jit.kernels import ANY, caller, complex_stack, data_of, integers, kernel, matrix, part, stack, stack2, vector
-from ...maths.recurrences import product
+from ...maths.recurrences import product, scaled
 from ...maths.tolerances import COMPLEX_STEP
 from ...maths.vectors import matrix_a
 from ..markers import PARAMETERS
@@ -77,8 +77,10 @@ def known_friction(k, wide, x, par, ends, kept, s, forces, f):
     # f_k = sum_j g_j N_{k-j}
     for m in range(MARKERS):
         if ends[m] >= 0.0:
-            for c in range(STARTS[m], STARTS[m] + (4 if CODES[m] == PARAMETERS else 3)):
-                f[c] = product(s[SLOTS + c], s[N], k)
+            c = STARTS[m]
+            f[c], f[c + 1], f[c + 2] = scaled(s, SLOTS + c, N, k)
+            if CODES[m] == PARAMETERS:
+                f[c + 3] = product(s[SLOTS + c + 3], s[N], k)
 
 
 @part

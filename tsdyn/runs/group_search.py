@@ -1,0 +1,320 @@
+"""The search of a step for the first zero of event functions that a kernel evaluates: one call a step."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..jit.kernels import Record, caller, data_of, entry, kernel, loader, matrix, resident
+from ..maths.dense_linalg import copy, is_finite
+from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
+from ..maths.tolerances import SHORTEST_INTERVAL
+from .dense_output import OTHER_CHART, SAME_STEP, read_one
+from .tolerances import ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTENED, SHORTLY, SHOWN_TURN
+
+# Newton's method for the function of a survey that crosses zero first.
+
+GO_ON, ARRIVED, UNSURE = 0, 1, 2
+
+
+@kernel
+def _move(values, marks, width, step):
+    furthest, k = -math.inf, -1
+    for j in range(values.size):
+        back = values[j] / marks[j, 3]
+        if back > furthest:
+            furthest, k = back, j
+    if k < 0:
+        return UNSURE
+    before = step[2] if k == int(step[0]) else math.inf
+    # The last digit, or rounding of the values: no step is shorter
+    size, t = abs(furthest), step[1] - furthest
+    arrived = size <= ROOT * abs(step[1]) or (size >= 0.5 * before and size < ROUGH_ROOT * width)
+    step[0], step[1], step[2] = k, t, size
+    if not marks[k, 0] <= t <= marks[k, 1]:
+        return UNSURE
+    return ARRIVED if arrived else GO_ON
+
+
+@entry("vmdv")
+def move(values, marks, width, step):
+    """One step of Newton's method, by values (m,) at its time. Return GO_ON, ARRIVED or UNSURE.
+
+    step (3,): the function, time and the last move; to be written. Where it leaves another function beyond zero, it
+    goes on with that one. marks (m, 4): since, until, roots and slopes of a `Survey`, of slope NaN where no root is
+    looked for; width: of the interval.
+    """
+    return _move(values, marks, width, step)
+
+
+# The search: samples at Chebyshev points, a survey of all functions, the first root by true values.
+
+VALUES = "ppdpp"  # of kernels of functions: two contexts, t, the state (3, n), values to be written
+call_values = caller(VALUES)
+CLEAR, FOUND = 0, 1  # and UNSURE
+
+
+class SearchNumbers(Record):
+    """Settings and results of a search."""
+
+    reader: int  # the kernel that reads states
+    values: int  # and that of the functions
+    place: int  # of the next time that is read, as of `dense_output.read`
+    found: int  # the function that is zero first
+    t: float  # when
+
+
+class SearchParts(NamedTuple):
+    """m functions, of `all` that their kernel evaluates."""
+
+    numbers: SearchNumbers
+    tables: np.ndarray  # root_isolation.kernel_tables
+    spins: np.ndarray  # int64 (bodies, 4) as a vector: where Euler parameters are
+    which: np.ndarray  # int64 (m,)  of all functions
+    falls: np.ndarray  # (m,)  direction of the changes that end the run, or zero
+    value: np.ndarray  # (m,)  at the end of the last step
+    noise: np.ndarray  # (m,)  rounding of values
+    odd: np.ndarray  # int64 (m,)  1 where a `Track` knows more than the value
+    all: np.ndarray  # values
+    samples: np.ndarray  # ((LARGEST + 4) m,)
+    left: np.ndarray  # int64 (m,)  1 of those that the survey is of
+    fine: np.ndarray  # (2, points of the largest grid)
+    marks: np.ndarray  # (m, 4)  of a survey
+    step: np.ndarray  # (3,)  of `move`
+    state: np.ndarray  # (3, n)  the last that was read
+    beside: np.ndarray  # int64 (m,)  1 of those that vanish with the one that is found
+
+
+_EXAMPLE = SearchParts(
+    SearchNumbers(), np.zeros(0), *np.zeros((2, 0), int), *np.zeros((3, 0)), np.zeros(0, int),
+    *np.zeros((2, 0)), np.zeros(0, int), *np.zeros((2, 0, 0)), np.zeros(0), np.zeros((0, 0)), np.zeros(0, int),
+)  # fmt: skip
+load_search = loader(_EXAMPLE)
+
+
+class StepIn(NamedTuple):
+    """Where the states of a step are read, and what functions are evaluated by."""
+
+    context: int  # of the reader
+    run: int
+    block: np.ndarray
+    charts: np.ndarray
+    points: np.ndarray
+    first: int  # contexts of the functions
+    second: int
+    t1: float  # s, its end
+    now: np.ndarray  # (3, n)  the state there
+
+
+@kernel
+def _evaluate(s, first, second, t, state, out):
+    """Values (m,) of the functions at t and a state (3, n)."""
+    call_values(s.numbers.values, first, second, t, state, s.all)
+    for j in range(out.size):
+        out[j] = s.all[s.which[j]]
+
+
+@kernel
+def _evaluate_within(s, step, t, whole, out):
+    """The same at a time within the step; False if there is no state."""
+    place = s.numbers.place
+    s.numbers.place = SAME_STEP
+    read = read_one(
+        s.numbers.reader, step.context, step.run, step.block, step.charts, step.points, t, place, whole, s.state
+    )
+    if read != 0:
+        return False
+    _evaluate(s, step.first, step.second, t, s.state, out)
+    return True
+
+
+@kernel
+def _turn_rate(spins, qd):
+    """The fastest turn of a body, rad/s."""
+    fastest = 0.0
+    for b in range(spins.size // 4):
+        square = 0.0
+        for i in range(4 * b, 4 * b + 4):
+            square += qd[spins[i]] * qd[spins[i]]
+        fastest = max(fastest, square)
+    return 2.0 * math.sqrt(fastest)
+
+
+@kernel
+def _survey(s, step, t0, t1, turning):
+    """The degree that resolves the functions on [t0, t1], with the samples of it, and marks; 0 if there is no state.
+
+    turning: of a body, rad/s.
+    """
+    m, known, N = s.value.size, 0, LOWEST
+    while turning * (t1 - t0) > SHOWN_TURN * N and N < LARGEST:
+        N *= 2
+    while True:
+        table = kernel_table(s.tables, N)
+        samples, last, check = matrix(data_of(s.samples), N + 2, m), known, N + 1
+        while table.points[check] != CHECK:
+            check -= 1
+        # Downwards, since samples of half the degree move up
+        for i in range(N + 1, 0, -1):
+            if known > 0 and (i == check or (i if i < check else i - 1) % 2 == 0):
+                copy(samples[last], samples[i])
+                last -= 1
+                continue
+            t = t1 if i == N + 1 else t0 + 0.5 * (t1 - t0) * (table.points[i] + 1.0)
+            if t == step.t1:
+                _evaluate(s, step.first, step.second, t, step.now, samples[i])
+            elif not _evaluate_within(s, step, t, 0, samples[i]):
+                return 0
+        copy(s.value, samples[0])
+        size = table.fine.size
+        fine = matrix(data_of(s.fine), 2, size)
+        grid = table.values, table.errors, table.widened, table.fine
+        if look(*grid, samples, s.noise, t0, t1, fine, s.marks) != 0 or N == LARGEST:
+            return N
+        N, known = 2 * N, N + 1
+
+
+@kernel
+def _mark(s, samples):
+    """Leave slopes to the functions that cross zero once, and no time to those clear of it; whether all are clear."""
+    clear = True
+    for j in range(s.value.size):
+        most = 0.0
+        for i in range(samples.shape[0]):
+            most = max(most, abs(samples[i, j]))
+        # Values of rounding alone have no zero
+        if s.noise[j] > 0.0 and most <= s.noise[j]:
+            s.marks[j, 0] = math.inf
+        is_clear = s.left[j] == 0 or s.marks[j, 0] == math.inf
+        clear = clear and is_clear
+        if is_clear or not (s.marks[j, 1] > s.marks[j, 0] and s.falls[j] * s.value[j] < 0.0):
+            s.marks[j, 3] = math.nan
+    return clear
+
+
+@kernel
+def _first_root(s, step, values, width):
+    """Write the first root into s.step: ARRIVED or UNSURE. values (m,): scratch."""
+    s.step[0], s.step[1], s.step[2] = -1.0, math.inf, math.inf
+    for j in range(values.size):
+        if s.marks[j, 3] == s.marks[j, 3] and s.marks[j, 2] < s.step[1]:
+            s.step[0], s.step[1] = j, s.marks[j, 2]
+    for _ in range(ROOT_STEPS if s.step[0] >= 0.0 else 0):
+        if not _evaluate_within(s, step, s.step[1], 0, values):
+            break
+        found = _move(values, s.marks, width, s.step)
+        if found != GO_ON:
+            return found
+    return UNSURE
+
+
+@kernel
+def _find_beside(s, step, t0, t, first, value):
+    """Mark the functions that vanish at t, too, by how fast they fall; False if there is no state. Two of scratch."""
+    before, others = t - SHORTLY * (t - t0), value.size > 1
+    if others and not _evaluate_within(s, step, before, 0, first):
+        return False
+    if not _evaluate_within(s, step, t, 1, value):
+        return False
+    for j in range(value.size if others else 0):
+        falls = value[j] < first[j] and value[j] * (t - before) <= SAME_INSTANT * abs(t) * (first[j] - value[j])
+        s.beside[j] = 1 if falls and j != s.numbers.found else 0
+    return True
+
+
+@entry("pppppddmmvmm")
+def search_step(search, context, run, first, second, t0, t1, before, now, block, charts, points):  # twelve: a step
+    """Search a step for the first zero: CLEAR, FOUND, or UNSURE, after which nothing has changed.
+
+    context, run: of the reader; first, second: of the functions; before, now (3, n): states at t0 and t1. Of a zero the
+    function and the time are in the `SearchNumbers`, the state and those that vanish beside in the `SearchParts`.
+    """
+    s, step = load_search(search), StepIn(context, run, block, charts, points, first, second, t1, now)
+    numbers, m, end, until = s.numbers, s.value.size, t1, t1
+    turning = max(_turn_rate(s.spins, before[1]), _turn_rate(s.spins, now[1]))
+    scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
+    numbers.place, numbers.found = OTHER_CHART, -1
+    for j in range(m):
+        s.left[j] = 1
+        if s.odd[j] != 0:
+            return UNSURE
+    while True:
+        degree = _survey(s, step, t0, until, turning)
+        if degree == 0:
+            return UNSURE
+        samples = matrix(data_of(s.samples), degree + 2, m)
+        clear = _mark(s, samples)
+        if clear and until == end:
+            break
+        if clear or _first_root(s, step, scratch[0], until - t0) != ARRIVED:
+            # A zero soon after the start is found on a short interval
+            until = t0 + SHORTENED * (until - t0)
+            if clear or not until - t0 > SHORTEST_INTERVAL * max(abs(t0), t1 - t0):
+                return UNSURE
+            continue
+        # What was unclear may be clear up to there
+        numbers.found, end, until, unclear = int(s.step[0]), s.step[1], s.step[1], False
+        for j in range(m):
+            s.left[j] = 1 if s.left[j] == 1 and s.marks[j, 0] < end and s.marks[j, 3] != s.marks[j, 3] else 0
+            unclear = unclear or s.left[j] == 1
+        if not unclear:
+            break
+    if numbers.found < 0:
+        copy(samples[degree + 1], s.value)
+        return CLEAR
+    numbers.t = end
+    return FOUND if _find_beside(s, step, t0, end, scratch[0], scratch[1]) else UNSURE
+
+
+@entry("pppdmv")
+def evaluate_functions(search, first, second, t, now, out):
+    """out (m,): values at t and a state (3, n); 0 if one is not finite, else 1."""
+    _evaluate(load_search(search), first, second, t, now, out)
+    return 1 if is_finite(out) else 0
+
+
+SEARCHING = (move, search_step, evaluate_functions)
+
+
+class GroupSearch:
+    """The search of steps for the first zero of a group of functions.
+
+    Parameters
+    ----------
+    kernel : tuple
+        Of the functions: the `Callback` with the types VALUES, its contexts, and how many functions it evaluates.
+    which : list of int
+        Those of the group.
+    falls : ndarray (m,)
+        Directions of the changes that end the run.
+    known : tuple of ndarray
+        `value`, `noise` and `odd` of the `SearchParts`.
+    spins : ndarray (bodies, 4)
+        Where Euler parameters are among n coordinates.
+    n : int
+    """
+
+    def __init__(self, kernel, which, falls, known, spins, n):
+        (called, self._first, self._second, count), m = kernel, len(which)
+        self.numbers = SearchNumbers(values=called.address)
+        self.parts = SearchParts(
+            self.numbers, kernel_tables(), spins.ravel(), np.array(which, int), falls, *known, np.zeros(count),
+            np.zeros((LARGEST + 4) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)), np.zeros((m, 4)),
+            np.zeros(3), np.zeros((3, n)), np.zeros(m, int),
+        )  # fmt: skip
+        self._search, self._keep = resident(self.parts)
+
+    def at(self, t, now):
+        """Values (m,) at t and a state (3, n), and whether they are finite."""
+        out = np.empty(self.parts.value.size)
+        return out, evaluate_functions(self._search, self._first, self._second, t, now, out) == 1
+
+    def find(self, step):
+        """The number of the function that is zero first in a step, `Inside`, -1 for none; None where that is unsure."""
+        numbers, reader, (t0, t1), known = self.numbers, step.reader, (step.t0, step.t1), step.known
+        numbers.reader, context, run = reader.where
+        contexts = self._search, context, run, self._first, self._second
+        found = reader.call(search_step, *contexts, t0, t1, known[t0], known[t1], *step.steps)
+        if found == FOUND:
+            known[numbers.t] = self.parts.state.copy()
+        return None if found == UNSURE else numbers.found

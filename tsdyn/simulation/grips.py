@@ -141,8 +141,8 @@ class Halting:
 
     A slip turns by 60 degrees at v >> V; where it has turned at all when it is as slow as V, it takes its direction
     there: below AHEAD friction has the direction d, so that it ends with its own. One that hasn't been FASTER V since
-    its phase began has h = 0.49, and turns by 8 degrees at v << V: it begins, or has its direction from there. The value
-    of one that begins at rest is divided by the time since: it may turn at once.
+    its phase began has h = 0.49, and turns by 8 degrees at v << V: it begins, or has its direction from there. Where it
+    begins at rest, the value is divided by the time since: the slip may turn at once.
 
     Parameters
     ----------

@@ -75,8 +75,8 @@ MOST_AT_AN_INSTANT = 100
 # is ended. Towers with friction take some 300 for each contact until they rest.
 EVENTS_JUDGED, CREEPING = 1000, 1e3
 # Cosine of the turn of a slip since its phase began, above which the next one keeps its direction; m/s: V, the velocity
-# from which on a slip that slows down may turn less and less: the force is off by 1e-4 of its turn there, since friction
-# has one direction below a hundredth of V.
+# from which on a slip that slows down may turn less and less. Below a hundredth of V friction has one direction, so the
+# direction of the force is off by 1e-4 of the turn there.
 SAME_WAY, SLOW = 1.0 - 1e-12, 1e-4
 # rad: a slip that has turned by more takes its direction anew before it ends; reactions change by as much, of their
 # size. Velocity over V that tells it from one that begins.

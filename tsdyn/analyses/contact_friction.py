@@ -18,7 +18,7 @@ from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
-from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, STOPPED, WITHIN_BOUND
+from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, PULLS, STOPPED, WITHIN_BOUND
 
 
 def rows_of(inertia, which):
@@ -396,7 +396,8 @@ def _held(inertia, closed, grips, b, small):
     (A, a), k = _holding(inertia, closed, grips, b), len(closed)
     by = np.linalg.pinv(A, rcond=RANK_TOL**2)[:k]
     pushes = -by @ a
-    return pushes, np.maximum(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * np.abs(pushes).max(initial=0.0))
+    largest = np.abs(pushes).max(initial=0.0)
+    return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, PULLS * largest)
 
 
 def _holding(inertia, closed, grips, b):

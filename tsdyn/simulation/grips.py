@@ -16,7 +16,7 @@ from ..maths.tolerances import TINY
 from ..model.handles import index_of
 from ..observables.reactions import balancing
 from .phase_scenes import first_row_of
-from .tolerances import FASTER, PULLS, SAME_WAY, SLOW, TURNED
+from .tolerances import FASTER, SAME_WAY, SLOW, TURNED
 
 # A closed contact with friction sticks or slides. Where it sticks, all its rows hold; those of the slip of a point are
 # rows on positions, which hold it where it came to rest. Where it slides, the row of the gap holds, and a force in
@@ -93,11 +93,6 @@ class Reactions:
     def workspace(self):
         """Made at the first evaluation: the start of the phase may show that rows are redundant."""
         return reaction_workspace(self.packed, np.nan)
-
-    def pulling(self, values):
-        """The number of a contact whose reaction pulls at the start of the phase, whose `over` gives these values."""
-        N = values[: len(self.closed)]
-        return int(N.argmin()) if N.size and N.min() < -PULLS * np.abs(N).max() else None
 
     def over(self, states):
         """Values (k, closed and sticking) of states at k times."""

@@ -75,16 +75,12 @@ MOST_AT_AN_INSTANT = 100
 # is ended. Towers with friction take some 300 for each contact until they rest.
 EVENTS_JUDGED, CREEPING = 1000, 1e3
 # Cosine of the turn of a slip since its phase began, above which the next one keeps its direction; m/s: V, the velocity
-# from which on a slip that slows down may turn less and less. Below a hundredth of V friction has one direction, so the
-# direction of the force is off by 1e-4 of the turn there.
+# from which on a slip that slows down may turn less and less: the force is off by 1e-4 of its turn there, as friction
+# has one direction below a hundredth of V.
 SAME_WAY, SLOW = 1.0 - 1e-12, 1e-4
 # rad: a slip that has turned by more takes its direction anew before it ends; reactions change by as much, of their
 # size. Velocity over V that tells it from one that begins.
 TURNED, FASTER = 1e-7, 4.0
-
-# Of the largest reaction of the contacts: one that pulls by more at the start of a phase has another cause than the
-# error of an event's time.
-PULLS = 1e-6
 
 # Load of a friction over that up to which it counts as none, from which on it counts.
 LOADED = 4.0

@@ -18,7 +18,7 @@ from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
-from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, STOPPED, WITHIN_BOUND
+from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, PULLS, STOPPED, WITHIN_BOUND
 
 
 def rows_of(inertia, which):
@@ -218,7 +218,8 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     gdd = c + inertia.J @ (response @ p)
     small, carried = LEVEL * (terms + np.abs(inertia.J @ response) @ np.abs(p)), inertia.carried()
     mode = _sharing(G, b, p, mode, cones, response)
-    closed, idle, spare, grips = [], [], [], {}
+    moves, sizes = ((A @ x + y).reshape(-1, 3)[:, 1:] for A, x, y in ((G, p, b), (np.abs(G), np.abs(p), np.abs(b))))
+    closed, idle, spare, grips, begun = [], [], [], {}, {}
     for j in np.argsort(-N * np.sqrt(np.diag(G)[::3])):
         i = resting[j]
         pushes = N[j] * G[3 * j, 3 * j] > small[i] + carried[i] * (i in fired)
@@ -237,6 +238,8 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
                 grips[i] = None
             else:
                 grips[i] = inertia.along(i, -T[j] / length)
+                gain = -moves[j] @ T[j] / length
+                begun |= {i: float(gain)} if gain > EVENT_ERROR * sizes[j].max() else {}
     alone = dict(zip(resting, b.reshape(-1, 3), strict=True))
     if by_rows:
         idle += spare
@@ -245,10 +248,9 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
         closed, idle = _carried(inertia, closed, idle, grips, N, resting, fired)
     pushes, rounding = _held(inertia, closed, grips, alone, small + carried)
     slack = slack_of(inertia, closed, pushes, small)
-    moves = (G @ p + b).reshape(-1, 3)[:, 1:]
     gains = {resting[j]: float(moves[j] @ d[j]) for j in np.flatnonzero(slides)}
     rows = _independent(inertia, closed, grips)
-    found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains)
+    found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains, begun)
     return found, bool((pushes < -rounding).any())
 
 
@@ -394,7 +396,8 @@ def _held(inertia, closed, grips, b, small):
     (A, a), k = _holding(inertia, closed, grips, b), len(closed)
     by = np.linalg.pinv(A, rcond=RANK_TOL**2)[:k]
     pushes = -by @ a
-    return pushes, np.maximum(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * np.abs(pushes).max(initial=0.0))
+    largest = np.abs(pushes).max(initial=0.0)
+    return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, PULLS * largest)
 
 
 def _holding(inertia, closed, grips, b):

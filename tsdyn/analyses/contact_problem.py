@@ -382,6 +382,7 @@ class ContactState(NamedTuple):
     rows: dict = MappingProxyType({})  # of closed ones that stick: which of the two rows of the slip are independent
     slack: dict = MappingProxyType({})  # of closed ones whose reactions are rounding: what these may fall below zero
     gains: dict = MappingProxyType({})  # of those that slide: what their slips gain, m/s^2
+    begun: dict = MappingProxyType({})  # the same of those that begin to slide, above rounding
 
 
 def solve_contacts(inertia, resting, qd, fired=()):

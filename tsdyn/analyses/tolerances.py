@@ -124,6 +124,9 @@ LEVEL = 1e-11
 # the two bodies is none; and a friction that slips by less than this share of the two velocities, and of what
 # accelerations have made since the start, takes part in the event of another, as if it rested.
 EVENT_ERROR = 1e-9
+# Of the largest reaction: contacts whose reactions pull by more are not closed, though rounding may explain it next to
+# singular states.
+PULLS = 1e-6
 # Share of the bound of friction that decides then: the contact slides, though its acceleration is rounding.
 WITHIN_BOUND = 1.0 - 1e-10
 # Rounding of a gap that has just opened, over its rate times the time since, from which on it is added: flights above

@@ -68,8 +68,6 @@ class Group:
         Which members vanish with the first event that was found; None where that is unknown.
     value, noise : ndarray (members,)
         At the end of the last step; rounding error of values, once measured.
-    pulling : function
-        Of the values at the start of a phase: the member whose reaction pulls, or None. None without reactions.
     """
 
     def __init__(self, over, events, numbers, spins, n):
@@ -77,7 +75,7 @@ class Group:
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
         source = getattr(over, "__self__", None)
-        known, self.pulling, kernel = (getattr(source, name, None) for name in ("noise", "pulling", "kernel"))
+        known, kernel = (getattr(source, name, None) for name in ("noise", "kernel"))
         self._least = np.zeros(len(own)) if known is None else known[self.which]
         self.value, self.noise = np.zeros(len(own)), np.zeros(len(own))
         self._odd = np.zeros(len(own), int)  # 1 where the `Track` knows more than the value

@@ -277,9 +277,7 @@ class Watch:
         again = self.tracks is not None
         self.tracks = self.tracks or [Track() for _ in self.events]
         for group in self._groups:
-            values = self._at_start(group)
-            self._demand_pushes(group, values)
-            group.begin(values)
+            group.begin(self._at_start(group))
         for i in self._single:
             track = self.tracks[i]
             track.begin(self.t, self._value(i, self.t, self.state), False)
@@ -379,14 +377,6 @@ class Watch:
             over, which = event.function.over, event.function.which
             return self._finite(i, t, float(over(self._states(np.array([t]), state[None]))[0, which]))
         return event.value(t, self._instant(t, state))
-
-    def _demand_pushes(self, group, values):
-        """Raise `EventFailed` where a reaction of the group pulls at the start of a phase."""
-        found = None if group.pulling is None else group.pulling(values)
-        if found is not None:
-            name = self.events[group.numbers[found]].name
-            text = f"The reaction of {name} would pull at t = {self.t:.9g} s, where the friction of contacts changes."
-            raise EventFailed(text, self.t, Status.CONTACT_FAILED)
 
     def _finite(self, i, t, value):
         """The value of a member of a group; raises `EventFailed`."""

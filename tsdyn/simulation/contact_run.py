@@ -486,7 +486,7 @@ class _ContactRun(Transitions):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.slides(i)]
         self.fast = {} if self.known is None else self.fast
-        halting = Halting(gaps, slides, NEGLIGIBLE * self._slip_terms(slides), self.fast)
+        halting = Halting(gaps, slides, NEGLIGIBLE * self._slip_terms(slides), modes.rising, self.fast)
         for k, i in enumerate(slides):
             yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
 

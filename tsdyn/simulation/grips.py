@@ -16,7 +16,7 @@ from ..maths.tolerances import TINY
 from ..model.handles import index_of
 from ..observables.reactions import balancing
 from .phase_scenes import first_row_of
-from .tolerances import FASTER, PULLS, SAME_WAY, SLOW, TURNED
+from .tolerances import FASTER, SAME_WAY, SLOW, TURNED
 
 # A closed contact with friction sticks or slides. Where it sticks, all its rows hold; those of the slip of a point are
 # rows on positions, which hold it where it came to rest. Where it slides, the row of the gap holds, and a force in
@@ -94,11 +94,6 @@ class Reactions:
         """Made at the first evaluation: the start of the phase may show that rows are redundant."""
         return reaction_workspace(self.packed, np.nan)
 
-    def pulling(self, values):
-        """The number of a contact whose reaction pulls at the start of the phase, whose `over` gives these values."""
-        N = values[: len(self.closed)]
-        return int(N.argmin()) if N.size and N.min() < -PULLS * np.abs(N).max() else None
-
     def over(self, states):
         """Values (k, closed and sticking) of states at k times."""
         lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
@@ -141,21 +136,31 @@ class Halting:
 
     A slip turns by 60 degrees at v >> V; where it has turned at all when it is as slow as V, it takes its direction
     there: below AHEAD friction has the direction d, so that it ends with its own. One that hasn't been FASTER V since
-    its phase began has h = 0.49, and turns by 8 degrees at v << V: it begins, or has its direction from there.
+    its phase began has h = 0.49, and turns by 8 degrees at v << V: it begins, or has its direction from there. Where it
+    begins at rest, the value is divided by the time since: the slip may turn at once.
 
     Parameters
     ----------
     gaps : Gaps
     slides : list of int
         Those that slide.
-    noise : ndarray (slides,), m/s
-        Rounding of the slips: of one that others hold, nothing else is left.
+    rounding : ndarray (slides,), m/s
+        Of the slips: of one that others hold, nothing else is left.
+    begun : dict
+        Of those that begin at rest: time and acceleration there, by the numbers of gaps.
     since : dict of int to float
         Times, s, since when slips have been faster, by the numbers of gaps: found with the values.
+
+    Attributes
+    ----------
+    noise : ndarray (slides,)
+        Rounding of the values.
     """
 
-    def __init__(self, gaps, slides, noise, since):
-        self.gaps, self.slides, self.noise, self.since = gaps, slides, noise, since
+    def __init__(self, gaps, slides, rounding, begun, since):
+        self.gaps, self.slides, self.rounding, self.since = gaps, slides, rounding, since
+        self.begun = [(k, *begun[i]) for k, i in enumerate(slides) if i in begun]
+        self.noise = np.where([i in begun for i in slides], 0.0, rounding)
         self.ways = gaps.slots[slides][:, None] + np.arange(3)
 
     def over(self, states):
@@ -166,8 +171,12 @@ class Halting:
                 self.since.setdefault(i, float(states.t[fast.argmax()]))
         late = states.t[:, None] > [self.since.get(i, np.inf) for i in self.slides]
         turned = (speed - along) * (speed + along)
-        h = np.where(late, turned / (turned + (TURNED * speed) ** 2 + self.noise**2 + TINY), 0.49)
-        return along - (0.5 + h * SLOW / (speed + SLOW)) * speed
+        h = np.where(late, turned / (turned + (TURNED * speed) ** 2 + self.rounding**2 + TINY), 0.49)
+        values = along - (0.5 + h * SLOW / (speed + SLOW)) * speed
+        for k, begun, gain in self.begun:
+            later = states.t > begun
+            values[:, k] = np.where(later, values[:, k] / np.where(later, states.t - begun, 1.0), 0.01 * gain)
+        return values
 
 
 def losses(gaps, which, lam, t, q, qd):

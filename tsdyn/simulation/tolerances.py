@@ -82,10 +82,6 @@ SAME_WAY, SLOW = 1.0 - 1e-12, 1e-4
 # size. Velocity over V that tells it from one that begins.
 TURNED, FASTER = 1e-7, 4.0
 
-# Of the largest reaction of the contacts: one that pulls by more at the start of a phase has another cause than the
-# error of an event's time.
-PULLS = 1e-6
-
 # Load of a friction over that up to which it counts as none, from which on it counts.
 LOADED = 4.0
 # Of the load that counts as none: rounding of reactions, along chains too.

@@ -189,6 +189,7 @@ class Transitions:
         """Take over a `ContactState`."""
         self.remembered, modes = self.remembered.copy(), self.modes
         modes.closed, modes.idle, modes.slack = contacts.closed, contacts.idle, dict(contacts.slack)
+        modes.rising = {i: (self.t, gain) for i, gain in contacts.begun.items()}
         modes.grips = gripped(self.gaps, before, contacts, self.q, self.remembered[self.count :])
 
     def _begin_memory(self, closed):

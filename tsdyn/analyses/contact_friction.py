@@ -17,7 +17,7 @@ import numpy as np
 from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, SUM_ROUNDING, TINY
-from .contact_problem import ContactState, NoSolution, depends, energy_gain, rounding_of, slack_of
+from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, STOPPED, WITHIN_BOUND
 
 

@@ -198,8 +198,9 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
         if all(found[1].grips.get(i, ()) is None for i in which):
             return found
     found = ended(slow_slips(inertia, qd, slow, LEAST_SLIP), resting)
-    which = [i for i in slow_slips(inertia, qd, turned, STOPPED) if found[1].gains.get(i, 0.0) < 0.0]
-    return ended(which) if which else found
+    if any(found[1].gains.get(i, 0.0) < 0.0 for i in slow_slips(inertia, qd, turned, STOPPED)):
+        return ended(slow_slips(inertia, qd, slow, STOPPED))
+    return found
 
 
 def _solve(inertia, resting, qd, fired, by_rows=False):

@@ -53,7 +53,8 @@ CONTACT_SCENES = (
     ("ropes", 700089),  # flights of some hundred roundings
     ("cradle", 115), ("balls", 138),  # reactions that are rounding
     ("chain_over_floor", 9), ("chain_over_floor", 118),  # slips and links that bilateral constraints hold
-    pytest.param("chain_over_floor", 700140, marks=pytest.mark.slow),  # reactions of a stretched chain, which are rounding of accelerations
+    # Reactions of a stretched chain, which are rounding of accelerations.
+    pytest.param("chain_over_floor", 700140, marks=pytest.mark.slow),
     pytest.param("stack", 11, marks=pytest.mark.slow),  # low flights within long steps
 )  # fmt: skip
 

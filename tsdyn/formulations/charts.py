@@ -5,7 +5,6 @@ import math
 from ..elements.loops.constraint_rows import OMEGA, POSE, RD, P, R, orient, place_bodies
 from ..jit.kernels import kernel, long_kernel, stack, stack2
 from ..jit.simd import add, cross, first, fma, four, get, lanes, larger, let, put, second, splat, third, times, total
-from ..maths.dense_linalg import copy
 from ..maths.tolerances import ROUNDING, TINY
 from ..rows.interface import (
     METRIC,

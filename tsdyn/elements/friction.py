@@ -164,8 +164,7 @@ def act_series(s, f, k, out):
 @kernel
 def size(square):
     """sqrt(square), exact to first order in an imaginary part; where it is zero, so is its derivative."""
-    root = np.sqrt(square.real + LEAST_SQUARE)
-    return root + (square - square.real) * (0.5 / root)
+    return (square.real + 0.5 * (square - square.real)) * (1.0 / np.sqrt(square.real + LEAST_SQUARE))
 
 
 @kernel

@@ -214,17 +214,18 @@ def put_state(w, out):
     copy(w.qdd, out[2])
 
 
-READ = "ppipdipdiip"  # types of the arguments of readers
+READ = "ppipdipdip"  # types of the arguments of readers
 SAME_STEP, SAME_CHART, OTHER_CHART = 0, 1, 2  # where a time is, beside the one before
+WHOLE = 4  # added: accelerations are asked for, which may be missing otherwise
 call_read = caller(READ)
 
 
 @callback(READ)
-def read(context, run, size, block, begun, width, point, t, place, whole, out):  # eleven: a step, what is asked of it
+def read(context, run, size, block, begun, width, point, t, asked, out):  # ten: a step, and what is asked of it
     """out (3, n): q, qd, qdd at t within the step of a block of this size. Status.
 
-    begun, point: the time of its chart, and what `RunLog.points` has of it, of this width. place: where t is, beside
-    the time before. whole: whether accelerations are asked for; else they may be missing.
+    begun, point: the time of its chart, and what `RunLog.points` has of it, of this width. asked: where t is, beside
+    the time before, and WHOLE.
 
     Every time starts from its chart's q0, so that it gives the same numbers whatever was asked for before it.
     """
@@ -232,7 +233,7 @@ def read(context, run, size, block, begun, width, point, t, place, whole, out): 
     w, n, step = c.work, c.work.q.size, vector(block, size)
     recall(c.system, step)  # rows that hold frictions depend on it
     # Every time begins at the same state of its chart
-    if place != OTHER_CHART:
+    if asked % WHOLE != OTHER_CHART:
         bring_back(c, r.warm)
     else:
         # A new chart: rebuilt at q0 with its selection of rows
@@ -253,16 +254,19 @@ def read(context, run, size, block, begun, width, point, t, place, whole, out): 
 
 
 @kernel
-def read_one(reader, context, run, block, charts, points, t, place, whole, out):  # ten: as of `read`
+def read_one(reader, context, run, block, charts, points, t, asked, out):  # nine: as of `read`
     """As `read`, of a block of these charts and their points."""
     chart = int(block[B_CHART])
     begun, width, point = charts[chart, 0], points.shape[1], points[chart]
-    return call_read(reader, context, run, block.size, block, begun, width, point, t, place, whole, out)
+    return call_read(reader, context, run, block.size, block, begun, width, point, t, asked, out)
 
 
 @entry("ippvwmmmi", np.zeros((0, 0, 0)))
 def read_states(reader, context, run, t, rows, blocks, charts, points, whole, out):  # ten: as of `read`
-    """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows], by a reader's kernel. Status."""
+    """out (k, 3, n): q, qd, qdd at t (k,), each within the step blocks[rows], by a reader's kernel. Status.
+
+    whole: WHOLE or 0.
+    """
     place = OTHER_CHART
     for i in range(t.size):
         block = blocks[rows[i]]
@@ -270,7 +274,7 @@ def read_states(reader, context, run, t, rows, blocks, charts, points, whole, ou
             before = blocks[rows[i - 1]]
             place = SAME_CHART if block[B_CHART] == before[B_CHART] else OTHER_CHART
             place = SAME_STEP if rows[i] == rows[i - 1] else place
-        status = read_one(reader, context, run, block, charts, points, t[i], place, whole, out[i])
+        status = read_one(reader, context, run, block, charts, points, t[i], place + whole, out[i])
         if status != 0:
             return status
     return 0
@@ -422,7 +426,9 @@ class Reader:
         whole: whether accelerations are asked for; else they may be missing.
         """
         out = np.zeros((t.size, 3, self.n))
-        return out, STATUSES[self.call(read_states, *self.where, t, rows, blocks, charts, points, int(whole), out)]
+        return out, STATUSES[
+            self.call(read_states, *self.where, t, rows, blocks, charts, points, WHOLE if whole else 0, out)
+        ]
 
     def call(self, kernel, *arguments):
         """Call a kernel that reads states."""

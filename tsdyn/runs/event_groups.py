@@ -10,8 +10,9 @@ from .group_search import ARRIVED, GO_ON, GroupSearch, move
 from .tolerances import FALLEN, FROM_REST, ROOT_STEPS
 
 # A group is surveyed on a step at once (root_isolation.survey). Of the members that cross zero the earliest is located,
-# by the interpolant and Newton's method; the others are surveyed again up to there. Only members whose zeros are
-# unclear are searched one by one, as events of users are.
+# by the interpolant and Newton's method; the others are surveyed again up to there. Where a kernel evaluates the
+# functions, one call does so (group_search.py). Only members whose zeros are unclear are searched one by one, as events
+# of users are.
 
 
 class States(NamedTuple):
@@ -78,8 +79,8 @@ class Group:
         source = getattr(over, "__self__", None)
         known, self.pulling, kernel = (getattr(source, name, None) for name in ("noise", "pulling", "kernel"))
         self._least = np.zeros(len(own)) if known is None else known[self.which]
-        # The last: 1 where the `Track` knows more than the value
-        self.value, self.noise, self._odd = np.zeros(len(own)), np.zeros(len(own)), np.zeros(len(own), int)
+        self.value, self.noise = np.zeros(len(own)), np.zeros(len(own))
+        self._odd = np.zeros(len(own), int)  # 1 where the `Track` knows more than the value
         # Those that survey and Newton's method serve: changes in one direction end the run
         self._exact = [event.exact for event in own]
         self._may_fall = np.array([event.falls for event in own])

@@ -8,9 +8,8 @@ import numpy as np
 from ..jit.kernels import Record, caller, data_of, entry, kernel, loader, matrix, resident
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
-from ..maths.tolerances import SHORTEST_INTERVAL
-from .dense_output import OTHER_CHART, SAME_STEP, read_one
-from .tolerances import ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTENED, SHORTLY, SHOWN_TURN
+from .dense_output import OTHER_CHART, SAME_STEP, WHOLE, read_one
+from .tolerances import ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTLY, SHOWN_TURN
 
 # Newton's method for the function of a survey that crosses zero first.
 
@@ -60,8 +59,10 @@ class SearchNumbers(Record):
     reader: int  # the kernel that reads states
     values: int  # and that of the functions
     place: int  # of the next time that is read, as of `dense_output.read`
+    t0: float  # s, the step
+    t1: float
     found: int  # the function that is zero first
-    t: float  # when
+    t: float  # when, s
 
 
 class SearchParts(NamedTuple):
@@ -92,7 +93,7 @@ _EXAMPLE = SearchParts(
 load_search = loader(_EXAMPLE)
 
 
-class StepIn(NamedTuple):
+class SearchedStep(NamedTuple):
     """Where the states of a step are read, and what functions are evaluated by."""
 
     context: int  # of the reader
@@ -116,12 +117,10 @@ def _evaluate(s, first, second, t, state, out):
 
 @kernel
 def _evaluate_within(s, step, t, whole, out):
-    """The same at a time within the step; False if there is no state."""
-    place = s.numbers.place
+    """The same at a time within the step; False if there is no state. whole: WHOLE or 0."""
+    asked = s.numbers.place + whole
     s.numbers.place = SAME_STEP
-    read = read_one(
-        s.numbers.reader, step.context, step.run, step.block, step.charts, step.points, t, place, whole, s.state
-    )
+    read = read_one(s.numbers.reader, step.context, step.run, step.block, step.charts, step.points, t, asked, s.state)
     if read != 0:
         return False
     _evaluate(s, step.first, step.second, t, s.state, out)
@@ -214,7 +213,7 @@ def _find_beside(s, step, t0, t, first, value):
     before, others = t - SHORTLY * (t - t0), value.size > 1
     if others and not _evaluate_within(s, step, before, 0, first):
         return False
-    if not _evaluate_within(s, step, t, 1, value):
+    if not _evaluate_within(s, step, t, WHOLE, value):
         return False
     for j in range(value.size if others else 0):
         falls = value[j] < first[j] and value[j] * (t - before) <= SAME_INSTANT * abs(t) * (first[j] - value[j])
@@ -222,15 +221,17 @@ def _find_beside(s, step, t0, t, first, value):
     return True
 
 
-@entry("pppppddmmvmm")
-def search_step(search, context, run, first, second, t0, t1, before, now, block, charts, points):  # twelve: a step
+@entry("pppppmmvmm")
+def search_step(search, context, run, first, second, before, now, block, charts, points):  # ten: a step
     """Search a step for the first zero: CLEAR, FOUND, or UNSURE, after which nothing has changed.
 
     context, run: of the reader; first, second: of the functions; before, now (3, n): states at t0 and t1. Of a zero the
     function and the time are in the `SearchNumbers`, the state and those that vanish beside in the `SearchParts`.
     """
-    s, step = load_search(search), StepIn(context, run, block, charts, points, first, second, t1, now)
-    numbers, m, end, until = s.numbers, s.value.size, t1, t1
+    s = load_search(search)
+    t0, t1 = s.numbers.t0, s.numbers.t1
+    step = SearchedStep(context, run, block, charts, points, first, second, t1, now)
+    numbers, m, end = s.numbers, s.value.size, t1
     turning = max(_turn_rate(s.spins, before[1]), _turn_rate(s.spins, now[1]))
     scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
     numbers.place, numbers.found = OTHER_CHART, -1
@@ -239,21 +240,16 @@ def search_step(search, context, run, first, second, t0, t1, before, now, block,
         if s.odd[j] != 0:
             return UNSURE
     while True:
-        degree = _survey(s, step, t0, until, turning)
+        degree = _survey(s, step, t0, end, turning)
         if degree == 0:
             return UNSURE
         samples = matrix(data_of(s.samples), degree + 2, m)
-        clear = _mark(s, samples)
-        if clear and until == end:
+        if _mark(s, samples):
             break
-        if clear or _first_root(s, step, scratch[0], until - t0) != ARRIVED:
-            # A zero soon after the start is found on a short interval
-            until = t0 + SHORTENED * (until - t0)
-            if clear or not until - t0 > SHORTEST_INTERVAL * max(abs(t0), t1 - t0):
-                return UNSURE
-            continue
+        if _first_root(s, step, scratch[0], end - t0) != ARRIVED:
+            return UNSURE
         # What was unclear may be clear up to there
-        numbers.found, end, until, unclear = int(s.step[0]), s.step[1], s.step[1], False
+        numbers.found, end, unclear = int(s.step[0]), s.step[1], False
         for j in range(m):
             s.left[j] = 1 if s.left[j] == 1 and s.marks[j, 0] < end and s.marks[j, 3] != s.marks[j, 3] else 0
             unclear = unclear or s.left[j] == 1
@@ -311,10 +307,10 @@ class GroupSearch:
 
     def find(self, step):
         """The number of the function that is zero first in a step, `Inside`, -1 for none; None where that is unsure."""
-        numbers, reader, (t0, t1), known = self.numbers, step.reader, (step.t0, step.t1), step.known
-        numbers.reader, context, run = reader.where
+        numbers, reader, known = self.numbers, step.reader, step.known
+        numbers.t0, numbers.t1, (numbers.reader, context, run) = step.t0, step.t1, reader.where
         contexts = self._search, context, run, self._first, self._second
-        found = reader.call(search_step, *contexts, t0, t1, known[t0], known[t1], *step.steps)
+        found = reader.call(search_step, *contexts, known[step.t0], known[step.t1], *step.steps)
         if found == FOUND:
             known[numbers.t] = self.parts.state.copy()
         return None if found == UNSURE else numbers.found

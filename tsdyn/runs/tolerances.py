@@ -122,8 +122,6 @@ FROM_REST, FALLEN = 1e-11, 1e-6
 # shorter is rounding.
 ROOT_STEPS, ROUGH_ROOT = 6, 1e-8
 ROOT, LEAST_TIME = 4.0 * EPS, 2.0**-1022
-# Share of an interval on which zeros near its start are looked for again.
-SHORTENED = 2.0**-6
 
 # --- slices ----------------------------------------------------------------------------------------------------------
 # s between returns to Python: progress bars and Ctrl-C answer at once, at a cost of 0.1 ms a slice.

@@ -30,7 +30,7 @@ from ..rows.interface import (
     weigh_bodies,
     with_all_rows,
 )
-from ..runs.dense_output import READ, SAME_STEP, TrajectoryReading, put_state, recall
+from ..runs.dense_output import READ, SAME_STEP, WHOLE, TrajectoryReading, put_state, recall
 from ..runs.run_memory import Memory
 from ..workspaces import B_DATA, B_START, lay_out, load_run, plain_work, words
 from .coefficients import change, exact_product, inverses, put_product, run_forces, run_loops, spin, turn, turn_ahead
@@ -239,12 +239,12 @@ def accelerate_with_friction_here(context, t, h):
 
 
 @callback(READ)
-def read_series(context, run, size, block, begun, width, point, t, place, whole, out):  # eleven: as of the type
+def read_series(context, run, size, block, begun, width, point, t, asked, out):  # ten: as of `dense_output.read`
     """out (3, n): q, qd, qdd at t within the step of a block; as runs.dense_output.read. Status."""
     c, r, step = load_series(context), load_run(run), vector(block, size)
     w, x, data = c.work, c.expansion, step[B_DATA:]
     # A block is the whole series of a step, which serves for all times in the step
-    if place != SAME_STEP:
+    if asked % WHOLE != SAME_STEP:
         x.order.top = int(data[0])
         copy(data[1 + w.q.size :][: x.bodies.size], x.bodies)
     # Poses of the start are where Euler parameters are followed from
@@ -253,7 +253,7 @@ def read_series(context, run, size, block, begun, width, point, t, place, whole,
     set_floor(c, w.q)
     place_bodies(c.graph.bodies, w.q, c.tangent.poses)
     keep_start(c.graph, c.tangent.poses, x.start)
-    status = state_within(context, c, r.kernels, t, t - step[B_START], whole == 1)
+    status = state_within(context, c, r.kernels, t, t - step[B_START], asked >= WHOLE)
     if status == 0:
         put_state(w, matrix(out, 3, w.q.size))
     return status

@@ -268,7 +268,7 @@ def test_a_stop_of_a_linkage_with_redundant_joints():
 
 
 def test_a_contact_that_the_start_takes_below_zero_closes():
-    """A lever on a stop near its hinge carries a rod at its end: 3e-10 m at the stop are 2e-9 m at the rod's contact."""
+    """A lever on a contact near its hinge carries a rod at its end: 3e-10 m there are 2e-9 m at the rod's contact."""
     scene = ts.Scene(gravity=(0, 0, -G))
     for name, mass in (("lever", 10.0), ("rod", 1.0)):
         inertia = (0.01, mass / 12, mass / 12)

@@ -5,6 +5,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.tolerances import EPS
+from tsdyn.simulation import phase_scenes
 
 C = ts.constraints
 G = 9.81
@@ -142,6 +143,41 @@ def test_many_impacts_leave_the_constraints_as_they_are(count):
 
 
 # outputs across impacts, which a run goes on from in its memory
+
+
+def test_phases_take_over_the_parameters_that_the_scene_has_checked(monkeypatch):
+    """Three balls come to rest one after the other; nothing is asked of a rod again for their phases."""
+    scene, asked, given = ts.Scene(gravity=(0, 0, -G)), [], C.Distance.parameters
+    monkeypatch.setattr(C.Distance, "parameters", lambda rod: asked.append(rod) or given(rod))
+    heights = [0.5, 1.0, 1.5]
+    for i, h in enumerate(heights):
+        ball = scene.add_body(mass=1.0, inertia=(1, 1, 1), position=(i, 0, h + 0.1))
+        scene.add(C.SphereContact(ball, scene.ground, radius_a=0.1, normal_b=(0, 0, 1), restitution=0.0))
+    bob = scene.add_point_mass(mass=1.0, position=(5, 0, 0))
+    scene.add(C.Distance(bob, scene.ground, point_b=(4, 0, 0)))
+    ts.simulate(scene, (0, 0.1))
+    assert asked
+    asked.clear()
+    solution = ts.simulate(scene, (0, 1.0))
+    falls = [begin for begin, _, _ in solution.phases][1:]
+    np.testing.assert_allclose(falls, np.sqrt(2 * np.array(heights) / G), rtol=1e-12)
+    assert not asked
+
+
+def test_memory_of_many_phases_is_let_go_of(monkeypatch):
+    """Three boxes come to rest by way of more sets of contacts than are kept; the run has the same bits."""
+    solutions, kept = [], []
+    for coordinates in (phase_scenes.KEPT_COORDINATES, 0):
+        monkeypatch.setattr(phase_scenes, "KEPT_COORDINATES", coordinates)
+        scene = stack(3)
+        solutions.append(ts.simulate(scene, (0, 1.0), rtol=1e-10, atol=1e-10))
+        kept.append(len(scene._phases))
+    assert kept[1] <= phase_scenes.LEAST_PHASES < kept[0]
+    one, other = solutions
+    assert one.success
+    assert other.success
+    np.testing.assert_array_equal(one.q, other.q)
+    np.testing.assert_array_equal(one.energy, other.energy)
 
 
 def bouncing(e=1.0, balls=1):

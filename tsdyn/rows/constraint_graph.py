@@ -422,10 +422,10 @@ class _GraphBuilder:
         self.sides, self.places = np.full((m + len(self.tails), 2), self.nb, np.int64), np.full(m, -1, np.int64)
         self.at_body, self.at_node = [[] for _ in range(self.nb)], [[] for _ in self.nodes]
         for i, (constraint, pair, row) in enumerate(self.joints):
-            e = np.arange(self.pairs[i], self.pairs[i] + self.counts[i])
+            e = slice(self.pairs[i], self.pairs[i] + self.counts[i])
             self.sides[e] = pair
             if constraint.all_rows:
-                self.places[e] = np.arange(row, row + constraint.all_rows)
+                self.places[e] = range(row, row + constraint.all_rows)
             self.at_node[self.inside[i][0]].append(i)
             for side, body in enumerate(pair):
                 if body < self.nb and body not in self.hubs:

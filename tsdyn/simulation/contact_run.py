@@ -137,6 +137,7 @@ class _ContactRun(Transitions):
         self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
         self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
         self.lowered = set()  # times of impacts at which less than the coefficients of restitution acts
+        self.kernels_of = set()  # classes of constraints and forces that phases have had
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
         self.fast = {}  # see `Halting`
 
@@ -334,6 +335,10 @@ class _ContactRun(Transitions):
 
     def _run_of(self, phase):
         """The `Run` of a phase, and the call of it."""
+        kinds = {type(part) for part in (*phase._added, *phase._forces)}
+        if self.kernels_of.issuperset(kinds):
+            _ = phase.packed  # so that its kernels aren't looked for again
+        self.kernels_of |= kinds
         call = RunCall((self.t, self.span[1]))
         return self.run_of(phase, replace(self.options, events=None), call), call
 

@@ -15,6 +15,7 @@ from ..model.handles import begins_of, handles_of
 from ..model.packed import pack
 from ..rows.constraint_graph import parts_of
 from ..validation import listed
+from .tolerances import KEPT_COORDINATES, LEAST_PHASES
 
 # A phase is a scene of its own, packed once for each combination of contacts: the bodies, joints and forces of the
 # scene, less those that are switched off, and the rows that its units add in their modes, such as that of a closed gap.
@@ -54,7 +55,9 @@ def dependent(scene, items):
 
 
 def phase_of(scene, rows, holds=(), without=None, every=()):
-    """The scene with these rows, primitives, and forces in place of its contacts; kept until the scene changes.
+    """The scene with these rows, primitives, and forces in place of its contacts.
+
+    Kept until the scene changes, or until phases have become so many that their memory is let go of.
 
     holds: rows with numbers that the run remembers, as `friction_problem.Hold`. without: constraints and forces left
     out, by default those that are inactive at the start. every: all that may hold; the phase is packed with their rows,
@@ -66,7 +69,10 @@ def phase_of(scene, rows, holds=(), without=None, every=()):
     without = dependent(scene, inactive_of(scene)) if without is None else without
     packed = every or holds  # whose rows are
     key = frozenset(map(id, rows)), frozenset(map(id, without)), frozenset(hold.key for hold in packed), bool(every)
-    if key not in known:
+    phase = known.get(key)
+    if phase is None:
+        if len(known) >= max(LEAST_PHASES, KEPT_COORDINATES // (7 * len(scene._bodies))):
+            _let_go(known)
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
         constraints, forces = ([each for each in rows if isinstance(each, Force) is given] for given in (False, True))
         held = [hold.rows() for hold in packed]
@@ -74,11 +80,20 @@ def phase_of(scene, rows, holds=(), without=None, every=()):
         vars(phase).update(vars(scene))
         vars(phase).update(
             _added=[each for each in scene._added if id(each) not in gone] + [*constraints, *chain(*held)],
-            _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None, _start=None,
-            _prepared=None, _phases=None, _gaps=None, _spare={}, _waiting={}, _opens=False,
+            _forces=[each for each in scene._forces if id(each) not in gone] + forces, _packed=None,
+            _start=scene._initial(), _prepared=None, _phases=None, _gaps=None, _spare={}, _waiting={}, _opens=False,
             _pack=partial(_pack_phase, phase, scene, packed, held), _whole=scene,
         )  # fmt: skip
-    return _with_rows_held(known[key], holds) if every else known[key]
+    return _with_rows_held(phase, holds) if every else phase
+
+
+def _let_go(known):
+    """Forget phases; what solutions have of them is packed numbers, without the memory of runs."""
+    for phase in known.values():
+        if phase._packed is not None:
+            kept = phase._packed.derived
+            kept.start_workspaces, kept.row_parts, kept.reactions, kept.engines = [], [], {}, {}
+    known.clear()
 
 
 def _with_rows_held(base, holds):

@@ -90,3 +90,7 @@ PULLS = 1e-6
 LOADED = 4.0
 # Of the load that counts as none: rounding of reactions, along chains too.
 REACTION_NOISE = 1e-3
+
+# Coordinates of all phases of a scene that are kept, at most, and phases at least: memory of runs takes 10 kB for each
+# coordinate, 0.7 GB in all.
+KEPT_COORDINATES, LEAST_PHASES = 1 << 16, 8

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.bodies import Ground
 from ..elements.element import address
 from ..elements.loops import force_series
 from ..elements.loops.constraint_rows import INTS, MASK, STILL
@@ -19,7 +18,6 @@ from ..formulations.locked_orientations import instances
 from ..jit.kernels import Record, loader, records, twin
 from ..jit.resident import zeros
 from ..model.equations import changes_with_state
-from ..model.handles import index_of
 from ..model.packed import System, coupled_loads, members_of
 from ..motions.of_coordinates import CoordinateFunction
 from ..motions.prescribed import Motion
@@ -534,7 +532,7 @@ def _motions(graph, packed, orders, places, constraints):
 
 
 PATTERNS = 1024  # that are kept, of classes with their numbers
-NO_MASK = (None,) * 4
+NO_MASK = (None,) * 5
 
 
 def masks(graph, packed):
@@ -544,15 +542,16 @@ def masks(graph, packed):
     constant. So do columns that the primitive's own series leaves constant in a random motion. Returns how many markers
     have constant columns.
     """
-    constant, lengths, known = 0, graph.bodies[:, 1].tolist(), packed.derived.masks
+    constant, known = 0, packed.derived.masks
+    lengths = dict(zip(map(id, packed.bodies), graph.bodies[:, 1].tolist(), strict=True))
     for row, (kind, members) in zip(graph.kinds, instances(packed, graph), strict=True):
         for i, (constraint, par) in enumerate(members):
             ends = constraint.a, constraint.b, *constraint.others
-            sizes = tuple([0 if isinstance(body, Ground) else lengths[index_of(packed, body)] for body in ends])
-            which, turned, mask, still = known.get(id(constraint), NO_MASK)
-            if which is not constraint or turned != sizes:
+            sizes = tuple([lengths.get(id(body), 0) for body in ends])
+            which, given, before, mask, still = known.get(id(constraint), NO_MASK)
+            if which is not constraint or given is not par or before != sizes:
                 mask, still = _mask_of(constraint, (*Motion.numbers(par), *[0.0] * kind.memory), sizes)
-                known[id(constraint)] = constraint, sizes, mask, still
+                known[id(constraint)] = constraint, par, sizes, mask, still
             graph.table[row.table + i * INTS + MASK] = mask
             constant += still
     return constant

@@ -301,3 +301,22 @@ def test_a_stop_of_a_linkage_with_redundant_joints():
     assert abs(impulse * rates.mean() - (before - after)) < 1e-11
     again, _ = ts.impact(scene, ts.State(0.0, *scene.start), ["stop"])
     np.testing.assert_array_equal(again.qd, 0.0)
+
+
+def test_a_contact_that_the_start_takes_below_zero_closes():
+    """A lever on a contact near its hinge carries a rod at its end: 3e-10 m there are 2e-9 m at the rod's contact."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    for name, mass in (("lever", 10.0), ("rod", 1.0)):
+        inertia = (0.01, mass / 12, mass / 12)
+        scene.add_body(mass=mass, inertia=inertia, position=(0.5, 0, 0), name=name)
+    scene.add(C.Revolute.at(scene.ground, scene["lever"], point=(0, 0, 0), axis=(0, 1, 0)))
+    scene.add(C.Revolute.at(scene["lever"], scene["rod"], point=(1, 0, 0), axis=(0, 1, 0)))
+    for body, x, gap in (("lever", 0.1, 3e-10), ("rod", 0.8, 1.2e-9)):
+        at = {"point_a": (x - 0.5, 0, 0), "point_b": (0, 0, -gap), "name": f"below {body}"}
+        scene.add(C.PlaneContact(scene[body], scene.ground, **at, **FLOOR))
+    solution = ts.simulate(scene, (0, 0.1)).raise_if_failed()
+    assert np.abs(solution.qd).max() < 1e-12
+    # Moments about the hinges
+    np.testing.assert_allclose(solution.reaction("below rod")[0][-1], [0, 0, G * 0.5 / 0.2], rtol=1e-7)
+    up = (10.0 * G * 0.5 - (0.5 / 0.2 - 1.0) * G) / 0.1
+    np.testing.assert_allclose(solution.reaction("below lever")[0][-1], [0, 0, up], rtol=1e-7)

@@ -170,7 +170,8 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
 
     Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. It is ended where the
     contact would stick: with all that are as slow, as of a body that comes to rest, or alone. Below STOPPED it is
-    ended, too, where it slows down with its friction against it, to slide off in another direction at once.
+    ended, too, where it slows down with its friction against it, to slide off in another direction at once: with all
+    of its two bodies, since the slip of one point alone is no motion that begins.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
@@ -198,8 +199,16 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
         if all(found[1].grips.get(i, ()) is None for i in which):
             return found
     found = ended(slow_slips(inertia, qd, slow, LEAST_SLIP), resting)
-    which = [i for i in slow_slips(inertia, qd, turned, STOPPED) if found[1].gains.get(i, 0.0) < 0.0]
+    turned = [i for i in slow_slips(inertia, qd, turned, STOPPED) if found[1].gains.get(i, 0.0) < 0.0]
+    pairs = {_pair(inertia.gaps, i) for i in turned}
+    which = [i for i in slow_slips(inertia, qd, slow, STOPPED) if _pair(inertia.gaps, i) in pairs]
     return ended(which) if which else found
+
+
+def _pair(gaps, i):
+    """The two bodies of a gap."""
+    part = gaps.list[i].side.row
+    return frozenset((id(part.a), id(part.b)))
 
 
 def _solve(inertia, resting, qd, fired, by_rows=False):

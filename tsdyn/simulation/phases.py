@@ -111,7 +111,7 @@ class Phases:
     impulses : list of (float, str, Impulse or ndarray)
         Time (s), name, impulse: see `Solution.impulses`.
     starts : list of float
-        s; before those of `list` where flights below rounding are left out.
+        s; before those of `list` where flights that are none are left out.
     gains : dict of int to float
         Change of the kinetic energy (J) at the beginning of phases, by their numbers: what impacts took.
     changes : list of (tuple of str, dict)
@@ -147,7 +147,7 @@ class Phases:
         return kind
 
     def add(self, kind, begin, rest, end, names, changes):
-        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights below rounding end."""
+        """Add the next phase: from `begin`, s, or as `list` has it from `rest`, when flights that are none end."""
         self.changes.append(changes)
         if self.list:
             begun, _, held = self.list[-1]
@@ -198,7 +198,7 @@ class Phases:
     def merged(self):
         """The `list`, each name once; phases are one where the same rows hold, and no impact or action is between.
 
-        Without those of no duration: other events came during flights below rounding that were to end there.
+        Without those of no duration: other events came during flights that were to end there.
         """
         found, before, hit, struck = [], None, {t for t, *_ in self.impulses}, False
         for (start, end, names), begun, changes in zip(self.list, self.starts, self.changes, strict=True):

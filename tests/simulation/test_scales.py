@@ -220,7 +220,7 @@ def test_a_stop_ends_a_fast_motion_in_large_units(seed):
 
 
 @pytest.mark.parametrize("place", [np.zeros(3), np.array([2e4, -3e4, 1e4])])
-def test_a_box_comes_to_rest_where_it_does_at_the_origin(place):
+def test_a_box_comes_to_rest_where_it_does_at_the_origin(place, tmp_path):
     """Corners stick at points of the ground; v^2 / (2 mu g) from the start."""
     scene, mu, v, corner = ts.Scene(), 0.3, 0.7, np.array([0.2, 0.15, 0.1])
     box = scene.add_body(2.0, (0.02, 0.04, 0.05), place + 0.1 * Z, velocity=(v, 0, 0), name="box")
@@ -236,4 +236,7 @@ def test_a_box_comes_to_rest_where_it_does_at_the_origin(place):
     rest = place + v**2 / (2 * mu * 9.81) * X + 0.1 * Z
     np.testing.assert_allclose(run.position(box)[-1], rest, rtol=ROUNDING, atol=1e-14)
     np.testing.assert_allclose(run.at(50.0).position(box), rest, rtol=ROUNDING, atol=1e-14)
+    run.save(tmp_path / "rest.h5")
+    again = ts.load(tmp_path / "rest.h5", scene)
+    np.testing.assert_array_equal(again.at(50.0).position(box), run.at(50.0).position(box))
     assert run.constraint_error.position.max() <= 1e-15 + ROUNDING * np.abs(place).max()

@@ -106,7 +106,8 @@ def _sees_differences(packed):
 def run_near(driver, task, scene, origin, tol):
     """Return the `Outcome` of a task run relative to a local origin; tol as for `Prepared.start`."""
     packed = task.prepared.packed
-    local, shift = _local(task, scene, origin), np.zeros(task.q.size)
+    local = _local(task.prepared, scene, origin, task.remembered[len(task.angles) :])
+    shift = np.zeros(task.q.size)
     shift[packed.system.bodies[:, :1] + np.arange(3)] = origin
     q = task.q - shift
     tol *= (1.0 + np.abs(task.q).max()) / (1.0 + np.abs(q).max())
@@ -133,9 +134,9 @@ def run_near(driver, task, scene, origin, tol):
     return outcome._replace(rows=rows, end=end, events=events, trajectory=trajectory)
 
 
-def _local(task, scene, origin):
-    """Return the `Prepared` of the scene relative to that origin; kept for the next run."""
-    packed, slots = task.prepared.packed, task.remembered[len(task.angles) :]
+def _local(prepared, scene, origin, slots):
+    """Return the `Prepared` of the scene relative to that origin; kept for the next run. slots: as of `_moved`."""
+    packed = prepared.packed
     kept = packed.derived.local
     if kept is None or (kept[0] != origin).any() or (kept[1] != slots[kept[2]]).any():
         moved, held = _moved(packed, origin, slots)

@@ -91,8 +91,12 @@ def trajectory_of(numbers, arrays, scenes):
     if kind == "moved":
         shift = arrays["shift"]
         demand(shift.shape == (int(packed.system.bodies[:, 1].sum()),), "the origin")
-        local = local_origin._local(prepared(scene), scene, shift[:3]).packed
-        stand_in = SimpleNamespace(packed=local)
+        slots = packed.system.reals[packed.system.memory]
+        for blocks in (array for name, array in arrays.items() if name.endswith("blocks") and len(array)):
+            demand(blocks.ndim == 2 and blocks.shape[1] >= slots.size, "dense output")
+            slots = blocks[0, blocks.shape[1] - slots.size :]
+        local = local_origin._local(prepared(scene), scene, shift[:3], slots)
+        stand_in = SimpleNamespace(packed=local.packed)
         return local_origin._Moved(trajectory_of(numbers["inner"], arrays, [stand_in]), shift)
     if numbers["derived"] != derived_record(packed):
         take_derived(packed, numbers["derived"])

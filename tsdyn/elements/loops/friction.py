@@ -77,10 +77,10 @@ def known_friction(k, wide, x, par, ends, kept, s, forces, f):
     # f_k = sum_j g_j N_{k-j}
     for m in range(MARKERS):
         if ends[m] >= 0.0:
-            c = STARTS[m]
-            f[c], f[c + 1], f[c + 2] = scaled(s, SLOTS + c, N, k)
+            at = STARTS[m]
+            f[at], f[at + 1], f[at + 2] = scaled(s, SLOTS + at, N, k)
             if CODES[m] == PARAMETERS:
-                f[c + 3] = product(s[SLOTS + c + 3], s[N], k)
+                f[at + 3] = product(s[SLOTS + at + 3], s[N], k)
 
 
 @part

@@ -400,13 +400,15 @@ def _held(inertia, closed, grips, b, small):
     """Reactions (k,) of closed gaps where they and the slips of those that stick have no accelerations; their rounding.
 
     b: accelerations (3,) of gaps and slips where all are open, by gaps; small (count,): rounding of accelerations of
-    gaps. Reactions may fall below zero by twice their rounding: by the error of reactions at an event.
+    gaps. Reactions may fall below zero by twice their rounding: by the error of reactions at an event. Largest
+    reactions are those, or what one contact alone would carry of the terms: in free fall all reactions are rounding.
     """
     (A, a), k = _holding(inertia, closed, grips, b), len(closed)
     by = np.linalg.pinv(A, rcond=RANK_TOL**2)[:k]
     pushes = -by @ a
-    largest = np.abs(pushes).max(initial=0.0)
-    return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, PULLS * largest)
+    largest, carried = np.abs(pushes).max(initial=0.0), small[closed] / (LEVEL * inertia.G[closed, closed])
+    most = PULLS * np.maximum(largest, carried)
+    return pushes, np.clip(np.abs(by[:, :k]) @ small[closed], 0.5 * EVENT_ERROR * largest, most)
 
 
 def _holding(inertia, closed, grips, b):

@@ -8,6 +8,8 @@ from ..jit.kernels import entry, kernel, stack
 from .tolerances import (
     CONE_FACTORS,
     CONE_LEFT,
+    CONE_SHIFT,
+    CONE_SHIFTED,
     CONE_SLIP,
     CONE_STALLED,
     CONE_STEPS,
@@ -254,6 +256,20 @@ def _slope(mu, given, d, kinds, y, D):
 CONES = _images, _sweep, _slope
 
 
+def _step(A, D, F):
+    """A step x with A x = F but for CONE_SHIFTED of it, or the least one where rows that depend on each other disagree.
+
+    A = I - D (I - r G): with G + CONE_SHIFT I, as if every contact gave way a little, A is regular.
+    """
+    try:
+        x = np.linalg.solve(A + CONE_SHIFT * D, F)
+        if np.abs(F - A @ x).max() <= CONE_SHIFTED * np.abs(F).max():
+            return x
+    except np.linalg.LinAlgError:
+        pass
+    return np.linalg.lstsq(A, F, rcond=RANK_TOL**2)[0]
+
+
 class _Problem:
     """One problem in scaled units; arguments as of `solve_cone`."""
 
@@ -306,7 +322,8 @@ class _Problem:
             if stalled > CONE_STALLED:  # b of rows that depend on each other may disagree by rounding
                 most = (max(share * terms, self.rounding) for share in (left, CONE_LEFT))
                 return nearest if all(x <= y for x, y in zip((best, normal), most, strict=True)) else None
-            step = np.linalg.lstsq(eye - self.slope(y) @ (eye - factor * self.G), -F, rcond=RANK_TOL**2)[0]
+            D = self.slope(y)
+            step = _step(eye - D @ (eye - factor * self.G), D, -F)
             share = 1.0
             while True:
                 trial = p + share * step

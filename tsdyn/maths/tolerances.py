@@ -49,8 +49,8 @@ MOST_ENTRIES = 20
 # Newton's method on Coulomb's cone, to a residual of SUM_ROUNDING of its terms: steps at most; steps without half the
 # residual after which it has stalled. What is left where dependent rows disagree by rounding; of slips that no bounded
 # force would end, where rows depend on each other to half of the digits. Sweeps over the contacts before each start;
-# factors of u. Of a diagonal of one, added where rows depend on each other: where they disagree by rounding, steps along
-# them are the disagreement over it; share of the residual that a step with it may leave.
+# factors of u. Shift of a diagonal of one for rows that depend on each other: where these disagree by rounding, a step
+# is the disagreement over the shift; share of the residual that such a step may leave.
 CONE_STEPS, CONE_STALLED, CONE_LEFT, CONE_SLIP = 60, 8, 1e-11, 1e-8
 CONE_SHIFT, CONE_SHIFTED = 1e-6, 1e-3
 CONE_SWEEPS, CONE_FACTORS = (0, 3, 30, 300, 3000), (1.0, 3.0, 10.0, 0.3)

@@ -58,6 +58,28 @@ def test_a_stack_of_boxes_falls_and_comes_to_rest(count, rough):
         np.testing.assert_allclose(force, [0, 0, (count - i) * G], atol=1e-9 * count)
 
 
+@pytest.mark.slow
+def test_boxes_of_a_rough_tower_touch_in_flight():
+    """Ten boxes land one after the other: those above fly on each other's corners, where all reactions are rounding."""
+    scene, end, count = stack(10, rough=True), 0.22, 10
+    solution = ts.simulate(scene, (0, end), rtol=1e-10, atol=1e-10).raise_if_failed()
+    assert solution.reached == end
+    assert np.diff(solution.energy).max() < 1e-12 * count**2 * G
+    # The floor only pushes: momentum falls by the weights at most, at events by unseen flights, too
+    pushes = np.diff(solution.linear_momentum[:, 2]) + count * G * np.diff(solution.t)
+    events, unseen = np.diff(solution.t) == 0.0, count * np.sqrt(2 * G * 16 * EPS)
+    assert pushes[~events].min() > -1e-12 * count
+    assert pushes[events].min() > -unseen
+    for i, box in enumerate(scene.bodies):
+        below = scene.bodies[i - 1] if i else None
+        R, x = solution.state.rotation(box), solution.state.position(box)
+        for corner in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+            point = x + R @ (BOX * [*corner, -1])
+            if below is not None:
+                point = solution.state.rotation(below).T @ (point - solution.state.position(below)) - [0, 0, BOX[2]]
+            assert point[2] > -1e-12
+
+
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_all_corners_of_boxes_leave_a_platform_at_one_instant(count):
     """A platform moves by A sin(w t), boxes slide on it; all loads vanish where A w^2 sin(w t) = g."""

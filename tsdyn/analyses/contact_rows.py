@@ -33,6 +33,7 @@ from ..model.equations import (
     time_derivative,
     with_short_rows,
 )
+from ..model.joint_turns import find_counted_angles
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, no_system
 from ..observables.evaluate import NO_INERTIA
@@ -377,7 +378,7 @@ def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # te
 
 KERNELS = (
     find_gaps, measure_opened, find_open_gaps, find_rows, find_slips, respond, accelerate, bounce, gain,
-    find_multipliers, *SURVEYING, *SEARCHING, *CONES,
+    find_multipliers, find_counted_angles, *SURVEYING, *SEARCHING, *CONES,
 )  # fmt: skip
 
 

@@ -88,8 +88,8 @@ def measure_opened(t, which, start, values):
     """Divide gaps by the time since they have opened, in values (k, gaps) at times t (k,), or add rounding to them.
 
     start (4, opened): time, gap, rate and rounding where those of the numbers `which` have opened; without a rate the
-    second. With y = rounding / (rate time) the first are rate + (gap / time - rate) / (1 + y^7): the rate at once, where
-    gaps are rounding, and the gap over the time where they close.
+    second. The first are rate + (gap / time - rate) / (1 + y^7), y = rounding / (rate time): the rate at once, where
+    gaps are rounding, and gap / time where they close.
     """
     for k in range(t.size):
         _measure_opened(t[k], which, start, values[k])

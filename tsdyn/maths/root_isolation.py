@@ -331,8 +331,8 @@ class Search:
     shaken : function
         Error of the value at a time that rounding of the state causes.
     noise : float
-        Rounding error of the values, as measured before: measured again where values are no larger, since it may have
-        been that of larger ones.
+        Rounding error of the values, as measured before: measured again where values are no larger and rounding of the
+        state makes less, since it may have been that of larger values.
     most : int, optional
         Samples at most; MOST by default.
     least : float
@@ -366,12 +366,12 @@ class Search:
             self._measure_by(math.ldexp(limits.SAFE, min(exponent, limits.MOST_SCALED)))
             whole = self._fit(a, b, self._unit * value, None, degree)
         self.points.append((a, self._unit * value))
-        least = self._unit * self.least
-        if self.noise > least and whole.clear <= self.noise:
+        least, middle = self._unit * self.least, 0.5 * (a + b)
+        if max(least, whole.clear) < self.noise and self._unit * self.shaken(middle) < limits.STALE * self.noise:
             self.noise = least
             whole = self._fit(a, b, self._unit * value, None, whole.degree)
         if not (whole.resolved or whole.off != whole.off):
-            self.noise = max(self._rounding(whole), self._unit * self.shaken(0.5 * (a + b)), least)
+            self.noise = max(self._rounding(whole), self._unit * self.shaken(middle), least)
             whole = whole._replace(resolved=whole.off <= self.noise)
         self._follow(whole, 0)
         last = self.points[-1][1] if self.points[-1][0] == b else float(whole.samples[-1])

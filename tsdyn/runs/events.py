@@ -537,7 +537,8 @@ class Watch:
 
         # A function that fails at some time is searched up to the last time before
         while end > step.t0:
-            search = Search(sample, lambda t: self._shaken(i, t, step.at), track.noise, most)
+            least = self._group_of[i].least_noise(i) if is_member else 0.0
+            search = Search(sample, lambda t: self._shaken(i, t, step.at), track.noise, most, least)
             try:
                 degree = max(self._degree(step.turning * (step.t1 - step.t0)), track.degree // 2)
                 track.degree, track.end = search.run(step.t0, track.value, end, degree)

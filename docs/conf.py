@@ -6,6 +6,7 @@ Pages of classes and of the gallery are written into docs/reference and docs/gal
 executed by it.
 """
 
+import json
 import os
 import re
 import sys
@@ -17,7 +18,9 @@ os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE.parent), *filter(None, [os.
 
 from docs import class_pages, gallery_pages  # noqa: E402
 from docs.gallery import ENTRIES  # noqa: E402
+from tsdyn import Scene, simulate  # noqa: E402
 from tsdyn._version import __version__  # noqa: E402
+from tsdyn.files.schema import schema  # noqa: E402
 
 project = "tsdyn"
 author = "The tsdyn authors"
@@ -27,7 +30,7 @@ exclude_patterns = ["**/.ipynb_checkpoints"]
 html_theme = "furo"
 html_title = f"tsdyn {version}"
 html_static_path = []
-html_extra_path = ["files"]  # animations of the gallery
+html_extra_path = ["files"]  # animations of the gallery, the JSON Schema of scene files
 myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
@@ -68,4 +71,5 @@ def setup(app):
     """Write the pages that are made from the code."""
     class_pages.write(HERE / "reference")
     gallery_pages.write(HERE / "gallery", HERE / "files")
+    (HERE / "files" / "scene.schema.json").write_text(json.dumps(schema(Scene, simulate), indent=1), encoding="utf-8")
     app.connect("source-read", within_site)

@@ -5,7 +5,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.closed_forms import point_pendulum
-from tests.helpers.tolerances import ALGEBRA, CLOSE, FAIR, FINE, HELD, LOOSE, ROUNDING
+from tests.helpers.tolerances import ALGEBRA, CLOSE, EPS, FAIR, FINE, HELD, LOOSE, ROUNDING
 from tsdyn.maths.root_isolation import Search
 
 I = ts.integrators
@@ -185,6 +185,18 @@ def test_a_bouncing_ball_never_falls_through(direction):
         t, state = state.t, state._replace(qd=-0.5 * state.qd)
     fall = 0.2**0.5
     assert t == pytest.approx(3.0 * fall, abs=CLOSE)
+
+
+@pytest.mark.parametrize("speed", [1e-3, 1e-2])
+@pytest.mark.parametrize("first_step", [1e-13, 1e-12, 1e-11])
+def test_rounding_of_large_values_hides_no_zero_later(first_step, speed):
+    """The mean velocity of a throw from 1 m: in the first step its rounding is larger than its values."""
+    events = [lambda t, state: (state.q[2] - 1.0) / t if t else speed]
+    end = speed / 5.0
+    method = I.Taylor(first_step=first_step)
+    (times,) = ts.simulate(thrown(1.0, speed), (0.0, 1.5 * end), integrator=method, events=events).t_events
+    assert times[-1] == pytest.approx(end, rel=EPS / (speed * end))
+    assert (times[:-1] < 1e3 * first_step).all()
 
 
 # failures

@@ -39,6 +39,21 @@ def test_impact_times_of_a_bouncing_ball(e):
     assert {name for _, name, _ in solution.impulses} == {"floor"}
 
 
+@pytest.mark.parametrize("speed", [1e-3, 1e-2])
+@pytest.mark.parametrize("first_step", [1e-14, 1e-13, 1e-12, 1e-11])
+def test_impacts_after_steps_in_which_gaps_are_rounding(first_step, speed):
+    """Of a ball that bounces at 1 m without loss: in the first step of a flight it rises by less than a last digit."""
+    scene = ts.Scene(gravity=(0, 0, -G))
+    ball = scene.add_point_mass(1.0, position=(0, 0, 1), velocity=(0, 0, -speed))
+    scene.add(C.PlaneContact(ball, scene.ground, point_b=(0, 0, 1), normal_b=(0, 0, 1), unilateral=True, restitution=1))
+    flight = 2 * speed / G
+    solution = ts.simulate(scene, (0, 4.5 * flight), integrator=ts.integrators.Taylor(first_step=first_step))
+    assert solution.success
+    times = np.array([t for t, *_ in solution.impulses])
+    assert np.abs(times - flight * np.arange(5)).max() < 16 * EPS / speed
+    assert penetration(scene, solution) > 1 - 4 * EPS
+
+
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.8])
 def test_a_bouncing_ball_comes_to_rest_and_slides_on(e):
     scene, fall = bouncing(e)

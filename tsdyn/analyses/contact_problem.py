@@ -21,8 +21,8 @@ from ..elements.bodies import turning
 from ..elements.unilateral import contacts_of
 from ..maths.complementarity import complement
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
+from ..model.handles import all_angles, counted, displacement, first_rows, handles_of, index_of
 from ..model.handles import angle as angle_of
-from ..model.handles import counted, displacement, first_rows, handles_of, index_of
 from .contact_rows import ContactWorkspace
 from .tolerances import LEVEL
 
@@ -91,7 +91,9 @@ class Gaps:
         handles, bodies = handles_of(packed), packed.system.bodies
         self._places = ~turning(bodies, int(bodies[:, 1].sum()))
         self.following = {i: self._rate(handles, gap.side) for i, gap in enumerate(self.list) if gap.side.follows}
-        self._stops = [(i, self._stop(handles, gap.side)) for i, gap in enumerate(self.list) if gap.side.joint]
+        stops = [(i, gap.side) for i, gap in enumerate(self.list) if gap.side.joint]
+        self._stops, self._bounds = [i for i, _ in stops], np.array([side.bound for _, side in stops])
+        self._counted = [handles.row(side.joint, "angle").first + side.which for _, side in stops]
         self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
         self._lengths = None, None  # a length, and `lengths` of it
 
@@ -132,17 +134,6 @@ class Gaps:
         """Rows of Phi of gaps and of their slips, by default of all."""
         return np.concatenate((self.rows[which], self.slip_rows[which][self.rough[which]].ravel()))
 
-    def _stop(self, handles, side):
-        """A function of q (..., n) and counted angles (..., angles) that returns the gap (...) of a joint's angle."""
-        place = handles.row(side.joint, "angle")
-        geometry, at = place.angles[side.which], place.first + side.which
-
-        def value(q, angles):
-            found = angle_of(geometry, *handles.motions(geometry, (q,)), 0)
-            return side.sign * (counted(found, angles[..., at]) - side.bound)
-
-        return value
-
     @staticmethod
     def _rate(handles, side):
         """A function of q, qd (..., n) that returns the rate (...) of a joint, in the direction of its ratchet."""
@@ -155,13 +146,12 @@ class Gaps:
         """Gaps (k, count) at times t (k,).
 
         levels (k, ...) begin with q (n,); counted is a function that returns the counted angles (k, angles) of joints.
+        Of a joint's angle a gap is +- (angle - bound).
         """
         rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
         found = np.ascontiguousarray(self.workspace.gaps(t, rows, self.sign)[:, : self.count])
         if self._stops:
-            q, angles = rows[:, : self.workspace.n], counted()
-            for i, value in self._stops:
-                found[:, i] = value(q, angles)
+            found[:, self._stops] = self.sign[self._stops] * (counted()[:, self._counted] - self._bounds)
         return found
 
     def of_contact(self, contact):
@@ -211,9 +201,10 @@ class Gaps:
         return self.workspace.slips(t, levels, self._slips[which].ravel(), self._ways[which], ways)
 
     def at(self, q, angles, t=0.0):
-        """Gaps (count,) at one state."""
+        """Gaps (count,) at one state; angles (angles,) near which those of joints are counted."""
         if self._stops:
-            return self.values(np.array([t]), q[None], lambda: angles[None])[0]
+            handles = handles_of(self.packed)
+            return self.values(np.array([t]), q[None], lambda: counted(all_angles(handles, q), angles)[None])[0]
         return self.workspace.gaps(np.array([t]), q[None], self.sign)[0, : self.count]
 
 

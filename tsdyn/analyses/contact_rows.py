@@ -33,6 +33,7 @@ from ..model.equations import (
     time_derivative,
     with_short_rows,
 )
+from ..model.joint_turns import find_counted_angles
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, no_system
 from ..observables.evaluate import NO_INERTIA
@@ -88,7 +89,8 @@ def measure_opened(t, which, start, values):
     """Divide gaps by the time since they have opened, in values (k, gaps) at times t (k,), or add rounding to them.
 
     start (4, opened): time, gap, rate and rounding where those of the numbers `which` have opened; without a rate the
-    second. The first have the rounding, r, too, times (r / (rate time))^6: above noise at once, none where they close.
+    second. The first are rate + (gap / time - rate) / (1 + y^7), y = rounding / (rate time): the rate at once, where
+    gaps are rounding, and gap / time where they close.
     """
     for k in range(t.size):
         _measure_opened(t[k], which, start, values[k])
@@ -102,10 +104,11 @@ def _measure_opened(t, which, start, values):
         if not rate > 0.0:
             values[which[j]] = grown + rounding
         elif since > 0.0:
-            share = (rounding / (rate * since)) ** 2
-            if share > JUST_OPENED**2:  # else it would be the sign of gaps that are zero to the last digit
-                grown += rounding * share * share * share
-            values[which[j]] = grown / since
+            mean, y = grown / since, rounding / (rate * since)
+            if y > JUST_OPENED:  # else it would be the sign of gaps that are zero to the last digit
+                square = y * y
+                mean = rate + (mean - rate) / (1.0 + square * square * square * y)
+            values[which[j]] = mean
         else:
             values[which[j]] = rate
 
@@ -377,7 +380,7 @@ def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # te
 
 KERNELS = (
     find_gaps, measure_opened, find_open_gaps, find_rows, find_slips, respond, accelerate, bounce, gain,
-    find_multipliers, *SURVEYING, *SEARCHING, *CONES,
+    find_multipliers, find_counted_angles, *SURVEYING, *SEARCHING, *CONES,
 )  # fmt: skip
 
 

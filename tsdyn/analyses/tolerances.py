@@ -129,8 +129,8 @@ EVENT_ERROR = 1e-9
 PULLS = 1e-6
 # Share of the bound of friction that decides then: the contact slides, though its acceleration is rounding.
 WITHIN_BOUND = 1.0 - 1e-10
-# Rounding of a gap that has just opened, over its rate times the time since, from which on it is added: flights above
-# rounding end at 1/16.
+# Rounding of a gap that has just opened, over its rate times the time since, from which on its rate counts beside it:
+# flights above rounding end at 1/16.
 JUST_OPENED = 1.0 / 14.0
 
 # --- friction at rest ------------------------------------------------------------------------------------------------

@@ -331,9 +331,12 @@ class Search:
     shaken : function
         Error of the value at a time that rounding of the state causes.
     noise : float
-        Known rounding error of the values.
+        Rounding error of the values, as measured before: measured again where values are no larger and rounding of the
+        state makes less, since it may have been that of larger values.
     most : int, optional
         Samples at most; MOST by default.
+    least : float
+        Rounding error that values have for sure.
 
     Attributes
     ----------
@@ -344,8 +347,8 @@ class Search:
         Samples taken.
     """
 
-    def __init__(self, sample, shaken, noise=0.0, most=None):
-        self.sample, self.shaken, self.noise, self.most = sample, shaken, noise, most or MOST
+    def __init__(self, sample, shaken, noise=0.0, most=None, least=0.0):
+        self.sample, self.shaken, self.noise, self.most, self.least = sample, shaken, noise, most or MOST, least
         self.points, self.spent, self._shortest, self._unit = [], 0, 0.0, 1.0
 
     def run(self, a, value, b, degree):
@@ -363,8 +366,12 @@ class Search:
             self._measure_by(math.ldexp(limits.SAFE, min(exponent, limits.MOST_SCALED)))
             whole = self._fit(a, b, self._unit * value, None, degree)
         self.points.append((a, self._unit * value))
+        least, middle = self._unit * self.least, 0.5 * (a + b)
+        if max(least, whole.clear) < self.noise and self._unit * self.shaken(middle) < limits.STALE * self.noise:
+            self.noise = least
+            whole = self._fit(a, b, self._unit * value, None, whole.degree)
         if not (whole.resolved or whole.off != whole.off):
-            self.noise = max(self._rounding(whole), self._unit * self.shaken(0.5 * (a + b)))
+            self.noise = max(self._rounding(whole), self._unit * self.shaken(middle), least)
             whole = whole._replace(resolved=whole.off <= self.noise)
         self._follow(whole, 0)
         last = self.points[-1][1] if self.points[-1][0] == b else float(whole.samples[-1])

@@ -75,6 +75,8 @@ ROUGH_SHARE, SHORTEST_INTERVAL, DEEPEST = 1e-7, 1e4 * EPS, 2.0**-24
 MOST_BISECTIONS = 64
 # Noise is measured on intervals of the share ROUGH_SHARE, then this many times as long, up to the second share.
 NOISE_RATIO, WIDEST_NOISE = 1e-3, 1e-3
+# Share of a noise below which rounding of the state doesn't explain it: rounding in random directions varies by less.
+STALE = 0.1
 # Values are multiplied by a power of two: by SAFE, so that no sum of them is infinite; by one that makes the largest
 # about SAFE where it is below UNDERFLOWING then, since parts of it would vanish; its exponent is limited.
 SAFE, UNDERFLOWING, MOST_SCALED = 2.0**-16, 2.0**-500, 1000

@@ -11,7 +11,7 @@ results are computed from q, on the turn nearest to the tracked angle.
 
 import math
 
-from ..jit.kernels import kernel, long_kernel
+from ..jit.kernels import entry, kernel, long_kernel
 from ..maths.vectors import cross, dot, spin, subtract, to_body, to_ground
 
 HALF_PI, TURN_ROUND = 0.5 * math.pi, 2.0 * math.pi
@@ -84,3 +84,34 @@ def count_turns(r, q, qd, h):
     """Follow the angles to q, qd, a step h from the last accepted point."""
     for j in range(r.joints.shape[0]):
         r.remembered[j] = angle_after(r, j, q, qd, h)
+
+
+@kernel
+def _angle_and_rate(place, frame, q, qd):
+    """An angle in (-pi, pi] and its rate, Eq. (1)."""
+    f, g, h = (frame[0], frame[1], frame[2]), (frame[3], frame[4], frame[5]), (frame[6], frame[7], frame[8])
+    own, m, other, n = place[0], place[1], place[2], place[3]
+    p, o = _four(q, own, m, 1.0), _four(q, other, n, 1.0)
+    v = seen(p, o, h)
+    return math.atan2(dot(g, v), dot(f, v)), _rate(f, g, v, p, _four(qd, own, m, 0.0), o, _four(qd, other, n, 0.0))
+
+
+@kernel
+def _counted(angle, near):
+    return angle + TURN_ROUND * math.floor((near - angle) / TURN_ROUND + 0.5)
+
+
+@entry("wmmvvmm")
+def find_counted_angles(joints, frames, before, near, h, states, out):
+    """out (k, count): angles of joints at states (k, 3 n), h (k,) after the state before (3, n), by Eq. (2).
+
+    near (count,): these angles there, roughly.
+    """
+    n = before.shape[1]
+    for j in range(near.size):
+        place = joints[4 * j : 4 * j + 4]
+        first, rate = _angle_and_rate(place, frames[j], before[0], before[1])
+        first = _counted(first, near[j])
+        for k in range(h.size):
+            angle, other = _angle_and_rate(place, frames[j], states[k, :n], states[k, n : 2 * n])
+            out[k, j] = _counted(angle, first + 0.5 * h[k] * (rate + other))

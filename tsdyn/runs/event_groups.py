@@ -102,6 +102,10 @@ class Group:
             track.begin(t, value, not self._was_new or (self._exact[i] and value > 0.0))
             track.noise = float(self.noise[i])
 
+    def least_noise(self, number):
+        """Of an event of its own: the rounding error of values that is known beforehand."""
+        return float(self._least[self.numbers.index(number)])
+
     def take_back(self, track, i):
         """Take what a `Track` knows at the end of a step."""
         self.value[i], self.noise[i] = track.value, track.noise
@@ -157,7 +161,7 @@ class Group:
             self.degree, last[left] = seen.degree, seen.samples[-1]
             if self._was_new and self._some_may_fall and (fallen := self._fallen(seen.samples, left)) is not None:
                 return (self.numbers[fallen], step.t0), []
-            unclear = self._unclear(seen, left, noise)
+            unclear = self._unclear(seen, left)
             if not unclear:
                 alone = {}
                 break
@@ -174,7 +178,7 @@ class Group:
         self.value[:] = last
         return found, [i for i, since in alone.items() if since < end]
 
-    def _unclear(self, seen, left, noise):
+    def _unclear(self, seen, left):
         """Of the members `left` those that may have a zero, and up to which time they have none."""
         unclear = {j: since for j, since in enumerate(seen.since) if since < math.inf}
         # What a `Track` knows of zeros is of no interest where the member is clear, on the side that it falls from
@@ -183,9 +187,10 @@ class Group:
                 unclear.setdefault(j, seen.a)
             else:
                 self._odd[left[j]] = 0
-        # Values of rounding alone have no zero
-        if unclear and noise.any():
-            quiet = (np.abs(seen.samples).max(axis=0) <= noise).tolist()
+        # Values of known rounding alone have no zero
+        least = self._least[left]
+        if unclear and least.any():
+            quiet = (np.abs(seen.samples).max(axis=0) <= least).tolist()
             unclear = {j: since for j, since in unclear.items() if not quiet[j]}
         return unclear
 

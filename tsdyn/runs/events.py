@@ -11,8 +11,8 @@ from ..errors import InvalidArgument, Status
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import all_angles, counted, handles_of
-from ..model.kinematics import Anchor
-from ..observables.state import EventInstant, RememberingState
+from ..model.joint_turns import find_counted_angles
+from ..observables.state import EventInstant
 from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
 from . import tolerances as limits
@@ -356,12 +356,13 @@ class Watch:
     def _instant(self, t, state):
         return EventInstant(self.packed, self.memory[self.angles :], self.beside, t, state)
 
-    def _instants(self, t, states):
-        """The same at times t (k,), states (k, 3, n), without multipliers."""
-        before, (q, qd, _), angles = self.beside
-        anchor = Anchor(angles, t - before, (q, qd))
-        parts = (np.ascontiguousarray(states[:, i]) for i in range(3))
-        return RememberingState.of(self.packed, self.memory[self.angles :], anchor, t, *parts, None)
+    def _counted(self, times, levels):
+        """Counted angles (k, angles) at times t (k,) within the step, levels (k, 3, n)."""
+        t0, state, near = self.beside
+        joints, out = handles_of(self.packed), np.empty((times.size, self.angles))
+        rows = levels.reshape(times.size, 3 * self._n)
+        find_counted_angles(joints.joints.ravel(), joints.frames, state, near, times - t0, rows, out)
+        return out
 
     def _angles(self, t, state):
         """Counted angles (angles,) at a state within the step, by the rates at its start and here."""
@@ -387,7 +388,7 @@ class Watch:
 
     def _states(self, times, levels):
         """What groups are given: times t (k,), levels (k, 3, n)."""
-        return States(times, levels, self.memory[self.angles :], lambda: self._instants(times, levels).angles)
+        return States(times, levels, self.memory[self.angles :], lambda: self._counted(times, levels))
 
     def _sample(self, group, times, levels):
         """Values (k, members) of a group."""
@@ -536,7 +537,8 @@ class Watch:
 
         # A function that fails at some time is searched up to the last time before
         while end > step.t0:
-            search = Search(sample, lambda t: self._shaken(i, t, step.at), track.noise, most)
+            least = self._group_of[i].least_noise(i) if is_member else 0.0
+            search = Search(sample, lambda t: self._shaken(i, t, step.at), track.noise, most, least)
             try:
                 degree = max(self._degree(step.turning * (step.t1 - step.t0)), track.degree // 2)
                 track.degree, track.end = search.run(step.t0, track.value, end, degree)

@@ -174,16 +174,10 @@ def _survey(s, step, t0, t1, turning):
 
 
 @kernel
-def _mark(s, samples):
+def _mark(s):
     """Leave slopes to the functions that cross zero once, and no time to those clear of it; whether all are clear."""
     clear = True
     for j in range(s.value.size):
-        most = 0.0
-        for i in range(samples.shape[0]):
-            most = max(most, abs(samples[i, j]))
-        # Values of rounding alone have no zero
-        if s.noise[j] > 0.0 and most <= s.noise[j]:
-            s.marks[j, 0] = math.inf
         is_clear = s.left[j] == 0 or s.marks[j, 0] == math.inf
         clear = clear and is_clear
         if is_clear or not (s.marks[j, 1] > s.marks[j, 0] and s.falls[j] * s.value[j] < 0.0):
@@ -243,8 +237,7 @@ def search_step(search, context, run, first, second, before, now, block, charts,
         degree = _survey(s, step, t0, end, turning)
         if degree == 0:
             return UNSURE
-        samples = matrix(data_of(s.samples), degree + 2, m)
-        if _mark(s, samples):
+        if _mark(s):
             break
         if _first_root(s, step, scratch[0], end - t0) != ARRIVED:
             return UNSURE
@@ -256,7 +249,7 @@ def search_step(search, context, run, first, second, before, now, block, charts,
         if not unclear:
             break
     if numbers.found < 0:
-        copy(samples[degree + 1], s.value)
+        copy(matrix(data_of(s.samples), degree + 2, m)[degree + 1], s.value)
         return CLEAR
     numbers.t = end
     return FOUND if _find_beside(s, step, t0, end, scratch[0], scratch[1]) else UNSURE

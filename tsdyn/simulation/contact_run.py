@@ -127,7 +127,8 @@ class _ContactRun(Transitions):
         kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
         # Whether phases of frictions that stick and slide are packed once, with the rows of all: see `phase_of`
         self.switches = run_task is not None and free.packed.derived.redundant is None
-        self.length = self.gaps.extent(self.q)
+        apart = np.abs(self.gaps.at(self.q, self.remembered[: self.count]))
+        self.length = max(self.gaps.extent(self.q), apart[self.gaps.lengths(0.0) == 0.0].max(initial=0.0))
         demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol, self.able)
         self.users = prepared_events(options.events) or []
         self.rest = self.t

@@ -197,4 +197,5 @@ def _angles(kept, state, t, q):
 
 def _demand_apart(scene, state, q):
     kept = prepared(phase_of(scene, []))
-    demand_apart(gaps_of(scene), q, _angles(kept, state, getattr(state, "t", 0.0), q), INITIAL_TOL)
+    gaps, angles = gaps_of(scene), _angles(kept, state, getattr(state, "t", 0.0), q)
+    demand_apart(gaps, gaps.at(q, angles), gaps.extent(q), INITIAL_TOL)

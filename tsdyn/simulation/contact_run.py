@@ -61,12 +61,14 @@ from .unit_events import Breaking, Closing, Leaving, Slowing
 # `UnitModes` has all that a phase follows from, beside t, q, qd and what the run remembers: a checkpoint needs no more.
 
 
-def demand_apart(gaps, q, angles, tol, able=None):
-    """Raise InconsistentState where gaps are below zero, of those that are able to close: by default, at the start."""
-    values = gaps.at(q, angles)
+def demand_apart(gaps, values, length, tol, able=None):
+    """Raise InconsistentState where gaps are below zero, of those that are able to close: by default, at the start.
+
+    values (count,): the gaps; length: of the scene, m.
+    """
     if able is None:
         able = [i for i, gap in enumerate(gaps.list) if gap.contact.active]
-    allowed = -tol * gaps.lengths(gaps.extent(q))
+    allowed = -tol * gaps.lengths(length)
     deep = [i for i in able if values[i] < allowed[i]]
     if deep:
         found = listed([f"{gaps.names[i]} {gaps.list[i].contact.excess} by {-values[i]:.3g}" for i in deep], NAMED)
@@ -127,9 +129,9 @@ class _ContactRun(Transitions):
         kept.start(free, *start, options.redundancy == "drop")  # finds redundant bilateral rows
         # Whether phases of frictions that stick and slide are packed once, with the rows of all: see `phase_of`
         self.switches = run_task is not None and free.packed.derived.redundant is None
-        apart = np.abs(self.gaps.at(self.q, self.remembered[: self.count]))
-        self.length = max(self.gaps.extent(self.q), apart[self.gaps.lengths(0.0) == 0.0].max(initial=0.0))
-        demand_apart(self.gaps, self.q, self.remembered[: self.count], options.initial_tol, self.able)
+        apart, length = self.gaps.at(self.q, self.remembered[: self.count]), self.gaps.extent(self.q)
+        demand_apart(self.gaps, apart, length, options.initial_tol, self.able)
+        self.length = max(length, np.abs(apart[self.gaps.lengths(0.0) == 0.0]).max(initial=0.0))
         self.users = prepared_events(options.events) or []
         self.rest = self.t
         self.kinds, self.parts, self.found, self.report = [], [], [[] for _ in self.users], reporter(call.progress)

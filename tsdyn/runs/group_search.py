@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit.kernels import Record, caller, data_of, entry, kernel, loader, matrix, resident
+from ..jit.kernels import Record, callback, caller, data_of, entry, kernel, loader, matrix, resident, seen
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
 from .dense_output import OTHER_CHART, SAME_STEP, WHOLE, read_one
@@ -58,6 +58,7 @@ class SearchNumbers(Record):
 
     reader: int  # the kernel that reads states
     values: int  # and that of the functions
+    finder: int  # and `find_first`
     place: int  # of the next time that is read, as of `dense_output.read`
     t0: float  # s, the step
     t1: float
@@ -105,6 +106,19 @@ class SearchedStep(NamedTuple):
     second: int
     t1: float  # s, its end
     now: np.ndarray  # (3, n)  the state there
+
+
+class StepArrays(NamedTuple):
+    """What a `SearchedStep` is made of."""
+
+    before: np.ndarray  # (3, n)  the state at t0
+    now: np.ndarray
+    block: np.ndarray
+    charts: np.ndarray
+    points: np.ndarray
+
+
+load_arrays = loader(StepArrays(*np.zeros((2, 0, 0)), np.zeros(0), *np.zeros((2, 0, 0))))
 
 
 @kernel
@@ -215,18 +229,14 @@ def _find_beside(s, step, t0, t, first, value):
     return True
 
 
-@entry("pppppmmvmm")
-def search_step(search, context, run, first, second, before, now, block, charts, points):  # ten: a step
-    """Search a step for the first zero: CLEAR, FOUND, or UNSURE, after which nothing has changed.
-
-    context, run: of the reader; first, second: of the functions; before, now (3, n): states at t0 and t1. Of a zero the
-    function and the time are in the `SearchNumbers`, the state and those that vanish beside in the `SearchParts`.
-    """
-    s = load_search(search)
+@callback("pppppp")
+def find_first(search, context, run, first, second, arrays):
+    """As `search_step`, for kernels; arrays: `StepArrays`."""
+    s, a = load_search(search), load_arrays(arrays)
     t0, t1 = s.numbers.t0, s.numbers.t1
-    step = SearchedStep(context, run, block, charts, points, first, second, t1, now)
+    step = SearchedStep(context, run, a.block, a.charts, a.points, first, second, t1, a.now)
     numbers, m, end = s.numbers, s.value.size, t1
-    turning = max(_turn_rate(s.spins, before[1]), _turn_rate(s.spins, now[1]))
+    turning = max(_turn_rate(s.spins, a.before[1]), _turn_rate(s.spins, a.now[1]))
     scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
     numbers.place, numbers.found = OTHER_CHART, -1
     for j in range(m):
@@ -255,14 +265,34 @@ def search_step(search, context, run, first, second, before, now, block, charts,
     return FOUND if _find_beside(s, step, t0, end, scratch[0], scratch[1]) else UNSURE
 
 
-@entry("pppdmv")
-def evaluate_functions(search, first, second, t, now, out):
+call_find = caller("pppppp")
+
+
+@entry("pppppmmvmm")
+def search_step(search, context, run, first, second, before, now, block, charts, points):  # ten: a step
+    """Search a step for the first zero: CLEAR, FOUND, or UNSURE, after which nothing has changed.
+
+    context, run: of the reader; first, second: of the functions; before, now (3, n): states at t0 and t1. Of a zero the
+    function and the time are in the `SearchNumbers`, the state and those that vanish beside in the `SearchParts`.
+    """
+    arrays, finder = StepArrays(before, now, block, charts, points), load_search(search).numbers.finder
+    return call_find(finder, search, context, run, first, second, seen(arrays))
+
+
+@kernel
+def begin_functions(s, first, second, t, now, out):
     """out (m,): values at t and a state (3, n); 0 if one is not finite, else 1."""
-    _evaluate(load_search(search), first, second, t, now, out)
+    _evaluate(s, first, second, t, now, out)
     return 1 if is_finite(out) else 0
 
 
-SEARCHING = (move, search_step, evaluate_functions)
+@entry("pppdmv")
+def evaluate_functions(search, first, second, t, now, out):
+    """As `begin_functions`."""
+    return begin_functions(load_search(search), first, second, t, now, out)
+
+
+SEARCHING = (move, find_first, search_step, evaluate_functions)
 
 
 class GroupSearch:
@@ -284,25 +314,25 @@ class GroupSearch:
     """
 
     def __init__(self, kernel, which, falls, known, spins, n):
-        (called, self._first, self._second, count), m = kernel, len(which)
-        self.numbers = SearchNumbers(values=called.address)
+        (called, *self.contexts, count), m = kernel, len(which)
+        self.numbers = SearchNumbers(values=called.address, finder=find_first.address)
         self.parts = SearchParts(
             self.numbers, kernel_tables(), spins.ravel(), np.array(which, int), falls, *known, np.zeros(count),
             np.zeros((LARGEST + 4) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)), np.zeros((m, 4)),
             np.zeros(3), np.zeros((3, n)), np.zeros(m, int),
         )  # fmt: skip
-        self._search, self._keep = resident(self.parts)
+        self.address, self._keep = resident(self.parts)
 
     def at(self, t, now):
         """Values (m,) at t and a state (3, n), and whether they are finite."""
         out = np.empty(self.parts.value.size)
-        return out, evaluate_functions(self._search, self._first, self._second, t, now, out) == 1
+        return out, evaluate_functions(self.address, *self.contexts, t, now, out) == 1
 
     def find(self, step):
         """The number of the function that is zero first in a step, `Inside`, -1 for none; None where that is unsure."""
         numbers, reader, known = self.numbers, step.reader, step.known
         numbers.t0, numbers.t1, (numbers.reader, context, run) = step.t0, step.t1, reader.where
-        contexts = self._search, context, run, self._first, self._second
+        contexts = self.address, context, run, *self.contexts
         found = reader.call(search_step, *contexts, known[step.t0], known[step.t1], *step.steps)
         if found == FOUND:
             known[numbers.t] = self.parts.state.copy()

@@ -39,10 +39,10 @@ from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome, interval, output_times, state_arrays
 from ..runs.tolerances import START_ZERO
 from ..validation import counted, damaged, demand, listed
-from . import hybrid
+from . import flights, hybrid
 from .grips import Halting, Reactions, items_of
 from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
-from .phases import PhasePieces, Phases, Pinned, UnitModes, plain
+from .phases import Impulse, PhasePieces, Phases, Pinned, UnitModes, plain
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
@@ -90,7 +90,7 @@ FAILURES = {
 @cache
 def _compile_once(slides):
     """Have compiled what events need; slides: whether there is exact friction of joints."""
-    compile_ahead((*contact_rows.KERNELS, *(friction_units.KERNELS if slides else ())))
+    compile_ahead((*contact_rows.KERNELS, *flights.KERNELS, *(friction_units.KERNELS if slides else ())))
 
 
 class _ContactRun(Transitions):
@@ -258,7 +258,7 @@ class _ContactRun(Transitions):
             other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(), resume=None if other else self._resume, archive=self.archive,
+                max_steps=self._steps_left(), resume=None if other else self, archive=self.archive,
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
             self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
@@ -363,8 +363,8 @@ class _ContactRun(Transitions):
         demand(self.remembered.shape == (self.count + self.scene.system.memory.size,), "what is remembered")
         return self._phase_of_modes(self.every if record[3] else ()), self.gaps
 
-    def _resume(self, t, run, numbers):
-        """After events of these numbers: whether the run of the phase goes on, with other velocities.
+    def resume(self, t, run, numbers):
+        """As of `Watch`, after events of these numbers: whether the run of the phase goes on, with other velocities.
 
         It does where the same gaps are closed as before.
         """
@@ -381,6 +381,27 @@ class _ContactRun(Transitions):
         self.closing.open(self.modes.opened)
         self.again.append(t)
         return True
+
+    def flights(self, group, memory, reader):
+        """As of `Watch`."""
+        if self.frictions.count or not (self.modes.same(UnitModes()) and flights.Flights.serve(memory, group)):
+            return None
+        return flights.Flights(self, group, memory, reader)
+
+    def land(self, flown):
+        """As of `Watch`."""
+        impacts = flown.impacts()
+        for t, i, *_, p, energy in impacts:
+            self._end_phase(t)
+            self.t = self.rest = t
+            self.phases.impulses.append((t, self.gaps.names[int(i)], Impulse(p)))
+            self.phases.gain(energy)
+            self.again.append(t)
+        i, *opened = impacts[-1][1:5]
+        self.modes, self.at_once = UnitModes(opened={int(i): (self.t, *opened)}), 0
+        self.q, self.ended, self.qdd, self.qd = flown.parts.struck.copy()
+        self.remembered = flown.parts.noted.copy()
+        self.judged = self.judged[0], self.judged[1] + flown.numbers.impacts
 
     def _scene(self):
         """The scene of the present modes."""

@@ -15,7 +15,7 @@ from ..elements.loops.constraint_rows import move_bodies, place_bodies, take_loa
 from ..errors import SingularConfiguration
 from ..formulations.accelerations import accelerate_with_friction, refine_accelerations, solve_accelerations
 from ..formulations.tolerances import EXACT, REFINEMENTS
-from ..jit.kernels import ANY, Record, callback, entry, kernel, loader, resident, vector
+from ..jit.kernels import ANY, Record, callback, entry, kernel, loader, matrix, resident, vector
 from ..maths.complementarity import CONES
 from ..maths.dense_linalg import copy, largest
 from ..maths.root_isolation import SURVEYING
@@ -33,7 +33,7 @@ from ..model.equations import (
     time_derivative,
     with_short_rows,
 )
-from ..model.joint_turns import find_counted_angles
+from ..model.joint_turns import counted_angle, find_counted_angles
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, no_system
 from ..observables.evaluate import NO_INERTIA
@@ -115,10 +115,11 @@ def _measure_opened(t, which, start, values):
 
 
 class GapCounts(Record):
-    """Numbers of rows of contacts, and of gaps that have just opened."""
+    """Numbers of rows of contacts, of gaps that have just opened, and of coordinates."""
 
     rows: int
     opened: int
+    n: int
 
 
 class ImpactNumbers(Record):
@@ -133,6 +134,16 @@ class ImpactNumbers(Record):
     length: float  # sizes of the terms of the gap
 
 
+class Stops(NamedTuple):
+    """The gaps that are sign (angle - bound), of angles of joints."""
+
+    gaps: np.ndarray  # int64 (stops,)  their numbers
+    angles: np.ndarray  # int64 (stops,)  those of the angles
+    bounds: np.ndarray  # (stops,)
+    joints: np.ndarray  # int64 (4 angles,)  as of `find_counted_angles`
+    frames: np.ndarray  # (angles, 9)
+
+
 class OpenGaps(NamedTuple):
     """What is known of open gaps."""
 
@@ -140,18 +151,34 @@ class OpenGaps(NamedTuple):
     sign: np.ndarray  # (gaps,)  of a gap over Phi
     which: np.ndarray  # int64 (gaps,)  those that have just opened come first
     start: np.ndarray  # (4, gaps)  as of `measure_opened`
+    stops: Stops
 
 
 load_rows = loader(no_system())
-load_open_gaps = loader(OpenGaps(GapCounts(), np.zeros(0), np.zeros(0, int), np.zeros((4, 0))))
+_none = np.zeros(0, int)
+_no_stops = Stops(_none, _none, np.zeros(0), _none, np.zeros((0, 9)))
+load_open_gaps = loader(OpenGaps(GapCounts(), np.zeros(0), _none, np.zeros((4, 0)), _no_stops))
+
+
+@kernel
+def find_gaps_within(s, gaps, t, state, t0, before, near, out):  # eight: and where the step began
+    """out (rows,) = the gaps first, at t and a state (3, n); near (angles,): of joints at t0 and `before`, roughly."""
+    find_gaps_at(s, t, state[0], gaps.sign, out)
+    stops = gaps.stops
+    for k in range(stops.gaps.size):
+        i, j = stops.gaps[k], stops.angles[k]
+        place = stops.joints[4 * j : 4 * j + 4]
+        angle = counted_angle(place, stops.frames[j], before, near[j], t - t0, state[0], state[1])
+        out[i] = gaps.sign[i] * (angle - stops.bounds[k])
 
 
 @callback(VALUES)
-def find_open_gaps(contacts, own, t, state, out):
-    """out (rows,) = the gaps first, at t and a state (3, n), as `find_gaps` and `measure_opened` have them."""
+def find_open_gaps(contacts, own, t, state, out, t0, before, near):  # eight: VALUES
+    """As `find_gaps_within`, and `measure_opened`."""
     gaps = load_open_gaps(own)
-    values = vector(out, gaps.counts.rows)
-    find_gaps_at(load_rows(contacts), t, vector(state, ANY), gaps.sign, values)
+    values, n = vector(out, gaps.counts.rows), gaps.counts.n
+    now, first = matrix(state, 3, n), matrix(before, 3, n)
+    find_gaps_within(load_rows(contacts), gaps, t, now, t0, first, vector(near, ANY), values)
     _measure_opened(t, gaps.which[: gaps.counts.opened], gaps.start, values)
     return 0
 

@@ -57,7 +57,7 @@ class Group:
         All of the run.
     numbers : list of int
         Of its own.
-    spins, n
+    spins, n, angles
         As of `GroupSearch`.
 
     Attributes
@@ -72,7 +72,7 @@ class Group:
         Whether no step has been searched since the start.
     """
 
-    def __init__(self, over, events, numbers, spins, n):
+    def __init__(self, over, events, numbers, spins, n, angles):
         self.over, self.numbers, self.degree = over, numbers, 0
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
@@ -89,7 +89,7 @@ class Group:
         self.kernel = self.beside = None
         if kernel is not None and all(self._exact) and not self._some_may_fall:
             known = self.value, self.noise, self._odd
-            self.kernel = GroupSearch(kernel, self.which, self._falls, known, spins, n)
+            self.kernel = GroupSearch(kernel, self.which, self._falls, known, spins, n, angles)
 
     def begin(self, values):
         """Take the values (members,) at the start of a run."""

@@ -96,8 +96,9 @@ ROOM = 64  # states that are kept
 class Inside:
     """States within the step that a run has just made."""
 
-    def __init__(self, reader, run, log, t0, before, spins):
-        self.t0, self.t1, self._spins = t0, run.clock.t, spins
+    def __init__(self, reader, run, log, start, spins):
+        (self.t0, before, self.near), self.t1, self._spins = start, run.clock.t, spins
+        t0 = self.t0
         self.reader, self.steps = reader, (run.block, log.charts, log.points)
         self.known = {t0: before, self.t1: run.now.copy()}
 
@@ -216,7 +217,7 @@ class Watch:
         for i, event in enumerate(events):
             if isinstance(event.function, GroupMember):
                 groups.setdefault(event.function.over, []).append(i)
-        self._groups = [Group(over, events, numbers, self._p, self._n) for over, numbers in groups.items()]
+        self._groups = [Group(over, events, numbers, self._p, self._n, self.angles) for over, numbers in groups.items()]
         self._group_of = {i: group for group in self._groups for i in group.numbers}
         self._members = list(self._group_of)
         self._single = [i for i in range(len(events)) if i not in self._group_of]
@@ -440,7 +441,7 @@ class Watch:
     def _at_start(self, group):
         """Values (members,) of a group where it begins."""
         if group.kernel is not None:
-            values, finite = group.kernel.at(self.t, self.state)
+            values, finite = group.kernel.at(*self.beside)
         else:
             values = self._sample(group, np.array([self.t]), self.state[None])[0]
             finite = np.isfinite(values).all()
@@ -455,7 +456,7 @@ class Watch:
         known = self.t, self.state, self.memory
         self.memory = run.remembered.copy()
         try:
-            return self._locate(run, log, Inside(self.reader, run, log, self.t, self.state, self._p))
+            return self._locate(run, log, Inside(self.reader, run, log, self.beside, self._p))
         except KeyboardInterrupt:
             self.memory = known[2]
             raise

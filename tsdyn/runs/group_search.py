@@ -48,7 +48,9 @@ def move(values, marks, width, step):
 
 # The search: samples at Chebyshev points, a survey of all functions, the first root by true values.
 
-VALUES = "ppdpp"  # of kernels of functions: two contexts, t, the state (3, n), values to be written
+# Of kernels of functions: two contexts, t, the state (3, n), values to be written; where the step began: the time, the
+# state, and angles of joints, roughly
+VALUES = "ppdppdpp"
 call_values = caller(VALUES)
 CLEAR, FOUND = 0, 1  # and UNSURE
 
@@ -85,11 +87,13 @@ class SearchParts(NamedTuple):
     step: np.ndarray  # (3,)  of `move`
     state: np.ndarray  # (3, n)  the last that was read
     beside: np.ndarray  # int64 (m,)  1 of those that vanish with the one that is found
+    near: np.ndarray  # (angles,)  of joints where the step began, roughly
 
 
 _EXAMPLE = SearchParts(
     SearchNumbers(), np.zeros(0), *np.zeros((2, 0), int), *np.zeros((3, 0)), np.zeros(0, int),
     *np.zeros((2, 0)), np.zeros(0, int), *np.zeros((2, 0, 0)), np.zeros(0), np.zeros((0, 0)), np.zeros(0, int),
+    np.zeros(0),
 )  # fmt: skip
 load_search = loader(_EXAMPLE)
 
@@ -104,8 +108,10 @@ class SearchedStep(NamedTuple):
     points: np.ndarray
     first: int  # contexts of the functions
     second: int
+    t0: float  # s, where it begins
+    before: np.ndarray  # (3, n)  the state there
     t1: float  # s, its end
-    now: np.ndarray  # (3, n)  the state there
+    now: np.ndarray
 
 
 class StepArrays(NamedTuple):
@@ -122,9 +128,9 @@ load_arrays = loader(StepArrays(*np.zeros((2, 0, 0)), np.zeros(0), *np.zeros((2,
 
 
 @kernel
-def _evaluate(s, first, second, t, state, out):
+def _evaluate(s, first, second, t, state, t0, before, out):  # eight: and where the step began
     """Values (m,) of the functions at t and a state (3, n)."""
-    call_values(s.numbers.values, first, second, t, state, s.all)
+    call_values(s.numbers.values, first, second, t, state, s.all, t0, before, s.near)
     for j in range(out.size):
         out[j] = s.all[s.which[j]]
 
@@ -137,7 +143,7 @@ def _evaluate_within(s, step, t, whole, out):
     read = read_one(s.numbers.reader, step.context, step.run, step.block, step.charts, step.points, t, asked, s.state)
     if read != 0:
         return False
-    _evaluate(s, step.first, step.second, t, s.state, out)
+    _evaluate(s, step.first, step.second, t, s.state, step.t0, step.before, out)
     return True
 
 
@@ -175,7 +181,7 @@ def _survey(s, step, t0, t1, turning):
                 continue
             t = t1 if i == N + 1 else t0 + 0.5 * (t1 - t0) * (table.points[i] + 1.0)
             if t == step.t1:
-                _evaluate(s, step.first, step.second, t, step.now, samples[i])
+                _evaluate(s, step.first, step.second, t, step.now, step.t0, step.before, samples[i])
             elif not _evaluate_within(s, step, t, 0, samples[i]):
                 return 0
         copy(s.value, samples[0])
@@ -234,7 +240,7 @@ def find_first(search, context, run, first, second, arrays):
     """As `search_step`, for kernels; arrays: `StepArrays`."""
     s, a = load_search(search), load_arrays(arrays)
     t0, t1 = s.numbers.t0, s.numbers.t1
-    step = SearchedStep(context, run, a.block, a.charts, a.points, first, second, t1, a.now)
+    step = SearchedStep(context, run, a.block, a.charts, a.points, first, second, t0, a.before, t1, a.now)
     numbers, m, end = s.numbers, s.value.size, t1
     turning = max(_turn_rate(s.spins, a.before[1]), _turn_rate(s.spins, a.now[1]))
     scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
@@ -282,7 +288,7 @@ def search_step(search, context, run, first, second, before, now, block, charts,
 @kernel
 def begin_functions(s, first, second, t, now, out):
     """out (m,): values at t and a state (3, n); 0 if one is not finite, else 1."""
-    _evaluate(s, first, second, t, now, out)
+    _evaluate(s, first, second, t, now, t, now, out)
     return 1 if is_finite(out) else 0
 
 
@@ -311,20 +317,23 @@ class GroupSearch:
     spins : ndarray (bodies, 4)
         Where Euler parameters are among n coordinates.
     n : int
+    angles : int
+        Of joints.
     """
 
-    def __init__(self, kernel, which, falls, known, spins, n):
+    def __init__(self, kernel, which, falls, known, spins, n, angles):
         (called, *self.contexts, count), m = kernel, len(which)
         self.numbers = SearchNumbers(values=called.address, finder=find_first.address)
         self.parts = SearchParts(
             self.numbers, kernel_tables(), spins.ravel(), np.array(which, int), falls, *known, np.zeros(count),
             np.zeros((LARGEST + 4) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)), np.zeros((m, 4)),
-            np.zeros(3), np.zeros((3, n)), np.zeros(m, int),
+            np.zeros(3), np.zeros((3, n)), np.zeros(m, int), np.zeros(angles),
         )  # fmt: skip
         self.address, self._keep = resident(self.parts)
 
-    def at(self, t, now):
-        """Values (m,) at t and a state (3, n), and whether they are finite."""
+    def at(self, t, now, near):
+        """Values (m,) at t and a state (3, n), and whether they are finite; near (angles,): of joints, roughly."""
+        self.parts.near[:] = near
         out = np.empty(self.parts.value.size)
         return out, evaluate_functions(self.address, *self.contexts, t, now, out) == 1
 
@@ -332,7 +341,7 @@ class GroupSearch:
         """The number of the function that is zero first in a step, `Inside`, -1 for none; None where that is unsure."""
         numbers, reader, known = self.numbers, step.reader, step.known
         numbers.t0, numbers.t1, (numbers.reader, context, run) = step.t0, step.t1, reader.where
-        contexts = self.address, context, run, *self.contexts
+        contexts, self.parts.near[:] = (self.address, context, run, *self.contexts), step.near
         found = reader.call(search_step, *contexts, known[step.t0], known[step.t1], *step.steps)
         if found == FOUND:
             known[numbers.t] = self.parts.state.copy()

@@ -8,7 +8,7 @@ from ..analyses.contact_rows import (
     BOUNCES,
     bounce_off,
     energy_gained,
-    find_gaps_at,
+    find_gaps_within,
     load_contacts,
     load_impact,
     load_open_gaps,
@@ -112,7 +112,7 @@ def _strike(f, r, s, i, t):
         if s.value.size > 1 and s.beside[j] != 0:
             return False
     q, qd = s.state[0], s.state[1]
-    find_gaps_at(c.rows, t, q, f.sign, f.gaps)
+    find_gaps_within(c.rows, load_open_gaps(n.own), t, s.state, n.t0, f.before, s.near, f.gaps)
     for j in range(f.sign.size):
         if j != i and f.gaps[j] <= START_ZERO * limit[j]:
             return False
@@ -152,6 +152,7 @@ def fly(flight, log, most):
         for j in range(3):
             copy(r.now[j], f.before[j])
         copy(r.remembered, f.remembered)
+        copy(r.remembered[: s.near.size], s.near)
         n.t0, steps = r.clock.t, r.numbers.steps
         n.used += 1
         status = call_driver(n.driver, n.context, n.run, at, 1)
@@ -175,6 +176,7 @@ def fly(flight, log, most):
                 n.used += 1
                 status, n.new = call_driver(n.driver, n.context, n.run, at, -1), 1
                 copy(f.least, s.noise)
+                copy(r.remembered[: s.near.size], s.near)
                 if r.numbers.begun == 0 or begin_functions(s, n.rows, n.own, r.clock.t, r.now, s.value) == 0:
                     n.ended = NOT_BEGUN
                     return status

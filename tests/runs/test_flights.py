@@ -11,6 +11,7 @@ from tests.helpers.tolerances import HELD
 from tsdyn.runs import driver
 from tsdyn.simulation.contact_run import _ContactRun
 from tsdyn.simulation.flights import Flights
+from tsdyn.simulation.unit_events import Closing
 
 FLOOR = {"normal_b": (0, 0, 1), "unilateral": True}
 
@@ -35,19 +36,20 @@ def two_balls():
 
 
 def pendulum():
-    """A double pendulum whose tip hits a floor, with a spring at its first joint that counts turns."""
+    """A double pendulum whose tip hits a floor, with a spring at its first joint."""
     scene = ts.Scene(gravity=(0, 0, -G))
     rods = [scene.add_body(**ts.shapes.rod(1.0, axis="x", mass=1.0), position=(0.5 + i, 0, 0)) for i in range(2)]
-    first = scene.add(ts.constraints.Revolute.at(scene.ground, rods[0], point=(0, 0, 0), axis=(0, 1, 0)))
+    scene.add(ts.constraints.Revolute.at(scene.ground, rods[0], point=(0, 0, 0), axis=(0, 1, 0)))
     scene.add(ts.constraints.Revolute.at(*rods, point=(1, 0, 0), axis=(0, 1, 0)))
-    scene.add(ts.forces.TorsionalSpring(first, stiffness=3.0))
+    turning = {"axis_a": (0, 1, 0), "reference_a": (1, 0, 0), "reference_b": (1, 0, 0)}
+    scene.add(ts.forces.TorsionalSpring(scene.ground, rods[0], **turning, stiffness=3.0))
     tip = {"point_a": (0.5, 0, 0), "point_b": (0, 0, -0.8), "restitution": 0.7}
     scene.add(ts.constraints.PlaneContact(rods[1], scene.ground, **tip, **FLOOR))
     return scene
 
 
 SCENES = {"ball": ball, "two balls": two_balls, "pendulum": pendulum, "many": lambda: ball(1.0)}
-SPANS = {"many": 1000.0}
+SPANS = {"many": 2000.0}  # more impacts than are made before progress is judged
 CASES = {
     "steps": {},
     "outputs": {"t_eval": np.linspace(0.0, 3.0, 97)},
@@ -88,3 +90,18 @@ def test_python_has_nothing_to_do_between_impacts(monkeypatch):
     times = [(1 + 2 * k) * fall for k in range(100) if (1 + 2 * k) * fall < 20.0]
     np.testing.assert_allclose([t for t, *_ in solution.impulses], times, rtol=0, atol=HELD)
     np.testing.assert_allclose([p for *_, p in solution.impulses], 2.0 * G * fall, rtol=1e-12)
+
+
+def test_an_angle_that_stops_bound_beyond_a_turn(monkeypatch):
+    """A rod that turns to and fro between -7 and 8 rad, by 0.9 of its rate after each impact; Python sees no gap."""
+    monkeypatch.setattr(_ContactRun, "_transit", lambda run, fired: pytest.fail(f"asked at {run.t}"))
+    monkeypatch.setattr(Closing, "over", lambda self, states: pytest.fail(f"gaps at {states.t}"))
+    scene, rate = ts.Scene(gravity=(0, 0, 0)), 3.0
+    rod = scene.add_body(**ts.shapes.rod(1.0, axis="x", mass=1.0), angular_velocity=(0, rate, 0))
+    hinge = scene.add(ts.constraints.Revolute.at(scene.ground, rod, point=(0, 0, 0), axis=(0, 1, 0)))
+    scene.add(ts.constraints.Stop(hinge, lower=-7.0, upper=8.0, restitution=0.9))
+    solution = ts.simulate(scene, (0.0, 37.0))
+    times = 8.0 / rate + np.append(0.0, np.cumsum(15.0 / (rate * 0.9 ** np.arange(1, 5))))
+    np.testing.assert_allclose([t for t, *_ in solution.impulses], times, rtol=1e-13)
+    end = 8.0 - rate * 0.9**5 * (37.0 - times[-1])  # after the fifth
+    np.testing.assert_allclose(solution.state.angle(hinge), end, rtol=0, atol=1e-11)

@@ -6,7 +6,7 @@ H W H^T lam = H W f,  a = W (f - H^T lam)       H: bilateral rows               
 
 import math
 import threading
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from ..elements.loops.constraint_rows import move_bodies, place_bodies, take_loa
 from ..errors import SingularConfiguration
 from ..formulations.accelerations import accelerate_with_friction, refine_accelerations, solve_accelerations
 from ..formulations.tolerances import EXACT, REFINEMENTS
-from ..jit.kernels import ANY, Record, callback, entry, kernel, loader, matrix, resident, vector
+from ..jit.kernels import ANY, Record, callback, caller, entry, kernel, loader, matrix, resident, vector
 from ..maths.complementarity import CONES
 from ..maths.dense_linalg import copy, largest
 from ..maths.root_isolation import SURVEYING
@@ -125,6 +125,7 @@ class GapCounts(Record):
 class ImpactNumbers(Record):
     """Of the impact of one gap."""
 
+    kernel: int  # the address of `bounce_off`
     i: int  # its number
     sign: float
     e: float
@@ -304,12 +305,15 @@ load_impact = loader(
 )
 
 
-@kernel
-def bounce_off(c, w, t, q, qd, memory):
+@callback("ppdppp")
+def bounce_off(context, impact, t, q, qd, memory):
     """Impact of the gap sign Phi_i alone, with restitution e: p = -(1 + e) gd / G.
 
     NO_FACTORS; BOUNCES; STAYS where velocities are rounding, or the flight afterwards would be none.
     """
+    c, w = load_contacts(context), load_impact(impact)
+    n = c.free.work.q.size
+    q, qd, memory = vector(q, n), vector(qd, n), vector(memory, c.free.system.memory.size)
     x, rows, gamma = w.numbers, w.rows, w.gamma
     i, sign, e = x.i, x.sign, x.e
     for j in range(w.place.size):
@@ -343,10 +347,13 @@ def bounce_off(c, w, t, q, qd, memory):
     return STAYS if gdd < 0.0 and x.rate * x.rate < -2.0 * gdd * x.lowest else BOUNCES
 
 
+call_bounce = caller("ppdppp")
+
+
 @entry("ppdvvv")
 def bounce(context, impact, t, q, qd, memory):
     """As `bounce_off`."""
-    return bounce_off(load_contacts(context), load_impact(impact), t, q, qd, memory)
+    return call_bounce(load_impact(impact).numbers.kernel, context, impact, t, q, qd, memory)
 
 
 @entry("pvvvm")
@@ -456,7 +463,7 @@ def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # te
 
 
 KERNELS = (
-    find_gaps, measure_opened, find_open_gaps, find_rows, find_slips, respond, accelerate, bounce, gain,
+    find_gaps, measure_opened, find_open_gaps, find_rows, find_slips, respond, accelerate, bounce_off, bounce, gain,
     find_multipliers, find_counted_angles, *SURVEYING, *SEARCHING, *CONES,
 )  # fmt: skip
 
@@ -522,9 +529,6 @@ class ContactWorkspace:
         self._bilateral = len(free.system.segments)
         spans = rows.segments, free.system.inertia_segments
         self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in spans)
-        scratch = np.empty(self.m, int), self._short, np.empty((4, self.n)), np.empty((2, self.m)), self._inertias
-        self._impact = Impact(ImpactNumbers(), *scratch)
-        self.impact_address, self._keep_impact = resident(self._impact)
         answered = interrupts_answered() if calls_laws(free) else lambda kernel: kernel
         self._accelerate, self._bounce = answered(accelerate), answered(bounce)
         self.enter()
@@ -597,13 +601,21 @@ class ContactWorkspace:
 
         given: the first of these numbers.
         """
-        numbers = self._impact.numbers
+        impact, address, _ = self.impact
+        numbers = impact.numbers
         numbers.i, numbers.sign, numbers.e, numbers.lowest = given
         self.enter()
-        found = self._bounce(self.address, self.impact_address, t, q, qd, memory)
+        found = self._bounce(self.address, address, t, q, qd, memory)
         if found == NO_FACTORS:
             raise SingularConfiguration(NO_INERTIA)
-        return (numbers, self._impact.rows[2].copy()) if found == BOUNCES else None
+        return (numbers, impact.rows[2].copy()) if found == BOUNCES else None
+
+    @cached_property
+    def impact(self):
+        """The `Impact` of kernels, its address, and what keeps that."""
+        scratch = np.empty(self.m, int), self._short, np.empty((4, self.n)), np.empty((2, self.m)), self._inertias
+        made = Impact(ImpactNumbers(kernel=bounce_off.address), *scratch)
+        return made, *resident(made)
 
     def gain(self, q, before, after):
         """Kinetic energy that velocities (n,) have more afterwards, J."""

@@ -222,14 +222,34 @@ def _first_root(s, step, values, width):
 
 
 @kernel
-def _find_beside(s, step, t0, t, first, value):
+def _is_near_another(s, t, degree, width, value):
+    """Whether another function may vanish at t, too. value (m,): there; degree, width: of the last survey.
+
+    Markov: |p'| < 2 N^2 max |p| / width, and max |p| is less than four times the largest sample.
+    """
+    m, steepest = value.size, 8.0 * degree * degree / width
+    samples = matrix(data_of(s.samples), degree + 2, m)
+    for j in range(m):
+        scale = 0.0
+        for i in range(degree + 2):
+            scale = max(scale, abs(samples[i, j]))
+        if j != s.numbers.found and not value[j] > SAME_INSTANT * abs(t) * steepest * scale:
+            return True
+    return False
+
+
+@kernel
+def _find_beside(s, step, t, degree, width, first, value):
     """Mark the functions that vanish at t, too, by how fast they fall; False if there is no state. Two of scratch."""
-    before, others = t - SHORTLY * (t - t0), value.size > 1
-    if others and not _evaluate_within(s, step, before, 0, first):
-        return False
     if not _evaluate_within(s, step, t, WHOLE, value):
         return False
-    for j in range(value.size if others else 0):
+    s.beside[:] = 0
+    if not _is_near_another(s, t, degree, width, value):
+        return True
+    before = t - SHORTLY * (t - step.t0)
+    if not (_evaluate_within(s, step, before, 0, first) and _evaluate_within(s, step, t, WHOLE, value)):
+        return False
+    for j in range(value.size):
         falls = value[j] < first[j] and value[j] * (t - before) <= SAME_INSTANT * abs(t) * (first[j] - value[j])
         s.beside[j] = 1 if falls and j != s.numbers.found else 0
     return True
@@ -241,7 +261,7 @@ def find_first(search, context, run, first, second, arrays):
     s, a = load_search(search), load_arrays(arrays)
     t0, t1 = s.numbers.t0, s.numbers.t1
     step = SearchedStep(context, run, a.block, a.charts, a.points, first, second, t0, a.before, t1, a.now)
-    numbers, m, end = s.numbers, s.value.size, t1
+    numbers, m, end, width = s.numbers, s.value.size, t1, t1 - t0
     turning = max(_turn_rate(s.spins, a.before[1]), _turn_rate(s.spins, a.now[1]))
     scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
     numbers.place, numbers.found = OTHER_CHART, -1
@@ -255,7 +275,8 @@ def find_first(search, context, run, first, second, arrays):
             return UNSURE
         if _mark(s):
             break
-        if _first_root(s, step, scratch[0], end - t0) != ARRIVED:
+        width = end - t0
+        if _first_root(s, step, scratch[0], width) != ARRIVED:
             return UNSURE
         # What was unclear may be clear up to there
         numbers.found, end, unclear = int(s.step[0]), s.step[1], False
@@ -268,7 +289,7 @@ def find_first(search, context, run, first, second, arrays):
         copy(matrix(data_of(s.samples), degree + 2, m)[degree + 1], s.value)
         return CLEAR
     numbers.t = end
-    return FOUND if _find_beside(s, step, t0, end, scratch[0], scratch[1]) else UNSURE
+    return FOUND if _find_beside(s, step, end, degree, width, scratch[0], scratch[1]) else UNSURE
 
 
 call_find = caller("pppppp")

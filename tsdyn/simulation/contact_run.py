@@ -384,7 +384,9 @@ class _ContactRun(Transitions):
 
     def flights(self, group, memory, reader):
         """As of `Watch`."""
-        if self.frictions.count or not (self.modes.same(UnitModes()) and flights.Flights.serve(memory, group)):
+        bounce = self.gaps.restitution[self.able].any() and not self.gaps.rough[self.able].all()
+        plain = bounce and not self.frictions.count and self.modes.same(UnitModes())
+        if not (plain and flights.Flights.serve(memory, group)):
             return None
         return flights.Flights(self, group, memory, reader)
 
@@ -622,7 +624,8 @@ class _ContactRun(Transitions):
 
     def _outcome(self, status, began):
         parts = [each for each in (*self.base._added, *self.base._forces) if each.name in self.switched]
-        self.phases.name_switched([each for each in parts if not getattr(each, "unilateral", False)])
+        if named := [each for each in parts if not getattr(each, "unilateral", False)]:
+            self.phases.name_switched(named)
         parts, end, archive, events = self.parts, self.end, self.archive, None
         ends = [part.end for part in parts]
         logs = self.options.history is not False and archive is None

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..analyses.contact_rows import (
     BOUNCES,
-    bounce_off,
+    call_bounce,
     energy_gained,
     find_gaps_within,
     load_contacts,
@@ -109,7 +109,7 @@ def _strike(f, r, s, i, t):
     if n.impacts >= n.most or t - n.last <= 16.0 * EPS * max(abs(t), EPS) or not t < r.clock.t_end:
         return False
     for j in range(s.beside.size):
-        if s.value.size > 1 and s.beside[j] != 0:
+        if s.beside[j] != 0:
             return False
     q, qd = s.state[0], s.state[1]
     find_gaps_within(c.rows, load_open_gaps(n.own), t, s.state, n.t0, f.before, s.near, f.gaps)
@@ -120,7 +120,7 @@ def _strike(f, r, s, i, t):
     x.i, x.sign, x.e, x.lowest = i, f.sign[i], f.restitution[i], FLIGHT * n.length
     if x.e == 0.0 or f.gaps[i] < -PENETRATION * limit[i]:
         return False
-    if bounce_off(c, w, t, q, qd, r.remembered[r.joints.shape[0] :]) != BOUNCES:
+    if call_bounce(x.kernel, n.contacts, n.impact, t, q, qd, r.remembered[r.joints.shape[0] :]) != BOUNCES:
         return False
     row, o = f.impacts[n.impacts], load_open_gaps(n.own)
     row[0], row[1], row[2], row[3], row[5] = t, i, f.gaps[i], x.rate, x.p
@@ -211,7 +211,7 @@ class Flights:
         kernel.numbers.reader, context, run = reader.where
         self.numbers = FlightNumbers(
             memory.driver.address, *where, memory.restart[0], kernel.address, context, run, rows, own,
-            workspace.address, workspace.impact_address, length,
+            workspace.address, workspace.impact[1], length,
         )  # fmt: skip
         self.parts = Flight(
             self.numbers, gaps.sign, restitution, gaps.lengths(length), group.least, np.zeros(workspace.m),

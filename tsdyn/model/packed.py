@@ -111,7 +111,8 @@ class Derived:
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts
     engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine
-    levers: object = None  # (bodies,), m: inertia_rows.levers
+    levers: object = None  # (bodies,), m: inertia_rows.levers, of a phase those of its scene
+    arms: object = None  # (bodies,), m, at the start: constraint_graph.arms; likewise
     near: object = None  # the start last found near the origin: local_origin.within_rounding
     grounded: tuple = None  # local_origin.origin_of, and for the start last seen:
     origin: tuple = (None, None)

@@ -13,7 +13,8 @@ from ..errors import InconsistentState, InvalidArgument
 from ..formulations.locked_orientations import still
 from ..model.handles import begins_of, handles_of
 from ..model.packed import pack
-from ..rows.constraint_graph import parts_of
+from ..rows.constraint_graph import arms, parts_of
+from ..rows.inertia_rows import levers
 from ..validation import listed
 from .tolerances import KEPT_COORDINATES, LEAST_PHASES
 
@@ -125,7 +126,8 @@ def _pack_phase(phase, scene, holds, held):
     """Pack a phase of a scene: it remembers what the scene does, in the same order."""
     whole = scene.packed
     packed = pack(phase, handles_of(whole).where_some_act((*phase._added, *phase._forces)), whole)
-    packed.derived.masks = whole.derived.masks
+    known = whole.derived
+    packed.derived.masks, packed.derived.levers, packed.derived.arms = known.masks, levers(whole), arms(whole)
     if whole.system.memory.size:
         packed = _remembering(packed, whole)
     return _holding(packed, holds, held) if holds or packed.contacts else packed

@@ -524,7 +524,7 @@ def pack(scene, handles=None, whole=None):
     for function, begin, at in functions:
         reals[at : at + PLACES] = function.addresses(begin, len(reals))
         reals += function.numbers()
-    contacts = [each for each in scene.constraints if getattr(each, "taken", 0)]
+    contacts = [each for each in scene.constraints if each.taken]
     for contact in contacts:
         kept[contact] = range(len(reals), len(reals) + contact.taken)
         reals += [0.0] * contact.taken

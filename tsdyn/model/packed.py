@@ -128,8 +128,7 @@ class Derived:
 
     def forget_graphs(self):
         """The constraint graph is another."""
-        self.graph = None
-        self.graphs.clear()
+        self.graph, self.graphs = None, {}  # and not cleared: phases may share them
         self.forget_locked()
 
     def forget_locked(self):

@@ -86,6 +86,17 @@ def test_slip_across_a_slope_turns_down_it():
     assert abs(v[-1, 0] - 1.0) < 1e-6
 
 
+@pytest.mark.parametrize(("mu", "angle"), [(0.3, np.radians(10)), (0.6, 0.3), (0.35, 0.3)])
+def test_slip_across_a_slope_that_turns_down_it_ends_in_time(mu, angle):
+    """v = v0 u^(p-1) (1 + u^2) / 2, u = tan(f / 2), p = mu / tan(angle), f from the line of fall: the time of rest."""
+    solution = ts.simulate(slope(mu, angle, (0, 1, 0)), (0, 8), integrator=ts.integrators.Taylor(tol=1e-15))
+    p = mu / np.tan(angle)
+    time = (1 / (p - 1) + 1 / (p + 1)) / (2 * G * np.sin(angle))
+    assert len(solution.phases) == 2
+    assert abs(solution.phases[1][0] - time) < 1e-10
+    assert solution.sticking("floor")[-1]
+
+
 def test_energy_is_balanced_with_the_work_of_friction():
     solution = ts.simulate(slope(0.5, 0.4, (1, 2, 0)), (0, 6), dense_output=True)
     np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=1e-12)

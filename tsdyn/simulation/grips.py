@@ -68,6 +68,14 @@ def gripped(gaps, before, contacts, q, memory):
     return grips
 
 
+def stopping_time(inertia, which, qd, after, qdd):
+    """Time, s, in which slips that have been ended, at qd (n,) and no more `after`, end by accelerations qdd (n,)."""
+    before, left, gained = (x[which] for x in (inertia.slips(qd), inertia.slips(after), inertia.tangents @ qdd))
+    against = -(before * (gained + inertia.biases(qd)[which, 1:])).sum(axis=1)
+    ended = before.any(axis=1) & ~left.any(axis=1) & (against > 0.0)
+    return float(((before * before).sum(axis=1)[ended] / against[ended]).max(initial=0.0))
+
+
 class Reactions:
     """Reactions of closed contacts, and what is left to the bounds of those that stick, as event functions.
 

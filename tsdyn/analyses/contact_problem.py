@@ -373,6 +373,7 @@ class ContactState(NamedTuple):
     slack: dict = MappingProxyType({})  # of closed ones whose reactions are rounding: what these may fall below zero
     gains: dict = MappingProxyType({})  # of those that slide: what their slips gain, m/s^2
     begun: dict = MappingProxyType({})  # the same of those that begin to slide, above rounding
+    slow: np.ndarray | None = None  # (count,) slips, m/s, below which friction keeps a direction
 
 
 def solve_contacts(inertia, resting, qd, fired=()):

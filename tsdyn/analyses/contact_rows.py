@@ -480,13 +480,13 @@ class ReactionWorkspace:
         graph = self.graph if packed.derived.switched is None else with_all_rows(self.graph)
         whole = parts(system._replace(reals=system.reals.copy()), graph, self.n)
         self.address, *self._keep = resident(whole)
-        self._tangent = whole.tangent
+        self._tangent, self._reals = whole.tangent, whole.system.reals
         find = find_reactions if self.count else find_multipliers
         self._find = interrupts_answered()(find) if calls_laws(packed) else find
 
-    def begin(self, graph):
-        """As if it were new, with the redundant rows of a graph."""
-        self.graph = graph
+    def begin(self, graph, reals):
+        """As if it were new, with the redundant rows of a graph and the numbers of a system."""
+        self.graph, self._reals[...] = graph, reals
         reset_selection(graph, self._tangent)
 
     def multipliers(self, t, levels, memory):
@@ -506,7 +506,7 @@ def reaction_workspace(packed, redundant=0.0):
     graph = graph_of(packed, REDUCED, BIAS)
     if key not in known or known[key].graph.row is not graph.row:
         known[key] = ReactionWorkspace(packed, redundant)
-    known[key].begin(graph)
+    known[key].begin(graph, packed.system.reals)
     return known[key]
 
 

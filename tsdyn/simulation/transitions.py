@@ -19,7 +19,7 @@ from ..observables.generalised_forces import force_loads
 from ..observables.state import begin_memory
 from ..runs.tolerances import START_ZERO
 from ..validation import listed
-from .grips import gripped
+from .grips import gripped, stopping_time
 from .impacts import along_normals, held, impact_of, impulse_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import Impulse, UnitModes
@@ -133,6 +133,8 @@ class Transitions:
             self.modes, struck = UnitModes(), self.qd
             if self.gaps.rough[resting].any():
                 self.qd, contacts = at_turn(inertia, resting, self.qd, leaving, turned, opening)
+                if self.qd is not struck and np.array_equal(struck, self.ended):
+                    self.rest = self.t + stopping_time(inertia, resting, struck, self.qd, self.qdd)
                 if self.qd is not struck and opening:
                     rates = inertia.rates(self.qd)
             else:

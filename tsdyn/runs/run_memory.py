@@ -328,11 +328,12 @@ class Memory:
     def load(self):
         """Load the driver, where this process has not called it yet."""
         if not getattr(self.advance_kernel, "overloads", True):
-            self._call(*self.where, no_log(), 0)
+            self._call(self.driver.address, *self.where, no_log(), 0)
+        self._driver = self.driver.address
 
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver."""
-        arguments = self._context, self._run, log, most
+        arguments = self._driver, self._context, self._run, log, most
         # Short steps: Ctrl-C waits for the end of a slice
         if self.weight < LONG_STEPS:
             return STATUSES[self._call(*arguments)]
@@ -345,7 +346,7 @@ class Memory:
 
     def _call(self, *arguments):
         kernel = self.advance_kernel
-        return (interrupts_answered()(kernel) if self.calls_laws else kernel)(self.driver.address, *arguments)
+        return (interrupts_answered()(kernel) if self.calls_laws else kernel)(*arguments)
 
     @property
     def called(self):

@@ -369,15 +369,14 @@ class Transitions:
         gaps, e = self.gaps, float(self.gaps.restitution[i])
         if self.frictions.count or gaps.rough[i] or i in gaps.following or before.closed or before.idle or e == 0.0:
             return False
-        found = gaps.workspace.bounce(self.t, self.q, self.qd, slots, i, float(gaps.sign[i]), e)
-        (rate, size, G, p, acceleration, length), qd = found
-        if not (G > 0.0 and rate < -NEGLIGIBLE * size):
+        given = i, float(gaps.sign[i]), e, FLIGHT * self.length
+        found = gaps.workspace.bounce(self.t, self.q, self.qd, slots, *given)
+        if found is None:
             return False
-        if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * FLIGHT * self.length:
-            return False
-        rounding = EPS * max(self.length, ROUNDED * length)
-        self.phases.impulses.append((self.t, gaps.names[i], Impulse(p)))
-        self.qd, self.modes = qd, UnitModes(opened={i: self._opened(i, -e * rate, 0.25 * rounding)})
+        impact, self.qd = found
+        rounding = EPS * max(self.length, ROUNDED * impact.length)
+        self.phases.impulses.append((self.t, gaps.names[i], Impulse(impact.p)))
+        self.modes = UnitModes(opened={i: self._opened(i, impact.rate, 0.25 * rounding)})
         return True
 
     def _hit(self, inertia, touching, rates):

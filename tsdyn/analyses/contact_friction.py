@@ -382,10 +382,10 @@ def halted(inertia, qd, resting, which):
 def slow_speeds(inertia, qd, terms):
     """Slips (count,), m/s, below which friction keeps a direction: parts of the bodies' velocities.
 
-    And of those that accelerations of the gaps, of the sizes `terms` (count,), cause along the scene's length.
+    And of those that the largest of the accelerations of gaps, `terms` (count,), causes along the scene's length.
     """
     velocities = (np.abs(inertia.tangents) @ np.abs(qd)).max(axis=1)
-    return AHEAD * (velocities + np.sqrt(inertia.gaps.extent(inertia.q) * terms))
+    return AHEAD * (velocities + np.sqrt(inertia.gaps.extent(inertia.q) * terms.max(initial=0.0)))
 
 
 def slow_slips(inertia, qd, which, limits):

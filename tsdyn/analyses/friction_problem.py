@@ -27,7 +27,7 @@ from ..model.handles import first_rows
 from ..observables.evaluate import ITERATIONS, constraint_arrays
 from ..observables.generalised_forces import applied_loads
 from .friction_units import ACROSS, ALONG, WHOLE, normal_loads_of, slip_velocities
-from .tolerances import BROKEN, EVENT_ERROR, LEVEL, PIVOTS, RESTS
+from .tolerances import BROKEN, EVENT_ERROR, LEVEL, PIVOTS, RESTS, USUAL
 
 if TYPE_CHECKING:
     from ..elements.friction import Sliding
@@ -181,7 +181,9 @@ class Frictions:
     def speeds(self, q, qd, memory):
         """Of those that slide (k, units): velocities along their directions, in a plane less half of the speed."""
         v, _, axes = self.motions(q, qd)
-        ways = memory[self.ways] * np.where(self.signed[:, None], axes, 1.0)
+        sizes = np.linalg.norm(memory[self.ways], axis=1)
+        lengths = np.where(self.signed | (sizes == 0.0), 1.0, sizes)
+        ways = memory[self.ways] / lengths[:, None] * np.where(self.signed[:, None], axes, 1.0)
         return (v * ways).sum(axis=2) - np.where(self.signed, 0.0, 0.5) * np.linalg.norm(v, axis=2)
 
     def turn(self, t, levels, memory):
@@ -199,26 +201,39 @@ class Frictions:
             along = np.sign((ways[:, i] * axes[:, i]).sum(axis=1))[:, None]
             memory[:, unit.way] = along if self.signed[i] else ways[:, i]
 
-    def at(self, q):
+    def paces(self, sizes, rates, gravity, length):
+        """Velocities (units,) over USUAL: those of their terms, sizes (units,), and what accelerations make of them.
+
+        These act along the scene's length, m, or one radian; rates (units,): their terms before, gravity: m/s^2. One
+        where nothing is known, as where forces move bodies from rest.
+        """
+        gained = np.where(self.turns, rates + gravity / (length or np.inf), (rates + gravity) * length)
+        found = (sizes + np.sqrt(gained)) / USUAL
+        return np.where(found > 0.0, found, 1.0)
+
+    def at(self, q, paces):
         """The `FrictionFrames` at q (n,)."""
         A, (_, _, axes) = self.frames(q[None])[0], self.motions(q[None], np.zeros((1, q.size)))
-        return FrictionFrames(self, axes[0], A)
+        return FrictionFrames(self, axes[0], A, paces)
 
 
 class FrictionFrames:
-    """The frictions of a scene in one configuration: axes (units, 3) and rotation matrices (bodies, 3, 3)."""
+    """The frictions of a scene in one configuration: axes (units, 3) and rotation matrices (bodies, 3, 3).
 
-    def __init__(self, frictions, axes, A):
-        self.frictions, self.axes, self.A = frictions, axes, A
+    paces (units,): the lengths of directions that are written, over which friction keeps them below SLIP.
+    """
+
+    def __init__(self, frictions, axes, A, paces):
+        self.frictions, self.axes, self.A, self.paces = frictions, axes, A, paces
 
     def written(self, i, way):
         """The numbers of a direction (3,), ground frame: a sign where there is an axis."""
-        return np.sign(way @ self.axes[i]) if self.frictions.signed[i] else way
+        return np.sign(way @ self.axes[i]) if self.frictions.signed[i] else self.paces[i] * way
 
     def read(self, i, memory):
         """The direction (3,), ground frame, of a unit that slides; zeros while it sticks."""
         numbers = memory[self.frictions.units[i].way]
-        return numbers[0] * self.axes[i] if numbers.size == 1 else numbers
+        return numbers[0] * self.axes[i] if numbers.size == 1 else numbers / (np.linalg.norm(numbers) or 1.0)
 
     def basis(self, i, free, mobility):
         """Orthonormal directions (r, 3), ground frame, in which a unit may slide.

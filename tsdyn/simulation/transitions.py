@@ -262,10 +262,12 @@ class Transitions:
         frictions, count = self.frictions, self.count
         if not frictions.count:
             return None
-        place, (v, _, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
+        v, _, _ = frictions.motions(self.q[None], self.qd[None])
         # Velocities that change within rounding of the time are at rest, too, and those that come to rest at
         # once: where loads vanish along a chain events would follow each other ever faster
         sizes, rates = frictions.sizes(self.q, self.qd), frictions.sizes(self.q, self.qdd)
+        paces = frictions.paces(sizes, rates, np.linalg.norm(self.scene.system.gravity), self.length)
+        place = frictions.at(self.q, paces)
         least = np.maximum(NEGLIGIBLE * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
         least = np.maximum(least, EVENT_ERROR * np.minimum(sizes, (self.t - self.span[0]) * rates))
         self.remembered, resting, guess = self.remembered.copy(), [], {}
@@ -278,7 +280,7 @@ class Transitions:
             speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
             if i in before.blocked and memory[unit.way].any():
                 guess[i] = place.read(i, memory)
-            if speed <= max(least[i], 0.0 if signed else STOPPED) or (signed and i in fired):
+            if speed <= max(least[i], 0.0 if signed else STOPPED * paces[i]) or (signed and i in fired):
                 resting.append(i)
                 memory[unit.way] = 0.0
             else:

@@ -37,6 +37,7 @@ from .model.handles import has_rates
 from .motions import program, tracing
 from .motions.signals import Signal
 from .rows.interface import ELIMINATION
+from .runs.run_memory import advance_run
 from .runs.step_control import watch
 from .runs.step_engine import second_derivative
 from .runs.stepper import advance
@@ -136,7 +137,7 @@ def of_method(method, form, within, far=False, rough=False):
 
     far: of series that are too long for caches near by; rough: of a scene with joint friction.
     """
-    yield from (evaluate_constraints, initial_conditions.evaluate_start)
+    yield from (evaluate_constraints, initial_conditions.evaluate_start, advance_run)
     if isinstance(method, Taylor):
         yield from (expanding(rough, far), step_parts.reach, advance_series)
         yield from (accelerating(rough), step_parts.pass_singular) if within else ()

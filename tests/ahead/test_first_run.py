@@ -12,7 +12,7 @@ from tests.helpers.processes import python
 from tsdyn import ahead
 from tsdyn.configuration.initial_conditions import evaluate_start
 from tsdyn.jit.compiled import _types
-from tsdyn.runs.stepper import advance
+from tsdyn.runs.run_memory import advance_run
 from tsdyn.taylor.stepper import advance_series
 
 ROOT = Path(__file__).parents[2]
@@ -98,7 +98,7 @@ def test_what_a_run_needs_is_asked_for_and_no_more(tmp_path, name, method, form,
 def test_signatures_are_those_of_the_calls():
     ts.simulate(top.build(), (0.0, 0.01))
     ts.simulate(top.build(), (0.0, 0.01), integrator="dop853")
-    for kernel in (evaluate_start, advance_series, advance):
+    for kernel in (evaluate_start, advance_run):
         assert list(kernel.overloads) == [_types(kernel)]
 
 

@@ -66,11 +66,12 @@ def test_boxes_of_a_rough_tower_touch_in_flight():
     solution = ts.simulate(scene, (0, end), rtol=1e-10, atol=1e-10).raise_if_failed()
     assert solution.reached == end
     assert np.diff(solution.energy).max() < 1e-12 * count**2 * G
-    # The floor only pushes: momentum falls by the weights at most, at events by unseen flights, too
+    # The floor only pushes: momentum falls by the weights at most. At events slips below 1e-6 m/s end at once, where
+    # they turn, by friction that is vertical as far as boxes lean: by 0.01
     pushes = np.diff(solution.linear_momentum[:, 2]) + count * G * np.diff(solution.t)
-    events, unseen = np.diff(solution.t) == 0.0, count * np.sqrt(2 * G * 16 * EPS)
+    events, ended = np.diff(solution.t) == 0.0, count * 1e-6 * 0.01
     assert pushes[~events].min() > -1e-12 * count
-    assert pushes[events].min() > -unseen
+    assert pushes[events].min() > -ended
     for i, box in enumerate(scene.bodies):
         below = scene.bodies[i - 1] if i else None
         R, x = solution.state.rotation(box), solution.state.position(box)

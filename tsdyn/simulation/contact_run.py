@@ -39,11 +39,11 @@ from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome, interval, output_times, state_arrays
 from ..runs.tolerances import START_ZERO
 from ..validation import counted, listed
-from . import hybrid
+from . import flights, hybrid
 from .checkpoints import Checkpoints
 from .grips import Halting, Reactions, items_of
 from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
-from .phases import PhasePieces, Phases, Pinned, UnitModes
+from .phases import Impulse, PhasePieces, Phases, Pinned, UnitModes
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
@@ -88,7 +88,7 @@ FAILURES = {
 @cache
 def _compile_once(slides):
     """Have compiled what events need; slides: whether there is exact friction of joints."""
-    compile_ahead((*contact_rows.KERNELS, *(friction_units.KERNELS if slides else ())))
+    compile_ahead((*contact_rows.KERNELS, *flights.KERNELS, *(friction_units.KERNELS if slides else ())))
 
 
 class _ContactRun(Transitions, Checkpoints):
@@ -255,7 +255,7 @@ class _ContactRun(Transitions, Checkpoints):
             other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(), resume=None if other else self._resume, archive=self.archive,
+                max_steps=self._steps_left(), resume=None if other else self, archive=self.archive,
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
             self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
@@ -343,8 +343,8 @@ class _ContactRun(Transitions, Checkpoints):
             self.kind = self.phases.kind(self.packed, self._record, self.scene.packed, self.gaps)
         self.phases.add(self.kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
 
-    def _resume(self, t, run, numbers):
-        """After events of these numbers: whether the run of the phase goes on, with other velocities.
+    def resume(self, t, run, numbers):
+        """As of `Watch`, after events of these numbers: whether the run of the phase goes on, with other velocities.
 
         It does where the same gaps are closed as before.
         """
@@ -361,6 +361,29 @@ class _ContactRun(Transitions, Checkpoints):
         self.closing.open(self.modes.opened)
         self.again.append(t)
         return True
+
+    def flights(self, group, memory, reader):
+        """As of `Watch`."""
+        bounce = self.gaps.restitution[self.able].any() and not self.gaps.rough[self.able].all()
+        plain = bounce and not self.frictions.count and self.modes.same(UnitModes())
+        if not (plain and flights.Flights.serve(memory, group)):
+            return None
+        return flights.Flights(self, group, memory, reader)
+
+    def land(self, flown):
+        """As of `Watch`."""
+        impacts = flown.impacts()
+        for t, i, *_, p, energy in impacts:
+            self._end_phase(t)
+            self.t = self.rest = t
+            self.phases.impulses.append((t, self.gaps.names[int(i)], Impulse(p)))
+            self.phases.gain(energy)
+            self.again.append(t)
+        i, *opened = impacts[-1][1:5]
+        self.modes, self.at_once = UnitModes(opened={int(i): (self.t, *opened)}), 0
+        self.q, self.ended, self.qdd, self.qd = flown.parts.struck.copy()
+        self.remembered = flown.parts.noted.copy()
+        self.judged = self.judged[0], self.judged[1] + flown.numbers.impacts
 
     def _scene(self):
         """The scene of the present modes."""
@@ -581,7 +604,8 @@ class _ContactRun(Transitions, Checkpoints):
 
     def _outcome(self, status, began):
         parts = [each for each in (*self.base._added, *self.base._forces) if each.name in self.switched]
-        self.phases.name_switched([each for each in parts if not getattr(each, "unilateral", False)])
+        if named := [each for each in parts if not getattr(each, "unilateral", False)]:
+            self.phases.name_switched(named)
         parts, end, archive, events = self.parts, self.end, self.archive, None
         ends = [part.end for part in parts]
         logs = self.options.history is not False and archive is None

@@ -327,7 +327,7 @@ class SeriesMemory(Memory):
         The highest order that there is room for.
     """
 
-    advance_kernel = staticmethod(advance_series)
+    driver = advance_series
 
     def __init__(self, prepared, highest):
         self.series, packed, n = prepared.series, prepared.packed, prepared.n

@@ -179,12 +179,12 @@ class Frictions:
         return sizes + np.where(self.turns, passing, 0.0) / (self.packed.size or np.inf)
 
     def speeds(self, q, qd, memory):
-        """Of those that slide (k, units): velocities along their directions, in a plane less half of the speed."""
+        """Of those that slide (k, units): velocities along their directions, in a plane as of `within`."""
         v, _, axes = self.motions(q, qd)
         sizes = np.linalg.norm(memory[self.ways], axis=1)
         lengths = np.where(self.signed | (sizes == 0.0), 1.0, sizes)
         ways = memory[self.ways] / lengths[:, None] * np.where(self.signed[:, None], axes, 1.0)
-        return (v * ways).sum(axis=2) - np.where(self.signed, 0.0, 0.5) * np.linalg.norm(v, axis=2)
+        return within(v, ways, self.signed)
 
     def turn(self, t, levels, memory):
         """Write the directions of slip into memory (k, slots), zero where a slip rate is zero to rounding.
@@ -215,6 +215,18 @@ class Frictions:
         """The `FrictionFrames` at q (n,)."""
         A, (_, _, axes) = self.frames(q[None])[0], self.motions(q[None], np.zeros((1, q.size)))
         return FrictionFrames(self, axes[0], A, paces)
+
+
+def within(v, ways, signed):
+    """Components of v (..., 3) along directions; in a plane, where not signed, zero where v is 60 degrees off.
+
+    v.d - |v - (v.d) d| / sqrt(3)
+
+    Of a slip that comes to rest without turning it is as smooth as v, which its size is not.
+    """
+    along = (v * ways).sum(axis=-1)
+    across = np.linalg.norm(v - along[..., None] * ways, axis=-1)
+    return along - np.where(signed, 0.0, across / np.sqrt(3.0))
 
 
 class FrictionFrames:
@@ -605,11 +617,11 @@ class RestProblem:
         return self.G[np.ix_(at, at)] - self.G[np.ix_(at, rows)] @ held
 
     def _rates(self, ways, a, small):
-        """Accelerations along the directions of sliding, in a plane less half of their size; zero within rounding."""
+        """Accelerations along the directions of sliding, in a plane as of `within`; zero within rounding."""
         found = {}
         for i, way in ways.items():
-            at, part = self.at[i], 0.0 if self.place.frictions.signed[i] else 0.5
-            rate = a[at] @ self.bases[i] @ way - part * np.linalg.norm(a[at])
+            at = self.at[i]
+            rate = within(a[at] @ self.bases[i], way, self.place.frictions.signed[i])
             found[i] = float(rate) if rate > small[at].max() else 0.0
         return found
 

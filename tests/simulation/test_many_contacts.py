@@ -59,6 +59,44 @@ def test_a_stack_of_boxes_falls_and_comes_to_rest(count, rough):
         np.testing.assert_allclose(force, [0, 0, (count - i) * G], atol=1e-9 * count)
 
 
+@pytest.mark.parametrize(
+    ("count", "e", "seed", "half"),
+    [
+        (5, 0.0, 8, 0.3),
+        (4, 0.0, 9, 0.3),
+        *(pytest.param(10, *case, 0.33, marks=pytest.mark.slow) for case in ((0.0, 3), (0.5, 2))),
+    ],
+)
+def test_balls_fall_into_a_box(count, e, seed, half):
+    """Without friction; contacts beside those that are hit have rates that are rounding, of either sign.
+
+    At the end floor and walls carry the weight and what accelerates the balls.
+    """
+    radius, scene, rng = 0.1, ts.Scene(gravity=(0, 0, -G)), np.random.default_rng(seed)
+    balls = []
+    for i in range(count):
+        place = (rng.uniform(-0.15, 0.15), rng.uniform(-0.15, 0.15), 0.15 + 0.25 * i)
+        balls.append(scene.add_body(**ts.shapes.sphere(radius, mass=1.0), position=place))
+    for i, ball in enumerate(balls):
+        sides = [((0, 0, 0), (0, 0, 1))]
+        sides += [(tuple(-half * np.array(n)), n) for n in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))]
+        for at, n in sides:
+            scene.add(C.SphereContact(ball, scene.ground, radius_a=radius, center_b=at, normal_b=n, restitution=e))
+        for other in balls[:i]:
+            scene.add(C.SphereContact(ball, other, radius_a=radius, radius_b=radius, restitution=e))
+    solution = ts.simulate(scene, (0, 2.0))
+    assert solution.success, solution.message
+    x = np.array([solution.position(ball) for ball in balls])
+    apart = [np.linalg.norm(x[i] - x[j], axis=1).min() for i in range(count) for j in range(i)]
+    assert min(apart) > 2 * radius - 1e-12  # that of constraints
+    assert min(x[:, :, 2].min(), half - np.abs(x[:, :, :2]).max()) > radius - 1e-12
+    assert np.diff(solution.energy).max() < 1e-8 * count * G  # the tolerance of the run
+    resting = [c for c in scene.constraints if isinstance(c, C.SphereContact) and c.name in solution.phases[-1][2]]
+    force = sum(solution.reaction(c)[0][-1] for c in resting if c.b is scene.ground)
+    rises = sum(solution.acceleration(ball)[-1] for ball in balls)
+    np.testing.assert_allclose(force, rises + np.array([0, 0, count * G]), atol=1e-9 * count * G)
+
+
 @pytest.mark.slow
 def test_boxes_of_a_rough_tower_touch_in_flight():
     """Ten boxes land one after the other: those above fly on each other's corners, where all reactions are rounding."""

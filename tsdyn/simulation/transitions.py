@@ -105,9 +105,10 @@ class Transitions:
                 return None
             inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
             rates = inertia.rates(self.qd)
-            # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies
+            # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies; rates that are
+            # rounding of these are of no sign, and no start of a flight
             small, unstruck = NEGLIGIBLE * inertia.sizes(self._largest(self.qd)), self._is_unstruck()
-            rates[[i for i in before.closed if unstruck or abs(rates[i]) <= small[i]]] = 0.0
+            rates[[i for i in touching if abs(rates[i]) <= small[i] or (unstruck and i in before.closed)]] = 0.0
             # What rounding of the time leaves open is no rate: gaps close, or reach the tops of flights, at once
             none = RESTS * EPS * abs(self.t) * inertia.accelerations(self.qd)[1]
             rates[np.abs(rates) <= none] = 0.0
@@ -395,6 +396,8 @@ class Transitions:
         # Contacts that another impact lifts by rounding, of its impulses or of the time, stay closed
         rounding = NEGLIGIBLE * np.abs(inertia.G[:, touching]) @ p[:, 0]
         after[after <= np.maximum(rounding, RESTS * EPS * abs(self.t) * a)] = 0.0
+        still = NEGLIGIBLE * inertia.sizes(self._largest(self.qd)) * (rates == 0.0)  # lifted by impulses of rounding
+        after[after <= still] = 0.0
         self._note_impulses(inertia, touching, p, self.qd)
         self.qd = qd
         return after

@@ -143,6 +143,7 @@ class _ContactRun(Transitions):
         self.kernels_of = set()  # classes of constraints and forces that phases have had
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
         self.fast = {}  # see `Halting`
+        self.struck = {}  # of gaps after impacts: the time, and the largest rate since and just before
 
     def _take_scene(self, scene, inactive=None, values=None):
         """What follows from the scene alone, and makes the scenes of its phases.
@@ -633,7 +634,7 @@ class _ContactRun(Transitions):
         phases, arrays = self.phases.saved()
         numbers = {name: getattr(self, name) for name in KEPT} | {"modes": self.modes.saved(), "phases": phases}
         numbers |= {"changes": plain((self.inactive, self.values)), "switched": sorted(self.switched)}
-        numbers["fast"] = plain(self.fast)
+        numbers |= {"fast": plain(self.fast), "struck": plain(self.struck)}
         starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
         for where, (_, *parts) in starts.items():
             arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
@@ -657,6 +658,7 @@ class _ContactRun(Transitions):
             self.change(tuple(inactive), dict(values))
             self.switched |= set(known["switched"])
             self.modes, self.fast = UnitModes.of(known["modes"]), dict(known["fast"])
+            self.struck = {i: tuple(pair) for i, pair in known["struck"]}
             if known["sampling"] is not None:
                 self.sampling = Sampling(prepared(phase_of(self.scene, [])), True)
                 self.sampling.restore(known["sampling"])

@@ -37,6 +37,7 @@ from .model.handles import has_rates
 from .motions import program, tracing
 from .motions.signals import Signal
 from .rows.interface import ELIMINATION
+from .runs.run_memory import advance_run
 from .runs.step_control import watch
 from .runs.step_engine import second_derivative
 from .runs.stepper import advance
@@ -48,7 +49,9 @@ from .taylor.stepper import advance_series
 
 # Which kernels a run needs, so that a first one can have them compiled at the same time.
 
-_known = set()  # what this process has made sure of: method, form, whether there is anything between steps, friction
+# What this process has made sure of: method, form, whether there is anything between steps, friction; for which classes
+# of constraints and forces
+_known = {}
 
 
 def prepare_first_run(scene, method, form, within, default):
@@ -58,12 +61,16 @@ def prepare_first_run(scene, method, form, within, default):
     for between the steps.
     """
     packed = scene._packed
-    mixed = form.is_mixed(has_rates(scene))
-    key = type(method), form.name, mixed, within, packed is not None and packed.system.normals.size > 0
-    if (key in _known and packed is not None) or DEBUG or not scene.bodies:
+    rough = packed.system.normals.size > 0 if packed is not None else _is_rough(scene)
+    key = type(method), form.name, form.is_mixed(has_rates(scene)), within, rough
+    if DEBUG or not scene.bodies:
+        return
+    # A packed scene has its kernels; a phase adds rows and forces to the parts of a scene, which has them
+    kinds = set() if packed is not None else {type(part) for part in (*scene._added, *scene._forces)}
+    if key in _known and (packed is not None or (scene._whole is not None and kinds <= _known[key])):
         return
     compile_ahead(kernels_of(scene, method or _default_method(scene, *default), form, within))
-    _known.add((*key[:4], _is_rough(scene)))
+    _known[key] = _known.get(key, set()) | kinds
 
 
 def kernels_of(scene, method, form, within):
@@ -130,7 +137,7 @@ def of_method(method, form, within, far=False, rough=False):
 
     far: of series that are too long for caches near by; rough: of a scene with joint friction.
     """
-    yield from (evaluate_constraints, initial_conditions.evaluate_start)
+    yield from (evaluate_constraints, initial_conditions.evaluate_start, advance_run)
     if isinstance(method, Taylor):
         yield from (expanding(rough, far), step_parts.reach, advance_series)
         yield from (accelerating(rough), step_parts.pass_singular) if within else ()

@@ -12,7 +12,7 @@ from tests.helpers.processes import python
 from tsdyn import ahead
 from tsdyn.configuration.initial_conditions import evaluate_start
 from tsdyn.jit.compiled import _types
-from tsdyn.runs.stepper import advance
+from tsdyn.runs.run_memory import advance_run
 from tsdyn.taylor.stepper import advance_series
 
 ROOT = Path(__file__).parents[2]
@@ -98,7 +98,7 @@ def test_what_a_run_needs_is_asked_for_and_no_more(tmp_path, name, method, form,
 def test_signatures_are_those_of_the_calls():
     ts.simulate(top.build(), (0.0, 0.01))
     ts.simulate(top.build(), (0.0, 0.01), integrator="dop853")
-    for kernel in (evaluate_start, advance_series, advance):
+    for kernel in (evaluate_start, advance_run):
         assert list(kernel.overloads) == [_types(kernel)]
 
 
@@ -132,3 +132,18 @@ print(cache.statistics["misses"], end.tobytes().hex())
     out, _ = python("-c", code, folder=tmp_path, TSDYN_QUIET="1")
     expected = ts.simulate(top.build(), (0.0, 0.1)).q[-1]
     assert out == f"0 {expected.tobytes().hex()}"
+
+
+def test_kernels_of_phases_are_looked_up_once(monkeypatch):
+    """Sets of closed contacts add rows of classes that are known: another scene's phases look for nothing."""
+
+    def fall(count):
+        scene = ts.Scene(gravity=(0, 0, -10))
+        for i in range(count):
+            ball = scene.add_point_mass(mass=1.0, position=(i, 0, 0.2 + 0.1 * i))
+            scene.add(ts.constraints.PlaneContact(ball, scene.ground, normal_b=(0, 0, 1), unilateral=True))
+        return ts.simulate(scene, (0, 0.5))
+
+    fall(1)
+    monkeypatch.setattr(ahead, "kernels_of", lambda *given: pytest.fail("looked up again"))
+    assert len(fall(3).phases) == 4

@@ -43,6 +43,67 @@ def test_without_limits_they_are_listed(door):
     assert not np.any(ts.simulate(scene, (0, 0.1)).impulses)
 
 
+RAIL = """<sdf version="1.7"><model name="press">
+  <link name="ram"><inertial><mass>2</mass></inertial></link>
+  <joint name="rail" type="prismatic"><parent>world</parent><child>ram</child>
+    <axis><xyz>0 0 -1</xyz><limit>{}</limit></axis></joint>
+</model></sdf>"""
+
+
+@pytest.mark.filterwarnings("ignore::tsdyn.ImportLosses")
+@pytest.mark.parametrize("drop", [0.5, 2000.0])
+@pytest.mark.parametrize("lower", ["", "<lower>-1e16</lower>"])
+def test_limits_of_one_side(tmp_path, drop, lower):
+    """A ram of 2 kg falls onto its upper limit, and has no lower one."""
+    file = tmp_path / "press.sdf"
+    file.write_text(RAIL.format(f"{lower}<upper>{drop}</upper>"))
+    assert ts.load(file).constraints[-1].name != "limits of rail"
+    scene = ts.load(file, limits=True)
+    assert (scene["limits of rail"].lower, scene["limits of rail"].upper) == (None, drop)
+    fall = np.sqrt(2 * drop / 9.81)
+    (t, _, impulse), *_ = ts.simulate(scene, (0, 1.1 * fall)).impulses
+    assert t == pytest.approx(fall, rel=1e-14)
+    assert impulse == pytest.approx(2 * 9.81 * fall, rel=1e-12)
+
+
+CROSS = """<sdf version="1.7"><model name="swing">
+  <link name="bob"><pose>0 0 -0.5 0 0 0</pose><inertial><mass>2</mass></inertial></link>
+  <joint name="cross" type="universal"><parent>world</parent><child>bob</child><pose>0 0 0.5 0 0 0</pose>
+    <axis><xyz>1 0 0</xyz><limit><lower>-0.3</lower></limit></axis>
+    <axis2><xyz>{} 1 0</xyz><limit><lower>-0.2</lower><upper>0.1</upper></limit></axis2></joint>
+</model></sdf>"""
+
+
+@pytest.mark.parametrize(("lean", "joint"), [(0, "cross"), (0.5, "cross 2")])
+def test_limits_of_both_axes(tmp_path, lean, joint):
+    """Of a universal joint, and of two hinges where its axes are oblique."""
+    file = tmp_path / "swing.sdf"
+    file.write_text(CROSS.format(lean))
+    scene = ts.load(file, limits=True)
+    first, second = scene["limits of cross"], scene["limits of cross 2"]
+    assert ((first.lower, first.upper), (second.lower, second.upper)) == ((-0.3, None), (-0.2, 0.1))
+    spin = -np.array([lean, 1, 0]) / np.hypot(lean, 1)  # about the second axis, towards its lower bound
+    for body in scene.bodies:  # of two oblique hinges one is the cross, without mass
+        body.velocity, body.angular_velocity = np.cross(spin, body.position), spin * (body.name == "bob")
+    (_, name, _), *_ = ts.simulate(scene, (0, 1)).impulses
+    assert name == "limits of cross 2"
+    assert joint in [each.name for each in scene.constraints]
+
+
+@pytest.mark.filterwarnings("ignore::tsdyn.ImportLosses")
+@pytest.mark.parametrize("lower", [0.5, 0.25])
+def test_limits_that_cross(tmp_path, lower):
+    """They are a mistake; equal ones, which exporters write for none, are listed."""
+    file = tmp_path / "door.urdf"
+    file.write_text(DOOR.replace('-0.5" upper', f'{lower}" upper'))
+    assert "limits of a joint" in str(ts.load(file).imported)
+    if lower > 0.25:
+        with pytest.raises(ts.InvalidFile, match="limits of hinge: lower must be below upper"):
+            ts.load(file, limits=True)
+    else:
+        assert "limits of a joint" in str(ts.load(file, limits=True).imported)
+
+
 def test_limits_of_other_files(tmp_path):
     scene = ts.Scene()
     scene.add_point_mass(mass=1.0)

@@ -321,6 +321,19 @@ def test_phases_of_a_run_with_impacts():
 
 
 @pytest.mark.slow
+def test_flights_of_a_run_with_impacts():
+    """Without friction: one kernel call makes steps and impacts."""
+    scene = ts.Scene()
+    ball = scene.add_point_mass(1.0, position=(0, 0, 1.0))
+    floor = {"normal_b": (0, 0, 1), "restitution": 0.99}
+    scene.add(ts.constraints.PlaneContact(ball, scene.ground, unilateral=True, **floor))
+    found = ts.profile(scene, (0.0, 30.0), advice=False)
+    assert calls(found, "steps", "flights, with searches and impacts") < 5 < 30 < len(found.solution.impulses)
+    assert found.accounted == pytest.approx(1.0)
+    assert not any(phase.part in ("searches of steps", "impacts") for phase in found.phases)
+
+
+@pytest.mark.slow
 def test_phases_of_a_run_with_exact_friction():
     found = ts.profile(braked(), (0.0, 1.0), integrator="radau", advice=False)
     assert found.solution.sticking("brake")[-1]

@@ -336,6 +336,29 @@ def test_a_sampled_controller_across_impacts():
     assert np.ptp(solution.energy - solution.work) < 1e-12
 
 
+def test_a_phase_that_a_sample_ends_does_not_ask_again():
+    """A ramp of 12, 24, 36 N in steps of 0.1 s lifts 2 kg off the floor with the second one."""
+
+    class Ramp:
+        def reset(self):
+            self.load = 0.0
+
+        def __call__(self, t, state):
+            self.load += 12.0
+            return self.load
+
+    scene = ts.Scene(gravity=(0, 0, -10))
+    block = scene.add_body(2.0, (1, 1, 1), name="block")
+    scene.add(C.Translational.at(scene.ground, block, point=(0, 0, 0), axis=(0, 0, 1), name="rail"))
+    scene.add(C.PlaneContact(block, scene.ground, normal_b=(0, 0, 1), unilateral=True, name="floor"))
+    scene.add(ts.forces.Control(Ramp(), ["rail"], period=0.1, name="ramp"))
+    solution = ts.simulate(scene, (0, 0.3))
+    (_, leaves, _), _ = solution.phases
+    assert abs(leaves - 0.1) < 1e-15
+    # 2 m/s^2 for 0.1 s, then 8 m/s^2
+    assert abs(solution.displacement("rail")[-1] - (0.01 + 0.2 * 0.1 + 0.04)) < 1e-14
+
+
 def test_a_sampled_controller_is_not_asked_beyond_an_event():
     def half(t, state):
         return state.displacement("slide") - 0.5

@@ -7,6 +7,7 @@ import pytest
 
 import tsdyn as ts
 from tests.helpers.tolerances import EPS
+from tsdyn.rows import constraint_graph
 from tsdyn.simulation import phase_scenes, transitions
 
 C = ts.constraints
@@ -67,11 +68,12 @@ def test_boxes_of_a_rough_tower_touch_in_flight():
     solution = ts.simulate(scene, (0, end), rtol=1e-10, atol=1e-10).raise_if_failed()
     assert solution.reached == end
     assert np.diff(solution.energy).max() < 1e-12 * count**2 * G
-    # The floor only pushes: momentum falls by the weights at most, at events by unseen flights, too
+    # The floor only pushes: momentum falls by the weights at most. At events slips below 1e-6 m/s end at once, where
+    # they turn, by friction that is vertical as far as boxes lean: by 0.01
     pushes = np.diff(solution.linear_momentum[:, 2]) + count * G * np.diff(solution.t)
-    events, unseen = np.diff(solution.t) == 0.0, count * np.sqrt(2 * G * 16 * EPS)
+    events, ended = np.diff(solution.t) == 0.0, count * 1e-6 * 0.01
     assert pushes[~events].min() > -1e-12 * count
-    assert pushes[events].min() > -unseen
+    assert pushes[events].min() > -ended
     for i, box in enumerate(scene.bodies):
         below = scene.bodies[i - 1] if i else None
         R, x = solution.state.rotation(box), solution.state.position(box)
@@ -118,7 +120,7 @@ def test_impacts_of_three_balls_that_collapse_end_in_one_velocity(e):
         scene.add(C.SphereContact(a, b, radius_a=0.05, radius_b=0.05, restitution=e))
     solution = ts.simulate(scene, (0, 2.0)).raise_if_failed()
     np.testing.assert_allclose(solution.qd[-1][::3], 1 / 3, atol=4 * EPS)
-    assert 4 < len({t for t, *_ in solution.impulses}) < 16
+    assert 4 < len({t for t, *_ in solution.impulses}) < 24
     # As long as flights are long, by the law: the second impact is that of the second pair
     speeds = [impulse for *_, impulse in solution.impulses[:2]]
     np.testing.assert_allclose(speeds, [(1 + e) / 2, ((1 + e) / 2) ** 2], rtol=1e-14)
@@ -154,6 +156,19 @@ def test_impacts_of_shifted_boxes_that_accumulate_are_few(monkeypatch):
             assert abs(momentum[at[-1]] - momentum[at[0]] - impulse) < 1e-8
         counts.append(len(impulses))
     assert counts[1] < 0.7 * counts[0]
+
+
+def test_sets_of_contacts_between_the_same_bodies_share_a_graph(monkeypatch):
+    """As many corners of a box at a time are one graph with other points; the run has the bits of separate ones."""
+    built, graph = [], constraint_graph._GraphBuilder.graph
+    monkeypatch.setattr(constraint_graph._GraphBuilder, "graph", lambda self: built.append(self) or graph(self))
+    shared = ts.simulate(stack(2), (0, 0.4))
+    sets, graphs = len(shared._phases.packed), len(built)
+    monkeypatch.setattr(phase_scenes, "_takes_over", lambda packed, first: False)
+    alone = ts.simulate(stack(2), (0, 0.4))
+    assert len(built) - graphs >= sets > graphs > 1
+    for name in ("t", "q", "qd", "qdd", "multipliers"):
+        np.testing.assert_array_equal(getattr(shared, name), getattr(alone, name))
 
 
 def chain(links):

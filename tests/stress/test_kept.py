@@ -77,6 +77,7 @@ KEPT_CONTACTS = {
     ): "rows of contacts that stick lose rank: the run ends with an account",
     ("stack", 600024): "all corners of a box leave at one instant",
     ("stack", 910030): "velocities of 1e8 m/s end at an impact",
+    ("stack", 3000376): "at velocities of 1e8 m/s slips of 1e-6 m/s are rounding",
     ("ropes", 500014): "reactions of rounding, in free fall",
 }
 

@@ -14,11 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.tolerances import AHEAD, LEAST_SLIP
 from ..maths.complementarity import OPEN, STICKS, solve_cone
 from ..maths.tolerances import RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
-from .tolerances import EVENT_ERROR, LEAST_SHARE, LEVEL, PULLS, STOPPED, WITHIN_BOUND
+from .tolerances import AHEAD, EVENT_ERROR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
 
 
 def rows_of(inertia, which):
@@ -82,6 +81,8 @@ class Cones:
         Accelerations of these where the bodies have none.
     open, terms : ndarray (count,)
         Accelerations of all gaps where all are open, and the sizes of their terms.
+    slow : ndarray (count,)
+        Of `slow_speeds`.
     """
 
     def __init__(self, inertia, resting, qd):
@@ -89,8 +90,8 @@ class Cones:
         self.open, self.terms = inertia.accelerations(qd)
         self.rounding = SUM_ROUNDING * self.terms.max(initial=0.0)
         self.rows, self.bias = rows_of(inertia, resting), inertia.biases(qd)[resting].ravel()
-        speeds = np.hypot(*slips.T)
-        self.slides = speeds > LEAST_SLIP
+        speeds, self.slow = np.hypot(*slips.T), slow_speeds(inertia, qd, self.terms)
+        self.slides = speeds > LEAST_SLIP * self.slow[resting]
         self.d = np.full(slips.shape, np.nan)
         self.d[self.slides] = slips[self.slides] / speeds[self.slides, None]
         self.rough, self.kinetic, self.static = (x[resting] for x in (gaps.rough, gaps.kinetic, gaps.static))
@@ -168,18 +169,19 @@ def _alone(inertia, found, qd, fired):
 def at_turn(inertia, resting, qd, fired, turned, opening=()):
     """Velocities (n,) and the `ContactState`, with the slips ended that come to rest where they turn.
 
-    Below AHEAD friction keeps its direction, so that a slip which ends turns again and again. It is ended where the
-    contact would stick: with all that are as slow, as of a body that comes to rest, or alone. Below STOPPED it is
-    ended, too, where it slows down with its friction against it, to slide off in another direction at once: with all
-    of its two bodies, since the slip of one point alone is no motion that begins.
+    Below `slow_speeds` friction keeps its direction, so that a slip which ends turns again and again. It is ended where
+    the contact would stick: with all that are as slow, as of a body that comes to rest, or alone. Below a part of that,
+    SLOWEST_SLIP, it is ended, too, where it slows down with its friction against it, to slide off in another direction
+    at once: with all of its two bodies, since the slip of one point alone is no motion that begins.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
     opening : list of int
         Gaps that open with a rate: they go on to.
     """
-    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], AHEAD)
-    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rough[i]], AHEAD)
+    limits = slow_speeds(inertia, qd, inertia.accelerations(qd)[1])
+    turned = slow_slips(inertia, qd, [i for i in turned if i in resting], limits)
+    slow = slow_slips(inertia, qd, [i for i in resting if inertia.gaps.rough[i]], limits)
     closed = [i for i in inertia.held if i in resting]
 
     def ended(which, closed=closed):
@@ -198,10 +200,10 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
             continue
         if all(found[1].grips.get(i, ()) is None for i in which):
             return found
-    found = ended(slow_slips(inertia, qd, slow, LEAST_SLIP), resting)
-    turned = [i for i in slow_slips(inertia, qd, turned, STOPPED) if found[1].gains.get(i, 0.0) < 0.0]
+    found = ended(slow_slips(inertia, qd, slow, LEAST_SLIP * limits), resting)
+    turned = [i for i in slow_slips(inertia, qd, turned, SLOWEST_SLIP * limits) if found[1].gains.get(i, 0.0) < 0.0]
     pairs = {_pair(inertia.gaps, i) for i in turned}
-    which = [i for i in slow_slips(inertia, qd, slow, STOPPED) if _pair(inertia.gaps, i) in pairs]
+    which = [i for i in slow_slips(inertia, qd, slow, SLOWEST_SLIP * limits) if _pair(inertia.gaps, i) in pairs]
     return ended(which) if which else found
 
 
@@ -259,7 +261,7 @@ def _solve(inertia, resting, qd, fired, by_rows=False):
     slack = slack_of(inertia, closed, pushes, small)
     gains = {resting[j]: float(moves[j] @ d[j]) for j in np.flatnonzero(slides)}
     rows = _independent(inertia, closed, grips)
-    found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains, begun)
+    found = ContactState(closed, sorted(idle + spare), gdd, grips, rows, slack, gains, begun, cones.slow)
     return found, bool((pushes < -rounding).any())
 
 
@@ -377,9 +379,18 @@ def halted(inertia, qd, resting, which):
     return qd - response @ np.linalg.lstsq(G, left, rcond=RANK_TOL**2)[0]
 
 
-def slow_slips(inertia, qd, which, limit):
-    """Of gaps with friction those that slip, by `limit`, m/s, at most."""
-    return [i for i in which if 0.0 < np.hypot(*inertia.slips(qd)[i]) <= limit]
+def slow_speeds(inertia, qd, terms):
+    """Slips (count,), m/s, below which friction keeps a direction: parts of the bodies' velocities.
+
+    And of those that accelerations of the gaps, of the sizes `terms` (count,), cause along the scene's length.
+    """
+    velocities = (np.abs(inertia.tangents) @ np.abs(qd)).max(axis=1)
+    return AHEAD * (velocities + np.sqrt(inertia.gaps.extent(inertia.q) * terms))
+
+
+def slow_slips(inertia, qd, which, limits):
+    """Of gaps with friction those that slip, by limits (count,), m/s, at most."""
+    return [i for i in which if 0.0 < np.hypot(*inertia.slips(qd)[i]) <= limits[i]]
 
 
 def _ways(inertia, grips):

@@ -23,7 +23,7 @@ from ..maths.complementarity import complement
 from ..maths.tolerances import NEGLIGIBLE, RANK_TOL
 from ..model.handles import all_angles, counted, displacement, first_rows, handles_of, index_of
 from ..model.handles import angle as angle_of
-from .contact_rows import ContactWorkspace
+from .contact_rows import ContactWorkspace, Stops
 from .tolerances import LEVEL
 
 
@@ -58,6 +58,8 @@ class Gaps:
         Whether there is friction.
     slots : ndarray (count,)
         Where the numbers of those with friction begin in what the run remembers.
+    stops : Stops
+        Those of angles of joints.
     slip_rows : ndarray (count, 2)
         Rows of Phi of the slips, where there is friction.
     following : dict
@@ -94,13 +96,10 @@ class Gaps:
         stops = [(i, gap.side) for i, gap in enumerate(self.list) if gap.side.joint]
         self._stops, self._bounds = [i for i, _ in stops], np.array([side.bound for _, side in stops])
         self._counted = [handles.row(side.joint, "angle").first + side.which for _, side in stops]
+        of_stops = np.array(self._stops, int), np.array(self._counted, int), np.array(self._bounds, float)
+        self.stops = Stops(*of_stops, handles.joints.ravel(), handles.frames)
         self._angles = np.array([max(1.0, abs(gap.side.bound)) if gap.side.joint else 0.0 for gap in self.list])
         self._lengths = None, None  # a length, and `lengths` of it
-
-    @property
-    def in_python(self):
-        """Whether Python evaluates some of the gaps: those of angles of joints."""
-        return bool(self._stops)
 
     def extent(self, q):
         """The scene's length at q (n,), m: the largest number of a point or a position."""
@@ -374,6 +373,7 @@ class ContactState(NamedTuple):
     slack: dict = MappingProxyType({})  # of closed ones whose reactions are rounding: what these may fall below zero
     gains: dict = MappingProxyType({})  # of those that slide: what their slips gain, m/s^2
     begun: dict = MappingProxyType({})  # the same of those that begin to slide, above rounding
+    slow: np.ndarray | None = None  # (count,) slips, m/s, below which friction keeps a direction
 
 
 def solve_contacts(inertia, resting, qd, fired=()):

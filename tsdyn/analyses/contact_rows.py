@@ -6,7 +6,7 @@ H W H^T lam = H W f,  a = W (f - H^T lam)       H: bilateral rows               
 
 import math
 import threading
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,11 +15,11 @@ from ..elements.loops.constraint_rows import move_bodies, place_bodies, take_loa
 from ..errors import SingularConfiguration
 from ..formulations.accelerations import accelerate_with_friction, refine_accelerations, solve_accelerations
 from ..formulations.tolerances import EXACT, REFINEMENTS
-from ..jit.kernels import ANY, Record, callback, entry, kernel, loader, resident, vector
+from ..jit.kernels import ANY, Record, callback, caller, entry, kernel, loader, matrix, resident, vector
 from ..maths.complementarity import CONES
 from ..maths.dense_linalg import copy, largest
 from ..maths.root_isolation import SURVEYING
-from ..maths.tolerances import LAST_PLACE
+from ..maths.tolerances import LAST_PLACE, NEGLIGIBLE
 from ..maths.vectors import add, spin, subtract
 from ..model.equations import (
     WIDTH,
@@ -33,7 +33,7 @@ from ..model.equations import (
     time_derivative,
     with_short_rows,
 )
-from ..model.joint_turns import find_counted_angles
+from ..model.joint_turns import counted_angle, find_counted_angles
 from ..model.laws import calls_laws, interrupts_answered
 from ..model.packed import System, no_system
 from ..observables.evaluate import NO_INERTIA
@@ -73,11 +73,12 @@ def find_gaps(context, t, q, sign, out):
     """
     s = load_contacts(context).rows
     for k in range(t.size):
-        _find_gaps(s, t[k], q[k], sign, out[k])
+        find_gaps_at(s, t[k], q[k], sign, out[k])
 
 
 @kernel
-def _find_gaps(s, t, q, sign, out):
+def find_gaps_at(s, t, q, sign, out):
+    """The same at one time."""
     set_time(s, t)
     constraints(s, q, t, out)
     for i in range(sign.size):
@@ -114,10 +115,34 @@ def _measure_opened(t, which, start, values):
 
 
 class GapCounts(Record):
-    """Numbers of rows of contacts, and of gaps that have just opened."""
+    """Numbers of rows of contacts, of gaps that have just opened, and of coordinates."""
 
     rows: int
     opened: int
+    n: int
+
+
+class ImpactNumbers(Record):
+    """Of the impact of one gap."""
+
+    kernel: int  # the address of `bounce_off`
+    i: int  # its number
+    sign: float
+    e: float
+    lowest: float  # m or rad; a flight that is lower is none
+    p: float  # its impulse
+    rate: float  # afterwards
+    length: float  # sizes of the terms of the gap
+
+
+class Stops(NamedTuple):
+    """The gaps that are sign (angle - bound), of angles of joints."""
+
+    gaps: np.ndarray  # int64 (stops,)  their numbers
+    angles: np.ndarray  # int64 (stops,)  those of the angles
+    bounds: np.ndarray  # (stops,)
+    joints: np.ndarray  # int64 (4 angles,)  as of `find_counted_angles`
+    frames: np.ndarray  # (angles, 9)
 
 
 class OpenGaps(NamedTuple):
@@ -127,18 +152,34 @@ class OpenGaps(NamedTuple):
     sign: np.ndarray  # (gaps,)  of a gap over Phi
     which: np.ndarray  # int64 (gaps,)  those that have just opened come first
     start: np.ndarray  # (4, gaps)  as of `measure_opened`
+    stops: Stops
 
 
 load_rows = loader(no_system())
-load_open_gaps = loader(OpenGaps(GapCounts(), np.zeros(0), np.zeros(0, int), np.zeros((4, 0))))
+_none = np.zeros(0, int)
+_no_stops = Stops(_none, _none, np.zeros(0), _none, np.zeros((0, 9)))
+load_open_gaps = loader(OpenGaps(GapCounts(), np.zeros(0), _none, np.zeros((4, 0)), _no_stops))
+
+
+@kernel
+def find_gaps_within(s, gaps, t, state, t0, before, near, out):  # eight: and where the step began
+    """out (rows,) = the gaps first, at t and a state (3, n); near (angles,): of joints at t0 and `before`, roughly."""
+    find_gaps_at(s, t, state[0], gaps.sign, out)
+    stops = gaps.stops
+    for k in range(stops.gaps.size):
+        i, j = stops.gaps[k], stops.angles[k]
+        place = stops.joints[4 * j : 4 * j + 4]
+        angle = counted_angle(place, stops.frames[j], before, near[j], t - t0, state[0], state[1])
+        out[i] = gaps.sign[i] * (angle - stops.bounds[k])
 
 
 @callback(VALUES)
-def find_open_gaps(contacts, own, t, state, out):
-    """out (rows,) = the gaps first, at t and a state (3, n), as `find_gaps` and `measure_opened` have them."""
+def find_open_gaps(contacts, own, t, state, out, t0, before, near):  # eight: VALUES
+    """As `find_gaps_within`, and `measure_opened`."""
     gaps = load_open_gaps(own)
-    values = vector(out, gaps.counts.rows)
-    _find_gaps(load_rows(contacts), t, vector(state, ANY), gaps.sign, values)
+    values, n = vector(out, gaps.counts.rows), gaps.counts.n
+    now, first = matrix(state, 3, n), matrix(before, 3, n)
+    find_gaps_within(load_rows(contacts), gaps, t, now, t0, first, vector(near, ANY), values)
     _measure_opened(t, gaps.which[: gaps.counts.opened], gaps.start, values)
     return 0
 
@@ -245,22 +286,48 @@ def accelerate(context, t, q, qd, out, gamma, lam):
     _accelerate(load_contacts(context), t, q, qd, out, gamma, lam)
 
 
-@entry("pdvvvwmmmv")
-def bounce(context, t, q, qd, memory, place, short, rows, gamma, numbers):
-    """Impact of one gap, sign Phi_i, with restitution e: p = -(1 + e) gd / G. 0 where there are no factors, else 1.
+NO_FACTORS, BOUNCES, STAYS = 0, 1, 2
 
-    rows (4, n): J and M~ J^T of the gap, velocities and accelerations afterwards; gamma (2, m). rows and gamma are zero
-    on entry. numbers (9,): i, sign and e; to be written: gd before, the sizes of its terms, G, p, gdd afterwards, the
-    sizes of terms of the gap.
+
+class Impact(NamedTuple):
+    """The impact of one gap."""
+
+    numbers: ImpactNumbers
+    place: np.ndarray  # int64 (m,)  scratch, as of `find_rows`
+    short: np.ndarray
+    rows: np.ndarray  # (4, n)  J and M~ J^T of the gap, velocities and accelerations afterwards
+    gamma: np.ndarray  # (2, m)  scratch
+    inertias: np.ndarray  # (i, 14)  scratch for inertia rows
+
+
+load_impact = loader(
+    Impact(ImpactNumbers(), np.zeros(0, int), *np.zeros((4, 0, 0))),
+)
+
+
+@callback("ppdppp")
+def bounce_off(context, impact, t, q, qd, memory):
+    """Impact of the gap sign Phi_i alone, with restitution e: p = -(1 + e) gd / G.
+
+    NO_FACTORS; BOUNCES; STAYS where velocities are rounding, or the flight afterwards would be none.
     """
-    c, i, sign, e = load_contacts(context), int(numbers[0]), numbers[1], numbers[2]
-    _find_rows(c.rows, t, q, place, short, rows[:1], gamma[0])
+    c, w = load_contacts(context), load_impact(impact)
+    n = c.free.work.q.size
+    q, qd, memory = vector(q, n), vector(qd, n), vector(memory, c.free.system.memory.size)
+    x, rows, gamma = w.numbers, w.rows, w.gamma
+    i, sign, e = x.i, x.sign, x.e
+    for j in range(w.place.size):
+        w.place[j] = -1
+    w.place[i] = 0
+    rows[:, :] = 0.0
+    gamma[:, :] = 0.0
+    _find_rows(c.rows, t, q, w.place, w.short, rows[:1], gamma[0])
     J, response, after, qdd = rows[0], rows[1], rows[2], rows[3]
     for j in range(J.size):
         J[j] *= sign
     none = rows[:0]
     if not _respond(c.free, t, q, memory, rows[:1], rows[1:2], none, q[:0]):
-        return 0
+        return NO_FACTORS
     rate, size, G, length = sign * gamma[0, i], abs(gamma[0, i]), 0.0, 0.0
     for j in range(J.size):
         rate += J[j] * qd[j]
@@ -274,17 +341,34 @@ def bounce(context, t, q, qd, memory, place, short, rows, gamma, numbers):
     gdd = sign * gamma[1, i]
     for j in range(J.size):
         gdd += J[j] * qdd[j]
-    numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8] = rate, size, G, p, gdd, length
-    return 1
+    x.p, x.rate, x.length = p, -e * rate, length
+    if not (G > 0.0 and rate < -NEGLIGIBLE * size):
+        return STAYS
+    return STAYS if gdd < 0.0 and x.rate * x.rate < -2.0 * gdd * x.lowest else BOUNCES
+
+
+call_bounce = caller("ppdppp")
+
+
+@entry("ppdvvv")
+def bounce(context, impact, t, q, qd, memory):
+    """As `bounce_off`."""
+    return call_bounce(load_impact(impact).numbers.kernel, context, impact, t, q, qd, memory)
 
 
 @entry("pvvvm")
 def gain(context, q, before, after, h):
+    """As `energy_gained`."""
+    return energy_gained(load_contacts(context).free.system, q, before, after, h)
+
+
+@kernel
+def energy_gained(s, q, before, after, h):
     """Kinetic energy that velocities (n,) have more afterwards, J; h (i, 14): scratch for inertia rows.
 
     v.M v / 2 - u.M u / 2 = (v - u).M (v + u) / 2
     """
-    s, total = load_contacts(context).free.system, 0.0
+    total = 0.0
     for b in range(s.bodies.shape[0]):
         i = s.bodies[b, 0]
         for c in range(3):
@@ -379,7 +463,7 @@ def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # te
 
 
 KERNELS = (
-    find_gaps, measure_opened, find_open_gaps, find_rows, find_slips, respond, accelerate, bounce, gain,
+    find_gaps, measure_opened, find_open_gaps, find_rows, find_slips, respond, accelerate, bounce_off, bounce, gain,
     find_multipliers, find_counted_angles, *SURVEYING, *SEARCHING, *CONES,
 )  # fmt: skip
 
@@ -396,13 +480,13 @@ class ReactionWorkspace:
         graph = self.graph if packed.derived.switched is None else with_all_rows(self.graph)
         whole = parts(system._replace(reals=system.reals.copy()), graph, self.n)
         self.address, *self._keep = resident(whole)
-        self._tangent = whole.tangent
+        self._tangent, self._reals = whole.tangent, whole.system.reals
         find = find_reactions if self.count else find_multipliers
         self._find = interrupts_answered()(find) if calls_laws(packed) else find
 
-    def begin(self, graph):
-        """As if it were new, with the redundant rows of a graph."""
-        self.graph = graph
+    def begin(self, graph, reals):
+        """As if it were new, with the redundant rows of a graph and the numbers of a system."""
+        self.graph, self._reals[...] = graph, reals
         reset_selection(graph, self._tangent)
 
     def multipliers(self, t, levels, memory):
@@ -422,7 +506,7 @@ def reaction_workspace(packed, redundant=0.0):
     graph = graph_of(packed, REDUCED, BIAS)
     if key not in known or known[key].graph.row is not graph.row:
         known[key] = ReactionWorkspace(packed, redundant)
-    known[key].begin(graph)
+    known[key].begin(graph, packed.system.reals)
     return known[key]
 
 
@@ -442,15 +526,14 @@ class ContactWorkspace:
         rows, self._graph = with_short_rows(contacts), None
         self._rows, self._all = rows._replace(reals=rows.reals.copy()), np.arange(self.m)
         self.rows_address, self._keep_rows = resident(self._rows)
-        self._impact = np.empty(self.m, int), np.empty((4, self.n)), np.empty((2, self.m)), np.empty(9)  # of `bounce`
         self._bilateral = len(free.system.segments)
         spans = rows.segments, free.system.inertia_segments
         self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in spans)
         answered = interrupts_answered() if calls_laws(free) else lambda kernel: kernel
         self._accelerate, self._bounce = answered(accelerate), answered(bounce)
-        self._enter()
+        self.enter()
 
-    def _enter(self):
+    def enter(self):
         """Take the constraint graph as it is now: a start may have shown that bilateral rows are redundant."""
         graph = graph_of(self._free, REDUCED, BIAS)
         if graph is not self._graph:
@@ -492,7 +575,7 @@ class ContactWorkspace:
 
     def _respond(self, t, q, memory, loads, lam, left):
         out = np.empty_like(loads)
-        self._enter()
+        self.enter()
         if not respond(self.address, t, q, memory, loads, out, lam, left):
             raise SingularConfiguration(NO_INERTIA)
         return out
@@ -513,17 +596,26 @@ class ContactWorkspace:
         self._accelerate(self.address, t, q, qd, qdd, np.zeros(self.m), lam[-1])
         return np.vstack([out, qdd]), lam, left
 
-    def bounce(self, t, q, qd, memory, i, sign, e):
-        """Numbers (6,) of an impact of the gap in row i alone, as of the kernel, and velocities (n,) afterwards."""
-        place, rows, gamma, numbers = self._impact
-        place.fill(-1)
-        rows.fill(0.0)
-        gamma.fill(0.0)
-        place[i], numbers[0], numbers[1], numbers[2] = 0, i, sign, e
-        self._enter()
-        if not self._bounce(self.address, t, q, qd, memory, place, self._short, rows, gamma, numbers):
+    def bounce(self, t, q, qd, memory, *given):
+        """The impact of one gap: its `ImpactNumbers` and velocities (n,) afterwards; None where it stays.
+
+        given: the first of these numbers.
+        """
+        impact, address, _ = self.impact
+        numbers = impact.numbers
+        numbers.i, numbers.sign, numbers.e, numbers.lowest = given
+        self.enter()
+        found = self._bounce(self.address, address, t, q, qd, memory)
+        if found == NO_FACTORS:
             raise SingularConfiguration(NO_INERTIA)
-        return numbers[3:].tolist(), rows[2].copy()
+        return (numbers, impact.rows[2].copy()) if found == BOUNCES else None
+
+    @cached_property
+    def impact(self):
+        """The `Impact` of kernels, its address, and what keeps that."""
+        scratch = np.empty(self.m, int), self._short, np.empty((4, self.n)), np.empty((2, self.m)), self._inertias
+        made = Impact(ImpactNumbers(kernel=bounce_off.address), *scratch)
+        return made, *resident(made)
 
     def gain(self, q, before, after):
         """Kinetic energy that velocities (n,) have more afterwards, J."""

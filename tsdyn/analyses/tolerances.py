@@ -127,6 +127,13 @@ EVENT_ERROR = 1e-9
 # Of the largest reaction: contacts whose reactions pull by more are not closed, though rounding may explain it next to
 # singular states.
 PULLS = 1e-6
+# Of the velocities of bodies, and of those that they reach along the scene's length: the slip of a contact below which
+# its friction keeps a direction. Where slip begins slowly, as v = c t^2 / 2, and its direction turns, the friction
+# turns v within v / (mu g): from 1e-6 m/s on, for 1 m and 9.81 m/s^2, that takes some hundred steps, from 1e-9 on 30
+# times as many; the place is right to v sqrt(2 v / c), 1e-9 m.
+AHEAD = 3e-7
+# Of that slip: one below which a slip that turns has come to rest, and the least: iterations of stages leave 1e-13 m/s.
+SLOWEST_SLIP, LEAST_SLIP = 1e-2, 1e-5
 # Share of the bound of friction that decides then: the contact slides, though its acceleration is rounding.
 WITHIN_BOUND = 1.0 - 1e-10
 # Rounding of a gap that has just opened, over its rate times the time since, from which on its rate counts beside it:
@@ -135,7 +142,7 @@ JUST_OPENED = 1.0 / 14.0
 
 # --- friction at rest ------------------------------------------------------------------------------------------------
 # m/s or rad/s: a body that slides in a plane, more slowly, has come to rest where its direction turns: ten times the
-# velocity below which its direction is kept. So has a contact, if it would stick: m/s.
+# velocity below which its direction is kept.
 STOPPED = 1e-8
 # Roundings of the time within which an acceleration changes velocities by none: an event's time is right to some ten.
 RESTS = 100.0

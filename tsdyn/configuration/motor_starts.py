@@ -316,7 +316,7 @@ def _pairs(packed):
     ground = int(packed.system.bodies[:, 1].sum())
     titles, places, directions, moving = [], [], [], []
     for member in packed.members:
-        for pair in getattr(member.constraint, "opposed", ()):
+        for pair in member.constraint.opposed if hasattr(type(member.constraint), "opposed") else ():
             titles.append(member.constraint.title)
             places.append([starts.get(id(body), ground) for body, _ in pair])
             (_, first), (_, second) = pair

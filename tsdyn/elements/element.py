@@ -373,6 +373,7 @@ class Attachment:
     active = True  # whether it takes part from the start of a run; see `Scene.deactivate`
     named = False  # by its user
     owner: Any = None  # the joint that it is a part of
+    taken = 0  # slots that a run fills by itself, beside those of `memory`
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)

@@ -106,7 +106,7 @@ class Force(Attachment):
 
     error = InvalidForce
     lacks = "forces and has no law"
-    memory = taken = 0
+    memory = 0
     slots = 0
     no_series = ""
     sharp = False

@@ -52,14 +52,14 @@ def sliding(vv, par):
 
 @kernel
 def heading(v0, v1, v2, d, v_0):
-    """e = v / |v| while v is within 90 degrees of d (3,), and d where |v| is far below v_0; zero where d is.
+    """e = v / |v| while v is within 90 degrees of d (3,), and along d where |v| is far below v_0 |d|; zero where d is.
 
-    u = d + (v - d d.v) d.v / ((d.v)^2 + v_0^2),  e = u / |u|:  analytic at v = 0, and constant where v has the
-    direction of d, whatever its sign.
+    u = d + (v d.d - d d.v) d.v / ((d.v)^2 + (v_0 d.d)^2),  e = u / |u|:  analytic at v = 0, and constant where v has
+    the direction of d, whatever its sign.
     """
-    a = v0 * d[0] + v1 * d[1] + v2 * d[2]
-    c = a / (a * a + v_0 * v_0)
-    u0, u1, u2 = d[0] + c * (v0 - a * d[0]), d[1] + c * (v1 - a * d[1]), d[2] + c * (v2 - a * d[2])
+    a, b = v0 * d[0] + v1 * d[1] + v2 * d[2], d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+    c = a / (a * a + v_0 * v_0 * b * b + TINY)
+    u0, u1, u2 = d[0] + c * (b * v0 - a * d[0]), d[1] + c * (b * v1 - a * d[1]), d[2] + c * (b * v2 - a * d[2])
     size = np.sqrt(u0 * u0 + u1 * u1 + u2 * u2 + TINY)
     return u0 / size, u1 / size, u2 / size
 
@@ -122,11 +122,12 @@ HEADING_ROWS = 11
 def heading_series(s, v, first, d, v_0, k):
     """Coefficient k, a tuple of three, of `heading`; v in rows v to v + 2 of s, HEADING_ROWS rows are its own."""
     a, u, zero = first, first + 3, 1.0 if k == 0 else 0.0
+    b = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
     s[a, k] = s[v, k] * d[0] + s[v + 1, k] * d[1] + s[v + 2, k] * d[2]
-    s[a + 1, k] = square(s[a], k) + v_0 * v_0 * zero
+    s[a + 1, k] = square(s[a], k) + (v_0 * v_0 * b * b + TINY) * zero
     s[a + 2, k] = quotient(s[a], s[a + 1], s[a + 2], k)
     for i in range(3):
-        s[first + 6 + i, k] = s[v + i, k] - s[a, k] * d[i]
+        s[first + 6 + i, k] = b * s[v + i, k] - s[a, k] * d[i]
         s[u + i, k] = d[i] * zero + product(s[first + 6 + i], s[a + 2], k)
     s[first + 9, k] = dot(s, u, u, k) + TINY * zero
     s[first + 10, k] = inverse_root(s[first + 9], s[first + 10], k)

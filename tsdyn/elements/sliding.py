@@ -3,13 +3,13 @@
     n      normal towards a: z of the plane of b, or s (x_a - x_b) / |x_a - x_b| between balls, s = -1 within b
     k      = sum c_j e_j - R n,  c_j = -a_j^2 (e_j.n) / sqrt(sum a_i^2 (e_i.n)^2)                (1)
     v      = xd_a + omega_a x k - xd_b - omega_b x (x_a - x_b + k), less its part along n        (2)
-    force  = -mu N e,  e along u - n n.u,  u = d + (v - d d.v) d.v / ((d.v)^2 + v_0^2)           (3)
+    force  = -mu N e,  e along u - n n.u,  u = d + (v d.d - d d.v) d.v / ((d.v)^2 + (d.d)^2)     (3)
     dissipation = mu N e.v                                                                       (4)
 
 k is the contact point from x_a: an ellipsoid of semi-axes a_j along e_j, thickened by R. The force acts on a there, the
 opposite on b. N is the normal reaction, with its sign: a step beyond an opening is regular. e is v / |v| while v is
-within 90 degrees of d, a direction of the slip that a run sets, and that of d in the tangent plane where |v| is far
-below v_0: so the force is analytic where the slip begins and ends.
+within 90 degrees of d, a slow slip that a run sets, and has its direction in the tangent plane where |v| is far below
+|d|: so the force is analytic where the slip begins and ends.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from ..maths.recurrences import cross, dot, inverse_root, product, scaled
 from .force import Force
 from .friction import TANGENTIAL_ROWS, heading, heading_series, tangential, tangential_series
 from .markers import Point, Turn, Vector
-from .tolerances import AHEAD
 
 MU, SIDE, AXES, TYRE, BALLS, WAY = 0, 1, 2, 5, 6, 7  # where these begin in par; then N
 A, B, Z, E = 0, 6, 12, 15  # where x_a, x_b, z and e_1 begin in x; a Turn follows each point
@@ -74,7 +73,7 @@ class _Sliding(Force):
         k0, k1, k2 = arm(x, par, n0, n1, n2)
         l0, l1, l2 = x[0] - x[6] + k0, x[1] - x[7] + k1, x[2] - x[8] + k2
         v0, v1, v2 = slip_velocity(x, xd, par)
-        e0, e1, e2 = tangential(n0, n1, n2, *heading(v0, v1, v2, par[WAY : WAY + 3], AHEAD))
+        e0, e1, e2 = tangential(n0, n1, n2, *heading(v0, v1, v2, par[WAY : WAY + 3], 1.0))
         f = -par[-1] * par[MU]
         F0, F1, F2 = f * e0, f * e1, f * e2
         out[0], out[1], out[2] = F0, F1, F2
@@ -108,7 +107,7 @@ class _Sliding(Force):
         off = scaled(s, 3, 21, k)
         for i in range(3):
             s[22 + i, k] = s[18 + i, k] - off[i]
-        u0, u1, u2 = heading_series(s, 22, 52, par[WAY : WAY + 3], AHEAD, k)
+        u0, u1, u2 = heading_series(s, 22, 52, par[WAY : WAY + 3], 1.0, k)
         e0, e1, e2 = tangential_series(s, 3, u0, u1, u2, 63, k)
         s[27, k], s[28, k], s[29, k] = -par[MU] * e0, -par[MU] * e1, -par[MU] * e2
         n0, n1, n2 = cross(s, 12, 27, k)
@@ -130,7 +129,7 @@ class _Sliding(Force):
     def dissipation(x, xd, par, t):
         """Eq. (4)."""
         v0, v1, v2 = slip_velocity(x, xd, par)
-        e0, e1, e2 = tangential(*normal(x, par), *heading(v0, v1, v2, par[WAY : WAY + 3], AHEAD))
+        e0, e1, e2 = tangential(*normal(x, par), *heading(v0, v1, v2, par[WAY : WAY + 3], 1.0))
         return par[-1] * par[MU] * (e0 * v0 + e1 * v1 + e2 * v2)
 
 

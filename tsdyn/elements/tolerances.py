@@ -36,7 +36,3 @@ LEAST_SLIP = 1e-11
 # N^2 and (N m)^2: added to the squares of parts of a reaction. A complex step leaves -COMPLEX_STEP^2 of one that is
 # zero.
 LEAST_SQUARE = 4.0 * COMPLEX_STEP**2
-# m/s: the slip of a contact below which its friction keeps a direction. Where slip begins slowly, as v = c t^2 / 2, and
-# its direction turns, the friction turns v within v / (mu g): from 1e-6 m/s on that takes some hundred steps, from 1e-9
-# on 30 times as many; the place is right to v sqrt(2 v / c), 1e-9 m.
-AHEAD = 1e-6

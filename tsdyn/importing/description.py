@@ -210,6 +210,7 @@ class Description:
 
 SHOWN = 8  # names of a group in a text
 UNBOUNDED = 1e3  # rad or m: a range from which on limits say nothing on where a loop closes
+UNLIMITED = 1e16  # rad or m: a bound that is none, by the specification of SDF
 
 
 class LeftOut(NamedTuple):
@@ -244,6 +245,8 @@ class ImportReport:
         into another one are found again.
     limits : dict
         Name of a joint with limits in the file -> (lower, upper), rad or m; hints of `scene.assemble`.
+    stops : dict
+        (joint, index of its angle) -> the same for `limits=True`, of any size; None where a side has no bound.
 
     Examples
     --------
@@ -258,6 +261,7 @@ class ImportReport:
         self._notes: dict[str, None] = {}
         self.frames: dict[str, FrameOn] = {}
         self.limits: dict[str, tuple[float, float]] = {}
+        self.stops: dict[tuple[str, int], tuple[float | None, float | None]] = {}
 
     @property
     def left_out(self) -> tuple[LeftOut, ...]:
@@ -273,10 +277,13 @@ class ImportReport:
         """Note what is left out, once."""
         self._left[LeftOut(what, where, detail)] = None
 
-    def leave_limits(self, joint: str, lower: float, upper: float, shown: str = "") -> None:
-        """Note the limits of a joint, hints of an assembly."""
-        if 0.0 < upper - lower < UNBOUNDED:
+    def leave_limits(self, joint: str, lower: float, upper: float, shown: str = "", axis: int = 0) -> None:
+        """Note the limits of a joint's axis: bounds of a stop, and of the first axis hints of an assembly."""
+        if not axis and 0.0 < upper - lower < UNBOUNDED:
             self.limits[joint] = lower, upper
+        lowest, highest = (bound if abs(bound) < UNLIMITED else None for bound in (lower, upper))
+        if lowest != highest:  # equal bounds are those of exporters that have none
+            self.stops[joint, axis] = lowest, highest
         self.leave("limits of a joint", joint, shown or f"[{lower:g}, {upper:g}]")
 
     def carry(self, what: str, where: str) -> None:

@@ -121,10 +121,16 @@ def _scene(description: Any, make: Any, report: ImportReport, mistakes: Any, lim
     gap = _close(scene, report) if any(joint.loop for joint in description.joints) else 0.0
     if limits:
         joints = {joint.name: joint for joint in scene.constraints if joint.joint_coordinates}
-        for name, (lower, upper) in report.limits.items():
-            if name in joints:
-                scene.add(Stop(joints[name], lower, upper, name=f"limits of {name}"))
+        for (name, axis), (lower, upper) in report.stops.items():
+            part, index = _axis_of(joints, name, axis)
+            if part in joints:
+                joint = (joints[part], "angle", index) if index else joints[part]
+                try:
+                    scene.add(Stop(joint, lower, upper, name=f"limits of {name}" + f" {axis + 1}" * bool(axis)))
+                except TsdynError as error:
+                    mistakes.add((1, 1), str(error))
                 report.carry("limits of a joint", name)
+        mistakes.demand_none()
     report.warn(gap)
     return scene
 

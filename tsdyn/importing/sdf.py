@@ -107,8 +107,8 @@ KINDS = {
     "universal": "universal",
     "revolute2": "universal",
 }
+UNLIMITED = {"lower": -description.UNLIMITED, "upper": description.UNLIMITED}
 MIMIC = ("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0)
-UNLIMITED = 1e16  # of a limit, by the specification
 
 
 def add_joints(found, model, frames, names, prefix, report):
@@ -214,14 +214,15 @@ def _dynamics(axis, joint, tag, report):
         elif stiffness or damping:
             report.leave(f"spring and damper of a {joint.kind} joint", joint.name, f"{stiffness:g}, {damping:g}")
     if limit is not None:
-        given = {what: limit.scalar(what, UNLIMITED) for what in ("lower", "upper")}
-        given |= {what: value for what in ("effort", "velocity") if (value := limit.scalar(what, UNLIMITED)) != -1.0}
-        found = [f"{what} {value:g}" for what, value in given.items() if abs(value) < UNLIMITED]
+        given = {what: limit.scalar(what, bound) for what, bound in UNLIMITED.items()}
+        given |= {what: value for what in ("effort", "velocity") if (value := limit.scalar(what, -1.0)) != -1.0}
+        found = [f"{what} {value:g}" for what, value in given.items() if abs(value) < description.UNLIMITED]
         for what in ("stiffness", "dissipation"):
             limit.all(what)
         if found:
-            lower, upper = (given[what] if tag == "axis" else 0.0 for what in ("lower", "upper"))
-            report.leave_limits(joint.name, lower, upper, f"[{', '.join(found)}]")
+            report.leave_limits(
+                joint.name, given["lower"], given["upper"], f"[{', '.join(found)}]", int(tag == "axis2")
+            )
 
 
 def _mimic(found, axis, joint, tag, report):

@@ -301,6 +301,31 @@ def resident(value, header=()):
     return where(image) + 8 * len(header), (image, value)
 
 
+@intrinsic
+def seen(typing, value):
+    """The address of the image of a named tuple of arrays, on the stack: for kernels that are called by address."""
+
+    def generate(context, builder, signature, arguments):
+        words = []
+        for i, kind in enumerate(value.types):
+            array = context.make_array(kind)(context, builder, value=builder.extract_value(arguments[0], i))
+            shape = [builder.extract_value(array.shape, axis) for axis in range(kind.ndim)]
+            words += [builder.ptrtoint(array.data, _i64), *shape]
+        image = builder.bitcast(_on_stack(builder, ir.ArrayType(_i64, len(words))), ir.PointerType(_i64))
+        for i, word in enumerate(words):
+            builder.store(word, builder.gep(image, [_i64(i)]))
+        return builder.ptrtoint(image, _i64)
+
+    return types.int64(value), generate
+
+
+if DEBUG:
+
+    def seen(value):
+        """The named tuple itself."""
+        return value
+
+
 def image_of(value):
     """The words of an array (the address of its numbers, its lengths), of a record (its address), or of a tuple."""
     words = []

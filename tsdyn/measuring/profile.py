@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 # that of other functions of this table that it calls.
 WATCHED = (
     (Memory, Memory.advance, "steps", "compiled driver"),
+    (Watch, Watch._fly, "steps", "flights, with searches and impacts"),
     (Watch, Watch._search_step, "events", "searches of steps"),
     (Transitions, Transitions._hit, "events", "impacts"),
     (Transitions, Transitions._bounces, "events", "impacts"),
@@ -272,7 +273,7 @@ def profile(scene: Scene, t_span: Span = (0.0, 10.0), *, advice: bool = True, **
     constraint rows and each force, are timed by repetition at the final state, and counted. Other runs pay nothing.
 
     Of a run with contacts, exact friction or events with an action, phases are those of its Python code: steps of the
-    compiled driver as a whole, searches for events, impacts, what holds after them, and packing.
+    compiled driver as a whole, flights between impacts, searches for events, impacts, what holds after them, packing.
 
     Parameters
     ----------

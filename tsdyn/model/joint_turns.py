@@ -32,6 +32,12 @@ def rate_of(f, g, v, w):
 
 
 @kernel
+def _counted(angle, near):
+    """An angle on the turn nearest to `near`."""
+    return angle + TURN_ROUND * math.floor((near - angle) / TURN_ROUND + 0.5)
+
+
+@kernel
 def _roughly(E, F, near):
     """atan2(F, E) to 0.08 rad, on the turn nearest to `near`."""
     size = abs(E) + abs(F)
@@ -40,8 +46,7 @@ def _roughly(E, F, near):
     share = F / size
     if E < 0.0:
         share = 2.0 - share if F >= 0.0 else -2.0 - share
-    angle = HALF_PI * share
-    return angle + TURN_ROUND * math.floor((near - angle) / TURN_ROUND + 0.5)
+    return _counted(HALF_PI * share, near)
 
 
 @kernel
@@ -97,8 +102,11 @@ def _angle_and_rate(place, frame, q, qd):
 
 
 @kernel
-def _counted(angle, near):
-    return angle + TURN_ROUND * math.floor((near - angle) / TURN_ROUND + 0.5)
+def counted_angle(place, frame, before, near, h, q, qd):
+    """The angle of a joint at q, qd, h after the state before (3, n), where it is roughly `near`, by Eq. (2)."""
+    first, rate = _angle_and_rate(place, frame, before[0], before[1])
+    angle, other = _angle_and_rate(place, frame, q, qd)
+    return _counted(angle, _counted(first, near) + 0.5 * h * (rate + other))
 
 
 @entry("wmmvvmm")
@@ -110,8 +118,6 @@ def find_counted_angles(joints, frames, before, near, h, states, out):
     n = before.shape[1]
     for j in range(near.size):
         place = joints[4 * j : 4 * j + 4]
-        first, rate = _angle_and_rate(place, frames[j], before[0], before[1])
-        first = _counted(first, near[j])
         for k in range(h.size):
-            angle, other = _angle_and_rate(place, frames[j], states[k, :n], states[k, n : 2 * n])
-            out[k, j] = _counted(angle, first + 0.5 * h[k] * (rate + other))
+            q, qd = states[k, :n], states[k, n : 2 * n]
+            out[k, j] = counted_angle(place, frames[j], before, near[j], h[k], q, qd)

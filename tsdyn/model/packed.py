@@ -111,7 +111,8 @@ class Derived:
     places_within: list = None  # of each primitive among those of its class: reactions.only
     coordinate_starts: dict = None  # diagnostics.starts
     engines: dict = field(default_factory=dict)  # scene_cache.Prepared.engine
-    levers: object = None  # (bodies,), m: inertia_rows.levers
+    levers: object = None  # (bodies,), m: inertia_rows.levers, of a phase those of its scene
+    arms: object = None  # (bodies,), m, at the start: constraint_graph.arms; likewise
     near: object = None  # the start last found near the origin: local_origin.within_rounding
     grounded: tuple = None  # local_origin.origin_of, and for the start last seen:
     origin: tuple = (None, None)
@@ -127,8 +128,7 @@ class Derived:
 
     def forget_graphs(self):
         """The constraint graph is another."""
-        self.graph = None
-        self.graphs.clear()
+        self.graph, self.graphs = None, {}  # and not cleared: phases may share them
         self.forget_locked()
 
     def forget_locked(self):
@@ -523,7 +523,7 @@ def pack(scene, handles=None, whole=None):
     for function, begin, at in functions:
         reals[at : at + PLACES] = function.addresses(begin, len(reals))
         reals += function.numbers()
-    contacts = [each for each in scene.constraints if getattr(each, "taken", 0)]
+    contacts = [each for each in scene.constraints if each.taken]
     for contact in contacts:
         kept[contact] = range(len(reals), len(reals) + contact.taken)
         reals += [0.0] * contact.taken

@@ -1,6 +1,7 @@
 """The constraint graph of a scene and its construction: rows, bodies, products, split hubs; the metric of lengths."""
 
 from functools import cache
+from itertools import pairwise
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -133,10 +134,12 @@ MASS_REMEDY = "Give light bodies that carry heavy ones more mass, or make them o
 
 
 def arms(packed):
-    """L of each body, (bodies,), m: no less than a share of the longest; one in a scene without lengths."""
-    found = levers(packed)
-    longest, shown = found.max(initial=0.0), _longest_shown(packed)
-    return np.maximum(found, LEAST_SHARE * longest if longest > NO_ARM * shown else shown or 1.0)
+    """L of each body, (bodies,), m: no less than a share of the longest; one in a scene without lengths. Found once."""
+    if packed.derived.arms is None:
+        found = levers(packed)
+        longest, shown = found.max(initial=0.0), _longest_shown(packed)
+        packed.derived.arms = np.maximum(found, LEAST_SHARE * longest if longest > NO_ARM * shown else shown or 1.0)
+    return packed.derived.arms
 
 
 def _longest_shown(packed):
@@ -364,11 +367,11 @@ class _GraphBuilder:
             if constraint.normalises:
                 self.normals[self.bodies[id(constraint.a)]] = row
             elif i not in omitted:
-                pair = tuple(self.bodies.get(id(body), self.nb) for body in (constraint.a, constraint.b))
-                self.joints.append(_Joint(constraint, pair, row))
-        for added in self.packed.inertias:
-            pair = tuple(self.bodies.get(id(body), self.nb) for body in (added.a, added.b))
-            self.joints.append(_Joint(added, pair, -1))
+                self.joints.append(_Joint(constraint, self._pair(constraint), row))
+        self.joints += [_Joint(added, self._pair(added), -1) for added in self.packed.inertias]
+
+    def _pair(self, part):
+        return self.bodies.get(id(part.a), self.nb), self.bodies.get(id(part.b), self.nb)
 
     def _find_nodes(self):
         """The nodes, how many rows each has, and of every joint its node and its first row within."""
@@ -391,8 +394,9 @@ class _GraphBuilder:
         self.parts = [] if whole else cut(pairs, self.sizes, degrees)
         self.hubs, self.cliques = {part.body for part in self.parts}, [[] for _ in range(self.nb)]
         for pair, node in self.nodes.items():
-            for body in set(pair) - self.hubs - {self.nb}:
-                self.cliques[body].append(node)
+            for body in pair:
+                if body < self.nb and body not in self.hubs:
+                    self.cliques[body].append(node)
         self.cliques += [[*part.nodes, *(weld for weld, _ in part.welds)] for part in self.parts]
 
     def _find_lean_bodies(self):
@@ -419,47 +423,48 @@ class _GraphBuilder:
             first if part.all_rows else next(later) for (part, *_), first in zip(self.joints, self.firsts, strict=True)
         ]
         self.counts = [part.all_rows or 1 for part, *_ in self.joints]
-        self.sides, self.places = np.full((m + len(self.tails), 2), self.nb, np.int64), np.full(m, -1, np.int64)
+        sides, places = [(self.nb, self.nb)] * (m + len(self.tails)), [-1] * m
         self.at_body, self.at_node = [[] for _ in range(self.nb)], [[] for _ in self.nodes]
         for i, (constraint, pair, row) in enumerate(self.joints):
-            e = slice(self.pairs[i], self.pairs[i] + self.counts[i])
-            self.sides[e] = pair
+            first, count = self.pairs[i], self.counts[i]
+            sides[first : first + count] = [pair] * count
             if constraint.all_rows:
-                self.places[e] = range(row, row + constraint.all_rows)
+                places[first : first + count] = range(row, row + count)
             self.at_node[self.inside[i][0]].append(i)
             for side, body in enumerate(pair):
                 if body < self.nb and body not in self.hubs:
                     self.at_body[body].append((i, side))
+        self.sides, self.places = np.array(sides, np.int64).reshape(-1, 2), np.array(places, np.int64)
 
     def _at_part(self, body, nodes):
         """The joints of these nodes that are at a body, and their sides there."""
         found = (i for node in nodes for i in self.at_node[node] if body in self.joints[i].pair)
         return [(i, self.joints[i].pair.index(body)) for i in found]
 
-    def _product(self, rows, columns):
-        """Columns of ConstraintGraph.products, as far as two lists of joints and their sides say them."""
-        (i, side), (j, other) = rows[0], columns[0]
+    def _product(self, i, side, rows, j, other, columns):
+        """Columns of ConstraintGraph.products, of runs that begin with joints i and j, at sides of these."""
         (node, r), (other_node, c) = self.inside[i], self.inside[j]
-        rows, columns = (sum([self.counts[one] for one, _ in run]) for run in (rows, columns))
         target, stride, _ = self.where(node, other_node)
         left, right = 16 * self.pairs[i] + 8 * side, 16 * self.pairs[j] + 8 * other
         return left, rows, right, columns, target + r * stride + c, stride
 
     def _products(self):
+        counts, firsts, product = self.counts, self.firsts, self._product
         kinds = [1 if joint.constraint.all_rows else 2 for joint in self.joints]
-        products = [(*self._product([(i, 0)], [(i, 0)]), kind) for i, kind in enumerate(kinds)]
+        products = [(*product(i, 0, counts[i], i, 0, counts[i]), kind) for i, kind in enumerate(kinds)]
         products.sort(key=itemgetter(-1))  # later terms of sums add to what is there
         for found in self.at_body:
-            runs = self._runs(found)
+            runs = [(run, firsts[run[0][0]], sum([counts[i] for i, _ in run])) for run in self._runs(found)]
             # Of each joint with the rest of its run
-            for run in runs:
-                products += [(*self._product(run[k - 1 : k], run[k:]), 0) for k in range(1, len(run))]
+            for run, _, left in runs:
+                for one, after in pairwise(run):
+                    left -= counts[one[0]]
+                    products.append((*product(*one, counts[one[0]], *after, left), 0))
             # Of pairs of runs, above the diagonal only; two terms of one sum both ways
-            for run in runs:
-                for other in runs:
-                    first, second = self.firsts[run[0][0]], self.firsts[other[0][0]]
+            for run, first, rows in runs:
+                for other, second, columns in runs:
                     if first < second or (first == second and run is not other):
-                        products.append((*self._product(run, other), 0))
+                        products.append((*product(*run[0], rows, *other[0], columns), 0))
         return records(Product, products)
 
     def _runs(self, found):
@@ -485,7 +490,8 @@ class _GraphBuilder:
             for i, side in found:
                 for j, other in found:
                     if self.firsts[i] <= self.firsts[j]:
-                        products.append((*self._product([(i, side)], [(j, other)]), ROWS, part.body))
+                        at_part = self._product(i, side, self.counts[i], j, other, self.counts[j])
+                        products.append((*at_part, ROWS, part.body))
                         scales.append(part.scale - (i == j))  # the whole hub's is among the products
             for weld, sign in part.welds:
                 count = self.sizes[weld]
@@ -571,10 +577,12 @@ class _GraphBuilder:
 
     def _turns(self):
         """ConstraintGraph.turns."""
+        if not is_small(self.packed.size):
+            return np.zeros(0)
         turns = np.zeros(len(self.places))
         for (constraint, _, _), first in zip(self.joints, self.firsts, strict=True):
             turns[first : first + constraint.all_rows] = not has_lengths(constraint)
-        return turns if is_small(self.packed.size) and turns.any() else np.zeros(0)
+        return turns if turns.any() else np.zeros(0)
 
     def _rates(self):
         """ConstraintGraph.rates."""

@@ -3,12 +3,15 @@
 import heapq
 from bisect import bisect_right
 from collections import deque
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from ..maths.dense_linalg import sparse_lu
 from .tolerances import LINK_COST, LOOKUP, NUMBER_COST, OWN, PIVOTS_COST, PRODUCT_COST, UPDATE_COST, WIDEST
+
+COSTS = 4096  # of blocks of so many sizes, kept
 
 # Panels: where every number of a factor goes, and the products that elimination subtracts.
 #
@@ -374,6 +377,7 @@ def _tree(sizes, order, cliques):
     return parent, reach
 
 
+@lru_cache(COSTS)
 def _cost(size, reach):
     """Nanoseconds, roughly, of factoring a block once and solving with it three times: measured and fitted."""
     if size == reach == 3:

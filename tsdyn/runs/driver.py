@@ -341,7 +341,8 @@ class Sampling:
         """Evaluate the functions that are due at t, and hold their values."""
         for i, load in enumerate(self.loads):
             force = load.force
-            if t > self.last[i] and (not self.begun or is_due(t, force.period)):
+            later = t - self.last[i] > 2.0 * _slack(t, force.period)  # a phase may begin by rounding after an instant
+            if later and (not self.begun or is_due(t, force.period)):
                 angles, self.last[i] = memory.run.remembered[: self.handles.count], t
                 values = self._values(load, t, (q, qd), angles)
                 slots = np.arange(load.slot, load.slot + len(values))
@@ -458,7 +459,12 @@ def sampled(packed):
 
 def is_due(t, period):
     """Return True if t is an instant of a period."""
-    return abs(t - round(t / period) * period) <= max(SAME_TIME * period, TOGETHER * abs(t))
+    return abs(t - round(t / period) * period) <= _slack(t, period)
+
+
+def _slack(t, period):
+    """How far a time t may be from an instant of a period and count as that instant, s."""
+    return max(SAME_TIME * period, TOGETHER * abs(t))
 
 
 def instants_of(packed, t0, t1):

@@ -57,7 +57,7 @@ class Group:
         All of the run.
     numbers : list of int
         Of its own.
-    spins, n
+    spins, n, angles
         As of `GroupSearch`.
 
     Attributes
@@ -66,17 +66,19 @@ class Group:
         None where no kernel evaluates the functions.
     beside : ndarray (members,)
         Which members vanish with the first event that was found; None where that is unknown.
-    value, noise : ndarray (members,)
-        At the end of the last step; rounding error of values, once measured.
+    value, noise, least : ndarray (members,)
+        At the end of the last step; rounding error of values, once measured; that which is known beforehand.
+    is_new : bool
+        Whether no step has been searched since the start.
     """
 
-    def __init__(self, over, events, numbers, spins, n):
+    def __init__(self, over, events, numbers, spins, n, angles):
         self.over, self.numbers, self.degree = over, numbers, 0
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
         source = getattr(over, "__self__", None)
         known, kernel = (getattr(source, name, None) for name in ("noise", "kernel"))
-        self._least = np.zeros(len(own)) if known is None else known[self.which]
+        self.least = np.zeros(len(own)) if known is None else known[self.which]
         self.value, self.noise = np.zeros(len(own)), np.zeros(len(own))
         self._odd = np.zeros(len(own), int)  # 1 where the `Track` knows more than the value
         # Those that survey and Newton's method serve: changes in one direction end the run
@@ -87,11 +89,11 @@ class Group:
         self.kernel = self.beside = None
         if kernel is not None and all(self._exact) and not self._some_may_fall:
             known = self.value, self.noise, self._odd
-            self.kernel = GroupSearch(kernel, self.which, self._falls, known, spins, n)
+            self.kernel = GroupSearch(kernel, self.which, self._falls, known, spins, n, angles)
 
     def begin(self, values):
         """Take the values (members,) at the start of a run."""
-        self.value[:], self.noise[:], self._odd[:], self._is_new = values, self._least, 0, True
+        self.value[:], self.noise[:], self._odd[:], self.is_new = values, self.least, 0, True
 
     def lend(self, track, i, t):
         """Let the `Track` of member i know what is known at t, the start of the step that has been searched."""
@@ -104,7 +106,7 @@ class Group:
 
     def least_noise(self, number):
         """Of an event of its own: the rounding error of values that is known beforehand."""
-        return float(self._least[self.numbers.index(number)])
+        return float(self.least[self.numbers.index(number)])
 
     def take_back(self, track, i):
         """Take what a `Track` knows at the end of a step."""
@@ -113,14 +115,14 @@ class Group:
 
     def lend_all(self, tracks, t):
         """Let all tracks know what is known at t, the end of a step."""
-        self._first, self._was_new = self.value.copy(), self._is_new
+        self._first, self._was_new = self.value.copy(), self.is_new
         for i, number in enumerate(self.numbers):
             self.lend(tracks[number], i, t)
 
     def take_all(self, tracks):
         """Take what all tracks know at the end of a step."""
         self.begin(np.zeros(len(self.numbers)))
-        self._is_new = False
+        self.is_new = False
         for i, number in enumerate(self.numbers):
             self.take_back(tracks[number], i)
 
@@ -136,7 +138,7 @@ class Group:
         found = None if self.kernel is None else self.kernel.find(step)
         if found is None:
             return None
-        self._is_new, self.beside = False, self.kernel.parts.beside
+        self.is_new, self.beside = False, self.kernel.parts.beside
         return (None if found < 0 else (self.numbers[found], self.kernel.numbers.t)), []
 
     def search(self, step, sample, degree):
@@ -150,7 +152,7 @@ class Group:
         degree : function
             The least degree of interpolants on a time, s.
         """
-        self._first, self._was_new, self._is_new = self.value.copy(), self._is_new, False
+        self._first, self._was_new, self.is_new = self.value.copy(), self.is_new, False
         found, last, least, self.beside = None, self.value.copy(), degree(step.t1 - step.t0), None
         alone, left, end = {}, np.arange(len(last)), step.t1
         while left.size:
@@ -188,7 +190,7 @@ class Group:
             else:
                 self._odd[left[j]] = 0
         # Values of known rounding alone have no zero
-        least = self._least[left]
+        least = self.least[left]
         if unclear and least.any():
             quiet = (np.abs(seen.samples).max(axis=0) <= least).tolist()
             unclear = {j: since for j, since in unclear.items() if not quiet[j]}

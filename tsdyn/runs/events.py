@@ -8,6 +8,7 @@ import numpy as np
 
 from ..elements.bodies import largest_of_kind, turning
 from ..errors import InvalidArgument, Status
+from ..jit.interrupts import deferred_interrupts
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import all_angles, counted, handles_of
@@ -17,6 +18,7 @@ from ..validation import demand, demand_numbers, is_count, number
 from ..workspaces import B_END, STORED
 from . import tolerances as limits
 from .event_groups import Group, GroupMember, States
+from .run_memory import Memory
 
 # Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp.
 
@@ -84,6 +86,8 @@ def prepare(events):
     return found
 
 
+UNSEARCHED, UNBEGUN, NOT_BEGUN = 1, 2, 3  # how flights end: a step isn't searched, a run is to begin again, or can't
+
 # States inside the last step of a run, for event location.
 
 ROOM = 64  # states that are kept
@@ -92,8 +96,9 @@ ROOM = 64  # states that are kept
 class Inside:
     """States within the step that a run has just made."""
 
-    def __init__(self, reader, run, log, t0, before, spins):
-        self.t0, self.t1, self._spins = t0, run.clock.t, spins
+    def __init__(self, reader, run, log, start, spins):
+        (self.t0, before, self.near), self.t1, self._spins = start, run.clock.t, spins
+        t0 = self.t0
         self.reader, self.steps = reader, (run.block, log.charts, log.points)
         self.known = {t0: before, self.t1: run.now.copy()}
 
@@ -185,6 +190,12 @@ class Track:
 class Watch:
     """The events of one run: what is known of the functions, and what has been found.
 
+    `resume` has
+
+        resume(t, run, numbers)         whether the run goes on after events of these numbers, with other velocities
+        flights(group, memory, reader)  the `Flights` of a memory, in which Python has nothing to do; None for none
+        land(flights)                   takes the impacts of the last flight
+
     Attributes
     ----------
     t : float, s
@@ -206,7 +217,7 @@ class Watch:
         for i, event in enumerate(events):
             if isinstance(event.function, GroupMember):
                 groups.setdefault(event.function.over, []).append(i)
-        self._groups = [Group(over, events, numbers, self._p, self._n) for over, numbers in groups.items()]
+        self._groups = [Group(over, events, numbers, self._p, self._n, self.angles) for over, numbers in groups.items()]
         self._group_of = {i: group for group in self._groups for i in group.numbers}
         self._members = list(self._group_of)
         self._single = [i for i in range(len(events)) if i not in self._group_of]
@@ -214,7 +225,7 @@ class Watch:
 
     def read_by(self, reader):
         """Take a reader of the steps that are watched from now on."""
-        none, self.reader = np.empty(0), reader
+        none, self.reader, self.flies = np.empty(0), reader, None
         reader(none, none.astype(int), np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0)))  # loads the kernel
 
     def found(self, n):
@@ -238,16 +249,25 @@ class Watch:
                     return failure.status, str(failure)
                 raise InvalidArgument(f"events: {failure}") from failure.__cause__
         stiff, answer = run.numbers.stiff, getattr(memory, "answer", None)  # of sampled loads
+        if self.flies is None:
+            self.flies = self._flights(memory)
         # One step at a time, searched before the next one
-        for _ in range(most):
+        while most > 0:
             if self.begins_again:
                 status, reason = self._begin_again(memory, log)
                 if status != Status.SLICE_DONE:
                     return status, reason
+                most -= 1
                 continue  # it has written an output
             done = run.numbers.steps
-            status = memory.advance(log, 1) if answer is None else memory.step(log)
-            if run.numbers.steps > done:
+            if self.flies:
+                with deferred_interrupts():
+                    status, rows, unsearched = self._fly(run, log, most)
+            else:
+                status, rows = memory.advance(log, 1) if answer is None else memory.step(log), 1
+                unsearched = run.numbers.steps > done
+            most -= rows
+            if unsearched:
                 try:
                     last = self._search_step(run, log)
                 except EventFailed as failure:
@@ -267,6 +287,30 @@ class Watch:
             if status != Status.SLICE_DONE or full or run.numbers.stiff != stiff:  # stiffness ends the call
                 return status, ""
         return status, ""
+
+    def _flights(self, memory):
+        """The `Flights` of a memory; False where there are none."""
+        if self.resume is None or self._single or len(self._groups) != 1 or not isinstance(memory, Memory):
+            return False
+        return self.resume.flights(self._groups[0], memory, self.reader) or False
+
+    def _fly(self, run, log, most):
+        """Make steps and impacts; the Status, how many rows of the log that took, whether a step is to be searched."""
+        flights, numbers = self.flies, self.flies.numbers
+        status = flights.advance(log, most)
+        if numbers.impacts:
+            self.resume.land(flights)
+            self.start = numbers.last
+        self.begins_again, unsearched = numbers.ended == UNBEGUN, numbers.ended == UNSEARCHED
+        if unsearched:
+            self.t, self.state, self.memory = numbers.t0, flights.parts.before.copy(), flights.parts.remembered.copy()
+        else:
+            self.t, self.state, self.memory = run.clock.t, run.now.copy(), run.remembered.copy()
+        if numbers.ended == NOT_BEGUN:
+            if run.numbers.begun:
+                self._at_start(flights.group)  # says why
+            run.numbers.begun = 1  # there is a run so far
+        return status, numbers.used, unsearched
 
     def _begin(self, run, anew):
         """Take the values at the start of a run, or where it begins `anew` after a jump."""
@@ -291,7 +335,7 @@ class Watch:
             return False
         if any(self.list[i] and (self.events[i].action or self._ends(i)) for i in self._single):
             return False
-        self.begins_again = self.resume(last.t, run, [i for i in self._members if self.list[i]])
+        self.begins_again = self.resume.resume(last.t, run, [i for i in self._members if self.list[i]])
         return self.begins_again
 
     def _ends(self, i):
@@ -397,7 +441,7 @@ class Watch:
     def _at_start(self, group):
         """Values (members,) of a group where it begins."""
         if group.kernel is not None:
-            values, finite = group.kernel.at(self.t, self.state)
+            values, finite = group.kernel.at(*self.beside)
         else:
             values = self._sample(group, np.array([self.t]), self.state[None])[0]
             finite = np.isfinite(values).all()
@@ -412,7 +456,7 @@ class Watch:
         known = self.t, self.state, self.memory
         self.memory = run.remembered.copy()
         try:
-            return self._locate(run, log, Inside(self.reader, run, log, self.t, self.state, self._p))
+            return self._locate(run, log, Inside(self.reader, run, log, self.beside, self._p))
         except KeyboardInterrupt:
             self.memory = known[2]
             raise

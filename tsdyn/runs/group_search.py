@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit.kernels import Record, caller, data_of, entry, kernel, loader, matrix, resident
+from ..jit.kernels import Record, callback, caller, data_of, entry, kernel, loader, matrix, resident, seen
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
 from .dense_output import OTHER_CHART, SAME_STEP, WHOLE, read_one
@@ -48,7 +48,9 @@ def move(values, marks, width, step):
 
 # The search: samples at Chebyshev points, a survey of all functions, the first root by true values.
 
-VALUES = "ppdpp"  # of kernels of functions: two contexts, t, the state (3, n), values to be written
+# Of kernels of functions: two contexts, t, the state (3, n), values to be written; where the step began: the time, the
+# state, and angles of joints, roughly
+VALUES = "ppdppdpp"
 call_values = caller(VALUES)
 CLEAR, FOUND = 0, 1  # and UNSURE
 
@@ -58,6 +60,7 @@ class SearchNumbers(Record):
 
     reader: int  # the kernel that reads states
     values: int  # and that of the functions
+    finder: int  # and `find_first`
     place: int  # of the next time that is read, as of `dense_output.read`
     t0: float  # s, the step
     t1: float
@@ -84,11 +87,13 @@ class SearchParts(NamedTuple):
     step: np.ndarray  # (3,)  of `move`
     state: np.ndarray  # (3, n)  the last that was read
     beside: np.ndarray  # int64 (m,)  1 of those that vanish with the one that is found
+    near: np.ndarray  # (angles,)  of joints where the step began, roughly
 
 
 _EXAMPLE = SearchParts(
     SearchNumbers(), np.zeros(0), *np.zeros((2, 0), int), *np.zeros((3, 0)), np.zeros(0, int),
     *np.zeros((2, 0)), np.zeros(0, int), *np.zeros((2, 0, 0)), np.zeros(0), np.zeros((0, 0)), np.zeros(0, int),
+    np.zeros(0),
 )  # fmt: skip
 load_search = loader(_EXAMPLE)
 
@@ -103,14 +108,29 @@ class SearchedStep(NamedTuple):
     points: np.ndarray
     first: int  # contexts of the functions
     second: int
+    t0: float  # s, where it begins
+    before: np.ndarray  # (3, n)  the state there
     t1: float  # s, its end
-    now: np.ndarray  # (3, n)  the state there
+    now: np.ndarray
+
+
+class StepArrays(NamedTuple):
+    """What a `SearchedStep` is made of."""
+
+    before: np.ndarray  # (3, n)  the state at t0
+    now: np.ndarray
+    block: np.ndarray
+    charts: np.ndarray
+    points: np.ndarray
+
+
+load_arrays = loader(StepArrays(*np.zeros((2, 0, 0)), np.zeros(0), *np.zeros((2, 0, 0))))
 
 
 @kernel
-def _evaluate(s, first, second, t, state, out):
+def _evaluate(s, first, second, t, state, t0, before, out):  # eight: and where the step began
     """Values (m,) of the functions at t and a state (3, n)."""
-    call_values(s.numbers.values, first, second, t, state, s.all)
+    call_values(s.numbers.values, first, second, t, state, s.all, t0, before, s.near)
     for j in range(out.size):
         out[j] = s.all[s.which[j]]
 
@@ -123,7 +143,7 @@ def _evaluate_within(s, step, t, whole, out):
     read = read_one(s.numbers.reader, step.context, step.run, step.block, step.charts, step.points, t, asked, s.state)
     if read != 0:
         return False
-    _evaluate(s, step.first, step.second, t, s.state, out)
+    _evaluate(s, step.first, step.second, t, s.state, step.t0, step.before, out)
     return True
 
 
@@ -161,7 +181,7 @@ def _survey(s, step, t0, t1, turning):
                 continue
             t = t1 if i == N + 1 else t0 + 0.5 * (t1 - t0) * (table.points[i] + 1.0)
             if t == step.t1:
-                _evaluate(s, step.first, step.second, t, step.now, samples[i])
+                _evaluate(s, step.first, step.second, t, step.now, step.t0, step.before, samples[i])
             elif not _evaluate_within(s, step, t, 0, samples[i]):
                 return 0
         copy(s.value, samples[0])
@@ -202,31 +222,47 @@ def _first_root(s, step, values, width):
 
 
 @kernel
-def _find_beside(s, step, t0, t, first, value):
+def _is_near_another(s, t, degree, width, value):
+    """Whether another function may vanish at t, too. value (m,): there; degree, width: of the last survey.
+
+    Markov: |p'| < 2 N^2 max |p| / width, and max |p| is less than four times the largest sample.
+    """
+    m, steepest = value.size, 8.0 * degree * degree / width
+    samples = matrix(data_of(s.samples), degree + 2, m)
+    for j in range(m):
+        scale = 0.0
+        for i in range(degree + 2):
+            scale = max(scale, abs(samples[i, j]))
+        if j != s.numbers.found and not value[j] > SAME_INSTANT * abs(t) * steepest * scale:
+            return True
+    return False
+
+
+@kernel
+def _find_beside(s, step, t, degree, width, first, value):
     """Mark the functions that vanish at t, too, by how fast they fall; False if there is no state. Two of scratch."""
-    before, others = t - SHORTLY * (t - t0), value.size > 1
-    if others and not _evaluate_within(s, step, before, 0, first):
-        return False
     if not _evaluate_within(s, step, t, WHOLE, value):
         return False
-    for j in range(value.size if others else 0):
+    s.beside[:] = 0
+    if not _is_near_another(s, t, degree, width, value):
+        return True
+    before = t - SHORTLY * (t - step.t0)
+    if not (_evaluate_within(s, step, before, 0, first) and _evaluate_within(s, step, t, WHOLE, value)):
+        return False
+    for j in range(value.size):
         falls = value[j] < first[j] and value[j] * (t - before) <= SAME_INSTANT * abs(t) * (first[j] - value[j])
         s.beside[j] = 1 if falls and j != s.numbers.found else 0
     return True
 
 
-@entry("pppppmmvmm")
-def search_step(search, context, run, first, second, before, now, block, charts, points):  # ten: a step
-    """Search a step for the first zero: CLEAR, FOUND, or UNSURE, after which nothing has changed.
-
-    context, run: of the reader; first, second: of the functions; before, now (3, n): states at t0 and t1. Of a zero the
-    function and the time are in the `SearchNumbers`, the state and those that vanish beside in the `SearchParts`.
-    """
-    s = load_search(search)
+@callback("pppppp")
+def find_first(search, context, run, first, second, arrays):
+    """As `search_step`, for kernels; arrays: `StepArrays`."""
+    s, a = load_search(search), load_arrays(arrays)
     t0, t1 = s.numbers.t0, s.numbers.t1
-    step = SearchedStep(context, run, block, charts, points, first, second, t1, now)
-    numbers, m, end = s.numbers, s.value.size, t1
-    turning = max(_turn_rate(s.spins, before[1]), _turn_rate(s.spins, now[1]))
+    step = SearchedStep(context, run, a.block, a.charts, a.points, first, second, t0, a.before, t1, a.now)
+    numbers, m, end, width = s.numbers, s.value.size, t1, t1 - t0
+    turning = max(_turn_rate(s.spins, a.before[1]), _turn_rate(s.spins, a.now[1]))
     scratch = matrix(data_of(s.samples[(LARGEST + 2) * m :]), 2, m)
     numbers.place, numbers.found = OTHER_CHART, -1
     for j in range(m):
@@ -239,7 +275,8 @@ def search_step(search, context, run, first, second, before, now, block, charts,
             return UNSURE
         if _mark(s):
             break
-        if _first_root(s, step, scratch[0], end - t0) != ARRIVED:
+        width = end - t0
+        if _first_root(s, step, scratch[0], width) != ARRIVED:
             return UNSURE
         # What was unclear may be clear up to there
         numbers.found, end, unclear = int(s.step[0]), s.step[1], False
@@ -252,17 +289,37 @@ def search_step(search, context, run, first, second, before, now, block, charts,
         copy(matrix(data_of(s.samples), degree + 2, m)[degree + 1], s.value)
         return CLEAR
     numbers.t = end
-    return FOUND if _find_beside(s, step, t0, end, scratch[0], scratch[1]) else UNSURE
+    return FOUND if _find_beside(s, step, end, degree, width, scratch[0], scratch[1]) else UNSURE
+
+
+call_find = caller("pppppp")
+
+
+@entry("pppppmmvmm")
+def search_step(search, context, run, first, second, before, now, block, charts, points):  # ten: a step
+    """Search a step for the first zero: CLEAR, FOUND, or UNSURE, after which nothing has changed.
+
+    context, run: of the reader; first, second: of the functions; before, now (3, n): states at t0 and t1. Of a zero the
+    function and the time are in the `SearchNumbers`, the state and those that vanish beside in the `SearchParts`.
+    """
+    arrays, finder = StepArrays(before, now, block, charts, points), load_search(search).numbers.finder
+    return call_find(finder, search, context, run, first, second, seen(arrays))
+
+
+@kernel
+def begin_functions(s, first, second, t, now, out):
+    """out (m,): values at t and a state (3, n); 0 if one is not finite, else 1."""
+    _evaluate(s, first, second, t, now, t, now, out)
+    return 1 if is_finite(out) else 0
 
 
 @entry("pppdmv")
 def evaluate_functions(search, first, second, t, now, out):
-    """out (m,): values at t and a state (3, n); 0 if one is not finite, else 1."""
-    _evaluate(load_search(search), first, second, t, now, out)
-    return 1 if is_finite(out) else 0
+    """As `begin_functions`."""
+    return begin_functions(load_search(search), first, second, t, now, out)
 
 
-SEARCHING = (move, search_step, evaluate_functions)
+SEARCHING = (move, find_first, search_step, evaluate_functions)
 
 
 class GroupSearch:
@@ -281,28 +338,31 @@ class GroupSearch:
     spins : ndarray (bodies, 4)
         Where Euler parameters are among n coordinates.
     n : int
+    angles : int
+        Of joints.
     """
 
-    def __init__(self, kernel, which, falls, known, spins, n):
-        (called, self._first, self._second, count), m = kernel, len(which)
-        self.numbers = SearchNumbers(values=called.address)
+    def __init__(self, kernel, which, falls, known, spins, n, angles):
+        (called, *self.contexts, count), m = kernel, len(which)
+        self.numbers = SearchNumbers(values=called.address, finder=find_first.address)
         self.parts = SearchParts(
             self.numbers, kernel_tables(), spins.ravel(), np.array(which, int), falls, *known, np.zeros(count),
             np.zeros((LARGEST + 4) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)), np.zeros((m, 4)),
-            np.zeros(3), np.zeros((3, n)), np.zeros(m, int),
+            np.zeros(3), np.zeros((3, n)), np.zeros(m, int), np.zeros(angles),
         )  # fmt: skip
-        self._search, self._keep = resident(self.parts)
+        self.address, self._keep = resident(self.parts)
 
-    def at(self, t, now):
-        """Values (m,) at t and a state (3, n), and whether they are finite."""
+    def at(self, t, now, near):
+        """Values (m,) at t and a state (3, n), and whether they are finite; near (angles,): of joints, roughly."""
+        self.parts.near[:] = near
         out = np.empty(self.parts.value.size)
-        return out, evaluate_functions(self._search, self._first, self._second, t, now, out) == 1
+        return out, evaluate_functions(self.address, *self.contexts, t, now, out) == 1
 
     def find(self, step):
         """The number of the function that is zero first in a step, `Inside`, -1 for none; None where that is unsure."""
         numbers, reader, known = self.numbers, step.reader, step.known
         numbers.t0, numbers.t1, (numbers.reader, context, run) = step.t0, step.t1, reader.where
-        contexts = self._search, context, run, self._first, self._second
+        contexts, self.parts.near[:] = (self.address, context, run, *self.contexts), step.near
         found = reader.call(search_step, *contexts, known[step.t0], known[step.t1], *step.steps)
         if found == FOUND:
             known[numbers.t] = self.parts.state.copy()

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit.kernels import Record, kernel
+from ..jit.kernels import Record, kernel, loader
 from ..motions.tracing import LENGTH
 from ..validation import EXACT, damaged, demand, is_count
 from ..workspaces import STORED, Clock, Counters, LevelControl, RunKernels, RunNumbers
@@ -32,6 +32,9 @@ def no_log():
     """An example of its type, of no rows."""
     none = np.zeros((0, 1))
     return RunLog(np.zeros(0), np.zeros((0, 3)), none, none, none, none, none)
+
+
+load_log = loader(no_log())
 
 
 @kernel

@@ -1,19 +1,20 @@
 """Run workspace of a driver, allocated once and reused by successive runs; Ctrl-C within a step."""
 
 import math
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import Status
 from ..jit.interrupts import interruptible
-from ..jit.kernels import callback, resident
+from ..jit.kernels import callback, caller, entry, kernel, loader, resident, seen
+from ..maths.dense_linalg import copy
 from ..methods.explicit import ACCELERATE, PLACE
 from ..model.laws import calls_laws, interrupts_answered
 from ..rows.interface import reset_selection, selection_parts, set_selection
-from ..workspaces import FILLED, STORED, divided, enter_joints, set_tolerances, words
-from .run_log import no_log, with_end
+from ..workspaces import FILLED, STORED, LevelControl, divided, enter_joints, load_run, set_tolerances, words
+from .run_log import close_chart, no_log
 from .task import step_count
 from .tolerances import LONG_STEPS, PIECE
 
@@ -114,6 +115,57 @@ def advance(kernel, arguments, run, called):
         raise
 
 
+call_driver = caller("pppi")
+
+
+@entry("ipp", no_log(), "i")
+def advance_run(driver, context, run, log, most):
+    """Call the driver at this address: `stepper.advance`, or that of series."""
+    return call_driver(driver, context, run, seen(log), most)
+
+
+class Restart(NamedTuple):
+    """Where a run begins again: parts of its context."""
+
+    control: LevelControl
+    q: np.ndarray  # (n,)
+    qd: np.ndarray
+    reals: np.ndarray  # of the system, and which of them forces remember
+    memory: np.ndarray
+
+
+load_restart = loader(Restart(LevelControl(), *np.zeros((3, 0)), np.zeros(0, int)))
+
+
+@kernel
+def go_back(s, r, log):
+    """Let a run begin again where it is, from the positions and velocities of `run.now`: before its first step."""
+    numbers, t = r.numbers, r.clock.t
+    # Outputs and stops from here on are still to come
+    while numbers.rows > 0 and log.t_eval.size > 0 and log.out[numbers.rows - 1, 0] >= t:
+        numbers.rows -= 1
+    while numbers.next_eval > 0 and log.t_eval[numbers.next_eval - 1] >= t:
+        numbers.next_eval -= 1
+    while numbers.next_stop > 0 and log.stops[numbers.next_stop - 1, 0] > t:
+        numbers.next_stop -= 1
+    while numbers.next_stop < log.stops.shape[0] and log.stops[numbers.next_stop, 0] <= t:
+        numbers.next_stop += 1
+    if numbers.in_chart > 0:
+        close_chart(r, log, s.control.condition, s.control.contraction)
+    copy(r.now[0], s.q)
+    copy(r.now[1], s.qd)
+    for j in range(s.memory.size):
+        s.reals[s.memory[j]] = r.remembered[r.joints.shape[0] + j]
+    numbers.begun = 0
+
+
+@entry("pp", no_log())
+def begin_again(restart, run, log):
+    """As `go_back`."""
+    go_back(load_restart(restart), load_run(run), log)
+    return 0
+
+
 UNLIMITED = 2**62  # steps wanted of an adaptive run
 STATUSES = {int(status): status for status in Status}
 
@@ -130,7 +182,7 @@ class Layout(NamedTuple):
 class Memory:
     """System, workspace and state of a run, and where kernels find them; one run at a time.
 
-    A driver's own derives from it, sets `advance_kernel` and allocates the parts.
+    A driver's own derives from it, sets `driver` and allocates the parts.
 
     Parameters
     ----------
@@ -145,7 +197,8 @@ class Memory:
     engine = None  # that it is laid out for
     arrays = None  # of a first slice: `driver.SliceArrays`
     layout = None  # a `Layout`
-    advance_kernel = None  # the compiled driver: (context, run, log, most) -> Status
+    driver = None  # the compiled driver, a `Callback`
+    advance_kernel = staticmethod(advance_run)  # which calls it
 
     def __init__(self, prepared, graph, context, run):
         self.packed, self.weight, self.graph, self.run = prepared.packed, prepared.n, graph, run
@@ -256,22 +309,14 @@ class Memory:
 
     def begin_again(self, log):
         """Begin again where the run is, from the positions and velocities of `run.now`; the Status."""
-        run, numbers, control, t = self.run, self.run.numbers, self.work.control, self.run.clock.t
-        # Outputs and stops from here on are still to come
-        while numbers.rows > 0 and log.t_eval.size and log.out[numbers.rows - 1, 0] >= t:
-            numbers.rows -= 1
-        if log.t_eval.size:
-            numbers.next_eval = int(log.t_eval.searchsorted(t))
-        if log.stops.size:
-            numbers.next_stop = int(log.stops[:, 0].searchsorted(t, "right"))
-        if numbers.in_chart > 0:
-            with_end(log.charts[: numbers.chart_rows + 1], numbers, control.condition, control.contraction)
-            numbers.chart_rows += 1
-        self.work.q[...], self.work.qd[...] = run.now[0], run.now[1]
-        own = self.context.system
-        own.reals[own.memory] = run.remembered[len(run.joints) :]
-        numbers.begun = 0
+        begin_again(self.restart[0], self._run, log)
         return self.advance(log, -1)
+
+    @cached_property
+    def restart(self):
+        """The address of its `Restart`, and what keeps that."""
+        work, system = self.work, self.context.system
+        return resident(Restart(work.control, work.q, work.qd, system.reals, system.memory))
 
     def saved(self):
         """What is to be saved of it beside its arrays: nothing."""
@@ -283,7 +328,7 @@ class Memory:
     def load(self):
         """Load the driver, where this process has not called it yet."""
         if not getattr(self.advance_kernel, "overloads", True):
-            self.advance_kernel(*self.where, no_log(), 0)
+            self._call(*self.where, no_log(), 0)
 
     def advance(self, log, most):
         """Make up to `most` steps; the Status, as of the driver."""
@@ -300,7 +345,7 @@ class Memory:
 
     def _call(self, *arguments):
         kernel = self.advance_kernel
-        return (interrupts_answered()(kernel) if self.calls_laws else kernel)(*arguments)
+        return (interrupts_answered()(kernel) if self.calls_laws else kernel)(self.driver.address, *arguments)
 
     @property
     def called(self):

@@ -44,7 +44,7 @@ class StepMemory(Memory):
         Floats of the method's tableau, memory and block, for `lay_out`.
     """
 
-    advance_kernel = staticmethod(advance)
+    driver = advance
 
     def __init__(self, prepared, graph, saddle, coupled, form, implicit, sizes, lengths):
         n, m, packed = prepared.n, prepared.m, prepared.packed

@@ -6,7 +6,7 @@ from ..errors import Status
 from ..formulations.accelerations import body_of, unit_friction
 from ..formulations.charts import AT_START, BY_FAILURE, BY_INTERVAL, turned_most
 from ..formulations.tolerances import CONTRACTION_KEPT, CONTRACTION_LOST
-from ..jit.kernels import entry, kernel, long_kernel, stack
+from ..jit.kernels import callback, kernel, long_kernel, stack
 from ..maths.dense_linalg import copy
 from ..maths.tolerances import TINY
 from ..methods.explicit import call_step
@@ -36,7 +36,7 @@ from .dense_output import (
     restore_now,
     store_now,
 )
-from .run_log import close_chart, is_full, no_log, note_accepted, note_try, open_chart
+from .run_log import close_chart, is_full, load_log, note_accepted, note_try, open_chart
 from .step_control import accept, call_watch, first_step, forget_scale, gets_on, stretch, watch_stiffness
 
 # Rotation limit of a step in driven scenes.
@@ -507,14 +507,14 @@ def _finish(context, run, c, r, log, t0, last, reason):
     return status
 
 
-@entry("pp", no_log(), "i")
+@callback("pppi")
 def advance(context, run, log, most):
     """Make up to `most` steps. Status: SUCCESS at the end of the interval, SLICE_DONE, or the reason to stop.
 
-    context and run are the addresses of a `Context` and a `RunState`, log is a `RunLog`. The first call, but one with
+    Addresses of a `Context`, a `RunState` and a `RunLog`. The first call, but one with
     most = 0, begins the run; with most = -1 it does no more.
     """
-    c, r = load(context), load_run(run)
+    c, r, log = load(context), load_run(run), load_log(log)
     status = 0
     adaptive, implicit, driven = r.numbers.adaptive == 1, r.numbers.stage_at > 0, is_rheonomic(c.system)
     # Begin, or go on after Python was asked at a stop

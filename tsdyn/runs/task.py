@@ -179,7 +179,7 @@ class Task(NamedTuple):
     choose: object  # a function that makes the `Turns` of a run, or the `Turns`; None where no other method goes on
     stops: np.ndarray = NO_STOPS  # times at which a step ends, as of `motions.knots.stops_of`
     sampling: object = None  # a `driver.Sampling`, or None
-    resume: object = None  # a function of time, run and numbers of events: whether a run goes on after them
+    resume: object = None  # goes on after events in the same memory; see `Watch`
     archive: object = None  # a `files.archive.Archive` that outputs and histories go to, or None
 
     @property

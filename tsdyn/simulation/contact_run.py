@@ -38,11 +38,12 @@ from ..runs.events import prepare as prepared_events
 from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome, interval, output_times, state_arrays
 from ..runs.tolerances import START_ZERO
-from ..validation import counted, damaged, demand, listed
-from . import hybrid
+from ..validation import counted, listed
+from . import flights, hybrid
+from .checkpoints import Checkpoints
 from .grips import Halting, Reactions, items_of
 from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
-from .phases import PhasePieces, Phases, Pinned, UnitModes, plain
+from .phases import Impulse, PhasePieces, Phases, Pinned, UnitModes
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
 from .segments import summed
@@ -77,9 +78,6 @@ def demand_apart(gaps, values, length, tol, able=None):
         )
 
 
-# Numbers of a run that a checkpoint holds as they are, and the names of its arrays
-KEPT = "t", "rest", "counts", "steps", "taken", "at_once", "judged", "methods", "replaced", "written", "totals"
-START, PREFIX = ("q", "qd", "remembered"), "phase "
 # What a phase raises that can't begin, after others
 FAILURES = {
     InvalidForce: Status.SAMPLING_FAILED,
@@ -90,10 +88,10 @@ FAILURES = {
 @cache
 def _compile_once(slides):
     """Have compiled what events need; slides: whether there is exact friction of joints."""
-    compile_ahead((*contact_rows.KERNELS, *(friction_units.KERNELS if slides else ())))
+    compile_ahead((*contact_rows.KERNELS, *flights.KERNELS, *(friction_units.KERNELS if slides else ())))
 
 
-class _ContactRun(Transitions):
+class _ContactRun(Transitions, Checkpoints):
     """One run in the making.
 
     Parameters
@@ -140,7 +138,6 @@ class _ContactRun(Transitions):
         self.sampling, self.end, self.totals = None, None, None  # of the last phase; counts of those in the archive
         self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
         self.lowered = set()  # times of impacts at which less than the coefficients of restitution acts
-        self.kernels_of = set()  # classes of constraints and forces that phases have had
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
         self.fast = {}  # see `Halting`
         self.struck = {}  # of gaps after impacts: the time, and the largest rate since and just before
@@ -259,7 +256,7 @@ class _ContactRun(Transitions):
             other, resting = self.instead(task, Status.STEP_COLLAPSED), task.q if self.end is None else self.first[1]
             task = task._replace(
                 events=self._events(phase), within=True, report=self._reporting(), times=self._times(),
-                max_steps=self._steps_left(), resume=None if other else self._resume, archive=self.archive,
+                max_steps=self._steps_left(), resume=None if other else self, archive=self.archive,
                 sampling=self._sampling(task.prepared),
             )  # fmt: skip
             self.names, self.packed, self.decided, self.again, self.known = names, phase.packed, None, [], None
@@ -339,10 +336,6 @@ class _ContactRun(Transitions):
 
     def _run_of(self, phase):
         """The `Run` of a phase, and the call of it."""
-        kinds = {type(part) for part in (*phase._added, *phase._forces)}
-        if self.kernels_of.issuperset(kinds):
-            _ = phase.packed  # so that its kernels aren't looked for again
-        self.kernels_of |= kinds
         call = RunCall((self.t, self.span[1]))
         return self.run_of(phase, replace(self.options, events=None), call), call
 
@@ -351,21 +344,8 @@ class _ContactRun(Transitions):
             self.kind = self.phases.kind(self.packed, self._record, self.scene.packed, self.gaps)
         self.phases.add(self.kind, self.t, self.rest, t, self.names, (self.inactive, self.values))
 
-    def _record(self):
-        """What the scene of the present phase is made of, for files."""
-        switched = self.packed.derived.switched is not None
-        return [self.modes.saved(), self.remembered.tolist(), plain((self.inactive, self.values)), switched]
-
-    def _recorded_scene(self, record):
-        """The scene that such a record describes, and its gaps."""
-        inactive, values = record[2]
-        self.change(tuple(inactive), dict(values))
-        self.modes, self.remembered = UnitModes.of(record[0]), np.array(record[1], float)
-        demand(self.remembered.shape == (self.count + self.scene.system.memory.size,), "what is remembered")
-        return self._phase_of_modes(self.every if record[3] else ()), self.gaps
-
-    def _resume(self, t, run, numbers):
-        """After events of these numbers: whether the run of the phase goes on, with other velocities.
+    def resume(self, t, run, numbers):
+        """As of `Watch`, after events of these numbers: whether the run of the phase goes on, with other velocities.
 
         It does where the same gaps are closed as before.
         """
@@ -382,6 +362,30 @@ class _ContactRun(Transitions):
         self.closing.open(self.modes.opened)
         self.again.append(t)
         return True
+
+    def flights(self, group, memory, reader):
+        """As of `Watch`."""
+        bounce = self.gaps.restitution[self.able].any() and not self.gaps.rough[self.able].all()
+        plain = bounce and not self.frictions.count and self.modes.same(UnitModes())
+        if not (plain and flights.Flights.serve(memory, group)):
+            return None
+        return flights.Flights(self, group, memory, reader)
+
+    def land(self, flown):
+        """As of `Watch`."""
+        impacts = flown.impacts()
+        for t, i, _, rate, _, p, energy in impacts:
+            self._end_phase(t)
+            self.t = self.rest = t
+            self.phases.impulses.append((t, self.gaps.names[int(i)], Impulse(p)))
+            self.struck[int(i)] = t, rate / float(self.gaps.restitution[int(i)])
+            self.phases.gain(energy)
+            self.again.append(t)
+        i, *opened = impacts[-1][1:5]
+        self.modes, self.at_once = UnitModes(opened={int(i): (self.t, *opened)}), 0
+        self.q, self.ended, self.qdd, self.qd = flown.parts.struck.copy()
+        self.remembered = flown.parts.noted.copy()
+        self.judged = self.judged[0], self.judged[1] + flown.numbers.impacts
 
     def _scene(self):
         """The scene of the present modes."""
@@ -602,7 +606,8 @@ class _ContactRun(Transitions):
 
     def _outcome(self, status, began):
         parts = [each for each in (*self.base._added, *self.base._forces) if each.name in self.switched]
-        self.phases.name_switched([each for each in parts if not getattr(each, "unilateral", False)])
+        if named := [each for each in parts if not getattr(each, "unilateral", False)]:
+            self.phases.name_switched(named)
         parts, end, archive, events = self.parts, self.end, self.archive, None
         ends = [part.end for part in parts]
         logs = self.options.history is not False and archive is None
@@ -626,52 +631,6 @@ class _ContactRun(Transitions):
             PhasePieces([part.trajectory for part in parts], self.kinds) if self.options.dense_output else None,
             events, began, " and ".join(self.methods), self.phases,
         )  # fmt: skip
-
-    # Checkpoints: what a run goes on with, where its present phase begins
-
-    def saved(self):
-        """Numbers and arrays by name."""
-        phases, arrays = self.phases.saved()
-        numbers = {name: getattr(self, name) for name in KEPT} | {"modes": self.modes.saved(), "phases": phases}
-        numbers |= {"changes": plain((self.inactive, self.values)), "switched": sorted(self.switched)}
-        numbers |= {"fast": plain(self.fast), "struck": plain(self.struck)}
-        starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
-        for where, (_, *parts) in starts.items():
-            arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
-        numbers |= {"first": self.first[0], "sampling": self.sampling and self.sampling.saved()}
-        if self.end is not None:
-            arrays |= {"last": self.end.last, "ended": self.end.remembered}
-            numbers["reached"] = self.end.reached
-        for i, found in enumerate(self.found):
-            columns = zip(*found, strict=True) if found else (np.empty(0), *2 * [np.empty((0, self.q.size))])
-            for name, column in zip(("t", "q", "qd"), columns, strict=True):
-                arrays[f"event {i}.{name}"] = np.concatenate(column) if found else column
-        return {"phases": numbers}, {f"{PREFIX}{name}": array for name, array in arrays.items()}
-
-    def restore(self, numbers, arrays):
-        """As it was when it was saved."""
-        with damaged("the checkpoint"):
-            known, n, arrays = numbers["phases"], self.q.size, _own(arrays)
-            vars(self).update({name: known[name] for name in KEPT})
-            self.phases.restore(known["phases"], arrays, self._recorded_scene)
-            inactive, values = known["changes"]
-            self.change(tuple(inactive), dict(values))
-            self.switched |= set(known["switched"])
-            self.modes, self.fast = UnitModes.of(known["modes"]), dict(known["fast"])
-            self.struck = {i: tuple(pair) for i, pair in known["struck"]}
-            if known["sampling"] is not None:
-                self.sampling = Sampling(prepared(phase_of(self.scene, [])), True)
-                self.sampling.restore(known["sampling"])
-            starts = [[arrays[f"{where}{name}"] for name in START] for where in ("first.", "")]
-            for q, qd, memory in starts:
-                demand(q.shape == qd.shape == (n,) and memory.shape == self.remembered.shape, "the start of a phase")
-            self.known = self.t, *starts[1]
-            self.t, self.q, self.qd, self.remembered = self.first = known["first"], *starts[0]
-            if "reached" in known:
-                demand(arrays["last"].shape == (3, n), "the end of a phase")
-                self.end = RunEnd(known["reached"], arrays["last"], arrays["ended"], self.totals, None, None)
-            for i, found in enumerate(self.found):
-                found.append(tuple(arrays[f"event {i}.{name}"] for name in ("t", "q", "qd")))
 
 
 def pinned(outcome, q, still):
@@ -715,19 +674,8 @@ def run_contacts(scene, options, call, run_of, run_task, instead, archive=None):
     return run.run()
 
 
-def recorded(numbers, arrays):
-    """Numbers and arrays of the `Phases` in a checkpoint."""
-    return numbers["phases"]["phases"], _own(arrays)
-
-
-def _own(arrays):
-    return {name.removeprefix(PREFIX): array for name, array in arrays.items() if name.startswith(PREFIX)}
-
-
 def phases_of(scene, numbers, arrays):
     """The `Phases` of a file, of a run of this scene; raises KeyError, TypeError or ValueError if they are none."""
     run = object.__new__(_ContactRun)
     run._take_scene(scene)
-    phases = Phases(scene.packed, run.gaps)
-    phases.restore(numbers, arrays, run._recorded_scene)
-    return phases
+    return run.restored_phases(numbers, arrays)

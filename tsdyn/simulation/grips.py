@@ -10,7 +10,6 @@ from ..analyses.contact_rows import reaction_workspace
 from ..analyses.tolerances import EVENT_ERROR
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
-from ..elements.tolerances import AHEAD
 from ..jit.kernels import twin
 from ..maths.tolerances import TINY
 from ..model.handles import index_of
@@ -21,8 +20,8 @@ from .tolerances import FASTER, SAME_WAY, SLOW, TURNED
 # A closed contact with friction sticks or slides. Where it sticks, all its rows hold; those of the slip of a point are
 # rows on positions, which hold it where it came to rest. Where it slides, the row of the gap holds, and a force in
 # proportion to its reaction acts (elements/sliding.py), with a direction d near the slip; the next phase takes another
-# one where the slip has turned too far. Both are among what the run remembers: d (3,), ground frame, and for each of
-# the two rows where in b, m, the point of a is.
+# one where the slip has turned too far. Both are among what the run remembers: d (3,), ground frame, of the length of a
+# slip below which friction keeps its direction, m/s, and for each of the two rows where in b, m, the point of a is.
 
 
 def items_of(gaps, modes):
@@ -58,8 +57,8 @@ def gripped(gaps, before, contacts, q, memory):
         way, others = memory[gaps.slots[i] :][:3], gaps.list[i].contact.parts[1:]
         if d is not None:
             grips[i] = None
-            if not (before.slides(i) and np.dot(way, d) > SAME_WAY):
-                way[:] = d
+            if not (before.slides(i) and np.dot(way, d) > SAME_WAY * np.linalg.norm(way)):
+                way[:] = contacts.slow[i] * d
             continue
         way[:] = 0.0
         grips[i] = tuple(map(int, contacts.rows.get(i, ()))) if others else (1, 1)
@@ -67,6 +66,14 @@ def gripped(gaps, before, contacts, q, memory):
             for k, part in enumerate(others, 1):
                 memory[gaps.slots[i] + 3 * k :][:3] = held_point(gaps.packed, part, q)
     return grips
+
+
+def stopping_time(inertia, which, qd, after, qdd):
+    """Time, s, in which slips that have been ended, at qd (n,) and no more `after`, end by accelerations qdd (n,)."""
+    before, left, gained = (x[which] for x in (inertia.slips(qd), inertia.slips(after), inertia.tangents @ qdd))
+    against = -(before * (gained + inertia.biases(qd)[which, 1:])).sum(axis=1)
+    ended = before.any(axis=1) & ~left.any(axis=1) & (against > 0.0)
+    return float(((before * before).sum(axis=1)[ended] / against[ended]).max(initial=0.0))
 
 
 class Reactions:
@@ -134,10 +141,11 @@ class Halting:
 
         c = 1/2 + w h,  w = V / (v + V),  h = u^2 / (u^2 + (TURNED v)^2 + noise^2),  u^2 = v^2 - (d.v)^2
 
-    A slip turns by 60 degrees at v >> V; where it has turned at all when it is as slow as V, it takes its direction
-    there: below AHEAD friction has the direction d, so that it ends with its own. One that hasn't been FASTER V since
-    its phase began has h = 0.49, and turns by 8 degrees at v << V: it begins, or has its direction from there. Where it
-    begins at rest, the value is divided by the time since: the slip may turn at once.
+    Here d is of unit length, and V is SLOW times the slip below which friction has this direction. A slip turns by 60
+    degrees at v >> V; where it has turned at all when it is as slow as V, it takes its direction there, so that it ends
+    with its own. One that hasn't been FASTER V since its phase began has h = 0.49, and turns by 8 degrees at v << V: it
+    begins, or has its direction from there. Where it begins at rest, the value is divided by the time since: the slip
+    may turn at once.
 
     Parameters
     ----------
@@ -165,14 +173,17 @@ class Halting:
 
     def over(self, states):
         """Values (k, slides) of states at k times."""
-        along, speed = self.gaps.slips(states.t, states.levels, self.slides, states.memory[self.ways])
-        for i, fast in zip(self.slides, (speed > FASTER * SLOW).T, strict=True):
+        ways = states.memory[self.ways]
+        slow = np.linalg.norm(ways, axis=1)
+        along, speed = self.gaps.slips(states.t, states.levels, self.slides, ways / slow[:, None])
+        V = SLOW * slow
+        for i, fast in zip(self.slides, (speed > FASTER * V).T, strict=True):
             if fast.any():
                 self.since.setdefault(i, float(states.t[fast.argmax()]))
         late = states.t[:, None] > [self.since.get(i, np.inf) for i in self.slides]
         turned = (speed - along) * (speed + along)
         h = np.where(late, turned / (turned + (TURNED * speed) ** 2 + self.rounding**2 + TINY), 0.49)
-        values = along - (0.5 + h * SLOW / (speed + SLOW)) * speed
+        values = along - (0.5 + h * V / (speed + V)) * speed
         for k, begun, gain in self.begun:
             later = states.t > begun
             values[:, k] = np.where(later, values[:, k] / np.where(later, states.t - begun, 1.0), 0.01 * gain)
@@ -219,6 +230,6 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
     for j, i in enumerate(frictional):
         if modes.slides(i):
             out[:, gaps.rows[i]] = -gaps.sign[i] * N[:, j]
-            d = gaps.across(i, tangents[:, j], memory[:, gaps.slots[i] :][:, :3])  # (k, 2)
-            e = np.array([twin(heading)(*v, 0.0, (*way, 0.0), AHEAD)[:2] for v, way in zip(slip[:, j], d, strict=True)])
-            out[:, rows[j]] = (gaps.kinetic[i] * N[:, j])[:, None] * e
+            d, v = gaps.across(i, tangents[:, j], memory[:, gaps.slots[i] :][:, :3]), slip[:, j]  # (k, 2)
+            e = twin(heading)(v[:, 0], v[:, 1], 0.0, np.column_stack([d, np.zeros(len(d))]).T, 1.0)[:2]
+            out[:, rows[j]] = (gaps.kinetic[i] * N[:, j])[:, None] * np.array(e).T

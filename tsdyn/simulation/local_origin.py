@@ -82,7 +82,7 @@ def _origin(packed, q):
 
 def _points(packed):
     """Return the corners (2, 3) of a box around all ground points of items, and the longest lever on a body."""
-    grounded, longest = [], 0.0
+    grounded, levers = [], [np.zeros(3)]
     pairs = [*zip(packed.constraints, packed.coordinates, strict=True)]
     pairs += [(load.force, load.coordinates) for load in packed.loads]
     for item, coordinates in pairs:
@@ -90,8 +90,8 @@ def _points(packed):
             if marker.code == POINT and isinstance(item.body_of(marker), Ground):
                 grounded.append(s)
             elif marker.code == POINT:
-                longest = max(longest, float(np.abs(s).max()))
-    grounded = np.array(grounded).reshape(-1, 3)
+                levers.append(s)
+    grounded, longest = np.array(grounded).reshape(-1, 3), float(np.abs(levers).max())
     return np.array([grounded.min(axis=0), grounded.max(axis=0)]) if len(grounded) else grounded, longest
 
 

@@ -13,7 +13,8 @@ from ..errors import InconsistentState, InvalidArgument
 from ..formulations.locked_orientations import still
 from ..model.handles import begins_of, handles_of
 from ..model.packed import pack
-from ..rows.constraint_graph import parts_of
+from ..rows.constraint_graph import arms, parts_of
+from ..rows.inertia_rows import levers
 from ..validation import listed
 from .tolerances import KEPT_COORDINATES, LEAST_PHASES
 
@@ -21,8 +22,10 @@ from .tolerances import KEPT_COORDINATES, LEAST_PHASES
 # scene, less those that are switched off, and the rows that its units add in their modes, such as that of a closed gap.
 # So nothing below it knows of contacts, and a scene without contacts loads nothing of this. Numbers of these rows that
 # are taken at a transition, such as the place where a block sticks, are among what the run remembers: nothing is packed
-# for other values, nor for frictions of joints that stick or slide. All phases remember the same: angles of all joints,
-# and what all forces and constraints of the scene remember, whether these are active or not.
+# for other values, nor for frictions of joints that stick or slide. As many contacts between the same bodies, at other
+# points, are the same phase with other numbers: of it they take over the constraint graph and memory. All phases
+# remember the same: angles of all joints, and what all forces and constraints of the scene remember, whether these are
+# active or not.
 
 NAMED = 5  # contacts in a message
 SHARED = "holds", "places", "members", "short_rows", "start_workspaces", "reactions"  # of `Derived`: by such phases
@@ -71,7 +74,8 @@ def phase_of(scene, rows, holds=(), without=None, every=()):
     key = frozenset(map(id, rows)), frozenset(map(id, without)), frozenset(hold.key for hold in packed), bool(every)
     phase = known.get(key)
     if phase is None:
-        if len(known) >= max(LEAST_PHASES, KEPT_COORDINATES // (7 * len(scene._bodies))):
+        most = max(LEAST_PHASES, KEPT_COORDINATES // (7 * len(scene._bodies)))
+        if len({id(each) for each in known.values()}) >= most:
             _let_go(known)
         gone = {id(each) for each in (*contacts_of(scene._added), *without)}
         constraints, forces = ([each for each in rows if isinstance(each, Force) is given] for given in (False, True))
@@ -84,7 +88,32 @@ def phase_of(scene, rows, holds=(), without=None, every=()):
             _start=scene._initial(), _prepared=None, _phases=None, _gaps=None, _spare={}, _waiting={}, _opens=False,
             _pack=partial(_pack_phase, phase, scene, packed, held), _whole=scene,
         )  # fmt: skip
+        if not (packed or forces):
+            first = known.setdefault((key[1], tuple([(type(row), id(row.a), id(row.b)) for row in rows])), phase)
+            if first is not phase and _takes_over(phase.packed, first.packed):
+                phase._base = first
     return _with_rows_held(phase, holds) if every else phase
+
+
+def _takes_over(packed, first):
+    """Whether phases differ in numbers alone, as of corners of the same boxes; then one takes over what has none.
+
+    These are the graph, series and memory. Not where starts have found out more of the rows.
+    """
+    known, own = first.derived, packed.derived
+    if known.redundant is not None or known.turning or len(still(first).bodies) or packed.size != first.size:
+        return False
+    names = [name for name in packed.system._fields if name != "reals"]
+    arrays = [[getattr(each.system, name) for name in names] for each in (packed, first)]
+    if packed.parameters != first.parameters or not all(map(_are_same, *arrays)):
+        return False
+    own.graph, own.graphs = parts_of(first), known.graphs
+    own.start_workspaces, own.reactions = known.start_workspaces, known.reactions
+    return True
+
+
+def _are_same(one, other):
+    return one.shape == other.shape and one.tobytes() == other.tobytes()
 
 
 def _let_go(known):
@@ -125,7 +154,8 @@ def _pack_phase(phase, scene, holds, held):
     """Pack a phase of a scene: it remembers what the scene does, in the same order."""
     whole = scene.packed
     packed = pack(phase, handles_of(whole).where_some_act((*phase._added, *phase._forces)), whole)
-    packed.derived.masks = whole.derived.masks
+    known = whole.derived
+    packed.derived.masks, packed.derived.levers, packed.derived.arms = known.masks, levers(whole), arms(whole)
     if whole.system.memory.size:
         packed = _remembering(packed, whole)
     return _holding(packed, holds, held) if holds or packed.contacts else packed

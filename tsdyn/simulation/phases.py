@@ -123,7 +123,8 @@ class Phases:
     def __init__(self, packed, gaps):
         self.whole, self.gaps, self.list, self.impulses = packed, gaps, [], []
         self.starts, self.of, self.gains, self.changes = [], [], {}, []
-        self.packed, self.modes, self._gaps, self._columns, self._known = [], [], [], [], {}  # of each kind of phase
+        self.packed, self.modes, self._gaps, self._wholes, self._known = [], [], [], [], {}  # of each kind of phase
+        self._columns = {}  # of kinds, when it has been asked for
         self.scenes = []  # of each kind, of phases that were restored
 
     @property
@@ -143,7 +144,7 @@ class Phases:
             self.packed.append(packed)
             self.modes.append(modes())
             self._gaps.append(gaps)
-            self._columns.append(shared_rows(whole, packed))
+            self._wholes.append(whole)
         return kind
 
     def add(self, kind, begin, rest, end, names, changes):
@@ -181,6 +182,8 @@ class Phases:
         """Multipliers (k, m) of all rows of the scene: zero of open contacts; arrays as of `reactions.multipliers`."""
         out = np.zeros((len(numbers), m))
         for kind, mine, some in self._gathered(numbers, arrays):
+            if kind not in self._columns:
+                self._columns[kind] = shared_rows(self._wholes[kind], self.packed[kind])
             shared = rows, columns = self._columns[kind]
             *motion, memory = some
             lam = reactions.multipliers(self.packed[kind], *motion, self._own_memory(kind, memory))

@@ -274,6 +274,7 @@ class Run:
     def _solve_phases(self, call, found, is_stored):
         """The same of a run with phases."""
         from . import contact_run
+        from .checkpoints import recorded
 
         started, scene, options, archive, goes_on = clock(), self.scene, self.options, None, ""
         if is_stored:
@@ -284,7 +285,7 @@ class Run:
             task = contact_run.first_task(scene, options, call, _run_of)
             outcome = self._ended(task, *found, archive)
             with damaged("the checkpoint"):
-                phases = contact_run.phases_of(scene, *contact_run.recorded(*found))
+                phases = contact_run.phases_of(scene, *recorded(*found))
             outcome = outcome._replace(phases=phases)
             return Solution(scene, task, outcome, {"prepare": 0.0, "run": found[0]["seconds"]})
         try:

@@ -457,7 +457,7 @@ class Scene:
         if known is not None and known.is_of_start:
             self.touch()
         elif known is not None:
-            known.family = None
+            known.family = known.arms = None
         self._start = None
 
     @property

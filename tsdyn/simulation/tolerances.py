@@ -77,10 +77,10 @@ MOST_AT_AN_INSTANT = 100
 # Events for each unit, and one more, after which progress is judged: a run that would need CREEPING times as many more
 # is ended. Towers with friction take some 300 for each contact until they rest.
 EVENTS_JUDGED, CREEPING = 1000, 1e3
-# Cosine of the turn of a slip since its phase began, above which the next one keeps its direction; m/s: V, the velocity
-# from which on a slip that slows down may turn less and less: the force is off by 1e-4 of its turn there, as friction
-# has one direction below a hundredth of V.
-SAME_WAY, SLOW = 1.0 - 1e-12, 1e-4
+# Cosine of the turn of a slip since its phase began, above which the next one keeps its direction; velocity V from
+# which on a slip that slows down may turn less and less, over that below which its friction has one direction: the
+# force is off by 1e-4 of its turn at V.
+SAME_WAY, SLOW = 1.0 - 1e-12, 100.0
 # rad: a slip that has turned by more takes its direction anew before it ends; reactions change by as much, of their
 # size. Velocity over V that tells it from one that begins.
 TURNED, FASTER = 1e-7, 4.0

@@ -19,7 +19,7 @@ from ..observables.generalised_forces import force_loads
 from ..observables.state import begin_memory
 from ..runs.tolerances import START_ZERO
 from ..validation import listed
-from .grips import gripped
+from .grips import gripped, stopping_time
 from .impacts import along_normals, held, impact_of, impulse_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import Impulse, UnitModes
@@ -134,6 +134,8 @@ class Transitions:
             self.modes, struck = UnitModes(), self.qd
             if self.gaps.rough[resting].any():
                 self.qd, contacts = at_turn(inertia, resting, self.qd, leaving, turned, opening)
+                if self.qd is not struck and np.array_equal(struck, self.ended):
+                    self.rest = self.t + stopping_time(inertia, resting, struck, self.qd, self.qdd)
                 if self.qd is not struck and opening:
                     rates = inertia.rates(self.qd)
             else:
@@ -366,18 +368,17 @@ class Transitions:
         gaps, e = self.gaps, float(self.gaps.restitution[i])
         if self.frictions.count or gaps.rough[i] or i in gaps.following or before.closed or before.idle or e == 0.0:
             return False
-        found = gaps.workspace.bounce(self.t, self.q, self.qd, slots, i, float(gaps.sign[i]), e)
-        (rate, size, G, p, acceleration, length), qd = found
-        if not (G > 0.0 and rate < -NEGLIGIBLE * size):
+        given = i, float(gaps.sign[i]), e, FLIGHT * self.length
+        found = gaps.workspace.bounce(self.t, self.q, self.qd, slots, *given)
+        if found is None:
             return False
-        if acceleration < 0.0 and (e * rate) ** 2 < -2.0 * acceleration * FLIGHT * self.length:
+        impact, after = found
+        if i in self.struck and self._is_pushed(i, impact.rate / e, e):
             return False
-        if i in self.struck and self._is_pushed(i, -rate, e):
-            return False
-        self.struck[i] = self.t, -rate
-        rounding = EPS * max(self.length, ROUNDED * length)
-        self.phases.impulses.append((self.t, gaps.names[i], Impulse(p)))
-        self.qd, self.modes = qd, UnitModes(opened={i: self._opened(i, -e * rate, 0.25 * rounding)})
+        self.struck[i], self.qd = (self.t, impact.rate / e), after
+        rounding = EPS * max(self.length, ROUNDED * impact.length)
+        self.phases.impulses.append((self.t, gaps.names[i], Impulse(impact.p)))
+        self.modes = UnitModes(opened={i: self._opened(i, impact.rate, 0.25 * rounding)})
         return True
 
     def _is_pushed(self, i, rate, e):

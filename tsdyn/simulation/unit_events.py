@@ -28,15 +28,15 @@ class Closing:
 
     def __init__(self, gaps, opened, lifted):
         self.gaps, self.lifted, count = gaps, lifted, gaps.count
-        self.counts = GapCounts(rows=gaps.workspace.m)
+        self.counts = GapCounts(rows=gaps.workspace.m, n=gaps.workspace.n)
         self.which, self.start = np.zeros(count, int), np.zeros((4, count))
-        self._own, self._keep = resident(OpenGaps(self.counts, gaps.sign, self.which, self.start))
+        self._own, self._keep = resident(OpenGaps(self.counts, gaps.sign, self.which, self.start, gaps.stops))
         self.open(opened)
 
     @property
     def kernel(self):
-        """The `GroupSearch.kernel` of the gaps; None where Python evaluates some of them."""
-        if self.gaps.following or self.gaps.in_python or self.lifted:
+        """The `GroupSearch.kernel` of the gaps; None where Python evaluates some: of ratchets, and those lifted."""
+        if self.gaps.following or self.lifted:
             return None
         return find_open_gaps, self.gaps.workspace.rows_address, self._own, self.counts.rows
 

@@ -327,7 +327,7 @@ class SeriesMemory(Memory):
         The highest order that there is room for.
     """
 
-    advance_kernel = staticmethod(advance_series)
+    driver = advance_series
 
     def __init__(self, prepared, highest):
         self.series, packed, n = prepared.series, prepared.packed, prepared.n
@@ -344,6 +344,11 @@ class SeriesMemory(Memory):
         self.reals = packed.system.reals
         self._laid_out.append(words(expansion.order))
         self.nbytes = 8 * (expansion.bodies.size + expansion.constraints.size + tangent.rows.S.size + run.block.size)
+
+    def enter(self, engine, task, may_pass):
+        """As of `Memory`; the numbers of a phase may be others."""
+        self.reals = task.prepared.packed.system.reals
+        super().enter(engine, task, may_pass)
 
     def advance(self, log, most):
         """As of `Memory`."""
@@ -408,10 +413,10 @@ def _reading(packed, series, highest):
     def begin(context):
         set_selection(context.tangent, off)
 
-    system, graph = packed.system, series.graph
+    system, graph, idle = packed.system, series.graph, series.idle.setdefault(highest, [])
     if packed.derived.switched is None:
-        return TrajectoryReading(read_series, workspace, system, 0, 16)
-    off, idle = np.flatnonzero(np.isin(graph.row, redundant_rows(packed))), series.idle.setdefault(highest, [])
+        return TrajectoryReading(read_series, workspace, system, 0, 16, idle=idle)
+    off = np.flatnonzero(np.isin(graph.row, redundant_rows(packed)))
     return TrajectoryReading(read_series, workspace, system, 0, 16, begin=begin, idle=idle)
 
 

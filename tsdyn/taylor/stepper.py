@@ -5,7 +5,7 @@ import math
 from ..elements.loops.constraint_rows import OMEGA, POSE, RD, move_bodies, place_bodies
 from ..errors import Status
 from ..formulations.charts import AT_START, BY_SERIES, extent
-from ..jit.kernels import entry, kernel, long_kernel
+from ..jit.kernels import callback, kernel, long_kernel
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.tolerances import ROUNDING_AT_MOST, TINY
 from ..model.equations import remember, set_time
@@ -13,7 +13,7 @@ from ..model.joint_turns import count_turns
 from ..motions.tolerances import SAMPLES
 from ..rows.interface import is_near_singular, singularity_indicator
 from ..runs.dense_output import head_block, is_wanted_before, record, record_end, store_block, store_now
-from ..runs.run_log import close_chart, is_full, no_log, note_accepted, note_try, open_chart
+from ..runs.run_log import close_chart, is_full, load_log, note_accepted, note_try, open_chart
 from ..runs.step_control import gets_on, stretch
 from ..runs.stepper import amend, fixed_end, is_sampled, next_stop, take_pieces
 from ..runs.tolerances import AT_LONGEST, FROM_ZERO, HALVED, MOST_TURN, SHORTEST, TRIES
@@ -462,10 +462,10 @@ def _move_on(context, c, r, log, t1):
     return _stand(context, c, r, log, t1)
 
 
-@entry("pp", no_log(), "i")
+@callback("pppi")
 def advance_series(context, run, log, most):
     """Make up to `most` steps, as `stepper.advance` does; context is the address of a `SeriesContext`. Status."""
-    return advance_by_series(context, load_series(context), load_run(run), log, most)
+    return advance_by_series(context, load_series(context), load_run(run), load_log(log), most)
 
 
 @kernel

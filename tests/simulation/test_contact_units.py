@@ -1,0 +1,114 @@
+"""Contacts in other units of length, mass and time: the same phases, instants, impulses and places."""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import tsdyn as ts
+
+C, F = ts.constraints, ts.forces
+CORNERS = (-1, -1), (-1, 1), (1, -1), (1, 1)
+
+
+class Units(NamedTuple):
+    """Units in terms of SI."""
+
+    length: float = 1.0
+    mass: float = 1.0
+    time: float = 1.0
+
+    def scene(self):
+        return ts.Scene(gravity=(0, 0, -9.81 * self.length / self.time**2))
+
+    def floor(self, body, point, base=None, at=(0, 0, 0), **law):
+        base = body.scene.ground if base is None else base
+        at = {"point_a": point, "point_b": at, "normal_b": (0, 0, 1), "unilateral": True}
+        body.scene.add(C.PlaneContact(body, base, **at, **law))
+
+
+def stack(u):
+    """Two tilted boxes fall and come to rest on each other."""
+    scene, size = u.scene(), u.length * np.array((2.4, 2.0, 1.0))
+    below, top = scene.ground, 0.0
+    for i in range(2):
+        half, place = 0.01 * (1 + i), (0, 0, (0.56 + 1.12 * i) * u.length)
+        box = scene.add_body(**ts.shapes.box(size, mass=(1 + i) * u.mass), position=place)
+        box.orientation = np.cos(half), np.sin(half), 0, 0
+        for corner in CORNERS:
+            u.floor(box, size / 2 * (*corner, -1), below, (0, 0, top), kinetic=0.3 + 0.2 * i)
+        below, top = box, 0.5 * u.length
+    return scene, 0.8
+
+
+def dominoes(u):
+    """The first of two is pushed over, and pushes the other one."""
+    scene, size, first = u.scene(), u.length * np.array((0.4, 1.0, 2.0)), None
+    for i in range(2):
+        w = np.array((0, 1.2 * (i == 0), 0)) / u.time
+        place = np.array((i, 0, 1)) * u.length
+        box = scene.add_body(**ts.shapes.box(size, mass=u.mass), position=place, angular_velocity=w)
+        box.velocity = np.cross(w, size / 2 * (-1, 0, 1))
+        scene.add(C.Planar.at(scene.ground, box, point=place, axis=(0, 1, 0)))
+        for x, z in ((-1, -1), (1, -1), (1, 1)):
+            u.floor(box, size / 2 * (x, 0, z), kinetic=0.2)
+        if first is not None:
+            at = {"point_a": size / 2 * (1, 0, 1), "point_b": size / 2 * (-1, 0, 0), "normal_b": (-1, 0, 0)}
+            scene.add(C.PlaneContact(first, box, **at, unilateral=True, kinetic=0.1))
+        first = box
+    return scene, 1.3
+
+
+def rope(u):
+    """A body thrown at the end of a rope: impacts accumulate, then it swings."""
+    scene, inertia = u.scene(), np.array((0.1, 0.2, 0.3)) * u.mass * u.length**2
+    place, velocity = np.array((0.4, 0, -0.9)) * u.length, np.array((0.5, 1, 2)) * u.length / u.time
+    bob = scene.add_body(u.mass, inertia, place, velocity=velocity)
+    ends = [(scene.ground, (0, 0, 0)), (bob, np.array((0.1, 0.05, 0)) * u.length)]
+    scene.add(C.Rope(ends, length=1.1 * u.length, restitution=0.3))
+    return scene, 3.0
+
+
+def stick_slip(u):
+    """A box that slides and turns, drawn by a spring, comes to rest."""
+    scene, size = u.scene(), u.length * np.array((2, 1.2, 0.8))
+    box = scene.add_body(**ts.shapes.box(size, mass=u.mass), position=(0, 0, 0.4 * u.length))
+    box.velocity, box.angular_velocity = np.array((0.3, 0.4, 0)) * u.length / u.time, (0, 0, 1 / u.time)
+    for corner in CORNERS:
+        u.floor(box, size / 2 * (*corner, -1), kinetic=0.3, static=0.35)
+    end = {"point_b": np.array((3, 0.5, 0.4)) * u.length, "free_length": u.length}
+    scene.add(F.Spring(box, scene.ground, **end, stiffness=4 * u.mass / u.time**2))
+    return scene, 2.0
+
+
+@cache
+def motion(make, u):
+    """Phases, and times, impulses and places in these units, of a run whose tolerances have the units, too."""
+    scene, end = make(u)
+    method = ts.integrators.Taylor(rtol=1e-14, atol=1e-14 * min(u.length, u.length / u.time, 1.0))
+    solution = ts.simulate(scene, (0, end * u.time), integrator=method).raise_if_failed()
+    found = solution.phases, solution.impulses
+    times = [np.array([each[0] for each in some]) / u.time for some in found]
+    p = np.array([float(each[2]) for each in solution.impulses]) * u.time / (u.mass * u.length)
+    places = [solution.position(body)[-1] / u.length for body in scene.bodies]
+    return [names for *_, names in found[0]], [name for _, name, _ in found[1]], *times, p, np.array(places)
+
+
+OTHERS = [
+    Units(1e-6, 1e9, 1e3),
+    Units(1e6, 1e-6, 1e-3),
+    *(pytest.param(Units(**{name: 1e6**power}), marks=pytest.mark.slow) for name in Units._fields for power in (1, -1)),
+]
+
+
+@pytest.mark.parametrize("make", [stack, dominoes, rope, stick_slip], ids=lambda make: make.__name__)
+@pytest.mark.parametrize("units", OTHERS, ids=lambda units: "{:g} m, {:g} kg, {:g} s".format(*units))
+def test_other_units_change_nothing(make, units):
+    """To rounding: of the last times of an accumulation, 1e-16 over the flights; of what redundant feet share."""
+    phases, hits, starts, instants, p, places = motion(make, Units())
+    assert (phases, hits) == motion(make, units)[:2]
+    assert len(phases) > 1
+    others = motion(make, units)[2:]
+    for own, other, tol in zip((starts, instants, p, places), others, (1e-9, 1e-9, 1e-9, 1e-12), strict=True):
+        np.testing.assert_allclose(other, own, rtol=0.0, atol=tol)

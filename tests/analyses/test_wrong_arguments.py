@@ -44,6 +44,8 @@ CASES = {
     ),
     "a coordinate it lacks": (driven({"pin 0.displacement": SINE}), "there are 'pin 0.angle', 'link 0'"),
     "one motion of a body": (driven({"link 0": SINE}), r"must be three motions.*give 'link 0\.x'"),
+    "a number for a body": (driven({"link 0": 0.5}), r"must be three motions.*got 0\.5.*give 'link 0\.x'"),
+    "a function for a body": (driven({"link 0": lambda t: (t, 0.0, 0.0)}), r"must be three motions.*spline"),
     "a motion twice": (driven({"pin 0": SINE, "pin 0.angle": SINE}), "the motion of pin 0.angle is given twice"),
 }
 

@@ -228,7 +228,7 @@ def test_ropes_that_cant_be():
         "a point mass has one point": [(heavy, (1, 0, 0)), (light, ORIGIN)],
         "all points are on": [(ground, ORIGIN), (ground, (1, 0, 0))],
         "not a body": [(heavy, ORIGIN), (3, ORIGIN)],
-        "no body is named 'hevy'": [("hevy", ORIGIN), (light, ORIGIN)],
+        "Rope: no body is named 'hevy'": [("hevy", ORIGIN), (light, ORIGIN)],
         "must be three finite numbers": [(ground, (1, 2)), (light, ORIGIN)],
         "give points=": [heavy, light],
     }

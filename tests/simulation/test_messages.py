@@ -316,8 +316,8 @@ def test_bodies_by_name_beside_a_handle():
     assert C.Revolute.at("crank", rod, point=(0, 0, 0), axis=(0, 0, 1)).a is crank
     assert C.Spherical(a="crank", b=scene.ground).a is crank
     assert F.Spring(crank, "ground", point_b=(0, 0, 1), stiffness=1.0).b is scene.ground
-    with pytest.raises(ts.InvalidConstraint, match="no body is named 'rood'; did you mean 'rod'"):
-        C.Spherical(crank, "rood")
+    with pytest.raises(ts.InvalidConstraint, match="knee: no body is named 'rood'; did you mean 'rod'"):
+        C.Spherical(crank, "rood", name="knee")
     with pytest.raises(ts.InvalidConstraint, match=r"'crank' is not a body; .* beside the handle of the other"):
         C.Spherical("crank", "rod")
 

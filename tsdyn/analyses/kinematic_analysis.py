@@ -36,12 +36,13 @@ from ..model.equations import remember, set_time
 from ..model.handles import handles_of
 from ..model.joint_turns import count_turns
 from ..model.packed import System
-from ..motions.elementary import Polynomial, Smooth
+from ..motions.elementary import Polynomial
 from ..motions.prescribed import Motion
+from ..motions.tables import is_data
 from ..observables.diagnostics import constraint_rows
 from ..rows.constraint_graph import BIAS, DRIFT, REDUCED, VALUES, ConstraintGraph, graph_of, no_graph, redundant_rows
 from ..rows.interface import TangentWorkspace, allocate_tangent, constrain, evaluate_bias, note_indicator
-from ..validation import listed, nearest, vector3
+from ..validation import listed, nearest, shown, vector3
 from ..workspaces import Work, parts, plain_context
 from . import tolerances as limits
 from .coordinates import AXES, Variations, chosen, item_of, named_coordinates
@@ -533,10 +534,10 @@ def _path(value, name):
     what = f"motion of {name} (x, y, z)"
     if isinstance(value, (tuple, list)) and len(value) == 3:
         return tuple(Motion.always(each, what) for each in value)
-    if isinstance(value, Smooth):
+    if not is_data(value):
         raise InvalidArgument(
             f"{WHO}: the {what} must be three motions, such as (ts.motions.Sine(0.1, 2.0), 0.0, 0.0), a ts.Table or a "
-            f"function of time with three values, got one, {value!r}. For one component give {name + '.x'!r}."
+            f"spline of SciPy's with three values, got {shown(value)}. For one component give {name + '.x'!r}."
         )
     return tuple(Motion.always(each, what) for each in Motion.components(value, 3, what))
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 # Lookup of bodies, constraints and forces by name or handle.
 
 
-def named(things, name, what, error=InvalidArgument):
-    """The one of some bodies, constraints or forces that has a name; `what` they are, in messages.
+def named(things, name, what, error=InvalidArgument, of=""):
+    """The one of some bodies, constraints or forces that has a name; `what` they are, `of` which item, in messages.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def named(things, name, what, error=InvalidArgument):
         if near
         else f"there are {listed([*map(repr, known)]) or 'none'}."
     )
-    raise error(f"no {what} is named {name!r}; {there}")
+    raise error(f"{f'{of}: ' * bool(of)}no {what} is named {name!r}; {there}")
 
 
 def new_name(value, thing, others, error):

@@ -284,19 +284,20 @@ def by_name(function: Function) -> Function:
         lacks_b = len(arguments) < 2 and "b" not in keywords and any(marker.body == "b" for marker in self.markers)
         if type(self).__init__.plain is Attachment.__init__ and (len(arguments) > 2 or lacks_b):
             raise TypeError("no call of this class")  # answered with the arguments that there are, see calls.py
-        arguments, keywords = _meant(self.error, arguments, keywords)
+        arguments, keywords = _meant(type(self), arguments, keywords)
         return function(self, *arguments, **keywords)
 
     return call
 
 
-def _meant(error, arguments, keywords):
-    """The arguments of a call, with the bodies a and b that are given by name."""
+def _meant(cls, arguments, keywords):
+    """The arguments of a call of a class, with the bodies a and b that are given by name."""
     bodies = [*arguments[:2], keywords.get("a"), keywords.get("b")]
     if any(isinstance(body, str) for body in bodies):
         for scene in (body.scene for body in bodies if isinstance(body, (PointMass, Ground))):
             known = (scene.ground, *scene.bodies)
-            here = [named(known, body, "body", error) if isinstance(body, str) else body for body in bodies]
+            of = keywords.get("name") or cls.__name__
+            here = [named(known, body, "body", cls.error, of) if isinstance(body, str) else body for body in bodies]
             given = len(arguments[:2])
             found = {key: body for key, body in zip("ab", here[-2:], strict=True) if key in keywords}
             return (*here[:given], *arguments[2:]), {**keywords, **found}
@@ -322,7 +323,7 @@ def rope_points(
     if len(scenes) > 1:
         raise error(f"{what}: its bodies belong to different scenes.")
     known = [scenes[0].ground, *scenes[0].bodies] if scenes else []
-    bodies = [named(known, body, "body", error) if known and isinstance(body, str) else body for body in bodies]
+    bodies = [named(known, body, "body", error, what) if known and isinstance(body, str) else body for body in bodies]
     wrong = [body for body in bodies if not isinstance(body, (PointMass, Ground))]
     if wrong:
         raise error(f"{what}: {wrong[0]!r} is not a body; {how}.")
@@ -454,7 +455,7 @@ class Attachment:
             Those of the class, its points (m) and directions in the ground frame: `point_a=` is carried into the frame
             of a, `point=` into those of both bodies, and so with every other pair. All else is passed on.
         """
-        (a, b), _ = _meant(cls.error, (a, b), {})
+        (a, b), _ = _meant(cls, (a, b), {})
         given = {}
         for name, value in arguments.items():
             common = [marker for marker in cls.markers if marker.argument == f"{name}_{marker.body}"]

@@ -1,5 +1,6 @@
 """For every test: a seeded random generator, hypothesis without clocks or a data base, kernels compiled ahead."""
 
+import gc
 import os
 import zlib
 from fnmatch import fnmatchcase
@@ -29,6 +30,11 @@ def pytest_sessionstart(session):
     whole = config.args_source is config.ArgsSource.TESTPATHS  # not some files alone
     if whole and not config.option.collectonly and not hasattr(config, "workerinput"):
         compile_ahead(dict.fromkeys(shared_kernels()))
+
+
+def pytest_collection_finish(session):
+    """Leave what is imported and collected, a million objects, out of all further garbage collections."""
+    gc.freeze()
 
 
 @pytest.hookimpl(tryfirst=True)

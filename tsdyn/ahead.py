@@ -7,7 +7,6 @@ cache on disk.
 
 import contextlib
 import functools
-import gc
 import json
 import multiprocessing
 import os
@@ -360,7 +359,6 @@ def _loops():
 def work():
     """Compile what is asked for."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
-    gc.set_threshold(100_000, 20, 20)
     answers, sys.stdout = sys.stdout, sys.stderr
     for line in sys.stdin:
         problem = ""

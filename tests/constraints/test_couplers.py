@@ -232,6 +232,7 @@ def test_a_product_of_two_angles_against_lagrange(options):
     assert np.ptp(solution.energy) < 1e-6 * loose(options) ** 0.5
 
 
+@pytest.mark.slow
 def test_linearisation_of_a_product():
     """At p = q = 0 of p^2 + p q + q^2: K = m g [[2, 1], [1, 2]]; the product is off the diagonal."""
     scene, _ = crane(lambda p, q: p**2 + p * q + q**2)
@@ -240,6 +241,7 @@ def test_linearisation_of_a_product():
     np.testing.assert_allclose(found.K, 2.0 * 9.81 * np.array([[2.0, 1.0], [1.0, 2.0]]), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_function_of_angles_and_travels_in_a_chain():
     """Each joint of a chain of five, of both kinds, is in a product with the others; a run goes on to the bit."""
     scene, last, joints = ts.Scene(), None, []
@@ -269,6 +271,7 @@ def test_a_function_of_angles_and_travels_in_a_chain():
     assert (again.q == ts.simulate(crane(lift)[0], (0.0, 1.0)).q).all()
 
 
+@pytest.mark.slow_for("dd", "ada")
 @pytest.mark.parametrize("kinds", ["aa", "da", "dd", "ada"])
 def test_kernels_and_series_of_functions_of_several(kinds):
     def make(a, b):

@@ -235,14 +235,17 @@ def test_a_run_goes_on_to_the_bit(tmp_path, monkeypatch):
             np.testing.assert_array_equal(getattr(resumed, name), getattr(whole, name))
 
 
-def test_cases_of_an_ensemble_are_single_runs():
+@pytest.mark.slow_for("lanes")
+@pytest.mark.parametrize(
+    ("method", "lanes"), [("taylor", None), ("taylor", 4), ("dop853", None)], ids=["taylor", "lanes", "dop853"]
+)
+def test_cases_of_an_ensemble_are_single_runs(method, lanes):
     masses = np.linspace(1.0, 4.0, 9)
-    for method, lanes in (("taylor", None), ("taylor", 4), ("dop853", None)):
-        found = ts.ensemble(sleigh(), {"sleigh.mass": masses}, (0.0, 2.0), integrator=method, lanes=lanes)
-        for i in (0, 8):
-            alone = ts.simulate(sleigh().with_parameters({"sleigh.mass": masses[i]}), (0.0, 2.0), integrator=method)
-            np.testing.assert_allclose(found.q[i], alone.q[-1], rtol=0, atol=NEAR if lanes else 0.0)
-            assert np.abs(found.case(i).constraint_error.velocity).max() < HELD
+    found = ts.ensemble(sleigh(), {"sleigh.mass": masses}, (0.0, 2.0), integrator=method, lanes=lanes)
+    for i in (0, 8):
+        alone = ts.simulate(sleigh().with_parameters({"sleigh.mass": masses[i]}), (0.0, 2.0), integrator=method)
+        np.testing.assert_allclose(found.q[i], alone.q[-1], rtol=0, atol=NEAR if lanes else 0.0)
+        assert np.abs(found.case(i).constraint_error.velocity).max() < HELD
 
 
 # Redundant rows, and starts.

@@ -134,6 +134,7 @@ def test_the_default_method_and_what_is_between_its_steps():
     np.testing.assert_allclose(solution.energy - solution.work, solution.energy[0], atol=NEAR)
 
 
+@pytest.mark.slow
 def test_a_plug_in_with_series():
     ts.testing.check_force(SmoothBall, states=1)
     scene = ts.Scene()

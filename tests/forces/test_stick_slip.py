@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import tsdyn as ts
 from tests.helpers.rough_joints import four_bar
 from tests.helpers.tolerances import CLOSE, FINE, HELD, TIGHT
+from tsdyn.simulation.unit_events import Slowing
 
 C, F, M = ts.constraints, ts.forces, ts.motions
 G = 9.81
@@ -88,6 +89,17 @@ def test_a_block_that_stops_and_is_pushed_below_the_limit_rests(given):
     assert (solution.q[rests] == solution.q[-1]).all()
     force = solution.reaction("friction", on=block)[0][rests, 0]
     np.testing.assert_allclose(force, -0.9 * 0.4 * 2.0 * G * np.sin(w * solution.t[rests]), atol=HELD)
+
+
+def test_a_straight_slide_in_a_plane_ends_after_a_few_evaluations(monkeypatch):
+    """Up a slope the block stops at v / (g (sin + mu cos)): what its event watches is as smooth as its velocity."""
+    mu, v, asked, over = 0.3, 1.5, [], Slowing.over
+    monkeypatch.setattr(Slowing, "over", lambda event, states: asked.append(states) or over(event, states))
+    solution = ts.simulate(on_a_plane((v * np.cos(SLOPE), 0, v * np.sin(SLOPE)), mu, SLOPE), (0, 1))
+    stop = v / (G * (np.sin(SLOPE) + mu * np.cos(SLOPE)))
+    assert abs(solution.phases[1][0] - stop) < HELD
+    assert abs(np.linalg.norm(solution.state.position("block")) - 0.5 * v * stop) < HELD
+    assert len(asked) < 12
 
 
 def test_a_slide_that_curves_to_its_end_in_the_plane():

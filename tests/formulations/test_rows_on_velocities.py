@@ -50,7 +50,7 @@ def by_series(scene, **options):
     return ts.simulate(scene, (0, SPAN), integrator=I.Taylor(tol=1e-15), **options).raise_if_failed()
 
 
-@pytest.mark.slow_but("*sleigh-dop853*", "*belt-nystrom4*", "*table-dop*null*", "*hinges-dop*null*", "*skate-radau")
+@pytest.mark.slow_but("*sleigh-dop853*", "*table-dop*null*", "*hinges-dop*null*", "*skate-radau")
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 @pytest.mark.parametrize("name", SCENES)
 def test_methods_and_forms_agree_with_series(name, way):

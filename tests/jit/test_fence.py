@@ -1,5 +1,6 @@
 """Numba's private parts: each is as it was seen; where one is gone or fails, Numba as it comes gives the same bits."""
 
+import gc
 import inspect
 import json
 import os
@@ -13,6 +14,7 @@ from numba.extending import intrinsic
 import tsdyn as ts
 from tests.helpers.processes import REPORT, ROOT, SMALL, TINY, command, edit, run
 from tsdyn.jit import backend, cache, compilers, stock, target
+from tsdyn.jit.kernels import entry
 from tsdyn.jit.resident import stack, zeros
 
 VERSIONS = f"Numba {numba.__version__}; it was seen in {' to '.join(backend.SEEN)}"
@@ -284,3 +286,19 @@ def information(environment):
     out, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
     return json.loads(out)
+
+
+@pytest.mark.skipif(compilers.current() is stock, reason="the cache is Numba's own")
+def test_no_garbage_is_collected_while_a_kernel_is_compiled(monkeypatch):
+    enabled, save = [], backend.KernelCache.save_overload
+    monkeypatch.setattr(backend.KernelCache, "save_overload", lambda *a: enabled.append(gc.isenabled()) or save(*a))
+    monkeypatch.setattr(cache, "load", lambda *a: None)  # compiled whether or not it is stored
+
+    @entry
+    def thrice(x):
+        return 3.0 * x
+
+    assert thrice(1.5) == 4.5
+    assert enabled
+    assert not any(enabled)  # of the self-test, too
+    assert gc.isenabled()

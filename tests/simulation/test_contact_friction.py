@@ -296,46 +296,6 @@ def test_a_pinned_rod_jams_where_it_hits_the_floor_too_steeply(kinetic, law):
     assert ts.simulate(scene, (0, 0.1), law=law).success
 
 
-def dominoes(planar=False, without=None):
-    """Two, the first is pushed; without one of their feet."""
-    scene, half, first = ts.Scene(gravity=(0, 0, -G)), np.array((0.05, 0.2, 0.4)), None
-    for i in range(2):
-        w, place = np.array((0, 1.5 * (i == 0), 0)), np.array((0.3 * i, 0, 0.4))
-        box = scene.add_body(**ts.shapes.box(2 * half, mass=1.0), position=place, angular_velocity=w)
-        box.velocity = np.cross(w, half * (-1, 0, 1))
-        if planar:
-            scene.add(C.Planar.at(scene.ground, box, point=place, axis=(0, 1, 0)))
-        for x, y, z in ((x, y, z) for x, z in ((-1, -1), (1, -1), (1, 1)) for y in (-1, 1)):
-            law = {"point_a": half * (x, y, z), "kinetic": 0.6, "name": f"foot {x} {y} {z} of {i}"}
-            if law["name"] != without:
-                scene.add(C.PlaneContact(box, scene.ground, **FLOOR, **law))
-        for y in (-1, 1) if i else ():
-            at = {"point_a": half * (1, y, 1), "point_b": half * (-1, 0, 0), "normal_b": (-1, 0, 0)}
-            scene.add(C.PlaneContact(first, box, **at, unilateral=True, name=f"push {y}"))
-        first = box
-    return scene
-
-
-def test_dominoes_that_wedge_have_several_motions():
-    """With their feet at the bound of friction both sides may carry alike, or one foot rise: the run says so."""
-    solution = ts.simulate(dominoes(), (0, 1.3))
-    assert solution.status == ts.Status.CONTACT_FAILED
-    assert "or several (Painleve's paradox)" in solution.message
-    begin, state = solution.reached, solution.state
-    pushing = [f"foot 1 {y} -1 of {i}" for i in range(2) for y in (-1, 1)] + ["push -1", "push 1"]
-    alike = {name: np.linalg.norm(solution.reaction(name)[0][-1]) for name in pushing}
-    assert min(alike.values()) > 0.1
-    for y in (-1, 1):
-        rises = f"foot 1 {y} -1 of 1"
-        other = ts.simulate(dominoes(without=rises), (begin, begin + 1e-3), state=ts.State(begin, state.q, state.qd))
-        place = other.position(other.scene.bodies[1], point=(0.05, 0.2 * y, -0.4))[:, 2]
-        assert (place[1:] > place[0]).all()
-        pushes = {name: np.linalg.norm(other.reaction(name)[0], axis=1).min() for name in pushing if name != rises}
-        assert min(pushes.values()) > 0.1
-    # Within a plane there is one motion
-    assert ts.simulate(dominoes(planar=True), (0, 1.3)).success
-
-
 @pytest.mark.parametrize("seed", range(12))
 def test_random_impacts_keep_the_laws(seed):
     """Of a box with five contacts: no approach, impulses that push, no energy gained, by both laws."""

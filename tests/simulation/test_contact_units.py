@@ -82,6 +82,15 @@ def stick_slip(u):
     return scene, 2.0
 
 
+def joint(u):
+    """A particle in a plane that leans: its slip turns down the slope, and ends."""
+    scene = ts.Scene(gravity=np.array((np.sin(0.3), 0, -np.cos(0.3))) * 9.81 * u.length / u.time**2)
+    block = scene.add_point_mass(u.mass, (2 * u.length, 0, 0), velocity=(0, u.length / u.time, 0))
+    plane = scene.add(C.PlaneContact(block, scene.ground, point_b=(u.length, 0, 0), normal_b=(0, 0, 1)))
+    scene.add(F.ContactFriction(plane, kinetic=0.35))
+    return scene, 4.0
+
+
 @cache
 def motion(make, u):
     """Phases, and times, impulses and places in these units, of a run whose tolerances have the units, too."""
@@ -102,13 +111,17 @@ OTHERS = [
 ]
 
 
-@pytest.mark.parametrize("make", [stack, dominoes, rope, stick_slip], ids=lambda make: make.__name__)
+@pytest.mark.parametrize("make", [stack, dominoes, rope, stick_slip, joint], ids=lambda make: make.__name__)
 @pytest.mark.parametrize("units", OTHERS, ids=lambda units: "{:g} m, {:g} kg, {:g} s".format(*units))
 def test_other_units_change_nothing(make, units):
-    """To rounding: of the last times of an accumulation, 1e-16 over the flights; of what redundant feet share."""
+    """To rounding: of the last times of an accumulation, 1e-16 over the flights; of what redundant feet share.
+
+    Slip that turns to its end keeps its direction below 3e-7 of the velocities: it ends right to some share of that.
+    """
     phases, hits, starts, instants, p, places = motion(make, Units())
     assert (phases, hits) == motion(make, units)[:2]
     assert len(phases) > 1
     others = motion(make, units)[2:]
-    for own, other, tol in zip((starts, instants, p, places), others, (1e-9, 1e-9, 1e-9, 1e-12), strict=True):
+    tols = 1e-7, 1e-9, 1e-9, 1e-12
+    for own, other, tol in zip((starts, instants, p, places), others, tols, strict=True):
         np.testing.assert_allclose(other, own, rtol=0.0, atol=tol)

@@ -1,12 +1,14 @@
 """Many contacts and many events: stacks, chains, long rows of impacts; outputs across impacts of one run."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 import tsdyn as ts
 from tests.helpers.tolerances import EPS
 from tsdyn.rows import constraint_graph
-from tsdyn.simulation import phase_scenes
+from tsdyn.simulation import phase_scenes, transitions
 
 C = ts.constraints
 G = 9.81
@@ -145,6 +147,53 @@ def test_all_corners_of_boxes_leave_a_platform_at_one_instant(count):
         flight = end - leave
         height += A * w * np.cos(w * leave) * flight - 0.5 * G * flight**2
         assert abs(solution.state.position(box)[2] - height) < 1e-10
+
+
+@pytest.mark.parametrize("e", [0.01, 0.03, 0.06])
+def test_impacts_of_three_balls_that_collapse_end_in_one_velocity(e):
+    """With restitution below 7 - 4 sqrt(3) impacts accumulate until all go on together, with the momentum of one."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    balls = [scene.add_point_mass(1.0, position=(x, 0, 0), velocity=(float(x == 0), 0, 0)) for x in (0.0, 0.3, 0.5)]
+    for a, b in pairwise(balls):
+        scene.add(C.SphereContact(a, b, radius_a=0.05, radius_b=0.05, restitution=e))
+    solution = ts.simulate(scene, (0, 2.0)).raise_if_failed()
+    np.testing.assert_allclose(solution.qd[-1][::3], 1 / 3, atol=4 * EPS)
+    assert 4 < len({t for t, *_ in solution.impulses}) < 24
+    # As long as flights are long, by the law: the second impact is that of the second pair
+    speeds = [impulse for *_, impulse in solution.impulses[:2]]
+    np.testing.assert_allclose(speeds, [(1 + e) / 2, ((1 + e) / 2) ** 2], rtol=1e-14)
+
+
+def test_impacts_of_shifted_boxes_that_accumulate_are_few(monkeypatch):
+    """Each end as without an end of accumulations, after fewer impacts; what falls is lost, and momentum is kept."""
+    counts, gap, count = [], 0.003, 3
+    for most in (0.0, transitions.ACCUMULATED):
+        monkeypatch.setattr(transitions, "ACCUMULATED", most)
+        scene, rng, below, top = ts.Scene(gravity=(0, 0, -G)), np.random.default_rng(3), None, 0.0
+        for i in range(count):
+            place = *(0.005 * rng.normal(size=2)), (gap + 0.2) * (i + 1) - 0.1
+            box = scene.add_body(**ts.shapes.box((0.4, 0.4, 0.2), mass=1.0), position=place, name=f"box {i}")
+            for corner in ((1, 1), (1, -1), (-1, -1), (-1, 1)):
+                at = {
+                    "point_a": (0.2 * corner[0], 0.2 * corner[1], -0.1),
+                    "point_b": (0, 0, top),
+                    "name": f"{corner}, {i}",
+                }
+                scene.add(C.PlaneContact(box, below or scene.ground, **at, **FLOOR, restitution=0.2, kinetic=0.4))
+            below, top = box, 0.1
+        solution = ts.simulate(scene, (0, 0.2), rtol=1e-10, atol=1e-10).raise_if_failed()
+        assert not solution.qd[-1].any()
+        np.testing.assert_allclose([solution.position(b)[-1, 2] for b in scene.bodies], [0.1, 0.3, 0.5], atol=1e-12)
+        np.testing.assert_allclose(solution.energy[0] - solution.energy[-1], gap * G * (1 + 2 + 3), rtol=1e-12)
+        assert np.diff(solution.energy).max() < 1e-9
+        impulses, momentum = {}, solution.linear_momentum[:, 2]
+        for t, name, impulse in solution.impulses:
+            impulses[t] = impulses.get(t, 0.0) + impulse * name.endswith(", 0")
+        for t, impulse in impulses.items():
+            (at,) = np.nonzero(solution.t == t)
+            assert abs(momentum[at[-1]] - momentum[at[0]] - impulse) < 1e-8
+        counts.append(len(impulses))
+    assert counts[1] < 0.7 * counts[0]
 
 
 def test_sets_of_contacts_between_the_same_bodies_share_a_graph(monkeypatch):

@@ -291,11 +291,11 @@ def _independent(inertia, closed, grips):
     loads, kept = inertia.free(rows.T).T, np.ones(len(rows), bool)
     held = RANK_TOL**2 * (rows * loads).sum(axis=1).max()  # by bilateral rows
     for k in range(len(rows)):  # Gram-Schmidt in the metric of kinetic energy
-        size = rows[k] @ loads[k]
-        for j in np.flatnonzero(kept[:k]):
-            share = rows[k] @ loads[j]
-            rows[k] -= share * rows[j]
-            loads[k] -= share * loads[j]
+        size, before = rows[k] @ loads[k], np.flatnonzero(kept[:k])
+        for _ in range(2):  # as classical Gram-Schmidt is right to rounding
+            shares = loads[before] @ rows[k]
+            rows[k] -= shares @ rows[before]
+            loads[k] -= shares @ loads[before]
         left = rows[k] @ loads[k]
         kept[k] = k < len(closed) or left > max(RANK_TOL * size, held)
         if kept[k]:
@@ -382,10 +382,10 @@ def halted(inertia, qd, resting, which):
 def slow_speeds(inertia, qd, terms):
     """Slips (count,), m/s, below which friction keeps a direction: parts of the bodies' velocities.
 
-    And of those that accelerations of the gaps, of the sizes `terms` (count,), cause along the scene's length.
+    And of those that the largest of the accelerations of gaps, `terms` (count,), causes along the scene's length.
     """
     velocities = (np.abs(inertia.tangents) @ np.abs(qd)).max(axis=1)
-    return AHEAD * (velocities + np.sqrt(inertia.gaps.extent(inertia.q) * terms))
+    return AHEAD * (velocities + np.sqrt(inertia.gaps.extent(inertia.q) * terms.max(initial=0.0)))
 
 
 def slow_slips(inertia, qd, which, limits):

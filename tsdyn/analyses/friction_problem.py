@@ -27,7 +27,7 @@ from ..model.handles import first_rows
 from ..observables.evaluate import ITERATIONS, constraint_arrays
 from ..observables.generalised_forces import applied_loads
 from .friction_units import ACROSS, ALONG, WHOLE, normal_loads_of, slip_velocities
-from .tolerances import BROKEN, EVENT_ERROR, LEVEL, PIVOTS, RESTS
+from .tolerances import BROKEN, EVENT_ERROR, LEVEL, PIVOTS, RESTS, USUAL
 
 if TYPE_CHECKING:
     from ..elements.friction import Sliding
@@ -179,10 +179,12 @@ class Frictions:
         return sizes + np.where(self.turns, passing, 0.0) / (self.packed.size or np.inf)
 
     def speeds(self, q, qd, memory):
-        """Of those that slide (k, units): velocities along their directions, in a plane less half of the speed."""
+        """Of those that slide (k, units): velocities along their directions, in a plane as of `within`."""
         v, _, axes = self.motions(q, qd)
-        ways = memory[self.ways] * np.where(self.signed[:, None], axes, 1.0)
-        return (v * ways).sum(axis=2) - np.where(self.signed, 0.0, 0.5) * np.linalg.norm(v, axis=2)
+        sizes = np.linalg.norm(memory[self.ways], axis=1)
+        lengths = np.where(self.signed | (sizes == 0.0), 1.0, sizes)
+        ways = memory[self.ways] / lengths[:, None] * np.where(self.signed[:, None], axes, 1.0)
+        return within(v, ways, self.signed)
 
     def turn(self, t, levels, memory):
         """Write the directions of slip into memory (k, slots), zero where a slip rate is zero to rounding.
@@ -199,26 +201,51 @@ class Frictions:
             along = np.sign((ways[:, i] * axes[:, i]).sum(axis=1))[:, None]
             memory[:, unit.way] = along if self.signed[i] else ways[:, i]
 
-    def at(self, q):
+    def paces(self, sizes, rates, gravity, length):
+        """Velocities (units,) over USUAL: those of their terms, sizes (units,), and what accelerations make of them.
+
+        These act along the scene's length, m, or one radian; rates (units,): their terms before, gravity: m/s^2. One
+        where nothing is known, as where forces move bodies from rest.
+        """
+        gained = np.where(self.turns, rates + gravity / (length or np.inf), (rates + gravity) * length)
+        found = (sizes + np.sqrt(gained)) / USUAL
+        return np.where(found > 0.0, found, 1.0)
+
+    def at(self, q, paces):
         """The `FrictionFrames` at q (n,)."""
         A, (_, _, axes) = self.frames(q[None])[0], self.motions(q[None], np.zeros((1, q.size)))
-        return FrictionFrames(self, axes[0], A)
+        return FrictionFrames(self, axes[0], A, paces)
+
+
+def within(v, ways, signed):
+    """Components of v (..., 3) along directions; in a plane, where not signed, zero where v is 60 degrees off.
+
+    v.d - |v - (v.d) d| / sqrt(3)
+
+    Of a slip that comes to rest without turning it is as smooth as v, which its size is not.
+    """
+    along = (v * ways).sum(axis=-1)
+    across = np.linalg.norm(v - along[..., None] * ways, axis=-1)
+    return along - np.where(signed, 0.0, across / np.sqrt(3.0))
 
 
 class FrictionFrames:
-    """The frictions of a scene in one configuration: axes (units, 3) and rotation matrices (bodies, 3, 3)."""
+    """The frictions of a scene in one configuration: axes (units, 3) and rotation matrices (bodies, 3, 3).
 
-    def __init__(self, frictions, axes, A):
-        self.frictions, self.axes, self.A = frictions, axes, A
+    paces (units,): the lengths of directions that are written, over which friction keeps them below SLIP.
+    """
+
+    def __init__(self, frictions, axes, A, paces):
+        self.frictions, self.axes, self.A, self.paces = frictions, axes, A, paces
 
     def written(self, i, way):
         """The numbers of a direction (3,), ground frame: a sign where there is an axis."""
-        return np.sign(way @ self.axes[i]) if self.frictions.signed[i] else way
+        return np.sign(way @ self.axes[i]) if self.frictions.signed[i] else self.paces[i] * way
 
     def read(self, i, memory):
         """The direction (3,), ground frame, of a unit that slides; zeros while it sticks."""
         numbers = memory[self.frictions.units[i].way]
-        return numbers[0] * self.axes[i] if numbers.size == 1 else numbers
+        return numbers[0] * self.axes[i] if numbers.size == 1 else numbers / (np.linalg.norm(numbers) or 1.0)
 
     def basis(self, i, free, mobility):
         """Orthonormal directions (r, 3), ground frame, in which a unit may slide.
@@ -590,11 +617,11 @@ class RestProblem:
         return self.G[np.ix_(at, at)] - self.G[np.ix_(at, rows)] @ held
 
     def _rates(self, ways, a, small):
-        """Accelerations along the directions of sliding, in a plane less half of their size; zero within rounding."""
+        """Accelerations along the directions of sliding, in a plane as of `within`; zero within rounding."""
         found = {}
         for i, way in ways.items():
-            at, part = self.at[i], 0.0 if self.place.frictions.signed[i] else 0.5
-            rate = a[at] @ self.bases[i] @ way - part * np.linalg.norm(a[at])
+            at = self.at[i]
+            rate = within(a[at] @ self.bases[i], way, self.place.frictions.signed[i])
             found[i] = float(rate) if rate > small[at].max() else 0.0
         return found
 

@@ -141,9 +141,10 @@ WITHIN_BOUND = 1.0 - 1e-10
 JUST_OPENED = 1.0 / 14.0
 
 # --- friction at rest ------------------------------------------------------------------------------------------------
-# m/s or rad/s: a body that slides in a plane, more slowly, has come to rest where its direction turns: ten times the
+# m/s or rad/s: velocities for which STOPPED, and SLIP of elements, are given: of bodies under gravity, along 1 m.
+# A body that slides in a plane, more slowly than STOPPED, has come to rest where its direction turns: ten times the
 # velocity below which its direction is kept.
-STOPPED = 1e-8
+USUAL, STOPPED = 3.0, 1e-8
 # Roundings of the time within which an acceleration changes velocities by none: an event's time is right to some ten.
 RESTS = 100.0
 # Rounds of pivoting over those for all units at once; after as many, or where modes come back, one unit at a time. Also

@@ -79,6 +79,7 @@ typing.templates.AttributeTemplate.resolve(self, value, attr)
 typing.templates.AttributeTemplate.generic_resolve
 base.BaseContext.insert_user_function(self, func, fndesc, libs)
 base.BaseContext.refresh(self)
+base.BaseContext.get_function(self, fn, sig, _firstcall)
 base.BaseContext.subtarget(self, kws)
 base.BaseContext.subtarget:cached_internal_func
 cpu.CPUContext.codegen(self)
@@ -92,6 +93,10 @@ codegen.CPUCodeLibrary.__init__(self, codegen, name)
 codegen.CPUCodeLibrary.__init__:_linking_libraries
 codegen.CPUCodeLibrary.__init__:_final_module
 codegen.CPUCodeLibrary._get_module_for_linking(self)
+codegen.CPUCodeLibrary._optimize_functions(self, ll_module)
+codegen.CPUCodeLibrary._optimize_functions:_data_layout
+codegen.CPUCodegen._function_pass_manager(self, kwargs)
+codegen.JITCPUCodegen._library_class
 codegen.CPUCodeLibrary._finalize_final_module:_finalized
 codegen.JITCPUCodegen.set_env(self, env_name, env)
 codegen.CPUCodegen._scan_and_fix_unresolved_refs(self, module)
@@ -133,6 +138,8 @@ _SERVE_OTHERS = {  # passes for closures, with blocks, exceptions, literal_unrol
     typed_passes.NopythonRewrites,
     typed_passes.DumpParforDiagnostics,
 }
+_OPTIONAL = "__array__", "static_getitem", "static_setitem"  # of which no type need have an implementation
+_of_ours = {}  # way of lowering: passes over tsdyn's own kernels
 
 
 class _Operator(types.Function):
@@ -182,8 +189,21 @@ def _remembering(context):
     return Remembering()
 
 
+class _Kernel(JITCodeLibrary):
+    """The code of a kernel."""
+
+    def _optimize_functions(self, ll_module):
+        """As Numba's own, with one sequence of passes for all functions of the module."""
+        ll_module.data_layout = self._codegen._data_layout
+        passes, builder = self._codegen._function_pass_manager()
+        for function in ll_module.functions:
+            passes.run(function, builder)
+
+
 class _Codegen(JITCPUCodegen):
     """Machine code for the portable target, beside Numba's own, which users' functions have."""
+
+    _library_class = _Kernel
 
     def __init__(self, beside):
         super().__init__("tsdyn")
@@ -207,7 +227,15 @@ class _Codegen(JITCPUCodegen):
 @cache
 def _for_target(context):
     """A target context that shares all with Numba's, but for the processor."""
-    return context.subtarget(_internal_codegen=_Codegen(context.codegen())) if portable() else context
+
+    class Shared(type(context)):
+        def get_function(self, fn, sig, _firstcall=True):
+            """As Numba's own, but look for new declarations of nothing that is known to have none."""
+            return super().get_function(fn, sig, _firstcall and not (isinstance(fn, str) and fn in _OPTIONAL))
+
+    found = context.subtarget(_internal_codegen=_Codegen(context.codegen())) if portable() else context.subtarget()
+    found.__class__ = Shared
+    return found
 
 
 class Compiler(CompilerBase):
@@ -222,17 +250,23 @@ class Compiler(CompilerBase):
 
     def define_pipelines(self):
         """Numba's own passes, but those that serve others; all of them for a user's kernel."""
+        if not is_ours(self.state.func_id.modname):
+            return [self._passes()]
+        if self.lowering not in _of_ours:
+            _of_ours[self.lowering] = self._passes(_SERVE_OTHERS)
+        return [_of_ours[self.lowering]]
+
+    def _passes(self, without=None):
         manager, seen = PassManager("kernel"), set()
-        ours = is_ours(self.state.func_id.modname)
         for kind, what in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
-            if not ours or kind not in _SERVE_OTHERS | seen:
+            if without is None or kind not in without | seen:
                 manager.add_pass(self.lowering if kind is typed_passes.NativeLowering else kind, what)
             seen.add(kind)
         manager.finalize()
-        return [manager]
+        return manager
 
 
-class _Library(JITCodeLibrary):
+class _Library(_Kernel):
     """The code of a kernel and of those that it calls, to be linked into others."""
 
     def finalize(self):

@@ -17,7 +17,7 @@ from . import stock
 from .cache import statistics
 from .code_hash import deep_hash
 from .compilers import attempt, callback_frames, current
-from .interrupts import prompt_interrupts
+from .interrupts import CollectionsDeferred, prompt_interrupts
 
 # Users' functions, compiled once a process: equal source and constants share one compiled function.
 #
@@ -53,7 +53,7 @@ def _compiling():
     began, outermost = time.perf_counter(), not getattr(_within, "block", False)
     _within.block = True
     try:
-        with prompt_interrupts(callback_frames()):
+        with CollectionsDeferred(), prompt_interrupts(callback_frames()):
             yield
     finally:
         if outermost:

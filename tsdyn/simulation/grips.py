@@ -174,7 +174,7 @@ class Halting:
     def over(self, states):
         """Values (k, slides) of states at k times."""
         ways = states.memory[self.ways]
-        slow = np.linalg.norm(ways, axis=1)
+        slow = np.maximum(np.linalg.norm(ways, axis=1), TINY)
         along, speed = self.gaps.slips(states.t, states.levels, self.slides, ways / slow[:, None])
         V = SLOW * slow
         for i, fast in zip(self.slides, (speed > FASTER * V).T, strict=True):

@@ -240,7 +240,7 @@ class Scene:
     _phases = _opens = None  # of a scene with contacts, or inactive parts: see phase_scenes.py
     _pack = pack  # what packs it; of a phase its own
     _whole = None  # of a phase: the scene
-    _base = None  # of a phase whose frictions are packed with the rows that hold them: that in which all of these hold
+    _base = None  # of a phase: the one whose graph and memory it shares, such as that in which all frictions hold
     _lacks = ""  # what is to be passed before it can be run; of the outline of a scene in a file
 
     def __setattr__(self, name: str, value: Never) -> None:

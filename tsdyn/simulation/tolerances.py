@@ -67,6 +67,9 @@ PENETRATION = 1e-9
 # Of the scene's length, of angles in rad: an impact that is followed by a lower flight is the last one. Contacts of a
 # tower lower each other's flights in turn, and impacts accumulate in them again and again: so each time ends early.
 FLIGHT = 1e-12
+# The same of flights that impacts of other contacts end, and the rate of their end over that of a free flight: contacts
+# are as good as closed then. Their impacts would go on down to FLIGHT, each contact through all flights.
+ACCUMULATED, PUSHED = 1e-8, 1.01
 # Roundings in a gap, of the sizes of its terms: gaps that are lifted by less have not opened.
 ROUNDED = 16.0
 # Events in a row without progress in time, beside one for each gap: a chain of openings that follow from each other.

@@ -24,7 +24,7 @@ from .impacts import along_normals, held, impact_of, impulse_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import Impulse, UnitModes
 from .scene_cache import prepared
-from .tolerances import CREEPING, EVENTS_JUDGED, FLIGHT, MOST_AT_AN_INSTANT, ROUNDED
+from .tolerances import ACCUMULATED, CREEPING, EVENTS_JUDGED, FLIGHT, MOST_AT_AN_INSTANT, PUSHED, ROUNDED
 
 
 def contact_state(inertia, resting, qd, fired=()):
@@ -103,7 +103,8 @@ class Transitions:
         try:
             if len(touching) == 1 and self._bounces(touching[0], before, slots):
                 return None
-            inertia = Inertia(self.gaps, self.t, self.q, slots, touching, before.closed)
+            near = self._near(touching)
+            inertia = Inertia(self.gaps, self.t, self.q, slots, [*touching, *near], before.closed)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies; rates that are
             # rounding of these are of no sign, and no start of a flight
@@ -118,7 +119,7 @@ class Transitions:
                 p, self.qd, rates = held(inertia, self.qd, ratchets, rates)
                 self._note_impulses(inertia, ratchets, along_normals(p), qd)
             if (rates[touching] < 0.0).any():
-                rates = self._hit(inertia, touching, rates)
+                rates = self._hit(inertia, touching, near, rates)
             resting = [i for i in touching if rates[i] == 0.0]
             if self.qd is not qd and resting:  # rounding of the velocities before an impact is left
                 _, self.qd, left = held(inertia, self.qd, resting, inertia.rates(self.qd))
@@ -263,10 +264,12 @@ class Transitions:
         frictions, count = self.frictions, self.count
         if not frictions.count:
             return None
-        place, (v, _, _) = frictions.at(self.q), frictions.motions(self.q[None], self.qd[None])
+        v, _, _ = frictions.motions(self.q[None], self.qd[None])
         # Velocities that change within rounding of the time are at rest, too, and those that come to rest at
         # once: where loads vanish along a chain events would follow each other ever faster
         sizes, rates = frictions.sizes(self.q, self.qd), frictions.sizes(self.q, self.qdd)
+        paces = frictions.paces(sizes, rates, np.linalg.norm(self.scene.system.gravity), self.length)
+        place = frictions.at(self.q, paces)
         least = np.maximum(NEGLIGIBLE * sizes + rounding, RESTS * EPS * abs(self.t) * rates)
         least = np.maximum(least, EVENT_ERROR * np.minimum(sizes, (self.t - self.span[0]) * rates))
         self.remembered, resting, guess = self.remembered.copy(), [], {}
@@ -279,7 +282,7 @@ class Transitions:
             speed, signed = np.linalg.norm(v[0, i]), frictions.signed[i]
             if i in before.blocked and memory[unit.way].any():
                 guess[i] = place.read(i, memory)
-            if speed <= max(least[i], 0.0 if signed else STOPPED) or (signed and i in fired):
+            if speed <= max(least[i], 0.0 if signed else STOPPED * paces[i]) or (signed and i in fired):
                 resting.append(i)
                 memory[unit.way] = 0.0
             else:
@@ -372,16 +375,42 @@ class Transitions:
         found = gaps.workspace.bounce(self.t, self.q, self.qd, slots, *given)
         if found is None:
             return False
-        impact, self.qd = found
+        impact, after = found
+        if i in self.struck and self._is_pushed(i, impact.rate / e, e):
+            return False
+        self.struck[i], self.qd = (self.t, impact.rate / e), after
         rounding = EPS * max(self.length, ROUNDED * impact.length)
         self.phases.impulses.append((self.t, gaps.names[i], Impulse(impact.p)))
         self.modes = UnitModes(opened={i: self._opened(i, impact.rate, 0.25 * rounding)})
         return True
 
-    def _hit(self, inertia, touching, rates):
-        """Jump of velocities at an impact; the rates (count,) afterwards."""
-        e, before = self.gaps.restitution[touching].copy(), rates[touching]
-        p, qd, after = self._jump(inertia, touching, before, e)
+    def _is_pushed(self, i, rate, e):
+        """Whether others have pushed a gap together in a low flight since its last impact: at a rate beyond e times."""
+        t, v = self.struck[i]
+        low = ACCUMULATED * self.gaps.lengths(self.length)[i]
+        return e < 1.0 and t < self.t and v * (self.t - t) <= low and rate > PUSHED * e * v
+
+    def _near(self, touching):
+        """Open gaps that have flown low since an impact; forgets the impacts of others."""
+        low = ACCUMULATED * self.gaps.lengths(self.length)
+        self.struck = {i: (t, v) for i, (t, v) in self.struck.items() if v * (self.t - t) <= low[i]}
+        return sorted(i for i in self.struck if i in self.able and i not in touching and self.gap[i] <= low[i])
+
+    def _hit(self, inertia, touching, near, rates):
+        """Jump of velocities at an impact; the rates (count,) afterwards.
+
+        Contacts of a tower that are hit in turn end each other's flights ever sooner: impacts accumulate. A contact
+        that is pushed back from a low flight is as good as closed: it has no restitution. So are those `near`, where
+        the impact would push them together: they take part in it.
+        """
+        which, e, before = touching, self.gaps.restitution[touching].copy(), rates[touching]
+        e[[k for k, i in enumerate(touching) if i in self.struck and self._is_pushed(i, -before[k], e[k])]] = 0.0
+        p, qd, after = self._jump(inertia, which, before, e)
+        if near:
+            rounding = NEGLIGIBLE * np.abs(inertia.G[np.ix_(near, which)]) @ p[:, 0]
+            if (after[near] < np.minimum(rates[near], 0.0) - rounding).any():
+                which, e, before = [*touching, *near], np.append(e, np.zeros(len(near))), rates[[*touching, *near]]
+                p, qd, after = self._jump(inertia, which, before, e)
         # Impacts that are followed by flights that are none are the last ones
         a = self._lowering(inertia, touching, qd, after)
         last = [k for k, i in enumerate(touching) if a[i] > 0.0 and before[k] < 0.0 and e[k] > 0.0]
@@ -389,14 +418,16 @@ class Transitions:
             flights = [2.0 * after[touching[k]] / (a[touching[k]] * (1.0 - e[k])) for k in last if e[k] < 1.0]
             self.rest = float(max([self.rest, *(self.t + T for T in flights)]))
             e[last] = 0.0
-            p, qd, after = self._jump(inertia, touching, before, e)
+            p, qd, after = self._jump(inertia, which, before, e)
             a = self._lowering(inertia, touching, qd, after)
         # Contacts that another impact lifts by rounding, of its impulses or of the time, stay closed
-        rounding = NEGLIGIBLE * np.abs(inertia.G[:, touching]) @ p[:, 0]
+        rounding = NEGLIGIBLE * np.abs(inertia.G[:, which]) @ p[:, 0]
         after[after <= np.maximum(rounding, RESTS * EPS * abs(self.t) * a)] = 0.0
         still = NEGLIGIBLE * inertia.sizes(self._largest(self.qd)) * (rates == 0.0)  # lifted by impulses of rounding
         after[after <= still] = 0.0
-        self._note_impulses(inertia, touching, p, self.qd)
+        self._note_impulses(inertia, which, p, self.qd)
+        self.struck |= {i: (self.t, -rate) for i, rate in zip(which, before.tolist(), strict=True) if rate < 0.0}
+        self.struck = {i: (t, max(v, float(after[i]))) for i, (t, v) in self.struck.items()}
         self.qd = qd
         return after
 

@@ -133,8 +133,8 @@ class Breaking:
 class Slowing:
     """The velocities of frictions, along the directions in which they slide, as event functions.
 
-    In a plane half of the speed is taken off: where the direction has turned by 60 degrees, a new one is taken. The
-    velocity of one that has just begun to slide is divided by the time since.
+    In a plane a new direction is taken where it has turned by 60 degrees: `friction_problem.within`. The velocity of
+    one that has just begun to slide is divided by the time since.
 
     Parameters
     ----------

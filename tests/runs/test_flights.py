@@ -1,6 +1,6 @@
 """Runs from impact to impact in one kernel call: the same bits as with Python between them, and closed forms."""
 
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -48,7 +48,16 @@ def pendulum():
     return scene
 
 
-SCENES = {"ball": ball, "two balls": two_balls, "pendulum": pendulum, "many": lambda: ball(1.0)}
+def collapse():
+    """Three balls in a row, the first of which flies: they hit each other until all go on together."""
+    scene = ts.Scene(gravity=(0, 0, 0))
+    balls = [scene.add_point_mass(1.0, position=(x, 0, 0), velocity=(float(x == 0), 0, 0)) for x in (0.0, 0.3, 0.5)]
+    for pair in pairwise(balls):
+        scene.add(ts.constraints.SphereContact(*pair, radius_a=0.05, radius_b=0.05, restitution=0.03))
+    return scene
+
+
+SCENES = {"ball": ball, "two balls": two_balls, "pendulum": pendulum, "many": lambda: ball(1.0), "collapse": collapse}
 SPANS = {"many": 2000.0}  # more impacts than are made before progress is judged
 CASES = {
     "steps": {},
@@ -68,7 +77,7 @@ def found(solution):
     return [solution.t, solution.q, solution.qd, solution.qdd, solution.energy, numbers, phases, *within]
 
 
-@pytest.mark.parametrize(("name", "case"), [*product(list(SCENES)[:3], CASES), ("many", "steps")])
+@pytest.mark.parametrize(("name", "case"), [*product(list(SCENES)[:3], CASES), ("many", "steps"), ("collapse", "steps")])
 def test_the_bits_are_those_of_a_run_with_python_between_impacts(name, case, monkeypatch):
     if case == "short slices":
         monkeypatch.setattr(driver, "FIRST_SLICE", 4)

@@ -24,7 +24,7 @@ from ..runs.run_log import no_log
 from ..runs.run_memory import STATUSES, begin_again, call_driver, go_back, load_restart
 from ..runs.tolerances import LONG_STEPS, START_ZERO
 from ..workspaces import B_END, STORED, load_run
-from .tolerances import EVENTS_JUDGED, FLIGHT, PENETRATION, ROUNDED
+from .tolerances import ACCUMULATED, EVENTS_JUDGED, FLIGHT, PENETRATION, PUSHED, ROUNDED
 
 # Where nothing of the user's is asked, and no gap is closed, a run is steps and impacts. What is more than the impact
 # of one gap, which opens again, is left to Python: there the last step is searched once more. Python takes over the
@@ -65,6 +65,7 @@ class Flight(NamedTuple):
     sign: np.ndarray  # (gaps,)
     restitution: np.ndarray  # (gaps,)  zero of those whose impacts are left to Python
     lengths: np.ndarray  # (gaps,)  what rounding of gaps is a part of
+    hits: np.ndarray  # (gaps, 2)  time and rate of the last impact, as of `Transitions.struck`; infinite before
     least: np.ndarray  # (m,)  rounding of the functions
     gaps: np.ndarray  # scratch
     before: np.ndarray  # (3, n)  q, qd, qdd where the last step began
@@ -75,7 +76,7 @@ class Flight(NamedTuple):
 
 
 _none = np.zeros((0, 0))
-load_flight = loader(Flight(FlightNumbers(), *np.zeros((5, 0)), _none, np.zeros(0), _none, np.zeros(0), _none))
+load_flight = loader(Flight(FlightNumbers(), *np.zeros((3, 0)), _none, *np.zeros((2, 0)), _none, np.zeros(0), _none, np.zeros(0), _none))
 
 
 @kernel
@@ -122,6 +123,10 @@ def _strike(f, r, s, i, t):
         return False
     if call_bounce(x.kernel, n.contacts, n.impact, t, q, qd, r.remembered[r.joints.shape[0] :]) != BOUNCES:
         return False
+    hit, low = f.hits[i], ACCUMULATED * limit[i]
+    if x.e < 1.0 and hit[0] < t and hit[1] * (t - hit[0]) <= low and x.rate / x.e > PUSHED * x.e * hit[1]:
+        return False  # as `Transitions._is_pushed`
+    hit[0], hit[1] = t, x.rate / x.e
     row, o = f.impacts[n.impacts], load_open_gaps(n.own)
     row[0], row[1], row[2], row[3], row[5] = t, i, f.gaps[i], x.rate, x.p
     row[4] = 0.25 * (EPS * max(n.length, ROUNDED * x.length))
@@ -214,8 +219,8 @@ class Flights:
             workspace.address, workspace.impact[1], length,
         )  # fmt: skip
         self.parts = Flight(
-            self.numbers, gaps.sign, restitution, gaps.lengths(length), group.least, np.zeros(workspace.m),
-            np.zeros(now.shape), memory.run.remembered.copy(), np.zeros((4, now.shape[1])),
+            self.numbers, gaps.sign, restitution, gaps.lengths(length), np.empty((gaps.count, 2)), group.least,
+            np.zeros(workspace.m), np.zeros(now.shape), memory.run.remembered.copy(), np.zeros((4, now.shape[1])),
             memory.run.remembered.copy(), np.zeros((count, ROW)),
         )  # fmt: skip
         self.contacts, self.group, (self._at, *self._keep) = contacts, group, resident(self.parts)
@@ -231,6 +236,9 @@ class Flights:
         """As `Memory.advance`; `most` rows of the log."""
         numbers, group, contacts = self.numbers, self.group, self.contacts
         numbers.last, numbers.new, workspace = contacts.t, group.is_new, contacts.gaps.workspace
+        hits, known = self.parts.hits, contacts.struck
+        hits.fill(np.inf)
+        hits[list(known)] = list(known.values()) or np.empty((0, 2))
         workspace.enter()
         numbers.contacts = workspace.address
         numbers.most = len(self.parts.impacts) - contacts.judged[1] - 1  # at the next one progress is judged

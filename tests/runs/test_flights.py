@@ -77,7 +77,9 @@ def found(solution):
     return [solution.t, solution.q, solution.qd, solution.qdd, solution.energy, numbers, phases, *within]
 
 
-@pytest.mark.parametrize(("name", "case"), [*product(list(SCENES)[:3], CASES), ("many", "steps"), ("collapse", "steps")])
+@pytest.mark.parametrize(
+    ("name", "case"), [*product(list(SCENES)[:3], CASES), ("many", "steps"), ("collapse", "steps")]
+)
 def test_the_bits_are_those_of_a_run_with_python_between_impacts(name, case, monkeypatch):
     if case == "short slices":
         monkeypatch.setattr(driver, "FIRST_SLICE", 4)

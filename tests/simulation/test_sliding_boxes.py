@@ -79,7 +79,8 @@ def test_slips_that_turn_while_they_end_make_few_events():
     """Of a box that slides and turns: directions turn the faster the slower it is; then it rests, exactly."""
     scene = boxes(1, mu=0.5, size=(0.3, 0.3, 0.6), velocity=(0.3, 0.2, 0), spin=1.0)
     solution = ts.simulate(scene, (0, 0.2), dense_output=True)
-    assert (np.diff(solution.t) == 0.0).sum() < 35
+    assert (np.diff(solution.t) == 0.0).sum() < 40
+    assert np.diff(solution.energy).max() < 1e-12 * solution.energy[0]  # ends of slips add none
     assert len(solution.phases) == 2
     assert not solution.qd[-1].any()
     energy = (0.3**2 + 0.2**2) / 2 + (0.3**2 + 0.3**2) / 12 / 2

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..maths.complementarity import OPEN, STICKS, solve_cone
-from ..maths.tolerances import RANK_TOL, SUM_ROUNDING, TINY
+from ..maths.tolerances import NEGLIGIBLE, RANK_TOL, SUM_ROUNDING, TINY
 from .contact_problem import ContactState, NoSolution, depends, energy_gain, slack_of
 from .tolerances import AHEAD, EVENT_ERROR, LEAST_SHARE, LEAST_SLIP, LEVEL, PULLS, SLOWEST_SLIP, WITHIN_BOUND
 
@@ -172,7 +172,7 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
     Below `slow_speeds` friction keeps its direction, so that a slip which ends turns again and again. It is ended where
     the contact would stick: with all that are as slow, as of a body that comes to rest, or alone. Below a part of that,
     SLOWEST_SLIP, it is ended, too, where it slows down with its friction against it, to slide off in another direction
-    at once: with all of its two bodies, since the slip of one point alone is no motion that begins.
+    at once: with all of its two bodies, since the slip of one point alone is no motion that begins. Energy never grows.
 
     turned : list of int
         Gaps whose slips have turned away from the direction of their friction.
@@ -191,6 +191,8 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
             more = [i for i in opening if rates[i] <= 0.5 * before[i]]
             if rates[resting].any() or more:  # others have closed at once
                 found = halted(inertia, qd, [*resting, *more], which)
+            if _gains(inertia, qd, found):  # by the friction of others that slide
+                found = qd
         return found, solve_rough_contacts(inertia, resting, found, fired)
 
     for which in (slow, turned) if turned else ():
@@ -205,6 +207,12 @@ def at_turn(inertia, resting, qd, fired, turned, opening=()):
     pairs = {_pair(inertia.gaps, i) for i in turned}
     which = [i for i in slow_slips(inertia, qd, slow, SLOWEST_SLIP * limits) if _pair(inertia.gaps, i) in pairs]
     return ended(which) if which else found
+
+
+def _gains(inertia, before, after):
+    """Whether velocities (n,) have more kinetic energy afterwards, beyond rounding."""
+    gain, q = inertia.gaps.workspace.gain, inertia.q
+    return gain(q, before, after) > NEGLIGIBLE * gain(q, np.zeros_like(before), before)
 
 
 def _pair(gaps, i):

@@ -76,7 +76,9 @@ class Flight(NamedTuple):
 
 
 _none = np.zeros((0, 0))
-load_flight = loader(Flight(FlightNumbers(), *np.zeros((3, 0)), _none, *np.zeros((2, 0)), _none, np.zeros(0), _none, np.zeros(0), _none))
+load_flight = loader(
+    Flight(FlightNumbers(), *np.zeros((3, 0)), _none, *np.zeros((2, 0)), _none, np.zeros(0), _none, np.zeros(0), _none)
+)
 
 
 @kernel

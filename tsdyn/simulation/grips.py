@@ -7,7 +7,7 @@ import numpy as np
 from ..analyses.contact_friction import spread
 from ..analyses.contact_problem import slip_rows
 from ..analyses.contact_rows import reaction_workspace
-from ..analyses.tolerances import EVENT_ERROR
+from ..analyses.tolerances import EVENT_ERROR, LEAST_SLIP
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
 from ..jit.kernels import twin
@@ -68,12 +68,16 @@ def gripped(gaps, before, contacts, q, memory):
     return grips
 
 
-def stopping_time(inertia, which, qd, after, qdd):
-    """Time, s, in which slips that have been ended, at qd (n,) and no more `after`, end by accelerations qdd (n,)."""
+def stopping_time(inertia, which, qd, after, qdd, slow):
+    """Time, s, in which slips that have been ended, at qd (n,) and no more `after`, end by accelerations qdd (n,).
+
+    slow (count,): `ContactState.slow`; a part of these is none.
+    """
     before, left, gained = (x[which] for x in (inertia.slips(qd), inertia.slips(after), inertia.tangents @ qdd))
     against = -(before * (gained + inertia.biases(qd)[which, 1:])).sum(axis=1)
-    ended = before.any(axis=1) & ~left.any(axis=1) & (against > 0.0)
-    return float(((before * before).sum(axis=1)[ended] / against[ended]).max(initial=0.0))
+    squares = (before * before).sum(axis=1)
+    ended = (squares > (LEAST_SLIP * slow[which]) ** 2) & ~left.any(axis=1) & (against > 0.0)
+    return float((squares[ended] / against[ended]).max(initial=0.0))
 
 
 class Reactions:

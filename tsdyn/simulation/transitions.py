@@ -136,7 +136,7 @@ class Transitions:
             if self.gaps.rough[resting].any():
                 self.qd, contacts = at_turn(inertia, resting, self.qd, leaving, turned, opening)
                 if self.qd is not struck and np.array_equal(struck, self.ended):
-                    self.rest = self.t + stopping_time(inertia, resting, struck, self.qd, self.qdd)
+                    self.rest = self.t + stopping_time(inertia, resting, struck, self.qd, self.qdd, contacts.slow)
                 if self.qd is not struck and opening:
                     rates = inertia.rates(self.qd)
             else:

@@ -35,7 +35,7 @@ class Checkpoints:
         phases, arrays = self.phases.saved()
         numbers = {name: getattr(self, name) for name in KEPT} | {"modes": self.modes.saved(), "phases": phases}
         numbers |= {"changes": plain((self.inactive, self.values)), "switched": sorted(self.switched)}
-        numbers |= {"fast": plain(self.fast), "struck": plain(self.struck)}
+        numbers |= {"fast": plain(self.fast), "hits": plain(self.hits)}
         starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
         for where, (_, *parts) in starts.items():
             arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
@@ -65,7 +65,7 @@ class Checkpoints:
             self.change(tuple(inactive), dict(values))
             self.switched |= set(known["switched"])
             self.modes, self.fast = UnitModes.of(known["modes"]), dict(known["fast"])
-            self.struck = {i: tuple(pair) for i, pair in known["struck"]}
+            self.hits = {i: tuple(pair) for i, pair in known["hits"]}
             if known["sampling"] is not None:
                 self.sampling = Sampling(prepared(phase_of(self.scene, [])), True)
                 self.sampling.restore(known["sampling"])

@@ -140,7 +140,7 @@ class _ContactRun(Transitions, Checkpoints):
         self.lowered = set()  # times of impacts at which less than the coefficients of restitution acts
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
         self.fast = {}  # see `Halting`
-        self.struck = {}  # of gaps after impacts: the time, and the largest rate since and just before
+        self.hits = {}  # of gaps after impacts: the time, and the largest rate since and just before
 
     def _take_scene(self, scene, inactive=None, values=None):
         """What follows from the scene alone, and makes the scenes of its phases.
@@ -374,11 +374,11 @@ class _ContactRun(Transitions, Checkpoints):
     def land(self, flown):
         """As of `Watch`."""
         impacts = flown.impacts()
-        for t, i, _, rate, _, p, energy in impacts:
+        for t, i, *_, p, energy in impacts:
             self._end_phase(t)
             self.t = self.rest = t
             self.phases.impulses.append((t, self.gaps.names[int(i)], Impulse(p)))
-            self.struck[int(i)] = t, rate / float(self.gaps.restitution[int(i)])
+            self.hits[int(i)] = tuple(flown.parts.hits[int(i)].tolist())
             self.phases.gain(energy)
             self.again.append(t)
         i, *opened = impacts[-1][1:5]

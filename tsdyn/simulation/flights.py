@@ -65,7 +65,7 @@ class Flight(NamedTuple):
     sign: np.ndarray  # (gaps,)
     restitution: np.ndarray  # (gaps,)  zero of those whose impacts are left to Python
     lengths: np.ndarray  # (gaps,)  what rounding of gaps is a part of
-    hits: np.ndarray  # (gaps, 2)  time and rate of the last impact, as of `Transitions.struck`; infinite before
+    hits: np.ndarray  # (gaps, 2)  time and rate of the last impact, as `_ContactRun.hits` has them; infinite before
     least: np.ndarray  # (m,)  rounding of the functions
     gaps: np.ndarray  # scratch
     before: np.ndarray  # (3, n)  q, qd, qdd where the last step began
@@ -106,6 +106,15 @@ def _end_step(r, log, t, t0, state):
 
 
 @kernel
+def is_pushed(t, v, now, low, rate, e):  # six: two hits
+    """Whether others have pushed a gap together since its last impact: in a low flight, at a rate beyond e times.
+
+    t, v: that impact, and the largest rate since and just before; rate: now, m/s; low: of flights, m.
+    """
+    return e < 1.0 and t < now and v * (now - t) <= low and rate > PUSHED * e * v
+
+
+@kernel
 def _strike(f, r, s, i, t):
     """The impact of gap i at t and the state of a search, noted; False where it is more than that of one gap."""
     n, c, w, limit = f.numbers, load_contacts(f.numbers.contacts), load_impact(f.numbers.impact), f.lengths
@@ -126,8 +135,8 @@ def _strike(f, r, s, i, t):
     if call_bounce(x.kernel, n.contacts, n.impact, t, q, qd, r.remembered[r.joints.shape[0] :]) != BOUNCES:
         return False
     hit, low = f.hits[i], ACCUMULATED * limit[i]
-    if x.e < 1.0 and hit[0] < t and hit[1] * (t - hit[0]) <= low and x.rate / x.e > PUSHED * x.e * hit[1]:
-        return False  # as `Transitions._is_pushed`
+    if is_pushed(hit[0], hit[1], t, low, x.rate / x.e, x.e):
+        return False
     hit[0], hit[1] = t, x.rate / x.e
     row, o = f.impacts[n.impacts], load_open_gaps(n.own)
     row[0], row[1], row[2], row[3], row[5] = t, i, f.gaps[i], x.rate, x.p
@@ -238,7 +247,7 @@ class Flights:
         """As `Memory.advance`; `most` rows of the log."""
         numbers, group, contacts = self.numbers, self.group, self.contacts
         numbers.last, numbers.new, workspace = contacts.t, group.is_new, contacts.gaps.workspace
-        hits, known = self.parts.hits, contacts.struck
+        hits, known = self.parts.hits, contacts.hits
         hits.fill(np.inf)
         hits[list(known)] = list(known.values()) or np.empty((0, 2))
         workspace.enter()

@@ -13,18 +13,20 @@ from ..errors import (
     SingularConfiguration,
     Status,
 )
+from ..jit.kernels import twin
 from ..maths.tolerances import EPS, NEGLIGIBLE, RANK_TOL
 from ..model.handles import handles_of
 from ..observables.generalised_forces import force_loads
 from ..observables.state import begin_memory
 from ..runs.tolerances import START_ZERO
 from ..validation import listed
+from .flights import is_pushed
 from .grips import gripped, stopping_time
 from .impacts import along_normals, held, impact_of, impulse_of, jumped
 from .phase_scenes import NAMED, gaps_of
 from .phases import Impulse, UnitModes
 from .scene_cache import prepared
-from .tolerances import ACCUMULATED, CREEPING, EVENTS_JUDGED, FLIGHT, MOST_AT_AN_INSTANT, PUSHED, ROUNDED
+from .tolerances import ACCUMULATED, CREEPING, EVENTS_JUDGED, FLIGHT, MOST_AT_AN_INSTANT, ROUNDED
 
 
 def contact_state(inertia, resting, qd, fired=()):
@@ -103,7 +105,7 @@ class Transitions:
         try:
             if len(touching) == 1 and self._bounces(touching[0], before, slots):
                 return None
-            near = self._near(touching)
+            near = self._low_flights(touching)
             inertia = Inertia(self.gaps, self.t, self.q, slots, [*touching, *near], before.closed)
             rates = inertia.rates(self.qd)
             # Rows have held the rates of closed gaps at zero, beside the velocities of all bodies; rates that are
@@ -376,25 +378,24 @@ class Transitions:
         if found is None:
             return False
         impact, after = found
-        if i in self.struck and self._is_pushed(i, impact.rate / e, e):
+        if self._is_pushed(i, impact.rate / e, e):
             return False
-        self.struck[i], self.qd = (self.t, impact.rate / e), after
+        self.hits[i], self.qd = (self.t, impact.rate / e), after
         rounding = EPS * max(self.length, ROUNDED * impact.length)
         self.phases.impulses.append((self.t, gaps.names[i], Impulse(impact.p)))
         self.modes = UnitModes(opened={i: self._opened(i, impact.rate, 0.25 * rounding)})
         return True
 
     def _is_pushed(self, i, rate, e):
-        """Whether others have pushed a gap together in a low flight since its last impact: at a rate beyond e times."""
-        t, v = self.struck[i]
+        """As `is_pushed`, of gap i."""
         low = ACCUMULATED * self.gaps.lengths(self.length)[i]
-        return e < 1.0 and t < self.t and v * (self.t - t) <= low and rate > PUSHED * e * v
+        return i in self.hits and twin(is_pushed)(*self.hits[i], self.t, low, rate, e)
 
-    def _near(self, touching):
-        """Open gaps that have flown low since an impact; forgets the impacts of others."""
-        low = ACCUMULATED * self.gaps.lengths(self.length)
-        self.struck = {i: (t, v) for i, (t, v) in self.struck.items() if v * (self.t - t) <= low[i]}
-        return sorted(i for i in self.struck if i in self.able and i not in touching and self.gap[i] <= low[i])
+    def _low_flights(self, touching):
+        """Open gaps that have flown low since an impact."""
+        low, able = ACCUMULATED * self.gaps.lengths(self.length), {*self.able}.difference(touching)
+        flown = [i for i, (t, v) in self.hits.items() if i in able and v * (self.t - t) <= low[i]]
+        return sorted(i for i in flown if self.gap[i] <= low[i])
 
     def _hit(self, inertia, touching, near, rates):
         """Jump of velocities at an impact; the rates (count,) afterwards.
@@ -404,7 +405,7 @@ class Transitions:
         the impact would push them together: they take part in it.
         """
         which, e, before = touching, self.gaps.restitution[touching].copy(), rates[touching]
-        e[[k for k, i in enumerate(touching) if i in self.struck and self._is_pushed(i, -before[k], e[k])]] = 0.0
+        e[[k for k, i in enumerate(touching) if self._is_pushed(i, -before[k], e[k])]] = 0.0
         p, qd, after = self._jump(inertia, which, before, e)
         if near:
             rounding = NEGLIGIBLE * np.abs(inertia.G[np.ix_(near, which)]) @ p[:, 0]
@@ -426,8 +427,8 @@ class Transitions:
         still = NEGLIGIBLE * inertia.sizes(self._largest(self.qd)) * (rates == 0.0)  # lifted by impulses of rounding
         after[after <= still] = 0.0
         self._note_impulses(inertia, which, p, self.qd)
-        self.struck |= {i: (self.t, -rate) for i, rate in zip(which, before.tolist(), strict=True) if rate < 0.0}
-        self.struck = {i: (t, max(v, float(after[i]))) for i, (t, v) in self.struck.items()}
+        self.hits |= {i: (self.t, -rate) for i, rate in zip(which, before.tolist(), strict=True) if rate < 0.0}
+        self.hits = {i: (t, max(v, float(after[i]))) for i, (t, v) in self.hits.items()}
         self.qd = qd
         return after
 

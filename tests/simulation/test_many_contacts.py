@@ -38,7 +38,7 @@ def stack(count, rough=False):
 
 @pytest.mark.parametrize(
     ("count", "rough"),
-    [(3, False), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((10, False), (5, True)))],
+    [(3, False), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((10, False), (5, True), (10, True)))],
 )
 def test_a_stack_of_boxes_falls_and_comes_to_rest(count, rough):
     """Contacts are redundant; the forces between boxes are the weights above, where the boxes rest.

@@ -10,7 +10,7 @@ from scipy.special import ellipk
 import tsdyn as ts
 from tests.helpers.contacts import G, bouncing, box, pendulum
 from tests.helpers.tolerances import EPS
-from tsdyn.simulation.unit_events import Leaving
+from tsdyn.simulation.contact_events import Reactions
 
 C = ts.constraints
 
@@ -158,7 +158,7 @@ def test_a_particle_leaves_a_ball_where_the_normal_force_vanishes(radius_a, radi
 @pytest.mark.parametrize(("values", "said"), [("fast", "too fast"), ("nan", "touch isn't determined")])
 def test_a_reaction_that_cannot_be_followed_ends_the_run_with_an_account(values, said, monkeypatch):
     """No more than some ten thousand reactions are evaluated."""
-    over, count = Leaving.over, 0
+    over, count = Reactions.over, 0
 
     def spoilt(self, states):
         nonlocal count
@@ -168,7 +168,8 @@ def test_a_reaction_that_cannot_be_followed_ends_the_run_with_an_account(values,
             return np.where(np.abs(found) < 0.1, np.nan, found)
         return found + np.sin(1e9 * states.t[:, None])
 
-    monkeypatch.setattr(Leaving, "over", spoilt)
+    monkeypatch.setattr(Reactions, "over", spoilt)
+    monkeypatch.setattr(Reactions, "kernel", None)
     scene = ts.Scene(gravity=(0, 0, -G))
     bead = scene.add_point_mass(mass=0.3, position=(0, 0, 1.0), velocity=(0.5, 0, 0))
     scene.add(C.SphereContact(bead, scene.ground, radius_a=0.0, radius_b=1.0, name="touch"))

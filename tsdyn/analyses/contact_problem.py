@@ -191,13 +191,9 @@ class Gaps:
         at = self._ways[i]
         return self._ways_sign[i] * tangents[..., at : at + 3]
 
-    def slips(self, t, levels, which, ways):
-        """Components (k, c) of the slips of gaps along directions (c, 3), ground frame, and their sizes (k, c).
-
-        levels (k, ...) begin with q and qd (n,).
-        """
-        ways = self._ways_sign[which, None] * ways
-        return self.workspace.slips(t, levels, self._slips[which].ravel(), self._ways[which], ways)
+    def slips(self, which):
+        """Of the slips of gaps: their rows (k, 2), where directions along these are in them (k,), and their signs."""
+        return self._slips[which], self._ways[which], self._ways_sign[which]
 
     def at(self, q, angles, t=0.0):
         """Gaps (count,) at one state; angles (angles,) near which those of joints are counted."""

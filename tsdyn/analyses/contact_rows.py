@@ -185,7 +185,8 @@ def find_open_gaps(contacts, own, t, state, out, t0, before, near):  # eight: VA
 
 
 @kernel
-def _find_rows(s, t, q, place, short, J, drift):
+def write_rows(s, t, q, place, short, J, drift):
+    """As `find_rows`."""
     set_time(s, t)
     constraint_jacobian(s, q, t, short)
     time_derivative(s, q, t, drift)
@@ -203,11 +204,11 @@ def find_rows(context, t, q, place, short, J, drift):
 
     place (m,): which row of J is that of a contact, -1 for none; short (lines, 14): scratch, zero on entry.
     """
-    _find_rows(load_contacts(context).rows, t, q, place, short, J, drift)
+    write_rows(load_contacts(context).rows, t, q, place, short, J, drift)
 
 
 @kernel
-def _write_multipliers(graph, f, lam):
+def _refine_multipliers(graph, f, lam):
     """Refine accelerations Z as `refine_accelerations` does, and write the multipliers into lam, by rows of Phi."""
     for e in range(f.b.size):
         if graph.row[e] >= 0:
@@ -246,7 +247,7 @@ def _respond(c, t, q, memory, loads, out, lam, left):
         if f.b.size > 0:
             constrain_accelerations(graph, f.rows, f.gamma, f.Z, f.b)
         if k < lam.shape[0]:
-            _write_multipliers(graph, f, lam[k])
+            _refine_multipliers(graph, f, lam[k])
             left[k] = largest(f.Z) / alone if alone > 0.0 else 0.0
         else:
             refine_accelerations(graph, f)
@@ -270,7 +271,7 @@ def _accelerate(c, t, q, qd, out, gamma, lam):
     move_bodies(graph.bodies, q, qd, f.poses)
     solve_accelerations(graph, s, w, f, t)
     if lam.size > 0:
-        _write_multipliers(graph, f, lam)
+        _refine_multipliers(graph, f, lam)
     else:
         refine_accelerations(graph, f)
     write_accelerations(graph.bodies, f.poses, f.Z, out)
@@ -321,7 +322,7 @@ def bounce_off(context, impact, t, q, qd, memory):
     w.place[i] = 0
     rows[:, :] = 0.0
     gamma[:, :] = 0.0
-    _find_rows(c.rows, t, q, w.place, w.short, rows[:1], gamma[0])
+    write_rows(c.rows, t, q, w.place, w.short, rows[:1], gamma[0])
     J, response, after, qdd = rows[0], rows[1], rows[2], rows[3]
     for j in range(J.size):
         J[j] *= sign
@@ -402,21 +403,27 @@ def _evaluate(c, t, levels):
     return factorise_rows(graph, s, f, f.rows, t, DYNAMICS)
 
 
-@entry("pvmvdm")
-def find_multipliers(context, t, levels, memory, redundant, out):
-    """out (k, m): multipliers at times t (k,) and states on the manifold, levels (k, 3 n), by the equations of motion.
+@kernel
+def write_multipliers(c, t, levels, redundant, out):
+    """out (m,): multipliers at t and a state on the manifold, levels (3 n,), by the equations of motion.
 
     redundant: what is written at redundant rows. NaN where there are none.
     """
+    regular = _evaluate(c, t, levels)
+    solve_accelerations(c.graph, c.system, c.work, c.tangent, t)
+    for e in range(c.tangent.b.size):
+        if c.graph.row[e] >= 0:
+            out[c.graph.row[e]] = c.tangent.b[e] if regular else math.nan
+    mark_redundant(c.graph, c.tangent, redundant, out)
+
+
+@entry("pvmvdm")
+def find_multipliers(context, t, levels, memory, redundant, out):
+    """out (k, m): the same at times t (k,) and levels (k, 3 n)."""
     c = load_parts(context)
     recall(c.system, memory)
     for k in range(t.size):
-        regular = _evaluate(c, t[k], levels[k])
-        solve_accelerations(c.graph, c.system, c.work, c.tangent, t[k])
-        for e in range(c.tangent.b.size):
-            if c.graph.row[e] >= 0:
-                out[k, c.graph.row[e]] = c.tangent.b[e] if regular else math.nan
-        mark_redundant(c.graph, c.tangent, redundant, out[k])
+        write_multipliers(c, t[k], levels[k], redundant, out[k])
 
 
 @entry("pvmvdmm")
@@ -438,32 +445,8 @@ def find_reactions(context, t, levels, memory, redundant, out, loads):
             loads[k, i] = r.load[7 * i] if found else math.nan
 
 
-@entry("pvmwwmmmvm")
-def find_slips(context, t, levels, place, at, ways, short, J, drift, out):  # ten: all of the slips
-    """out (k, 2 c): components of slips along ways d (c, 3), ground frame, and their sizes.
-
-    J (2 c, n): scratch for the rows of slips, of which `place` is as of `find_rows`; at (c,): where the coordinates of
-    the body at whose point the first three of a row are directions of the ground frame begin.
-    """
-    s, n, c = load_contacts(context).rows, J.shape[1], at.size
-    for k in range(t.size):
-        J[:, :] = 0.0
-        _find_rows(s, t[k], levels[k, :n], place, short, J, drift)
-        for i in range(c):
-            along, square = 0.0, 0.0
-            for r in range(2 * i, 2 * i + 2):
-                v, d = 0.0, 0.0
-                for j in range(n):
-                    v += J[r, j] * levels[k, n + j]
-                for j in range(3):
-                    d += J[r, at[i] + j] * ways[i, j]
-                along += v * d
-                square += v * v
-            out[k, i], out[k, c + i] = along, math.sqrt(square)
-
-
 KERNELS = (
-    find_gaps, measure_opened, find_open_gaps, find_rows, find_slips, respond, accelerate, bounce_off, bounce, gain,
+    find_gaps, measure_opened, find_open_gaps, find_rows, respond, accelerate, bounce_off, bounce, gain,
     find_multipliers, find_counted_angles, *SURVEYING, *SEARCHING, *CONES,
 )  # fmt: skip
 
@@ -525,10 +508,11 @@ class ContactWorkspace:
         self.n, self.m, self._free = int(contacts.system.bodies[:, 1].sum()), len(contacts.system.segments), free
         rows, self._graph = with_short_rows(contacts), None
         self._rows, self._all = rows._replace(reals=rows.reals.copy()), np.arange(self.m)
+        # Addresses of the rows; scratch for them, (lines, 14), zero on entry, is `short`
         self.rows_address, self._keep_rows = resident(self._rows)
         self._bilateral = len(free.system.segments)
         spans = rows.segments, free.system.inertia_segments
-        self._short, self._inertias = (np.zeros((len(x), WIDTH)) for x in spans)
+        self.short, self._inertias = (np.zeros((len(x), WIDTH)) for x in spans)
         answered = interrupts_answered() if calls_laws(free) else lambda kernel: kernel
         self._accelerate, self._bounce = answered(accelerate), answered(bounce)
         self.enter()
@@ -555,19 +539,8 @@ class ContactWorkspace:
             place = np.full(self.m, -1)
             place[which] = np.arange(len(which))
         J, drift = np.zeros((self.m if which is None else len(which), self.n)), np.zeros(self.m)
-        find_rows(self.address, t, q, place, self._short, J, drift)
+        find_rows(self.address, t, q, place, self.short, J, drift)
         return J, drift
-
-    def slips(self, t, levels, which, at, ways):
-        """Components (k, c) of slips along directions (c, 3), and their sizes (k, c), as of the kernel.
-
-        which (2 c,): rows of the slips; levels (k, ...) begin with q and qd (n,).
-        """
-        place, J, drift = np.full(self.m, -1), np.zeros((which.size, self.n)), np.zeros(self.m)
-        place[which], out = np.arange(which.size), np.empty((t.size, which.size))
-        rows = levels.reshape(t.size, math.prod(levels.shape[1:]))
-        find_slips(self.address, t, rows, place, at, ways, self._short, J, drift, out)
-        return out[:, : at.size], out[:, at.size :]
 
     def respond(self, t, q, memory, loads):
         """Accelerations (k, n) by loads (k, n), which must be contiguous."""
@@ -613,7 +586,7 @@ class ContactWorkspace:
     @cached_property
     def impact(self):
         """The `Impact` of kernels, its address, and what keeps that."""
-        scratch = np.empty(self.m, int), self._short, np.empty((4, self.n)), np.empty((2, self.m)), self._inertias
+        scratch = np.empty(self.m, int), self.short, np.empty((4, self.n)), np.empty((2, self.m)), self._inertias
         made = Impact(ImpactNumbers(kernel=bounce_off.address), *scratch)
         return made, *resident(made)
 

@@ -1,6 +1,7 @@
 """Event functions that are evaluated together, such as the gaps of contacts: most need no search in a step."""
 
 import math
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,9 @@ class States(NamedTuple):
     levels: np.ndarray  # (k, 3, n)  q, qd, qdd
     memory: np.ndarray  # what forces remember
     counted: object  # a function that returns the counted angles (k, angles) of joints
+    beside: tuple  # where the step begins: the time, the state (3, n), angles (angles,) of joints, roughly
 
+    n = property(lambda self: self.levels.shape[2])
     q, qd, qdd = (property(lambda self, i=i: np.ascontiguousarray(self.levels[:, i])) for i in range(3))
 
 
@@ -39,12 +42,6 @@ class GroupMember:
 
     def __init__(self, over, which):
         self.over, self.which = over, which
-
-    def __call__(self, t, instant):
-        """The value at one state."""
-        levels = np.array([[instant.q, instant.qd, instant.qdd]])
-        states = States(np.array([t]), levels, instant.memory, lambda: instant.angles[None])
-        return float(self.over(states)[0, self.which])
 
 
 class Group:
@@ -73,11 +70,10 @@ class Group:
     """
 
     def __init__(self, over, events, numbers, spins, n, angles):
-        self.over, self.numbers, self.degree = over, numbers, 0
+        self.over, self.numbers, self.degree, self._sizes = over, numbers, 0, (spins, n, angles)
         own = [events[i] for i in numbers]
         self.which = [event.function.which for event in own]
-        source = getattr(over, "__self__", None)
-        known, kernel = (getattr(source, name, None) for name in ("noise", "kernel"))
+        known = getattr(self._source, "noise", None)
         self.least = np.zeros(len(own)) if known is None else known[self.which]
         self.value, self.noise = np.zeros(len(own)), np.zeros(len(own))
         self._odd = np.zeros(len(own), int)  # 1 where the `Track` knows more than the value
@@ -86,10 +82,21 @@ class Group:
         self._may_fall = np.array([event.falls for event in own])
         self._some_may_fall = self._may_fall.any()
         self._falls = np.array([event.direction if event.limit == 1.0 else 0.0 for event in own])
-        self.kernel = self.beside = None
-        if kernel is not None and all(self._exact) and not self._some_may_fall:
-            known = self.value, self.noise, self._odd
-            self.kernel = GroupSearch(kernel, self.which, self._falls, known, spins, n, angles)
+        self.beside = None
+
+    @property
+    def _source(self):
+        """What the functions belong to."""
+        return getattr(self.over, "__self__", None)
+
+    @cached_property
+    def kernel(self):
+        """As of the class; made at the first evaluation, since the start of a run may show that rows are redundant."""
+        kernel = getattr(self._source, "kernel", None)
+        if kernel is None:
+            return None
+        known = self._may_fall.astype(int), self.least, self.value, self.noise, self._odd
+        return GroupSearch(kernel, self.which, self._falls, known, *self._sizes)
 
     def begin(self, values):
         """Take the values (members,) at the start of a run."""
@@ -128,14 +135,14 @@ class Group:
 
     def _fallen(self, samples, left):
         """A member, of those `left`, that falls from zero within rounding at the start, or None."""
-        scale = np.abs(samples).max(initial=0.0)
+        scale = np.abs(samples[:, self._may_fall[left]]).max(initial=0.0)
         zero = self._may_fall[left] & (np.abs(samples[0]) <= FROM_REST * scale)
         falls = zero & (samples.max(axis=0) <= FROM_REST * scale) & (samples[-1] < -FALLEN * scale)
         return int(left[falls.argmax()]) if falls.any() else None
 
     def search_by_kernel(self, step):
         """As `search`; None where the kernel is unsure, or there is none."""
-        found = None if self.kernel is None else self.kernel.find(step)
+        found = None if self.kernel is None else self.kernel.find(step, self.is_new)
         if found is None:
             return None
         self.is_new, self.beside = False, self.kernel.parts.beside

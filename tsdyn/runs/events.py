@@ -9,16 +9,16 @@ import numpy as np
 from ..elements.bodies import largest_of_kind, turning
 from ..errors import InvalidArgument, Status
 from ..jit.interrupts import deferred_interrupts
+from ..jit.kernels import resident
 from ..maths.root_isolation import LARGEST, Search, TooFast
 from ..maths.tolerances import EPS, MOST_SCALED
 from ..model.handles import all_angles, counted, handles_of
 from ..model.joint_turns import find_counted_angles
 from ..observables.state import EventInstant
 from ..validation import demand, demand_numbers, is_count, number
-from ..workspaces import B_END, STORED
 from . import tolerances as limits
 from .event_groups import Group, GroupMember, States
-from .run_memory import Memory
+from .run_memory import Memory, end_run
 
 # Users' event functions of time and state, with the attributes `terminal` and `direction` of SciPy's solve_ivp.
 
@@ -98,6 +98,7 @@ class Inside:
 
     def __init__(self, reader, run, log, start, spins):
         (self.t0, before, self.near), self.t1, self._spins = start, run.clock.t, spins
+        self.memory = run.remembered[self.near.size :]
         t0 = self.t0
         self.reader, self.steps = reader, (run.block, log.charts, log.points)
         self.known = {t0: before, self.t1: run.now.copy()}
@@ -193,7 +194,7 @@ class Watch:
     `resume` has
 
         resume(t, run, numbers)         whether the run goes on after events of these numbers, with other velocities
-        flights(group, memory, reader)  the `Flights` of a memory, in which Python has nothing to do; None for none
+        flights(groups, memory, reader) the `Flights` of a memory, in which Python has nothing to do; None for none
         land(flights)                   takes the impacts of the last flight
 
     Attributes
@@ -207,6 +208,7 @@ class Watch:
         self.start = self.t = start
         self.state = self.memory = None  # at t, and what is remembered of it: joints' angles, and what forces do
         self.angles = handles_of(packed).count
+        self._resident = (None,)  # a run, its address, and what keeps that
         self.beside = None  # the start of the present step, for `EventInstant`
         self.tracks = None
         self.list = [[] for _ in events]
@@ -290,9 +292,9 @@ class Watch:
 
     def _flights(self, memory):
         """The `Flights` of a memory; False where there are none."""
-        if self.resume is None or self._single or len(self._groups) != 1 or not isinstance(memory, Memory):
+        if self.resume is None or self._single or not self._groups or not isinstance(memory, Memory):
             return False
-        return self.resume.flights(self._groups[0], memory, self.reader) or False
+        return self.resume.flights(self._groups, memory, self.reader) or False
 
     def _fly(self, run, log, most):
         """Make steps and impacts; the Status, how many rows of the log that took, whether a step is to be searched."""
@@ -308,7 +310,7 @@ class Watch:
             self.t, self.state, self.memory = run.clock.t, run.now.copy(), run.remembered.copy()
         if numbers.ended == NOT_BEGUN:
             if run.numbers.begun:
-                self._at_start(flights.group)  # says why
+                self._at_start(flights.groups[0])  # says why
             run.numbers.begun = 1  # there is a run so far
         return status, numbers.used, unsearched
 
@@ -432,7 +434,8 @@ class Watch:
 
     def _states(self, times, levels):
         """What groups are given: times t (k,), levels (k, 3, n)."""
-        return States(times, levels, self.memory[self.angles :], lambda: self._counted(times, levels))
+        memory = self.memory[self.angles :]
+        return States(times, levels, memory, lambda: self._counted(times, levels), self.beside)
 
     def _sample(self, group, times, levels):
         """Values (k, members) of a group."""
@@ -440,9 +443,11 @@ class Watch:
 
     def _at_start(self, group):
         """Values (members,) of a group where it begins."""
+        finite = False
         if group.kernel is not None:
-            values, finite = group.kernel.at(*self.beside)
-        else:
+            values, finite = group.kernel.at(*self.beside, self.memory[self.angles :])
+        if not finite:  # as where dependent rows share reactions, which a kernel doesn't know of
+            group.kernel = None
             values = self._sample(group, np.array([self.t]), self.state[None])[0]
             finite = np.isfinite(values).all()
         if not finite:
@@ -718,18 +723,8 @@ class Watch:
     def _at(self, i, step, t):
         return self._value(i, t, step.at(t, not isinstance(self.events[i].function, GroupMember)))
 
-    @staticmethod
-    def _end(run, log, t, state, start):
+    def _end(self, run, log, t, state, start):
         """Let the run end at t, within the step that began at `start`."""
-        run.now[:] = state
-        run.clock.t = t
-        if log.t_eval.size > 0:
-            while run.numbers.rows > 0 and log.out[run.numbers.rows - 1, 0] > t:
-                run.numbers.rows -= 1
-        elif t > start:
-            row = log.out[run.numbers.rows - 1]
-            row[0], row[1 : 1 + state.size], row[1 + state.size :] = t, state.ravel(), run.remembered
-        else:
-            run.numbers.rows -= 1
-        if run.numbers.dense == STORED:
-            log.blocks[run.numbers.blocks - 1, B_END] = t
+        if self._resident[0] is not run:
+            self._resident = run, *resident(run)
+        end_run(self._resident[1], t, start, state, log)

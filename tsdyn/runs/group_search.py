@@ -9,7 +9,7 @@ from ..jit.kernels import Record, callback, caller, data_of, entry, kernel, load
 from ..maths.dense_linalg import copy, is_finite
 from ..maths.root_isolation import CHECK, FINE, LARGEST, LOWEST, kernel_table, kernel_tables, look
 from .dense_output import OTHER_CHART, SAME_STEP, WHOLE, read_one
-from .tolerances import ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTLY, SHOWN_TURN
+from .tolerances import FROM_REST, ROOT, ROOT_STEPS, ROUGH_ROOT, SAME_INSTANT, SHORTLY, SHOWN_TURN
 
 # Newton's method for the function of a survey that crosses zero first.
 
@@ -64,6 +64,7 @@ class SearchNumbers(Record):
     place: int  # of the next time that is read, as of `dense_output.read`
     t0: float  # s, the step
     t1: float
+    new: int  # whether no step has been searched since the run has begun
     found: int  # the function that is zero first
     t: float  # when, s
 
@@ -76,9 +77,12 @@ class SearchParts(NamedTuple):
     spins: np.ndarray  # int64 (bodies, 4) as a vector: where Euler parameters are
     which: np.ndarray  # int64 (m,)  of all functions
     falls: np.ndarray  # (m,)  direction of the changes that end the run, or zero
-    value: np.ndarray  # (m,)  at the end of the last step
+    may_fall: np.ndarray  # int64 (m,)  1 of those that may begin at zero within rounding, and fall at once
+    least: np.ndarray  # (m,)  rounding of values that is known beforehand
+    value: np.ndarray  # (m,)  at the end of the last step that is clear of zeros
     noise: np.ndarray  # (m,)  rounding of values
     odd: np.ndarray  # int64 (m,)  1 where a `Track` knows more than the value
+    last: np.ndarray  # (m,)  values at the end of the step that has been searched
     all: np.ndarray  # values
     samples: np.ndarray  # ((LARGEST + 4) m,)
     left: np.ndarray  # int64 (m,)  1 of those that the survey is of
@@ -88,12 +92,13 @@ class SearchParts(NamedTuple):
     state: np.ndarray  # (3, n)  the last that was read
     beside: np.ndarray  # int64 (m,)  1 of those that vanish with the one that is found
     near: np.ndarray  # (angles,)  of joints where the step began, roughly
+    memory: np.ndarray  # what forces remember, where the functions read it
 
 
 _EXAMPLE = SearchParts(
-    SearchNumbers(), np.zeros(0), *np.zeros((2, 0), int), *np.zeros((3, 0)), np.zeros(0, int),
-    *np.zeros((2, 0)), np.zeros(0, int), *np.zeros((2, 0, 0)), np.zeros(0), np.zeros((0, 0)), np.zeros(0, int),
-    np.zeros(0),
+    SearchNumbers(), np.zeros(0), *np.zeros((2, 0), int), np.zeros(0), np.zeros(0, int), *np.zeros((3, 0)),
+    np.zeros(0, int), *np.zeros((3, 0)), np.zeros(0, int), *np.zeros((2, 0, 0)), np.zeros(0), np.zeros((0, 0)),
+    np.zeros(0, int), *np.zeros((2, 0)),
 )  # fmt: skip
 load_search = loader(_EXAMPLE)
 
@@ -194,14 +199,42 @@ def _survey(s, step, t0, t1, turning):
 
 
 @kernel
-def _mark(s):
-    """Leave slopes to the functions that cross zero once, and no time to those clear of it; whether all are clear."""
-    clear = True
+def _may_have_fallen(s, samples):
+    """Whether a function that may begin at zero within rounding does so."""
+    scale, first = 0.0, math.inf
     for j in range(s.value.size):
-        is_clear = s.left[j] == 0 or s.marks[j, 0] == math.inf
-        clear = clear and is_clear
+        if s.may_fall[j] != 0:
+            scale, first = max(scale, _size(samples, j)), min(first, abs(samples[0, j]))
+    return first <= FROM_REST * scale
+
+
+@kernel
+def _size(samples, j):
+    """The largest value of a function."""
+    found = 0.0
+    for i in range(samples.shape[0]):
+        found = max(found, abs(samples[i, j]))
+    return found
+
+
+@kernel
+def _mark(s, samples):
+    """Leave slopes to the functions that cross zero once, and no time to those clear of it; whether all are clear.
+
+    Values of known rounding alone have no zero. UNSURE where a `Track` knows more of a function that isn't clear on the
+    side that it falls from.
+    """
+    clear = 1
+    for j in range(s.value.size):
+        is_clear = s.left[j] == 0 or s.marks[j, 0] == math.inf or _size(samples, j) <= s.least[j]
+        if s.odd[j] != 0 and not (is_clear and s.falls[j] * samples[samples.shape[0] - 1, j] < 0.0):
+            return UNSURE
+        if not is_clear:
+            clear = 0
         if is_clear or not (s.marks[j, 1] > s.marks[j, 0] and s.falls[j] * s.value[j] < 0.0):
             s.marks[j, 3] = math.nan
+        if is_clear:
+            s.marks[j, 0] = math.inf
     return clear
 
 
@@ -267,13 +300,15 @@ def find_first(search, context, run, first, second, arrays):
     numbers.place, numbers.found = OTHER_CHART, -1
     for j in range(m):
         s.left[j] = 1
-        if s.odd[j] != 0:
-            return UNSURE
     while True:
         degree = _survey(s, step, t0, end, turning)
-        if degree == 0:
+        samples = matrix(data_of(s.samples), degree + 2, m)
+        if degree == 0 or (numbers.new != 0 and numbers.found < 0 and _may_have_fallen(s, samples)):
             return UNSURE
-        if _mark(s):
+        clear = _mark(s, samples)
+        if clear == UNSURE:
+            return UNSURE
+        if clear == 1:
             break
         width = end - t0
         if _first_root(s, step, scratch[0], width) != ARRIVED:
@@ -286,13 +321,21 @@ def find_first(search, context, run, first, second, arrays):
         if not unclear:
             break
     if numbers.found < 0:
-        copy(matrix(data_of(s.samples), degree + 2, m)[degree + 1], s.value)
+        copy(samples[degree + 1], s.last)
         return CLEAR
     numbers.t = end
     return FOUND if _find_beside(s, step, end, degree, width, scratch[0], scratch[1]) else UNSURE
 
 
 call_find = caller("pppppp")
+
+
+@kernel
+def take_step(s):
+    """Take the values at the end of a step that is clear of zeros."""
+    copy(s.last, s.value)
+    s.odd[:] = 0
+    s.numbers.new = 0
 
 
 @entry("pppppmmvmm")
@@ -319,7 +362,32 @@ def evaluate_functions(search, first, second, t, now, out):
     return begin_functions(load_search(search), first, second, t, now, out)
 
 
-SEARCHING = (move, find_first, search_step, evaluate_functions)
+@entry("pppvmdmvm")
+def evaluate_over(kernel, first, second, t, levels, t0, before, near, out):  # nine: as of VALUES
+    """out (k, all): values by the kernel at this address, at times t (k,) and levels (k, 3 n)."""
+    for k in range(t.size):
+        call_values(kernel, first, second, t[k], levels[k], out[k], t0, before, near)
+
+
+SEARCHING = (move, find_first, search_step, evaluate_functions, evaluate_over)
+
+
+class KernelFunctions:
+    """Event functions that a kernel evaluates; the base of those with more to say.
+
+    Attributes
+    ----------
+    kernel : tuple
+        As of `GroupSearch`.
+    """
+
+    def over(self, states):
+        """Values (k, count) of `States`."""
+        called, *contexts, count, memory = self.kernel
+        memory[:] = states.memory[: memory.size]
+        levels, out = states.levels.reshape(states.t.size, 3 * states.n), np.empty((states.t.size, count))
+        evaluate_over(called.address, *contexts, states.t, levels, *states.beside, out)
+        return out
 
 
 class GroupSearch:
@@ -328,13 +396,14 @@ class GroupSearch:
     Parameters
     ----------
     kernel : tuple
-        Of the functions: the `Callback` with the types VALUES, its contexts, and how many functions it evaluates.
+        Of the functions: the `Callback` with the types VALUES, its contexts, how many functions it evaluates, and the
+        array that it reads what forces remember from.
     which : list of int
         Those of the group.
     falls : ndarray (m,)
         Directions of the changes that end the run.
     known : tuple of ndarray
-        `value`, `noise` and `odd` of the `SearchParts`.
+        `may_fall`, `least`, `value`, `noise` and `odd` of the `SearchParts`.
     spins : ndarray (bodies, 4)
         Where Euler parameters are among n coordinates.
     n : int
@@ -343,27 +412,38 @@ class GroupSearch:
     """
 
     def __init__(self, kernel, which, falls, known, spins, n, angles):
-        (called, *self.contexts, count), m = kernel, len(which)
+        (called, *self.contexts, count, memory), m = kernel, len(which)
         self.numbers = SearchNumbers(values=called.address, finder=find_first.address)
         self.parts = SearchParts(
-            self.numbers, kernel_tables(), spins.ravel(), np.array(which, int), falls, *known, np.zeros(count),
-            np.zeros((LARGEST + 4) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)), np.zeros((m, 4)),
-            np.zeros(3), np.zeros((3, n)), np.zeros(m, int), np.zeros(angles),
+            self.numbers, kernel_tables(), spins.ravel(), np.array(which, int), falls, *known, np.zeros(m),
+            np.zeros(count), np.zeros((LARGEST + 4) * m), np.zeros(m, int), np.zeros((2, FINE * LARGEST + 1)),
+            np.zeros((m, 4)), np.zeros(3), np.zeros((3, n)), np.zeros(m, int), np.zeros(angles), memory,
         )  # fmt: skip
         self.address, self._keep = resident(self.parts)
 
-    def at(self, t, now, near):
+    def at(self, t, now, near, memory):
         """Values (m,) at t and a state (3, n), and whether they are finite; near (angles,): of joints, roughly."""
-        self.parts.near[:] = near
+        self._enter(near, memory)
         out = np.empty(self.parts.value.size)
         return out, evaluate_functions(self.address, *self.contexts, t, now, out) == 1
 
-    def find(self, step):
-        """The number of the function that is zero first in a step, `Inside`, -1 for none; None where that is unsure."""
+    def _enter(self, near, memory):
+        self.parts.near[:] = near
+        self.parts.memory[:] = memory[: self.parts.memory.size]
+
+    def find(self, step, is_new):
+        """The number of the function that is zero first in a step, `Inside`, -1 for none; None where that is unsure.
+
+        is_new: whether no step has been searched since the start. Of a step without zeros the values at its end are
+        taken.
+        """
         numbers, reader, known = self.numbers, step.reader, step.known
-        numbers.t0, numbers.t1, (numbers.reader, context, run) = step.t0, step.t1, reader.where
-        contexts, self.parts.near[:] = (self.address, context, run, *self.contexts), step.near
+        numbers.t0, numbers.t1, (numbers.reader, context, run), numbers.new = step.t0, step.t1, reader.where, is_new
+        self._enter(step.near, step.memory)
+        contexts = self.address, context, run, *self.contexts
         found = reader.call(search_step, *contexts, known[step.t0], known[step.t1], *step.steps)
-        if found == FOUND:
+        if found == CLEAR:
+            self.parts.value[:], self.parts.odd[:] = self.parts.last, 0
+        elif found == FOUND:
             known[numbers.t] = self.parts.state.copy()
         return None if found == UNSURE else numbers.found

@@ -13,7 +13,7 @@ from ..maths.dense_linalg import copy
 from ..methods.explicit import ACCELERATE, PLACE
 from ..model.laws import calls_laws, interrupts_answered
 from ..rows.interface import reset_selection, selection_parts, set_selection
-from ..workspaces import FILLED, STORED, LevelControl, divided, enter_joints, load_run, set_tolerances, words
+from ..workspaces import B_END, FILLED, STORED, LevelControl, divided, enter_joints, load_run, set_tolerances, words
 from .run_log import close_chart, no_log
 from .task import step_count
 from .tolerances import LONG_STEPS, PIECE
@@ -157,6 +157,34 @@ def go_back(s, r, log):
     for j in range(s.memory.size):
         s.reals[s.memory[j]] = r.remembered[r.joints.shape[0] + j]
     numbers.begun = 0
+
+
+@kernel
+def end_step(r, log, t, start, state):
+    """Let a run end at t, within the step that began at `start`, with a state (3, n) and what it remembers."""
+    numbers, n = r.numbers, r.now.shape[1]
+    r.clock.t = t
+    for j in range(3):
+        copy(state[j], r.now[j])
+    if log.t_eval.size > 0:
+        while numbers.rows > 0 and log.out[numbers.rows - 1, 0] > t:
+            numbers.rows -= 1
+    elif t > start:
+        row = log.out[numbers.rows - 1]
+        row[0] = t
+        for j in range(3):
+            copy(state[j], row[1 + j * n : 1 + (j + 1) * n])
+        copy(r.remembered, row[1 + 3 * n :])
+    else:
+        numbers.rows -= 1
+    if numbers.dense == STORED:
+        log.blocks[numbers.blocks - 1, B_END] = t
+
+
+@entry("pddm", no_log())
+def end_run(run, t, start, state, log):
+    """As `end_step`."""
+    end_step(load_run(run), log, t, start, state)
 
 
 @entry("pp", no_log())

@@ -35,7 +35,7 @@ class Checkpoints:
         phases, arrays = self.phases.saved()
         numbers = {name: getattr(self, name) for name in KEPT} | {"modes": self.modes.saved(), "phases": phases}
         numbers |= {"changes": plain((self.inactive, self.values)), "switched": sorted(self.switched)}
-        numbers |= {"fast": plain(self.fast), "hits": plain(self.hits)}
+        numbers |= {"fast": plain(self.halting.fast if self.halting else {}), "hits": plain(self.hits)}
         starts = {"first.": self.first, "": (self.t, self.q, self.qd, self.remembered)}
         for where, (_, *parts) in starts.items():
             arrays |= {f"{where}{name}": array for name, array in zip(START, parts, strict=True)}
@@ -64,7 +64,7 @@ class Checkpoints:
             inactive, values = known["changes"]
             self.change(tuple(inactive), dict(values))
             self.switched |= set(known["switched"])
-            self.modes, self.fast = UnitModes.of(known["modes"]), dict(known["fast"])
+            self.modes, self.known_fast = UnitModes.of(known["modes"]), dict(known["fast"])
             self.hits = {i: tuple(pair) for i, pair in known["hits"]}
             if known["sampling"] is not None:
                 self.sampling = Sampling(prepared(phase_of(self.scene, [])), True)

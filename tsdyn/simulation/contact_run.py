@@ -39,10 +39,11 @@ from ..runs.run_log import ChartLog, RunEnd, StepLog
 from ..runs.task import Outcome, interval, output_times, state_arrays
 from ..runs.tolerances import START_ZERO
 from ..validation import counted, listed
-from . import flights, hybrid
+from . import contact_events, flights, hybrid
 from .checkpoints import Checkpoints
-from .grips import Halting, Reactions, items_of
-from .phase_scenes import NAMED, dependent, first_row_of, gaps_of, inactive_of, phase_of, with_own_parts
+from .contact_events import Halting, Reactions
+from .grips import items_of
+from .phase_scenes import NAMED, dependent, gaps_of, inactive_of, phase_of, with_own_parts
 from .phases import Impulse, PhasePieces, Phases, Pinned, UnitModes
 from .run_options import RunCall, RunOptions
 from .scene_cache import prepared, prepared_numbers
@@ -50,7 +51,7 @@ from .segments import summed
 from .termination import reporter, silent
 from .tolerances import PENETRATION
 from .transitions import Transitions
-from .unit_events import Breaking, Closing, Leaving, Slowing
+from .unit_events import Breaking, Closing, Slowing
 
 # A run with contacts is a sequence of phases. A scene has units: gaps, each open or closed. A phase is a run of the
 # scene with the units in their modes, the closed gaps as bilateral rows, and ends at the first zero of what a unit
@@ -88,7 +89,9 @@ FAILURES = {
 @cache
 def _compile_once(slides):
     """Have compiled what events need; slides: whether there is exact friction of joints."""
-    compile_ahead((*contact_rows.KERNELS, *flights.KERNELS, *(friction_units.KERNELS if slides else ())))
+    compile_ahead(
+        (*contact_rows.KERNELS, *contact_events.KERNELS, *flights.KERNELS, *(friction_units.KERNELS if slides else ()))
+    )
 
 
 class _ContactRun(Transitions, Checkpoints):
@@ -139,7 +142,7 @@ class _ContactRun(Transitions, Checkpoints):
         self.replaced, self.written = False, {}  # whether another method runs the phase; rows in the archive before it
         self.lowered = set()  # times of impacts at which less than the coefficients of restitution acts
         self.first = self.known = None  # how the run of the phase began; how a checkpoint has it
-        self.fast = {}  # see `Halting`
+        self.halting, self.known_fast = None, {}  # of the phase: `Halting`; what a checkpoint has of it
         self.hits = {}  # of gaps after impacts: the time, and the largest rate since and just before
 
     def _take_scene(self, scene, inactive=None, values=None):
@@ -363,13 +366,13 @@ class _ContactRun(Transitions, Checkpoints):
         self.again.append(t)
         return True
 
-    def flights(self, group, memory, reader):
+    def flights(self, groups, memory, reader):
         """As of `Watch`."""
-        bounce = self.gaps.restitution[self.able].any() and not self.gaps.rough[self.able].all()
-        plain = bounce and not self.frictions.count and self.modes.same(UnitModes())
-        if not (plain and flights.Flights.serve(memory, group)):
+        if not flights.Flights.serve(memory, groups):
             return None
-        return flights.Flights(self, group, memory, reader)
+        bounce = self.gaps.restitution[self.able].any() and not self.gaps.rough[self.able].all()
+        plain = bounce and not self.frictions.count and self.modes.same(UnitModes()) and memory.begins_again
+        return flights.Flights(self, groups, memory, reader, plain)
 
     def land(self, flown):
         """As of `Watch`."""
@@ -451,14 +454,11 @@ class _ContactRun(Transitions, Checkpoints):
 
     def _watches(self, phase):
         """Yield the units that may end a phase, gaps and then frictions, each with its event."""
-        gaps, frictions, modes, packed = self.gaps, self.frictions, self.modes, phase.packed
+        gaps, frictions, modes, packed, self.halting = self.gaps, self.frictions, self.modes, phase.packed, None
         if modes.grips:
             yield from self._rubbing(packed)
         else:
-            first = first_row_of(packed)
-            sides = [gaps.list[i].side for i in modes.closed]
-            rows, slack = [first[id(side.row)] for side in sides], [modes.slack.get(i, 0.0) for i in modes.closed]
-            leaving = Leaving(packed, rows, [side.sign for side in sides], slack).over
+            leaving = Reactions(gaps, modes, packed).over
         self.closing = Closing(gaps, modes.opened, modes.lifted)
         for i in self.able:
             if i in modes.idle or (modes.grips and i in modes.closed):
@@ -493,10 +493,10 @@ class _ContactRun(Transitions, Checkpoints):
         for k, i in enumerate([*pushing.closed, *(grips + i for i in pushing.sticks)]):
             yield i, Event(GroupMember(pushing.over, k), gaps.names[i % grips], 1.0, -1.0, False)
         slides = [i for i in modes.closed if modes.slides(i)]
-        self.fast = {} if self.known is None else self.fast
-        halting = Halting(gaps, slides, NEGLIGIBLE * self._slip_terms(slides), modes.rising, self.fast)
+        known = {} if self.known is None else self.known_fast
+        self.halting = Halting(gaps, slides, NEGLIGIBLE * self._slip_terms(slides), modes.rising, known)
         for k, i in enumerate(slides):
-            yield grips + i, Event(GroupMember(halting.over, k), gaps.names[i], 1.0, -1.0, False)
+            yield grips + i, Event(GroupMember(self.halting.over, k), gaps.names[i], 1.0, -1.0, False)
 
     def _slip_terms(self, which):
         """Sizes (k,) of the terms of slips at the present velocities."""

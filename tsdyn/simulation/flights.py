@@ -1,4 +1,4 @@
-"""Runs from impact to impact by one kernel call: steps, their searches, and impacts of single gaps without friction."""
+"""Phases by one kernel call: steps, their searches, and impacts of single gaps without friction."""
 
 from typing import NamedTuple
 
@@ -19,16 +19,16 @@ from ..maths.dense_linalg import copy
 from ..maths.tolerances import EPS
 from ..model.joint_turns import angle_after
 from ..runs.events import NOT_BEGUN, UNBEGUN, UNSEARCHED
-from ..runs.group_search import CLEAR, FOUND, StepArrays, begin_functions, call_find, load_search
+from ..runs.group_search import CLEAR, FOUND, StepArrays, begin_functions, call_find, load_search, take_step
 from ..runs.run_log import no_log
-from ..runs.run_memory import STATUSES, begin_again, call_driver, go_back, load_restart
+from ..runs.run_memory import STATUSES, begin_again, call_driver, end_run, end_step, go_back, load_restart
 from ..runs.tolerances import LONG_STEPS, START_ZERO
-from ..workspaces import B_END, STORED, load_run
+from ..workspaces import load_run
 from .tolerances import ACCUMULATED, EVENTS_JUDGED, FLIGHT, PENETRATION, PUSHED, ROUNDED
 
-# Where nothing of the user's is asked, and no gap is closed, a run is steps and impacts. What is more than the impact
-# of one gap, which opens again, is left to Python: there the last step is searched once more. Python takes over the
-# impacts of a call afterwards.
+# Where nothing of the user's is asked, a phase is steps, which are searched for its end. Where all gaps are open and
+# there is no friction, the impact of one gap, which opens again, is made here, too. What is more is left to Python:
+# there the last step is searched once more. Python takes over the impacts of a call afterwards.
 
 SLICE_DONE = int(Status.SLICE_DONE)
 ROW = 7  # numbers of an impact
@@ -41,10 +41,10 @@ class FlightNumbers(Record):
     context: int  # of the driver, and its run
     run: int
     restart: int  # `run_memory.Restart`
-    search: int  # `SearchParts`
     reader: int  # contexts of what reads states
     read_run: int
-    rows: int  # contexts of the functions
+    bounces: int  # whether impacts are made here
+    rows: int  # contexts of the gaps
     own: int
     contacts: int  # `ContactParts`
     impact: int  # `contact_rows.Impact`
@@ -62,6 +62,7 @@ class Flight(NamedTuple):
     """What the kernel of flights has of its own."""
 
     numbers: FlightNumbers
+    searches: np.ndarray  # int64 (groups, 3)  `SearchParts` of each group, and two contexts of its functions
     sign: np.ndarray  # (gaps,)
     restitution: np.ndarray  # (gaps,)  zero of those whose impacts are left to Python
     lengths: np.ndarray  # (gaps,)  what rounding of gaps is a part of
@@ -77,32 +78,19 @@ class Flight(NamedTuple):
 
 _none = np.zeros((0, 0))
 load_flight = loader(
-    Flight(FlightNumbers(), *np.zeros((3, 0)), _none, *np.zeros((2, 0)), _none, np.zeros(0), _none, np.zeros(0), _none)
+    Flight(
+        FlightNumbers(),
+        np.zeros((0, 0), int),
+        *np.zeros((3, 0)),
+        _none,
+        *np.zeros((2, 0)),
+        _none,
+        np.zeros(0),
+        _none,
+        np.zeros(0),
+        _none,
+    )
 )
-
-
-@kernel
-def _end_step(r, log, t, t0, state):
-    """As `Watch._end`."""
-    numbers, n = r.numbers, r.now.shape[1]
-    for j in range(r.joints.shape[0]):
-        r.remembered[j] = angle_after(r, j, state[0], state[1], t - r.clock.t)
-    r.clock.t = t
-    for j in range(3):
-        copy(state[j], r.now[j])
-    if log.t_eval.size > 0:
-        while numbers.rows > 0 and log.out[numbers.rows - 1, 0] > t:
-            numbers.rows -= 1
-    elif t > t0:
-        row = log.out[numbers.rows - 1]
-        row[0] = t
-        for j in range(3):
-            copy(state[j], row[1 + j * n : 1 + (j + 1) * n])
-        copy(r.remembered, row[1 + 3 * n :])
-    else:
-        numbers.rows -= 1
-    if numbers.dense == STORED:
-        log.blocks[numbers.blocks - 1, B_END] = t
 
 
 @kernel
@@ -161,28 +149,40 @@ def fly(flight, log, most):
     """
     f = load_flight(flight)
     n = f.numbers
-    r, s, at = load_run(n.run), load_search(n.search), seen(log)
-    status, stiff = SLICE_DONE, r.numbers.stiff
+    r, at = load_run(n.run), seen(log)
+    status, stiff, angles = SLICE_DONE, r.numbers.stiff, r.joints.shape[0]
     n.impacts, n.used, n.ended = 0, 0, 0
     while n.used < most:
         for j in range(3):
             copy(r.now[j], f.before[j])
         copy(r.remembered, f.remembered)
-        copy(r.remembered[: s.near.size], s.near)
         n.t0, steps = r.clock.t, r.numbers.steps
         n.used += 1
         status = call_driver(n.driver, n.context, n.run, at, 1)
         if r.numbers.steps > steps:
-            s.numbers.t0, s.numbers.t1 = n.t0, r.clock.t
             arrays = StepArrays(f.before, r.now, r.block, log.charts, log.points)
-            found = call_find(s.numbers.finder, n.search, n.reader, n.read_run, n.rows, n.own, seen(arrays))
+            found = CLEAR
+            for k in range(f.searches.shape[0]):
+                s = load_search(f.searches[k, 0])
+                copy(f.remembered[: s.near.size], s.near)
+                copy(r.remembered[angles : angles + s.memory.size], s.memory)
+                s.numbers.t0, s.numbers.t1, s.numbers.new = n.t0, r.clock.t, n.new
+                given = n.reader, n.read_run, f.searches[k, 1], f.searches[k, 2]
+                found = call_find(s.numbers.finder, f.searches[k, 0], *given, seen(arrays))
+                if found != CLEAR:
+                    break
+            s = load_search(f.searches[0, 0])
             if found == CLEAR:
+                for k in range(f.searches.shape[0]):
+                    take_step(load_search(f.searches[k, 0]))
                 n.new = 0
-            elif found != FOUND or not _strike(f, r, s, s.which[s.numbers.found], s.numbers.t):
+            elif found != FOUND or n.bounces == 0 or not _strike(f, r, s, s.which[s.numbers.found], s.numbers.t):
                 n.ended = UNSEARCHED
                 return status
             else:
-                _end_step(r, log, s.numbers.t, n.t0, s.state)
+                for j in range(angles):
+                    r.remembered[j] = angle_after(r, j, s.state[0], s.state[1], s.numbers.t - r.clock.t)
+                end_step(r, log, s.numbers.t, n.t0, s.state)
                 copy(f.struck[3], r.now[1])
                 copy(r.remembered, f.noted)
                 if n.used >= most and log.t_eval.size == 0:  # there is no room for its output
@@ -202,51 +202,55 @@ def fly(flight, log, most):
     return status
 
 
-KERNELS = fly, begin_again
+KERNELS = fly, begin_again, end_run
 
 
 class Flights:
-    """The flights of a run of one phase.
+    """The steps of a run of one phase.
 
     Parameters
     ----------
     contacts : _ContactRun
-        All gaps that are able to close are open.
-    group : Group
-        Their events.
+    groups : list of Group
+        The events of its units.
     memory : Memory
     reader : Reader
+    bounces : bool
+        Whether impacts are made: there is one group, of gaps.
     """
 
-    def __init__(self, contacts, group, memory, reader):
-        kernel, gaps, length = group.kernel, contacts.gaps, contacts.length
+    def __init__(self, contacts, groups, memory, reader, bounces):
+        gaps, length, searches = contacts.gaps, contacts.length, [group.kernel for group in groups]
         workspace = gaps.workspace
         restitution = np.where(gaps.rough, 0.0, gaps.restitution)
         now, count = memory.run.now, EVENTS_JUDGED * (1 + gaps.count)
-        (rows, own), where = kernel.contexts, memory.where
-        kernel.numbers.reader, context, run = reader.where
+        for search in searches:
+            search.numbers.reader, context, run = reader.where
+        again = memory.restart[0], workspace.impact[1]
         self.numbers = FlightNumbers(
-            memory.driver.address, *where, memory.restart[0], kernel.address, context, run, rows, own,
-            workspace.address, workspace.impact[1], length,
+            memory.driver.address, *memory.where, again[0], context, run, int(bounces), *searches[0].contexts,
+            workspace.address, again[1], length,
         )  # fmt: skip
+        addresses = np.array([[search.address, *search.contexts] for search in searches], int)
+        least = groups[0].least
         self.parts = Flight(
-            self.numbers, gaps.sign, restitution, gaps.lengths(length), np.empty((gaps.count, 2)), group.least,
+            self.numbers, addresses, gaps.sign, restitution, gaps.lengths(length), np.empty((gaps.count, 2)), least,
             np.zeros(workspace.m), np.zeros(now.shape), memory.run.remembered.copy(), np.zeros((4, now.shape[1])),
             memory.run.remembered.copy(), np.zeros((count, ROW)),
         )  # fmt: skip
-        self.contacts, self.group, (self._at, *self._keep) = contacts, group, resident(self.parts)
+        self.contacts, self.groups, (self._at, *self._keep) = contacts, groups, resident(self.parts)
 
     @staticmethod
-    def serve(memory, group):
-        """Whether Python has nothing to do in the steps of a memory, but for impacts."""
-        if DEBUG or group.kernel is None or not memory.begins_again or "advance" in vars(memory):
+    def serve(memory, groups):
+        """Whether Python has nothing to do in the steps of a memory, but for the ends of phases."""
+        if DEBUG or any(group.kernel is None for group in groups) or "advance" in vars(memory):
             return False
         return memory.weight < LONG_STEPS and not memory.calls_laws
 
     def advance(self, log, most):
         """As `Memory.advance`; `most` rows of the log."""
-        numbers, group, contacts = self.numbers, self.group, self.contacts
-        numbers.last, numbers.new, workspace = contacts.t, group.is_new, contacts.gaps.workspace
+        numbers, groups, contacts = self.numbers, self.groups, self.contacts
+        numbers.last, numbers.new, workspace = contacts.t, groups[0].is_new, contacts.gaps.workspace
         hits, known = self.parts.hits, contacts.hits
         hits.fill(np.inf)
         hits[list(known)] = list(known.values()) or np.empty((0, 2))
@@ -254,7 +258,8 @@ class Flights:
         numbers.contacts = workspace.address
         numbers.most = len(self.parts.impacts) - contacts.judged[1] - 1  # at the next one progress is judged
         status = STATUSES[fly(self._at, log, most)]
-        group.is_new = bool(numbers.new)
+        for group in groups:
+            group.is_new = bool(numbers.new)
         return status
 
     def impacts(self):

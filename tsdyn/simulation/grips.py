@@ -1,21 +1,17 @@
-"""Contacts with friction in the phases of a run: rows and laws of those that stick and slide, events, multipliers."""
-
-from functools import cached_property
+"""Contacts with friction in the phases of a run: rows and laws of those that stick and slide, multipliers."""
 
 import numpy as np
 
 from ..analyses.contact_friction import spread
 from ..analyses.contact_problem import slip_rows
-from ..analyses.contact_rows import reaction_workspace
 from ..analyses.tolerances import EVENT_ERROR, LEAST_SLIP
 from ..elements.bodies import rotation_matrix
 from ..elements.friction import heading
 from ..jit.kernels import twin
-from ..maths.tolerances import TINY
 from ..model.handles import index_of
 from ..observables.reactions import balancing
 from .phase_scenes import first_row_of
-from .tolerances import FASTER, SAME_WAY, SLOW, TURNED
+from .tolerances import SAME_WAY
 
 # A closed contact with friction sticks or slides. Where it sticks, all its rows hold; those of the slip of a point are
 # rows on positions, which hold it where it came to rest. Where it slides, the row of the gap holds, and a force in
@@ -80,50 +76,13 @@ def stopping_time(inertia, which, qd, after, qdd, slow):
     return float((squares[ended] / against[ended]).max(initial=0.0))
 
 
-class Reactions:
-    """Reactions of closed contacts, and what is left to the bounds of those that stick, as event functions.
-
-    Parameters
-    ----------
-    gaps : Gaps
-    modes : UnitModes
-    packed : Packed
-        Of the phase.
-    """
-
-    def __init__(self, gaps, modes, packed):
-        self.gaps, self.packed, self.closed = gaps, packed, modes.closed
-        self.sticks = [i for i in modes.closed if modes.sticks(i)]
-        first = first_row_of(packed)
-        self.normal = [first[id(_gap_row(gaps, modes, i))] for i in self.closed]
-        self.slip = np.array([_slip_columns(gaps.list[i].contact, first) for i in self.sticks], int).reshape(-1, 2)
-        self.which = [self.closed.index(i) for i in self.sticks]
-        self.slack = np.array([modes.slack.get(i, 0.0) for i in modes.closed])
-
-    @cached_property
-    def workspace(self):
-        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
-        return reaction_workspace(self.packed, np.nan)
-
-    def over(self, states):
-        """Values (k, closed and sticking) of states at k times."""
-        lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
-        N = -self.gaps.sign[self.closed] * lam[:, self.normal]
-        held = N[:, self.which]
-        T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
-        memory = np.tile(states.memory, (states.t.size, 1))
-        T = carried(self.gaps, self.sticks, states.t, states.q, memory, held, T)
-        N = N + self.slack
-        return np.hstack([N, self.gaps.static[self.sticks] * N[:, self.which] - np.hypot(*np.moveaxis(T, 2, 0))])
-
-
-def _gap_row(gaps, modes, i):
+def gap_row(gaps, modes, i):
     """The primitive whose first row is the gap of a closed contact in a phase."""
     gap = gaps.list[i]
     return gap.side.grip.gap if modes.slides(i) else gap.side.row
 
 
-def _slip_columns(contact, first):
+def slip_columns(contact, first):
     """The rows (2,) of the slip of a contact that sticks, -1 of one that depends on others."""
     if len(contact.parts) == 1:
         return slip_rows(contact, first)
@@ -138,60 +97,6 @@ def carried(gaps, which, t, q, memory, N, T):
         responses = np.array([gaps.responses(t[k], q[k], memory[k], which) for k in np.flatnonzero(rows)])
         T[rows] = spread(gaps.static[which] * N[rows], responses, T[rows])
     return T
-
-
-class Halting:
-    """Slips of contacts, as event functions: d.v - c v, zero where one ends or turns.
-
-        c = 1/2 + w h,  w = V / (v + V),  h = u^2 / (u^2 + (TURNED v)^2 + noise^2),  u^2 = v^2 - (d.v)^2
-
-    Here d is of unit length, and V is SLOW times the slip below which friction has this direction. A slip turns by 60
-    degrees at v >> V; where it has turned at all when it is as slow as V, it takes its direction there, so that it ends
-    with its own. One that hasn't been FASTER V since its phase began has h = 0.49, and turns by 8 degrees at v << V: it
-    begins, or has its direction from there. Where it begins at rest, the value is divided by the time since: the slip
-    may turn at once.
-
-    Parameters
-    ----------
-    gaps : Gaps
-    slides : list of int
-        Those that slide.
-    rounding : ndarray (slides,), m/s
-        Of the slips: of one that others hold, nothing else is left.
-    begun : dict
-        Of those that begin at rest: time and acceleration there, by the numbers of gaps.
-    since : dict of int to float
-        Times, s, since when slips have been faster, by the numbers of gaps: found with the values.
-
-    Attributes
-    ----------
-    noise : ndarray (slides,)
-        Rounding of the values.
-    """
-
-    def __init__(self, gaps, slides, rounding, begun, since):
-        self.gaps, self.slides, self.rounding, self.since = gaps, slides, rounding, since
-        self.begun = [(k, *begun[i]) for k, i in enumerate(slides) if i in begun]
-        self.noise = np.where([i in begun for i in slides], 0.0, rounding)
-        self.ways = gaps.slots[slides][:, None] + np.arange(3)
-
-    def over(self, states):
-        """Values (k, slides) of states at k times."""
-        ways = states.memory[self.ways]
-        slow = np.maximum(np.linalg.norm(ways, axis=1), TINY)
-        along, speed = self.gaps.slips(states.t, states.levels, self.slides, ways / slow[:, None])
-        V = SLOW * slow
-        for i, fast in zip(self.slides, (speed > FASTER * V).T, strict=True):
-            if fast.any():
-                self.since.setdefault(i, float(states.t[fast.argmax()]))
-        late = states.t[:, None] > [self.since.get(i, np.inf) for i in self.slides]
-        turned = (speed - along) * (speed + along)
-        h = np.where(late, turned / (turned + (TURNED * speed) ** 2 + self.rounding**2 + TINY), 0.49)
-        values = along - (0.5 + h * V / (speed + V)) * speed
-        for k, begun, gain in self.begun:
-            later = states.t > begun
-            values[:, k] = np.where(later, values[:, k] / np.where(later, states.t - begun, 1.0), 0.01 * gain)
-        return values
 
 
 def losses(gaps, which, lam, t, q, qd):
@@ -210,7 +115,7 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
     if not frictional:
         return
     first = first_row_of(packed)
-    N = np.array([-gaps.sign[i] * lam[:, first[id(_gap_row(gaps, modes, i))]] for i in frictional]).T
+    N = np.array([-gaps.sign[i] * lam[:, first[id(gap_row(gaps, modes, i))]] for i in frictional]).T
     tangents = np.array([gaps.slopes(*pair, frictional) for pair in zip(t, q, strict=True)])  # (k, c, 2, n)
     rows = gaps.slip_rows[frictional]
     sticks = [j for j, i in enumerate(frictional) if modes.sticks(i)]
@@ -225,7 +130,7 @@ def add_friction(gaps, modes, packed, shared, t, q, qd, memory, lam, out):
             f = np.einsum("kci,kcin->kn", np.where(redundant, T, 0.0), tangents[:, sticks])
             change = balancing(packed, t, q, f, memory[:, : packed.system.memory.size])
             # Near singular states that would take other normal loads: rows that hold carry the friction alone
-            pushing = [first[id(_gap_row(gaps, modes, i))] for i in frictional]
+            pushing = [first[id(gap_row(gaps, modes, i))] for i in frictional]
             moves = np.abs(change[:, pushing]).max(axis=1) > EVENT_ERROR * np.abs(N).max(axis=1)
             change[moves], T[moves] = 0.0, alone[moves]
             out[:, shared[0]] += change[:, shared[1]]

@@ -1,4 +1,4 @@
-"""What ends a phase of a run, as event functions: gaps and reactions of contacts, holds and slips of frictions."""
+"""What ends a phase of a run, as event functions: gaps of contacts, holds and slips of frictions."""
 
 from functools import cached_property
 
@@ -38,7 +38,7 @@ class Closing:
         """The `GroupSearch.kernel` of the gaps; None where Python evaluates some: of ratchets, and those lifted."""
         if self.gaps.following or self.lifted:
             return None
-        return find_open_gaps, self.gaps.workspace.rows_address, self._own, self.counts.rows
+        return find_open_gaps, self.gaps.workspace.rows_address, self._own, self.counts.rows, np.zeros(0)
 
     def open(self, opened):
         """Take other contacts that have just opened."""
@@ -57,34 +57,6 @@ class Closing:
         if self.lifted:
             values[:, self.lifted] = self.gaps.rates(states.t, states.q, states.qd, self.lifted)
         return values
-
-
-class Leaving:
-    """The reactions of closed contacts, positive where they push, and their slack, as event functions.
-
-    Parameters
-    ----------
-    packed : Packed
-        Of the phase.
-    rows : list of int
-    signs : list of float
-        Of the gaps over Phi.
-    slack : list of float
-        What a reaction may fall below zero.
-    """
-
-    def __init__(self, packed, rows, signs, slack):
-        self.packed, self.rows, self.signs, self.slack = packed, rows, np.array(signs), np.array(slack)
-
-    @cached_property
-    def workspace(self):
-        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
-        return reaction_workspace(self.packed)
-
-    def over(self, states):
-        """Values (k, closed) of `States`."""
-        lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
-        return self.slack - self.signs * lam[:, self.rows]
 
 
 class Breaking:
@@ -116,7 +88,7 @@ class Breaking:
 
     @cached_property
     def workspace(self):
-        """Made at the first evaluation, as of `Leaving`."""
+        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
         return reaction_workspace(self.packed)
 
     def over(self, states):

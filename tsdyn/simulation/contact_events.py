@@ -1,0 +1,272 @@
+"""Reactions and slips of closed contacts as event functions, which kernels evaluate."""
+
+import math
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..analyses.contact_rows import load_rows, reaction_workspace, write_multipliers, write_rows
+from ..jit.kernels import Record, callback, kernel, loader, matrix, resident, vector
+from ..maths.tolerances import TINY
+from ..model.equations import recall
+from ..model.laws import calls_laws
+from ..runs.group_search import VALUES, KernelFunctions
+from ..workspaces import load_parts
+from .grips import carried, gap_row, slip_columns
+from .phase_scenes import first_row_of
+from .tolerances import FASTER, SLOW, STRAIGHT, TURNED
+
+# Reactions
+
+
+class ReactionNumbers(Record):
+    """What stands at redundant rows."""
+
+    redundant: float
+
+
+class ReactionParts(NamedTuple):
+    """Reactions of closed contacts, and bounds of those that stick."""
+
+    numbers: ReactionNumbers
+    memory: np.ndarray  # what forces remember
+    normal: np.ndarray  # int64 (closed,)  rows of the gaps,
+    sign: np.ndarray  # (closed,)  and their signs over Phi
+    slack: np.ndarray  # (closed,)
+    which: np.ndarray  # int64 (sticking,)  which of the closed stick
+    slip: np.ndarray  # int64 (2 sticking,)  rows of their slips; -1 of one that depends on others
+    static: np.ndarray  # (sticking,)
+    lam: np.ndarray  # (m,)  scratch
+
+
+_none, _whole = np.zeros(0), np.zeros(0, int)
+load_reactions = loader(ReactionParts(ReactionNumbers(), _none, _whole, _none, _none, _whole, _whole, _none, _none))
+
+
+@callback(VALUES)
+def find_unit_reactions(parts, own, t, state, out, t0, before, near):  # eight: VALUES
+    """out (closed and sticking,): N + slack, then mu (N + slack) - |T|; NaN where T isn't unique."""
+    c, x = load_parts(parts), load_reactions(own)
+    closed, sticking, lam = x.normal.size, x.which.size, x.lam
+    values = vector(out, closed + sticking)
+    recall(c.system, x.memory)
+    write_multipliers(c, t, vector(state, 3 * c.work.q.size), x.numbers.redundant, lam)
+    for i in range(closed):
+        values[i] = x.slack[i] - x.sign[i] * lam[x.normal[i]]
+    for k in range(sticking):
+        i, j = x.slip[2 * k], x.slip[2 * k + 1]
+        T = math.hypot(lam[i], lam[j]) if i >= 0 and j >= 0 else math.nan
+        values[closed + k] = x.static[k] * values[x.which[k]] - T
+    return 0
+
+
+class Reactions(KernelFunctions):
+    """Reactions of closed contacts, positive where they push, and their slack, which they may fall below zero.
+
+    Then what is left to the bounds of those that stick.
+
+    Parameters
+    ----------
+    gaps : Gaps
+    modes : UnitModes
+    packed : Packed
+        Of the phase.
+    """
+
+    def __init__(self, gaps, modes, packed):
+        self.gaps, self.packed, self.closed = gaps, packed, modes.closed
+        self.sticks = [i for i in modes.closed if modes.sticks(i)]
+        first, rough = first_row_of(packed), bool(modes.grips)
+        self.normal = np.array([first[id(gap_row(gaps, modes, i))] for i in self.closed], int)
+        self.slip = np.array([slip_columns(gaps.list[i].contact, first) for i in self.sticks], int).reshape(-1, 2)
+        self.which = np.array([self.closed.index(i) for i in self.sticks], int)
+        self.slack = np.array([modes.slack.get(i, 0.0) for i in modes.closed])
+        # Rows of gaps that are redundant have no reaction; where there is friction they have an unknown one
+        self.redundant = np.nan if rough else 0.0
+
+    @cached_property
+    def workspace(self):
+        """Made at the first evaluation: the start of the phase may show that rows are redundant."""
+        return reaction_workspace(self.packed, self.redundant)
+
+    @cached_property
+    def kernel(self):
+        """As of `GroupSearch`; None where Python evaluates them, since laws are called or loads depend on reactions."""
+        if self.workspace.count or calls_laws(self.packed):
+            return None
+        memory, scratch = np.zeros(self.packed.system.memory.size), np.zeros(self.workspace.m)
+        own, *self._keep = resident(
+            ReactionParts(
+                ReactionNumbers(redundant=self.redundant), memory, self.normal, self.gaps.sign[self.closed], self.slack,
+                self.which, self.slip.ravel(), self.gaps.static[self.sticks], scratch,
+            )
+        )  # fmt: skip
+        count = len(self.closed) + len(self.sticks)
+        return find_unit_reactions, self.workspace.address, own, count, memory
+
+    def over(self, states):
+        """Values (k, closed and sticking) of `States`."""
+        if self.kernel is not None:
+            values = super().over(states)
+            if not np.isnan(values).any():
+                return values
+        lam, _ = self.workspace.multipliers(states.t, states.levels, states.memory)
+        N = -self.gaps.sign[self.closed] * lam[:, self.normal]
+        held = N[:, self.which]
+        T = np.where(self.slip < 0, np.nan, -lam[:, self.slip])
+        memory = np.tile(states.memory, (states.t.size, 1))
+        T = carried(self.gaps, self.sticks, states.t, states.q, memory, held, T)
+        N = N + self.slack
+        return np.hstack([N, self.gaps.static[self.sticks] * N[:, self.which] - np.hypot(*np.moveaxis(T, 2, 0))])
+
+
+# Slips
+
+
+class SlipNumbers(Record):
+    """Numbers of coordinates."""
+
+    n: int
+
+
+class SlipParts(NamedTuple):
+    """Slips of contacts that slide, c of them."""
+
+    numbers: SlipNumbers
+    memory: np.ndarray  # what forces remember
+    ways: np.ndarray  # int64 (c,)  where it has the directions (3,), of the length of a slow slip
+    at: np.ndarray  # int64 (c,)  where directions of the ground frame begin in the rows,
+    sign: np.ndarray  # (c,)  and their signs
+    place: np.ndarray  # int64 (m,)  which row of J is that of a contact, -1 for none
+    short: np.ndarray  # (lines, 14)  scratch for rows
+    J: np.ndarray  # (2 c, n)
+    drift: np.ndarray  # (m,)
+    rounding: np.ndarray  # (c,)
+    since: np.ndarray  # (c,)  when slips have become fast, s; infinite before
+    begun: np.ndarray  # (2, c)  time and acceleration of those that begin at rest; without acceleration others
+
+
+load_slips = loader(
+    SlipParts(
+        SlipNumbers(), _none, _whole, _whole, _none, _whole, np.zeros((0, 0)), np.zeros((0, 0)), *np.zeros((3, 0)),
+        np.zeros((0, 0)),
+    )
+)  # fmt: skip
+
+
+@kernel
+def _slip(x, i, state, d):
+    """Component of slip i along a direction d, ground frame, of any length, and its size, by the rows in J."""
+    along, square = 0.0, 0.0
+    for r in range(2 * i, 2 * i + 2):
+        v, w = 0.0, 0.0
+        for j in range(x.numbers.n):
+            v += x.J[r, j] * state[1, j]
+        for j in range(3):
+            w += x.J[r, x.at[i] + j] * d[j]
+        along += v * w
+        square += v * v
+    return x.sign[i] * along, math.sqrt(square)
+
+
+@kernel
+def _find_rows(s, x, t, state):
+    x.J[:, :] = 0.0
+    write_rows(s, t, state[0], x.place, x.short, x.J, x.drift)
+
+
+@callback(VALUES)
+def find_unit_slips(contacts, own, t, state, out, t0, before, near):  # eight: VALUES
+    """out (c,): as of `Halting`."""
+    s, x = load_rows(contacts), load_slips(own)
+    n, count = x.numbers.n, x.at.size
+    values, now, first = vector(out, count), matrix(state, 3, n), matrix(before, 3, n)
+    slow = False
+    for i in range(count):
+        slow = slow or x.since[i] == math.inf
+    if slow:
+        _find_rows(s, x, t0, first)
+        for i in range(count):
+            d = x.memory[x.ways[i] : x.ways[i] + 3]
+            least = max(math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), TINY)
+            if x.since[i] == math.inf and _slip(x, i, first, d)[1] > FASTER * SLOW * least:
+                x.since[i] = t0
+    _find_rows(s, x, t, now)
+    for i in range(count):
+        d = x.memory[x.ways[i] : x.ways[i] + 3]
+        least = max(math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), TINY)
+        along, v = _slip(x, i, now, d)
+        u, V = along / least, SLOW * least
+        turned, h = max((v - u) * (v + u) - STRAIGHT * v * v, 0.0), _BEGINS
+        bound = (TURNED * v) * (TURNED * v) + x.rounding[i] * x.rounding[i]
+        if x.since[i] < math.inf:
+            h = turned / (turned + bound + TINY)
+        c = 0.5 + h * V / (v + V)
+        value = u - c * v
+        if u > 0.0 or (u < 0.0 and turned <= bound):
+            value *= 1.0 + c * v / u
+        begun, gain = x.begun[0, i], x.begun[1, i]
+        if gain > 0.0:
+            value = value / (t - begun) if t > begun else _LEAST * gain
+        values[i] = value
+    return 0
+
+
+_BEGINS = 0.49  # h of slips that begin
+_LEAST = 1.0 - (0.5 + _BEGINS) ** 2  # and the least value, over their size
+
+
+class Halting(KernelFunctions):
+    """Slips v of contacts, as event functions: u - c^2 v^2 / u, with u = d.v, zero where one ends or turns.
+
+        c = 1/2 + w h,  w = V / (|v| + V),  h = z / (z + (TURNED v)^2 + noise^2),  z = v^2 - u^2
+
+    Here d is of unit length, and V is SLOW times the slip below which friction has this direction. A slip turns by 60
+    degrees at v >> V; where it has turned at all when it is as slow as V, it takes its direction there, so that it ends
+    with its own. One that hasn't been FASTER V since its phase began, at the start of a step, has h = 0.49, and turns
+    by 8 degrees at v << V: it begins, or has its direction from there. Where it begins at rest, the value is divided by
+    the time since: the slip may turn at once. The value is 3/4 u where a slip ends straight, and smooth there; where
+    u < 0 otherwise, beyond the pole, it is u - c v.
+
+    Parameters
+    ----------
+    gaps : Gaps
+    slides : list of int
+        Those that slide.
+    rounding : ndarray (slides,), m/s
+        Of the slips: of one that others hold, nothing else is left.
+    begun : dict
+        Of those that begin at rest: time and acceleration there, by the numbers of gaps.
+    fast : dict of int to float
+        Times, s, since when slips have been faster, by the numbers of gaps: found with the values.
+
+    Attributes
+    ----------
+    noise : ndarray (slides,)
+        Rounding of the values.
+    """
+
+    def __init__(self, gaps, slides, rounding, begun, fast):
+        workspace, (rows, at, sign) = gaps.workspace, gaps.slips(slides)
+        self.slides, self.since = slides, np.array([fast.get(i, np.inf) for i in slides], float)
+        self.noise = np.where([i in begun for i in slides], 0.0, rounding)
+        place, memory = np.full(workspace.m, -1), np.zeros(gaps.packed.system.memory.size)
+        place[rows.ravel()] = np.arange(rows.size)
+        starts = np.array([begun.get(i, (0.0, 0.0)) for i in slides], float).reshape(-1, 2).T
+        own, *self._keep = resident(
+            SlipParts(
+                SlipNumbers(n=workspace.n), memory, gaps.slots[slides], at, sign, place, workspace.short,
+                np.zeros((rows.size, workspace.n)), np.zeros(workspace.m), rounding, self.since,
+                np.ascontiguousarray(starts),
+            )
+        )  # fmt: skip
+        self.kernel = find_unit_slips, workspace.rows_address, own, len(slides), memory
+
+    @property
+    def fast(self):
+        """Times, s, since when slips have been fast, by the numbers of gaps."""
+        return {i: t for i, t in zip(self.slides, self.since.tolist(), strict=True) if t < np.inf}
+
+
+KERNELS = find_unit_reactions, find_unit_slips
